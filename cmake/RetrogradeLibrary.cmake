@@ -54,7 +54,8 @@ install(FILES ${CMAKE_BINARY_DIR}/retrogradeConfig.cmake DESTINATION ${package_d
 install(FILES ${CMAKE_BINARY_DIR}/retrogradeConfigVersion.cmake DESTINATION ${package_dir}
   RENAME retrograde-config-version.cmake)
 
-install(FILES ${PROJECT_SOURCE_DIR}/cmake/RetrogradeGenerators.cmake DESTINATION ${package_dir})
+install(FILES ${PROJECT_SOURCE_DIR}/cmake/RetrogradeGenerators.cmake
+  ${PROJECT_SOURCE_DIR}/cmake/RetrogradeTorch.cmake DESTINATION ${package_dir})
 
 # find_package(Halide) for projects written for Halide 14.
 set(halide_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/Halide)

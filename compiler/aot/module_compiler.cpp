@@ -10,6 +10,7 @@
 #include "aot/mangle.h"
 #include "aot/merge_objects.h"
 #include "aot/program.h"
+#include "aot/pytorch_wrapper.h"
 #include "aot/runtime_object.h"
 #include "autoschedule/choose_schedule.h"
 #include "codegen/archive.h"
@@ -41,7 +42,6 @@ void check_type(OutputFileType type, const std::string& module) {
   switch (type) {
     case OutputFileType::c_source:
     case OutputFileType::python_extension:
-    case OutputFileType::pytorch_wrapper:
     case OutputFileType::featurization:
     case OutputFileType::compiler_log:
       unsupported(asked,
@@ -143,6 +143,8 @@ class Outputs {
         return aot::header_text(module_.name(), module_.target(), declared_functions(module_));
       case OutputFileType::registration:
         return aot::registration_text(declared_functions(module_), module_.target());
+      case OutputFileType::pytorch_wrapper:
+        return aot::pytorch_wrapper_text(module_.name(), declared_functions(module_));
       default:
         internal_error("no writer for an output that was checked");
     }
@@ -240,6 +242,7 @@ class MultitargetOutputs {
       return aot::header_text(name_, baseline().target(), functions);
     if (type == OutputFileType::registration)
       return aot::registration_text(functions, baseline().target());
+    if (type == OutputFileType::pytorch_wrapper) return aot::pytorch_wrapper_text(name_, functions);
     RETROGRADE_ASSERT(type == OutputFileType::static_library, "an output without a writer");
     std::vector<codegen::Member> members = members_;
     members.push_back({aot::name_parts(name_).back() + "_wrapper.o", wrapper_object()});

@@ -123,6 +123,19 @@ TEST_F(AotErrors, SourceCodeInC) {
   EXPECT_TRUE(is_empty());
 }
 
+TEST_F(AotErrors, WrappersForPyTorchOfWhatItHasNot) {
+  Func wide("wide");
+  wide(x) = cast<uint16_t>(x);
+  expect_error<Unsupported>({"tensors and numbers that PyTorch has", "\"wide\" holds uint16"}, [&] {
+    wide.compile_to({{OutputFileType::pytorch_wrapper, path("a")}}, {}, "a", host);
+  });
+  expect_error<Unsupported>({"the function has a name of C", "n::a"}, [&] {
+    f.compile_to({{OutputFileType::pytorch_wrapper, path("a")}}, {in, gain}, "n::a",
+                 host.with_feature(Target::CPlusPlusMangling));
+  });
+  EXPECT_TRUE(is_empty());
+}
+
 TEST_F(AotErrors, OutputsThatOnlyGeneratorsHave) {
   expect_error<Unsupported>({"cpp_stub", "only generators"}, [&] {
     f.compile_to({{OutputFileType::cpp_stub, path("a")}}, {in, gain}, "a", host);

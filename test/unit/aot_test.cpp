@@ -136,6 +136,18 @@ TEST_F(AotFiles, HeaderIsReadByCAndByCpp) {
       << read_file(path("log"));
 }
 
+// What it does with tensors: test/install/torch_op.
+TEST_F(AotFiles, WrapperForPyTorchTakesTensorsAndNumbers) {
+  out.compile_to({{OutputFileType::pytorch_wrapper, path("a.pytorch.h")}}, {in, gain}, "brighter");
+  const std::string text = read_file(path("a.pytorch.h"));
+  EXPECT_TRUE(
+      has(text, "int brighter_th_(const at::Tensor& in, double gain, at::Tensor& brighter)"))
+      << text;
+  EXPECT_TRUE(has(text, "static_cast<float>(gain)"));
+  EXPECT_TRUE(has(text, "halide_type_t(halide_type_uint, 8), at::kByte"));
+  EXPECT_TRUE(has(text, "(Tensor in, float gain) -> Tensor"));
+}
+
 TEST_F(AotFiles, SeveralTargetsAsObjects) {
   const Target base("x86-64-linux-no_runtime");
   out.compile_to_multitarget_object_files(

@@ -31,7 +31,7 @@ enum class OutputFileType {
   llvm_assembly,
   object,
   python_extension,  // Unsupported
-  pytorch_wrapper,   // Unsupported
+  pytorch_wrapper,   // C++ that calls the functions on tensors; see aot/pytorch_wrapper.h
   registration,      // C++ that hands name_argv and name_metadata to the program
   schedule,          // Unsupported in Module::compile: generators write it
   static_library,
@@ -92,7 +92,9 @@ class Module {
   // Requires: an output file's folder must exist and be writable; a module is compiled to machine
   // code, LLVM's formats, statements and headers (Unsupported); only generators have stubs and
   // schedules (Unsupported); functions of a module and its submodules have different names; a
-  // module and its submodules are made for one target (Unsupported).
+  // module and its submodules are made for one target (Unsupported); of what has a wrapper for
+  // PyTorch its arguments are tensors and numbers that PyTorch has (Unsupported), and the function
+  // has a name of C (Unsupported).
   void compile(const std::map<OutputFileType, std::string>& output_files) const;
   // The object file.
   Buffer<uint8_t> compile_to_buffer() const;

@@ -1,0 +1,214 @@
+// pytorch_text.cpp -- see pytorch_text.h.
+#include "aot/pytorch_text.h"
+
+namespace retrograde::aot {
+
+const char* const pytorch_operator_text = R"(
+#ifdef RETROGRADE_TORCH_OP
+#include <torch/library.h>
+#include <torch/csrc/autograd/custom_function.h>
+#include <ATen/core/dispatch/Dispatcher.h>
+
+// The operator RETROGRADE_TORCH_NAMESPACE::RETROGRADE_TORCH_OP. The program also defines
+//   RETROGRADE_TORCH_SHAPE_<output>   the sizes of an output, as in: image.sym_size(0), image.sym_size(1) - 2;
+//                                     those of the first image with as many dimensions where it does not
+//   RETROGRADE_TORCH_GRADIENT         the wrapper of the gradient's function, whose header it has included
+namespace retrograde_torch {
+namespace RETROGRADE_TORCH_OP {
+
+constexpr const char* name =
+    RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_NAMESPACE) "::" RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP);
+using Results = $results$;
+$shapes$
+inline Results made($parameters$) {
+  return Results($empties$);
+}
+
+inline Results run($parameters$) {
+$empty_variables$  succeed(name, $function$_th_($arguments$, $outputs$));
+  return Results($outputs$);
+}
+
+inline Results call($parameters$) {
+  static const auto found = c10::Dispatcher::singleton().findSchemaOrThrow(name, "").typed<Results($types$)>();
+  return found.call($arguments$);
+}
+
+inline bool is_differentiated($parameters$) {
+  return at::GradMode::is_enabled() && ($any_requires_grad$);
+}
+
+#ifdef RETROGRADE_TORCH_GRADIENT
+using Gradients = $gradients$;
+constexpr const char* backward_name =
+    RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_NAMESPACE) "::" RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward";
+
+inline Gradients backward_made($backward_parameters$) {
+  return Gradients($gradient_empties$);
+}
+
+inline Gradients backward_run($backward_parameters$) {
+$gradient_variables$  succeed(backward_name, RETROGRADE_TORCH_GRADIENT($arguments$, $seeds$, $gradient_outputs$));
+  return Gradients($gradient_sums$);
+}
+
+inline Gradients backward_call($backward_parameters$) {
+  static const auto found =
+      c10::Dispatcher::singleton().findSchemaOrThrow(backward_name, "").typed<Gradients($backward_types$)>();
+  return found.call($arguments$, $seeds$);
+}
+
+struct OnlyOnce : torch::autograd::Function<OnlyOnce> {
+  static std::vector<at::Tensor> forward(torch::autograd::AutogradContext*, $backward_parameters$) {
+    at::AutoDispatchBelowADInplaceOrView below;
+    return tensors_of(backward_call($arguments$, $seeds$));
+  }
+  static torch::autograd::variable_list backward(torch::autograd::AutogradContext*, torch::autograd::variable_list) {
+    refuse_derivative(name, "its gradient was compiled, and no second derivative");
+    return {};
+  }
+};
+
+inline Gradients backward_autograd($backward_parameters$) {
+  if (at::GradMode::is_enabled() && ($any_requires_grad$ || $any_seed_requires_grad$)) {
+    const auto results = OnlyOnce::apply($arguments$, $seeds$);
+    return $results_of_only_once$;
+  }
+  at::AutoDispatchBelowADInplaceOrView below;
+  return backward_call($arguments$, $seeds$);
+}
+#endif
+
+struct Function : torch::autograd::Function<Function> {
+  static std::vector<at::Tensor> forward(torch::autograd::AutogradContext* context, $parameters$) {
+    at::AutoDispatchBelowADInplaceOrView below;
+    context->save_for_backward({$images$});
+$save_numbers$    return tensors_of(call($arguments$));
+  }
+  static torch::autograd::variable_list backward(torch::autograd::AutogradContext* context,
+                                                 torch::autograd::variable_list seeds) {
+#ifdef RETROGRADE_TORCH_GRADIENT
+    const auto saved = context->get_saved_variables();
+    const auto results = tensors_of(backward_call($restored$, $seed_list$));
+    return {$autograd_results$};
+#else
+    refuse_derivative(name, "no gradient was compiled: it was made without GRADIENT");
+    return {};
+#endif
+  }
+};
+
+inline Results autograd($parameters$) {
+  if (is_differentiated($arguments$)) {
+    const auto results = Function::apply($arguments$);
+    return $results_of_apply$;
+  }
+  at::AutoDispatchBelowADInplaceOrView below;
+  return call($arguments$);
+}
+
+inline Results refuse_device($parameters$) { refuse_cuda(name); }
+
+TORCH_LIBRARY_FRAGMENT(RETROGRADE_TORCH_NAMESPACE, library) {
+  library.def(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "($schema$) -> $results_schema$");
+  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::CPU, TORCH_FN(run));
+  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::CUDA, TORCH_FN(refuse_device));
+  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::Meta, TORCH_FN(made));
+  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::Autograd, TORCH_FN(autograd));
+#ifdef RETROGRADE_TORCH_GRADIENT
+  library.def(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward($schema$, $seed_schema$) -> $gradients_schema$");
+  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward", c10::DispatchKey::CPU, TORCH_FN(backward_run));
+  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward", c10::DispatchKey::Meta, TORCH_FN(backward_made));
+  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward", c10::DispatchKey::Autograd,
+               TORCH_FN(backward_autograd));
+#endif
+}
+
+const bool has_error_handler = (halide_set_error_handler(note_error), true);
+
+}  // namespace RETROGRADE_TORCH_OP
+}  // namespace retrograde_torch
+#undef RETROGRADE_TORCH_OP
+#endif
+)";
+
+const char* const pytorch_helpers = R"(
+#ifndef RETROGRADE_TORCH_HELPERS
+#define RETROGRADE_TORCH_HELPERS
+#define RETROGRADE_TORCH_TEXT_OF(word) #word
+#define RETROGRADE_TORCH_TEXT(word) RETROGRADE_TORCH_TEXT_OF(word)
+
+namespace retrograde_torch {
+
+// A tensor of the CPU as a buffer, its axes in reverse; not copied, but where an input's last axis is not dense.
+template <int Rank>
+struct View {
+  View(const char* function, const char* argument, const at::Tensor& tensor, halide_type_t type,
+       at::ScalarType scalar_type, bool is_output)
+      : kept(tensor) {
+    TORCH_CHECK(tensor.device().is_cpu() && tensor.scalar_type() == scalar_type && tensor.dim() == Rank,
+                "cannot call \"", function, "\": \"", argument, "\" is a tensor of the CPU of ", scalar_type, " over ",
+                Rank, " dimensions; given is one of ", tensor.device(), " of ", tensor.scalar_type(), " with sizes ",
+                tensor.sizes(), ". Convert it with tensor.to().");
+    if (Rank > 0 && tensor.size(Rank - 1) > 1 && tensor.stride(Rank - 1) != 1) {
+      TORCH_CHECK(!is_output, "cannot call \"", function, "\": the last axis of an output is dense; \"", argument,
+                  "\" has strides ", tensor.strides(), ". Give a contiguous tensor.");
+      kept = tensor.contiguous();
+    }
+    for (int axis = 0; axis < Rank; axis++) {
+      const int64_t size = kept.size(axis), stride = kept.stride(axis);
+      TORCH_CHECK(size <= INT32_MAX && stride <= INT32_MAX, "cannot call \"", function,
+                  "\": extents and strides fit int32; \"", argument, "\" has sizes ", kept.sizes(),
+                  ". Split the tensor.");
+      dimensions[Rank - 1 - axis] = halide_dimension_t(0, static_cast<int32_t>(size), static_cast<int32_t>(stride));
+    }
+    static char nothing[64];  // without an address a buffer asks which region is needed
+    raw.host = static_cast<uint8_t*>(kept.numel() > 0 ? kept.data_ptr() : nothing);
+    raw.type = type;
+    raw.dimensions = Rank;
+    raw.dim = dimensions;
+  }
+  at::Tensor kept;
+  halide_dimension_t dimensions[Rank > 0 ? Rank : 1];
+  halide_buffer_t raw{};
+};
+
+inline void check_rank(const char* function, const char* argument, const at::Tensor& tensor, int64_t rank) {
+  TORCH_CHECK(tensor.dim() == rank, "cannot call \"", function, "\": \"", argument, "\" has ", rank,
+              " dimensions; given is one with sizes ", tensor.sizes(), ". Give a tensor of that many dimensions.");
+}
+
+inline std::string& last_error() {
+  static thread_local std::string text;
+  return text;
+}
+inline void note_error(void*, const char* text) { last_error() = text; }
+inline void succeed(const char* name, int code) {
+  if (code == 0) return;
+  std::string why;
+  why.swap(last_error());
+  if (why.empty()) why = "cannot call \"" + std::string(name) + "\": error code " + std::to_string(code);
+  TORCH_CHECK(false, why);
+}
+[[noreturn]] inline void refuse_derivative(const char* name, const char* why) {
+  TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot differentiate \"", name,
+                              "\": derivatives are compiled ahead of time; ", why, ". Make the operator in Python, with retrograde.torch.operator.");
+  throw std::logic_error("not reached");
+}
+[[noreturn]] inline void refuse_cuda(const char* name) {
+  TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot call \"", name, "\" on tensors of CUDA: its code is the CPU's; it was "
+                              "compiled for no GPU. Move the tensors with tensor.cpu().");
+  throw std::logic_error("not reached");
+}
+
+inline std::vector<at::Tensor> tensors_of(at::Tensor result) { return {std::move(result)}; }
+template <class... Tensors>
+std::vector<at::Tensor> tensors_of(std::tuple<Tensors...> results) {
+  return std::apply([](auto&&... each) { return std::vector<at::Tensor>{std::move(each)...}; }, std::move(results));
+}
+
+}  // namespace retrograde_torch
+#endif
+)";
+
+}  // namespace retrograde::aot

@@ -1,0 +1,78 @@
+"""Operators that were compiled ahead of time, as PyTorch sees them; nothing of ours is imported.
+
+    use.py FOLDER"""
+import sys
+import timeit
+
+import torch
+
+folder = sys.argv[1]
+for name in ("weighted", "sum_of_two"):
+    torch.ops.load_library(f"{folder}/{name}.so")
+weighted, total = torch.ops.tests.weighted, torch.ops.tests.sum_of_two
+
+
+def raises(kind, words, call):
+    try:
+        call()
+    except kind as error:
+        assert words in str(error), error
+        return
+    raise AssertionError(f"no error: {words}")
+
+
+image, taps = torch.rand(5, 9, requires_grad=True), torch.tensor([1.0, 2, 1], requires_grad=True)
+
+
+def theirs(image, taps, gain):
+    return gain * sum(image[:, k:k + image.shape[1] - 2] * taps[k] for k in range(3)), image * image
+
+
+# Values and gradients, of an output that is used and of both.
+for negative, sign in ((False, 1), (True, -1)):
+    ours = weighted(image, taps, 1.5, negative)
+    for a, b in zip(ours, theirs(image, taps, 1.5 * sign)):
+        assert torch.allclose(a, b)
+for loss in (lambda r: r[0].sum(), lambda r: r[1].square().sum(), lambda r: (r[0].square().sum() + r[1].sum())):
+    got = torch.autograd.grad(loss(weighted(image, taps, 1.5, False)), (image, taps))
+    want = torch.autograd.grad(loss(theirs(image, taps, 1.5)), (image, taps), allow_unused=True)
+    for a, b in zip(got, want):
+        assert torch.allclose(a, torch.zeros_like(a) if b is None else b, atol=1e-5), (a, b)
+
+# Any strides, empty tensors, shapes without values.
+for given in (image.detach()[:, ::2], image.detach().t()[:, :5], torch.ones(1, 1).expand(4, 6), torch.empty(0, 7)):
+    for a, b in zip(weighted(given, taps, 2.0, False), theirs(given, taps, 2.0)):
+        assert torch.allclose(a, b)
+meta = weighted(torch.empty(5, 9, device="meta"), torch.empty(3, device="meta"), 1.0, False)
+assert [m.shape for m in meta] == [(5, 7), (5, 9)]
+
+# What is wrong is an exception.
+raises(RuntimeError, '"image" has 2 dimensions', lambda: weighted(taps, taps, 1.0, False))
+raises(RuntimeError, '"image" is a tensor of the CPU of Float over 2 dimensions; given is one of cpu of Double',
+       lambda: weighted(image.double(), taps, 1.0, False))
+raises(RuntimeError, "cannot", lambda: total(torch.ones(4), torch.ones(3)))
+gradient, = torch.autograd.grad(weighted(image, taps, 1.0, False)[0].sum(), image, create_graph=True)
+raises(RuntimeError, "no second derivative", lambda: gradient.sum().backward())
+raises(RuntimeError, "made without GRADIENT", lambda: total(taps, taps).sum().backward())
+
+if hasattr(torch.library, "opcheck"):
+    torch.library.opcheck(weighted.default, (image, taps, 1.5, False))
+    compiled = torch.compile(lambda i, t: weighted(i, t, 1.5, False)[0].sin(), fullgraph=True, dynamic=True)
+    for n in (5, 8):
+        given = torch.rand(n, 9, requires_grad=True)
+        a, b = compiled(given, taps), weighted(given, taps, 1.5, False)[0].sin()
+        assert torch.allclose(a, b)
+        a.sum().backward()
+        assert torch.allclose(given.grad, torch.autograd.grad(b.sum(), given)[0], atol=1e-6)
+
+# What a call costs, said and not judged here: machines are busy.
+one = torch.ones(1)
+
+
+def microseconds(call):
+    call()
+    return 1e6 * min(timeit.repeat(call, number=2000, repeat=5)) / 2000
+
+
+print(f"PyTorch {torch.__version__}: a call on one element takes {microseconds(lambda: total(one, one)):.2f} us, "
+      f"torch.add {microseconds(lambda: torch.ops.aten.add.Tensor(one, one)):.2f} us")
