@@ -116,7 +116,8 @@ class SimtTarget : public DeviceTarget {
                   : -1;
     };
     const auto* store = llvm::dyn_cast<llvm::StoreInst>(&one);
-    const bool is_load = llvm::isa<llvm::LoadInst>(one);
+    // The first look of a compare-and-swap is atomic, too.
+    const bool is_load = llvm::isa<llvm::LoadInst>(one) && !one.isAtomic();
     llvm::Type* type = store ? store->getValueOperand()->getType() : one.getType();
     if (const auto* update = llvm::dyn_cast<llvm::AtomicCmpXchgInst>(&one))
       type = update->getNewValOperand()->getType();

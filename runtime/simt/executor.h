@@ -35,6 +35,7 @@ struct ThreadState : retrograde_simt_thread {
     const uint8_t* address;
     int32_t bytes, site, space;
     uint8_t before[64];
+    uint64_t by_others;  // bit i: others stored byte i
     Moment other;
   };
   std::optional<Overwrite> overwrite;

@@ -153,8 +153,9 @@ void Executor::check_race(ThreadState& thread, const uint8_t* address, int32_t b
   const Conflict conflict =
       shadow.record(reinterpret_cast<Address>(address), bytes, access, moment_of(thread, site));
   if (!conflict.is_there) return;
-  ThreadState::Overwrite overwrite = {address, bytes, site, space, {}, conflict.other};
-  const bool both_store = access == Access::store && std::strcmp(conflict.other_did, "store") == 0;
+  ThreadState::Overwrite overwrite = {address, bytes,           site,          space,
+                                      {},      conflict.stored, conflict.other};
+  const bool both_store = access == Access::store && conflict.is_with_store;
   if (both_store && bytes <= static_cast<int32_t>(sizeof overwrite.before)) {
     std::memcpy(overwrite.before, address, static_cast<size_t>(bytes));
     thread.overwrite = overwrite;
@@ -168,7 +169,10 @@ void Executor::check_overwrite(ThreadState& thread) {
   if (!thread.overwrite) return;
   const ThreadState::Overwrite store = *thread.overwrite;
   thread.overwrite.reset();
-  if (std::memcmp(store.before, store.address, static_cast<size_t>(store.bytes)) == 0) return;
+  bool changes = false;
+  for (int32_t i = 0; i < store.bytes; ++i)
+    changes |= (store.by_others >> i & 1) && store.before[i] != store.address[i];
+  if (!changes) return;
   report_race(thread, store.address, store.space, store.site, "store", store.other, "store");
 }
 

@@ -40,9 +40,19 @@ void look(Conflict& conflict, const Moment& before, const Moment& now, const cha
   if (!conflict.is_there && !is_ordered(before, now)) conflict = {true, before, did};
 }
 
+// Adds what was found of so many bytes, from one of the access on.
+void join(Conflict& all, const Conflict& found, uint64_t from, uint64_t bytes) {
+  if (!found.is_there) return;
+  uint64_t stored = all.stored;
+  if (found.is_with_store && from < 64) stored |= ((uint64_t{1} << bytes) - 1) << from;
+  if (!all.is_there || (all.is_with_store && !found.is_with_store)) all = found;
+  all.stored = stored;
+}
+
 Conflict record_in(Cell& cell, Access access, const Moment& now) {
   Conflict conflict;
   look(conflict, cell.write, now, "store");
+  conflict.is_with_store = conflict.is_there;
   if (access != Access::load) look(conflict, cell.read, now, "load");
   if (access != Access::atomic) look(conflict, cell.atomic, now, "atomic update");
   add(access == Access::load ? cell.read : access == Access::store ? cell.write : cell.atomic, now);
@@ -66,34 +76,31 @@ Shadow::Page& Shadow::page_of(uint64_t word) {
   return *last_;
 }
 
-Conflict Shadow::record_word(uint64_t begin, uint64_t end, Access access, const Moment& now) {
+// `from`: which byte of the access is the first one of these.
+void Shadow::record_word(uint64_t begin, uint64_t end, Access access, const Moment& now,
+                         uint64_t from, Conflict& all) {
   Page& page = page_of(begin / 4);
   const auto index = static_cast<uint32_t>(begin / 4 % page_words);
   Cell& whole = page.words[index];
   auto parts = page.parts.empty() ? page.parts.end() : page.parts.find(index);
   if (parts == page.parts.end()) {
-    if (end - begin == 4) return record_in(whole, access, now);
+    if (end - begin == 4) return join(all, record_in(whole, access, now), from, 4);
     parts = page.parts.emplace(index, std::make_unique<Cell[]>(4)).first;
     std::fill_n(parts->second.get(), 4, whole);
   }
-  Conflict first;
-  for (uint64_t byte = begin; byte < end; byte++) {
-    const Conflict found = record_in(parts->second[byte % 4], access, now);
-    if (found.is_there && !first.is_there) first = found;
-  }
-  return first;
+  for (uint64_t byte = begin; byte < end; byte++)
+    join(all, record_in(parts->second[byte % 4], access, now), from + byte - begin, 1);
 }
 
 Conflict Shadow::record(uint64_t address, int32_t bytes, Access access, const Moment& now) {
-  Conflict first;
-  const uint64_t end = address + static_cast<uint64_t>(bytes);
+  Conflict all;
+  const uint64_t begin = address, end = address + static_cast<uint64_t>(bytes);
   while (address < end) {
     const uint64_t word_end = std::min(end, (address / 4 + 1) * 4);
-    const Conflict found = record_word(address, word_end, access, now);
-    if (found.is_there && !first.is_there) first = found;
+    record_word(address, word_end, access, now, address - begin, all);
     address = word_end;
   }
-  return first;
+  return all;
 }
 
 }  // namespace retrograde::simt

@@ -32,6 +32,8 @@ struct Conflict {
   bool is_there = false;
   Moment other;
   const char* other_did = "";
+  bool is_with_store = false;
+  uint64_t stored = 0;  // bit i: others stored byte i of the access
 };
 
 enum class Access { load, store, atomic };
@@ -39,8 +41,8 @@ enum class Access { load, store, atomic };
 // Of one kind of memory during one launch, or one block.
 class Shadow {
  public:
-  // `address` is counted from anywhere. The first conflict, which for stores of values that are there
-  // already may be none: the caller says so later.
+  // `address` is counted from anywhere. The first conflict, with a load or an atomic update if there is
+  // one. A store over the same values is none: the caller says so later of the bytes that others stored.
   Conflict record(uint64_t address, int32_t bytes, Access, const Moment&);
   // As if nothing had been accessed.
   void clear() {
@@ -56,7 +58,7 @@ class Shadow {
     std::unordered_map<uint32_t, std::unique_ptr<Cell[]>> parts;  // of words accessed by bytes
   };
   Page& page_of(uint64_t word);
-  Conflict record_word(uint64_t begin, uint64_t end, Access, const Moment&);
+  void record_word(uint64_t begin, uint64_t end, Access, const Moment&, uint64_t from, Conflict&);
   std::unordered_map<uint64_t, std::unique_ptr<Page>> pages_;
   Page* last_ = nullptr;
   uint64_t last_number_ = 0, generation_ = 0;

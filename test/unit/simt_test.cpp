@@ -129,6 +129,15 @@ void store_by_two(Thread* t, int32_t* data, int32_t) {
   store(t, data + t->thread[0] / 2, t->thread[0], 1);
 }
 void store_the_same(Thread* t, int32_t* data, int32_t) { store(t, data + t->thread[0] / 2, 7, 1); }
+struct Pair {
+  int32_t first, second;
+};
+void store_in_part_the_same(Thread* t, int32_t* data, int32_t) {
+  store(t, reinterpret_cast<Pair*>(data + t->thread[0]), {7, 7}, 1);
+}
+void store_in_part_others(Thread* t, int32_t* data, int32_t) {
+  store(t, reinterpret_cast<Pair*>(data + t->thread[0]), {t->thread[0], 7}, 1);
+}
 void store_by_blocks(Thread* t, int32_t* data, int32_t) { store(t, data, t->block[0], 1); }
 void read_and_store_by_blocks(Thread* t, int32_t* data, int32_t) {
   if (t->block[0] == 1) store(t, data, 3, 1);
@@ -157,6 +166,13 @@ TEST_F(Simt, FindsTwoStoresOfDifferentValues) {
 TEST_F(Simt, StoresOfOneValueByTwoThreadsAreNoRace) {
   ASSERT_EQ(run<store_the_same>(false, {1, 1, 8, 1, 0}, 8), success);
   EXPECT_EQ(left[3], 7);
+}
+// Bytes that nobody stored before do change.
+TEST_F(Simt, StoresThatOverlapInEqualValuesAreNoRace) {
+  ASSERT_EQ(run<store_in_part_the_same>(false, {1, 1, 4, 1, 0}, 8), success);
+  EXPECT_EQ(left[4], 7);
+  expect_finding<store_in_part_others>(false, {1, 1, 4, 1, 0}, 8, launch_failed,
+                                       {"byte 4 of an allocation of 32 bytes has a store"});
 }
 TEST_F(Simt, FindsRacesBetweenBlocks) {
   expect_finding<store_by_blocks>(false, {3, 1, 1, 1, 0}, 4, launch_failed,
