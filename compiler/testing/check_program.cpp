@@ -3,6 +3,7 @@
 #include "testing/check_program.h"
 
 #include <cstring>
+#include <optional>
 
 #include "diagnostics/error.h"
 #include "frontend/run/pipeline.h"
@@ -83,9 +84,8 @@ std::string describe(const Func& f, int value, const oracle::Region& over) {
 }
 
 void compare_outputs(const Regions& regions, const RandomProgram& program,
+                     const std::vector<oracle::Array>& expected,
                      const std::vector<GuardedOutput>& actual, Judged& judged) {
-  oracle::Interpreter interpreter({.rounding = oracle::Rounding::Contraction});
-  const auto expected = interpreter.realize(outputs_of(program), regions);
   size_t value = 0;
   for (size_t o = 0; o < regions.size(); ++o) {
     for (int v = 0; v < program.outputs[o].outputs(); ++v, ++value) {
@@ -127,14 +127,23 @@ Judged check_program(const RandomProgram& program, const ScheduleLog& schedule,
 }
 
 Judged check_with_schedule(const RandomProgram& program, const std::function<void()>& schedule,
-                           const Target& target) {
+                           const Target& target,
+                           const std::vector<std::function<void()>>& preparations) {
   Judged judged;
   try {
     schedule();
     Pipeline compiled(program.outputs);
     compiled.set_custom_trace(ignore_event);
-    for (const Regions& regions : program.runs)
-      compare_outputs(regions, program, run(compiled, regions, program, target), judged);
+    for (const Regions& regions : program.runs) {
+      oracle::Interpreter interpreter({.rounding = oracle::Rounding::Contraction});
+      std::optional<std::vector<oracle::Array>> expected;  // of what runs at all
+      for (const std::function<void()>& prepare : preparations) {
+        prepare();
+        const std::vector<GuardedOutput> actual = run(compiled, regions, program, target);
+        if (!expected) expected = interpreter.realize(outputs_of(program), regions);
+        compare_outputs(regions, program, *expected, actual, judged);
+      }
+    }
   } catch (const RuntimeError& error) {
     judged = {is_finding(error, target) ? Judgement::Broken : Judgement::Refused, error.what()};
   } catch (const UserError& error) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <vector>
 
 #include "ir/target.h"
 #include "testing/judgement.h"
@@ -14,8 +15,10 @@ namespace retrograde::fuzz {
 // program has the schedule afterwards. Counts: "values", and those "unstable", which say nothing.
 Judged check_program(const RandomProgram& program, const ScheduleLog& schedule,
                      const Target& target);
-// The same; `schedule` gives the schedule.
+// The same; `schedule` gives the schedule. What is compiled runs once after each of `preparations`, which
+// set how it runs: each run is compared.
 Judged check_with_schedule(const RandomProgram& program, const std::function<void()>& schedule,
-                           const Target& target);
+                           const Target& target,
+                           const std::vector<std::function<void()>>& preparations = {[] {}});
 
 }  // namespace retrograde::fuzz

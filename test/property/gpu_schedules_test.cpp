@@ -29,12 +29,17 @@ TEST_P(GpuSchedules, KernelsAgreeWithTheInterpreter) {
       get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
   uint64_t compared = 0;
   int refused = 0;
+  GpuScheduleCounts used;
   for (int i = 0; i < programs_per_order; ++i) {
     const uint64_t seed = first_seed + static_cast<uint64_t>(GetParam() * programs_per_order + i);
     Choices choices(seed);
     const RandomProgram program = make_program(choices, Style::pipelines());
     Judged judged = check_with_schedule(
-        program, [&] { schedule_on_gpu(program, choices); }, target);
+        program,
+        [&] {
+          for (const auto& [what, n] : schedule_on_gpu(program, choices)) used[what] += n;
+        },
+        target);
     compared += judged.counts["values"];
     refused += judged.judgement == Judgement::Refused;
     EXPECT_LE(judged.judgement, Judgement::Refused)
@@ -43,6 +48,8 @@ TEST_P(GpuSchedules, KernelsAgreeWithTheInterpreter) {
   }
   EXPECT_LE(refused, max_refused_fraction * programs_per_order);
   EXPECT_GT(compared, 0u);
+  for (const char* what : {"kernels", "Funcs in blocks", "partial results", "atomic updates"})
+    EXPECT_GE(used[what], 3u) << what;
 }
 
 INSTANTIATE_TEST_SUITE_P(Order, GpuSchedules, ::testing::Range(0, 4));
