@@ -123,12 +123,27 @@ Value* half_binary(Emitter& e, Kind kind, Type type, Value* a, Value* b) {
   return kind >= Kind::EQ ? result : float_to_half(e, type, result);
 }
 
+// What PTX's cvt makes of numbers out of range (PTX ISA, cvt): the nearest end. Of NaN it makes 0, but
+// where either type has 64 bits the sign's bit alone.
+Value* as_a_device_converts(Emitter& e, bool as_unsigned, llvm::Type* wide, Value* number) {
+  Value* integer =
+      e.b.CreateIntrinsic(as_unsigned ? llvm::Intrinsic::fptoui_sat : llvm::Intrinsic::fptosi_sat,
+                          {wide, number->getType()}, {number});
+  const unsigned bits = wide->getScalarSizeInBits();
+  if (bits < 64 && !number->getType()->getScalarType()->isDoubleTy()) return integer;
+  Value* of_nan = llvm::ConstantInt::get(wide, llvm::APInt::getSignMask(bits));
+  return e.b.CreateSelect(e.b.CreateFCmpUNO(number, number), of_nan, integer);
+}
+
 Value* float_to_integer(Emitter& e, Type to, Value* number) {
   // Out of range LLVM gives poison, which would spread to whatever depends on the lane; frozen, it
   // is only a number.
   const int bits = std::max(to.bits(), 32);
   auto* wide = with_lanes(e.b.getIntNTy(static_cast<unsigned>(bits)), to.lanes());
   const bool as_unsigned = to.is_uint() && to.bits() >= 32;
+  if (e.machine.device == Machine::Device::Simt) {
+    return e.b.CreateTrunc(as_a_device_converts(e, as_unsigned, wide, number), llvm_type(e, to));
+  }
   Value* integer = as_unsigned ? e.b.CreateFPToUI(number, wide) : e.b.CreateFPToSI(number, wide);
   return e.b.CreateTrunc(e.b.CreateFreeze(integer), llvm_type(e, to));
 }

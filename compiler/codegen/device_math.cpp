@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "codegen/fuse_products.h"
 #include "diagnostics/error.h"
 
 // cmake/RetrogradeDeviceMath.cmake
@@ -51,6 +52,7 @@ void link_device_math(Emitter& e) {
                                     function->removeFnAttr("tune-cpu");
                                     function->removeFnAttr(llvm::Attribute::OptimizeNone);
                                     set_target(e, function);
+                                    fuse_products(*function);
                                   }
                                 });
   RETROGRADE_ASSERT(!failed, "the functions of kernels do not link");

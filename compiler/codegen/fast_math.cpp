@@ -34,8 +34,8 @@ struct Formula {
   Value* greater(Value* a, double b) { return e.b.CreateFCmpOGT(a, constant(b)); }
   Value* select(Value* condition, Value* a, Value* b) { return e.b.CreateSelect(condition, a, b); }
   Value* to_int(Value* a) {
-    auto* integer = with_lanes(e.b.getInt32Ty(), lanes_of(a));
-    return e.b.CreateFreeze(e.b.CreateFPToSI(a, integer));
+    const int lanes = lanes_of(a);
+    return convert(e, Int(32, lanes), Float(32, lanes), a);
   }
   Value* to_float(Value* a) { return e.b.CreateSIToFP(a, type); }
   // c[0] + c[1] x + ..., by Horner's rule.

@@ -48,6 +48,11 @@ void FunctionContext::finish(Value* code) {
 llvm::CallInst* FunctionContext::call_runtime(const std::string& name, llvm::Type* result,
                                               const std::vector<Value*>& args,
                                               const std::vector<Value*>* more) {
+  if (!frame.context) {
+    unsupported("run a part of a pipeline on a GPU",
+                "a kernel computes, and calls nothing of the host", "it would call " + quoted(name),
+                "Compute that part on the host");
+  }
   std::vector<Value*> all = {frame.context};
   all.insert(all.end(), args.begin(), args.end());
   std::vector<llvm::Type*> params;

@@ -4,6 +4,7 @@
 
 #include "codegen/device_math.h"
 #include "codegen/function_generator.h"
+#include "codegen/fuse_products.h"
 #include "codegen/selectable.h"
 #include "codegen/unit.h"
 #include "diagnostics/error.h"
@@ -33,7 +34,7 @@ std::string KernelSet::ptx() {
   Emitter emitter(unit.module(), machine);
   for (const auto& kernel : kernels_) {
     const auto target = make_nvptx_target();
-    FunctionGenerator(emitter, source_, target.get()).generate_kernel(*kernel);
+    fuse_products(*FunctionGenerator(emitter, source_, target.get()).generate_kernel(*kernel));
   }
   link_device_math(emitter);
   std::string problem;
@@ -57,6 +58,7 @@ void KernelSet::compile_for_executor(std::vector<llvm::Function*>& functions) {
     kernel->sites.clear();
     const auto target = make_simt_target();
     functions.push_back(FunctionGenerator(emitter, source_, target.get()).generate_kernel(*kernel));
+    fuse_products(*functions.back());
   }
   link_device_math(emitter);
 }
@@ -120,7 +122,7 @@ llvm::Constant* KernelSet::described(const KernelUse& kernel, llvm::Function* si
 void KernelSet::finish() {
   if (kernels_.empty()) return;
   llvm::IRBuilder<>& b = host_.b;
-  const std::string code = ptx();
+  code_ = ptx();
   std::vector<llvm::Function*> simt(kernels_.size(), nullptr);
   if (host_.machine.wants_executor) {
     simt.clear();
@@ -130,7 +132,7 @@ void KernelSet::finish() {
   for (size_t i = 0; i < kernels_.size(); ++i) kernels.push_back(described(*kernels_[i], simt[i]));
   const auto count = static_cast<uint32_t>(kernels.size());
   image()->setInitializer(llvm::ConstantStruct::get(
-      image_type(), {b.getInt64(RETROGRADE_GPU_IMAGE_MAGIC), b.getInt64(code.size()), text(code),
+      image_type(), {b.getInt64(RETROGRADE_GPU_IMAGE_MAGIC), b.getInt64(code_.size()), text(code_),
                      b.getInt32(count), table(kernels[0]->getType(), kernels)}));
 }
 

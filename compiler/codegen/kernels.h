@@ -37,6 +37,8 @@ class KernelSet {
   int64_t image_bytes() const;
   // Gives the image its contents.
   void finish();
+  // The code for devices; empty before that, and where there are no kernels.
+  const std::string& code() const { return code_; }
 
  private:
   std::string ptx();
@@ -50,6 +52,7 @@ class KernelSet {
   Emitter& host_;
   const ir::LoweredFunction& source_;
   std::vector<std::unique_ptr<KernelUse>> kernels_;
+  std::string code_;
   llvm::GlobalVariable *image_ = nullptr, *state_ = nullptr;
 };
 

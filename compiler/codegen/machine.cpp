@@ -102,7 +102,10 @@ bool Machine::has_fma() const {
 bool Machine::has_rounding() const {
   return !is_x86() || has_avx2() || has_any(target, {F::SSE41, F::AVX});
 }
-bool Machine::has_f16c() const { return !is_x86() || has_avx512() || target.has_feature(F::F16C); }
+bool Machine::has_f16c() const {
+  const bool is_code_of_x86 = target.arch == Target::X86 && device != Device::Nvptx;
+  return !is_code_of_x86 || has_avx512() || target.has_feature(F::F16C);
+}
 
 int Machine::max_math_lanes(int bits) const { return vector_bits / bits; }
 int Machine::min_math_lanes(int bits) const { return 128 / bits; }

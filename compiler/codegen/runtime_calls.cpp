@@ -82,8 +82,10 @@ Value* pack(Values& values, const std::vector<Expr>& parts) {
 }
 
 // (address): a hint, and no access: the address may be anything.
+// A hint, which devices do without: others of their threads run while one waits for memory.
 Value* prefetch(Values& values, const Call& e) {
   FunctionContext& c = values.c;
+  if (c.e.machine.is_device()) return c.b.getInt32(0);
   c.b.CreateIntrinsic(llvm::Intrinsic::prefetch, {c.b.getPtrTy()},
                       {values.of(e.args[0]), c.b.getInt32(0), c.b.getInt32(3), c.b.getInt32(1)});
   return c.b.getInt32(0);

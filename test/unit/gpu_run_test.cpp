@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <functional>
 
@@ -220,6 +221,52 @@ TEST_F(GpuRun, GradientsRunOnGpus) {
         return gradient;
       },
       {66, 34});
+}
+
+// ---- the bits of a device, on whatever this is ----
+
+template <typename T>
+std::vector<uint8_t> bytes_of(const Buffer<T>& buffer) {
+  const auto* begin = reinterpret_cast<const uint8_t*>(buffer.data());
+  return {begin, begin + buffer.size_in_bytes()};
+}
+
+TEST_F(GpuRun, BitsDoNotDependOnTheProcessorOfTheHost) {
+  if (get_host_target().arch != Target::X86) GTEST_SKIP() << "older processors are of x86";
+  const Buffer<float> in = ramp(128, 32);
+  const auto on = [&](const std::string& host) {
+    Func out("out");
+    const Expr a = in(x, y) / 7.0f, b = in(127 - x, y) - 5.0f;
+    const Expr half = cast<float>(cast<float16_t>(a * b + 1.0f));
+    out(x, y) = a * b + sin(a) * exp(-b) - pow(a, b) * half + fast_exp(b) * a + sqrt(a) / b;
+    out.vectorize(x, 2).gpu_tile(x, y, xi, yi, 8, 4);
+    return bytes_of(Buffer<float>(out.realize({128, 32}, Target(host))));
+  };
+  const auto plain = on("x86-64-linux-cuda-cuda_capability_80");
+  EXPECT_EQ(on("x86-64-linux-sse41-avx-avx2-f16c-fma-cuda-cuda_capability_80"), plain);
+  EXPECT_EQ(on(with_gpu().to_string()), plain);
+}
+
+// PTX ISA, cvt: the nearest integer that there is; of NaN 0, or the sign's bit with 64 bits on a side.
+TEST_F(GpuRun, FloatsThatNoIntegerHoldsConvertAsOnADevice) {
+  Buffer<double> in(4);
+  in(0) = 1e30;
+  in(1) = -1e30;
+  in(2) = std::nan("");
+  in(3) = -2.75;
+  const auto convert = [&](Type from, Type to) {
+    Func out("out");
+    out(x) = cast<double>(cast(to, cast(from, in(x))));
+    out.gpu_tile(x, xi, 4);
+    const Buffer<double> got = out.realize({4}, with_gpu());
+    return std::vector<double>(got.begin(), got.end());
+  };
+  using Numbers = std::vector<double>;
+  EXPECT_EQ(convert(Float(32), Int(32)), (Numbers{0x1p31 - 1, -0x1p31, 0, -2}));
+  EXPECT_EQ(convert(Float(32), UInt(32)), (Numbers{0x1p32 - 1, 0, 0, 0}));
+  EXPECT_EQ(convert(Float(64), Int(32)), (Numbers{0x1p31 - 1, -0x1p31, -0x1p31, -2}));
+  EXPECT_EQ(convert(Float(32), Int(64)), (Numbers{0x1p63, -0x1p63, -0x1p63, -2}));
+  EXPECT_EQ(convert(Float(64), UInt(64)), (Numbers{0x1p64, 0, 0x1p63, 0}));
 }
 
 }  // namespace

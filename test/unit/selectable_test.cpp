@@ -7,14 +7,15 @@
 #include <llvm/Support/SourceMgr.h>
 
 #include "codegen/unit.h"
+#include "support/expect_ptxas.h"
 
 namespace retrograde::codegen {
 namespace {
 
 namespace Intrinsic = llvm::Intrinsic;
 
-Machine nvptx() {
-  const Target target = get_host_target().with_feature(Target::CUDA);
+Machine nvptx(Target::Feature capability) {
+  const Target target = get_host_target().with_feature(Target::CUDA).with_feature(capability);
   return device_machine(machine_for(target, false), Machine::Device::Nvptx);
 }
 
@@ -110,8 +111,11 @@ std::vector<Intrinsic::ID> of_values() {
   return ids;
 }
 
-TEST(Selectable, WhatIsListedIsTranslated) {
-  Unit unit(nvptx(), "listed", true);
+class Selectable : public testing::TestWithParam<Target::Feature> {};
+
+TEST_P(Selectable, WhatIsListedIsTranslated) {
+  const Machine machine = nvptx(GetParam());
+  Unit unit(machine, "listed", true);
   int count = 0;
   for (const Intrinsic::ID id : of_values()) {
     for (llvm::Type* type : types_of(id, unit.module().getContext())) {
@@ -125,7 +129,13 @@ TEST(Selectable, WhatIsListedIsTranslated) {
   const std::string ptx = unit.emit_last(llvm::CodeGenFileType::AssemblyFile);
   EXPECT_NE(ptx.find("f" + std::to_string(count - 1)), std::string::npos);
   EXPECT_EQ(ptx.find(".extern"), std::string::npos) << "a function that no device has";
+  expect_ptxas_takes(ptx, machine.cpu);
 }
+
+INSTANTIATE_TEST_SUITE_P(Chips, Selectable,
+                         testing::Values(Target::CUDACapability75, Target::CUDACapability80,
+                                         Target::CUDACapability86, Target::CUDACapability90),
+                         [](const auto& chip) { return nvptx(chip.param).cpu; });
 
 std::string found_in(const std::string& body, const std::string& before = "") {
   llvm::LLVMContext context;
@@ -139,7 +149,7 @@ std::string found_in(const std::string& body, const std::string& before = "") {
   return module ? find_unselectable(*module) : "no IR: " + error.getMessage().str();
 }
 
-TEST(Selectable, WhatIsNotIsFound) {
+TEST(NotSelectable, IsFound) {
   const std::pair<const char*, const char*> cases[] = {
       {"fence seq_cst", "a fence"},
       {"fence syncscope(\"singlethread\") seq_cst", "a fence"},

@@ -1,0 +1,24 @@
+// A test's expectation that ptxas takes PTX, where it is installed.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <string>
+
+#include "support/ptxas.h"
+
+namespace retrograde {
+
+// Says what it skips where there is no ptxas.
+inline void expect_ptxas_takes(const std::string& ptx, const std::string& chip) {
+  static int skipped = 0;
+  if (!has_ptxas()) {
+    std::printf("skipped, for no ptxas is installed: %d modules of PTX by now, %zu bytes for %s\n",
+                ++skipped, ptx.size(), chip.c_str());
+    return;
+  }
+  EXPECT_EQ(ptxas_problem(ptx, chip, "-O0"), "");
+}
+
+}  // namespace retrograde
