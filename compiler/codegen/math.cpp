@@ -109,6 +109,33 @@ Value* with_limit(Emitter& e, const MathFunction& function, Value* x, Value* ins
   return e.b.CreateSelect(is_far, outside, inside);
 }
 
+// ---- on devices, where libclc's functions leave something to do ----
+
+// Where exp(x) is a denormal, that of float32 gives 0: exp(x + 64) exp(-64), the sum of which is exact.
+Value* device_exp(Emitter& e, const MathFunction& function, Value* x) {
+  constexpr double least = -0x1.5d589ep+6, distance = 64, rest = 0x1.969d47321e4ccp-93;
+  Value* is_small = e.b.CreateFCmpOLT(x, float_constant(x, least));
+  Value* moved = e.b.CreateFAdd(x, float_constant(x, distance));
+  Value* result = call_by_pieces(e, function, {e.b.CreateSelect(is_small, moved, x)});
+  return e.b.CreateSelect(is_small, e.b.CreateFMul(result, float_constant(x, rest)), result);
+}
+
+// Those of float64 look into their tables beyond the ends, whatever is then done with what they find.
+Value* device_sinh_cosh(Emitter& e, const MathFunction& function, Value* x) {
+  Value* size = e.b.CreateUnaryIntrinsic(llvm::Intrinsic::fabs, x);
+  Value* is_near = e.b.CreateFCmpOLE(size, float_constant(x, function.float64_limit));  // no NaN is
+  Value* near = e.b.CreateSelect(is_near, x, float_constant(x, 0.0));
+  return e.b.CreateSelect(is_near, call_by_pieces(e, function, {near}),
+                          near_overflow(e, function.op, x, size));
+}
+
+Value* on_device(Emitter& e, const MathFunction& function, int bits, const Args& args) {
+  if (function.op == Op::exp && bits == 32) return device_exp(e, function, args[0]);
+  const bool looks_beyond = function.op == Op::sinh || function.op == Op::cosh;
+  if (looks_beyond && bits == 64) return device_sinh_cosh(e, function, args[0]);
+  return call_by_pieces(e, function, args);
+}
+
 }  // namespace
 
 bool is_math_operator(Op op) { return find_math_function(op) != nullptr; }
@@ -121,9 +148,9 @@ Value* math_operator(Emitter& e, Op op, Type type, const Args& args) {
   }
   if (op == Op::pow && type.bits() == 32) return float_pow(e, args[0], args[1]);
   const MathFunction& function = *find_math_function(op);
+  if (e.machine.is_device()) return on_device(e, function, type.bits(), args);
   Value* result = call_by_pieces(e, function, args);
   const double limit = type.bits() == 32 ? function.float32_limit : function.float64_limit;
-  if (e.machine.is_device()) return result;
   return limit == 0 ? result : with_limit(e, function, args[0], result, limit);
 }
 

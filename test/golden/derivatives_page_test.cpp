@@ -1,19 +1,14 @@
 // The tables of docs/derivatives.md are written here from the rule table itself, so that the page
-// cannot state a convention that the code does not have. The prose around them lives in the page: a
-// table stands between the lines "<!-- table: NAME -->" and "<!-- end of table -->".
-// RETROGRADE_UPDATE_GOLDEN=1 writes the tables; read the difference before you commit it.
+// cannot state a convention that the code does not have.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <map>
-#include <optional>
 #include <sstream>
 #include <string>
 
 #include "autodiff/rules/derivative_rules.h"
 #include "ir/build.h"
+#include "support/page_table.h"
 
 namespace retrograde::autodiff {
 namespace {
@@ -68,45 +63,13 @@ Tables tables() {
   return result;
 }
 
-// Where in the page a table begins and ends; nothing when a marker is missing.
-struct Span {
-  size_t begin, end;
-};
-std::optional<Span> table_in(const std::string& page, const std::string& name) {
-  const std::string opening = "<!-- table: " + name + " -->\n", closing = "<!-- end of table -->\n";
-  const size_t at = page.find(opening);
-  if (at == std::string::npos) return std::nullopt;
-  const size_t begin = at + opening.size(), end = page.find(closing, begin);
-  if (end == std::string::npos) return std::nullopt;
-  return Span{begin, end};
+void holds(const std::string& name, const std::string& table) {
+  expect_table_in_page(RETROGRADE_TEST_DIR "/../docs/derivatives.md", name, table);
 }
 
-class DerivativesPage : public testing::Test {
- protected:
-  static std::string read() {
-    std::ifstream file(path);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
-  void holds(const std::string& name, const std::string& table) {
-    std::string page = read();
-    const auto span = table_in(page, name);
-    ASSERT_TRUE(span) << path << " has no lines around a table " << name;
-    const size_t length = span->end - span->begin;
-    if (std::getenv("RETROGRADE_UPDATE_GOLDEN")) {
-      std::ofstream(path) << page.replace(span->begin, length, table);
-      return;
-    }
-    EXPECT_EQ(page.substr(span->begin, length), table)
-        << "RETROGRADE_UPDATE_GOLDEN=1 writes " << path;
-  }
-  static inline const std::string path = RETROGRADE_TEST_DIR "/../docs/derivatives.md";
-};
+TEST(DerivativesPage, holds_the_partials_of_the_rule_table) { holds("partials", tables().smooth); }
 
-TEST_F(DerivativesPage, holds_the_partials_of_the_rule_table) {
-  holds("partials", tables().smooth);
-}
-
-TEST_F(DerivativesPage, holds_the_reasons_of_operators_without_partials) {
+TEST(DerivativesPage, holds_the_reasons_of_operators_without_partials) {
   holds("no_partials", tables().others);
 }
 
