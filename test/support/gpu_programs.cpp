@@ -251,10 +251,13 @@ Func training_step(bool on_gpu) {
 
 }  // namespace
 
+float reduced_value(int i) { return static_cast<float>(i % 1000) / 1024; }
+
 Program reduction(int values) {
   const auto build = [values](bool on_gpu) {
+    const int threads = std::min(values / 4, 1 << 16), block = 256;
     Buffer<float> in(values);
-    in.for_each_element([&](int i) { in(i) = static_cast<float>(i % 1000) / 1024; });
+    in.for_each_element([&](int i) { in(i) = reduced_value(i); });
     RDom r(0, values, "r");
     Func sum("sum"), total("total");
     sum() = 0.0f;
@@ -262,10 +265,14 @@ Program reduction(int values) {
     total(x) = sum();
     sum.compute_root();
     if (on_gpu) {
-      RVar ro("ro"), ri("ri");
-      Func parts = sum.update().split(r, ro, ri, 256).rfactor(ri, u);
-      parts.compute_root().gpu_tile(u, xi, 128);
-      parts.update().gpu_tile(u, xi, 128);
+      // Neighbouring threads read neighbours; then a block adds up their sums, then a thread those.
+      RVar ro("ro"), ri("ri"), rio("rio"), rii("rii");
+      Func parts = sum.update().split(r, ro, ri, threads).rfactor(ri, u);
+      Func of_block = sum.update().split(ri, rio, rii, block).rfactor(rii, k);
+      for (Stage stage : {Stage(parts), parts.update()}) stage.gpu_tile(u, xi, block);
+      for (Stage stage : {Stage(of_block), of_block.update()}) stage.gpu_tile(k, xi, block);
+      parts.compute_root();
+      of_block.compute_root();
       sum.update().gpu_single_thread();
     }
     return total;

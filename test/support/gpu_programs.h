@@ -21,7 +21,8 @@ struct Program {
 inline void PrintTo(const Program& program, std::ostream* out) { *out << program.name; }
 
 std::vector<Program> all();
-// Sums of so many values, by blocks first.
+// The sum of so many values: of each thread, of a block's threads, of all.
 Program reduction(int values);
+float reduced_value(int i);
 
 }  // namespace gpu_programs

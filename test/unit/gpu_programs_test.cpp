@@ -116,6 +116,24 @@ TEST_P(GpuPrograms, SurviveEachFailureOfTheDriver) {
   EXPECT_GT(failures, 5);
 }
 
+// In a float, one after the other, so many values are no sum: the exact one is.
+TEST(GpuReduction, OfManyValuesIsTheirSum) {
+#ifdef RETROGRADE_MANY_PROGRAMS
+  constexpr int values = 1 << 24;
+#else
+  constexpr int values = 1 << 20;
+#endif
+  double expected = 0;
+  for (int i = 0; i < values; ++i) expected += static_cast<double>(gpu_programs::reduced_value(i));
+  Func f = gpu_programs::reduction(values).build(true);
+  for (int order = retrograde_simt_forward; order <= retrograde_simt_warp_ahead; ++order) {
+    set(order, false);
+    const Buffer<float> got = f.realize({1}, with_gpu());
+    EXPECT_NEAR(static_cast<double>(got(0)), expected, 1e-5 * expected);
+  }
+  set(retrograde_simt_forward, false);
+}
+
 std::vector<gpu_programs::Program> streaming() {
   std::vector<gpu_programs::Program> programs = gpu_programs::all();
   std::erase_if(programs, [](const auto& program) { return !program.is_streaming; });

@@ -79,30 +79,6 @@ TEST_F(GpuRun, ATileInSharedMemory) {
       {128, 68});
 }
 
-TEST_F(GpuRun, ProductsOfMatrices) {
-  const Buffer<float> a = ramp(48, 64), b = ramp(64, 48);
-  agrees(
-      [&](bool on_gpu) {
-        RDom r(0, 48, "r");
-        RVar ro("ro"), ri("ri");
-        Func sum("sum"), out("out"), left("left"), right("right");
-        left(x, y) = a(x, y);
-        right(x, y) = b(x, y);
-        sum(x, y) = 0.0f;
-        sum(x, y) += left(r, y) * right(x, r);
-        out(x, y) = sum(x, y);
-        if (on_gpu) {
-          out.gpu_tile(x, y, xi, yi, 16, 16);
-          sum.compute_at(out, x).store_in(MemoryType::Register).gpu_threads(x, y);
-          sum.update().split(r, ro, ri, 16).reorder(ri, x, y, ro).gpu_threads(x, y);
-          left.compute_at(sum, ro).gpu_threads(x, y);
-          right.compute_at(sum, ro).gpu_threads(x, y);
-        }
-        return out;
-      },
-      {64, 64});
-}
-
 TEST_F(GpuRun, TheHostComputesBetweenKernels) {
   const Buffer<float> in = ramp(100, 1);
   agrees(
