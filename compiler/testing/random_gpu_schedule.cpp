@@ -187,7 +187,7 @@ class GpuScheduler {
     ++counts_["Funcs in blocks"];
     f.compute_at(LoopLevel(blocks.func, blocks.loop, site.stage));
     // Registers are for what each thread makes for itself, which is seldom so.
-    if (choices_.chance(4)) {
+    if (choices_.chance(2)) {
       f.store_in(MemoryType::Register);
     } else if (choices_.chance(25)) {
       f.store_in(choices_.pick<MemoryType>({MemoryType::Heap, MemoryType::GPUShared}));
