@@ -6,12 +6,13 @@
 #   add_retrograde_library(<target> FROM <generator-target> [GENERATOR <name>] [FUNCTION_NAME <name>]
 #     [NAMESPACE <ns>] [GRADIENT] [PARAMS <param=value>...] [TARGETS <target>...]
 #     [FEATURES <feature>...] [USE_RUNTIME <target>] [AUTOSCHEDULER <name>] [PLUGINS <target>...]
-#     [HEADER <var>] [ASSEMBLY <var>] [BITCODE <var>] [LLVM_ASSEMBLY <var>] [STMT <var>]
+#     [SIMULATED_GPU] [HEADER <var>] [ASSEMBLY <var>] [BITCODE <var>] [LLVM_ASSEMBLY <var>] [STMT <var>]
 #     [STMT_HTML <var>] [REGISTRATION <var>])
 #     A library with the function that the generator makes, and <target>.h on its include path.
 #     GENERATOR and FUNCTION_NAME default to <target>; TARGETS to host, or to what the variable
 #     Retrograde_TARGET says. Of several TARGETS the machine decides at run time; the last one is what
-#     every machine can run. GRADIENT: the function of the gradient, see
+#     every machine can run. SIMULATED_GPU: kernels (FEATURES cuda) run on the simulated device, too, which
+#     RETROGRADE_GPU=simulated chooses at run time. GRADIENT: the function of the gradient, see
 #     generator/gradient_module.cpp. The variables get names of extra files beside the header.
 #
 #   add_retrograde_runtime(<target> [FROM <generator-target>] [TARGETS <target>...])
@@ -98,7 +99,7 @@ function(add_retrograde_library target)
   set(SCHEDULE_extension .schedule.h)
   set(STMT_extension .stmt)
   set(STMT_HTML_extension .stmt.html)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "GRADIENT;GRADIENT_DESCENT;C_BACKEND"
+  cmake_parse_arguments(PARSE_ARGV 1 arg "GRADIENT;GRADIENT_DESCENT;C_BACKEND;SIMULATED_GPU"
     "FROM;GENERATOR;FUNCTION_NAME;NAMESPACE;USE_RUNTIME;AUTOSCHEDULER;HEADER;${extra_types}"
     "TARGETS;FEATURES;PARAMS;PLUGINS")
   set(asked "add_retrograde_library(${target})")
@@ -196,8 +197,12 @@ function(add_retrograde_library target)
     endif()
   endforeach()
   list(JOIN emit "," emit)
+  set(program ${arg_FROM})
+  if(arg_SIMULATED_GPU)
+    set(program ${CMAKE_COMMAND} -E env RETROGRADE_GPU=simulated $<TARGET_FILE:${arg_FROM}>)
+  endif()
   add_custom_command(OUTPUT ${files}
-    COMMAND ${arg_FROM} -n ${target} -d ${gradient} -g ${arg_GENERATOR} -f ${arg_FUNCTION_NAME}
+    COMMAND ${program} -n ${target} -d ${gradient} -g ${arg_GENERATOR} -f ${arg_FUNCTION_NAME}
             -e ${emit} ${plugins} ${scheduler} -o ${folder} target=${targets} ${arg_PARAMS}
     DEPENDS ${arg_FROM} ${arg_PLUGINS}
     COMMENT "Generating ${target}" VERBATIM)

@@ -16,6 +16,7 @@
 #include "codegen/archive.h"
 #include "codegen/cut_loops.h"
 #include "codegen/function_generator.h"
+#include "codegen/kernels.h"
 #include "codegen/make_exports.h"
 #include "codegen/split_module.h"
 #include "codegen/stopwatch.h"
@@ -33,11 +34,14 @@ void verify(const llvm::Module& module) {
   throw InternalError("LLVM rejects the generated code: " + problem, "codegen", text_of(module));
 }
 
-// The function itself is called through its export; its argv form is not needed.
+// The function itself is called through its export; its argv form is not needed. Nobody looks for its
+// kernels: functions of other files may have the same name.
 void add_exports(Emitter& emitter, const Program& program) {
   for (const Export& e : program.exports) {
     const std::string& name = program.functions[e.function].name;
     emitter.module.getFunction(name + "_argv")->eraseFromParent();
+    if (llvm::GlobalVariable* image = emitter.module.getNamedGlobal(kernel_image_name(name)))
+      image->setLinkage(llvm::GlobalValue::InternalLinkage);
     make_export(emitter, e, emitter.module.getFunction(name));
   }
   for (const Dispatch& dispatch : program.dispatches) make_dispatch(emitter, dispatch);

@@ -65,6 +65,8 @@ void KernelSet::compile_for_executor(std::vector<llvm::Function*>& functions) {
 
 // ---- the image ----
 
+std::string kernel_image_name(const std::string& function) { return function + ".kernels.image"; }
+
 llvm::GlobalVariable* KernelSet::own_global(llvm::Type* type, const char* what) {
   // No constant: parts of a module that is compiled in several share one.
   return new llvm::GlobalVariable(host_.module, type, false, llvm::GlobalValue::InternalLinkage,

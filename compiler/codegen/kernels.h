@@ -26,6 +26,9 @@ struct KernelUse {
   bool suspends = false;           // it has barriers
 };
 
+// The image's symbol.
+std::string kernel_image_name(const std::string& function);
+
 class KernelSet {
  public:
   KernelSet(Emitter& host, const ir::LoweredFunction& function) : host_(host), source_(function) {}

@@ -54,8 +54,21 @@ LoadedProgram* Program::on(const DeviceState& device) {
   return nullptr;
 }
 
+// Whether the simulated device has all of its kernels.
+bool Program::is_simulated() const {
+  const retrograde_gpu_image* given = image();
+  for (int32_t i = 0; given && i < given->num_kernels; i++) {
+    if (!given->kernels[i].simt) return false;
+  }
+  return true;
+}
+
 int32_t Program::load_module(const Session& session, Module& module) const {
   const retrograde_gpu_image* given = image();
+  if (session.driver().is_simulated && !is_simulated())
+    return session.request.refuse(
+        "the simulated device runs kernels that were compiled for it", "these were compiled for devices alone",
+        "Compile them again with RETROGRADE_GPU=simulated in the environment of the compiler");
   if (given && !given->ptx && !session.driver().is_simulated)
     return session.request.refuse("kernels for a device must have been compiled to PTX",
                                   "these were compiled for the simulated device alone",

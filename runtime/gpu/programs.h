@@ -38,6 +38,7 @@ class Program {
  private:
   const retrograde_gpu_image* image() const;
   uint64_t fingerprint() const;
+  bool is_simulated() const;
   int32_t load_module(const Session&, Module&) const;
   int32_t allow_shared(const Session&, LoadedKernel&, int32_t bytes) const;
   LoadedProgram* on(const DeviceState&);

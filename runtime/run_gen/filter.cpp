@@ -268,6 +268,20 @@ int Call::run() {
   return filter_.call(argv.data());
 }
 
+int Call::for_each_result(int (*use)(Image&)) {
+  for (Argument& a : arguments_) {
+    if (!is_output(a) || !a.image.has_device_allocation()) continue;
+    if (const int code = use(a.image)) return code;
+  }
+  return 0;
+}
+int Call::wait() {
+  return for_each_result([](Image& image) { return image.device_sync(); });
+}
+int Call::bring_results() {
+  return for_each_result([](Image& image) { return image.copy_to_host(); });
+}
+
 void Call::write_outputs() const {
   for (const Argument& a : arguments_) {
     if (is_output(a) && !a.path.empty()) write_image(a.path, a.image);

@@ -27,8 +27,12 @@ class Call {
  public:
   // Problem where a value is missing or does not fit.
   Call(const Filter& filter, const Options& options);
-  // Its error code.
+  // Its error code. What it left on a device stays there.
   int run();
+  // Waits for devices.
+  int wait();
+  // Copies results from devices.
+  int bring_results();
   // Those that --output files were named for.
   void write_outputs() const;
   double output_elements() const;  // of the largest output
@@ -48,6 +52,7 @@ class Call {
   const Options& options_;
   std::vector<Argument> arguments_;
 
+  int for_each_result(int (*use)(Image&));
   void set_scalar(Argument& argument);
   void set_input(Argument& argument);
   void set_output(Argument& argument);

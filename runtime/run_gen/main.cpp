@@ -47,7 +47,8 @@ void counting_free(void*, void* block) {
 // ---- a run ----
 
 int run_once(Call& call, const Filter& filter) {
-  const int code = call.run();
+  int code = call.run();
+  if (code == 0) code = call.bring_results();
   if (code != 0)
     std::cerr << "Error: " << filter.metadata->name << " returned the error code " << code << "\n";
   return code;
@@ -56,6 +57,7 @@ int run_once(Call& call, const Filter& filter) {
 double seconds_of(Call& call, int iterations) {
   const auto begin = std::chrono::steady_clock::now();
   for (int i = 0; i < iterations; i++) call.run();
+  call.wait();
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
   return elapsed.count();
 }

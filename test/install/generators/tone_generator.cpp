@@ -7,6 +7,7 @@ class Tone : public Halide::Generator<Tone> {
  public:
   GeneratorParam<int> radius{"radius", 1, 0, 8};
   GeneratorParam<bool> vectorize{"vectorize", true};
+  GeneratorParam<bool> gpu{"gpu", false};
   Input<Buffer<float>> input{"input", 2};
   Input<Buffer<float>> kernel{"kernel", 1};
   Input<float> gain{"gain", 1.0f};
@@ -20,13 +21,18 @@ class Tone : public Halide::Generator<Tone> {
     output(x, y) = Halide::exp(blurred(x, y) * gain);
   }
   void schedule() {
+    if (gpu) {
+      output.gpu_tile(x, y, xi, yi, 8, 8);
+      blurred.compute_at(output, xi);
+      return;
+    }
     output.parallel(y);
     if (vectorize) output.vectorize(x, natural_vector_size<float>());
     blurred.compute_at(output, y);
   }
 
  private:
-  Var x{"x"}, y{"y"};
+  Var x{"x"}, y{"y"}, xi{"xi"}, yi{"yi"};
   Func blurred{"blurred"};
 };
 

@@ -1,0 +1,77 @@
+// A program that defines Halide's functions of contexts and streams itself: the static library that a
+// generator wrote, with the runtime in it, calls these.
+#include <HalideBuffer.h>
+#include <HalideRuntimeCuda.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <vector>
+
+#include "gpu/driver_types.h"
+#include "gpu_filter_alone.h"
+#include "support/gpu_filter_testing.h"
+#include "support/simulated_driver.h"
+
+namespace cuda = retrograde::cuda;
+
+namespace {
+
+cuda::Context context_made = nullptr;
+cuda::Stream stream_made = nullptr;
+std::vector<void*> users;  // of each context that was asked for
+int streams_given = 0, contexts_held = 0;
+
+}  // namespace
+
+extern "C" int halide_cuda_acquire_context(void* user_context, void** context, bool) {
+  users.push_back(user_context);
+  contexts_held++;
+  *context = context_made;
+  return 0;
+}
+extern "C" int halide_cuda_release_context(void*) {
+  contexts_held--;
+  return 0;
+}
+extern "C" int halide_cuda_get_stream(void*, void* context, void** stream) {
+  EXPECT_EQ(context, context_made);
+  streams_given++;
+  *stream = stream_made;
+  return 0;
+}
+
+namespace {
+
+using namespace gpu_filter_testing;
+
+TEST(AotGpuHandlers, ContextAndStreamAreTheProgramsOwn) {
+  setenv("RETROGRADE_GPU", "simulated", 1);
+  ASSERT_EQ(cuda::cuInit(0), cuda::success);
+  ASSERT_EQ(cuda::cuCtxCreate_v2(&context_made, 0, 0), cuda::success);
+  ASSERT_EQ(cuda::cuStreamCreate(&stream_made, 1), cuda::success);
+  ASSERT_EQ(cuda::cuCtxSetCurrent(nullptr), cuda::success);
+  {
+    Buffer<float, 2> in = input(64, 32), out(64, 32);
+    int user = 0;
+    ASSERT_EQ(gpu_filter_alone(&user, in, 2.0f, out), 0);
+    EXPECT_GT(streams_given, 0);
+    EXPECT_EQ(contexts_held, 0) << "what was acquired was released";
+    EXPECT_EQ(std::count(users.begin(), users.end(), &user), static_cast<int64_t>(users.size()));
+    EXPECT_EQ(live_objects().contexts, 1) << "no other was made";
+    cuda::Context current = &current;
+    ASSERT_EQ(cuda::cuCtxGetCurrent(&current), cuda::success);
+    EXPECT_EQ(current, nullptr) << "what was current is so again";
+    ASSERT_EQ(cuda::cuCtxSetCurrent(context_made), cuda::success);
+    EXPECT_EQ(cuda::cuStreamQuery(stream_made), cuda::not_ready) << "the work is on this stream";
+    EXPECT_EQ(cuda::cuStreamQuery(nullptr), cuda::success);
+    ASSERT_EQ(out.copy_to_host(), 0);
+    expect_filtered(in, 2.0f, out);
+  }
+  halide_device_release(nullptr, halide_cuda_device_interface());
+  EXPECT_EQ(live_objects().modules, 0);
+  EXPECT_EQ(live_objects().allocations, 0);
+  EXPECT_EQ(cuda::cuCtxDestroy_v2(context_made), cuda::success);
+}
+
+}  // namespace
