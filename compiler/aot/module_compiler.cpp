@@ -14,12 +14,14 @@
 #include "aot/runtime_object.h"
 #include "autoschedule/choose_schedule.h"
 #include "codegen/archive.h"
+#include "codegen/kernel_code.h"
 #include "codegen/machine.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
 #include "diagnostics/pass_observer.h"
 #include "frontend/run/compiler_interface.h"
 #include "frontend/run/module.h"
+#include "frontend/run/warnings.h"
 #include "ir/print.h"
 #include "lower/lower.h"
 
@@ -250,6 +252,13 @@ class MultitargetOutputs {
   }
 };
 
+void tell_notes(const ir::LoweredFunction& function, const Target& target) {
+  for (const auto& kernel : codegen::compile_kernels(function, options_for(target)).kernels) {
+    if (kernel.local_bytes > 0)
+      frontend::tell_warning(codegen::local_memory_note(kernel.name, kernel.local_bytes));
+  }
+}
+
 class AheadOfTime : public ModuleCompiler {
  public:
   ir::LoweredFunction lower(const PipelineSpec& pipeline,
@@ -258,9 +267,11 @@ class AheadOfTime : public ModuleCompiler {
     codegen::machine_for(target, false);  // says what cannot be compiled for before any work
     lower::LowerOptions options;
     options.target = pipeline.traced(target);
-    return lower::lower(pipeline.name,
-                        autoschedule::choose_schedule(pipeline, options.target).graph.outputs,
-                        inputs, options);
+    ir::LoweredFunction function = lower::lower(
+        pipeline.name, autoschedule::choose_schedule(pipeline, options.target).graph.outputs,
+        inputs, options);
+    if (frontend::has_warning_scope()) tell_notes(function, target);
+    return function;
   }
 
   std::vector<uint8_t> object(const Module& module) override {

@@ -9,6 +9,7 @@
 #include "codegen/unit.h"
 #include "diagnostics/error.h"
 #include "gpu/gpu_image.h"
+#include "ir/build.h"
 
 namespace retrograde::codegen {
 
@@ -136,6 +137,22 @@ void KernelSet::finish() {
   image()->setInitializer(llvm::ConstantStruct::get(
       image_type(), {b.getInt64(RETROGRADE_GPU_IMAGE_MAGIC), b.getInt64(code_.size()), text(code_),
                      b.getInt32(count), table(kernels[0]->getType(), kernels)}));
+}
+
+KernelCode KernelSet::described_code() const {
+  KernelCode result;
+  result.ptx = code_;
+  result.capability = host_.machine.target.cuda_capability();
+  for (const auto& kernel : kernels_) {
+    const auto& launch = *kernel->launch.as<ir::Launch>();
+    KernelCode::Kernel one;
+    one.symbol = kernel->name;
+    one.name = launch.name;
+    one.threads = launch.threads[0] * launch.threads[1] * launch.threads[2];
+    one.shared_bytes = ir::as_const_int(launch.shared_bytes);
+    result.kernels.push_back(std::move(one));
+  }
+  return result;
 }
 
 }  // namespace retrograde::codegen

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "codegen/device_target.h"
+#include "codegen/kernel_code.h"
 #include "ir/lowered_function.h"
 
 namespace retrograde::codegen {
@@ -42,6 +43,7 @@ class KernelSet {
   void finish();
   // The code for devices; empty before that, and where there are no kernels.
   const std::string& code() const { return code_; }
+  KernelCode described_code() const;
 
  private:
   std::string ptx();

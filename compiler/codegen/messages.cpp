@@ -8,7 +8,7 @@ using namespace ir;
 
 namespace {
 
-struct Format {
+struct MessageFormat {
   std::string text;
   std::vector<Value*> args;
 };
@@ -20,7 +20,7 @@ std::string escaped(const std::string& text) {
 }
 
 // `which`: lane of vectors to show.
-void add_part(Values& values, Format& format, const Expr& part, int which, bool printed) {
+void add_part(Values& values, MessageFormat& format, const Expr& part, int which, bool printed) {
   FunctionContext& c = values.c;
   if (const auto* literal = part.as<StringImm>()) {
     format.text += escaped(literal->value);
@@ -47,9 +47,9 @@ void add_part(Values& values, Format& format, const Expr& part, int which, bool 
   format.args.push_back(v);
 }
 
-Format format_of(Values& values, const std::vector<Expr>& parts, size_t first,
-                 const std::string& separator, int which, bool printed) {
-  Format format;
+MessageFormat format_of(Values& values, const std::vector<Expr>& parts, size_t first,
+                        const std::string& separator, int which, bool printed) {
+  MessageFormat format;
   for (size_t i = first; i < parts.size(); i++) {
     if (i > first) format.text += separator;
     add_part(values, format, parts[i], which, printed);
@@ -59,7 +59,7 @@ Format format_of(Values& values, const std::vector<Expr>& parts, size_t first,
 
 void print(Values& values, const std::vector<Expr>& parts, size_t first, int which) {
   FunctionContext& c = values.c;
-  const Format format = format_of(values, parts, first, " ", which, true);
+  const MessageFormat format = format_of(values, parts, first, " ", which, true);
   c.call_runtime("retrograde_print", c.b.getVoidTy(), {c.string_constant(format.text + "\n")},
                  &format.args);
 }
@@ -69,7 +69,7 @@ void print(Values& values, const std::vector<Expr>& parts, size_t first, int whi
 Value* report_error(Values& values, Value* code, const std::vector<Expr>& parts, size_t first,
                     const std::string& separator) {
   FunctionContext& c = values.c;
-  const Format format = format_of(values, parts, first, separator, 0, false);
+  const MessageFormat format = format_of(values, parts, first, separator, 0, false);
   return c.call_runtime("retrograde_report_error", c.b.getInt32Ty(),
                         {code, c.string_constant(format.text)}, &format.args);
 }

@@ -4,6 +4,7 @@
 
 #include "autoschedule/choose_schedule.h"
 #include "frontend/run/compiler_interface.h"
+#include "frontend/run/warnings.h"
 #include "jit/jit.h"
 #include "lower/lower.h"
 #include "retrograde_runtime.h"
@@ -161,6 +162,7 @@ class JitCompiler : public Compiler {
     jit::Options code_options;
     code_options.externs = pipeline.externs;
     auto code = jit::compile(function, target, code_options);
+    for (const std::string& note : code->notes()) frontend::tell_warning(note);
     return std::make_shared<JitPipeline>(std::move(function.args), std::move(code), target);
   }
 

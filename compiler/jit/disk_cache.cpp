@@ -241,22 +241,34 @@ std::shared_ptr<DiskCache> disk_cache() {
   return now.cache;
 }
 
-std::string disk_cache_key(const ir::LoweredFunction& function, const codegen::Options& options) {
-  const codegen::Machine machine = codegen::machine_for(options.target, options.tune_for_host);
-  Bytes content = compiler_build();
-  for (const std::string& part : {options.target.to_string(), machine.triple, machine.cpu,
-                                  machine.tune_cpu, machine.features})
-    content += number(part.size()) + part;
-  content += number(static_cast<uint64_t>(options.optimization_level));
-  content += number(static_cast<uint64_t>(options.kernels_for_executor));
-  run_on_large_stack([&] { content += fingerprint_text(function); });
+static Bytes sized(const Bytes& part) { return number(part.size()) + part; }
+
+static std::string hexadecimal(const Bytes& bytes) {
   std::string digits;
-  for (const char byte : sha256(content)) {
+  for (const char byte : bytes) {
     const char* const hex = "0123456789abcdef";
     digits += hex[static_cast<uint8_t>(byte) >> 4];
     digits += hex[static_cast<uint8_t>(byte) & 15];
   }
   return digits;
+}
+
+std::string content_key(const std::vector<std::string>& parts) {
+  Bytes content;
+  for (const std::string& part : parts) content += sized(part);
+  return hexadecimal(sha256(content));
+}
+
+std::string disk_cache_key(const ir::LoweredFunction& function, const codegen::Options& options) {
+  const codegen::Machine machine = codegen::machine_for(options.target, options.tune_for_host);
+  Bytes content = compiler_build();
+  for (const std::string& part : {options.target.to_string(), machine.triple, machine.cpu,
+                                  machine.tune_cpu, machine.features})
+    content += sized(part);
+  content += number(static_cast<uint64_t>(options.optimization_level));
+  content += number(static_cast<uint64_t>(options.kernels_for_executor));
+  run_on_large_stack([&] { content += fingerprint_text(function); });
+  return hexadecimal(sha256(content));
 }
 
 }  // namespace retrograde::jit

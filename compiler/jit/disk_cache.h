@@ -50,6 +50,7 @@ std::shared_ptr<DiskCache> open_disk_cache(const std::string& folder, int64_t ma
 // environment names.
 std::shared_ptr<DiskCache> disk_cache();
 // 64 hexadecimal digits.
+std::string content_key(const std::vector<std::string>& parts);
 std::string disk_cache_key(const ir::LoweredFunction& function, const codegen::Options& options);
 
 }  // namespace retrograde::jit

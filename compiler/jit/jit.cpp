@@ -7,23 +7,40 @@
 #include <unordered_map>
 
 #include "codegen/codegen.h"
+#include "codegen/kernel_code.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
 #include "diagnostics/pass_observer.h"
 #include "gpu/gpu_calls.h"
+#include "gpu/gpu_image.h"
 #include "ir/visit.h"
 #include "jit/disk_cache.h"
 #include "jit/fingerprint.h"
+#include "jit/kernel_images.h"
 #include "jit/linker.h"
 #include "retrograde_runtime.h"
 
 namespace retrograde::jit {
 namespace {
 
-bool launches_kernels(const ir::LoweredFunction& function) {
-  bool found = false;
-  ir::walk(function.body, [&](const ir::Launch&) { found = true; });
-  return found;
+// The names of its launches, in the order of their kernels.
+std::vector<std::string> launches_of(const ir::LoweredFunction& function) {
+  std::vector<std::string> names;
+  ir::walk(function.body, [&](const ir::Launch& n) { names.push_back(n.name); });
+  return names;
+}
+
+std::vector<std::string> notes_of(const retrograde_gpu_image& image,
+                                  const std::vector<std::string>& launches) {
+  std::vector<std::string> notes;
+  const auto local = codegen::local_bytes_by_kernel({image.ptx, image.ptx_bytes});
+  for (int32_t i = 0; i < image.num_kernels; ++i) {
+    const int64_t bytes = ir::value_or(local, image.kernels[i].name, int64_t{0});
+    const auto at = static_cast<size_t>(i);
+    if (bytes > 0 && at < launches.size())
+      notes.push_back(codegen::local_memory_note(launches[at], bytes));
+  }
+  return notes;
 }
 
 class Compiled : public CompiledFunction {
@@ -35,7 +52,11 @@ class Compiled : public CompiledFunction {
     object_ = link(code.object, code.function, externs);
     address_ = object_->find(code.function);
     argv_ = reinterpret_cast<Argv*>(object_->find(code.function + "_argv"));
-    if (launches_kernels(function)) kernels_ = object_->find(code.function + ".kernels.image");
+    if (const std::vector<std::string> launches = launches_of(function); !launches.empty()) {
+      offer_kernel_images();
+      kernels_ = object_->find(code.function + ".kernels.image");
+      notes_ = notes_of(*static_cast<const retrograde_gpu_image*>(kernels_), launches);
+    }
     times_.link_seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     tell_pass_observers({function.name, "link", times_.link_seconds, {}});
@@ -47,6 +68,7 @@ class Compiled : public CompiledFunction {
   int call(retrograde_context* context, void** args) const override { return argv_(context, args); }
   void* address() const override { return address_; }
   const CompileTimes& times() const override { return times_; }
+  const std::vector<std::string>& notes() const override { return notes_; }
 
  private:
   using Argv = int32_t(retrograde_context*, void**);
@@ -77,6 +99,7 @@ class Compiled : public CompiledFunction {
   Argv* argv_ = nullptr;
   void* kernels_ = nullptr;
   CompileTimes times_;
+  std::vector<std::string> notes_;
 };
 
 using Handle = std::shared_ptr<const CompiledFunction>;

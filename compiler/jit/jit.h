@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "ir/lowered_function.h"
 #include "ir/target.h"
@@ -42,6 +43,8 @@ class CompiledFunction {
   virtual void* address() const = 0;
   // What compiling it took; a later hit in the cache costs nothing of it.
   virtual const CompileTimes& times() const = 0;
+  // What is slower in it than it need be: performance notes, of its kernels.
+  virtual const std::vector<std::string>& notes() const = 0;
 };
 
 struct Options {

@@ -59,6 +59,25 @@ void bind_report(py::module_& m) {
       .def("__str__", &ScheduleReport::to_string);
 }
 
+void bind_kernel_report(py::module_& m) {
+  Class<KernelReport> report(m, "KernelReport");
+  using Kernel = KernelReport::Kernel;
+  Class<Kernel>(report, "Kernel", {"KernelReport::Kernel"})
+      .def_readonly("name", &Kernel::name)
+      .def_readonly("threads", &Kernel::threads)
+      .def_readonly("shared_bytes", &Kernel::shared_bytes)
+      .def_readonly("local_bytes", &Kernel::local_bytes)
+      .def_readonly("registers", &Kernel::registers)
+      .def_readonly("stack_bytes", &Kernel::stack_bytes)
+      .def_readonly("spill_bytes", &Kernel::spill_bytes);
+  report.def_readonly("kernels", &KernelReport::kernels)
+      .def_readonly("assembler", &KernelReport::assembler)
+      .def_readonly("notes", &KernelReport::notes)
+      .def("to_string", &KernelReport::to_string)
+      .def("to_json", &KernelReport::to_json)
+      .def("__str__", &KernelReport::to_string);
+}
+
 ScheduleReport explained(const Pipeline& pipeline, const Target& target, const py::object& outputs,
                          const ExplainOptions& options) {
   const Outputs to = outputs_from(outputs, "explain the schedule");
@@ -74,6 +93,13 @@ ScheduleReport explained(const Pipeline& pipeline, const Target& target, const p
 void bind_schedule_log(py::module_& m) {
   bind_log(m);
   bind_report(m);
+  bind_kernel_report(m);
+  def(
+      m, "explain_kernels",
+      [](const Pipeline& pipeline, const Target& target) {
+        return unlocked([=](const Interruption&) { return explain_kernels(pipeline, target); });
+      },
+      arg("pipeline"), arg("target"));
   reopened<Pipeline>(m, "Pipeline", {})
       .def("schedule_log", &Pipeline::schedule_log)
       .def("apply_schedule", &Pipeline::apply_schedule, arg("log"))

@@ -67,12 +67,16 @@ int32_t Program::load_module(const Session& session, Module& module) const {
   const retrograde_gpu_image* given = image();
   if (session.driver().is_simulated && !is_simulated())
     return session.request.refuse(
-        "the simulated device runs kernels that were compiled for it", "these were compiled for devices alone",
+        "the simulated device runs kernels that were compiled for it",
+        "these were compiled for devices alone",
         "Compile them again with RETROGRADE_GPU=simulated in the environment of the compiler");
   if (given && !given->ptx && !session.driver().is_simulated)
     return session.request.refuse("kernels for a device must have been compiled to PTX",
                                   "these were compiled for the simulated device alone",
                                   "Set RETROGRADE_GPU=simulated, or compile them for a device");
+  const char* ptx = given ? given->ptx : static_cast<const char*>(source_);
+  const uint64_t ptx_bytes = given ? given->ptx_bytes : static_cast<uint64_t>(bytes_);
+  if (ptx && load_assembled(session, ptx, ptx_bytes, module)) return 0;
   char log[1024] = "";
   int options[] = {jit_error_log, jit_error_log_bytes};
   void* values[] = {log, reinterpret_cast<void*>(sizeof log - 1)};

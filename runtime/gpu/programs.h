@@ -50,6 +50,9 @@ class Program {
   std::list<LoadedProgram> loaded_;
 };
 
+// assembler.cpp: what the program's assembler makes of PTX, loaded; false: nothing is.
+bool load_assembled(const Session&, const char* ptx, uint64_t bytes, Module&);
+
 std::shared_ptr<Program> find_program(const void* source);
 // Made unless there is one.
 std::shared_ptr<Program> make_program(const void* source, int64_t bytes);

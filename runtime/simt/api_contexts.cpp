@@ -142,6 +142,8 @@ RETROGRADE_SIMT_EXPORT Result cuGetErrorString(Result result, const char** text)
 }
 
 RETROGRADE_SIMT_EXPORT Result cuDriverGetVersion(int* version) {
+  const std::lock_guard lock(driver_mutex());
+  if (const Result verdict = begin_call("cuDriverGetVersion"); verdict != success) return verdict;
   *version = 12000;
   return success;
 }

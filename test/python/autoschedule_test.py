@@ -100,6 +100,21 @@ class Logs(unittest.TestCase):
         self.assertGreater(measured.measured_ms, 0)
         self.assertTrue(out.any() and str(measured) and measured.to_json())
 
+    def test_what_kernels_take(self):
+        image, horizontal, vertical = blur()
+        self.assertEqual(rg.explain_kernels(rg.Pipeline(vertical), HOST).kernels, [])
+        xi, yi = rg.Var("xi"), rg.Var("yi")
+        vertical.gpu_tile(x, y, xi, yi, 16, 8)
+        horizontal.compute_at(vertical, x).gpu_threads(x, y)
+        report = rg.explain_kernels(rg.Pipeline(vertical), rg.Target("host-cuda-cuda_capability_80"))
+        (kernel,) = report.kernels
+        self.assertEqual((kernel.threads % 16, kernel.local_bytes, report.notes), (0, 0, []))
+        self.assertGreater(kernel.shared_bytes, 0)
+        self.assertIn(kernel.name, str(report))
+        if kernel.registers is not None:
+            self.assertGreater(kernel.registers, 0)
+            self.assertEqual((kernel.stack_bytes, kernel.spill_bytes), (0, 0))
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <string>
 #include <vector>
 
 #include "gpu/gpu_image.h"
@@ -119,6 +120,11 @@ class Image {
   Image(const Image&) = delete;
   const char* source() const { return reinterpret_cast<const char*>(&image_); }
   static constexpr int bytes = sizeof(retrograde_gpu_image);
+  // For devices; the text lives as long as the image.
+  void set_ptx(const char* text) {
+    image_.ptx = text;
+    image_.ptx_bytes = std::char_traits<char>::length(text);
+  }
 
  private:
   const std::vector<retrograde_gpu_kernel> kernels_;

@@ -176,6 +176,11 @@ void tell_warnings(const std::vector<FuncPtr>& outputs) {
   for (const std::string& warning : warnings_of(outputs)) listener(warning);
 }
 
+void tell_warning(const std::string& warning) {
+  if (listener) listener(warning);
+}
+bool has_warning_scope() { return static_cast<bool>(listener); }
+
 }  // namespace retrograde::frontend
 
 namespace retrograde {

@@ -1,6 +1,7 @@
 // warnings.h -- what is legal in a pipeline but hardly meant: definitions that no result needs,
 // updates without a schedule beside definitions that have one, loops that run once as vectors. And
-// what is slower than it need be: a gradient that nobody scheduled, as a performance note.
+// what is slower than it need be, as performance notes: a gradient that nobody scheduled; kernels whose
+// arrays lie in local memory, which compiling alone finds.
 //
 //   {
 //     WarningScope scope([](const std::string& warning) { log(warning); });
@@ -37,6 +38,8 @@ namespace frontend {
 std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs);
 // To the scope around, if there is one.
 void tell_warnings(const std::vector<FuncPtr>& outputs);
+void tell_warning(const std::string& warning);
+bool has_warning_scope();
 }  // namespace frontend
 
 }  // namespace retrograde

@@ -28,6 +28,7 @@
 #include "frontend/language/var.h"
 #include "frontend/run/callable.h"
 #include "frontend/run/compile_cache.h"
+#include "frontend/run/kernel_report.h"
 #include "frontend/run/module.h"
 #include "frontend/run/param_map.h"
 #include "frontend/run/pipeline.h"
