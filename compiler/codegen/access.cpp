@@ -1,5 +1,7 @@
 #include "codegen/access.h"
 
+#include <bit>
+
 #include "ir/build.h"
 #include "ir/visit.h"
 
@@ -103,6 +105,24 @@ Value* lane_index(Emitter& e, Value* first, Value* stride, int lane) {
 }
 
 llvm::Align alignment_of(Type type) { return llvm::Align(static_cast<uint64_t>(type.bytes())); }
+
+uint64_t access_bytes(Type type) {
+  return static_cast<uint64_t>(type.bytes()) * static_cast<uint64_t>(type.lanes());
+}
+
+// Of private memory no address is taken: its vectors become registers.
+bool can_be_one_access(const Emitter& e, const Storage& storage, Type type) {
+  return e.machine.is_device() && !storage.is_private && !type.is_scalar() &&
+         std::has_single_bit(access_bytes(type)) &&
+         access_bytes(type) * 8 <= static_cast<uint64_t>(e.machine.vector_bits);
+}
+
+Value* is_aligned(FunctionContext& c, Value* pointer, Type type) {
+  llvm::Type* number = c.e.module.getDataLayout().getIntPtrType(pointer->getType());
+  Value* rest = c.b.CreateAnd(c.b.CreatePtrToInt(pointer, number),
+                              llvm::ConstantInt::get(number, access_bytes(type) - 1));
+  return c.b.CreateIsNull(rest);
+}
 
 // Lanes of one register. Wider vectors are read and written register by register: LLVM keeps an array
 // in registers only where its loads are as wide as its stores, and else cuts whole vectors as one

@@ -31,6 +31,10 @@ Value* element_pointer(Emitter& e, const Storage& from, Type type, Value* index)
 Value* lane_index(Emitter& e, Value* first, Value* stride, int lane);
 llvm::Align alignment_of(Type type);
 int native_lanes(const Machine& machine, Type type);
+// Whether a kernel may access these lanes, one behind the other, at once; and whether they stand so.
+bool can_be_one_access(const Emitter& e, const Storage& storage, Type type);
+Value* is_aligned(FunctionContext& c, Value* pointer, Type type);
+uint64_t access_bytes(Type type);
 template <class Instruction>
 Instruction* tagged(Instruction* instruction, const Storage& storage) {
   if (storage.alias) instruction->setMetadata(llvm::LLVMContext::MD_tbaa, storage.alias);

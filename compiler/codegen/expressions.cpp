@@ -185,8 +185,7 @@ Value* Values::make(const Shuffle& e) {
 
 Value* Values::make(const VectorReduce& e) {
   const Type element = e.type.element_of();
-  if (e.type.is_bool() && e.type.is_scalar() && e.op == Kind::Or)
-    return any_lane(c.e, of(e.value));
+  if (e.type.is_bool() && e.type.is_scalar() && e.op == Kind::Or) return any_lane(c.e, of(e.value));
   if (e.type.is_bool() && e.type.is_scalar() && e.op == Kind::And)
     return c.b.CreateNot(any_lane(c.e, c.b.CreateNot(of(e.value))));
   return reduce_groups(c.e, reduced_in_part(*this, e), e.type.lanes(), [&](Value* a, Value* b) {
@@ -211,8 +210,13 @@ Value* Values::make_index64(const Expr& e) {
     if (const auto* sum = e.as<Add>()) return c.b.CreateAdd(index64(sum->a), index64(sum->b));
     if (const auto* difference = e.as<Sub>())
       return c.b.CreateSub(index64(difference->a), index64(difference->b));
-    if (const auto* product = e.as<Mul>())
-      return c.b.CreateMul(index64(product->a), index64(product->b));
+    if (const auto* product = e.as<Mul>()) {
+      // Factors are coordinates and strides, of 32 bits; a device has one instruction for their product.
+      const auto factor = [&](const Expr& f) {
+        return c.e.machine.is_device() ? c.b.CreateSExt(of(f), c.b.getInt64Ty()) : index64(f);
+      };
+      return c.b.CreateMul(factor(product->a), factor(product->b));
+    }
     const auto* call = e.as<Call>();
     if (call && call->call_type == CallType::Operator && op_info(call->op).cls == OpClass::Marker) {
       return index64(call->args[0]);

@@ -17,6 +17,7 @@ struct Storage {
   Value* owned =
       nullptr;  // slot of a heap block to free, null once freed; null when not ours to free
   llvm::MDNode* alias = nullptr;  // what else it may overlap: only memory of the same tag
+  bool is_private = false;  // a thread's own of a kernel: registers, if its places are constants
 };
 
 // Values of nodes, as far as they hold at the insertion point. The handle keeps the node's

@@ -85,7 +85,7 @@ Storage FunctionGenerator::allocate_in_kernel(const Allocate& s) {
   llvm::AllocaInst* block =
       c_.entry_alloca(memory_type(e_, s.type), *elements * s.type.lanes(), s.name);
   block->setAlignment(llvm::Align(16));
-  return {block, nullptr, alias_tag(e_, s.name)};
+  return {block, nullptr, alias_tag(e_, s.name), true};
 }
 
 }  // namespace retrograde::codegen

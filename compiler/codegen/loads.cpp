@@ -26,6 +26,27 @@ static Value* load_lanes_under(FunctionContext& c, const Storage& from, Type typ
   return from_memory(c.e, type, from_lanes(c.e, lanes));
 }
 
+// A kernel's vector in one access where its address is a multiple of its size, which buffers decide when it
+// runs; else lane by lane.
+static Value* load_if_aligned(FunctionContext& c, const Storage& from, Type type, Value* pointer) {
+  auto* element = memory_type(c.e, type);
+  return c.chosen(
+      is_aligned(c, pointer, type),
+      [&]() -> Value* {
+        auto* vector = with_lanes(element, type.lanes());
+        return tagged(c.b.CreateAlignedLoad(vector, pointer, llvm::Align(access_bytes(type))),
+                      from);
+      },
+      [&]() -> Value* {
+        std::vector<Value*> lanes;
+        for (int i = 0; i < type.lanes(); ++i) {
+          Value* at = c.b.CreateGEP(element, pointer, c.int64(i));
+          lanes.push_back(tagged(c.b.CreateAlignedLoad(element, at, alignment_of(type)), from));
+        }
+        return from_lanes(c.e, lanes);
+      });
+}
+
 Value* load_dense(FunctionContext& c, const Storage& from, Type type, Value* first,
                   Value* predicate) {
   if (predicate && c.e.machine.is_device())
@@ -41,6 +62,8 @@ Value* load_dense(FunctionContext& c, const Storage& from, Type type, Value* fir
   }
   auto* vector = with_lanes(memory_type(c.e, type), lanes);
   Value* pointer = element_pointer(c.e, from, type, first);
+  if (can_be_one_access(c.e, from, type))
+    return from_memory(c.e, type, load_if_aligned(c, from, type, pointer));
   if (!predicate)
     return from_memory(c.e, type,
                        tagged(c.b.CreateAlignedLoad(vector, pointer, alignment_of(type)), from));

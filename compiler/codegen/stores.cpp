@@ -33,6 +33,19 @@ void store_dense(FunctionContext& c, const Storage& to, Type type, Value* first,
     return;
   }
   Value *pointer = element_pointer(c.e, to, type, first), *bytes = to_memory(c.e, type, stored);
+  if (can_be_one_access(c.e, to, type)) {
+    Value* whole = is_aligned(c, pointer, type);
+    c.if_true(whole, [&] {
+      tagged(c.b.CreateAlignedStore(bytes, pointer, llvm::Align(access_bytes(type))), to);
+    });
+    c.if_true(c.b.CreateNot(whole), [&] {
+      for (int i = 0; i < lanes; ++i) {
+        Value* at = c.b.CreateGEP(memory_type(c.e, type), pointer, c.int64(i));
+        tagged(c.b.CreateAlignedStore(lane(c.e, bytes, i), at, alignment_of(type)), to);
+      }
+    });
+    return;
+  }
   if (predicate) {
     tagged(c.b.CreateMaskedStore(bytes, pointer, alignment_of(type), predicate), to);
   } else {

@@ -1,5 +1,7 @@
 #include "support/gpu_programs.h"
 
+#include <algorithm>
+
 namespace gpu_programs {
 namespace {
 
@@ -23,9 +25,10 @@ Func tiled(Func f, bool on_gpu, int width = 16, int height = 8) {
 
 // ---- from linear algebra ----
 
-Func matrix_product(bool on_gpu) {
-  const Buffer<float> a = picture(64, 64), b = picture(64, 64);
-  RDom r(0, 64, "r");
+Func matrix_product(bool on_gpu, int scale) {
+  const int n = 64 * scale;
+  const Buffer<float> a = picture(n, n), b = picture(n, n);
+  RDom r(0, n, "r");
   RVar ro("ro"), ri("ri");
   Func sum("sum"), out("out"), left("left"), right("right");
   left(x, y) = a(x, y);
@@ -45,8 +48,8 @@ Func matrix_product(bool on_gpu) {
 
 // ---- filters ----
 
-Func convolution(bool on_gpu) {
-  const Buffer<float> in = picture(100, 60), weights = picture(3, 3);
+Func convolution(bool on_gpu, int scale) {
+  const Buffer<float> in = picture(100 * scale, 60 * scale), weights = picture(3, 3);
   RDom r(-1, 3, -1, 3, "r");
   Func tile("tile"), sum("sum"), out("out");
   tile(x, y) = BoundaryConditions::repeat_edge(in)(x, y);
@@ -61,8 +64,8 @@ Func convolution(bool on_gpu) {
   return out;
 }
 
-Func separable_blur(bool on_gpu) {
-  const Buffer<float> in = picture(128, 64);
+Func separable_blur(bool on_gpu, int scale) {
+  const Buffer<float> in = picture(128 * scale, 64 * scale);
   Func rows("rows"), out("out");
   const Func image = BoundaryConditions::mirror_image(in);
   rows(x, y) = (image(x - 1, y) + 2.0f * image(x, y) + image(x + 1, y)) / 4.0f;
@@ -74,21 +77,22 @@ Func separable_blur(bool on_gpu) {
   return out;
 }
 
-Func tone_curve(bool on_gpu) {
-  const Buffer<float> in = picture(256, 64);
+Func tone_curve(bool on_gpu, int scale) {
+  const Buffer<float> in = picture(256 * scale, 64 * scale);
   Func out("out");
   out(x, y) = in(x, y) * in(x, y) * (3.0f - 2.0f * in(x, y));
   if (on_gpu) out.gpu_tile(x, y, xi, yi, 64, 4);
   return out;
 }
 
-Func recursive_filter(bool on_gpu) {
-  const Buffer<float> in = picture(48, 80);
-  RDom forth(1, 47, "forth"), back(1, 47, "back");
+Func recursive_filter(bool on_gpu, int scale) {
+  const int width = 48 * scale, last = width - 1;
+  const Buffer<float> in = picture(width, 80 * scale);
+  RDom forth(1, last, "forth"), back(1, last, "back");
   Func out("out");
   out(x, y) = in(x, y);
   out(forth, y) = 0.6f * out(forth - 1, y) + 0.4f * in(forth, y);
-  out(47 - back, y) = 0.6f * out(48 - back, y) + 0.4f * out(47 - back, y);
+  out(last - back, y) = 0.6f * out(width - back, y) + 0.4f * out(last - back, y);
   out.compute_root();
   if (on_gpu) {
     out.gpu_tile(x, y, xi, yi, 16, 8);
@@ -114,8 +118,8 @@ Func twice_as_large(Func f, const std::string& name) {
 }
 
 // Paris, Hasinoff, Kautz: Local Laplacian Filters (SIGGRAPH 2011), with few levels.
-Func local_laplacian(bool on_gpu) {
-  const Buffer<float> in = picture(64, 48);
+Func local_laplacian(bool on_gpu, int scale) {
+  const Buffer<float> in = picture(64 * scale, 48 * scale);
   constexpr int levels = 3, tones = 4;
   Func image("image"), remapped("remapped");
   image(x, y) = BoundaryConditions::repeat_edge(in)(x, y);
@@ -150,9 +154,9 @@ Func local_laplacian(bool on_gpu) {
 }
 
 // Chen, Paris, Durand: Real-time Edge-Aware Image Processing with the Bilateral Grid (SIGGRAPH 2007).
-Func bilateral_grid(bool on_gpu) {
+Func bilateral_grid(bool on_gpu, int scale) {
   constexpr int cell = 8, tones = 8;
-  const Buffer<float> in = picture(64, 48);
+  const Buffer<float> in = picture(64 * scale, 48 * scale);
   const Func image = BoundaryConditions::repeat_edge(in);
   RDom r(0, cell, 0, cell, "r");
   Func grid("grid"), along_z("along_z"), along_x("along_x"), along_y("along_y"), out("out");
@@ -178,8 +182,8 @@ Func bilateral_grid(bool on_gpu) {
 }
 
 // A raw picture to colours: faulty points, the colours between, a matrix, a curve.
-Func camera_pipe(bool on_gpu) {
-  Buffer<uint16_t> raw(72, 52);
+Func camera_pipe(bool on_gpu, int scale) {
+  Buffer<uint16_t> raw(72 * scale, 52 * scale);
   raw.for_each_element([&](int i, int j) {
     raw(i, j) = static_cast<uint16_t>((i * 131 + j * 57 + (i * j) % 97) % 1024);
   });
@@ -224,16 +228,18 @@ Func camera_pipe(bool on_gpu) {
 }
 
 // A step of learning a filter: its weights, less a part of the gradient of the loss.
-Func training_step(bool on_gpu) {
-  const Buffer<float> in = picture(66, 34), wanted = picture(64, 32), start = picture(3, 3);
-  RDom r(0, 3, 0, 3, "r"), all(0, 64, 0, 32, "all");
+Func training_step(bool on_gpu, int scale) {
+  const int width = 64 * scale, height = 32 * scale;
+  const Buffer<float> in = picture(width + 2, height + 2), wanted = picture(width, height),
+                      start = picture(3, 3);
+  RDom r(0, 3, 0, 3, "r"), all(0, width, 0, height, "all");
   Func weights("weights"), filtered("filtered"), loss("loss"), step("step");
   weights(x, y) = start(x, y);
   filtered(x, y) = 0.0f;
   filtered(x, y) += in(x + r.x, y + r.y) * weights(r.x, r.y);
   const Expr error = filtered(all.x, all.y) - wanted(all.x, all.y);
   loss() = 0.0f;
-  loss() += error * error / (64.0f * 32.0f);
+  loss() += error * error / static_cast<float>(width * height);
   const Derivative d = propagate_adjoints(loss);
   Func gradient = d(weights);
   step(x, y) = weights(x, y) - 0.1f * gradient(x, y);
@@ -277,20 +283,45 @@ Program reduction(int values) {
     }
     return total;
   };
-  return {"reduction", build, {1}};
+  return {"reduction", build, {1}, false, 4.0 * values, 1.0 * values, 1 << 10};
 }
 
-std::vector<Program> all() {
-  return {{"tone_curve", tone_curve, {256, 64}, true},
-          {"separable_blur", separable_blur, {128, 64}, true},
-          {"convolution", convolution, {100, 60}},
-          {"matrix_product", matrix_product, {64, 64}},
-          {"recursive_filter", recursive_filter, {48, 80}},
-          {"local_laplacian", local_laplacian, {64, 48}},
-          {"bilateral_grid", bilateral_grid, {64, 48}},
-          {"camera_pipe", camera_pipe, {72, 52, 3}},
-          {"training_step", training_step, {3, 3}},
-          reduction(1 << 14)};
+std::vector<Program> all(int scale) {
+  using Builder = Func(bool on_gpu, int scale);
+  std::vector<Program> programs;
+  // Bytes and operations of an element of the output's first two dimensions.
+  const auto add = [&](const char* name, Builder* build, std::vector<int> sizes, double bytes,
+                       double operations, int timing_scale) {
+    for (size_t d = 0; d < std::min<size_t>(sizes.size(), 2); ++d) sizes[d] *= scale;
+    const double elements = static_cast<double>(sizes[0]) * sizes[1];
+    programs.push_back({name, [=](bool on_gpu) { return build(on_gpu, scale); }, sizes, false,
+                        bytes * elements, operations * elements, timing_scale});
+  };
+  add("tone_curve", tone_curve, {256, 64}, 8, 5, 32);
+  add("separable_blur", separable_blur, {128, 64}, 8, 8, 64);
+  for (Program& program : programs) program.is_streaming = true;
+  add("convolution", convolution, {100, 60}, 8, 18, 64);
+  add("matrix_product", matrix_product, {64, 64}, 12, 2.0 * 64 * scale, 32);
+  add("recursive_filter", recursive_filter, {48, 80}, 8, 6, 64);
+  add("local_laplacian", local_laplacian, {64, 48}, 8, 0, 64);
+  add("bilateral_grid", bilateral_grid, {64, 48}, 8, 0, 64);
+  add("camera_pipe", camera_pipe, {72, 52, 3}, 14, 0, 64);
+  programs.push_back({"training_step",
+                      [=](bool on_gpu) { return training_step(on_gpu, scale); },
+                      {3, 3},
+                      false,
+                      8.0 * 64 * 32 * scale * scale,
+                      (18.0 + 3 + 18) * 64 * 32 * scale * scale,
+                      16});
+  programs.push_back(reduction((1 << 14) * scale));
+  return programs;
+}
+
+Program named(const std::string& name, int scale) {
+  for (Program& program : all(scale)) {
+    if (program.name == name) return program;
+  }
+  return {};
 }
 
 }  // namespace gpu_programs

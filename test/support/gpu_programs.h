@@ -16,12 +16,17 @@ struct Program {
   std::function<retrograde::Func(bool on_gpu)> build;
   std::vector<int> sizes;
   bool is_streaming = false;  // each kernel reads and stores rows: then sectors of memory are few
+  // What it cannot do without at these sizes: bytes of its inputs and outputs; products and sums.
+  double bytes = 0, operations = 0;
+  int timing_scale = 1;  // at which a large device has enough to do
 };
 
 inline void PrintTo(const Program& program, std::ostream* out) { *out << program.name; }
 
-std::vector<Program> all();
-// The sum of so many values: of each thread, of a block's threads, of all.
+// As tests have them, or larger by a factor in each dimension.
+std::vector<Program> all(int scale = 1);
+Program named(const std::string& name, int scale = 1);
+// Sums of so many values, by blocks first.
 Program reduction(int values);
 float reduced_value(int i);
 
