@@ -1,6 +1,7 @@
 // schedule_log.cpp -- schedules as values, and what they cost.
 #include "bind_all.h"
 #include "binding.h"
+#include "frontend/run/kernel_report.h"
 #include "func_class.h"
 #include "runnable.h"
 
