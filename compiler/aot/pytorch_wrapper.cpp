@@ -50,7 +50,7 @@ std::string scalar_type(const ExportArgument& argument) {
                                : "at::kLong";
   if (type.is_uint() && type.bits() == 8) return "at::kByte";
   unsupported("write a wrapper for PyTorch",
-              "its arguments are tensors and numbers that PyTorch has",
+              "what PyTorch calls has tensors and numbers that PyTorch has",
               quoted(argument.name) + " holds " + to_string(type), "Use another element type");
 }
 
@@ -84,7 +84,8 @@ Function function_of(const DeclaredFunction& declared) {
   Function function{declared.name, declared.signature.user_context, {}, {}, {}};
   if (name_parts(declared.name).size() > 1) {
     unsupported("write a wrapper for PyTorch of " + quoted(declared.name),
-                "the function has a name of C", "it is in a namespace", "Leave the namespace out");
+                "what PyTorch calls has a name of C", "it is in a namespace",
+                "Leave the namespace out");
   }
   for (const ExportArgument& argument : declared.signature.arguments) {
     if (argument.name == "__user_context") continue;

@@ -23,6 +23,7 @@ class FunctionGenerator {
   // Adds `name` and `name_argv` to the module.
   void generate();
   llvm::Function* generate_kernel(KernelUse& kernel);
+  // Of the function, once it is generated.
   const KernelSet& kernels() const { return kernels_; }
 
  private:

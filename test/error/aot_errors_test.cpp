@@ -129,7 +129,7 @@ TEST_F(AotErrors, WrappersForPyTorchOfWhatItHasNot) {
   expect_error<Unsupported>({"tensors and numbers that PyTorch has", "\"wide\" holds uint16"}, [&] {
     wide.compile_to({{OutputFileType::pytorch_wrapper, path("a")}}, {}, "a", host);
   });
-  expect_error<Unsupported>({"the function has a name of C", "n::a"}, [&] {
+  expect_error<Unsupported>({"what PyTorch calls has a name of C", "n::a"}, [&] {
     f.compile_to({{OutputFileType::pytorch_wrapper, path("a")}}, {in, gain}, "n::a",
                  host.with_feature(Target::CPlusPlusMangling));
   });

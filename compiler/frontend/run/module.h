@@ -92,9 +92,8 @@ class Module {
   // Requires: an output file's folder must exist and be writable; a module is compiled to machine
   // code, LLVM's formats, statements and headers (Unsupported); only generators have stubs and
   // schedules (Unsupported); functions of a module and its submodules have different names; a
-  // module and its submodules are made for one target (Unsupported); of what has a wrapper for
-  // PyTorch its arguments are tensors and numbers that PyTorch has (Unsupported), and the function
-  // has a name of C (Unsupported).
+  // module and its submodules are made for one target (Unsupported); what PyTorch calls has tensors
+  // and numbers that PyTorch has (Unsupported); what PyTorch calls has a name of C (Unsupported).
   void compile(const std::map<OutputFileType, std::string>& output_files) const;
   // The object file.
   Buffer<uint8_t> compile_to_buffer() const;
