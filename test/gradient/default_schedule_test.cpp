@@ -508,7 +508,7 @@ TEST_F(DefaultSchedule, WhatLanesReadAcrossRowsIsCopiedTurned) {
 
 // A panel of all rows is too large to stay in a near cache: one of a block of them is copied at once.
 TEST_F(DefaultSchedule, PanelsOfLongProductsArePackedBlockByBlock) {
-  constexpr int rows = 40, inner = 500, columns = 512;
+  constexpr int rows = 40, inner = 1100, columns = 512;
   const Buffer<float> left = gradient::random_image({inner, rows}, -1, 1, 1);
   const Buffer<float> right = gradient::random_image({columns, inner}, -1, 1, 2);
   Func product("product");

@@ -104,14 +104,16 @@ TEST(SlicesOfAFunc, AreNotWhereAnIterationReadsTwo) {
 // A histogram of each tile of several pictures, blurred along its bins, then along rows of tiles.
 struct BlurredHistograms {
   BlurredHistograms() {
-    const RDom pixel(0, 4, 0, 4);
+    const RDom pixel(0, 4, 0, 4), near(-1, 3);
     const auto value = [&](const Expr& px, const Expr& py) {
       return (px * 7 + py * 13 + n) % bins;
     };
     counts(x, y, z, n) = 0.0f;
     counts(x, y, value(4 * x + pixel.x, 4 * y + pixel.y), n) += 1.0f;
-    deep(x, y, z, n) = counts(x, y, clamp(z - 1, 0, bins - 1), n) + counts(x, y, z, n);
-    wide(x, y, z, n) = deep(x, y, z, n) + deep(x, y + 1, z, n);
+    deep(x, y, z, n) = 0.0f;
+    deep(x, y, z, n) += counts(x, y, clamp(z + near, 0, bins - 1), n);
+    wide(x, y, z, n) = 0.0f;
+    wide(x, y, z, n) += deep(x, y + near, z, n);
     out(x, y, z, n) = wide(x, y, z, n) + wide(x + 1, y, z, n);
   }
   static constexpr int bins = 24;
