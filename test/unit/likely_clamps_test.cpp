@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <functional>
+#include <vector>
 
+#include "ir/atomic_update.h"
 #include "ir/visit.h"
 #include "lower/lower.h"
 #include "retrograde/retrograde.h"
@@ -71,6 +73,34 @@ TEST(LikelyClamps, NotWhereDataOrMovingLimitsDecide) {
   by_data.vectorize(x, 8, TailStrategy::RoundUp), moving.vectorize(x, 8, TailStrategy::RoundUp);
   EXPECT_EQ(vector_loads(by_data).dense, 0);
   EXPECT_EQ(vector_loads(moving).dense, 0);
+}
+
+// What an update's own index reads stays as it is in the place that is stored to: else an atomic update
+// would read the element beside the exchange, and lose others' sums.
+TEST(LikelyClamps, NotInTheIndicesByWhichAnUpdateAccumulates) {
+  ImageParam in(Int(32), 1, "in");
+  constexpr int samples = 100000;
+  const RDom r(0, samples);
+  const Expr bin = in(clamp(r, 0, in.dim(0).extent() - 1));
+  Func sums("sums");
+  sums(x) = 0;
+  sums(clamp(bin, 0, 4)) += bin;
+  sums.update().atomic().parallel(r);
+  int updates = 0, others = 0;  // of each part of the loop
+  const std::vector<graph::FuncPtr> outputs = {sums.function()};
+  const ir::LoweredFunction code =
+      lower::lower("sums", outputs, lower::infer_arguments(outputs), lower::LowerOptions());
+  ir::walk(code.body, [&](const ir::Atomic& atomic) {
+    const auto* store = atomic.body.as<ir::Store>();
+    ++(store && ir::find_atomic_update(*store) ? updates : others);
+  });
+  EXPECT_GT(updates, 0);
+  EXPECT_EQ(others, 0);
+  Buffer<int> data(samples);
+  data.for_each_element([&](int i) { data(i) = i % 5; });
+  in.set(data);
+  const Buffer<int> found = sums.realize({5});
+  for (int i = 0; i < 5; i++) EXPECT_EQ(found(i), i * (samples / 5));
 }
 
 TEST(LikelyClamps, EverySizeAndLimitGivesThePlainLoopsValues) {

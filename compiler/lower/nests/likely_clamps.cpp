@@ -69,8 +69,8 @@ void mark_stage(const LoopedFunc& f, Definition& stage) {
     const bool reads_element =
         call && (call->call_type == CallType::Func || call->call_type == CallType::Image);
     if (!reads_element) return {};
-    const Expr read = map_children(e, recurse);
-    return call->symbol.raw() == f.func.get() ? read : map_children(read, index);
+    const bool is_own = call->symbol.raw() == f.func.get();
+    return is_own ? e : map_children(map_children(e, recurse), index);
   });
   for (Expr& value : stage.values) value = reads(value);
 }

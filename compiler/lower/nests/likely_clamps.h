@@ -7,8 +7,8 @@
 // alone decide, between limits that they do not move, in the indices of what it reads: a place that
 // data decide may lie anywhere, and so may one whose limits move along.
 //
-// Not done: the indices of a Func that its own update reads, which say by being the same as those
-// that it stores to that the update accumulates.
+// Not done: the indices of a Func that its own update reads, and what these read in turn: they say by
+// being the same as those that it stores to that the update accumulates.
 // Source: ours, of what partition_loops says of likely. Tests: test/unit/likely_clamps_test.cpp.
 #pragma once
 
