@@ -81,19 +81,35 @@ Interval BoundsEngine::sum_bounds(const Sum& form) {
   return apart ? *apart : sum_of_bounds(form);
 }
 
-// Whether something that varies is in both, and less of it in their sum; in sides of sides, too.
-bool BoundsEngine::shares_varying(const Sum& rest, const Sum& side, int64_t factor) {
-  return std::ranges::any_of(side.terms, [&](const Term& part) {
-    const Expr& atom = part.atom;
-    if (!varies(atom)) return false;
-    const int64_t sign = (part.factor > 0) == (factor > 0) ? 1 : -1;
+// What varies of a sum, with its sign; of minima and maxima, too, what is in either side, and what is divided, of which
+// a remainder may be left. Minima share their sides: the first few are enough.
+void BoundsEngine::collect_varying(const Sum& form, bool negated,
+                                   std::vector<std::pair<Expr, bool>>& found) {
+  for (const Term& term : form.terms) {
+    const Expr& atom = term.atom;
+    if (found.size() >= most_varying || !varies(atom)) continue;
+    const bool negative = (term.factor < 0) != negated;
     if (atom.kind() == Kind::Min || atom.kind() == Kind::Max) {
       const auto& op = *atom.as<Binary>();
-      return shares_varying(rest, linear_form(op.a), sign) ||
-             shares_varying(rest, linear_form(op.b), sign);
+      collect_varying(linear_form(op.a), negative, found);
+      collect_varying(linear_form(op.b), negative, found);
+    } else if (const Div* div = atom.as<Div>(); div && as_const_int(div->b).value_or(0) > 0) {
+      collect_varying(linear_form(div->a), negative, found);
+    } else {
+      found.emplace_back(atom, negative);
     }
-    return std::ranges::any_of(rest.terms, [&](const Term& t) {
-      return t.atom.same_as(atom) && (t.factor > 0) != (sign > 0);
+  }
+}
+
+// Whether something that varies is in both, and less of it in their sum.
+bool BoundsEngine::shares_varying(const Sum& rest, const Sum& side, int64_t factor) {
+  std::vector<std::pair<Expr, bool>> of_rest, of_side;
+  collect_varying(side, factor < 0, of_side);
+  if (of_side.empty()) return false;
+  collect_varying(rest, false, of_rest);
+  return std::ranges::any_of(of_side, [&](const auto& part) {
+    return std::ranges::any_of(of_rest, [&](const auto& other) {
+      return other.second != part.second && other.first.same_as(part.first);
     });
   });
 }

@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/interval.h"
@@ -53,6 +54,7 @@ class BoundsEngine {
   Interval sum_of_bounds(const Sum& form);
   std::optional<Interval> bounds_by_facts(const Sum& form);
   std::optional<Interval> bounds_by_sides(const Sum& form);
+  void collect_varying(const Sum& form, bool negated, std::vector<std::pair<Expr, bool>>& found);
   bool shares_varying(const Sum& rest, const Sum& side, int64_t factor);
   Sum with_remainders(Sum form);
   Interval bounds_of_atom(const Expr& atom);
@@ -82,6 +84,7 @@ class BoundsEngine {
   BoundsEngine* outer_ = nullptr;  // without the condition
   std::vector<Sum> facts_;         // of the condition
   static constexpr int most_sides = 3;
+  static constexpr size_t most_varying = 32;
   int sides_taken_ = 0;  // of minima and maxima, by who calls
   NodeMemo<Interval> memo_;
   NodeMemo<Interval> atoms_;  // the same for what is no sum

@@ -2,6 +2,7 @@
 // that the compiler chose reads more than the program and its gradient need.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "frontend/language/inline_reductions.h"
@@ -120,6 +121,51 @@ TEST(OddSizes, AReductionOfRunTimeExtentZeroHasAGradientOfZero) {
       EXPECT_EQ(slopes(0) != 0, n > 0) << loss.name() << " of " << n;
       EXPECT_EQ(slopes(3), 0);
       EXPECT_EQ(slope() != 1, n > 0) << loss.name() << " of " << n;
+    }
+  }
+}
+
+// One compiled gradient for seeds of every size. It reads the seed where it is: not a row more, as the ends of rows and
+// taps apart would have it.
+TEST(OddSizes, AConvolutionsGradientReadsASeedOfRunTimeSizeWhereItIs) {
+  constexpr int taps = 3;
+  ImageParam image(Float(32), 3, "image"), filter(Float(32), 4, "filter"),
+      seed(Float(32), 3, "seed");
+  Var x("x"), y("y"), c("c");
+  for (const int apart : {1, 2}) {
+    RDom r(0, taps, 0, taps, 0, filter.dim(2).extent());
+    Func f("f");
+    f(x, y, c) = 0.0f;
+    f(x, y, c) += filter(r.x, r.y, r.z, c) * image(x + apart * r.x, y + apart * r.y, r.z);
+    Region bounds;
+    for (int d = 0; d < 3; ++d) bounds.push_back({seed.dim(d).min(), seed.dim(d).extent()});
+    Func by_image = propagate_adjoints(f, Func(seed), bounds)(image);
+    for (const auto& [width, height, from, to] :
+         std::vector<std::array<int, 4>>{{20, 17, 5, 4}, {1, 3, 1, 2}}) {
+      const int wide = width + apart * (taps - 1), high = height + apart * (taps - 1);
+      Buffer<float> in(wide, high, from), weights(taps, taps, from, to), slopes(width, height, to);
+      in.fill(0.5f);
+      weights.for_each_element([&](int i, int j, int k, int l) {
+        weights(i, j, k, l) = 1 + i + 0.5f * j - k + 0.25f * l;
+      });
+      slopes.for_each_element(
+          [&](int i, int j, int l) { slopes(i, j, l) = 0.125f * ((7 * i + 5 * j + 3 * l) % 11); });
+      image.set(in);
+      filter.set(weights);
+      seed.set(slopes);
+      const Buffer<float> found = by_image.realize({wide, high, from});
+      Buffer<double> expected(wide, high, from);
+      expected.fill(0);
+      weights.for_each_element([&](int i, int j, int k, int l) {
+        for (int v = 0; v < height; ++v)
+          for (int u = 0; u < width; ++u)
+            expected(u + apart * i, v + apart * j, k) +=
+                static_cast<double>(weights(i, j, k, l)) * slopes(u, v, l);
+      });
+      expected.for_each_element([&](int u, int v, int k) {
+        ASSERT_NEAR(found(u, v, k), expected(u, v, k), 1e-4)
+            << u << ", " << v << ", " << k << " of " << width;
+      });
     }
   }
 }

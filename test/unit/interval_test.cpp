@@ -58,7 +58,11 @@ TEST_F(IntervalTest, SidesOfAMinimumCancelWithWhatStandsBesideIt) {
   EXPECT_EQ(bounds(i * 16 + min(40 - i * 16, 8)), "[8, 40]");
   EXPECT_EQ(bounds(i * 16 + max(min(5 - i * 2, 1), 0) * 8), "[8, 112]");
   EXPECT_EQ(bounds(i - max(i - 3, 0)), "[0, 3]");
+  EXPECT_EQ(bounds(min(i, 5) - max((i - 2) / 2, 0) * 2), "[0, 3]");
   EXPECT_EQ(bounds(i + max(i, 3)), "[3, 14]");  // they do not cancel
+  // Nor does either stand alone: rows of a seed below tap rows that begin where the seed does.
+  EXPECT_EQ(bounds(min(i, 5) - max(i - 3, 0)), "[0, 3]");
+  EXPECT_EQ(bounds(min(i, 5) - max((i - 2) / 2, 0) * 2), "[0, 3]");
 }
 
 TEST_F(IntervalTest, DivisionTakesOutMultiples) {
