@@ -13,6 +13,7 @@
 #include <optional>
 #include <random>
 
+#include "common/division.h"
 #include "common/files.h"
 #include "common/progress.h"
 #include "common/report.h"
@@ -33,7 +34,7 @@ using retrograde::text;
 
 namespace {
 
-constexpr int longest_side = 384, batch_grid = 3, one_in_held_out = 5;
+constexpr int longest_side = 384, batch_grid = 3;
 constexpr float batch_first_rate = 0.02f, batch_last_rate = 0.002f;
 
 struct NamedPair {
@@ -43,26 +44,22 @@ struct NamedPair {
 
 struct Photographs {
   std::vector<NamedPair> training, held_out;
+  std::string division;  // in words
 };
 
 Photographs read_photographs(const Options& options) {
   const bool own_targets = std::filesystem::is_directory(options.pairs / "target");
-  std::vector<std::filesystem::path> files = apps::images_in(options.pairs);
-  if (files.size() < 2) {
-    retrograde::call_error(text("learn a look from ", quoted(options.pairs.string())),
-                           "some photographs are learned from and others held out",
-                           text("it has ", files.size()), "Give a folder with at least 2");
-  }
-  std::mt19937_64 random(options.seed);
-  std::shuffle(files.begin(), files.end(), random);
-  Photographs all;
-  for (size_t n = 0; n < files.size(); ++n) {
-    const auto target =
-        own_targets ? options.pairs / "target" / files[n].filename() : std::filesystem::path();
-    auto& to = n % one_in_held_out == 1 ? all.held_out : all.training;
-    to.push_back({files[n].filename().string(), read_pair(files[n], target)});
-  }
-  return all;
+  const auto pairs_of = [&](const std::vector<std::filesystem::path>& files) {
+    std::vector<NamedPair> pairs;
+    for (const auto& file : files) {
+      const auto target =
+          own_targets ? options.pairs / "target" / file.filename() : std::filesystem::path();
+      pairs.push_back({file.filename().string(), read_pair(file, target)});
+    }
+    return pairs;
+  };
+  const apps::Division division = apps::division_of(options.pairs);
+  return {pairs_of(division.train), pairs_of(division.held_out), division.words};
 }
 
 // All with the same channels: three where a photograph or the look to begin with has colours.
@@ -235,6 +232,7 @@ void learn_from_pairs(const Options& options, const std::optional<Look>& start) 
   const Accuracy training = measure(look, photographs.training, "learned from", table);
   const Accuracy held_out = measure(look, photographs.held_out, "held out", table);
   write_pictures(options, look, photographs.held_out[0], report);
+  report.add_note("divided " + photographs.division);
   report.add_number("PSNR, photographs learned from", training.after, "dB", training.before);
   report.add_number("PSNR, photographs held out", held_out.after, "dB", held_out.before);
   report.add_table(table);

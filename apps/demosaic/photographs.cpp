@@ -2,54 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <sstream>
 
+#include "common/division.h"
 #include "diagnostics/error.h"
 
 namespace demosaic {
 
 using retrograde::quoted;
 using retrograde::text;
-
-namespace {
-
-constexpr const char* list_name = "photographs.txt";
-constexpr size_t held_out_every = 4;
-
-[[noreturn]] void refuse_list(const std::filesystem::path& list, const std::string& evidence) {
-  retrograde::call_error(text("read the list of photographs ", quoted(list.string())),
-                         "each of its lines is \"train FILE\" or \"held_out FILE\"", evidence,
-                         "Correct it, or take it away: then every fourth photograph is held out");
-}
-
-void read_list(const std::filesystem::path& folder, Dataset& dataset) {
-  const auto list = folder / list_name;
-  std::ifstream file(list);
-  std::string line;
-  while (std::getline(file, line)) {
-    std::istringstream words(line.substr(0, line.find('#')));
-    std::string kind, name;
-    if (!(words >> kind)) continue;
-    if (!(words >> name) || (kind != "train" && kind != "held_out")) {
-      refuse_list(list, text("it has the line ", quoted(line)));
-    }
-    auto& to = kind == "train" ? dataset.train : dataset.held_out;
-    to.push_back(read_photograph(folder / name));
-  }
-  dataset.division = text("as ", list_name, " says");
-}
-
-void divide_by_name(const std::filesystem::path& folder, Dataset& dataset) {
-  const auto files = apps::images_in(folder);
-  for (size_t n = 0; n < files.size(); ++n) {
-    const bool held_out = n % held_out_every == held_out_every - 1 || n + 1 == files.size();
-    (held_out ? dataset.held_out : dataset.train).push_back(read_photograph(files[n]));
-  }
-  dataset.division = "every fourth by name, and the last, are held out";
-}
-
-}  // namespace
 
 float encoded(float light) {
   const float v = std::clamp(light, 0.0f, 1.0f);
@@ -110,20 +70,10 @@ std::vector<float> mosaic_of(const Photograph& photograph) {
 }
 
 Dataset read_dataset(const std::filesystem::path& folder) {
-  Dataset dataset;
-  if (std::filesystem::exists(folder / list_name)) {
-    read_list(folder, dataset);
-  } else {
-    divide_by_name(folder, dataset);
-  }
-  if (dataset.train.empty() || dataset.held_out.empty()) {
-    retrograde::call_error(
-        text("learn from the photographs in ", quoted(folder.string())),
-        "some are learned from and others are measured on, so that there are two at least",
-        text("there are ", dataset.train.size(), " to learn from and ", dataset.held_out.size(),
-             " to measure on"),
-        "Add photographs");
-  }
+  const apps::Division division = apps::division_of(folder);
+  Dataset dataset{.division = division.words};
+  for (const auto& file : division.train) dataset.train.push_back(read_photograph(file));
+  for (const auto& file : division.held_out) dataset.held_out.push_back(read_photograph(file));
   return dataset;
 }
 

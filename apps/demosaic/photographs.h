@@ -48,8 +48,7 @@ struct Dataset {
   std::vector<Photograph> train, held_out;
   std::string division;  // in words
 };
-// As the folder's photographs.txt says; without one, every fourth by name is held out. Throws
-// retrograde::UserError unless there is one of either kind at least.
+// Divided as common/division.h says. Throws retrograde::UserError.
 Dataset read_dataset(const std::filesystem::path& folder);
 
 // 10 log10(1 / mean squared error), all pixels and colours alike; in linear light, or as encoded.

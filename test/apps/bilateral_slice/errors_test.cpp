@@ -96,7 +96,10 @@ TEST_F(BilateralSliceErrors, AFolderTakesThePlaceOfThePhoto) {
   fs::create_directories(folder_ / "alone");
   fs::copy_file(photo_, folder_ / "alone" / "photo.png");
   run("--output " + out().string() + " --pairs " + (folder_ / "alone").string());
-  expect_refused({"learned from and others held out", "it has 1"});
+  expect_refused({"some are learned from and others are measured on", "Add photographs"});
+  std::ofstream(folder_ / "alone" / "photographs.txt") << "held_out none.png\ntrain photo.png\n";
+  run("--output " + out().string() + " --pairs " + (folder_ / "alone").string());
+  expect_refused({"none.png", "existing image"});
   expect_no_results();
 }
 
