@@ -131,34 +131,36 @@ class BudgetedSchedule {
     return callers + std::max(allowed_times * largest, sizes.machine().more_than_caches);
   }
 
-  // What brings a schedule down to the budget, if that is enough; none that was refused.
+  // What brings a schedule down to the budget, if that is enough; none that was refused. One after the other: what is
+  // computed where it is read makes what it reads in turn more expensive to compute again.
   std::set<std::string> to_recompute(const Attempt& attempt,
                                      const std::set<std::string>& refused) const {
-    struct Choice {
-      double operations;  // for each byte
-      MemoryEstimate::Part part;
-    };
     ChosenPlaces chosen;
     chosen.recomputed = with_names(outputs_, attempt.recomputed);
-    const auto uses = uses_of_stored(outputs_, chosen);
     const auto candidates = by_name();
-    std::vector<Choice> choices;
-    for (const MemoryEstimate::Part& part : attempt.estimate.at_peak) {
-      const auto found = candidates.find(part.func->name);
-      if (found == candidates.end() || refused.contains(part.func->name)) continue;
-      const StorageUse& use = uses.at(found->second.get());
-      const double again = std::max(0.0, use.reads - 1) * use.operations;
-      if (request_.options.memory_budget == 0 && again > worth_ways * way_to_memory) continue;
-      choices.push_back({again / std::max(1, total_bytes(part.func->types)), part});
-    }
-    std::stable_sort(choices.begin(), choices.end(),
-                     [](const Choice& a, const Choice& b) { return a.operations < b.operations; });
     int64_t excess = attempt.graph.memory.bytes - attempt.graph.memory.budget_bytes;
     std::set<std::string> result;
-    for (const Choice& choice : choices) {
-      if (excess <= 0) break;
-      result.insert(choice.part.func->name);
-      excess -= choice.part.bytes;
+    while (excess > 0) {
+      const auto uses = uses_of_stored(outputs_, chosen);
+      double least = std::numeric_limits<double>::infinity();  // operations for each byte
+      const MemoryEstimate::Part* best = nullptr;
+      for (const MemoryEstimate::Part& part : attempt.estimate.at_peak) {
+        const std::string& name = part.func->name;
+        const auto found = candidates.find(name);
+        if (found == candidates.end() || refused.contains(name) || result.contains(name)) continue;
+        const StorageUse& use = uses.at(found->second.get());
+        const double again = std::max(0.0, use.reads_in_all - 1) * use.operations;
+        const double for_a_byte = again / std::max(1, total_bytes(part.func->types));
+        const bool is_allowed =
+            request_.options.memory_budget > 0 || again <= worth_ways * way_to_memory;
+        if (!is_allowed || for_a_byte >= least) continue;
+        least = for_a_byte;
+        best = &part;
+      }
+      if (!best) break;
+      result.insert(best->func->name);
+      chosen.recomputed.insert(candidates.at(best->func->name).get());
+      excess -= best->bytes;
     }
     return result;
   }

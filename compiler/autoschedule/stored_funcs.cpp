@@ -89,6 +89,7 @@ class StorageChooser {
       stored_.insert(f.get());
       result.push_back(f);
     }
+    count_reads_in_all();
     return result;
   }
 
@@ -101,7 +102,7 @@ class StorageChooser {
   bool is_stored_running_sum(const FuncPtr& f) const {
     const auto found = readers_.find(f.get());
     if (found == readers_.end() || found->second.size() != 1 ||
-        !is_running_sum(*f, **found->second.begin()))
+        !is_running_sum(*f, *found->second[0].func))
       return false;
     const std::vector<FuncPtr> summed = summed_adjoints(*f);
     return std::count_if(summed.begin(), summed.end(), [&](const FuncPtr& g) {
@@ -128,12 +129,29 @@ class StorageChooser {
         const auto* call = e.as<Call>();
         if (call && call->call_type == CallType::Func && call->symbol.raw() != &f) {
           StorageUse& use = uses_[call->symbol.raw()];
-          use.reads += reads_an_element(*call, f, f.stage(s));
+          const double reads = reads_an_element(*call, f, f.stage(s));
+          use.reads += reads;
           if (fixed_) use.alternatives = std::max(use.alternatives, alternatives(*call, f));
-          readers_[call->symbol.raw()].insert(&f);
+          std::vector<Reader>& readers = readers_[call->symbol.raw()];  // f is the last, if any
+          if (readers.empty() || readers.back().func != &f) readers.push_back({&f, 0});
+          readers.back().reads += reads;
         }
       });
     }
+  }
+
+  // What is inlined is computed as often as it is read, and reads as often.
+  void count_reads_in_all() {
+    for (auto it = order_.rbegin(); it != order_.rend(); ++it) {  // readers first
+      StorageUse& use = uses_[it->get()];
+      for (const Reader& by : readers_[it->get()])
+        use.reads_in_all += by.reads * (is_inlined(*by.func) ? uses_[by.func].reads_in_all : 1);
+    }
+  }
+  bool is_inlined(const FuncContents& f) const {
+    return f.is_pure() && !is_touched(f) && !stored_.contains(&f) &&
+           std::none_of(outputs_.begin(), outputs_.end(),
+                        [&](const FuncPtr& output) { return output.get() == &f; });
   }
 
   // Of what a Func chooses, by dimensions that the reader's loops or data move, not constants.
@@ -178,7 +196,11 @@ class StorageChooser {
   const ChosenPlaces& chosen_;
   const FixedDimensions* const fixed_;
   std::unordered_map<const Symbol*, StorageUse> uses_;
-  std::unordered_map<const Symbol*, std::unordered_set<const FuncContents*>> readers_;
+  struct Reader {
+    const FuncContents* func;
+    double reads;  // for an element of it
+  };
+  std::unordered_map<const Symbol*, std::vector<Reader>> readers_;
   std::unordered_set<const FuncContents*> stored_;
 };
 

@@ -30,6 +30,7 @@ std::vector<FuncPtr> stored_by_default(const std::vector<FuncPtr>& outputs,
 // it.
 struct StorageUse {
   double reads = 0;
+  double reads_in_all = 0;  // of readers that are inlined, for each time that these are computed
   double alternatives = 1;  // that a read chooses from, where it does not say which
   double operations = 0;
   double share_of_way = 1;  // to memory: narrow values are shorter on it, as they are in vectors

@@ -123,6 +123,26 @@ Program relaxed(int count) {
   return {{state, d(rhs)}, {{200, 150}, {200, 150}}, {rhs}};
 }
 
+// Places that a few numbers of each frame decide, what is there, and the gradient of its squares by these numbers: eight
+// sums of one chain of values.
+Program placed(int frames) {
+  const Buffer<float> numbers = random_image({8, frames}, 0, 0.1, 1),
+                      seen = random_image({200, 150, frames}, 0, 1, 2);
+  Var x("x"), y("y"), i("i");
+  Func depth("depth"), shift_x("shift_x"), shift_y("shift_y"), residual("residual"), loss("loss");
+  const Expr u = (cast<float>(x) - 100) / 100, v = (cast<float>(y) - 75) / 100;
+  const auto n = [&](int k) { return Expr(numbers(k, i)); };
+  depth(x, y, i) = 1 + n(6) * u + n(7) * v;
+  shift_x(x, y, i) = (n(0) * u + n(1) * v + n(2)) / max(depth(x, y, i), 0.1f);
+  shift_y(x, y, i) = (n(3) * u + n(4) * v + n(5)) / max(depth(x, y, i), 0.1f);
+  residual(x, y, i) = sin(shift_x(x, y, i)) * cos(shift_y(x, y, i)) - seen(x, y, i);
+  RDom all(0, 200, 0, 150, 0, frames);
+  loss() = 0.0f;
+  loss() += residual(all.x, all.y, all.z) * residual(all.x, all.y, all.z);
+  const Derivative d = propagate_adjoints(loss);
+  return {{loss, d(numbers)}, {{}, {8, frames}}, {numbers, seen}};
+}
+
 double product(const Buffer<float>& a, const Buffer<float>& b) {
   double sum = 0;
   a.for_each_element([&](const int* at) { sum += double(a(at)) * b(at); });
@@ -203,6 +223,22 @@ TEST(MemoryBudget, IsTwiceTheLargestFuncByDefault) {
   const Outcome found = run(program, {});
   const int64_t seed = 160 * 120 * 4, planes = 160 * 120 * 12 * 4;
   EXPECT_EQ(found.said.memory_budget_bytes, program.callers_bytes() + seed + 2 * planes);
+}
+
+double predicted_ms(const Program& program, const AutoscheduleOptions& options) {
+  Pipeline pipeline = program.copy();
+  const Target target = get_jit_target_from_environment();
+  pipeline.auto_schedule(target, options, MachineParams(2, 64 << 10, 40));
+  return pipeline.explain_schedule(Realization(program.buffers()), target).predicted_ms;
+}
+
+// Each of a chain is cheap to compute again, all of them are not: what the last one takes is that of all before, for each
+// of its readers.
+TEST(MemoryBudget, CountsWhatAChainComputesAgain) {
+  const Program program = placed(13);
+  AutoscheduleOptions large;
+  large.memory_budget = int64_t(1) << 40;
+  EXPECT_LT(predicted_ms(program, {}), 1.5 * predicted_ms(program, large));
 }
 
 // The sum of their adjoints is made as they are: what is alive at once is the same for more steps.
