@@ -5,17 +5,22 @@
 
 A worker as ../pairs/worker_protocol.h says, in PyTorch's eager mode or through torch.compile, on the
 inputs that a worker of the benchmark has saved. In float64 it is the reference. Programs are what users
-of PyTorch write: the operators of torch.nn.functional where there is one, autograd for the gradients.
+of PyTorch write: the operators of torch.nn.functional where there is one, autograd for the gradients; those that
+are also operators of ../torch stand in its formulations.py.
 """
 import ctypes
 import gc
 import struct
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import torch
 import torch.nn.functional as F
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "torch"))
+import formulations
 
 PROGRAMS = {}
 
@@ -30,45 +35,14 @@ def program(by):
 
 # ---- the operators; dimensions are in the reverse order of the .cpp files ----
 
-def centres(size, kind):
-    """Of pixels from -1 to 1, as grid_sample counts them."""
-    return (torch.arange(size, dtype=kind) + 0.5) * (2 / size) - 1
-
-
-@program(by=3)
-def bilateral_slice(image, guide, grid):
-    _, height, width = image.shape
-    x = centres(width, image.dtype).expand(height, width)
-    y = centres(height, image.dtype)[:, None].expand(height, width)
-    places = torch.stack([x, y, guide * 2 - 1], -1)[None, None]
-    affine = F.grid_sample(grid.flatten(0, 1)[None], places, padding_mode="border",
-                           align_corners=False).view(3, 4, height, width)
-    return (affine[:, :3] * image).sum(1) + affine[:, 3]
-
-
-@program(by=2)
-def spatial_transformer(images, transforms):
-    places = F.affine_grid(transforms, images.shape, align_corners=False)
-    return F.grid_sample(images, places, align_corners=False)
-
-
-def moved(image, by):
-    """What stands where each pixel says, at most at the edge."""
-    _, height, width = image.shape
-    x = torch.arange(width, dtype=image.dtype) + by[0]
-    y = torch.arange(height, dtype=image.dtype)[:, None] + by[1]
-    places = torch.stack([x * (2 / (width - 1)) - 1, y * (2 / (height - 1)) - 1], -1)
-    return F.grid_sample(image[None], places[None], padding_mode="border", align_corners=True)[0]
-
-
-@program(by=2)
-def flow_warp(image, flow):
-    return moved(image, flow)
+program(by=3)(formulations.bilateral_slice)
+program(by=2)(formulations.spatial_transformer)
+program(by=2)(formulations.flow_warp)
 
 
 @program(by=3)
 def conv2d(image, weights, bias):
-    return F.conv2d(image, weights, bias, padding=1)
+    return formulations.convolution(image, weights, bias)
 
 
 @program(by=2)
@@ -94,7 +68,7 @@ def fluid_step(velocity, force, density, target):
     driven = diffused = velocity + 0.5 * force
     for _ in range(20):
         diffused = (driven + 0.2 * sum(neighbours(diffused))) * (1 / (1 + 4 * 0.2))
-    carried = moved(diffused, -0.5 * diffused)
+    carried = formulations.flow_warp(diffused, -0.5 * diffused)
     east, west, south, north = neighbours(carried)
     divergence = 0.5 * ((east - west)[0:1] + (south - north)[1:2])
     pressure = -0.25 * divergence
@@ -102,7 +76,7 @@ def fluid_step(velocity, force, density, target):
         pressure = 0.25 * (sum(neighbours(pressure)) - divergence)
     east, west, south, north = neighbours(pressure)
     final = carried - 0.5 * torch.cat([east - west, south - north])
-    return ((moved(density[None], -0.5 * final)[0] - target) ** 2).sum()
+    return ((formulations.flow_warp(density[None], -0.5 * final)[0] - target) ** 2).sum()
 
 
 @program(by=5)
@@ -145,17 +119,7 @@ def bilateral_smoothing(values, confidence, strength):
 
 @program(by=2)
 def non_local_means(image, strength):
-    height, width = image.shape
-    padded = F.pad(image[None, None], [8] * 4, mode="replicate")[0, 0]  # 5 of the search, 3 of patches
-    weights = values = 0
-    for dy in range(11):
-        for dx in range(11):
-            difference = padded[5:-5, 5:-5] - padded[dy:dy + height + 6, dx:dx + width + 6]
-            distance = F.avg_pool2d((difference ** 2)[None], 7, 1)[0]
-            weight = torch.exp(-strength * distance)
-            weights = weights + weight
-            values = values + weight * padded[dy + 3:dy + 3 + height, dx + 3:dx + 3 + width]
-    return values / weights
+    return formulations.non_local_means(image, strength, patch=7, search=11)
 
 
 # ---- the worker ----

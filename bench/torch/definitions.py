@@ -6,6 +6,7 @@ order of Funcs here, innermost first; what PyTorch has for the same stands in fo
 reverse.
 """
 import retrograde as rg
+from formulations import BINS, PATCH, SEARCH
 
 x, y, c, n = (rg.Var(name) for name in "xycn")
 
@@ -141,9 +142,6 @@ def recursive_filter(kind, shapes=None):
     return filtered, [image, mix], None
 
 
-PATCH, SEARCH = 3, 5  # of non_local_means
-
-
 def non_local_means(kind, shapes=None):
     """Each pixel from those in a window, weighted by how like the patches around both are.
     Source: Buades, Coll and Morel, A Non-Local Algorithm for Image Denoising, CVPR 2005."""
@@ -165,9 +163,6 @@ def non_local_means(kind, shapes=None):
     values[x, y] += weight[x, y, s.x, s.y] * f[x + s.x, y + s.y]
     denoised[x, y] = values[x, y] / weights[x, y]
     return denoised, [image, strength], None
-
-
-BINS = 8  # of soft_histogram
 
 
 def soft_histogram(kind, shapes=None):

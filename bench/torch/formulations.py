@@ -1,9 +1,11 @@
 """formulations.py -- the eight operators of definitions.py as users of PyTorch write them: the operators of
-torch.nn.functional where there is one, which compute many elements at a time where there is none."""
+torch.nn.functional where there is one, which compute many elements at a time where there is none. Those that
+../operators has at other sizes are its programs of PyTorch, too."""
 import torch
 import torch.nn.functional as F
 
-from definitions import BINS, PATCH, SEARCH
+PATCH, SEARCH = 3, 5  # of non_local_means
+BINS = 8  # of soft_histogram
 
 
 def _centres(size, like):
@@ -22,6 +24,7 @@ def bilateral_slice(image, guide, grid):
 
 
 def flow_warp(image, flow):
+    """What stands where each pixel's flow says, at most at the edge."""
     _, height, width = image.shape
     x = torch.arange(width, dtype=image.dtype) + flow[0]
     y = torch.arange(height, dtype=image.dtype)[:, None] + flow[1]
@@ -59,17 +62,17 @@ def recursive_filter(image, mix):
     return matrix(height) @ image @ matrix(width).T
 
 
-def non_local_means(image, strength):
+def non_local_means(image, strength, patch=PATCH, search=SEARCH):
     height, width = image.shape
-    margin, half = PATCH // 2, SEARCH // 2
+    margin, half = patch // 2, search // 2
     # Patches repeat what the search sees: the edge of the image, at both of their places.
     padded = F.pad(image[None, None], [margin + half] * 4, mode="replicate")[0, 0]
     centre = padded[half:padded.shape[0] - half, half:padded.shape[1] - half]
     weights = values = 0
-    for dy in range(SEARCH):
-        for dx in range(SEARCH):
+    for dy in range(search):
+        for dx in range(search):
             moved = padded[dy:dy + centre.shape[0], dx:dx + centre.shape[1]]
-            distance = F.avg_pool2d(((centre - moved) ** 2)[None, None], PATCH, 1)[0, 0]
+            distance = F.avg_pool2d(((centre - moved) ** 2)[None, None], patch, 1)[0, 0]
             weight = torch.exp(-strength * distance)
             weights = weights + weight
             values = values + weight * moved[margin:margin + height, margin:margin + width]
