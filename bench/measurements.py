@@ -95,7 +95,17 @@ def torch_operators(report):
             "forward and backward", "times as fast", "error"]
     return table(head, rows) + (f"\nGeometric means to the better of PyTorch's two: forward "
                                 f"{report['forward_geometric_mean']:.2f}, with backward "
-                                f"{report['both_geometric_mean']:.2f} times as fast.\n")
+                                f"{report['both_geometric_mean']:.2f} times as fast.\n"
+                                ) + call_overhead(report.get("overhead_us"))
+
+
+def call_overhead(report):
+    if not report:
+        return ""
+    ways = list(report["PyTorch"])
+    rows = [[name, *(f"{row[way]:.1f}" + ("" if name == "PyTorch" else f" ({row[way] - report['PyTorch'][way]:+.1f})")
+                     for way in ways)] for name, row in report.items()]
+    return "\n" + table(["us for a call on one element (over PyTorch's own)", *ways], rows)
 
 
 def operators(report):

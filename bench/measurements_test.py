@@ -79,10 +79,12 @@ class Measurements(unittest.TestCase):
         row = {"operator": "curve", "failures": {"compiled": "no"}, "retrograde_error": 1e-7, "eager_error": 2e-7,
                "forward_ratio": 4.0, "both_ratio": 3.0, "retrograde_forward_ms": 1.0, "retrograde_both_ms": 2.0,
                "eager_forward_ms": 4.0, "eager_both_ms": 6.0}
-        report = {"pytorch": "2.13", "operators": [row], "forward_geometric_mean": 4.0, "both_geometric_mean": 3.0}
+        report = {"pytorch": "2.13", "operators": [row], "forward_geometric_mean": 4.0, "both_geometric_mean": 3.0,
+                  "overhead_us": {"PyTorch": {"forward": 2.0}, "ours": {"forward": 5.5}}}
         page = self.record("torch", report, PAGE.replace("programs", "torch"))
         self.assertIn("| curve | 1 / 4 / – | 4.00 | 2 / 6 / – | 3.00 | 1e-07 / 2e-07 / – |", page)
         self.assertIn("forward 4.00, with backward 3.00 times as fast", page)
+        self.assertIn("| PyTorch | 2.0 |\n| ours | 5.5 (+3.5) |", page)
 
     def test_a_model_says_how_it_orders_all_stages(self):
         row = {"program": "blur", "kind": "kernels", "predicted_ms": 3.0, "measured_ms": 4.0,

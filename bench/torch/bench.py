@@ -7,7 +7,8 @@ PACKAGE is the folder that holds the Python package. PyTorch is that of the virt
 ../operators/peers.py, which is made when it is not there. What PyTorch has for the same (formulations.py) runs as it
 is and through torch.compile; all run in turn, on the same tensors and as many threads: forward alone, and forward
 with backward by all inputs. Errors are the largest |a - b| / max(|b|, root mean square of b) over the result and all
-gradients, b being PyTorch's own in float64. `ratio` is that of the better of PyTorch's two to ours.
+gradients, b being PyTorch's own in float64. `ratio` is that of the better of PyTorch's two to ours. At the end stands
+what a call costs where there is nothing to compute (overhead.py).
 """
 import argparse
 import json
@@ -21,6 +22,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "operators")]
+import overhead
 import peers
 
 SIDES = ("retrograde", "eager", "compiled")
@@ -199,6 +201,9 @@ def main():
             + f" ({row.get(what + '_ratio', 0):5.2f})" for what in ("forward", "both"))
         errors = " ".join(f"{row.get(f'{side}_error', float('nan')):.0e}" for side in SIDES)
         print(f"{name:20}{cells}  errors {errors}", *row["failures"].items(), flush=True)
+    if not options.operators:
+        report["overhead_us"] = overhead.measure()
+        overhead.show(report["overhead_us"])
     for what in ("forward", "both"):
         ratios = [row[f"{what}_ratio"] for row in report["operators"] if f"{what}_ratio" in row]
         report[f"{what}_geometric_mean"] = geometric_mean(ratios)

@@ -72,15 +72,15 @@ class Bound {
   }
 
   // The same of tensors of PyTorch, whose element types are those of the pipeline: whoever calls has seen to that.
-  // Written for calls whose work is nothing.
-  void call_tensors(const py::args& given) {
+  // A number is a tensor without dimensions. Written for calls whose work is nothing.
+  void call_tensors(const py::tuple& given) {
     if (given.size() != args_.size() + outputs_.size())
       throw py::type_error("a Callable takes its arguments, then its output buffers");
     auto kept = std::make_shared<Tensors>(given);
     int64_t elements = 0;
     for (size_t i = 0; i < given.size(); i++) {
       if (i < args_.size() && args_[i].is_scalar()) {
-        kept->values[i] = DynamicCall::value_of(scalar_of(args_[i].type, given[i]));
+        kept->values[i] = DynamicCall::value_of(scalar_of_tensor(given[i], args_[i].type));
         continue;
       }
       const Parameter& parameter = parameter_of_argument(i);
@@ -97,10 +97,50 @@ class Bound {
     });
   }
 
+  // What call_on_expected() takes and gives: element types and sizes, in pairs. `empty` is torch.empty.
+  void expect_tensors(const py::object& empty, const py::iterable& inputs,
+                      const py::iterable& results, const py::object& device) {
+    const auto kinds = [](const py::iterable& pairs) {
+      std::vector<TensorKind> result;
+      for (py::handle one : pairs) {
+        const auto pair = one.cast<std::pair<py::object, py::tuple>>();
+        result.push_back({pair.first, pair.second});
+      }
+      return result;
+    };
+    inputs_ = kinds(inputs);
+    results_ = kinds(results);
+    empty_ = empty;
+    device_ = device;
+  }
+
+  // The results, made here; None, and nothing has happened, where tensors are others than was said. One call of
+  // Python's for all of it: each would take longer than what it asks for.
+  py::object call_on_expected(const py::tuple& given) {
+    if (given.size() != inputs_.size() || !empty_) return py::none();
+    for (size_t i = 0; i < inputs_.size(); i++) {
+      if (!is_of(given[i], inputs_[i])) return py::none();
+    }
+    static PyObject* const names = py::make_tuple("dtype", "device").release().ptr();
+    py::list made(results_.size());
+    py::tuple all(given.size() + results_.size());
+    for (size_t i = 0; i < given.size(); i++) all[i] = given[i];
+    for (size_t i = 0; i < results_.size(); i++) {
+      PyObject* const arguments[] = {results_[i].sizes.ptr(), results_[i].dtype.ptr(),
+                                     device_.ptr()};
+      PyObject* const result = PyObject_Vectorcall(empty_.ptr(), arguments, 1, names);
+      if (!result) throw py::error_already_set();
+      made[i] = py::reinterpret_steal<py::object>(result);
+      all[given.size() + i] = made[i];
+    }
+    call_tensors(all);
+    return made;
+  }
+
  private:
   // What a call touches, for as long as it runs.
   struct Tensors {
-    explicit Tensors(const py::args& given)
+    explicit Tensors(const py::tuple& given)
         : owner(keep(given)), buffers(given.size()), values(given.size()) {}
     Kept owner;
     std::vector<Runtime::Buffer<>> buffers;
@@ -156,6 +196,8 @@ class Bound {
   Compile compile_;
   std::vector<Argument> args_;
   std::vector<Parameter> parameters_, outputs_;  // null: of a scalar
+  std::vector<TensorKind> inputs_, results_;     // see expect_tensors
+  py::object empty_, device_;
   Callable callable_;
   size_t lifted_ = 0;            // when it was compiled
   int64_t short_elements_ = -1;  // calls on so many were short
@@ -198,6 +240,8 @@ void bind_callable(py::module_& m) {
   Class<Bound>(m, "Callable")
       .def("__call__", &Bound::call)
       .def("_call_tensors", &Bound::call_tensors)
+      .def("_expect_tensors", &Bound::expect_tensors)
+      .def("_call_on_expected", &Bound::call_on_expected)
       .def("defined", [](const Bound&) { return true; });
   bind_compile(reopened<Func>(m, "Func", {"Runnable"}));
   bind_compile(reopened<Pipeline>(m, "Pipeline", {"Runnable"}));

@@ -2,9 +2,11 @@
 #include "tensor_memory.h"
 
 #include <climits>
+#include <cstring>
 
 #include "casters.h"
 #include "diagnostics/error.h"
+#include "numbers.h"
 
 namespace retrograde::python {
 
@@ -33,11 +35,26 @@ int part(PyObject* number, const char* what) {
 
 alignas(64) char nothing[64];
 
+void* address_of(py::handle tensor) {
+  static const Name data_ptr("data_ptr");
+  const py::object address = checked(PyObject_CallMethodNoArgs(tensor.ptr(), data_ptr.object));
+  void* data = PyLong_AsVoidPtr(address.ptr());
+  if (!data && PyErr_Occurred()) throw py::error_already_set();
+  return data;
+}
+
+template <class T>
+T element_at(const void* address) {
+  T value;
+  std::memcpy(&value, address, sizeof value);
+  return value;
+}
+
 }  // namespace
 
 Runtime::Buffer<> buffer_of_tensor(py::handle tensor, Type type) {
-  static const Name data_ptr("data_ptr"), shape("shape"), stride("stride");
-  const py::object address = checked(PyObject_CallMethodNoArgs(tensor.ptr(), data_ptr.object));
+  static const Name shape("shape"), stride("stride");
+  void* const data = address_of(tensor);
   const py::object sizes = checked(PyObject_GetAttr(tensor.ptr(), shape.object));
   const py::object strides = checked(PyObject_CallMethodNoArgs(tensor.ptr(), stride.object));
   const bool fits = PyTuple_Check(sizes.ptr()) && PyTuple_Check(strides.ptr()) &&
@@ -56,9 +73,22 @@ Runtime::Buffer<> buffer_of_tensor(py::handle tensor, Type type) {
         halide_dimension_t(0, part(PyTuple_GET_ITEM(sizes.ptr(), axis), "extents"),
                            part(PyTuple_GET_ITEM(strides.ptr(), axis), "strides"));
   }
-  void* data = PyLong_AsVoidPtr(address.ptr());
-  if (!data && PyErr_Occurred()) throw py::error_already_set();
   return Runtime::Buffer<>(to_halide_type(type), data ? data : nothing, rank, dimensions);
+}
+
+ir::Scalar scalar_of_tensor(py::handle tensor, Type type) {
+  if (type == Float(32)) return ir::Scalar::of_float(type, element_at<float>(address_of(tensor)));
+  if (type == Float(64)) return ir::Scalar::of_float(type, element_at<double>(address_of(tensor)));
+  return scalar_of(type, tensor.attr("item")());
+}
+
+bool is_of(py::handle tensor, const TensorKind& kind) {
+  static const Name dtype("dtype"), shape("shape");
+  if (checked(PyObject_GetAttr(tensor.ptr(), dtype.object)).ptr() != kind.dtype.ptr()) return false;
+  const py::object sizes = checked(PyObject_GetAttr(tensor.ptr(), shape.object));
+  const int same = PyObject_RichCompareBool(sizes.ptr(), kind.sizes.ptr(), Py_EQ);
+  if (same < 0) throw py::error_already_set();
+  return same == 1;
 }
 
 }  // namespace retrograde::python

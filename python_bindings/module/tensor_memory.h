@@ -16,4 +16,14 @@ namespace py = pybind11;
 // Requires: extents and strides fit int32 (CompileError).
 Runtime::Buffer<> buffer_of_tensor(py::handle tensor, Type type);
 
+// The one element of a tensor without dimensions.
+ir::Scalar scalar_of_tensor(py::handle tensor, Type type);
+
+// The element type and the sizes of a tensor, as PyTorch says them.
+struct TensorKind {
+  py::object dtype;
+  py::tuple sizes;
+};
+bool is_of(py::handle tensor, const TensorKind& kind);
+
 }  // namespace retrograde::python

@@ -4,6 +4,7 @@ checks, tensors of all kinds, torch.compile, vmap, and that training with them l
     torch_operators_test.py OPERATOR [unittest's arguments]
 
 Ends with 77, which ctest counts as skipped, where there is no PyTorch."""
+import ctypes
 import gc
 import os
 import resource
@@ -210,16 +211,30 @@ class Training(unittest.TestCase):
                 OP(*tensors).square().mean().backward()
                 optimizer.step()
             gc.collect()
-            return len(gc.get_objects()), resource_kb()
+            objects = gc.get_objects()
+            return len(objects), sum(isinstance(one, torch.Tensor) for one in objects), heap_bytes(), resident_kb()
 
         train(50)
-        objects, kb = train(STEPS // 2)
-        objects_after, kb_after = train(STEPS // 2)
+        objects, live, heap, kb = train(STEPS // 2)
+        objects_after, live_after, heap_after, kb_after = train(STEPS // 2)
         self.assertLessEqual(objects_after - objects, 10)
+        self.assertEqual(live_after, live)
+        self.assertLessEqual(heap_after - heap, 8 * STEPS)  # less than any object takes
         self.assertLessEqual(kb_after - kb, 1024)
 
 
-def resource_kb():
+def heap_bytes():
+    """What of the C library's memory is in use: tensors' elements, and what the compiled code and the extension hold."""
+    class Mallinfo(ctypes.Structure):
+        _fields_ = [(name, ctypes.c_size_t) for name in ("arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks",
+                                                         "fsmblks", "uordblks", "fordblks", "keepcost")]
+    mallinfo2 = ctypes.CDLL("libc.so.6").mallinfo2
+    mallinfo2.restype = Mallinfo
+    info = mallinfo2()
+    return info.uordblks + info.hblkhd
+
+
+def resident_kb():
     with open("/proc/self/statm", encoding="ascii") as file:
         return int(file.read().split()[1]) * resource.getpagesize() // 1024
 

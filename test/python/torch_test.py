@@ -6,6 +6,7 @@ import sys
 import textwrap
 import threading
 import unittest
+from unittest import mock
 
 import retrograde as rg
 
@@ -237,6 +238,86 @@ class Operators(unittest.TestCase):
         for t in threads:
             t.join()
         self.assertEqual(failures, [])
+
+
+def total(name):
+    a, b, f = rg.ImageParam("float32", 1, "a"), rg.ImageParam("float32", 1, "b"), rg.Func("total")
+    f[x] = a[x] + b[x]
+    return operator(f"tests::{name}", f, [a, b])
+
+
+class PastTheDispatcher(unittest.TestCase):
+    """Calls for which the dispatcher has nothing to decide go past it; whoever looks at calls there sees them still."""
+
+    def setUp(self):
+        self.a, self.b = torch.rand(3), torch.rand(3, requires_grad=True)
+
+    def test_ordinary_calls_go_past_it(self):
+        op = total("goes_past")
+        with mock.patch.object(type(op._calls), "dispatch", side_effect=AssertionError):
+            result = op(self.a, self.b)
+            self.assertTrue(torch.equal(result, self.a + self.b))
+            result.sum().backward()
+            self.assertEqual(self.b.grad.tolist(), [1, 1, 1])
+            self.assertFalse(op(self.a, self.b.detach()).requires_grad)
+            with torch.no_grad():
+                self.assertFalse(op(self.a, self.b).requires_grad)
+
+    def test_modes_see_calls(self):
+        from torch.utils._python_dispatch import TorchDispatchMode
+        seen = []
+
+        class Watch(TorchDispatchMode):
+            def __torch_dispatch__(self, function, types, args=(), kwargs=None):
+                seen.append(str(function))
+                return function(*args, **(kwargs or {}))
+
+        op = total("watched")
+        op(self.a, self.b)
+        with Watch():
+            op(self.a, self.b).sum().backward()
+        self.assertIn("tests.watched.default", seen)
+        self.assertIn("tests.watched_derivative.default", seen)
+
+    def test_subclasses_see_calls(self):
+        class Watched(torch.Tensor):
+            seen = []
+
+            @classmethod
+            def __torch_function__(cls, function, types, args=(), kwargs=None):
+                cls.seen.append(str(function))
+                return super().__torch_function__(function, types, args, kwargs or {})
+
+        self.assertIsInstance(total("of_subclass")(self.a.as_subclass(Watched), self.b), Watched)
+        self.assertTrue(any("of_subclass" in one for one in Watched.seen), Watched.seen)
+
+    def test_profilers_see_calls(self):
+        op = total("profiled")
+        op(self.a, self.b)
+        with torch.autograd.profiler.profile() as seen:
+            op(self.a, self.b)
+        self.assertIn("tests::profiled", {event.name for event in seen.function_events})
+
+    def test_traces_see_calls(self):
+        op = total("traced")
+        traced = torch.jit.trace(lambda a, b: op(a, b), (self.a, self.b.detach()))
+        self.assertIn("tests::traced", str(traced.graph))
+
+    def test_what_runs_below_autograd_is_not_differentiated(self):
+        op = total("below")
+        guard = torch._C._AutoDispatchBelowAutograd()
+        try:
+            self.assertFalse(op(self.a, self.b).requires_grad)
+        finally:
+            del guard
+        with torch.inference_mode():
+            self.assertTrue(op(self.a, self.b).is_inference())
+
+    @unittest.skipUnless(hasattr(torch, "set_default_device"), "there is no default device")
+    def test_results_are_where_the_tensors_are(self):
+        op = total("of_device")
+        with torch.device("meta"):
+            self.assertEqual(op(self.a, self.b).device.type, "cpu")
 
 
 if __name__ == "__main__":

@@ -12,6 +12,8 @@ made, so that a compiled graph that PyTorch kept on disk finds them. Each has a 
     vmap           a batched call: the kernels take batches as they are
 
 PyTorch 1.13 has no vmap and no functorch transforms of such operators; all else is the same there.
+
+Calls for which the dispatcher has nothing to decide go past it (_direct.py).
 """
 import threading
 
@@ -19,6 +21,7 @@ import torch
 from torch.autograd import forward_ad
 
 from .._errors import Unsupported, error
+from ._direct import is_compiling, is_direct
 from ._plan import GRADIENT, TANGENT
 
 if tuple(int(n) for n in torch.__version__.split(".")[:2]) < (1, 13):
@@ -27,7 +30,7 @@ if tuple(int(n) for n in torch.__version__.split(".")[:2]) < (1, 13):
 
 _lock, _libraries, _names = threading.Lock(), {}, set()
 _HAS_FRAGMENTS = hasattr(torch.library, "register_fake")
-_enable_single_level = None
+_are_transforms_active = torch._C._are_functorch_transforms_active if hasattr(torch, "func") else lambda: False
 if hasattr(torch, "func"):
     from torch._functorch.utils import enable_single_level_autograd_function as _enable_single_level
 
@@ -40,7 +43,7 @@ def _library(namespace):
 
 
 def register(operator):
-    """Defines both operators; returns the overloads that are called."""
+    """Defines both operators; returns the way in."""
     namespace, name = operator.name.split("::")
     with _lock:
         if operator.name in _names or hasattr(getattr(torch.ops, namespace), name):
@@ -52,15 +55,15 @@ def register(operator):
         library.define(f"{name}({', '.join(f'Tensor {n}' for n in operator.argument_names)}) -> "
                        + ("Tensor" if operator.single else f"({', '.join(['Tensor'] * operator.results)})"), **tags)
         library.define(f"{name}_derivative(Tensor[] tensors, int[] path) -> Tensor[]", **tags)
-        Calls(operator, library, namespace, name)
+        return Calls(operator, library, namespace, name)
 
 
 class Calls:
-    """The kernels of one operator, and the way into the dispatcher for both of its names. Inside, all calls are
-    (path, tensors) and give a list."""
+    """The kernels of one operator, and the way in for both of its names. Inside, all calls are (path, tensors), a tuple
+    each, and give a list."""
 
     def __init__(self, operator, library, namespace, name):
-        self.operator = operator
+        self.operator, self._last = operator, {}
         kernels = {"CPU": self.run, "CUDA": self.refuse, "Autograd": self.differentiate,
                    "AutocastCPU": self.cast, "AutocastCUDA": self.cast}
         for key, kernel in kernels.items():
@@ -86,7 +89,14 @@ class Calls:
         return lambda *tensors: tuple(kernel((), tensors))
 
     def __call__(self, path, tensors):
-        """Through the dispatcher."""
+        """What the dispatcher does, without it where it has nothing to decide."""
+        if is_compiling() or not is_direct(tensors):
+            return self.dispatch(path, tensors)
+        if torch.is_grad_enabled() and _any_requires_grad(*tensors):
+            return _apply_function(self, path, self.run, *tensors)
+        return self.run(path, tensors)
+
+    def dispatch(self, path, tensors):
         if path:
             return self.derivative(list(tensors), list(path))
         result = self.overload(*tensors)
@@ -95,7 +105,15 @@ class Calls:
     # ---- the kernels ----
 
     def run(self, path, tensors):
-        return self.operator.plan_for(path, tensors).run(tensors)
+        last = self._last.get(path)  # most calls are of the sizes of the one before
+        if last is not None:
+            results = last(tensors)
+            if results is not None:
+                return results
+        plan = self.operator.plan_for(path, tensors)
+        results = plan.run(tensors)
+        self._last[path] = plan.call_on_expected
+        return results
 
     def fake(self, path, tensors):
         return self.operator.plan(path, tensors).fake(tensors)
@@ -107,24 +125,45 @@ class Calls:
 
     def differentiate(self, path, tensors):
         if forward_ad._current_level < 0 and not (torch.is_grad_enabled() and _any_requires_grad(*tensors)):
-            return _below(self, path, tensors)
-        return list(_apply(self, path, tensors))
+            return self.below(path, tensors)
+        if not _are_transforms_active():
+            return list(_apply_function(self, path, self.below, *tensors))
+        # As autograd.Function.apply, but of one level of functorch's transforms: that of the kernel that calls it;
+        # inner levels come back through the dispatcher. Autograd turns modes off that are inner levels' as well.
+        grad, forward = torch.is_grad_enabled(), torch._C._is_fwd_grad_enabled()
+
+        def below(path, tensors):
+            with torch.set_grad_enabled(grad), forward_ad._set_fwd_grad_enabled(forward):
+                return self.below(path, tensors)
+
+        with _enable_single_level():
+            return list(_apply_function(self, path, below, *tensors))
+
+    def below(self, path, tensors):
+        """The kernels behind autograd's."""
+        if is_direct(tensors):
+            return self.run(path, tensors)
+        guard = torch._C._AutoDispatchBelowAutograd()
+        try:
+            return self.dispatch(path, tensors)
+        finally:
+            del guard
 
     def cast(self, path, tensors):
         dtypes = self.operator.plan(path, tensors).dtypes
         cast = [t.to(dtype) if t.dtype.is_floating_point and dtype.is_floating_point else t
                 for t, dtype in zip(tensors, dtypes)]
         with torch.autocast("cpu", enabled=False), torch.autocast("cuda", enabled=False):
-            return self(path, cast)
+            return self.dispatch(path, cast)
 
     # ---- vmap: the vmapped dimension in front of the other batch dimensions ----
 
     def vmap_operator(self, info, dims, *tensors):
-        results = self((), self._batched((), tensors, dims))
+        results = self.dispatch((), self._batched((), tensors, dims))
         return (results[0], 0) if self.operator.single else (tuple(results), (0,) * len(results))
 
     def vmap_derivative(self, info, dims, tensors, path):
-        results = self(path, self._batched(path, tensors, dims[0]))
+        results = self.dispatch(path, self._batched(path, tensors, dims[0]))
         return results, [0] * len(results)
 
     def _batched(self, path, tensors, dims):
@@ -140,7 +179,7 @@ class Calls:
 
 
 def of_derivative(kernel):
-    return lambda tensors, path: kernel(tuple(path), tensors)
+    return lambda tensors, path: kernel(tuple(path), tuple(tensors))
 
 
 # ---- derivatives ----
@@ -155,33 +194,19 @@ def _each_requires_grad(*tensors):
 _any_requires_grad = getattr(torch._C, "_any_requires_grad", _each_requires_grad)
 
 
-def _apply(calls, path, tensors):
-    """As autograd.Function.apply, but of one level of functorch's transforms: that of the kernel that calls it, while
-    inner levels come back through the dispatcher."""
-    apply = super(torch.autograd.Function, _Function).apply
-    if _enable_single_level is None or not torch._C._are_functorch_transforms_active():
-        return apply(calls, path, None, *tensors)
-    with _enable_single_level():
-        return apply(calls, path, (torch.is_grad_enabled(), torch._C._is_fwd_grad_enabled()), *tensors)
-
-
 def _mask(places):
     return sum(1 << i for i in places)
 
 
 class _Function(torch.autograd.Function):
     @staticmethod
-    def forward(ctx, calls, path, modes, *tensors):
+    def forward(ctx, calls, path, below, *tensors):
         ctx.calls, ctx.path = calls, path
         ctx.set_materialize_grads(False)
         ctx.save_for_backward(*tensors)
         if forward_ad._current_level >= 0:
             ctx.save_for_forward(*tensors)
-        if modes is None:
-            return tuple(_below(calls, path, tensors))
-        # Autograd turns the modes off in here. They are those of inner levels as well, which are still to come.
-        with torch.set_grad_enabled(modes[0]), forward_ad._set_fwd_grad_enabled(modes[1]):
-            return tuple(_below(calls, path, tensors))
+        return tuple(below(path, tensors))
 
     @staticmethod
     def backward(ctx, *seeds):
@@ -192,45 +217,18 @@ class _Function(torch.autograd.Function):
         if wanted and given:
             path = (*ctx.path, GRADIENT, _mask(wanted), _mask(given))
             # Dense ones: autograd's seeds of sums have stride 0, for which pipelines would be compiled anew.
-            gradients = ctx.calls(path, [*tensors, *(seeds[i].contiguous() for i in given)])
+            gradients = ctx.calls(path, (*tensors, *(seeds[i].contiguous() for i in given)))
             for i, gradient in zip(wanted, gradients):
                 # Of an item that the batch shares.
                 results[i] = gradient if gradient.shape == tensors[i].shape else gradient.sum_to_size(tensors[i].shape)
         return (None, None, None, *results)
 
     @staticmethod
-    def jvp(ctx, _calls, _path, _modes, *tangents):
+    def jvp(ctx, _calls, _path, _below, *tangents):
         given = [i for i, t in enumerate(tangents) if t is not None]
         path = (*ctx.path, TANGENT, _mask(given), 0)
-        moved = ctx.calls(path, [*ctx.saved_tensors, *(tangents[i] for i in given)])
+        moved = ctx.calls(path, (*ctx.saved_tensors, *(tangents[i] for i in given)))
         return tuple(t if t.dtype.is_floating_point else None for t in moved)
 
 
-# ---- the way down from autograd ----
-
-_dispatch_keys = getattr(torch._C, "_dispatch_keys", None)
-_HAS_KEYS = _dispatch_keys is not None and hasattr(torch._C.DispatchKeySet, "raw_repr")
-_are_transforms_active = getattr(torch._C, "_are_functorch_transforms_active", lambda: True)
-_count_modes = getattr(torch._C, "_len_torch_dispatch_stack", lambda: 1)
-_PLAIN = _dispatch_keys(torch.empty(0)).raw_repr() if _HAS_KEYS else None
-
-
-def _is_plain(tensors):
-    """Whether nothing is left to dispatch on but the CPU's kernel: dense tensors, no modes, no transforms."""
-    if _PLAIN is None or _count_modes() or _are_transforms_active():
-        return False
-    for t in tensors:
-        if _dispatch_keys(t).raw_repr() != _PLAIN:
-            return False
-    return True
-
-
-def _below(calls, path, tensors):
-    """The kernels behind autograd's; that of the CPU at once, where it is the one: dispatching costs more than it does."""
-    if _is_plain(tensors):
-        return calls.run(path, tensors)
-    guard = torch._C._AutoDispatchBelowAutograd()
-    try:
-        return calls(path, tensors)
-    finally:
-        del guard
+_apply_function = super(torch.autograd.Function, _Function).apply

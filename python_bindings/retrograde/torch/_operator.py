@@ -9,6 +9,7 @@ import torch
 from .. import _retrograde as rg
 from .._errors import CompileError, error
 from . import _library
+from ._direct import is_compiling
 from ._plan import Plan, is_image
 
 _numbers = itertools.count()
@@ -92,7 +93,7 @@ class Operator:
         self._by = next((i for i, d in enumerate(plan.dtypes) if d == torch.float32), None) if self._define else None
         self._plans[torch.float32 if self._by is not None else None] = plan
         self._parameters = plan
-        _library.register(self)
+        self._calls = _library.register(self)
 
     def _defined(self, dtype):
         kind = str(dtype)[6:]
@@ -151,7 +152,10 @@ class Operator:
                 if not isinstance(tensor, torch.Tensor):
                     tensors = self._as_tensors(tensors)
                     break
-            return self.overload(*tensors)
+            if is_compiling():
+                return self.overload(*tensors)
+            results = self._calls((), tensors)
+            return results[0] if self.single else tuple(results)
         raise error(TypeError, f'call the operator "{self.name}"', f"it takes {', '.join(self.argument_names)}",
                     f"{len(tensors)} arguments are given", "Give one for each")
 
@@ -167,7 +171,7 @@ class Operator:
                 follows = self._define and dtype == torch.float32 and of
                 tensor = torch.tensor(tensor, dtype=of if follows else dtype)
             made.append(tensor)
-        return made
+        return tuple(made)
 
     def made(self):
         """The paths of the derivatives that were made: Plan.derived."""

@@ -16,6 +16,7 @@ DTYPES = {torch.float16: rg.Float(16), torch.bfloat16: rg.BFloat(16), torch.floa
           torch.int32: rg.Int(32), torch.int64: rg.Int(64), torch.bool: rg.Bool()}
 TYPES = {str(kind): dtype for dtype, kind in DTYPES.items()}
 GRADIENT, TANGENT = 0, 1  # the steps of a path: see Plan.derived
+_CPU = torch.device("cpu")
 _numbers = itertools.count()
 
 
@@ -53,7 +54,7 @@ class Plan:
         self.ranks = [parameter.dimensions() if is_image(parameter) else 0 for parameter in self.inputs]
         self.result_dtypes = [dtype_of(f) for f in self.outputs]
         self._images = [is_image(parameter) for parameter in self.inputs]
-        self._has_numbers = not all(self._images)
+        self.call_on_expected = None  # once it is compiled: see _compile
         self._lock, self._callable, self._derived = threading.RLock(), None, {}
         self._result_shapes, self._seeds = None, 0  # so many of the last inputs are seeds
         if sizes is not None:
@@ -126,7 +127,7 @@ class Plan:
     def run(self, tensors):
         batch = self.batch(tensors) if self.check(tensors) else ()
         shapes = self.shapes(tensors, batch)
-        results = [torch.empty(shape, dtype=dtype) for shape, dtype in zip(shapes, self.result_dtypes)]
+        results = [torch.empty(shape, dtype=dtype, device=_CPU) for shape, dtype in zip(shapes, self.result_dtypes)]
         if self.sizes is None and self._is_trivial(tensors, results):
             return results
         if not batch:
@@ -151,18 +152,22 @@ class Plan:
             with self._lock:
                 if self._callable is None:
                     self._callable = self._compile()
-        if self._has_numbers:
-            tensors = [t if image else t.item() for t, image in zip(tensors, self._images)]
-        self._callable._call_tensors(*tensors, *results)
+        self._callable._call_tensors((*tensors, *results))
 
     def _compile(self):
-        """Funcs that nobody scheduled get a schedule."""
+        """Funcs that nobody scheduled get a schedule. Of sizes that are known, call_on_expected(tensors) then is run(),
+        or gives None for tensors of others."""
         pipeline = rg.Pipeline(self.outputs)
         # The region that register tiles read comes out too large where it is clamped to sizes that are not known, and
         # in derivatives of gradients: what they read of a seed would be refused.
         tiles = self.sizes is not None and self.order < 2
         pipeline.set_autoschedule(rg.AutoscheduleOptions(without=[] if tiles else [rg.Decision.register_tiles]))
-        return pipeline.compile_to_callable(self.inputs)
+        compiled = pipeline.compile_to_callable(self.inputs)
+        if self.sizes is not None:
+            compiled._expect_tensors(torch.empty, zip(self.dtypes, self.sizes),
+                                     zip(self.result_dtypes, self._result_shapes), _CPU)
+            self.call_on_expected = compiled._call_on_expected
+        return compiled
 
     # ---- its derivatives ----
 

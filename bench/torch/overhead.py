@@ -1,0 +1,121 @@
+#!/usr/bin/python3
+"""overhead.py -- what a call of one of our operators costs beside one of PyTorch's own, on tensors of one element.
+
+    overhead.py PACKAGE [--output FILE]
+
+PACKAGE is the folder that holds the Python package; runs with the interpreter's own PyTorch, one thread. Microseconds,
+the least of many rounds, in which all take turns. Both add two tensors. Beside them stands what PyTorch itself asks for
+an operator that does nothing but make its result: as a function of Python that torch.library has registered, and as an
+autograd.Function that keeps its inputs.
+"""
+import argparse
+import json
+import os
+import sys
+import time
+
+ROUNDS, CALLS = 200, 40
+
+
+def _native():
+    import torch
+
+    return torch.add
+
+
+def _ours(knows_sizes):
+    import retrograde as rg
+    from retrograde.torch import operator
+
+    def define(kind, shapes=None):
+        x, total = rg.Var("x"), rg.Func("total")
+        a, b = rg.ImageParam(kind, 1, "a"), rg.ImageParam(kind, 1, "b")
+        total[x] = a[x] + b[x]
+        return total, [a, b]
+
+    if knows_sizes:
+        return operator("overhead::total", define)
+    return operator("overhead::total_of_any_sizes", lambda kind: define(kind))
+
+
+def _empty_operator():
+    import torch
+
+    library = torch.library.Library("overhead_empty", "DEF")
+    library.define("result(Tensor a, Tensor b) -> Tensor")
+    library.impl("result", lambda a, b: torch.empty((1,)), "CPU")
+
+    class Empty(torch.autograd.Function):
+        @staticmethod
+        def forward(ctx, a, b):
+            ctx.save_for_backward(a, b)
+            return torch.empty((1,))
+
+        @staticmethod
+        def backward(ctx, seed):
+            return None, seed
+
+    def autograd(a, b):
+        return Empty.apply(a, b) if a.requires_grad or b.requires_grad else torch.empty((1,))
+
+    library.impl("result", autograd, "Autograd")
+    _empty_operator.kept = library
+    return torch.ops.overhead_empty.result.default, Empty.apply
+
+
+def measure():
+    """{what is called: {how: us}}."""
+    import torch
+
+    registered, function = _empty_operator()
+    calls = {"PyTorch": _native(), "ours": _ours(True), "ours of any sizes": _ours(False),
+             "an empty operator": registered, "an empty autograd.Function": function}
+    a, b, wanting = torch.rand(1), torch.rand(1), torch.rand(1, requires_grad=True)
+
+    def both(call):
+        wanting.grad = None
+        call(a, wanting).backward()
+
+    ways = {"forward": lambda call: call(a, b), "forward, gradient wanted": lambda call: call(a, wanting),
+            "forward and backward": both}
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    best = {name: dict.fromkeys(ways, float("inf")) for name in calls}
+    for _ in range(ROUNDS):
+        for name, call in calls.items():
+            for way, run in ways.items():
+                run(call)
+                start = time.perf_counter()
+                for _ in range(CALLS):
+                    run(call)
+                best[name][way] = min(best[name][way], 1e6 * (time.perf_counter() - start) / CALLS)
+    torch.set_num_threads(threads)
+    return best
+
+
+def show(report):
+    ways = list(report["PyTorch"])
+    print(f"{'us for a call on one element':32}" + "".join(f"{way:>34}" for way in ways))
+    for name, row in report.items():
+        over = {way: f"{row[way]:.2f} ({row[way] - report['PyTorch'][way]:+.2f})" for way in ways}
+        print(f"{name:32}" + "".join(f"{over[way]:>34}" for way in ways))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("package")
+    parser.add_argument("--output")
+    options = parser.parse_args()
+    sys.path.insert(0, os.path.abspath(options.package))
+    import torch
+
+    print(f"PyTorch {torch.__version__}")
+    report = measure()
+    show(report)
+    if options.output:
+        with open(options.output, "w", encoding="utf-8") as file:
+            json.dump({"pytorch": torch.__version__, "overhead_us": report}, file, indent=1)
+
+
+if __name__ == "__main__":
+    main()
