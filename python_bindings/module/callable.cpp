@@ -76,59 +76,46 @@ class Bound {
   void call_tensors(const py::tuple& given) {
     if (given.size() != args_.size() + outputs_.size())
       throw py::type_error("a Callable takes its arguments, then its output buffers");
-    auto kept = std::make_shared<Tensors>(given);
+    Tensors tensors(given.size());
     int64_t elements = 0;
     for (size_t i = 0; i < given.size(); i++) {
       if (i < args_.size() && args_[i].is_scalar()) {
-        kept->values[i] = DynamicCall::value_of(scalar_of_tensor(given[i], args_[i].type));
+        tensors.values[i] = DynamicCall::value_of(scalar_of_tensor(given[i], args_[i].type));
         continue;
       }
       const Parameter& parameter = parameter_of_argument(i);
-      Runtime::Buffer<>& buffer = kept->buffers[i];
+      Runtime::Buffer<>& buffer = tensors.buffers[i];
       buffer = buffer_of_tensor(given[i], i < args_.size() ? args_[i].type : parameter->type);
       if (parameter && buffer.dimensions() > 0)
         allow_stride(*parameter, buffer.dim(0).stride(), buffer.dim(0).extent());
       elements += static_cast<int64_t>(buffer.number_of_elements());
-      kept->values[i] = DynamicCall::value_of(buffer);
+      tensors.values[i] = DynamicCall::value_of(buffer);
     }
     if (count_lifted() != lifted_) compile_again();
-    run(elements, [callable = callable_, kept](const Interruption&) {
-      DynamicCall::call(callable, kept->values);
-    });
+    run(given, elements, std::move(tensors));
   }
 
-  // What call_on_expected() takes and gives: element types and sizes, in pairs. `empty` is torch.empty.
-  void expect_tensors(const py::object& empty, const py::iterable& inputs,
-                      const py::iterable& results, const py::object& device) {
-    const auto kinds = [](const py::iterable& pairs) {
-      std::vector<TensorKind> result;
-      for (py::handle one : pairs) {
-        const auto pair = one.cast<std::pair<py::object, py::tuple>>();
-        result.push_back({pair.first, pair.second});
-      }
-      return result;
-    };
-    inputs_ = kinds(inputs);
-    results_ = kinds(results);
-    empty_ = empty;
-    device_ = device;
+  // What call_on_expected() takes: element types and sizes, in pairs; and functions that make a result each.
+  void expect_tensors(const py::iterable& inputs, const py::iterable& makers) {
+    for (py::handle one : inputs) {
+      const auto pair = one.cast<std::pair<py::object, py::tuple>>();
+      inputs_.push_back({pair.first, pair.second});
+    }
+    for (py::handle one : makers) makers_.push_back(py::reinterpret_borrow<py::object>(one));
   }
 
   // The results, made here; None, and nothing has happened, where tensors are others than was said. One call of
   // Python's for all of it: each would take longer than what it asks for.
   py::object call_on_expected(const py::tuple& given) {
-    if (given.size() != inputs_.size() || !empty_) return py::none();
+    if (given.size() != inputs_.size()) return py::none();
     for (size_t i = 0; i < inputs_.size(); i++) {
       if (!is_of(given[i], inputs_[i])) return py::none();
     }
-    static PyObject* const names = py::make_tuple("dtype", "device").release().ptr();
-    py::list made(results_.size());
-    py::tuple all(given.size() + results_.size());
+    py::list made(makers_.size());
+    py::tuple all(given.size() + makers_.size());
     for (size_t i = 0; i < given.size(); i++) all[i] = given[i];
-    for (size_t i = 0; i < results_.size(); i++) {
-      PyObject* const arguments[] = {results_[i].sizes.ptr(), results_[i].dtype.ptr(),
-                                     device_.ptr()};
-      PyObject* const result = PyObject_Vectorcall(empty_.ptr(), arguments, 1, names);
+    for (size_t i = 0; i < makers_.size(); i++) {
+      PyObject* const result = PyObject_CallNoArgs(makers_[i].ptr());
       if (!result) throw py::error_already_set();
       made[i] = py::reinterpret_steal<py::object>(result);
       all[given.size() + i] = made[i];
@@ -138,11 +125,9 @@ class Bound {
   }
 
  private:
-  // What a call touches, for as long as it runs.
+  // What a call touches, for as long as it runs. Values point into buffers, also of what it is moved to.
   struct Tensors {
-    explicit Tensors(const py::tuple& given)
-        : owner(keep(given)), buffers(given.size()), values(given.size()) {}
-    Kept owner;
+    explicit Tensors(size_t count) : buffers(count), values(count) {}
     std::vector<Runtime::Buffer<>> buffers;
     std::vector<DynamicCall::Value> values;
   };
@@ -150,16 +135,19 @@ class Bound {
   // Another thread for the sake of Ctrl-C costs more than a call that is over before anybody could press it. Such a
   // call is one on no more elements than one that was seen to be short; a number among the arguments may be a count
   // of loops, so then nothing is known.
-  template <class Work>
-  void run(int64_t elements, Work work) {
+  void run(const py::tuple& given, int64_t elements, Tensors tensors) {
     const bool may_be_short = !counts_ && elements <= most_short_elements;
-    const auto start = std::chrono::steady_clock::now();
+    const Callable callable = callable_;
     if (may_be_short && elements <= short_elements_) {
-      py::gil_scoped_release release;
-      work(nullptr);
+      const py::gil_scoped_release release;
+      DynamicCall::call(callable, tensors.values);
       return;
     }
-    unlocked(std::move(work));
+    const auto start = std::chrono::steady_clock::now();
+    auto kept = std::make_shared<Tensors>(std::move(tensors));
+    unlocked([callable, kept, owner = keep(given)](const Interruption&) {
+      DynamicCall::call(callable, kept->values);
+    });
     if (may_be_short && std::chrono::steady_clock::now() - start < short_time)
       short_elements_ = elements;
   }
@@ -196,8 +184,8 @@ class Bound {
   Compile compile_;
   std::vector<Argument> args_;
   std::vector<Parameter> parameters_, outputs_;  // null: of a scalar
-  std::vector<TensorKind> inputs_, results_;     // see expect_tensors
-  py::object empty_, device_;
+  std::vector<TensorKind> inputs_;               // see expect_tensors
+  std::vector<py::object> makers_;
   Callable callable_;
   size_t lifted_ = 0;            // when it was compiled
   int64_t short_elements_ = -1;  // calls on so many were short

@@ -30,29 +30,29 @@ void check_limits(const ParameterContents& parameter, const Scalar& value,
 
 void check_buffer(const halide_buffer_t* buffer, const std::string& name, Type type, int dimensions,
                   bool with_memory, const std::string& asked) {
-  const std::string what = "the buffer for " + quoted(name);
+  const auto what = [&] { return "the buffer for " + quoted(name); };  // of errors only
   if (!buffer)
-    call_error(asked, what + " must not be null", "a null halide_buffer_t* was given",
+    call_error(asked, what() + " must not be null", "a null halide_buffer_t* was given",
                "Give a buffer");
   const Type actual = from_halide_type(buffer->type);
   if (actual != type) {
-    call_error(asked, what + " must have the right element type",
+    call_error(asked, what() + " must have the right element type",
                text("it holds ", to_string(actual), ", ", to_string(type), " is needed"),
                "Give a buffer of that type");
   }
   if (buffer->dimensions != dimensions) {
-    call_error(asked, what + " must have the right number of dimensions",
+    call_error(asked, what() + " must have the right number of dimensions",
                text("it has ", buffer->dimensions, ", ", dimensions, " are needed"),
                "Give a buffer of that many dimensions");
   }
   for (int d = 0; d < dimensions; d++) {
     if (buffer->dim[d].extent >= 0) continue;
-    call_error(asked, what + " must not have negative extents",
+    call_error(asked, what() + " must not have negative extents",
                text("dimension ", d, " has extent ", buffer->dim[d].extent),
                "Give extents of at least 0");
   }
   if (with_memory && !buffer->host && !buffer->device) {
-    call_error(asked, what + " must have memory", "it has only a shape",
+    call_error(asked, what() + " must have memory", "it has only a shape",
                "Call allocate() on it first");
   }
 }

@@ -43,7 +43,7 @@ struct Callable::Contents {
   JITHandlers handlers;
   std::vector<Place> places;    // one for each argument, in the caller's order
   std::vector<Place> literals;  // Buffers that the program itself names
-  std::string asked() const { return "call " + quoted(name); }
+  std::string asked;            // how errors begin
 };
 
 // Every argument is one of the code's, or one that the outputs do not need, which is taken and left
@@ -51,6 +51,7 @@ struct Callable::Contents {
 Callable Pipeline::callable(const std::vector<Argument>& args, const Target& target) {
   auto contents = std::make_shared<Callable::Contents>();
   contents->name = spec().name;
+  contents->asked = "call " + quoted(contents->name);
   contents->code = compiled(target);
   contents->handlers = jit_handlers();
   const std::vector<ir::LoweredArgument>& lowered = contents->code->arguments();
@@ -84,7 +85,7 @@ void Callable::check(const std::vector<Value>& values) const {
   if (!defined())
     user_error("call a Callable", "only what was compiled can be called",
                "it was constructed without a pipeline", "Get it from compile_to_callable()");
-  const std::string asked = contents_->asked();
+  const std::string& asked = contents_->asked;
   const std::vector<Place>& places = contents_->places;
   if (values.size() != places.size()) {
     call_error(asked, "it takes its arguments, then its output buffers",
@@ -93,18 +94,18 @@ void Callable::check(const std::vector<Value>& values) const {
   }
   for (size_t i = 0; i < values.size(); i++) {
     const Place& place = places[i];
-    const std::string what = text("argument ", i + 1, ", ", quoted(place.name), ",");
+    const auto what = [&] { return text("argument ", i + 1, ", ", quoted(place.name), ","); };
     if (values[i].is_buffer != place.is_buffer) {
-      call_error(asked, what + (place.is_buffer ? " must be a buffer" : " must be a scalar"),
+      call_error(asked, what() + (place.is_buffer ? " must be a buffer" : " must be a scalar"),
                  place.is_buffer ? "a scalar was given" : "a buffer was given",
                  place.is_buffer ? "Give a Buffer" : "Give a number");
     }
     if (values[i].type.bits() > 0 && values[i].type != place.type) {
-      call_error(asked, text(what, " must be of type ", to_string(place.type)),
+      call_error(asked, text(what(), " must be of type ", to_string(place.type)),
                  to_string(values[i].type) + " was given", "Give a value of that type");
     }
     if (values[i].dimensions >= 0 && values[i].dimensions != place.dimensions) {
-      call_error(asked, what + " must have the dimensions that it was compiled for",
+      call_error(asked, what() + " must have the dimensions that it was compiled for",
                  text("they are ", place.dimensions, ", and a buffer of ", values[i].dimensions,
                       " was given"),
                  "Give a buffer of that many dimensions");
@@ -114,7 +115,7 @@ void Callable::check(const std::vector<Value>& values) const {
 
 int Callable::call(JITUserContext* context, const std::vector<Value>& values) const {
   check(values);
-  const std::string asked = contents_->asked();
+  const std::string& asked = contents_->asked;
   std::vector<void*> argv(contents_->code->arguments().size() + 1);  // one more: for those unused
   std::vector<uint64_t> scalars(values.size());
   for (size_t i = 0; i < values.size(); i++) {

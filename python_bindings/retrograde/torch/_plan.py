@@ -3,7 +3,9 @@
 Tensors may have more dimensions than their parameters, in front of them: a batch. These are broadcast as PyTorch
 broadcasts, and each item of the batch is a call of its own.
 """
+import functools
 import itertools
+import math
 import threading
 
 import torch
@@ -164,8 +166,8 @@ class Plan:
         pipeline.set_autoschedule(rg.AutoscheduleOptions(without=[] if tiles else [rg.Decision.register_tiles]))
         compiled = pipeline.compile_to_callable(self.inputs)
         if self.sizes is not None:
-            compiled._expect_tensors(torch.empty, zip(self.dtypes, self.sizes),
-                                     zip(self.result_dtypes, self._result_shapes), _CPU)
+            compiled._expect_tensors(zip(self.dtypes, self.sizes),
+                                     [_maker(*one) for one in zip(self._result_shapes, self.result_dtypes)])
             self.call_on_expected = compiled._call_on_expected
         return compiled
 
@@ -220,6 +222,14 @@ class Plan:
         sizes = None if self.sizes is None else [*self.sizes, *(self.sizes[i] for i in given)]
         return Plan(f"{self.name}, tangent", moved, self.inputs + tangents,
                     lambda tensors: self._shapes(tensors[:count]), sizes, self.order + 1)
+
+
+def _maker(shape, dtype):
+    """A function that makes a result. One like another takes half as long as one by its sizes: where it matters, which is
+    where a tensor is small, there is another."""
+    if math.prod(shape) <= 4096:
+        return functools.partial(torch.empty_like, torch.empty(shape, dtype=dtype, device=_CPU))
+    return functools.partial(torch.empty, shape, dtype=dtype, device=_CPU)
 
 
 def _set_bounds(buffer, size):
