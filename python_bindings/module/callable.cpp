@@ -95,35 +95,6 @@ class Bound {
     run(given, elements, std::move(tensors));
   }
 
-  // What call_on_expected() takes: element types and sizes, in pairs; and functions that make a result each.
-  void expect_tensors(const py::iterable& inputs, const py::iterable& makers) {
-    for (py::handle one : inputs) {
-      const auto pair = one.cast<std::pair<py::object, py::tuple>>();
-      inputs_.push_back({pair.first, pair.second});
-    }
-    for (py::handle one : makers) makers_.push_back(py::reinterpret_borrow<py::object>(one));
-  }
-
-  // The results, made here; None, and nothing has happened, where tensors are others than was said. One call of
-  // Python's for all of it: each would take longer than what it asks for.
-  py::object call_on_expected(const py::tuple& given) {
-    if (given.size() != inputs_.size()) return py::none();
-    for (size_t i = 0; i < inputs_.size(); i++) {
-      if (!is_of(given[i], inputs_[i])) return py::none();
-    }
-    py::list made(makers_.size());
-    py::tuple all(given.size() + makers_.size());
-    for (size_t i = 0; i < given.size(); i++) all[i] = given[i];
-    for (size_t i = 0; i < makers_.size(); i++) {
-      PyObject* const result = PyObject_CallNoArgs(makers_[i].ptr());
-      if (!result) throw py::error_already_set();
-      made[i] = py::reinterpret_steal<py::object>(result);
-      all[given.size() + i] = made[i];
-    }
-    call_tensors(all);
-    return made;
-  }
-
  private:
   // What a call touches, for as long as it runs. Values point into buffers, also of what it is moved to.
   struct Tensors {
@@ -184,12 +155,50 @@ class Bound {
   Compile compile_;
   std::vector<Argument> args_;
   std::vector<Parameter> parameters_, outputs_;  // null: of a scalar
-  std::vector<TensorKind> inputs_;               // see expect_tensors
-  std::vector<py::object> makers_;
   Callable callable_;
   size_t lifted_ = 0;            // when it was compiled
   int64_t short_elements_ = -1;  // calls on so many were short
   bool counts_ = false;          // whether an argument is a whole number
+};
+
+// Calls on tensors of element types and sizes that are known: one call of Python's for all that there is to do, each of
+// which would take longer than what it asks for. Nothing of it changes: threads may share it.
+class ExpectedCall {
+ public:
+  // Of a Bound; element types and sizes of its arguments, in pairs; functions that make a result each.
+  ExpectedCall(py::object callable, const py::iterable& inputs, const py::iterable& makers)
+      : callable_(std::move(callable)), bound_(callable_.cast<Bound*>()) {
+    for (py::handle one : inputs) {
+      const auto pair = one.cast<std::pair<py::object, py::tuple>>();
+      inputs_.push_back({pair.first, pair.second});
+    }
+    for (py::handle one : makers) makers_.push_back(py::reinterpret_borrow<py::object>(one));
+  }
+
+  // The results; None, and nothing has happened, where tensors are others than was said.
+  py::object call(const py::tuple& given) const {
+    if (given.size() != inputs_.size()) return py::none();
+    for (size_t i = 0; i < inputs_.size(); i++) {
+      if (!is_of(given[i], inputs_[i])) return py::none();
+    }
+    py::list made(makers_.size());
+    py::tuple all(given.size() + makers_.size());
+    for (size_t i = 0; i < given.size(); i++) all[i] = given[i];
+    for (size_t i = 0; i < makers_.size(); i++) {
+      PyObject* const result = PyObject_CallNoArgs(makers_[i].ptr());
+      if (!result) throw py::error_already_set();
+      made[i] = py::reinterpret_steal<py::object>(result);
+      all[given.size() + i] = made[i];
+    }
+    bound_->call_tensors(all);
+    return made;
+  }
+
+ private:
+  py::object callable_;
+  Bound* bound_;
+  std::vector<TensorKind> inputs_;
+  std::vector<py::object> makers_;
 };
 
 Parameter parameter_of(py::handle object) {
@@ -228,9 +237,10 @@ void bind_callable(py::module_& m) {
   Class<Bound>(m, "Callable")
       .def("__call__", &Bound::call)
       .def("_call_tensors", &Bound::call_tensors)
-      .def("_expect_tensors", &Bound::expect_tensors)
-      .def("_call_on_expected", &Bound::call_on_expected)
       .def("defined", [](const Bound&) { return true; });
+  py::class_<ExpectedCall>(m, "_ExpectedCall")
+      .def(py::init<py::object, const py::iterable&, const py::iterable&>())
+      .def("__call__", &ExpectedCall::call);
   bind_compile(reopened<Func>(m, "Func", {"Runnable"}));
   bind_compile(reopened<Pipeline>(m, "Pipeline", {"Runnable"}));
 }

@@ -149,6 +149,24 @@ class Operators(unittest.TestCase):
             self.assertEqual(op(torch.full((n,), 3.0)).tolist(), [9] * n)
         self.assertLess(len(asked), 20)
 
+    def test_sizes_that_come_again(self):
+        op = blur("float32")
+        for n in (6, 6, 6, 9, 9, 9, 6, 9):  # a call on the sizes of the one before is a shorter way
+            image, taps = torch.rand(n), torch.rand(3, requires_grad=True)
+            result = op(image, taps)
+            want = sum(image[k:k + n - 2] * taps[k] for k in range(3))
+            torch.testing.assert_close(result, want)
+            gradient, = torch.autograd.grad(result.sum(), taps)
+            torch.testing.assert_close(gradient, torch.autograd.grad(want.sum(), taps)[0])
+            self.assertEqual(op(image[::2], taps).shape, ((n + 1) // 2 - 2,))
+
+    def test_sizes_that_values_say(self):
+        count, f = rg.ImageParam("int64", 1, "count"), rg.Func("f")
+        f[x] = count[0] + rg.cast("int64", x)
+        op = operator(f, [count], lambda count: [int(count[0])])
+        for n in (3, 3, 3, 5, 3):
+            self.assertEqual(op(torch.tensor([n])).tolist(), list(range(n, 2 * n)))
+
     def test_forward_mode(self):
         import torch.autograd.forward_ad as forward
         op, taps = blur(), torch.tensor([1.0, 2, 1], dtype=torch.float64)

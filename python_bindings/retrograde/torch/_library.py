@@ -63,7 +63,7 @@ class Calls:
     each, and give a list."""
 
     def __init__(self, operator, library, namespace, name):
-        self.operator, self._last = operator, {}
+        self.operator, self._last, self._functions = operator, {}, {}
         kernels = {"CPU": self.run, "CUDA": self.refuse, "Autograd": self.differentiate,
                    "AutocastCPU": self.cast, "AutocastCUDA": self.cast}
         for key, kernel in kernels.items():
@@ -92,8 +92,12 @@ class Calls:
         """What the dispatcher does, without it where it has nothing to decide."""
         if is_compiling() or not is_direct(tensors):
             return self.dispatch(path, tensors)
+        return self.direct(path, tensors)
+
+    def direct(self, path, tensors):
+        """Where is_direct(tensors)."""
         if torch.is_grad_enabled() and _any_requires_grad(*tensors):
-            return _apply_function(self, path, self.run, *tensors)
+            return self.differentiably(path)(self.run, *tensors)
         return self.run(path, tensors)
 
     def dispatch(self, path, tensors):
@@ -112,7 +116,7 @@ class Calls:
                 return results
         plan = self.operator.plan_for(path, tensors)
         results = plan.run(tensors)
-        self._last[path] = plan.call_on_expected
+        self._last[path] = plan.expected
         return results
 
     def fake(self, path, tensors):
@@ -127,7 +131,7 @@ class Calls:
         if forward_ad._current_level < 0 and not (torch.is_grad_enabled() and _any_requires_grad(*tensors)):
             return self.below(path, tensors)
         if not _are_transforms_active():
-            return list(_apply_function(self, path, self.below, *tensors))
+            return list(self.differentiably(path)(self.below, *tensors))
         # As autograd.Function.apply, but of one level of functorch's transforms: that of the kernel that calls it;
         # inner levels come back through the dispatcher. Autograd turns modes off that are inner levels' as well.
         grad, forward = torch.is_grad_enabled(), torch._C._is_fwd_grad_enabled()
@@ -137,7 +141,14 @@ class Calls:
                 return self.below(path, tensors)
 
         with _enable_single_level():
-            return list(_apply_function(self, path, below, *tensors))
+            return list(self.differentiably(path)(below, *tensors))
+
+    def differentiably(self, path):
+        """A function of what runs (path, tensors), and of the tensors, whose results autograd knows."""
+        function = self._functions.get(path)
+        if function is None:
+            function = self._functions.setdefault(path, _function_of(self, path))
+        return function
 
     def below(self, path, tensors):
         """The kernels behind autograd's."""
@@ -198,37 +209,37 @@ def _mask(places):
     return sum(1 << i for i in places)
 
 
-class _Function(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx, calls, path, below, *tensors):
-        ctx.calls, ctx.path = calls, path
-        ctx.set_materialize_grads(False)
-        ctx.save_for_backward(*tensors)
-        if forward_ad._current_level >= 0:
-            ctx.save_for_forward(*tensors)
-        return tuple(below(path, tensors))
+def _function_of(calls, path):
+    """Of one path: what a call hands over besides are its tensors alone, since autograd looks at each argument."""
+    class Call(torch.autograd.Function):
+        @staticmethod
+        def forward(ctx, below, *tensors):
+            ctx.set_materialize_grads(False)
+            ctx.save_for_backward(*tensors)
+            if forward_ad._current_level >= 0:
+                ctx.save_for_forward(*tensors)
+            return tuple(below(path, tensors))
 
-    @staticmethod
-    def backward(ctx, *seeds):
-        tensors = ctx.saved_tensors
-        wanted = [i for i, t in enumerate(tensors) if ctx.needs_input_grad[i + 3] and t.dtype.is_floating_point]
-        given = [i for i, seed in enumerate(seeds) if seed is not None and seed.dtype.is_floating_point]
-        results = [None] * len(tensors)
-        if wanted and given:
-            path = (*ctx.path, GRADIENT, _mask(wanted), _mask(given))
-            # Dense ones: autograd's seeds of sums have stride 0, for which pipelines would be compiled anew.
-            gradients = ctx.calls(path, (*tensors, *(seeds[i].contiguous() for i in given)))
-            for i, gradient in zip(wanted, gradients):
-                # Of an item that the batch shares.
-                results[i] = gradient if gradient.shape == tensors[i].shape else gradient.sum_to_size(tensors[i].shape)
-        return (None, None, None, *results)
+        @staticmethod
+        def backward(ctx, *seeds):
+            tensors = ctx.saved_tensors
+            wanted = [i for i, t in enumerate(tensors) if ctx.needs_input_grad[i + 1] and t.dtype.is_floating_point]
+            given = [i for i, seed in enumerate(seeds) if seed is not None and seed.dtype.is_floating_point]
+            results = [None] * len(tensors)
+            if wanted and given:
+                step = GRADIENT, _mask(wanted), _mask(given)
+                # Dense ones: autograd's seeds of sums have stride 0, for which pipelines would be compiled anew.
+                gradients = calls((*path, *step), (*tensors, *(seeds[i].contiguous() for i in given)))
+                for i, gradient in zip(wanted, gradients):
+                    # Of an item that the batch shares.
+                    shape = tensors[i].shape
+                    results[i] = gradient if gradient.shape == shape else gradient.sum_to_size(shape)
+            return (None, *results)
 
-    @staticmethod
-    def jvp(ctx, _calls, _path, _below, *tangents):
-        given = [i for i, t in enumerate(tangents) if t is not None]
-        path = (*ctx.path, TANGENT, _mask(given), 0)
-        moved = ctx.calls(path, (*ctx.saved_tensors, *(tangents[i] for i in given)))
-        return tuple(t if t.dtype.is_floating_point else None for t in moved)
+        @staticmethod
+        def jvp(ctx, _below, *tangents):
+            given = [i for i, t in enumerate(tangents) if t is not None]
+            moved = calls((*path, TANGENT, _mask(given), 0), (*ctx.saved_tensors, *(tangents[i] for i in given)))
+            return tuple(t if t.dtype.is_floating_point else None for t in moved)
 
-
-_apply_function = super(torch.autograd.Function, _Function).apply
+    return super(torch.autograd.Function, Call).apply

@@ -9,7 +9,7 @@ import torch
 from .. import _retrograde as rg
 from .._errors import CompileError, error
 from . import _library
-from ._direct import is_compiling
+from ._direct import is_compiling, is_direct
 from ._plan import Plan, is_image
 
 _numbers = itertools.count()
@@ -148,14 +148,13 @@ class Operator:
 
     def __call__(self, *tensors):
         if len(tensors) == len(self.argument_names):
+            if not is_compiling() and is_direct(tensors):
+                results = self._calls.direct((), tensors)
+                return results[0] if self.single else tuple(results)
             for tensor in tensors:
                 if not isinstance(tensor, torch.Tensor):
-                    tensors = self._as_tensors(tensors)
-                    break
-            if is_compiling():
-                return self.overload(*tensors)
-            results = self._calls((), tensors)
-            return results[0] if self.single else tuple(results)
+                    return self(*self._as_tensors(tensors))
+            return self.overload(*tensors)
         raise error(TypeError, f'call the operator "{self.name}"', f"it takes {', '.join(self.argument_names)}",
                     f"{len(tensors)} arguments are given", "Give one for each")
 

@@ -56,7 +56,7 @@ class Plan:
         self.ranks = [parameter.dimensions() if is_image(parameter) else 0 for parameter in self.inputs]
         self.result_dtypes = [dtype_of(f) for f in self.outputs]
         self._images = [is_image(parameter) for parameter in self.inputs]
-        self.call_on_expected = None  # once it is compiled: see _compile
+        self._last_kinds, self.expected = None, None  # see _expect
         self._lock, self._callable, self._derived = threading.RLock(), None, {}
         self._result_shapes, self._seeds = None, 0  # so many of the last inputs are seeds
         if sizes is not None:
@@ -134,6 +134,7 @@ class Plan:
             return results
         if not batch:
             self._call(tensors, results)
+            self._expect(tensors, shapes)
         elif 0 not in batch:
             wide = [t.expand(batch + tuple(t.shape[t.dim() - rank:])) for t, rank in zip(tensors, self.ranks)]
             for at in itertools.product(*map(range, batch)):
@@ -157,19 +158,28 @@ class Plan:
         self._callable._call_tensors((*tensors, *results))
 
     def _compile(self):
-        """Funcs that nobody scheduled get a schedule. Of sizes that are known, call_on_expected(tensors) then is run(),
-        or gives None for tensors of others."""
+        """Funcs that nobody scheduled get a schedule."""
         pipeline = rg.Pipeline(self.outputs)
         # The region that register tiles read comes out too large where it is clamped to sizes that are not known, and
         # in derivatives of gradients: what they read of a seed would be refused.
         tiles = self.sizes is not None and self.order < 2
         pipeline.set_autoschedule(rg.AutoscheduleOptions(without=[] if tiles else [rg.Decision.register_tiles]))
-        compiled = pipeline.compile_to_callable(self.inputs)
-        if self.sizes is not None:
-            compiled._expect_tensors(zip(self.dtypes, self.sizes),
-                                     [_maker(*one) for one in zip(self._result_shapes, self.result_dtypes)])
-            self.call_on_expected = compiled._call_on_expected
-        return compiled
+        return pipeline.compile_to_callable(self.inputs)
+
+    def _expect(self, tensors, shapes):
+        """Of sizes that came twice in a row, expected(tensors) then is run(), or gives None for tensors of others: a
+        shorter way. Not where the shapes of results come from more than those of tensors."""
+        kinds = [(t.dtype, tuple(t.shape)) for t in tensors]
+        if kinds != self._last_kinds:
+            self._last_kinds = kinds
+            return
+        try:
+            alone = self.shapes([torch.empty(shape, dtype=dtype, device="meta") for dtype, shape in kinds], ())
+        except Exception:  # a user's function asks tensors for values, and they have none
+            return
+        if [tuple(one) for one in alone] == [tuple(one) for one in shapes]:
+            makers = [_maker(tuple(one), dtype) for one, dtype in zip(shapes, self.result_dtypes)]
+            self.expected = rg._ExpectedCall(self._callable, kinds, makers)
 
     # ---- its derivatives ----
 
@@ -225,8 +235,8 @@ class Plan:
 
 
 def _maker(shape, dtype):
-    """A function that makes a result. One like another takes half as long as one by its sizes: where it matters, which is
-    where a tensor is small, there is another."""
+    """A function that makes a result. One like another takes half as long as one by its sizes: where it matters,
+    which is where a tensor is small, there is another."""
     if math.prod(shape) <= 4096:
         return functools.partial(torch.empty_like, torch.empty(shape, dtype=dtype, device=_CPU))
     return functools.partial(torch.empty, shape, dtype=dtype, device=_CPU)
