@@ -4,7 +4,7 @@
 #     The program of the generators in these files: retrograde::generator gives it its main().
 #
 #   add_retrograde_library(<target> FROM <generator-target> [GENERATOR <name>] [FUNCTION_NAME <name>]
-#     [NAMESPACE <ns>] [GRADIENT] [PARAMS <param=value>...] [TARGETS <target>...]
+#     [NAMESPACE <ns>] [GRADIENT | SEPARATE_GRADIENTS] [PARAMS <param=value>...] [TARGETS <target>...]
 #     [FEATURES <feature>...] [USE_RUNTIME <target>] [AUTOSCHEDULER <name>] [PLUGINS <target>...]
 #     [SIMULATED_GPU] [HEADER <var>] [ASSEMBLY <var>] [BITCODE <var>] [LLVM_ASSEMBLY <var>] [STMT <var>]
 #     [STMT_HTML <var>] [REGISTRATION <var>])
@@ -12,8 +12,9 @@
 #     GENERATOR and FUNCTION_NAME default to <target>; TARGETS to host, or to what the variable
 #     Retrograde_TARGET says. Of several TARGETS the machine decides at run time; the last one is what
 #     every machine can run. SIMULATED_GPU: kernels (FEATURES cuda) run on the simulated device, too, which
-#     RETROGRADE_GPU=simulated chooses at run time. GRADIENT: the function of the gradient, see
-#     generator/gradient_module.cpp. The variables get names of extra files beside the header.
+#     RETROGRADE_GPU=simulated chooses at run time. GRADIENT: the function of the gradient;
+#     SEPARATE_GRADIENTS: one that gives the gradients by all images and numbers, and one for each of them
+#     (generator/gradient_module.cpp). The variables get names of extra files beside the header.
 #
 #   add_retrograde_runtime(<target> [FROM <generator-target>] [TARGETS <target>...])
 #     A runtime for USE_RUNTIME: retrograde::runtime, or for another platform one that the
@@ -99,7 +100,7 @@ function(add_retrograde_library target)
   set(SCHEDULE_extension .schedule.h)
   set(STMT_extension .stmt)
   set(STMT_HTML_extension .stmt.html)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "GRADIENT;GRADIENT_DESCENT;C_BACKEND;SIMULATED_GPU"
+  cmake_parse_arguments(PARSE_ARGV 1 arg "GRADIENT;GRADIENT_DESCENT;SEPARATE_GRADIENTS;C_BACKEND;SIMULATED_GPU"
     "FROM;GENERATOR;FUNCTION_NAME;NAMESPACE;USE_RUNTIME;AUTOSCHEDULER;HEADER;${extra_types}"
     "TARGETS;FEATURES;PARAMS;PLUGINS")
   set(asked "add_retrograde_library(${target})")
@@ -140,6 +141,9 @@ function(add_retrograde_library target)
   set(gradient 0)
   if(arg_GRADIENT OR arg_GRADIENT_DESCENT)
     set(gradient 1)
+  endif()
+  if(arg_SEPARATE_GRADIENTS)
+    set(gradient separate)
   endif()
   set(scheduler)
   if(arg_AUTOSCHEDULER MATCHES "^Halide::" AND NOT TARGET "${arg_AUTOSCHEDULER}")

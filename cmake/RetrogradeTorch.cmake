@@ -5,7 +5,8 @@
 #     [AUTOSCHEDULER <name>])
 #     A module <target>.so that torch.ops.load_library loads; then torch.ops.<ns>.<target>(...) takes the generator's
 #     inputs and gives its outputs. NAMESPACE defaults to "retrograde".
-#     GRADIENT: autograd differentiates it, once; the gradient is that of the generator's program (-d 1).
+#     GRADIENT: autograd differentiates it, once, by images and by floating-point numbers that are given as tensors
+#     without dimensions; what is computed are the gradients that are asked for (-d separate).
 #     PYTHON: whose PyTorch it is compiled for, "/usr/bin/python3" by default; include and library paths come from it,
 #     so that no CUDA toolkit is needed where that PyTorch knows CUDA.
 #     SHAPE: the sizes of an output as PyTorch orders them, C++ over the inputs' names, as in
@@ -74,9 +75,9 @@ function(retrograde_add_torch_op target)
   set(text "// Written by retrograde_add_torch_op: the operator ${arg_NAMESPACE}::${target}.\n")
   if(arg_GRADIENT)
     list(APPEND parts ${target}_gradient)
-    add_retrograde_library(${target}_gradient ${options} GRADIENT PYTORCH_WRAPPER gradient_wrapper)
+    add_retrograde_library(${target}_gradient ${options} SEPARATE_GRADIENTS PYTORCH_WRAPPER gradient_wrapper)
     string(APPEND text "#include \"${gradient_wrapper}\"\n"
-      "#define RETROGRADE_TORCH_GRADIENT ${target}_gradient_th_\n")
+      "#define RETROGRADE_TORCH_GRADIENT(of) ${target}_gradient##of##_th_\n")
   endif()
   string(APPEND text "#define RETROGRADE_TORCH_NAMESPACE ${arg_NAMESPACE}\n#define RETROGRADE_TORCH_OP ${target}\n")
   foreach(shape IN LISTS arg_SHAPE)

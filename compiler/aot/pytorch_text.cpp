@@ -12,7 +12,9 @@ const char* const pytorch_operator_text = R"(
 // The operator RETROGRADE_TORCH_NAMESPACE::RETROGRADE_TORCH_OP. The program also defines
 //   RETROGRADE_TORCH_SHAPE_<output>   the sizes of an output, as in: image.sym_size(0), image.sym_size(1) - 2;
 //                                     those of the first image with as many dimensions where it does not
-//   RETROGRADE_TORCH_GRADIENT         the wrapper of the gradient's function, whose header it has included
+//   RETROGRADE_TORCH_GRADIENT(of)     the wrappers of the gradient's functions, whose header it has included: `of` is
+//                                     nothing for all gradients, _by_<input> for one of several
+// Floating-point numbers are numbers, or tensors without dimensions, which are differentiated like images.
 namespace retrograde_torch {
 namespace RETROGRADE_TORCH_OP {
 
@@ -29,39 +31,46 @@ $empty_variables$  succeed(name, $function$_th_($arguments$, $outputs$));
   return Results($outputs$);
 }
 
-inline Results call($parameters$) {
-  static const auto found = c10::Dispatcher::singleton().findSchemaOrThrow(name, "").typed<Results($types$)>();
-  return found.call($arguments$);
-}
+constexpr const char* tensors_name = RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "$dot_overload$";
 
-inline bool is_differentiated($parameters$) {
-  return at::GradMode::is_enabled() && ($any_requires_grad$);
+inline const auto& found() {
+  static const auto handle =
+      c10::Dispatcher::singleton().findSchemaOrThrow(name, "$overload$").typed<Results($tensor_types$)>();
+  return handle;
 }
 
 #ifdef RETROGRADE_TORCH_GRADIENT
-using Gradients = $gradients$;
 constexpr const char* backward_name =
     RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_NAMESPACE) "::" RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward";
+constexpr int64_t all_gradients = (int64_t{1} << $gradient_count$) - 1;
 
-inline Gradients backward_made($backward_parameters$) {
-  return Gradients($gradient_empties$);
+inline std::vector<at::Tensor> backward_made($backward_parameters$) {
+  std::vector<at::Tensor> results;
+$gradients_made$  return results;
 }
 
-inline Gradients backward_run($backward_parameters$) {
-$gradient_variables$  succeed(backward_name, RETROGRADE_TORCH_GRADIENT($arguments$, $seeds$, $gradient_outputs$));
-  return Gradients($gradient_sums$);
+// Those whose bits are in `wanted`, and no others are computed.
+inline std::vector<at::Tensor> backward_run($backward_parameters$) {
+  std::vector<at::Tensor> results;
+  if (wanted == all_gradients) {
+$gradient_variables$    succeed(backward_name, RETROGRADE_TORCH_GRADIENT()($values$, $seeds$, $gradient_outputs$));
+    results = {$gradient_results$};
+    return results;
+  }
+$gradients_alone$  return results;
 }
 
-inline Gradients backward_call($backward_parameters$) {
-  static const auto found =
-      c10::Dispatcher::singleton().findSchemaOrThrow(backward_name, "").typed<Gradients($backward_types$)>();
-  return found.call($arguments$, $seeds$);
+inline const auto& found_backward() {
+  static const auto handle = c10::Dispatcher::singleton()
+                                 .findSchemaOrThrow(backward_name, "")
+                                 .typed<std::vector<at::Tensor>($backward_types$)>();
+  return handle;
 }
 
 struct OnlyOnce : torch::autograd::Function<OnlyOnce> {
   static std::vector<at::Tensor> forward(torch::autograd::AutogradContext*, $backward_parameters$) {
     at::AutoDispatchBelowADInplaceOrView below;
-    return tensors_of(backward_call($arguments$, $seeds$));
+    return found_backward().call($backward_arguments$);
   }
   static torch::autograd::variable_list backward(torch::autograd::AutogradContext*, torch::autograd::variable_list) {
     refuse_derivative(name, "its gradient was compiled, and no second derivative");
@@ -69,27 +78,28 @@ struct OnlyOnce : torch::autograd::Function<OnlyOnce> {
   }
 };
 
-inline Gradients backward_autograd($backward_parameters$) {
-  if (at::GradMode::is_enabled() && ($any_requires_grad$ || $any_seed_requires_grad$)) {
-    const auto results = OnlyOnce::apply($arguments$, $seeds$);
-    return $results_of_only_once$;
-  }
+inline std::vector<at::Tensor> backward_autograd($backward_parameters$) {
+  if (at::GradMode::is_enabled() && ($any_requires_grad$ || $any_seed_requires_grad$))
+    return OnlyOnce::apply($backward_arguments$);
   at::AutoDispatchBelowADInplaceOrView below;
-  return backward_call($arguments$, $seeds$);
+  return found_backward().call($backward_arguments$);
 }
 #endif
 
 struct Function : torch::autograd::Function<Function> {
-  static std::vector<at::Tensor> forward(torch::autograd::AutogradContext* context, $parameters$) {
+  static std::vector<at::Tensor> forward(torch::autograd::AutogradContext* context, $tensor_parameters$) {
     at::AutoDispatchBelowADInplaceOrView below;
-    context->save_for_backward({$images$});
-$save_numbers$    return tensors_of(call($arguments$));
+    context->save_for_backward({$tensors$});
+$save_numbers$    return tensors_of(found().call($arguments$));
   }
   static torch::autograd::variable_list backward(torch::autograd::AutogradContext* context,
                                                  torch::autograd::variable_list seeds) {
 #ifdef RETROGRADE_TORCH_GRADIENT
     const auto saved = context->get_saved_variables();
-    const auto results = tensors_of(backward_call($restored$, $seed_list$));
+    int64_t wanted = 0;
+$find_wanted$    const auto results = found_backward().call($restored$, $seed_list$);
+    size_t next = 0;
+    const auto gradient = [&](int64_t bit) { return wanted & bit ? results[next++] : at::Tensor(); };
     return {$autograd_results$};
 #else
     refuse_derivative(name, "no gradient was compiled: it was made without GRADIENT");
@@ -98,25 +108,24 @@ $save_numbers$    return tensors_of(call($arguments$));
   }
 };
 
-inline Results autograd($parameters$) {
-  if (is_differentiated($arguments$)) {
+inline Results autograd(c10::DispatchKeySet keys, $tensor_parameters$) {
+  if (at::GradMode::is_enabled() && ($any_requires_grad$)) {
     const auto results = Function::apply($arguments$);
     return $results_of_apply$;
   }
-  at::AutoDispatchBelowADInplaceOrView below;
-  return call($arguments$);
+  return found().redispatch(keys & c10::after_autograd_keyset, $arguments$);
 }
 
-inline Results refuse_device($parameters$) { refuse_cuda(name); }
-
+inline Results refuse_device($tensor_parameters$) { refuse_cuda(name); }
+$numbers$
 TORCH_LIBRARY_FRAGMENT(RETROGRADE_TORCH_NAMESPACE, library) {
-  library.def(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "($schema$) -> $results_schema$");
-  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::CPU, TORCH_FN(run));
-  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::CUDA, TORCH_FN(refuse_device));
-  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::Meta, TORCH_FN(made));
-  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::Autograd, TORCH_FN(autograd));
-#ifdef RETROGRADE_TORCH_GRADIENT
-  library.def(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward($schema$, $seed_schema$) -> $gradients_schema$");
+  library.def(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "$dot_overload$($tensor_schema$) -> $results_schema$");
+  library.impl(tensors_name, c10::DispatchKey::CPU, TORCH_FN($run$));
+  library.impl(tensors_name, c10::DispatchKey::CUDA, TORCH_FN(refuse_device));
+  library.impl(tensors_name, c10::DispatchKey::Meta, TORCH_FN($made$));
+  library.impl(tensors_name, c10::DispatchKey::Autograd, TORCH_FN(autograd));
+$register_numbers$#ifdef RETROGRADE_TORCH_GRADIENT
+  library.def(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward($backward_schema$) -> Tensor[]");
   library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward", c10::DispatchKey::CPU, TORCH_FN(backward_run));
   library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward", c10::DispatchKey::Meta, TORCH_FN(backward_made));
   library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward", c10::DispatchKey::Autograd,
@@ -130,6 +139,32 @@ const bool has_error_handler = (halide_set_error_handler(note_error), true);
 }  // namespace retrograde_torch
 #undef RETROGRADE_TORCH_OP
 #endif
+)";
+
+const char* const pytorch_numbers_text = R"(
+inline Results made_of_tensors($tensor_parameters$) { return made($values$); }
+inline Results run_of_tensors($tensor_parameters$) { return run($values$); }
+
+inline Results autograd_of_numbers(c10::DispatchKeySet keys, $parameters$) {
+  if (at::GradMode::is_enabled() && ($any_image_requires_grad$)) {
+    const auto results = Function::apply($boxed_arguments$);
+    return $results_of_apply$;
+  }
+  static const auto handle =
+      c10::Dispatcher::singleton().findSchemaOrThrow(name, "").typed<Results($types$)>();
+  return handle.redispatch(keys & c10::after_autograd_keyset, $arguments$);
+}
+
+inline Results refuse_device_of_numbers($parameters$) { refuse_cuda(name); }
+)";
+
+// After that of tensors: a caller's tensor would become a number here, without a gradient.
+const char* const pytorch_register_numbers_text =
+    R"(  library.def(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "($schema$) -> $results_schema$");
+  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::CPU, TORCH_FN(run));
+  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::CUDA, TORCH_FN(refuse_device_of_numbers));
+  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::Meta, TORCH_FN(made));
+  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::Autograd, TORCH_FN(autograd_of_numbers));
 )";
 
 const char* const pytorch_helpers = R"(
@@ -176,6 +211,14 @@ struct View {
 inline void check_rank(const char* function, const char* argument, const at::Tensor& tensor, int64_t rank) {
   TORCH_CHECK(tensor.dim() == rank, "cannot call \"", function, "\": \"", argument, "\" has ", rank,
               " dimensions; given is one with sizes ", tensor.sizes(), ". Give a tensor of that many dimensions.");
+}
+
+// Of a number that is a tensor; 0 where it has no value yet: sizes do not depend on it.
+inline double number_of(const char* function, const char* argument, const at::Tensor& number) {
+  TORCH_CHECK(number.dim() == 0 && at::isFloatingType(number.scalar_type()), "cannot call \"", function, "\": \"",
+              argument, "\" is a floating-point number, or a tensor of one without dimensions; given is one of ",
+              number.scalar_type(), " with sizes ", number.sizes(), ". Take an element of it.");
+  return number.is_meta() ? 0.0 : number.item<double>();
 }
 
 inline std::string& last_error() {

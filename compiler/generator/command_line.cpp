@@ -41,12 +41,16 @@ OutputFileType read_emit_type(const std::string& word) {
              quoted(word) + " is none of them", "Name one or more of these, with commas between");
 }
 
-bool read_gradient(const std::string& text) {
-  if (text != "0" && text != "1") {
-    user_error(std::string(asked) + " with -d " + text, "-d takes 1, the gradient, or 0",
-               quoted(text) + " is neither", "Write -d 1 or leave it out");
+CommandLine::Gradient read_gradient(const std::string& text) {
+  using Gradient = CommandLine::Gradient;
+  const std::map<std::string, Gradient> known = {
+      {"0", Gradient::None}, {"1", Gradient::Whole}, {"separate", Gradient::Separate}};
+  const auto found = known.find(text);
+  if (found == known.end()) {
+    user_error(std::string(asked) + " with -d " + text, "-d takes 1, the gradient, 0, or separate",
+               quoted(text) + " is none of them", "Write -d 1 or leave it out");
   }
-  return text == "1";
+  return found->second;
 }
 
 int read_seconds(const std::string& text) {
@@ -165,9 +169,20 @@ void run_generator(const CommandLine& command) {
   const std::string base = command.file_base.empty() ? base_name(function) : command.file_base;
   const auto build = [&](const std::string& name, const Target& target) {
     const auto generator = make_generator(command, target);
-    return command.gradient ? generator->build_gradient_module(name)
-                            : generator->build_module(name);
+    switch (command.gradient) {
+      case CommandLine::Gradient::Whole:
+        return generator->build_gradient_module(name);
+      case CommandLine::Gradient::Separate:
+        return generator->build_separate_gradients(name);
+      default:
+        return generator->build_module(name);
+    }
   };
+  if (command.gradient == CommandLine::Gradient::Separate && command.targets.size() > 1) {
+    user_error(std::string(asked) + " with -d separate",
+               "separate gradients are compiled for one target",
+               text(command.targets.size(), " targets are given"), "Name one, or ask for -d 1");
+  }
   auto files = files_of(command, base);
   if (const auto stub = files.find(OutputFileType::cpp_stub); stub != files.end()) {
     make_generator(command, command.targets[0])->emit_cpp_stub(stub->second);
@@ -223,7 +238,8 @@ void run(const CommandLine& command) {
 }
 
 std::string usage() {
-  return "usage: [-g GENERATOR] [-f FUNCTION] -o FOLDER [-n FILE_BASE] [-e TYPE,...] [-d 0|1]\n"
+  return "usage: [-g GENERATOR] [-f FUNCTION] -o FOLDER [-n FILE_BASE] [-e TYPE,...] [-d "
+         "0|1|separate]\n"
          "       [-p PLUGIN,...] [-s SCHEDULER] [-r RUNTIME] [-t SECONDS]\n"
          "       target=TARGET[,TARGET...] [param=value ...]\n"
          "  -g  the generator to run: " +
@@ -235,7 +251,9 @@ std::string usage() {
          names_of(emit_names()) +
          "\n"
          "      by default c_header, static_library and registration\n"
-         "  -d  1: the gradient of the generator's outputs with respect to its images\n"
+         "  -d  1: the gradient of the generator's outputs with respect to its images; separate: "
+         "functions\n"
+         "      that give it by all images and numbers, and by each of them alone\n"
          "  -p  shared libraries to load, with autoschedulers\n"
          "  -s  the scheduler that auto_schedule=true means\n"
          "  -r  write a runtime of this name\n"

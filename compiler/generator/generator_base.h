@@ -128,6 +128,14 @@ class GeneratorBase : public NamesInterface {
   // schedule of gradients.
   // Requires: gradients are of outputs with one value; gradients are of floating-point outputs.
   Module build_gradient_module(const std::string& function_name = "");
+  // The gradients by images and numbers of floating-point types, summed over the outputs, for who
+  // wants some of them: the function gives all; <function>_by_<input>, one for each input where
+  // there are several, computes that by this input and nothing else. They take the inputs, then for
+  // each floating-point output _grad_loss_for_<output>, and give _grad_loss_wrt_<input>. The rest
+  // is as above.
+  // Requires: gradients are of outputs with one value; gradients are of floating-point outputs;
+  // gradients are by floating-point inputs.
+  Module build_separate_gradients(const std::string& function_name = "");
 
   // ---- in configure() ----
   // Requires: inputs and outputs are added in configure().
@@ -196,7 +204,10 @@ class GeneratorBase : public NamesInterface {
   void auto_schedule_pipeline(Pipeline& pipeline) const;
   std::vector<Argument> input_arguments() const;
   std::vector<std::string> input_names() const;
+  using NamedParameter = std::pair<std::string, std::shared_ptr<graph::ParameterContents>>;
+  std::vector<NamedParameter> differentiable_inputs() const;
   std::vector<ImageParam> image_inputs(std::vector<std::string>& names) const;
+  Module gradient_function(const std::string& function_name, const std::vector<NamedParameter>& by);
   Module to_module(Pipeline& pipeline, const std::vector<Argument>& inputs,
                    const std::vector<std::string>& declared_names, const std::string& function_name,
                    LinkageType linkage);

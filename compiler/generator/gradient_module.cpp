@@ -7,6 +7,9 @@
 // Names, order and types of the arguments are those of Halide 14's gradient modules: images only.
 // An image of integers gets a gradient of zeros; so does every image from an output of integers,
 // which stands still while the inputs change a little.
+//
+// Separate gradients are another form of the same, for who asks for some of the gradients only:
+// summed over the outputs, of numbers too, and without what is known to be 0.
 #include <optional>
 #include <set>
 
@@ -42,10 +45,17 @@ void check_differentiable(const std::vector<Func>& outputs, const std::string& g
              "Make one an output of floats");
 }
 
-Func zeros(const ImageParam& image) {
-  const auto at = ir::numbered(image.dimensions(), [&](int d) { return Var::implicit(d); });
-  Func f("zeros");
-  f(at) = cast(image.type(), 0);
+AdjointInput adjoint_input(const std::shared_ptr<graph::ParameterContents>& parameter) {
+  return AdjointInput(std::shared_ptr<ir::Symbol>(parameter));
+}
+
+// Over the dimensions of an input, and of its type; 0 where there is nothing to add.
+Func sum_of(const std::vector<Func>& parts, const graph::ParameterContents& input) {
+  const auto at = ir::numbered(input.dimensions, [&](int d) { return Var::implicit(d); });
+  Func f(parts.empty() ? "zeros" : "gradient");
+  Expr total = cast(input.type, 0);
+  for (const Func& part : parts) total = total + part(at);
+  f(at) = total;
   return f;
 }
 
@@ -91,7 +101,7 @@ Module GeneratorBase::build_gradient_module(const std::string& function_name) {
         derivative = propagate_adjoints(funcs[i], seed, region_of(seed), options);
       for (size_t k = 0; k < images.size(); k++) {
         const bool has = derivative && derivative->has(images[k]);
-        Func gradient = has ? (*derivative)(images[k]) : zeros(images[k]);
+        Func gradient = has ? (*derivative)(images[k]) : sum_of({}, *images[k].parameter());
         if (!seen.insert(gradient.function().get()).second) gradient = lambda(gradient(_));
         gradients.push_back(gradient);
         gradient_names.push_back("_grad_loss_" + of + "_wrt_" + image_names[k]);
@@ -99,6 +109,78 @@ Module GeneratorBase::build_gradient_module(const std::string& function_name) {
     }
   }
   names.insert(names.end(), gradient_names.begin(), gradient_names.end());
+  Pipeline pipeline(gradients);
+  add_requirements(pipeline);
+  auto_schedule_pipeline(pipeline);
+  return to_module(pipeline, arguments, names, function_name, LinkageType::ExternalPlusMetadata);
+}
+
+std::vector<GeneratorBase::NamedParameter> GeneratorBase::differentiable_inputs() const {
+  std::vector<NamedParameter> inputs;
+  for (const GeneratorInputBase* input : members_.inputs) {
+    for (size_t i = 0; i < input->values().size(); i++) {
+      const auto& parameter = input->values()[i].parameter;
+      if (parameter && parameter->type.is_float())
+        inputs.push_back({input->element_name(i), parameter});
+    }
+  }
+  return inputs;
+}
+
+Module GeneratorBase::build_separate_gradients(const std::string& function_name) {
+  generate_all();
+  const std::string function = function_name.empty() ? name_ : function_name;
+  const std::vector<NamedParameter> inputs = differentiable_inputs();
+  if (inputs.empty()) {
+    user_error("build the gradients of the generator " + quoted(name_),
+               "gradients are by floating-point inputs", "it has none",
+               "Make an input one of floats");
+  }
+  std::vector<Module> modules{gradient_function(function, inputs)};
+  for (const NamedParameter& input : inputs) {
+    if (inputs.size() > 1)
+      modules.push_back(gradient_function(function + "_by_" + input.first, {input}));
+  }
+  return link_modules(function, modules);
+}
+
+Module GeneratorBase::gradient_function(const std::string& function_name,
+                                        const std::vector<NamedParameter>& by) {
+  std::vector<Argument> arguments = input_arguments();
+  std::vector<std::string> names = input_names();
+  std::vector<std::string> output_names;
+  std::vector<Func> outputs;
+  for (const GeneratorOutputBase* output : members_.outputs) {
+    for (size_t i = 0; i < output->funcs().size(); i++) {
+      outputs.push_back(output->funcs()[i]);
+      output_names.push_back(output->element_name(i));
+    }
+  }
+  check_differentiable(outputs, name_);
+
+  AdjointOptions options;
+  for (const auto& [name, parameter] : by) options.wrt.push_back(adjoint_input(parameter));
+  std::vector<Derivative> derivatives;
+  for (size_t i = 0; i < outputs.size(); i++) {
+    if (!outputs[i].type().is_float()) continue;
+    const std::string name = "_grad_loss_for_" + output_names[i];
+    const ImageParam seed(outputs[i].type(), outputs[i].dimensions(), name);
+    arguments.push_back(frontend::argument_of(*seed.parameter()));
+    names.push_back(name);
+    derivatives.push_back(propagate_adjoints(outputs[i], seed, region_of(seed), options));
+  }
+  std::vector<Func> gradients;
+  std::set<const graph::FuncContents*> seen;
+  for (const auto& [name, parameter] : by) {
+    std::vector<Func> parts;
+    for (const Derivative& derivative : derivatives) {
+      if (derivative.has(adjoint_input(parameter)))
+        parts.push_back(derivative.of(adjoint_input(parameter)));
+    }
+    const bool is_one = parts.size() == 1 && seen.insert(parts[0].function().get()).second;
+    gradients.push_back(is_one ? parts[0] : sum_of(parts, *parameter));
+    names.push_back("_grad_loss_wrt_" + name);
+  }
   Pipeline pipeline(gradients);
   add_requirements(pipeline);
   auto_schedule_pipeline(pipeline);

@@ -297,6 +297,21 @@ TEST(GeneratorErrors, GradientsAreOfFloats) {
   expect_mentions(text, {"gradients are of floating-point outputs", "holds uint8"});
 }
 
+TEST(GeneratorErrors, SeparateGradientsAreByInputsOfFloats) {
+  class OfBytes : public Generator<OfBytes> {
+   public:
+    Input<Buffer<uint8_t, 1>> in{"in"};
+    Output<Buffer<float, 1>> out{"out"};
+    void generate() {
+      Var x;
+      out(x) = cast<float>(in(x));
+    }
+  };
+  auto bytes = GeneratorContext(get_host_target()).create<OfBytes>();
+  expect_error({"gradients are by floating-point inputs", "it has none"},
+               [&] { bytes->build_separate_gradients(); });
+}
+
 TEST(GeneratorErrors, GradientsAreOfOutputsWithOneValue) {
   class Pair : public Generator<Pair> {
    public:
@@ -309,6 +324,8 @@ TEST(GeneratorErrors, GradientsAreOfOutputsWithOneValue) {
   };
   auto pair = GeneratorContext(get_host_target()).create<Pair>();
   expect_error({"gradients are of outputs with one value"}, [&] { pair->build_gradient_module(); });
+  expect_error({"gradients are of outputs with one value"},
+               [&] { pair->build_separate_gradients(); });
 }
 
 TEST(GeneratorErrors, RequirementsAreConditionsOnParameters) {
@@ -399,6 +416,13 @@ TEST(GeneratorProgram, RefusesOneRuntimeForMachinesThatDiffer) {
   expect_mentions(result.errors,
                   {"make the runtime \"rt\"",
                    "\"x86-64-linux-debug\" and \"x86-64-linux\" need different ones"});
+}
+
+TEST(GeneratorProgram, RefusesSeparateGradientsForSeveralTargets) {
+  const Outcome result = run({"-g", "simple_for_errors", "-d", "separate", "-o", ".",
+                              "target=x86-64-linux-avx2,x86-64-linux"});
+  EXPECT_EQ(result.status, 1);
+  expect_mentions(result.errors, {"compiled for one target", "2 targets are given"});
 }
 
 TEST(GeneratorProgram, RefusesWhatIsNoFlag) {

@@ -254,6 +254,8 @@ TEST_F(Rules, PartsOfACompiledGenerator) {
          [&] { context.create<ByteGenerator>()->build_gradient_module("g"); });
   expect("gradients are of outputs with one value",
          [&] { context.create<RuleGenerator>()->build_gradient_module("g"); });
+  expect("gradients are by floating-point inputs",
+         [&] { context.create<ByteGenerator>()->build_separate_gradients("g"); });
   const GeneratorFactory factory = [](const GeneratorContext& c) {
     return ByteGenerator::create(c);
   };

@@ -321,6 +321,39 @@ TEST(Generator, GradientModuleTakesOutputsOfSeveralTypes) {
   for (int i : {4, 5, 6}) EXPECT_EQ(args[i].type, Float(32)) << "of the input's type";
 }
 
+TEST(Generator, SeparateGradientsAreOfEachInputOfFloatsAndOfAll) {
+  const GeneratorContext context(Target("x86-64-linux"));
+  const Module module = context.create<Square>()->build_separate_gradients("g");
+  const auto declared = module.get_metadata_name_map();
+  Names functions;
+  std::vector<Names> gradients;
+  for (const auto& function : module.functions()) {
+    functions.push_back(function.name);
+    gradients.emplace_back();
+    for (const Argument& argument : function.args) {
+      const auto found = declared.find(argument.name);
+      const std::string name = found == declared.end() ? argument.name : found->second;
+      if (argument.is_output()) gradients.back().push_back(name);
+    }
+  }
+  EXPECT_EQ(functions, (Names{"g", "g_by_in", "g_by_unused", "g_by_w"}));
+  const std::string by = "_grad_loss_wrt_";
+  EXPECT_EQ(gradients,
+            (std::vector<Names>{
+                {by + "in", by + "unused", by + "w"}, {by + "in"}, {by + "unused"}, {by + "w"}}));
+  const Argument& of_number = module.functions().back().args.back();
+  EXPECT_EQ(of_number.dimensions, 0);
+  EXPECT_EQ(of_number.type, Float(32));
+  EXPECT_EQ(argument_names(module),
+            (Names{"in", "table", "unused", "w", "_grad_loss_for_out", "_grad_loss_wrt_w"}));
+
+  // One function, where there is one input; seeds are of outputs of floats.
+  const Module alone = context.create<Several>()->build_separate_gradients("several");
+  EXPECT_EQ(alone.functions().size(), 1u);
+  EXPECT_EQ(argument_names(alone),
+            (Names{"in", "_grad_loss_for_square", "_grad_loss_for_twice", "_grad_loss_wrt_in"}));
+}
+
 TEST(Generator, AutoScheduleRunsTheSchedulerItNames) {
   std::vector<std::string> scheduled;
   Pipeline::add_autoscheduler(

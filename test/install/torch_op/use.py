@@ -5,6 +5,7 @@ import sys
 import timeit
 
 import torch
+from torch.utils._python_dispatch import TorchDispatchMode
 
 folder = sys.argv[1]
 for name in ("weighted", "sum_of_two"):
@@ -39,6 +40,39 @@ for loss in (lambda r: r[0].sum(), lambda r: r[1].square().sum(), lambda r: (r[0
     for a, b in zip(got, want):
         assert torch.allclose(a, torch.zeros_like(a) if b is None else b, atol=1e-5), (a, b)
 
+# Numbers are differentiated where they are tensors; each gradient is the same alone as with the others.
+gain = torch.tensor(1.5, requires_grad=True)
+assert all(torch.equal(a, b) for a, b in zip(weighted(image, taps, gain, True), weighted(image, taps, 1.5, True)))
+for given in (image, taps, gain), (gain,), (taps, gain), (image,):
+    seeds = [torch.rand(5, 7), torch.rand(5, 9)]
+    got = torch.autograd.grad(weighted(image, taps, gain, False), given, seeds)
+    want = torch.autograd.grad(theirs(image, taps, gain), given, seeds)
+    for a, b in zip(got, want):
+        assert a.shape == b.shape and torch.allclose(a, b, rtol=1e-4, atol=1e-5), (a, b)
+in_double = torch.tensor(1.5, dtype=torch.float64, requires_grad=True)
+alone, = torch.autograd.grad(weighted(image, taps, in_double, False)[0].sum(), in_double)
+assert alone.dtype == torch.float64 and abs(alone - theirs(image, taps, 1.0)[0].sum()) < 1e-4
+
+# Only what is asked for is computed: autograd asks for the third gradient, and then none of an image's size is made.
+class Asked(TorchDispatchMode):
+    wanted = []
+
+    def __torch_dispatch__(self, function, types, args=(), kwargs=None):
+        if "weighted_backward" in str(function):
+            self.wanted.append(args[-1])
+        return function(*args, **(kwargs or {}))
+
+
+result = weighted(image, taps, gain, False)[0].sum()
+with Asked():
+    torch.autograd.grad(result, gain)
+assert Asked.wanted == [0b100], Asked.wanted
+large = torch.rand(100, 100)
+with torch.autograd.profiler.profile(profile_memory=True) as seen:
+    torch.ops.tests.weighted_backward(large, taps, gain, False, large[:, 2:], large, 0b100)
+made = [event.cpu_memory_usage for event in seen.function_events]
+assert made and max(made) < 1000, made
+
 # Any strides, empty tensors, shapes without values.
 for given in (image.detach()[:, ::2], image.detach().t()[:, :5], torch.ones(1, 1).expand(4, 6), torch.empty(0, 7)):
     for a, b in zip(weighted(given, taps, 2.0, False), theirs(given, taps, 2.0)):
@@ -54,9 +88,19 @@ raises(RuntimeError, "cannot", lambda: total(torch.ones(4), torch.ones(3)))
 gradient, = torch.autograd.grad(weighted(image, taps, 1.0, False)[0].sum(), image, create_graph=True)
 raises(RuntimeError, "no second derivative", lambda: gradient.sum().backward())
 raises(RuntimeError, "made without GRADIENT", lambda: total(taps, taps).sum().backward())
+raises(RuntimeError, '"gain" is a floating-point number, or a tensor of one without dimensions',
+       lambda: weighted(image, taps, torch.ones(1), False))
 
 if hasattr(torch.library, "opcheck"):
     torch.library.opcheck(weighted.default, (image, taps, 1.5, False))
+    torch.library.opcheck(weighted.tensors, (image, taps, gain, False))
+    # Without derivatives of its own.
+    given = [t.detach() for t in (image, taps, gain)]
+    torch.library.opcheck(torch.ops.tests.weighted_backward.default,
+                          (*given, False, torch.ones(5, 7), torch.ones(5, 9), 0b101))
+    of_tensors = torch.compile(lambda i, t, g: weighted(i, t, g, False)[0].sin(), fullgraph=True)
+    assert torch.allclose(torch.autograd.grad(of_tensors(image, taps, gain).sum(), gain)[0],
+                          torch.autograd.grad(weighted(image, taps, gain, False)[0].sin().sum(), gain)[0], atol=1e-5)
     compiled = torch.compile(lambda i, t: weighted(i, t, 1.5, False)[0].sin(), fullgraph=True, dynamic=True)
     for n in (5, 8):
         given = torch.rand(n, 9, requires_grad=True)
