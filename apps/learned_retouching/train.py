@@ -125,15 +125,24 @@ def plot(report, path):
     figure.savefig(path, dpi=110)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def options_of(program, output, **defaults):
+    """A parser of the options that training has."""
+    parser = argparse.ArgumentParser(description=program, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--images", default=str(Path(__file__).resolve().parents[1] / "images"))
-    parser.add_argument("--output", default="out/learned_retouching")
-    for name, value in (("steps", 300), ("size", 256), ("batch", 4), ("threads", 2), ("seed", 1)):
+    parser.add_argument("--output", default=output)
+    for name, value in {"steps": 300, "size": 256, "batch": 4, "threads": 2, "seed": 1, **defaults}.items():
         parser.add_argument(f"--{name}", type=int, default=value)
-    options = parser.parse_args()
+    return parser
+
+
+def large_enough(options):
+    return [p for p in photographs(options.images) if min(p.shape[1:]) >= options.size]
+
+
+def main():
+    options = options_of(__doc__, "out/learned_retouching").parse_args()
     torch.set_num_threads(options.threads)
-    pictures = [p for p in photographs(options.images) if min(p.shape[1:]) >= options.size]
+    pictures = large_enough(options)
     trainings = {"pipeline": Training(slice_by_pipeline, pictures, options),
                  "pytorch_alone": Training(slice_by_pytorch, pictures, options)}
     for at in range(options.steps):
