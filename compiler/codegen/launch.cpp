@@ -2,7 +2,7 @@
 //
 //   launch k blocks(n, 1, 1) threads(32, 1, 1) shared(0) { out[..] = in[..] * gain }
 //      =>
-//   code = retrograde_to_device(context, in.buffer), the same for out
+//   code = retrograde_to_device(context, in.buffer), the same for out, which may be given memory alone
 //   code = retrograde_gpu_initialize_kernels(context, &state, &image, bytes)
 //   code = retrograde_gpu_run(context, state, "k", n, 1, 1, 32, 1, 1, 0, sizes, {in.buffer, out.buffer,
 //                             &gain}, are_buffers)

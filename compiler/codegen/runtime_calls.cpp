@@ -18,6 +18,7 @@ constexpr PairedCall paired_calls[] = {
     {"retrograde_profiler_begin", "retrograde_profiler_end"},
     {"retrograde_profiler_thread", "retrograde_profiler_leave"},
     {"retrograde_device_buffer", "retrograde_device_buffer_free"},
+    {"retrograde_overwrite_begin", "retrograde_overwrite_end"},
 };
 
 // What was begun is ended by a function that leaves early, too.

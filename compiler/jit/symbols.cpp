@@ -66,6 +66,8 @@ void add_gpu(Table& table) {
   table["retrograde_gpu_buffer_copy"] = pointer(retrograde_gpu_buffer_copy);
   table["retrograde_device_buffer"] = pointer(retrograde_device_buffer);
   table["retrograde_device_buffer_free"] = pointer(retrograde_device_buffer_free);
+  table["retrograde_overwrite_begin"] = pointer(retrograde_overwrite_begin);
+  table["retrograde_overwrite_end"] = pointer(retrograde_overwrite_end);
   table["retrograde_to_device"] = pointer(retrograde_to_device);
   table["retrograde_device_changed"] = pointer(retrograde_device_changed);
   table["retrograde_to_host"] = pointer(retrograde_to_host);

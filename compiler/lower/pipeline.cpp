@@ -129,6 +129,25 @@ std::vector<std::string> buffer_names(const std::vector<LoweredArgument>& args) 
   return names;
 }
 
+bool stores_every_element(const LoopedFunc& f) {
+  const auto has_undef = [](const Expr& value) {
+    return any_node(value, [](const Call& call) { return call.is_op(Op::undef); });
+  };
+  return !f.func->extern_definition && std::ranges::none_of(f.stages[0].values, has_undef);
+}
+
+GivenBuffers given_buffers(const Lowering& lowering) {
+  GivenBuffers given;
+  given.names = buffer_names(lowering.args);
+  for (const LoopedFunc& f : lowering.program.funcs) {
+    if (!f.is_output || !stores_every_element(f)) continue;
+    std::vector<std::string>& values = given.overwritten[f.name()];
+    for (size_t i = 0; i < f.func->types.size(); ++i)
+      values.push_back(value_buffer_name(*f.func, static_cast<int>(i)));
+  }
+  return given;
+}
+
 constexpr Pass passes[] = {
     {"build_loop_nests", Phase::Loops, nest_loops},
     {"drop_bounds_query", Phase::Loops, wanted<Target::NoBoundsQuery, drop_bounds_query>},
@@ -175,7 +194,7 @@ constexpr Pass passes[] = {
     {"fuzz_float_stores", Phase::Vector, wanted<Target::FuzzFloatStores, fuzz_float_stores>},
     {"make_kernels", Phase::Vector,
      [](Lowering& lowering, const Stmt& s) {
-       return make_kernels(s, lowering.options.target, buffer_names(lowering.args));
+       return make_kernels(s, lowering.options.target, given_buffers(lowering));
      }},
     {"inject_profiling", Phase::Vector,
      [](Lowering& lowering, const Stmt& s) {

@@ -2,6 +2,7 @@
 
 #include <HalideRuntime.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <new>
 
@@ -9,6 +10,8 @@ namespace {
 
 // What a pipeline stores for itself is empty at first, unlike the buffers that it is given.
 constexpr uint64_t is_own_storage = uint64_t{1} << 32;
+// Between retrograde_overwrite_begin and its end.
+constexpr uint64_t is_overwritten = uint64_t{1} << 33;
 
 struct OwnBuffer {
   halide_buffer_t buffer = {};
@@ -43,13 +46,30 @@ int32_t retrograde_device_buffer_free(retrograde_context* context, halide_buffer
   return code;
 }
 
+halide_buffer_t* retrograde_overwrite_begin(retrograde_context*, halide_buffer_t* buffer,
+                                            int32_t num_others, halide_buffer_t* const* others) {
+  if (std::find(others, others + num_others, buffer) != others + num_others) return nullptr;
+  buffer->flags |= is_overwritten;
+  return buffer;
+}
+
+int32_t retrograde_overwrite_end(retrograde_context*, halide_buffer_t* buffer) {
+  if (buffer) buffer->flags &= ~is_overwritten;
+  return 0;
+}
+
+// A buffer that is only given memory stays dirty until a kernel has been started that stores into it: should
+// that fail, the host has its elements.
 int32_t retrograde_to_device(retrograde_context* context, halide_buffer_t* buffer) {
   const bool is_given = !(buffer->flags & is_own_storage);
   if (is_given && !buffer->device && buffer->host) buffer->set_host_dirty(true);
+  if ((buffer->flags & is_overwritten) && !buffer->device_dirty())
+    return retrograde_gpu_malloc(context, buffer);
   return retrograde_gpu_copy_to_device(context, buffer);
 }
 
 int32_t retrograde_device_changed(retrograde_context*, halide_buffer_t* buffer) {
+  buffer->set_host_dirty(false);
   buffer->set_device_dirty(true);
   return 0;
 }
@@ -59,6 +79,7 @@ int32_t retrograde_to_host(retrograde_context* context, halide_buffer_t* buffer)
 }
 
 int32_t retrograde_host_changed(retrograde_context*, halide_buffer_t* buffer) {
+  buffer->flags &= ~is_overwritten;
   if (buffer->device || (buffer->flags & is_own_storage)) buffer->set_host_dirty(true);
   return 0;
 }

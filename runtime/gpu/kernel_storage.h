@@ -18,6 +18,14 @@ struct halide_buffer_t* retrograde_device_buffer(retrograde_context*, void* host
 /* With its memory on the device. Null is one, too. */
 int32_t retrograde_device_buffer_free(retrograde_context*, struct halide_buffer_t*);
 
+/* Until the end, no element of the buffer is read before it is stored: what the host has of it is not
+ * copied to the device, unless one of the others, which may be read, is the same buffer, or the host stores
+ * into it on the way. Gives what the end is told; null is that, too. */
+struct halide_buffer_t* retrograde_overwrite_begin(retrograde_context*, struct halide_buffer_t*,
+                                                   int32_t num_others,
+                                                   struct halide_buffer_t* const* others);
+int32_t retrograde_overwrite_end(retrograde_context*, struct halide_buffer_t*);
+
 /* Before a kernel touches it: what the host has is on the device. A buffer that is on no device yet may
  * hold what the caller gave: that is copied, whatever its flags say. */
 int32_t retrograde_to_device(retrograde_context*, struct halide_buffer_t*);

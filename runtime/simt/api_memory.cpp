@@ -56,9 +56,17 @@ Result copy_from_pageable(StreamState& stream, const Side& from, const Side& to,
   });
 }
 
+void count_copied(const Side& from, const Side& to, size_t bytes) {
+  retrograde_simt_copied& sum = state().copied;
+  (to.is_host     ? sum.to_host
+   : from.is_host ? sum.to_device
+                  : sum.between_devices) += static_cast<int64_t>(bytes);
+}
+
 Result copy(StreamState& stream, const Side& from, const Side& to, size_t width, size_t height) {
   if (width == 0 || height == 0) return success;
   if (!is_there(from, width, height) || !is_there(to, width, height)) return invalid_value;
+  count_copied(from, to, width * height);
   const bool from_pageable = from.is_host && !is_locked(from.first);
   const bool to_pageable = to.is_host && !is_locked(to.first);
   if (from_pageable || to_pageable) {
@@ -204,4 +212,9 @@ RETROGRADE_SIMT_EXPORT Result cuMemcpyPeerAsync(Address to, Context to_context, 
       return invalid_context;
     return copy(stream, on_device(from), on_device(to), bytes, 1);
   });
+}
+
+void retrograde_simt_count_copied(retrograde_simt_copied* out) {
+  const std::lock_guard lock(driver_mutex());
+  *out = state().copied;
 }

@@ -77,6 +77,12 @@ typedef struct retrograde_simt_live {
 } retrograde_simt_live;
 void retrograde_simt_count_live(retrograde_simt_live*);
 
+/* Bytes of all copies that were asked for so far. */
+typedef struct retrograde_simt_copied {
+  int64_t to_device, to_host, between_devices;
+} retrograde_simt_copied;
+void retrograde_simt_count_copied(retrograde_simt_copied*);
+
 /* ---- the profile ---- */
 
 /* Sums over launches of a kernel. A warp request is what the threads of a warp access by one

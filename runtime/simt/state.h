@@ -105,6 +105,7 @@ struct State {
   std::set<std::unique_ptr<EventState>> events;
   std::set<std::unique_ptr<GraphState>> graphs;
   std::map<const uint8_t*, size_t> locked_host;  // memory that is locked to its pages
+  retrograde_simt_copied copied = {};
   uint64_t captures = 0;
   bool is_initialized = false;
 };

@@ -3,6 +3,7 @@
 #include <set>
 
 #include "ir/build.h"
+#include "ir/lists.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/runtime_call.h"
@@ -34,7 +35,10 @@ Expr buffer_of(const std::string& name) { return variable(name + ".buffer", Hand
 
 class BothSides {
  public:
-  BothSides(const Stmt& s, Names on_device) : fresh_(s), on_device_(std::move(on_device)) {}
+  BothSides(const Stmt& s, const GivenBuffers& given)
+      : fresh_(s), given_(given), on_device_(touched_by_kernels(s)) {
+    on_device_.insert(given.names.begin(), given.names.end());
+  }
 
   Stmt visit(const Stmt& s) {
     if (!s.defined() || s.kind() == Kind::Launch) return s;
@@ -45,17 +49,40 @@ class BothSides {
       all.push_back(make_let(let->name, let->value, visit(let->body)));
       return make_block(std::move(all));
     }
-    if (s.kind() == Kind::Block || s.kind() == Kind::ProducerConsumer)
-      return map_children(s, [&](const Stmt& part) { return visit(part); });
+    if (s.kind() == Kind::Block) return inside(s);
+    if (const auto* mark = s.as<ProducerConsumer>())
+      return mark->produces ? overwriting(mark->name, inside(s)) : inside(s);
     Accesses own;
     for_each_child(
         s, [&](const Expr& e) { add(own, accesses(e)); }, [](const Stmt&) {});
     std::vector<Stmt> all = brought_back(own);
-    all.push_back(map_children(s, [&](const Stmt& part) { return visit(part); }));
+    all.push_back(inside(s));
     return make_block(std::move(all));
   }
 
  private:
+  Stmt inside(const Stmt& s) {
+    return map_children(s, [&](const Stmt& part) { return visit(part); });
+  }
+
+  Stmt overwriting(const std::string& func, Stmt production) {
+    for (const std::string& name : value_or(given_.overwritten, func, std::vector<std::string>())) {
+      std::vector<Expr> others;
+      for (const std::string& other : given_.names) {
+        if (other != name) others.push_back(buffer_of(other));
+      }
+      const auto count = static_cast<int>(others.size());
+      const std::string mark = fresh_(name + ".overwritten");
+      const Expr begun = call_runtime(
+          "retrograde_overwrite_begin",
+          {buffer_of(name), count, others.empty() ? null_handle() : pack(std::move(others))},
+          Handle());
+      const Expr ended = call_runtime("retrograde_overwrite_end", {variable(mark, Handle())});
+      production = make_let(mark, begun, make_block({production, make_evaluate(ended)}));
+    }
+    return production;
+  }
+
   struct Accesses {
     Names reads, writes;
   };
@@ -129,15 +156,14 @@ class BothSides {
   }
 
   FreshNames fresh_;
-  const Names on_device_;
+  const GivenBuffers& given_;
+  Names on_device_;
 };
 
 }  // namespace
 
-Stmt keep_both_sides(const Stmt& s, const std::vector<std::string>& arguments) {
-  Names on_device = touched_by_kernels(s);
-  on_device.insert(arguments.begin(), arguments.end());
-  return BothSides(s, std::move(on_device)).visit(s);
+Stmt keep_both_sides(const Stmt& s, const GivenBuffers& given) {
+  return BothSides(s, given).visit(s);
 }
 
 }  // namespace retrograde::lower

@@ -12,8 +12,16 @@
 //                                               for ... { g[..] = f[..] }
 //                                               retrograde_device_buffer_free(f.buffer)
 //                                             }
+//
+// An output that kernels store into whole before anything reads it is not copied to the device first:
+//
+//   produce out { launch k { out[..] = .. } }  =>  let out.overwritten = retrograde_overwrite_begin(out.buffer,
+//                                                                          1, pack(in.buffer))
+//                                                  produce out { launch k { out[..] = .. } }
+//                                                  retrograde_overwrite_end(out.overwritten)
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -21,7 +29,13 @@
 
 namespace retrograde::lower {
 
-// In: with launches. `arguments`: names of buffers that the function is given.
-Stmt keep_both_sides(const Stmt& s, const std::vector<std::string>& arguments);
+struct GivenBuffers {
+  std::vector<std::string> names;
+  // By Func, those of its values: where its first stage stores each element of them.
+  std::map<std::string, std::vector<std::string>> overwritten;
+};
+
+// In: with launches. `given`: the buffers that the function is given.
+Stmt keep_both_sides(const Stmt& s, const GivenBuffers& given);
 
 }  // namespace retrograde::lower

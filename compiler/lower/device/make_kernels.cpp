@@ -3,7 +3,6 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
-#include "lower/device/device_buffers.h"
 #include "lower/device/kernel.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
@@ -104,10 +103,10 @@ int most_shared_bytes(const Target& target) {
   return 48 * kilobyte;
 }
 
-Stmt make_kernels(const Stmt& s, const Target& target, const std::vector<std::string>& arguments) {
+Stmt make_kernels(const Stmt& s, const Target& target, const GivenBuffers& given) {
   const Stmt with_kernels = KernelMaker(s, target)(s);
   if (!target.has_feature(Target::CUDA)) return with_kernels;
-  return keep_both_sides(with_kernels, arguments);
+  return keep_both_sides(with_kernels, given);
 }
 
 }  // namespace retrograde::lower

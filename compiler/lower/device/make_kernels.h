@@ -8,16 +8,13 @@
 // Tests: test/golden/lower/make_kernels/, test/unit/gpu_*_test.cpp.
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "ir/expr.h"
 #include "ir/target.h"
+#include "lower/device/device_buffers.h"
 
 namespace retrograde::lower {
 
-// `arguments`: names of the buffers that the function is given.
-Stmt make_kernels(const Stmt& s, const Target& target, const std::vector<std::string>& arguments);
+Stmt make_kernels(const Stmt& s, const Target& target, const GivenBuffers& given);
 
 // The shared memory that a block can have on a device of the target, in bytes: the opt-in limit of its
 // compute capability.
