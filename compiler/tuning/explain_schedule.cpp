@@ -10,7 +10,7 @@
 #include "frontend/data/buffer.h"
 #include "frontend/run/compiler_interface.h"
 #include "graph/schedule_log.h"
-#include "lower/lower.h"
+#include "tuning/kernels_taken.h"
 #include "tuning/machine.h"
 #include "tuning/measure_stages.h"
 #include "tuning/predict.h"
@@ -106,10 +106,8 @@ ScheduleReport explain_schedule(const PipelineSpec& pipeline,
   std::vector<BufferShape> shapes;
   for (const halide_buffer_t* buffer : outputs) shapes.push_back(tuning::shape_of(*buffer));
   if (shapes.empty()) shapes = tuning::output_shapes(scheduled);
-  lower::LowerOptions lowering;
-  lowering.target = target;
-  const ir::LoweredFunction function =
-      lower::lower(pipeline.name, scheduled, lower::infer_arguments(pipeline.outputs), lowering);
+  const tuning::LoweredForReport lowered = tuning::lower_for_report(pipeline, scheduled, target);
+  const ir::LoweredFunction& function = lowered.function;
   const tuning::Machine machine = tuning::machine_for(target);
   const int threads = options.threads > 0 ? options.threads : handlers.thread_limit;
   ScheduleReport report;
@@ -120,6 +118,7 @@ ScheduleReport explain_schedule(const PipelineSpec& pipeline,
   for (const graph::FuncPtr& f : graph::topological_order(scheduled)) funcs.push_back(f->name);
   add_stages(tuning::predict(function, tuning::program_sizes(function, shapes), machine, threads),
              funcs, report);
+  report.kernels = tuning::kernels_taken(lowered, target);
   if (!options.measure) return report;
   std::vector<Buffer<>> made;
   std::vector<halide_buffer_t*> used = outputs;
@@ -152,7 +151,7 @@ std::string ScheduleReport::to_string() const {
   }
   row("total", milliseconds(predicted_ms), milliseconds(measured_ms), "", "");
   out << "first call: " << milliseconds(first_call_ms) << " ms more, for new memory\n";
-  out << "machine: " << machine << "\n" << search.to_string();
+  out << "machine: " << machine << "\n" << search.to_string() << kernels.to_string();
   return out.str();
 }
 
@@ -176,6 +175,7 @@ std::string ScheduleReport::to_json() const {
                {"first_call_ms", first_call_ms},
                {"measured_ms", optional(measured_ms)},
                {"stages", Json::array()},
+               {"kernels", Json::parse(kernels.to_json())},
                {"search",
                 {{"tried", search.tried},
                  {"rules_ms", search.rules_ms},

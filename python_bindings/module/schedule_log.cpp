@@ -55,6 +55,7 @@ void bind_report(py::module_& m) {
       .def_readonly("first_call_ms", &ScheduleReport::first_call_ms)
       .def_readonly("measured_ms", &ScheduleReport::measured_ms)
       .def_readonly("search", &ScheduleReport::search)
+      .def_readonly("kernels", &ScheduleReport::kernels)
       .def("to_string", &ScheduleReport::to_string)
       .def("to_json", &ScheduleReport::to_json)
       .def("__str__", &ScheduleReport::to_string);
@@ -65,6 +66,7 @@ void bind_kernel_report(py::module_& m) {
   using Kernel = KernelReport::Kernel;
   Class<Kernel>(report, "Kernel", {"KernelReport::Kernel"})
       .def_readonly("name", &Kernel::name)
+      .def_readonly("loops", &Kernel::loops)
       .def_readonly("threads", &Kernel::threads)
       .def_readonly("shared_bytes", &Kernel::shared_bytes)
       .def_readonly("local_bytes", &Kernel::local_bytes)
@@ -93,8 +95,8 @@ ScheduleReport explained(const Pipeline& pipeline, const Target& target, const p
 
 void bind_schedule_log(py::module_& m) {
   bind_log(m);
-  bind_report(m);
   bind_kernel_report(m);
+  bind_report(m);
   def(
       m, "explain_kernels",
       [](const Pipeline& pipeline, const Target& target) {

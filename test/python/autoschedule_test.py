@@ -106,8 +106,12 @@ class Logs(unittest.TestCase):
         xi, yi = rg.Var("xi"), rg.Var("yi")
         vertical.gpu_tile(x, y, xi, yi, 16, 8)
         horizontal.compute_at(vertical, x).gpu_threads(x, y)
-        report = rg.explain_kernels(rg.Pipeline(vertical), rg.Target("host-cuda-cuda_capability_80"))
+        with_gpu = rg.Target("host-cuda-cuda_capability_80")
+        report = rg.explain_kernels(rg.Pipeline(vertical), with_gpu)
         (kernel,) = report.kernels
+        self.assertEqual(kernel.loops[0], f"{vertical.name()}: blocks y, x, threads yi, xi")
+        scheduled = rg.Pipeline(vertical).explain_schedule(with_gpu, [64, 64])
+        self.assertEqual(str(scheduled.kernels), str(report))
         self.assertEqual((kernel.threads % 16, kernel.local_bytes, report.notes), (0, 0, []))
         self.assertGreater(kernel.shared_bytes, 0)
         self.assertIn(kernel.name, str(report))

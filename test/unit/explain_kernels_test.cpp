@@ -51,6 +51,37 @@ TEST_F(ExplainKernels, NamesThemWithThreadsAndSharedMemory) {
   EXPECT_NE(report.to_string().find(kernel.name), std::string::npos) << report.to_string();
 }
 
+TEST_F(ExplainKernels, SaysWhichLoopsBecameThem) {
+  Func out = tiled();
+  RDom r(0, 3, "r");
+  out(x, r) += 1.0f;
+  out.update().gpu_tile(x, xi, 16, TailStrategy::GuardWithIf);
+  const KernelReport report = explain_kernels(Pipeline(out), with_gpu());
+  ASSERT_EQ(report.kernels.size(), 2u);
+  const std::string name = out.name();
+  const std::string rows = report.kernels[0].loops.at(1);
+  EXPECT_EQ(report.kernels[0].loops.at(0), name + ": blocks y, x, threads yi, xi");
+  EXPECT_EQ(rows.substr(rows.find(':')), ": threads y, x");
+  EXPECT_EQ(report.kernels[1].loops,
+            std::vector<std::string>{name + ".update(0): blocks x, threads xi"});
+  EXPECT_NE(report.to_string().find(report.kernels[1].name + " runs " + name + ".update(0)"),
+            std::string::npos)
+      << report.to_string();
+}
+
+TEST_F(ExplainKernels, IsPartOfWhatExplainsASchedule) {
+  const Pipeline pipeline(tiled());
+  const KernelReport kernels = explain_kernels(pipeline, with_gpu());
+  const ScheduleReport report = pipeline.explain_schedule(with_gpu(), {64, 64});
+  EXPECT_EQ(report.kernels.to_json(), kernels.to_json());
+  EXPECT_NE(report.to_string().find(kernels.to_string()), std::string::npos) << report.to_string();
+  const auto json = nlohmann::json::parse(report.to_json());
+  EXPECT_EQ(json["kernels"]["kernels"][0]["name"], kernels.kernels[0].name);
+  Func host("host");
+  host(x, y) = x + y;
+  EXPECT_TRUE(Pipeline(host).explain_schedule(with_gpu(), {64, 64}).kernels.kernels.empty());
+}
+
 TEST_F(ExplainKernels, SchedulesOfTheHostHaveNone) {
   Func out("out");
   out(x, y) = x + y;

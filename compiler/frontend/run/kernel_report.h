@@ -19,6 +19,7 @@ class Pipeline;
 struct KernelReport {
   struct Kernel {
     std::string name;                     // of its launch
+    std::vector<std::string> loops;       // by stage: "out: blocks y, x, threads yi, xi"
     int threads = 0;                      // of a block
     std::optional<int64_t> shared_bytes;  // of a block; none: the call decides
     int64_t local_bytes = 0;              // of a thread: of arrays that found no registers

@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "frontend/run/kernel_report.h"
+
 namespace retrograde {
 
 struct ExplainOptions {
@@ -53,6 +55,7 @@ struct ScheduleReport {
   double first_call_ms = 0;           // more, in a first call, for memory that is new
   std::optional<double> measured_ms;  // of the fastest run
   SearchedSchedules search;
+  KernelReport kernels;  // whose own times are not predicted
 
   std::string to_string() const;
   std::string to_json() const;

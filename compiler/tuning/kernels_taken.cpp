@@ -1,0 +1,143 @@
+#include "tuning/kernels_taken.h"
+
+#include <algorithm>
+#include <iomanip>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "codegen/kernel_code.h"
+#include "diagnostics/error.h"
+#include "ir/lists.h"
+#include "jit/ptxas.h"
+#include "lower/lower.h"
+
+namespace retrograde {
+
+namespace {
+
+using Kernel = KernelReport::Kernel;
+
+Kernel described(const codegen::KernelCode::Kernel& code) {
+  Kernel kernel;
+  kernel.name = code.name;
+  kernel.threads = code.threads;
+  kernel.shared_bytes = code.shared_bytes;
+  kernel.local_bytes = code.local_bytes;
+  return kernel;
+}
+
+void add_figures(const codegen::KernelCode& code, KernelReport& report) {
+  const std::string program = jit::find_ptxas();
+  if (program.empty()) {
+    report.assembler = "no figures of registers: ptxas is not installed";
+    return;
+  }
+  const jit::Assembly assembly = jit::assemble(program, code.ptx, code.capability);
+  report.assembler = text("ptxas ", jit::ptxas_version(program), " for sm_",
+                          jit::assembled_capability(code.capability));
+  if (!assembly.problem.empty()) report.assembler += " failed: " + assembly.problem;
+  for (size_t i = 0; i < code.kernels.size(); ++i) {
+    const auto* figures = ir::find_or_null(assembly.kernels, code.kernels[i].symbol);
+    if (!figures) continue;
+    report.kernels[i].registers = figures->registers;
+    report.kernels[i].stack_bytes = figures->stack_bytes;
+    report.kernels[i].spill_bytes = figures->spill_store_bytes + figures->spill_load_bytes;
+  }
+}
+
+std::string spill_note(const Kernel& kernel) {
+  return text("performance note: each thread of the kernel ", quoted(kernel.name),
+              " stores and loads ", *kernel.spill_bytes, " bytes that found none of its ",
+              *kernel.registers,
+              " registers. Give it less to do: smaller tiles of a thread, fewer unrolled "
+              "iterations, or blocks of fewer threads, which leave each more registers.");
+}
+
+void add_notes(KernelReport& report) {
+  for (const Kernel& kernel : report.kernels) {
+    const int64_t frame = kernel.stack_bytes.value_or(kernel.local_bytes);
+    if (kernel.spill_bytes.value_or(0) > 0)
+      report.notes.push_back(spill_note(kernel));
+    else if (frame > 0)
+      report.notes.push_back(codegen::local_memory_note(kernel.name, frame));
+  }
+}
+
+}  // namespace
+
+tuning::LoweredForReport tuning::lower_for_report(const PipelineSpec& pipeline,
+                                                  const std::vector<graph::FuncPtr>& scheduled,
+                                                  const Target& target) {
+  LoweredForReport result;
+  lower::LowerOptions options;
+  options.target = target;
+  Stmt last;
+  options.observe = [&](const std::string& pass, double, const Stmt& after) {
+    if (pass == "make_kernels") result.kernel_loops = lower::loops_of_kernels(last, after);
+    last = after;
+  };
+  result.function =
+      lower::lower(pipeline.name, scheduled, lower::infer_arguments(pipeline.outputs), options);
+  return result;
+}
+
+KernelReport tuning::kernels_taken(const LoweredForReport& lowered, const Target& target) {
+  codegen::Options options;
+  options.target = target;
+  options.kernels_for_executor = false;
+  const codegen::KernelCode code = codegen::compile_kernels(lowered.function, options);
+  KernelReport report;
+  if (code.kernels.empty()) return report;
+  for (const auto& kernel : code.kernels) {
+    report.kernels.push_back(described(kernel));
+    report.kernels.back().loops = ir::value_or(lowered.kernel_loops, kernel.name, {});
+  }
+  add_figures(code, report);
+  add_notes(report);
+  return report;
+}
+
+std::string KernelReport::to_string() const {
+  if (kernels.empty()) return "";
+  size_t width = 12;
+  for (const Kernel& kernel : kernels) width = std::max(width, kernel.name.size() + 2);
+  std::ostringstream out;
+  const auto row = [&](const std::vector<std::string>& cells) {
+    out << std::left << std::setw(static_cast<int>(width)) << cells[0] << std::right;
+    for (size_t i = 1; i < cells.size(); ++i) out << std::setw(14) << cells[i];
+    out << "\n";
+  };
+  const auto number = [](const auto& value) { return value ? std::to_string(*value) : "-"; };
+  row({"kernel", "threads", "shared bytes", "registers", "local bytes", "spilled"});
+  for (const Kernel& kernel : kernels) {
+    row({kernel.name, std::to_string(kernel.threads), number(kernel.shared_bytes),
+         number(kernel.registers),
+         std::to_string(std::max(kernel.local_bytes, kernel.stack_bytes.value_or(0))),
+         number(kernel.spill_bytes)});
+  }
+  for (const Kernel& kernel : kernels) {
+    for (const std::string& stage : kernel.loops) out << kernel.name << " runs " << stage << "\n";
+  }
+  out << assembler << "\n";
+  for (const std::string& note : notes) out << note << "\n";
+  return out.str();
+}
+
+std::string KernelReport::to_json() const {
+  using Json = nlohmann::json;
+  const auto optional = [](const auto& value) { return value ? Json(*value) : Json(); };
+  Json json = {{"assembler", assembler}, {"notes", notes}, {"kernels", Json::array()}};
+  for (const Kernel& kernel : kernels) {
+    json["kernels"].push_back({{"name", kernel.name},
+                               {"loops", kernel.loops},
+                               {"threads", kernel.threads},
+                               {"shared_bytes", optional(kernel.shared_bytes)},
+                               {"local_bytes", kernel.local_bytes},
+                               {"registers", optional(kernel.registers)},
+                               {"stack_bytes", optional(kernel.stack_bytes)},
+                               {"spill_bytes", optional(kernel.spill_bytes)}});
+  }
+  return json.dump(2) + "\n";
+}
+
+}  // namespace retrograde
