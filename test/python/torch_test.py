@@ -331,6 +331,13 @@ class PastTheDispatcher(unittest.TestCase):
         with torch.inference_mode():
             self.assertTrue(op(self.a, self.b).is_inference())
 
+    def test_tensors_without_memory_are_refused(self):
+        op = total("sparse")
+        for _ in range(3):
+            op(self.a, self.b)
+            with self.assertRaises(RuntimeError):
+                op(self.a.to_sparse(), self.b.detach())
+
     @unittest.skipUnless(hasattr(torch, "set_default_device"), "there is no default device")
     def test_results_are_where_the_tensors_are(self):
         op = total("of_device")

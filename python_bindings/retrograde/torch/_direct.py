@@ -46,10 +46,15 @@ if hasattr(_C.DispatchKeySet, "raw_repr"):
     def _is_ordinary(t):
         return _keys(t).raw_repr() == _OF_TENSORS
 else:  # PyTorch 1.13 does not show its sets of keys; a question for each of those that such a call could have
-    def _is_ordinary_thread():
-        return not (_C._len_torch_dispatch_stack() or _C._are_functorch_transforms_active() or _C._get_tracing_state()
-                    or torch.is_autocast_cpu_enabled() or _C._dispatch_tls_is_dispatch_key_excluded("AutogradOther"))
+    _count_dispatch_modes, _has_transforms, _is_traced = \
+        _C._len_torch_dispatch_stack, _C._are_functorch_transforms_active, _C._is_tracing
+    _has_autocast, _is_excluded = torch.is_autocast_cpu_enabled, _C._dispatch_tls_is_dispatch_key_excluded
+    _AUTOGRAD = _C.DispatchKey.AutogradOther  # excluded with autograd's other keys; its name would take 2 us to read
+    _is_functional = torch._is_functional_tensor
 
-    def _is_ordinary(t):
-        return (t.is_cpu and t.layout is torch.strided and not t.is_neg() and not t._is_zerotensor()
-                and not torch._is_functional_tensor(t))
+    def _is_ordinary_thread():
+        return not (_count_dispatch_modes() or _has_transforms() or _is_traced() or _has_autocast()
+                    or _is_excluded(_AUTOGRAD))
+
+    def _is_ordinary(t):  # a tensor of the CPU without memory has no address either, which is an error
+        return t.is_cpu and not t.is_neg() and not t._is_zerotensor() and not _is_functional(t)
