@@ -141,7 +141,7 @@ class GpuScheduler {
       const VarOrRVar& outer = loops.pure[static_cast<size_t>(d)];
       const VarOrRVar inner = outer.is_rvar ? VarOrRVar(RVar(names_.fresh("ri"))) : Var();
       const TailStrategy tail_of_split = tail(is_output);
-      stage.split(outer, outer, inner, choices_.pick<int>({4, 1, 2, 3, 8}), tail_of_split);
+      stage.split(outer, outer, inner, tile_size(d), tail_of_split);
       threads.push_back(inner);
       blocks.push_back(outer);
     }
@@ -162,6 +162,12 @@ class GpuScheduler {
     stage.split(loop, loop, lane, choices_.chance(50) ? 4 : 2, TailStrategy::GuardWithIf);
     stage.vectorize(lane);
     return lane;
+  }
+
+  // Rows of threads may be warps.
+  int tile_size(int dimension) {
+    constexpr int warp = 32;
+    return dimension == 0 && choices_.chance(10) ? warp : choices_.pick<int>({4, 1, 2, 3, 8});
   }
 
   // Outputs are as small as they come.

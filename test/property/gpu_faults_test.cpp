@@ -1,5 +1,6 @@
 // What the simulated device is for: kernels with a fault put in, such as a lowering with a bug would make
-// them: a barrier left out, arrays of shared memory that overlap, a condition lost. Some do no harm (a barrier
+// them: a barrier left out, or of warps in place of the block, arrays of shared memory that overlap, a condition
+// lost. Some do no harm (a barrier
 // between accesses that do not meet). One is real where some order of threads gives something else; each
 // real one is found in the first run that looks for races, whatever its order.
 #include <gtest/gtest.h>
@@ -36,7 +37,10 @@ struct Made {
   // Sizes of tiles come from the seed.
   explicit Made(int seed) {
     const int tile_x = 4 + seed * 3 % 13, tile_y = 2 + seed * 5 % 7;
-    seed % 3 == 0 ? two_stages(tile_x, tile_y) : seed % 3 == 1 ? product(tile_y) : in_turns(tile_x);
+    if (seed % 4 == 0) two_stages(tile_x, tile_y);
+    if (seed % 4 == 1) product(tile_y);
+    if (seed % 4 == 2) in_turns(tile_x);
+    if (seed % 4 == 3) in_warps(tile_y);
   }
 
   void two_stages(int tile_x, int tile_y) {
@@ -72,13 +76,27 @@ struct Made {
     out.gpu_tile(x, y, xi, yi, tile, 1, TailStrategy::GuardWithIf);
     line.compute_at(out, x).split(x, x, u, 3, TailStrategy::GuardWithIf).gpu_threads(u);
   }
+
+  // Each warp turns its own row around, then all of them the column.
+  void in_warps(int tile_y) {
+    constexpr int warp = 32;
+    Func line("line"), turned("turned");
+    line(x, y) = in(x, y) * 2.0f;
+    turned(x, y) = line(x / warp * warp + (warp - 1 - x % warp), y) - line(x, y);
+    out(x, y) = turned(x, y) + turned(x, y / tile_y * tile_y + (tile_y - 1 - y % tile_y));
+    out.output_buffer().dim(0).set_min(0);
+    out.output_buffer().dim(1).set_min(0);
+    out.gpu_tile(x, y, xi, yi, warp, tile_y, TailStrategy::GuardWithIf);
+    line.compute_at(out, x).gpu_threads(x, y);
+    turned.compute_at(out, x).gpu_threads(x, y);
+  }
 };
 
 // ---- faults ----
 
-bool is_barrier(const Stmt& s) {
+bool is_barrier(const Stmt& s, ir::Op op) {
   const auto* call = s.as<ir::Evaluate>();
-  return call && ir::as_op(call->value, ir::Op::gpu_barrier);
+  return call && ir::as_op(call->value, op);
 }
 
 // A condition on which iteration or thread it is.
@@ -110,10 +128,17 @@ class FaultMaker : public ir::Rewriter {
       in_kernel_ = false;
       return result;
     }
-    if (!in_kernel_ || !(is_barrier(s) || is_guard(s) || is_shared(s))) return children(s);
+    const bool is_of_block = is_barrier(s, ir::Op::gpu_barrier),
+               is_of_warp = is_barrier(s, ir::Op::gpu_warp_barrier);
+    if (!in_kernel_ || !(is_of_block || is_of_warp || is_guard(s) || is_shared(s)))
+      return children(s);
+    if (is_of_block && number_++ == wanted_) {
+      fault = kind = "weaker barrier";
+      return ir::make_evaluate(ir::call_op(ir::Op::gpu_warp_barrier, Int(32), {}));
+    }
     if (number_++ != wanted_) return children(s);
-    if (is_barrier(s)) {
-      fault = kind = "barrier";
+    if (is_of_block || is_of_warp) {
+      fault = kind = is_of_block ? "barrier" : "barrier of warps";
       return ir::make_evaluate(0);
     }
     if (const auto* choice = s.as<ir::IfThenElse>()) {
@@ -217,7 +242,9 @@ TEST(GpuFaults, AreFound) {
     }
   }
   choose(retrograde_simt_forward, 0, true);
-  for (const char* kind : {"barrier", "overlap", "condition"}) EXPECT_GE(kinds[kind], 20) << kind;
+  for (const char* kind : {"barrier", "weaker barrier", "overlap", "condition"})
+    EXPECT_GE(kinds[kind], 20) << kind;
+  EXPECT_GE(kinds["barrier of warps"], 10);
   EXPECT_LT(harmless, 2 * faults) << "few of the faults are any";
 }
 

@@ -24,7 +24,6 @@ namespace retrograde::lower {
 namespace {
 
 constexpr int most_threads = 1024;
-constexpr int warp = 32;
 constexpr size_t most_dimensions = 3;
 
 class ThreadChooser {
@@ -35,7 +34,7 @@ class ThreadChooser {
     visit(kernel_.body);
     const auto used = static_cast<size_t>(std::max(depth_, 1));
     for (size_t d = 0; d < used; ++d) {
-      const int unknown = used == 1 ? 4 * warp : d == 0 ? warp : 4;
+      const int unknown = used == 1 ? 4 * warp_threads : d == 0 ? warp_threads : 4;
       kernel_.threads[d] = most_[d] > 0 ? most_[d] : wants_some_[d] ? unknown : 1;
     }
     // Stages with other shapes share a block: the largest dimension gives way.
@@ -100,10 +99,10 @@ class ThreadChooser {
       refuse(loop, "lanes are the innermost of the loops over threads",
              "there is a loop over threads in it", "Reorder it inwards");
     }
-    if (!most || *most > warp) {
-      refuse(loop, text("a warp has ", warp, " lanes"),
+    if (!most || *most > warp_threads) {
+      refuse(loop, text("a warp has ", warp_threads, " lanes"),
              text("the loop runs ", loop.extent, " times"),
-             text("Split it by ", warp, ", and run the inner loop over lanes"));
+             text("Split it by ", warp_threads, ", and run the inner loop over lanes"));
     }
   }
 

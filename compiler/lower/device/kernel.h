@@ -24,6 +24,8 @@
 
 namespace retrograde::lower {
 
+constexpr int warp_threads = 32;  // x innermost
+
 struct Kernel {
   std::string name;
   std::vector<Expr> blocks;              // x, y, z

@@ -44,7 +44,8 @@ class ThreadMapper {
   // Barriers are for all.
   Stmt by_first_thread(const Stmt& s) const {
     const auto* call = s.as<Evaluate>();
-    if (call && as_op(call->value, Op::gpu_barrier)) return s;
+    if (call && (as_op(call->value, Op::gpu_barrier) || as_op(call->value, Op::gpu_warp_barrier)))
+      return s;
     Expr is_first = make_const(Bool(), int64_t{1});
     for (int d = 0; d < 3; ++d) {
       if (!covered_[static_cast<size_t>(d)] && count(d) > 1) is_first = is_first && thread(d) == 0;

@@ -21,6 +21,7 @@ struct Place {
   Expr value;  // from 0
   int64_t factor = 1, extent = 1;
   int thread = -1;
+  bool is_reversed = false;  // counted from the loop's end, for its factor is negative
 };
 struct AccessIndex {
   std::vector<Place> places;
@@ -65,25 +66,34 @@ class AccessWalker : public Rewriter {
     base = in_full(base, lets_);
     // Inner loops first: where they begin may depend on outer ones.
     std::vector<std::string> names;
+    simplification::BoundsMap bounds;
     for (auto loop = loops_.rbegin(); loop != loops_.rend(); ++loop) {
       if (!uses_variable(base, loop->name)) continue;
       names.push_back(loop->name + ".place");
       base = substitute(base, loop->name, loop->min + variable(names.back()));
+      if (loop->extent > 0) bounds[names.back()] = {Expr(0), make_const(Int(32), loop->extent - 1)};
     }
-    const auto sum = analysis::decompose(simplify(base), names);
+    const auto sum = analysis::decompose(simplification::simplify(base, bounds), names);
     if (!sum) return std::nullopt;
     const auto constant = as_const_int(simplify(sum->rest));
-    if (!constant || *constant < 0) return std::nullopt;
+    if (!constant) return std::nullopt;
     result.constant = *constant;
     for (const auto& [name, factor] : sum->coefficients) {
       const auto loop = std::ranges::find_if(
           loops_, [&, &name = name](const LoopAround& l) { return l.name + ".place" == name; });
-      if (factor < 0 || loop->extent <= 0) return std::nullopt;
+      if (loop->extent <= 0) return std::nullopt;
       if (factor == 0) continue;
-      result.places.push_back(
-          {variable(loop->name) - loop->min, factor, loop->extent, loop->thread});
+      Place place{variable(loop->name) - loop->min, factor, loop->extent, loop->thread};
+      if (factor < 0) {
+        const int64_t last = loop->extent - 1;
+        place.value = make_const(place.value.type(), last) - place.value;
+        place.factor = -factor;
+        place.is_reversed = true;
+        result.constant += factor * last;
+      }
+      result.places.push_back(std::move(place));
     }
-    return result;
+    return result.constant < 0 ? std::nullopt : std::optional(result);
   }
 
  protected:
@@ -123,10 +133,12 @@ class AccessWalker : public Rewriter {
   Substitution lets_;
 };
 
+// `told_apart`: the dimensions whose threads an element tells.
 class ElementsFinder {
  public:
-  ElementsFinder(const Kernel& kernel, const std::string& storage)
-      : kernel_(kernel), storage_(storage) {}
+  ElementsFinder(const Kernel& kernel, const std::string& storage,
+                 std::array<bool, 3> told_apart = {true, true, true})
+      : kernel_(kernel), storage_(storage), told_apart_(told_apart) {}
 
   std::optional<ThreadElements> find() {
     AccessWalker(kernel_, storage_, [&](const AccessWalker& walker, const Expr& index) {
@@ -159,14 +171,19 @@ class ElementsFinder {
   }
 
  private:
+  bool is_told_apart(int thread) const {
+    const auto d = static_cast<size_t>(thread);
+    return thread >= 0 && told_apart_[d] && kernel_.threads[d] > 1;
+  }
+
   // Each dimension with more than one thread has one factor, in all accesses.
   bool gather_threads() {
     for (int d = 0; d < 3; ++d) {
-      if (kernel_.threads[static_cast<size_t>(d)] == 1) continue;
+      if (!is_told_apart(d)) continue;
       Digit digit{0, 1, d};
       for (const AccessIndex& access : accesses_) {
         const auto place = std::ranges::find(access.places, d, &Place::thread);
-        if (place == access.places.end()) return false;
+        if (place == access.places.end() || place->is_reversed) return false;
         if (digit.factor != 0 && digit.factor != place->factor) return false;
         digit.factor = place->factor;
         digit.extent = std::max(digit.extent, place->extent);
@@ -177,18 +194,17 @@ class ElementsFinder {
     return true;
   }
 
+  // What an access adds up in one digit: loops of the same factor, lanes and constants.
   bool gather_others(const AccessIndex& access) {
-    const auto grow = [&](int64_t factor, int64_t extent) {
-      others_[factor] = std::max(others_[factor], extent);
-    };
     const auto constant = places_of(access.constant, threads_);
     if (!constant) return false;
-    for (const auto& [factor, value] : *constant) grow(factor, value + 1);
-    if (access.lanes > 1) grow(access.lane_stride, access.lanes);
+    std::map<int64_t, int64_t> largest = *constant;
+    if (access.lanes > 1) largest[access.lane_stride] += access.lanes - 1;
     for (const Place& place : access.places) {
-      if (place.thread < 0 || kernel_.threads[static_cast<size_t>(place.thread)] == 1)
-        grow(place.factor, place.extent);
+      if (!is_told_apart(place.thread)) largest[place.factor] += place.extent - 1;
     }
+    for (const auto& [factor, value] : largest)
+      others_[factor] = std::max(others_[factor], value + 1);
     return true;
   }
 
@@ -214,6 +230,7 @@ class ElementsFinder {
 
   const Kernel& kernel_;
   const std::string& storage_;
+  const std::array<bool, 3> told_apart_;
   std::vector<AccessIndex> accesses_;
   bool fails_ = false;
   std::vector<Digit> threads_;
@@ -225,6 +242,14 @@ class ElementsFinder {
 std::optional<ThreadElements> find_thread_elements(const Kernel& kernel,
                                                    const std::string& storage) {
   return ElementsFinder(kernel, storage).find();
+}
+
+// Warps have whole rows of threads where a row's length divides theirs, and whole planes likewise.
+bool is_one_warps(const Kernel& kernel, const std::string& storage) {
+  const int row = kernel.threads[0], plane = row * kernel.threads[1];
+  const bool has_rows = warp_threads % row == 0, has_planes = warp_threads % plane == 0;
+  if (!has_rows) return false;
+  return ElementsFinder(kernel, storage, {false, !has_planes, true}).find().has_value();
 }
 
 Stmt in_own_numbers(const Kernel& kernel, const std::string& storage,

@@ -34,6 +34,9 @@ struct ThreadElements {
 std::optional<ThreadElements> find_thread_elements(const Kernel& kernel,
                                                    const std::string& storage);
 
+// Whether each element is known to be touched by the threads of one warp alone.
+bool is_one_warps(const Kernel& kernel, const std::string& storage);
+
 // The kernel's body with the accesses of `storage` by the thread's own numbers.
 Stmt in_own_numbers(const Kernel& kernel, const std::string& storage,
                     const ThreadElements& elements);
