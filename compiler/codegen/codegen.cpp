@@ -216,17 +216,4 @@ std::string compile_assembly(const ir::LoweredFunction& function, const Options&
   });
 }
 
-std::string compile_ptx(const ir::LoweredFunction& function, const Options& options) {
-  std::string result;
-  run_on_large_stack([&] {
-    const Machine machine = machine_for(options.target, options.tune_for_host);
-    Unit unit(machine, function.name, /*keep_names=*/false);
-    Emitter emitter(unit.module(), machine);
-    FunctionGenerator generator(emitter, function);
-    generator.generate();
-    result = generator.kernels().code();
-  });
-  return result;
-}
-
 }  // namespace retrograde::codegen

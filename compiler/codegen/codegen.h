@@ -63,7 +63,5 @@ std::map<Format, std::string> compile_texts(const Program& program, const Option
 
 std::string compile_llvm_ir(const ir::LoweredFunction& function, const Options& options);
 std::string compile_assembly(const ir::LoweredFunction& function, const Options& options);
-// Its kernels for the GPU of the target; empty: it has none.
-std::string compile_ptx(const ir::LoweredFunction& function, const Options& options);
 
 }  // namespace retrograde::codegen

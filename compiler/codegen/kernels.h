@@ -41,8 +41,7 @@ class KernelSet {
   int64_t image_bytes() const;
   // Gives the image its contents.
   void finish();
-  // The code for devices; empty before that, and where there are no kernels.
-  const std::string& code() const { return code_; }
+  // Afterwards: the code for devices.
   KernelCode described_code() const;
 
  private:

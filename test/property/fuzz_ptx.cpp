@@ -4,7 +4,7 @@
 // support/fuzz.h.
 #include <cstdio>
 
-#include "codegen/codegen.h"
+#include "codegen/kernel_code.h"
 #include "lower/lower.h"
 #include "support/fuzz.h"
 #include "support/ptxas.h"
@@ -25,12 +25,6 @@ const std::vector<Chip> chips = {{"sm_80", Target::CUDACapability80},
                                  {"sm_86", Target::CUDACapability86},
                                  {"sm_90", Target::CUDACapability90}};
 
-uint64_t kernels_in(const std::string& ptx) {
-  uint64_t count = 0;
-  for (size_t at = 0; (at = ptx.find(".entry", at)) != std::string::npos; ++at) ++count;
-  return count;
-}
-
 Judged judge(Choices& choices, bool assembles) {
   Judged judged;
   try {
@@ -44,16 +38,17 @@ Judged judge(Choices& choices, bool assembles) {
     lowering.target = target;
     codegen::Options options;
     options.target = target;
-    const std::string ptx = codegen::compile_ptx(
+    const codegen::KernelCode code = codegen::compile_kernels(
         lower::lower("f", outputs, lower::infer_arguments(outputs), lowering), options);
-    judged.counts["kernels"] = kernels_in(ptx);
-    if (!assembles || ptx.empty()) return judged;
+    const uint64_t kernels = code.kernels.size();
+    judged.counts["kernels"] = kernels;
+    if (!assembles || kernels == 0) return judged;
     if (!has_ptxas()) {
-      judged.counts["kernels not assembled, for there is no ptxas"] = kernels_in(ptx);
+      judged.counts["kernels not assembled, for there is no ptxas"] = kernels;
       return judged;
     }
-    judged.counts["kernels assembled"] = kernels_in(ptx);
-    const std::string problem = ptxas_problem(ptx, chip.name);
+    judged.counts["kernels assembled"] = kernels;
+    const std::string problem = ptxas_problem(code.ptx, chip.name);
     if (!problem.empty()) judged = {Judgement::Broken, "ptxas: " + problem};
   } catch (const UserError& error) {
     judged = {Judgement::Refused, error.what()};

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "codegen/codegen.h"
+#include "codegen/kernel_code.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/operators.h"
@@ -24,6 +24,10 @@ codegen::Options options_for(size_t chip) {
   options.target = get_host_target().with_feature(Target::CUDA).with_feature(capabilities[chip]);
   options.kernels_for_executor = false;
   return options;
+}
+
+std::string ptx_of(const ir::LoweredFunction& function, const codegen::Options& options) {
+  return codegen::compile_kernels(function, options).ptx;
 }
 
 std::vector<std::string> lines_of(const std::string& text) {
@@ -55,7 +59,7 @@ std::vector<int> lanes_tried([[maybe_unused]] size_t chip) {
 TEST_P(Ptx, OfEverythingIsTakenByPtxas) {
   for (const int lanes : lanes_tried(GetParam())) {
     const auto function = every_kernel::of_everything(lanes, every_kernel::types());
-    const std::string ptx = codegen::compile_ptx(function, options_for(GetParam()));
+    const std::string ptx = ptx_of(function, options_for(GetParam()));
     EXPECT_GT(count(lines_of(ptx), ".entry"), 80u);
     EXPECT_EQ(count(lines_of(ptx), std::string(".target ") + chips[GetParam()]), 1u);
     expect_ptxas_takes(ptx, chips[GetParam()]);
@@ -66,7 +70,7 @@ TEST_P(Ptx, OfEverythingIsTakenByPtxas) {
 TEST(PtxOfEverything, RoundsEveryFloatAsTheExecutorDoes) {
   const auto function = every_kernel::of_everything(1, every_kernel::types());
   int rounded = 0;
-  for (const std::string& line : lines_of(codegen::compile_ptx(function, options_for(1)))) {
+  for (const std::string& line : lines_of(ptx_of(function, options_for(1)))) {
     const std::string instruction = line.substr(0, line.find_first_of(" \t", 1));
     const auto has = [&](const char* part) { return instruction.find(part) != std::string::npos; };
     EXPECT_FALSE(has(".approx") || has(".ftz") || has(".full")) << line;
@@ -85,7 +89,7 @@ INSTANTIATE_TEST_SUITE_P(Chips, Ptx, testing::Range(size_t{0}, std::size(chips))
 
 TEST(PtxOfEverything, WhatOnlyAHostCanDoIsRefused) {
   for (const ir::LoweredFunction& function : every_kernel::of_hosts_alone())
-    EXPECT_THROW(codegen::compile_ptx(function, options_for(1)), Unsupported) << function.name;
+    EXPECT_THROW(ptx_of(function, options_for(1)), Unsupported) << function.name;
 }
 
 // ---- FMA ----
@@ -102,7 +106,7 @@ std::vector<std::string> kernel_of(const std::vector<Expr>& values, bool is_stri
   function.body = ir::make_launch("k", {1, 1, 1}, {1, 1, 1}, 0, ir::make_block(stores));
   codegen::Options options = options_for(1);
   if (is_strict) options.target = options.target.with_feature(Target::StrictFloat);
-  return lines_of(codegen::compile_ptx(function, options));
+  return lines_of(ptx_of(function, options));
 }
 Expr in(int i) { return ir::make_load(Float(32), "in", i); }
 
