@@ -105,7 +105,7 @@ void Executor::begin_block(int64_t number) {
   block_ = static_cast<uint32_t>(number);
   interval_ = 1;
   ended_ = 0;
-  std::fill(parts_.begin(), parts_.end(), uint16_t{0});
+  std::fill(parts_.begin(), parts_.end(), 0u);
   shared_shadow_.clear();
   std::memset(shared_, 0xff, static_cast<size_t>(launch_.shared_bytes));
   const int64_t x = launch_.blocks[0], y = launch_.blocks[1];
@@ -208,7 +208,7 @@ bool Executor::let_block_go() {
   }
   for (uint32_t t = 0; t < count_; t++) threads_[t].wait = Wait::nothing;
   interval_++;
-  std::fill(parts_.begin(), parts_.end(), uint16_t{0});
+  std::fill(parts_.begin(), parts_.end(), 0u);
   if (profile_) profile_->sums.barriers++;
   return true;
 }

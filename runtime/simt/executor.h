@@ -100,7 +100,7 @@ class Executor {
   Fiber* running_ = nullptr;
   std::vector<uint32_t> order_;
   uint32_t ended_ = 0, block_ = 0, interval_ = 1;
-  std::vector<uint16_t> parts_;  // of the interval, by warp
+  std::vector<uint32_t> parts_;  // of the interval, by warp
   std::vector<uint64_t> shared_words_;
   uint8_t* shared_ = nullptr;
 

@@ -68,7 +68,7 @@ Shadow::Page& Shadow::page_of(uint64_t word) {
   if (!page) page = std::make_unique<Page>();
   if (page->generation != generation_) {
     std::fill_n(page->words, page_words, Cell());
-    page->parts.clear();
+    page->has_bytes.reset();
     page->generation = generation_;
   }
   last_ = page.get();
@@ -82,14 +82,14 @@ void Shadow::record_word(uint64_t begin, uint64_t end, Access access, const Mome
   Page& page = page_of(begin / 4);
   const auto index = static_cast<uint32_t>(begin / 4 % page_words);
   Cell& whole = page.words[index];
-  auto parts = page.parts.empty() ? page.parts.end() : page.parts.find(index);
-  if (parts == page.parts.end()) {
+  if (!page.has_bytes[index]) {
     if (end - begin == 4) return join(all, record_in(whole, access, now), from, 4);
-    parts = page.parts.emplace(index, std::make_unique<Cell[]>(4)).first;
-    std::fill_n(parts->second.get(), 4, whole);
+    if (!page.bytes) page.bytes = std::make_unique_for_overwrite<Cell[]>(4 * page_words);
+    std::fill_n(&page.bytes[4 * index], 4, whole);
+    page.has_bytes.set(index);
   }
   for (uint64_t byte = begin; byte < end; byte++)
-    join(all, record_in(parts->second[byte % 4], access, now), from + byte - begin, 1);
+    join(all, record_in(page.bytes[4 * index + byte % 4], access, now), from + byte - begin, 1);
 }
 
 Conflict Shadow::record(uint64_t address, int32_t bytes, Access access, const Moment& now) {

@@ -8,6 +8,7 @@
 // (as in FastTrack, Flanagan and Freund 2009, with the few clocks that barriers need in place of vectors).
 #pragma once
 
+#include <bitset>
 #include <cstdint>
 #include <memory>
 #include <unordered_map>
@@ -18,8 +19,9 @@ namespace retrograde::simt {
 // Who accesses, and when.
 struct Moment {
   uint32_t block = 0;
-  uint32_t interval = 0;          // of the block, from 1; 0: nobody
-  uint16_t thread = 0, part = 0;  // of the block; of the interval, for the thread's warp
+  uint32_t interval = 0;  // of the block, from 1; 0: nobody
+  uint32_t part = 0;      // of the interval, for the thread's warp
+  uint16_t thread = 0;    // of the block
   int16_t site = -1;
   uint8_t spread = 0;  // others since: 1 of this warp, 2 of other warps, 4 of other blocks
 };
@@ -55,7 +57,8 @@ class Shadow {
   struct Page {
     uint64_t generation = 0;
     Cell words[page_words];
-    std::unordered_map<uint32_t, std::unique_ptr<Cell[]>> parts;  // of words accessed by bytes
+    std::bitset<page_words> has_bytes;  // words that are accessed in parts
+    std::unique_ptr<Cell[]> bytes;      // four for each word, once one of them is
   };
   Page& page_of(uint64_t word);
   void record_word(uint64_t begin, uint64_t end, Access, const Moment&, uint64_t from, Conflict&);

@@ -223,6 +223,19 @@ TEST_F(Simt, BarriersOfAWarpOrderTheWarpAlone) {
                                         {"\"third statement\""});
 }
 
+// One thread stores, and another loads when the warp has waited n times.
+void wait_often(Thread* t, int32_t* data, int32_t n) {
+  if (t->thread[0] == 0) store(t, data, 7, 0);
+  for (int32_t i = 0; i < n; i++) t->calls->warp_barrier(t, 1);
+  if (t->thread[0] == 1) load(t, data, 2);
+}
+
+TEST_F(Simt, BarriersOfAWarpOrderHoweverManyThereAre) {
+  for (const int32_t times : {1, 1 << 16})
+    EXPECT_EQ(run<wait_often>(true, {1, 1, 2, 1, 0}, times), success)
+        << times << retrograde_simt_last_finding();
+}
+
 // ---- barriers and shuffles that not all reach ----
 
 void barrier_of_half(Thread* t, int32_t*, int32_t) {
