@@ -13,6 +13,7 @@ namespace retrograde::fuzz {
 namespace {
 
 constexpr size_t most_reasons = 12;
+constexpr double seconds_between_lines = 30;
 
 // All of the text, from its first digit on.
 template <typename T>
@@ -69,8 +70,13 @@ class Fuzzing {
     const auto elapsed = [&] {
       return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     };
-    for (uint64_t seed = seed_; tried_ < count_ && elapsed() <= seconds_; ++seed)
+    double told = 0;
+    for (uint64_t seed = seed_; tried_ < count_ && elapsed() <= seconds_; ++seed) {
       try_choices(choices_.empty() ? Choices(seed) : Choices(choices_), seed);
+      if (elapsed() < told + seconds_between_lines) continue;
+      told = elapsed();
+      print_progress(seed, told);
+    }
     print_summary(elapsed());
     const uint64_t legal = tried_ - judgements_[Judgement::Illegal];
     const bool is_many = tried_ >= 50;
@@ -217,6 +223,13 @@ class Fuzzing {
     if (prints_refusals_ && (is_refused || judgement == Judgement::Illegal))
       std::printf("seed %llu %s\n", static_cast<unsigned long long>(seed),
                   describe(result).c_str());
+  }
+
+  void print_progress(uint64_t seed, double seconds) const {
+    std::printf("to seed %llu: %llu programs, %llu findings, %.0f seconds\n",
+                static_cast<unsigned long long>(seed), static_cast<unsigned long long>(tried_),
+                static_cast<unsigned long long>(found_), seconds);
+    std::fflush(stdout);
   }
 
   // One line of counts, then one for each reason of refusals, the most frequent first.

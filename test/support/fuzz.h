@@ -2,7 +2,8 @@
 // memory, so that a crash or a hang is a finding like a wrong result. A finding is shrunk (testing/
 // choices.h) and printed with its choices. Refusals are counted by their rule.
 //
-//   --seed N | --from N, --count N | --seconds N    one program, or so many from one on
+//   --seed N | --from N, --count N | --seconds N    one program, or so many from one on; a line every 30 s
+//                                                    says how far it is
 //   --choices LIST       the program that a finding was shrunk to
 //   --compile PERCENT    of how many programs what takes machine code is checked, too
 //   --no-shrink, --print, --refusals                print the programs, print refusals
