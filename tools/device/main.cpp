@@ -3,15 +3,17 @@
 //   gpu_check [--output FILE] [--seconds N]    on the GPU of this machine
 //   gpu_check --simulated                      the same checks on the simulated device: of this program
 //
-//   --random N        random pipelines under random schedules (2000)
+//   --seconds N       that it may take, about (540; on the simulated device 10)
+//   --random N        random pipelines under random schedules (2000; on the simulated device 5)
 //   --first-seed N    of the first of them (1)
 //   --only NAME       of the programs these, of which there may be several
 //   --python PROGRAM  that may have PyTorch (python3)
 //
-// Compares, bit for bit, what the GPU and the executor of the simulated device give for the programs of
-// test/support/gpu_programs and for random ones; runs the programs under compute-sanitizer where that is
-// installed; times them beside the bandwidth of copies and the rate of FMA that it measures, and beside
-// PyTorch where that is installed. Writes all of it as JSON. Builds nothing and needs no network.
+// Has the driver compile kernels of every operator in every type; compares, bit for bit, what the GPU and the
+// executor of the simulated device give for the programs of test/support/gpu_programs and for random ones; runs
+// the programs under compute-sanitizer where that is installed; times them beside the bandwidth of copies and
+// the rate of FMA that it measures, and beside PyTorch where that is installed. Writes all of it as JSON. Builds
+// nothing and needs no network.
 //
 // Exit status: 0 all is well, 1 something is not, 2 wrong arguments, 77 there is no GPU.
 #include <unistd.h>
@@ -41,8 +43,8 @@ constexpr int problems_found = 1, wrong_arguments = 2, no_device = 77;
 
 struct Arguments {
   std::string output, python = "python3";
-  double seconds = 540;
-  int random = 2000;
+  double seconds = -1;  // as usual, both
+  int random = -1;
   uint64_t first_seed = 1;
   bool is_simulated = false;
   Names only;
@@ -96,6 +98,8 @@ Arguments arguments_of(int argc, char** argv) {
     else
       usage("there is no flag " + flag);
   }
+  if (result.random < 0) result.random = result.is_simulated ? 5 : 2000;
+  if (result.seconds < 0) result.seconds = result.is_simulated ? 10 : 540;
   return result;
 }
 
@@ -111,7 +115,9 @@ int work(const Arguments& arguments) {
       return 0;
     }
     RecordWriter records(arguments.file);
-    if (arguments.worker == "programs")
+    if (arguments.worker == "kernels")
+      compile_kernels(arguments.capability, arguments.is_simulated, arguments.seconds, records);
+    else if (arguments.worker == "programs")
       run_programs(target, arguments.only, records);
     else if (arguments.worker == "random")
       run_random(target, arguments.first_seed, arguments.random, arguments.seconds, records);
@@ -158,6 +164,7 @@ class Check {
 
   // The exit status.
   int run() {
+    compile_kernels_there();
     compare_part("programs", 1.0);
     compare_part("random", 0.35);
     sanitize();
@@ -209,12 +216,36 @@ class Check {
   // Of what is checked: the GPU, or the simulated device with another order of threads than the executor's.
   std::map<std::string, std::string> environment() const {
     if (!arguments_.is_simulated) return {{"RETROGRADE_GPU", "cuda"}};
-    return {{"RETROGRADE_GPU", "simulated"}, {"RETROGRADE_SIMT_ORDER", "random"}};
+    return {{"RETROGRADE_GPU", "simulated"},
+            {"RETROGRADE_SIMT_ORDER", "random"},
+            {"RETROGRADE_CACHE_DIR", folder_.file("code")}};
   }
   static std::map<std::string, std::string> executor() {
     return {{"RETROGRADE_GPU", "simulated"},
             {"RETROGRADE_SIMT_ORDER", "forward"},
             {"RETROGRADE_SIMT_FAIL", ""}};
+  }
+
+  void compile_kernels_there() {
+    std::cout << "kernels: every operator in every type, by the driver" << std::endl;
+    const double seconds = 0.2 * seconds_left();
+    const std::string file = folder_.file("kernels");
+    const Ended ended = run_child(worker("kernels", file, seconds), environment(), seconds + 60);
+    if (!ended.succeeded())
+      problem("the kernels of every operator end early, status " + std::to_string(ended.status) +
+              ": " + ended.err);
+    Json& told = json_["kernels"] = {{"modules", Json::array()}, {"compiled", 0}};
+    for (const Record& record : read_records(file)) {
+      if (record.state != Record::State::Done) {
+        problem("every operator for " + record.name + ": " + record.bytes);
+        continue;
+      }
+      told["modules"].push_back(record.name);
+      told["compiled"] = told["compiled"].get<int64_t>() + std::ranges::count(record.bytes, '\n');
+    }
+    if (told["modules"].empty()) problem("of the kernels of every operator none was compiled");
+    std::cout << "  " << told["compiled"] << " kernels in " << told["modules"].size() << " modules"
+              << std::endl;
   }
 
   void compare_part(const std::string& part, double share) {
@@ -295,6 +326,11 @@ class Check {
 
   // The script gets what was timed and what was computed, and gives times and differences.
   void compare_with_torch() {
+    constexpr double to_import_it = 3;
+    if (arguments_.is_simulated && seconds_left() < to_import_it) {
+      json_["pytorch"] = {{"not_run", "no time was left"}};
+      return;
+    }
     const fs::path script = fs::read_symlink("/proc/self/exe").parent_path().parent_path() /
                             "share" / "retrograde" / "gpu_check_torch.py";
     const std::string tasks = folder_.file("tasks.json");

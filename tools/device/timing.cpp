@@ -19,7 +19,8 @@ double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-// Seconds of one run: the median of batches, each long enough that waiting for its end is nothing.
+// Seconds of one run: the median of batches, each long enough that waiting for its end is nothing. In no
+// seconds, of a single one.
 double time_of(const std::function<void()>& run, const std::function<void()>& wait,
                double seconds) {
   constexpr size_t batches = 7;
@@ -29,6 +30,7 @@ double time_of(const std::function<void()>& run, const std::function<void()>& wa
   run();
   wait();
   const double once = std::max(seconds_since(begin), 1e-7);
+  if (seconds == 0) return once;
   const int runs = std::clamp(static_cast<int>(seconds / batches / once), 1, 1000);
   std::vector<double> times;
   for (size_t batch = 0; batch < batches; ++batch) {

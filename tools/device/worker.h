@@ -16,6 +16,11 @@ retrograde::Target target_for(int capability);
 using Names = std::vector<std::string>;
 void run_programs(const retrograde::Target& target, const Names& only, RecordWriter& records);
 
+// Every operator and kind of node in every type, as PTX for this chip and those before it, which the driver
+// compiles; for the simulated device in one form alone. A record for each that the seconds suffice for: the
+// names of its kernels.
+void compile_kernels(int capability, bool is_simulated, double seconds, RecordWriter& records);
+
 // Random pipelines under random schedules, of `count` seeds from `first` on, as far as the seconds suffice.
 void run_random(const retrograde::Target& target, uint64_t first, int count, double seconds,
                 RecordWriter& records);
