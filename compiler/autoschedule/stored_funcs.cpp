@@ -75,13 +75,13 @@ class StorageChooser {
       const bool left_inline = by_hand && !is_adjoint(f);
       bool stored =
           is_worth_storing(uses_[f.get()], left_inline && f->is_pure() ? explosion : cheap);
-      stored |= left_inline ? computes_more_than_is_read(*f) : is_output(f) || !f->is_pure();
+      stored |= left_inline ? computes_more_than_is_read(*f) : is_output(*f) || !f->is_pure();
       stored |= chosen_.preferred.contains(f.get());
       stored |= is_worth_choosing_once(uses_[f.get()]);
       stored |= is_stored_running_sum(f);
       if (limits_) {
         stored |= limits_->need_root.contains(f.get()) || limits_->levels.contains(f.get());
-        stored &= !limits_->stay.contains(f.get()) || is_output(f);  // which is at root anyway
+        stored &= !limits_->stay.contains(f.get()) || is_output(*f);  // which is at root anyway
       }
       stored |= chosen_.store.contains(f.get());
       stored &= !chosen_.inlined.contains(f.get()) && !chosen_.recomputed.contains(f.get());
@@ -94,8 +94,8 @@ class StorageChooser {
   }
 
  private:
-  bool is_output(const FuncPtr& f) const {
-    return std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
+  bool is_output(const FuncContents& f) const {
+    return std::ranges::find(outputs_, &f, &FuncPtr::get) != outputs_.end();
   }
 
   // Whether more adjoints of those that are stored can go once it is there.
@@ -112,7 +112,7 @@ class StorageChooser {
 
   // A block of a sum is computed where it is added up: see default_schedule.cpp.
   bool is_block_of_one(const FuncPtr& f) const {
-    if (!f->made || f->made->blocks == 0 || is_output(f)) return false;
+    if (!f->made || f->made->blocks == 0 || is_output(*f)) return false;
     const auto found = readers_.find(f.get());
     return found != readers_.end() && found->second.size() == 1;
   }
@@ -145,13 +145,14 @@ class StorageChooser {
     for (auto it = order_.rbegin(); it != order_.rend(); ++it) {  // readers first
       StorageUse& use = uses_[it->get()];
       for (const Reader& by : readers_[it->get()])
-        use.reads_in_all += by.reads * (is_inlined(*by.func) ? uses_[by.func].reads_in_all : 1);
+        use.reads_in_all +=
+            by.reads *
+            (is_inlined(*by.func) && !is_output(*by.func) ? uses_[by.func].reads_in_all : 1);
     }
   }
   bool is_inlined(const FuncContents& f) const {
-    return f.is_pure() && !is_touched(f) && !stored_.contains(&f) &&
-           std::none_of(outputs_.begin(), outputs_.end(),
-                        [&](const FuncPtr& output) { return output.get() == &f; });
+    return f.is_pure() && !stored_.contains(&f) &&
+           f.schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined;
   }
 
   // Of what a Func chooses, by dimensions that the reader's loops or data move, not constants.
@@ -185,9 +186,7 @@ class StorageChooser {
     if (call.call_type != CallType::Func) return 1;
     auto found = uses_.find(call.symbol.raw());
     auto callee = std::dynamic_pointer_cast<FuncContents>(call.symbol.lock());
-    bool stored = !callee || !callee->is_pure() || stored_.contains(callee.get()) ||
-                  callee->schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined;
-    return stored || found == uses_.end() ? 1 : found->second.operations;
+    return !callee || !is_inlined(*callee) || found == uses_.end() ? 1 : found->second.operations;
   }
 
   const std::vector<FuncPtr>& outputs_;
