@@ -25,6 +25,7 @@
 #include "lower/nests/inline_functions.h"
 #include "lower/nests/make_names_unique.h"
 #include "lower/nests/refuse_unsupported.h"
+#include "lower/nests/resolve_undef.h"
 #include "lower/nests/share_parameters.h"
 #include "lower/statement_passes.h"
 #include "lower/vectors/vectorize_inner_loops.h"
@@ -130,10 +131,7 @@ std::vector<std::string> buffer_names(const std::vector<LoweredArgument>& args) 
 }
 
 bool stores_every_element(const LoopedFunc& f) {
-  const auto has_undef = [](const Expr& value) {
-    return any_node(value, [](const Call& call) { return call.is_op(Op::undef); });
-  };
-  return !f.func->extern_definition && std::ranges::none_of(f.stages[0].values, has_undef);
+  return !f.func->extern_definition && std::ranges::none_of(f.stages[0].values, mentions_undef);
 }
 
 GivenBuffers given_buffers(const Lowering& lowering) {

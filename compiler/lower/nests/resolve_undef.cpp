@@ -12,11 +12,11 @@
 
 namespace retrograde::lower {
 
-namespace {
-
 bool mentions_undef(const Expr& e) {
   return any_node(e, [](const Expr& node) { return is_undef(node); });
 }
+
+namespace {
 
 Expr both(const Expr& a, const Expr& b) {
   if (is_const_true(a) || is_const_false(b) || equal(a, b)) return b;

@@ -13,4 +13,7 @@ namespace retrograde::lower {
 
 void resolve_undef(Program& program);
 
+// Whether a value may come from an undef: afterwards none does but a whole one, which is not stored.
+bool mentions_undef(const Expr& e);
+
 }  // namespace retrograde::lower
