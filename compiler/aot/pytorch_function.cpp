@@ -75,10 +75,7 @@ TorchFunction torch_function_of(const DeclaredFunction& declared) {
 
 std::string listed(const std::vector<ExportArgument>& arguments,
                    const std::function<std::string(const ExportArgument&)>& each) {
-  std::string result;
-  for (const ExportArgument& argument : arguments)
-    result += (result.empty() ? "" : ", ") + each(argument);
-  return result;
+  return joined(ir::mapped(arguments, each));
 }
 
 std::string parameter(const ExportArgument& argument) {

@@ -72,17 +72,13 @@ $otherwise$
 }
 
 std::string results_type(size_t count) {
-  if (count == 1) return "at::Tensor";
-  std::string types;
-  for (size_t i = 0; i < count; i++) types += i ? ", at::Tensor" : "at::Tensor";
-  return "std::tuple<" + types + ">";
+  const std::vector<std::string> types(count, "at::Tensor");
+  return count == 1 ? types[0] : "std::tuple<" + joined(types) + ">";
 }
 
 std::string results_schema(size_t count) {
-  if (count == 1) return "Tensor";
-  std::string types;
-  for (size_t i = 0; i < count; i++) types += i ? ", Tensor" : "Tensor";
-  return "(" + types + ")";
+  const std::vector<std::string> types(count, "Tensor");
+  return count == 1 ? types[0] : "(" + joined(types) + ")";
 }
 
 // What the results and their sizes are made of.

@@ -26,12 +26,26 @@ Region region_of(const ImageParam& image) {
   });
 }
 
+struct NamedOutput {
+  std::string name;
+  Func func;
+};
+
+std::vector<NamedOutput> named_outputs(const std::vector<GeneratorOutputBase*>& outputs) {
+  std::vector<NamedOutput> result;
+  for (const GeneratorOutputBase* output : outputs) {
+    const std::vector<Func> funcs = output->funcs();
+    for (size_t i = 0; i < funcs.size(); i++) result.push_back({output->element_name(i), funcs[i]});
+  }
+  return result;
+}
+
 // Every output has one value, and at least one of them is of floats.
-void check_differentiable(const std::vector<Func>& outputs, const std::string& generator) {
+void check_differentiable(const std::vector<NamedOutput>& outputs, const std::string& generator) {
   const std::string asked = "build the gradient of the generator " + quoted(generator);
   std::string types;
   bool has_floats = false;
-  for (const Func& f : outputs) {
+  for (const auto& [name, f] : outputs) {
     if (f.outputs() != 1) {
       user_error(asked, "gradients are of outputs with one value",
                  quoted(f.name()) + text(" has ", f.outputs(), " values"),
@@ -43,6 +57,15 @@ void check_differentiable(const std::vector<Func>& outputs, const std::string& g
   if (has_floats) return;
   user_error(asked, "gradients are of floating-point outputs", types,
              "Make one an output of floats");
+}
+
+// The gradient at an output, which becomes the next argument.
+ImageParam add_seed(const NamedOutput& output, std::vector<Argument>& arguments,
+                    std::vector<std::string>& names) {
+  names.push_back("_grad_loss_for_" + output.name);
+  ImageParam seed(output.func.type(), output.func.dimensions(), names.back());
+  arguments.push_back(frontend::argument_of(*seed.parameter()));
+  return seed;
 }
 
 AdjointInput adjoint_input(const std::shared_ptr<graph::ParameterContents>& parameter) {
@@ -81,31 +104,22 @@ Module GeneratorBase::build_gradient_module(const std::string& function_name) {
   AdjointOptions options;
   for (const ImageParam& image : images) options.wrt.push_back(image);
 
-  std::vector<Func> all;
-  for (const GeneratorOutputBase* output : members_.outputs) {
-    for (const Func& f : output->funcs()) all.push_back(f);
-  }
-  check_differentiable(all, name_);
+  const std::vector<NamedOutput> outputs = named_outputs(members_.outputs);
+  check_differentiable(outputs, name_);
 
   std::vector<Func> gradients;
   std::set<const graph::FuncContents*> seen;
-  for (const GeneratorOutputBase* output : members_.outputs) {
-    const std::vector<Func> funcs = output->funcs();
-    for (size_t i = 0; i < funcs.size(); i++) {
-      const std::string of = output->element_name(i);
-      const ImageParam seed(funcs[i].type(), funcs[i].dimensions(), "_grad_loss_for_" + of);
-      arguments.push_back(frontend::argument_of(*seed.parameter()));
-      names.push_back("_grad_loss_for_" + of);
-      std::optional<Derivative> derivative;
-      if (funcs[i].type().is_float())
-        derivative = propagate_adjoints(funcs[i], seed, region_of(seed), options);
-      for (size_t k = 0; k < images.size(); k++) {
-        const bool has = derivative && derivative->has(images[k]);
-        Func gradient = has ? (*derivative)(images[k]) : sum_of({}, *images[k].parameter());
-        if (!seen.insert(gradient.function().get()).second) gradient = lambda(gradient(_));
-        gradients.push_back(gradient);
-        gradient_names.push_back("_grad_loss_" + of + "_wrt_" + image_names[k]);
-      }
+  for (const NamedOutput& output : outputs) {
+    const ImageParam seed = add_seed(output, arguments, names);
+    std::optional<Derivative> derivative;
+    if (output.func.type().is_float())
+      derivative = propagate_adjoints(output.func, seed, region_of(seed), options);
+    for (size_t k = 0; k < images.size(); k++) {
+      const bool has = derivative && derivative->has(images[k]);
+      Func gradient = has ? (*derivative)(images[k]) : sum_of({}, *images[k].parameter());
+      if (!seen.insert(gradient.function().get()).second) gradient = lambda(gradient(_));
+      gradients.push_back(gradient);
+      gradient_names.push_back("_grad_loss_" + output.name + "_wrt_" + image_names[k]);
     }
   }
   names.insert(names.end(), gradient_names.begin(), gradient_names.end());
@@ -148,26 +162,16 @@ Module GeneratorBase::gradient_function(const std::string& function_name,
                                         const std::vector<NamedParameter>& by) {
   std::vector<Argument> arguments = input_arguments();
   std::vector<std::string> names = input_names();
-  std::vector<std::string> output_names;
-  std::vector<Func> outputs;
-  for (const GeneratorOutputBase* output : members_.outputs) {
-    for (size_t i = 0; i < output->funcs().size(); i++) {
-      outputs.push_back(output->funcs()[i]);
-      output_names.push_back(output->element_name(i));
-    }
-  }
+  const std::vector<NamedOutput> outputs = named_outputs(members_.outputs);
   check_differentiable(outputs, name_);
 
   AdjointOptions options;
   for (const auto& [name, parameter] : by) options.wrt.push_back(adjoint_input(parameter));
   std::vector<Derivative> derivatives;
-  for (size_t i = 0; i < outputs.size(); i++) {
-    if (!outputs[i].type().is_float()) continue;
-    const std::string name = "_grad_loss_for_" + output_names[i];
-    const ImageParam seed(outputs[i].type(), outputs[i].dimensions(), name);
-    arguments.push_back(frontend::argument_of(*seed.parameter()));
-    names.push_back(name);
-    derivatives.push_back(propagate_adjoints(outputs[i], seed, region_of(seed), options));
+  for (const NamedOutput& output : outputs) {
+    if (!output.func.type().is_float()) continue;
+    const ImageParam seed = add_seed(output, arguments, names);
+    derivatives.push_back(propagate_adjoints(output.func, seed, region_of(seed), options));
   }
   std::vector<Func> gradients;
   std::set<const graph::FuncContents*> seen;
