@@ -8,7 +8,7 @@
 namespace apps {
 
 struct Division {
-  std::vector<std::filesystem::path> train, held_out;
+  std::vector<std::filesystem::path> train = {}, held_out = {};
   std::string words;  // who says so
 };
 

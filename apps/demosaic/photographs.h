@@ -45,7 +45,7 @@ std::vector<float> mosaic_of(const Photograph& photograph);
 
 // Photographs to learn from, and others to be measured on.
 struct Dataset {
-  std::vector<Photograph> train, held_out;
+  std::vector<Photograph> train = {}, held_out = {};
   std::string division;  // in words
 };
 // Divided as common/division.h says. Throws retrograde::UserError.

@@ -10,7 +10,8 @@
 //   --python PROGRAM  that may have PyTorch (python3)
 //
 // Has the driver compile kernels of every operator in every type; compares, bit for bit, what the GPU and the
-// executor of the simulated device give for the programs of test/support/gpu_programs and for random ones; runs
+// executor of the simulated device give for pipelines of every operator (those of the differential tests), for
+// the programs of test/support/gpu_programs and for random ones; runs
 // the programs under compute-sanitizer where that is installed; times them beside the bandwidth of copies and
 // the rate of FMA that it measures, and beside PyTorch where that is installed. Writes all of it as JSON. Builds
 // nothing and needs no network.
@@ -119,6 +120,8 @@ int work(const Arguments& arguments) {
       compile_kernels(arguments.capability, arguments.is_simulated, arguments.seconds, records);
     else if (arguments.worker == "programs")
       run_programs(target, arguments.only, records);
+    else if (arguments.worker == "operators")
+      run_operators(target, arguments.seconds, records);
     else if (arguments.worker == "random")
       run_random(target, arguments.first_seed, arguments.random, arguments.seconds, records);
     else
@@ -165,6 +168,7 @@ class Check {
   // The exit status.
   int run() {
     compile_kernels_there();
+    compare_part("operators", 0.2);
     compare_part("programs", 1.0);
     compare_part("random", 0.35);
     sanitize();

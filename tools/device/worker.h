@@ -21,6 +21,10 @@ void run_programs(const retrograde::Target& target, const Names& only, RecordWri
 // names of its kernels.
 void compile_kernels(int capability, bool is_simulated, double seconds, RecordWriter& records);
 
+// The pipelines of test/differential/pipelines, which have every operator in every type, as far as the seconds
+// suffice.
+void run_operators(const retrograde::Target& target, double seconds, RecordWriter& records);
+
 // Random pipelines under random schedules, of `count` seeds from `first` on, as far as the seconds suffice.
 void run_random(const retrograde::Target& target, uint64_t first, int count, double seconds,
                 RecordWriter& records);

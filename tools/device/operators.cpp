@@ -1,0 +1,83 @@
+// The pipelines of the differential tests, which have every operator in every type: in kernels.
+#include <algorithm>
+#include <chrono>
+#include <limits>
+#include <unordered_set>
+
+#include "graph/function.h"
+#include "outcome.h"
+#include "retrograde/retrograde.h"
+#include "worker.h"
+
+namespace device_check {
+namespace {
+
+using namespace retrograde;
+
+#include "differential/pipelines/common.h"
+// Not to be sorted above.
+#include "differential/pipelines/arithmetic.h"
+#include "differential/pipelines/functions.h"
+#include "differential/pipelines/images.h"
+#include "differential/pipelines/reductions.h"
+#include "differential/pipelines/updates.h"
+
+// The stage's loops over elements that do not depend on each other in blocks of threads, where it has any.
+void make_kernel(Stage stage, const graph::FuncPtr& f) {
+  std::vector<Var> free;
+  for (const VarOrRVar& loop : stage.split_vars()) {
+    const bool is_own = std::ranges::find(f->args, loop.name()) != f->args.end();
+    if (is_own) free.emplace_back(loop.name());
+  }
+  const Var thread_x("thread_x"), thread_y("thread_y");
+  if (free.empty()) {
+    stage.gpu_single_thread();
+  } else if (free.size() == 1) {
+    stage.gpu_tile(free[0], thread_x, 32, TailStrategy::GuardWithIf);
+  } else {
+    stage.gpu_tile(free[0], free[1], thread_x, thread_y, 16, 4, TailStrategy::GuardWithIf);
+  }
+}
+
+// Outputs, and what has updates, is stored; the rest is computed in the kernels of what reads it.
+void make_kernels(const std::vector<Func>& outputs) {
+  std::vector<graph::FuncPtr> ends;
+  for (const Func& f : outputs) ends.push_back(f.function());
+  for (const graph::FuncPtr& f : graph::topological_order(ends)) {
+    const bool is_output = std::ranges::find(ends, f) != ends.end();
+    if (f->is_pure() && !is_output) continue;
+    if (!is_output) Func(f).compute_root();
+    for (int stage = 0; stage <= Func(f).num_update_definitions(); ++stage)
+      make_kernel(Stage(f, stage), f);
+  }
+}
+
+std::string run(const Built& built, const Target& target) {
+  std::vector<Buffer<>> buffers;
+  for (size_t i = 0; i < built.outputs.size(); ++i) {
+    for (const Type& type : built.outputs[i].output_types()) {
+      buffers.emplace_back(type, built.extents[i]);
+      if (!built.mins.empty()) buffers.back().set_min(built.mins[i]);
+    }
+  }
+  Pipeline(built.outputs).realize(Realization(buffers), target);
+  std::string bytes;
+  for (Buffer<>& buffer : buffers) bytes += bytes_of(buffer);
+  return bytes;
+}
+
+}  // namespace
+
+void run_operators(const Target& target, double seconds, RecordWriter& records) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  for (const Case& one : cases()) {
+    if (std::chrono::steady_clock::now() > end) return;
+    records.add(recorded(one.name, [&] {
+      const Built built = one.build(false);
+      make_kernels(built.outputs);
+      return run(built, target);
+    }));
+  }
+}
+
+}  // namespace device_check
