@@ -3,6 +3,8 @@
 #include "binding.h"
 #include "callback.h"
 #include "func_class.h"
+#include "graph/copy_graph.h"
+#include "graph/wrappers.h"
 #include "runnable.h"
 
 namespace retrograde::python {
@@ -143,6 +145,19 @@ void bind_schedulers(py::module_& m) {
   }));
 }
 
+// Another one of the same definitions, which has the schedule that auto_schedule() gives for the target; but where its
+// user gave directives, and the target has no kernels, it stays as they say.
+Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target) {
+  const PipelineSpec spec = pipeline.spec();
+  std::vector<Func> outputs;
+  for (const graph::FuncPtr& f : graph::copy_graph(graph::apply_wrappers(spec.outputs)).outputs)
+    outputs.emplace_back(f);
+  Pipeline copy(outputs);
+  copy.set_autoschedule(spec.autoschedule);
+  if (target.has_gpu_feature() || copy.schedule_log().size() == 0) copy.auto_schedule(target);
+  return copy;
+}
+
 void bind_scheduling(py::module_& m) {
   Class<Pipeline> c = reopened<Pipeline>(m, "Pipeline", {"Runnable"});
   c.def(
@@ -167,6 +182,12 @@ void bind_scheduling(py::module_& m) {
                 [=](const Interruption&) { return p.auto_schedule(name, target, machine); });
           },
           arg("name"), arg("target"), arg("machine_params") = MachineParams())
+      .def(
+          "_scheduled_copy",
+          [](const Pipeline& p, const Target& target) {
+            return unlocked([=](const Interruption&) { return scheduled_copy(p, target); });
+          },
+          arg("target"))
       .def("set_autoschedule", &Pipeline::set_autoschedule, arg("options"))
       .def_static(
           "add_autoscheduler",

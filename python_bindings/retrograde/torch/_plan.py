@@ -12,6 +12,7 @@ import torch
 
 from .. import _retrograde as rg
 from .._errors import CompileError, error
+from ._device import device_of
 
 DTYPES = {torch.float16: rg.Float(16), torch.bfloat16: rg.BFloat(16), torch.float32: rg.Float(32),
           torch.float64: rg.Float(64), torch.uint8: rg.UInt(8), torch.int8: rg.Int(8), torch.int16: rg.Int(16),
@@ -41,12 +42,11 @@ def is_image(parameter):
 
 class Plan:
     """Of Funcs, and the parameters that they read; `shapes`: those of the outputs, as PyTorch orders them, from the
-    tensors of one item; `sizes`: the shapes of the inputs where the plan is for these alone, or None; `order`: how many
-    times an operator was differentiated for it."""
+    tensors of one item; `sizes`: the shapes of the inputs where the plan is for these alone, or None."""
 
-    def __init__(self, name, outputs, inputs, shapes, sizes=None, order=0):
+    def __init__(self, name, outputs, inputs, shapes, sizes=None):
         self.name, self.outputs, self.inputs, self._shapes = name, list(outputs), list(inputs), shapes
-        self.sizes, self.order = sizes, order
+        self.sizes = sizes
         for f in self.outputs:
             if f.outputs() != 1:
                 raise error(CompileError, f'make an operator of "{f.name()}"', "a tensor holds one value at each point",
@@ -58,6 +58,7 @@ class Plan:
         self._images = [is_image(parameter) for parameter in self.inputs]
         self._last_kinds, self.expected = None, None  # see _expect
         self._lock, self._callable, self._derived = threading.RLock(), None, {}
+        self._on_devices = {}  # compiled, by target
         self._result_shapes, self._seeds = None, 0  # so many of the last inputs are seeds
         if sizes is not None:
             self._result_shapes = shapes([torch.empty(size, dtype=dtype, device="meta")
@@ -117,29 +118,62 @@ class Plan:
     def fake(self, tensors):
         """Results without values, for those who ask what shapes they would have."""
         self.check(tensors)
+        device = self._place(tensors)
+        return [torch.empty(shape, dtype=dtype, device=device)
+                for shape, dtype in zip(self.shapes(tensors, self.batch(tensors)), self.result_dtypes)]
+
+    def _place(self, tensors):
+        """The device of the images; None where there are none."""
         devices = {t.device for t, image in zip(tensors, self._images) if image}
         if len(devices) > 1:
             places = ", ".join(f"{name} on {t.device}" for name, t in zip(self.names, tensors))
             raise error(TypeError, f'call the operator "{self.name}"', "its tensors are on one device",
                         f"given are {places}", "Move them with tensor.to(device)")
-        device = devices.pop() if devices else None
-        return [torch.empty(shape, dtype=dtype, device=device)
-                for shape, dtype in zip(self.shapes(tensors, self.batch(tensors)), self.result_dtypes)]
+        return devices.pop() if devices else None
 
     def run(self, tensors):
         batch = self.batch(tensors) if self.check(tensors) else ()
         shapes = self.shapes(tensors, batch)
-        results = [torch.empty(shape, dtype=dtype, device=_CPU) for shape, dtype in zip(shapes, self.result_dtypes)]
+        results = self._results(shapes, _CPU)
         if self.sizes is None and self._is_trivial(tensors, results):
             return results
         if not batch:
             self._call(tensors, results)
             self._expect(tensors, shapes)
-        elif 0 not in batch:
-            wide = [t.expand(batch + tuple(t.shape[t.dim() - rank:])) for t, rank in zip(tensors, self.ranks)]
-            for at in itertools.product(*map(range, batch)):
-                self._call([t[at] for t in wide], [t[at] for t in results])
+        else:
+            self._call_each(self._call, batch, tensors, results)
         return results
+
+    def run_on_device(self, tensors, device=None):
+        """The same where images are a device's; `device`: which (_device.py). It is in the device's stream then."""
+        batch = self.batch(tensors) if self.check(tensors) else ()
+        place = self._place(tensors) or tensors[0].device
+        if place == _CPU and not device:  # numbers alone are elsewhere
+            return self.run([t.cpu() for t in tensors])
+        device = device or device_of(self.name, place)
+        with device.current():
+            results = self._results(self.shapes(tensors, batch), device.place)
+            if self._is_trivial(tensors, results):
+                return results
+            # A number is an argument of kernels, so the host must know it.
+            tensors = [t if image else t.cpu() for t, image in zip(tensors, self._images)]
+            call = functools.partial(self._call_on, device)
+            if not batch:
+                call(tensors, results)
+            else:
+                self._call_each(call, batch, tensors, results)
+        return results
+
+    def _results(self, shapes, device):
+        return [torch.empty(shape, dtype=dtype, device=device) for shape, dtype in zip(shapes, self.result_dtypes)]
+
+    def _call_each(self, call, batch, tensors, results):
+        """One call for each item of the batch."""
+        if 0 in batch:
+            return
+        wide = [t.expand(batch + tuple(t.shape[t.dim() - rank:])) for t, rank in zip(tensors, self.ranks)]
+        for at in itertools.product(*map(range, batch)):
+            call([t[at] for t in wide], [t[at] for t in results])
 
     def _is_trivial(self, tensors, results):
         """Of no elements, or linear in tensors of none, a gradient by its seeds: then filled with zeros. The pipeline's
@@ -154,17 +188,21 @@ class Plan:
         if self._callable is None:
             with self._lock:
                 if self._callable is None:
-                    self._callable = self._compile()
+                    self._callable = self._compile_for(rg.get_jit_target_from_environment())
         self._callable._call_tensors((*tensors, *results))
 
-    def _compile(self):
-        """Funcs that nobody scheduled get a schedule."""
-        pipeline = rg.Pipeline(self.outputs)
-        # The region that register tiles read comes out too large where it is clamped to sizes that are not known, and
-        # in derivatives of gradients: what they read of a seed would be refused.
-        tiles = self.sizes is not None and self.order < 2
-        pipeline.set_autoschedule(rg.AutoscheduleOptions(without=[] if tiles else [rg.Decision.register_tiles]))
-        return pipeline.compile_to_callable(self.inputs)
+    def _call_on(self, device, tensors, results):
+        found = self._on_devices.get(device.target)
+        if found is None:
+            with self._lock:
+                if device.target not in self._on_devices:
+                    self._on_devices[device.target] = self._compile_for(rg.Target(device.target))
+                found = self._on_devices[device.target]
+        found._call_tensors_on_device((*tensors, *results), device.stream())
+
+    def _compile_for(self, target):
+        """What nobody scheduled gets a schedule, in a copy: one for the CPU is none for a device."""
+        return rg.Pipeline(self.outputs)._scheduled_copy(target).compile_to_callable(self.inputs, target)
 
     def _expect(self, tensors, shapes):
         """Of sizes that came twice in a row, expected(tensors) then is run(), or gives None for tensors of others: a
@@ -216,7 +254,7 @@ class Plan:
         gradients = [_sum([d(parameter) for d in derivatives], parameter) for parameter in by]
         sizes = None if self.sizes is None else [*self.sizes, *(self._result_shapes[i] for i in given)]
         plan = Plan(f"{self.name}, gradient", gradients, self.inputs + seeds,
-                    lambda tensors: [tuple(tensors[i].shape) for i in wanted], sizes, self.order + 1)
+                    lambda tensors: [tuple(tensors[i].shape) for i in wanted], sizes)
         plan._seeds = len(seeds)
         return plan
 
@@ -231,7 +269,7 @@ class Plan:
         count = len(self.inputs)
         sizes = None if self.sizes is None else [*self.sizes, *(self.sizes[i] for i in given)]
         return Plan(f"{self.name}, tangent", moved, self.inputs + tangents,
-                    lambda tensors: self._shapes(tensors[:count]), sizes, self.order + 1)
+                    lambda tensors: self._shapes(tensors[:count]), sizes)
 
 
 def _maker(shape, dtype):
