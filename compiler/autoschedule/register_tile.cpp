@@ -73,13 +73,14 @@ int64_t sums_of(const RegisterTile& tile) {
 }
 
 // In one iteration of the reduction: an operand once for all of the tile that it does not depend on.
-// Of vectors that lie next to each other only the first comes from afar.
-double loads_of(const RegisterTile& tile, const std::vector<Operand>& operands) {
+// Of registers that lie next to each other only the first comes from afar. `registers`: of a vector.
+double loads_of(const RegisterTile& tile, const std::vector<Operand>& operands, double registers) {
   double loads = 0;
   for (const Operand& operand : operands) {
     const double first = operand.is_far ? far_lines : split_lines;
-    double count =
-        operand.depends_on[0] ? first + split_lines * static_cast<double>(tile.vectors - 1) : 1;
+    double count = operand.depends_on[0]
+                       ? first + split_lines * (registers * static_cast<double>(tile.vectors) - 1)
+                       : 1;
     for (const RegisterTile::Side& side : tile.sides)
       count *= operand.depends_on[side.dimension] ? static_cast<double>(side.size) : 1;
     loads += count;
@@ -112,11 +113,12 @@ double adds_of_functions(const Definition& stage) {
   return adds;
 }
 
-// For each product of a vector.
-double cycles(const RegisterTile& tile, const std::vector<Operand>& operands, double adds) {
-  const auto sums = static_cast<double>(sums_of(tile));
-  return std::max({loads_of(tile, operands) / sums / loads_a_cycle, (1 + adds) / products_a_cycle,
-                   latency / sums});
+// For each product of a register.
+double cycles(const RegisterTile& tile, const std::vector<Operand>& operands, double adds,
+              double registers) {
+  const double sums = registers * static_cast<double>(sums_of(tile));
+  return std::max({loads_of(tile, operands, registers) / sums / loads_a_cycle,
+                   (1 + adds) / products_a_cycle, latency / sums});
 }
 
 // Iterations of the tile for each that has an element.
@@ -152,7 +154,8 @@ std::vector<int64_t> sizes_of_side(const FuncContents& f, size_t dimension,
 VectorUnit vector_unit_of(const Target& target) {
   const bool has_many = target.arch == Target::ARM || target.has_feature(Target::AVX512);
   const int64_t registers = has_many ? 32 : 16;
-  return {registers * target.natural_vector_size(UInt(8)) * 3 / 4};
+  const int64_t bytes = target.natural_vector_size(UInt(8));
+  return {registers * bytes * 3 / 4, bytes};
 }
 
 std::optional<RegisterTile> register_tile(const FuncContents& f, const Definition& stage, int lanes,
@@ -174,9 +177,12 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
     if (is_pure_position(f, stage, d)) sides.push_back(d);
   }
   const double adds = adds_of_functions(stage);
+  const int64_t vector_bytes = lanes * f.types[0].bytes();
+  const double registers =
+      std::max(1.0, static_cast<double>(vector_bytes) / static_cast<double>(unit.register_bytes));
   RegisterTile best;
   const auto cost = [&](const RegisterTile& tile) {
-    return cycles(tile, *operands, adds) * iterations_an_element(tile, lanes, f, sizes);
+    return cycles(tile, *operands, adds, registers) * iterations_an_element(tile, lanes, f, sizes);
   };
   double least = cost(best) * worth_while;
   const auto consider = [&](RegisterTile tile) {

@@ -14,6 +14,7 @@ namespace retrograde::autoschedule {
 // What the machine's vector unit has. Default: 32 registers of 64 bytes.
 struct VectorUnit {
   int64_t accumulator_bytes = 1536;  // of the registers that hold sums; the others hold operands
+  int64_t register_bytes = 64;
 };
 VectorUnit vector_unit_of(const Target& target);
 
@@ -37,8 +38,9 @@ struct RegisterTile {
 // beyond the end counts as lost.
 // Model: two loads and two multiply-adds a cycle, of which each sum takes one every four cycles; a
 // vector, whose place is any, counts as two loads (vector units of x86-64 since 2015), the first of a
-// row as four where each iteration reads another row. Functions in the terms take what they take, so
-// that a tile which only hides latency is none.
+// row as four where each iteration reads another row. A vector of so many lanes is several registers
+// where these are smaller, each loaded alone; what all lanes share is loaded once. Functions in the
+// terms take what they take, so that a tile which only hides latency is none.
 std::optional<RegisterTile> register_tile(const FuncContents& f, const Definition& stage, int lanes,
                                           int64_t vectors, const VectorUnit& unit,
                                           const SizeEstimate& sizes = {});

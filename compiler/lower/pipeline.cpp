@@ -187,6 +187,7 @@ constexpr Pass passes[] = {
     {"transpose_loads", Phase::Vector, alone<transpose_loads>},
     {"deinterleave_loads", Phase::Vector, alone<deinterleave_loads>},
     {"simplify_vectors", Phase::Vector, run_simplify},
+    {"mask_guarded_loads", Phase::Vector, alone<mask_guarded_loads>},
     {"try_plain_products", Phase::Vector, alone<try_plain_products>},
     {"blend_masked_stores", Phase::Vector, alone<blend_masked_stores>},
     {"fuzz_float_stores", Phase::Vector, wanted<Target::FuzzFloatStores, fuzz_float_stores>},

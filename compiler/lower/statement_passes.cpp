@@ -27,6 +27,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"lower_atomics", lower_atomics},
       {"partition_loops", partition_loops},
       {"simplify", [](const Stmt& s) { return simplify(s); }},
+      {"mask_guarded_loads", mask_guarded_loads},
       {"transpose_loads", transpose_loads},
       {"drop_guarded_clamps", drop_guarded_clamps},
       {"trim_loops", trim_loops},

@@ -40,6 +40,8 @@ Stmt interleave_vectors(const Stmt& s);
 Stmt transpose_loads(const Stmt& s);
 // Strided loads that lie beside each other share the vectors they are picked from.
 Stmt deinterleave_loads(const Stmt& s);
+// Loads of clamped places, in the arms of selects that hold where nothing is clamped, are dense.
+Stmt mask_guarded_loads(const Stmt& s);
 // Sums of strong products are of plain ones where these are no NaN.
 Stmt try_plain_products(const Stmt& s);
 // Stores under a mask into storage of one's own write whole vectors.

@@ -389,6 +389,7 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     blended += !blend_masked_stores(vectorized).same_as(vectorized);
     expect_same("interleave_vectors", seed, program, interleave_vectors(vectorized), Phase::Vector);
     expect_same("deinterleave_loads", seed, program, deinterleave_loads(vectorized), Phase::Vector);
+    expect_same("mask_guarded_loads", seed, program, mask_guarded_loads(vectorized), Phase::Vector);
     expect_same("transpose_loads", seed, program, transpose_loads(vectorized), Phase::Vector);
     expect_same("free_early", seed, program, free_early(vectorized), Phase::Vector);
     expect_same("vectorize_loops alone", seed, program, vectorize_loops(unroll_loops(program)),
