@@ -199,6 +199,17 @@ TEST_F(GpuRun, GradientsRunOnGpus) {
       {66, 34});
 }
 
+// The profiler counts the time of the host, in its memory.
+TEST_F(GpuRun, KernelsDoNotTellTheProfiler) {
+  Func rows("rows"), out("out");
+  rows(x, y) = cast<float>(x * y);
+  out(x, y) = rows(x, y) + rows(x, y + 1);
+  out.gpu_tile(x, y, xi, yi, 16, 8);
+  rows.compute_at(out, x).gpu_threads(x, y);
+  const Buffer<float> found = out.realize({32, 16}, with_gpu().with_feature(Target::Profile));
+  EXPECT_EQ(found(31, 15), 31.0f * 15 + 31.0f * 16);
+}
+
 // ---- the bits of a device, on whatever this is ----
 
 template <typename T>

@@ -77,6 +77,7 @@ class Profiling : public StatementRewriter {
     if (const ProducerConsumer* n = s.as<ProducerConsumer>(); n && n->produces) return produce(*n);
     if (const For* n = s.as<For>(); n && runs_at_once(n->runs))
       return map_children(s, [&](const Stmt& body) { return on_a_thread(body); });
+    if (s.kind() == Kind::Launch) return s;  // memory of the host is none of a kernel's
     if (const Fork* n = s.as<Fork>()) return make_fork(on_a_thread(n->first), (*this)(n->rest));
     if (const Allocate* n = s.as<Allocate>()) return allocate(*n);
     return children(s);
