@@ -15,6 +15,13 @@ namespace retrograde::autoschedule {
 
 namespace {
 
+// What tells of each load, store, region or broken promise runs on the host.
+bool is_for_gpu(const Target& target) {
+  return target.has_feature(Target::CUDA) &&
+         !target.features_any_of({Target::TraceLoads, Target::TraceStores,
+                                  Target::TraceRealizations, Target::CheckUnsafePromises});
+}
+
 void schedule_all(const Pipeline& pipeline, const Target& target, const MachineParams& machine,
                   AutoSchedulerResults* results) {
   const PipelineSpec spec = pipeline.spec();
@@ -23,9 +30,9 @@ void schedule_all(const Pipeline& pipeline, const Target& target, const MachineP
     keep_graph(spec.name, outputs);
     const std::vector<FuncPtr> wrapped = apply_wrappers(outputs);
     const auto given = static_cast<std::ptrdiff_t>(schedule_log(wrapped).size());
-    ChosenSchedule chosen =
-        choose_schedule(wrapped, {vector_unit_of(target), spec.autoschedule, machine},
-                        Scheduling::Everything, target);
+    ScheduleRequest request{vector_unit_of(target), spec.autoschedule, machine};
+    request.on_gpu = is_for_gpu(target);
+    ChosenSchedule chosen = choose_schedule(wrapped, request, Scheduling::Everything, target);
     const ScheduledGraph& scheduled = chosen.graph;
     ScheduleLog log = schedule_log(scheduled.outputs);
     log.entries.erase(log.entries.begin(), log.entries.begin() + given);

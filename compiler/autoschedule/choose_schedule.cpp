@@ -56,7 +56,11 @@ std::string unknown_size(const std::vector<FuncPtr>& outputs) {
 }
 
 // Why there is nothing to search; empty: there is.
-std::string reason_against(const std::vector<FuncPtr>& outputs) {
+std::string reason_against(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request) {
+  if (request.on_gpu) {
+    return note_of(outputs, "a search predicts times of processors", "the target has a GPU",
+                   "Search for a target without one, or leave the search out");
+  }
   const std::vector<FuncPtr> order = topological_order(outputs);
   const auto is_left = [](const FuncPtr& f) { return !f->is_extern() && !is_touched(*f); };
   if (std::ranges::none_of(order, is_left)) {
@@ -99,7 +103,8 @@ ChosenSchedule choose_schedule(const std::vector<FuncPtr>& outputs, const Schedu
     return result;
   };
   if (!request.options.search && !wants_runner_up) return by_rules("");
-  if (const std::string reason = reason_against(outputs); !reason.empty()) return by_rules(reason);
+  if (const std::string reason = reason_against(outputs, request); !reason.empty())
+    return by_rules(reason);
   const auto cost = [&](const std::vector<FuncPtr>& scheduled) {
     return predicted_seconds(scheduled, target, threads_of(request));
   };

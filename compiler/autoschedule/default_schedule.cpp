@@ -13,6 +13,7 @@
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/cut_reductions.h"
 #include "autoschedule/cut_scatters.h"
+#include "autoschedule/gpu_schedule.h"
 #include "autoschedule/inlined_reads.h"
 #include "autoschedule/join_sweeps.h"
 #include "autoschedule/lane_dimension.h"
@@ -487,6 +488,25 @@ void move_and_join(const std::vector<FuncPtr>& outputs, const std::vector<FuncPt
   if (!without.contains(Decision::JoinSweeps)) join_sweeps(outputs, given, sizes);
 }
 
+// So that the log tells of every Func.
+void name_inlined(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& order) {
+  for (const FuncPtr& f : order) {
+    const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
+    const bool is_inlined = f->schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined;
+    if (is_inlined && !is_touched(*f) && f->is_pure() && !is_output) Func(f).compute_inline();
+  }
+}
+
+// What no kernel can compute has the loops that it has without a device.
+SizeEstimate give_gpu_schedule(const std::vector<FuncPtr>& outputs,
+                               const std::vector<FuncPtr>& stored, const PlacementLimits& limits,
+                               const ScheduleRequest& request) {
+  GpuSchedule schedule = schedule_on_gpu(outputs, stored, limits.levels, request);
+  for (const HostStage& left : schedule.on_host)
+    LoopChooser(left.func, left.stage, request, schedule.sizes).give();
+  return schedule.sizes;
+}
+
 }  // namespace
 
 SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
@@ -509,8 +529,14 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
       what == Scheduling::Everything
           ? stored_in_all(outputs, limits, chosen, may_choose ? &fixed : nullptr)
           : stored_by_default(outputs, chosen);
-  SizeEstimate sizes(outputs, limits_of(request));
   TaskSizes tasks(order);
+  if (request.on_gpu) {
+    const SizeEstimate sizes = give_gpu_schedule(outputs, stored, limits, request);
+    tasks.limit(outputs, request);
+    name_inlined(outputs, order);
+    return sizes;
+  }
+  SizeEstimate sizes(outputs, limits_of(request));
   cut_sums(outputs, stored, whole, chosen, sizes, request.options.without);
   const bool slices_scatters = makes(Decision::ScatterStrategy) && makes(Decision::Slices);
   const SlicedScatters slices(outputs, slices_scatters ? stored : std::vector<FuncPtr>(), whole,
@@ -541,11 +567,7 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   move_and_join(outputs, stored, given, whole, sizes, request.options.without);
   for (const FuncPtr& f : started) start_sums(f, request, sizes);
   tasks.limit(outputs, request);
-  for (const FuncPtr& f : order) {  // so that the log tells of every Func
-    const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
-    const bool is_inlined = f->schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined;
-    if (is_inlined && !is_touched(*f) && f->is_pure() && !is_output) Func(f).compute_inline();
-  }
+  name_inlined(outputs, order);
   return sizes;
 }
 

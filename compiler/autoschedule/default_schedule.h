@@ -45,6 +45,8 @@ struct ScheduleRequest {
   // Private parts one for each thread, added up by atomic updates (atomic_scatters.h): what a budget
   // wants of a schedule whose bits may differ.
   bool atomic_parts = false;
+  // All of a pipeline is scheduled for a device: its stages are kernels (gpu_schedule.h).
+  bool on_gpu = false;
 };
 
 // Gives the directives to the Funcs of this graph, whose wrappers have been applied. The result: how

@@ -18,8 +18,7 @@ Buffer<float> picture(int width, int height) {
 }
 
 Func tiled(Func f, bool on_gpu, int width = 16, int height = 8) {
-  f.compute_root();
-  if (on_gpu) f.gpu_tile(x, y, xi, yi, width, height, TailStrategy::GuardWithIf);
+  if (on_gpu) f.compute_root().gpu_tile(x, y, xi, yi, width, height, TailStrategy::GuardWithIf);
   return f;
 }
 
@@ -93,7 +92,6 @@ Func recursive_filter(bool on_gpu, int scale) {
   out(x, y) = in(x, y);
   out(forth, y) = 0.6f * out(forth - 1, y) + 0.4f * in(forth, y);
   out(last - back, y) = 0.6f * out(width - back, y) + 0.4f * out(last - back, y);
-  out.compute_root();
   if (on_gpu) {
     out.gpu_tile(x, y, xi, yi, 16, 8);
     out.update(0).gpu_tile(y, yi, 32, TailStrategy::GuardWithIf);
@@ -176,6 +174,7 @@ Func bilateral_grid(bool on_gpu, int scale) {
            zf * along_y(x / cell, y / cell, zi + 1, channel);
   };
   out(x, y) = sliced(0) / max(sliced(1), 1e-3f);
+  grid.compute_root();  // which each of its readers would make anew
   for (const Func& f : {grid, along_z, along_x, along_y, out}) tiled(f, on_gpu, 8, 8);
   if (on_gpu) grid.update().gpu_tile(x, y, xi, yi, 4, 4, TailStrategy::GuardWithIf);
   return out;
@@ -216,7 +215,7 @@ Func camera_pipe(bool on_gpu, int scale) {
   curve(x) =
       cast<uint8_t>(clamp(255.0f * pow(cast<float>(x) / 1023.0f, 1.0f / 2.2f), 0.0f, 255.0f));
   out(x, y, c) = cast<float>(curve(clamp(cast<int>(matched(x, y, c)), 0, 1023)));
-  curve.compute_root();
+  curve.compute_root();  // a table, so that equal values get equal bytes
   if (on_gpu) {
     curve.gpu_tile(x, xi, 128);
     out.bound(c, 0, 3).reorder(c, x, y).unroll(c);
@@ -243,10 +242,8 @@ Func training_step(bool on_gpu, int scale) {
   const Derivative d = propagate_adjoints(loss);
   Func gradient = d(weights);
   step(x, y) = weights(x, y) - 0.1f * gradient(x, y);
-  weights.compute_root();
-  filtered.compute_root();
-  gradient.compute_root();
   if (on_gpu) {
+    for (Func f : {weights, filtered, gradient}) f.compute_root();
     weights.gpu_tile(x, y, xi, yi, 3, 3);
     filtered.gpu_tile(x, y, xi, yi, 16, 8, TailStrategy::GuardWithIf);
     filtered.update().gpu_tile(x, y, xi, yi, 16, 8, TailStrategy::GuardWithIf);
@@ -269,8 +266,8 @@ Program reduction(int values) {
     sum() = 0.0f;
     sum() += in(r);
     total(x) = sum();
-    sum.compute_root();
     if (on_gpu) {
+      sum.compute_root();
       // Neighbouring threads read neighbours; then a block adds up their sums, then a thread those.
       RVar ro("ro"), ri("ri"), rio("rio"), rii("rii");
       Func parts = sum.update().split(r, ro, ri, threads).rfactor(ri, u);

@@ -1,0 +1,193 @@
+#include "autoschedule/device_sums.h"
+
+#include <algorithm>
+#include <bit>
+#include <iterator>
+#include <utility>
+
+#include "autoschedule/kernel_limits.h"
+#include "autoschedule/new_loop.h"
+#include "frontend/language/func.h"
+#include "frontend/language/rdom.h"
+#include "frontend/schedule/stage.h"
+#include "graph/own_reads.h"
+#include "graph/race_checks.h"
+#include "ir/build.h"
+
+namespace retrograde::autoschedule {
+
+namespace {
+
+constexpr int64_t few_threads = 1 << 12;        // fewer than the threads that a device runs at once
+constexpr int64_t enough_threads = 1 << 15;     // to keep it busy
+constexpr int64_t terms_of_long_sum = 1 << 10;  // terms that are worth another kernel
+constexpr int64_t terms_of_part = 16;           // of a partial sum, for each of its elements
+constexpr int64_t least_parts = 8;
+constexpr int64_t many_parts = 1 << 10;  // whose sum is cut again
+constexpr int parts_of_parts = 128;
+constexpr int64_t unknown_terms = 1 << 14;  // of a loop
+constexpr int64_t most_terms = 1 << 30;     // that one loop counts
+
+class SumCutter {
+ public:
+  SumCutter(const FuncPtr& f, int stage, std::vector<StageLoop> loops, const SizeEstimate& sizes)
+      : f_(f), index_(stage), sizes_(sizes), loops_(std::move(loops)) {}
+
+  // 0: it is no such sum.
+  int64_t parts() const {
+    const int64_t alone = independent_elements(), terms = this->terms();
+    if (alone == 0 || alone >= few_threads || terms < terms_of_long_sum) return 0;
+    const int64_t elements = elements_that_meet();
+    if (elements == 0) return 0;
+    const int64_t most =
+        std::min({enough_threads / alone, terms / (terms_of_part * elements), fused_terms()});
+    if (most < least_parts || !graph::can_prove_commutative(*f_, update())) return 0;
+    return static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(most)));
+  }
+
+  // The partial sums, those of their sums too.
+  std::vector<FuncPtr> cut(int64_t count) const {
+    Stage stage(f_, index_);
+    RVar all(summed()[0].loop.name());
+    for (const StageLoop& loop : fused(summed())) {
+      if (loop.loop.name() == all.name()) continue;
+      const RVar both(new_loop(*f_, index_, "terms"));
+      stage.fuse(all, loop.loop, both);
+      all = both;
+    }
+    std::vector<FuncPtr> made{factor(stage, all, "part", static_cast<int>(count))};
+    if (count >= many_parts)
+      made.push_back(factor(stage, RVar(remaining_loop()), "group", parts_of_parts));
+    return made;
+  }
+
+ private:
+  const Definition& update() const { return f_->stage(index_); }
+
+  std::vector<StageLoop> summed() const {
+    std::vector<StageLoop> result;
+    std::ranges::copy_if(loops_, std::back_inserter(result),
+                         [](const StageLoop& loop) { return !loop.is_independent; });
+    return result;
+  }
+
+  // Loops from the innermost on that are one, of a number that 32 bits count.
+  static std::vector<StageLoop> fused(const std::vector<StageLoop>& loops) {
+    std::vector<StageLoop> result;
+    int64_t product = 1;
+    for (const StageLoop& loop : loops) {
+      product *= std::max<int64_t>(loop.extent.value_or(unknown_terms), 1);
+      if (product > most_terms && !result.empty()) break;
+      result.push_back(loop);
+    }
+    return result;
+  }
+
+  static int64_t product_of(const std::vector<StageLoop>& loops) {
+    int64_t product = 1;
+    for (const StageLoop& loop : loops)
+      product =
+          std::min(product * std::max<int64_t>(loop.extent.value_or(unknown_terms), 0), most_terms);
+    return product;
+  }
+  int64_t terms() const { return summed().empty() ? 0 : product_of(summed()); }
+  int64_t fused_terms() const { return product_of(fused(summed())); }
+
+  // 0: they may be many.
+  int64_t independent_elements() const {
+    int64_t elements = 1;
+    for (const StageLoop& loop : loops_) {
+      if (!loop.is_independent) continue;
+      if (!loop.extent) return 0;
+      elements *= *loop.extent;
+      if (elements >= few_threads) return 0;
+    }
+    return elements;
+  }
+
+  // Of a part: those among which data or the loops of the sum choose. 0: not known.
+  int64_t elements_that_meet() const {
+    int64_t elements = 1;
+    for (size_t d = 0; d < f_->args.size(); ++d) {
+      const Expr& place = update().args[d];
+      if (is_const(place) || is_pure_position(*f_, update(), d)) continue;
+      elements *= sizes_.extent(*f_, d).value_or(0);
+      if (elements == 0 || elements > enough_threads * terms_of_part) return 0;
+    }
+    return elements;
+  }
+
+  // The loop over parts that factoring has left.
+  std::string remaining_loop() const {
+    const auto& dims = update().schedule.dims;
+    return std::ranges::find_if(dims, [](const Dim& dim) { return dim.is_reduction; })->var;
+  }
+
+  // Of every so many terms one; parts lie beside each other.
+  FuncPtr factor(Stage& stage, const RVar& all, const std::string& name, int count) const {
+    const RVar part(new_loop(*f_, index_, name));
+    const Var own(new_loop(*f_, index_, name + "s"));
+    stage.split(all, all, part, count, TailStrategy::GuardWithIf);
+    Func parts = stage.rfactor(part, own);
+    std::vector<Var> layout{own};
+    for (const Var& arg : parts.args()) {
+      if (arg.name() != own.name()) layout.push_back(arg);
+    }
+    parts.compute_root();
+    if (layout.size() > 1) parts.reorder_storage(layout);
+    return parts.function();
+  }
+
+  const FuncPtr f_;
+  const int index_;
+  const SizeEstimate& sizes_;
+  const std::vector<StageLoop> loops_;
+};
+
+}  // namespace
+
+std::vector<FuncPtr> cut_sums_for_device(const std::vector<FuncPtr>& funcs,
+                                         const std::vector<FuncPtr>& stored,
+                                         const ScheduleRequest& request,
+                                         const SizeEstimate& sizes) {
+  std::vector<FuncPtr> made;
+  for (const FuncPtr& f : funcs) {
+    for (int s = 1; s < f->stage_count(); ++s) {
+      if (f->stage(s).rvars.empty() || !can_be_kernel(f, s, stored)) continue;
+      const std::vector<StageLoop> loops = loops_of_stage(*f, s, sizes);
+      const bool scatters = iterations_may_meet(*f, s, loops);
+      const Decision decision = scatters ? Decision::ScatterStrategy : Decision::CutReductions;
+      if (request.options.without.contains(decision)) continue;
+      if (scatters && may_be_atomic(*f, s, request)) continue;
+      const SumCutter cutter(f, s, loops, sizes);
+      if (const int64_t parts = cutter.parts(); parts > 0) {
+        const std::vector<FuncPtr> more = cutter.cut(parts);
+        made.insert(made.end(), more.begin(), more.end());
+      }
+    }
+  }
+  return made;
+}
+
+bool iterations_may_meet(const FuncContents& f, int stage, const std::vector<StageLoop>& loops) {
+  const Definition& update = f.stage(stage);
+  bool moves = false;
+  for (size_t d = 0; d < f.args.size(); ++d)
+    moves = moves || (!is_const(update.args[d]) && !is_pure_position(f, update, d));
+  return moves &&
+         std::ranges::any_of(loops, [](const StageLoop& loop) { return !loop.is_independent; });
+}
+
+// Sums, products, extremes and bits of integers are the same in any order.
+bool may_be_atomic(const FuncContents& f, int stage, const ScheduleRequest& request) {
+  if (request.options.without.contains(Decision::ScatterStrategy) || f.types.size() != 1)
+    return false;
+  const Type type = f.types[0];
+  const bool keeps_bits = type.is_int() || type.is_uint();
+  const bool has_operation = type.is_scalar() && (type.bits() == 32 || type.bits() == 64);
+  if (!has_operation || (!keeps_bits && request.options.deterministic)) return false;
+  return !graph::read_of_other_element(f, f.stage(stage)).defined() &&
+         graph::can_prove_commutative(f, f.stage(stage));
+}
+
+}  // namespace retrograde::autoschedule

@@ -1,0 +1,65 @@
+// Random pipelines under Pipeline::auto_schedule for a GPU: always legal, and right on the simulated
+// device. What is refused is refused without a schedule, too.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "frontend/run/pipeline.h"
+#include "ir/target.h"
+#include "simt/simt_driver.h"
+#include "testing/check_program.h"
+
+namespace retrograde::fuzz {
+namespace {
+
+[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
+
+constexpr uint64_t first_seed = 8000;
+constexpr int orders = 4;
+constexpr int programs_per_shard = 4;
+#ifdef RETROGRADE_MANY_PROGRAMS
+constexpr int shards = 150;
+#else
+constexpr int shards = 15;  // 60 programs
+#endif
+
+RandomProgram program_of(uint64_t seed) {
+  Choices choices(seed);
+  return make_program(choices, Style::pipelines());
+}
+
+class GpuAutoSchedules : public ::testing::TestWithParam<int> {};
+
+TEST_P(GpuAutoSchedules, AreLegalAndRight) {
+  retrograde_simt_options options;
+  retrograde_simt_get_options(&options);
+  options.order = GetParam() % orders;
+  retrograde_simt_set_options(&options);
+  const Target target =
+      get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
+  uint64_t compared = 0;
+  int on_gpu = 0;
+  for (int i = 0; i < programs_per_shard; ++i) {
+    const uint64_t seed = first_seed + static_cast<uint64_t>(GetParam() * programs_per_shard + i);
+    const RandomProgram program = program_of(seed);
+    std::string source;
+    Judged judged = check_with_schedule(
+        program, [&] { source = Pipeline(program.outputs).auto_schedule(target).schedule_source; },
+        target);
+    compared += judged.counts["values"];
+    on_gpu += source.find("gpu_") != std::string::npos;
+    if (judged.judgement == Judgement::Right) continue;
+    const Judged as_it_is = check_program(program_of(seed), {}, get_host_target());
+    EXPECT_LE(judged.judgement, as_it_is.judgement)
+        << "seed " << seed << " is " << name_of(judged.judgement) << ": " << judged.detail << "\n"
+        << to_text(program) << "auto_schedule gave\n"
+        << source;
+  }
+  EXPECT_GT(compared, 0u);
+  EXPECT_GE(on_gpu, programs_per_shard - 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shard, GpuAutoSchedules, ::testing::Range(0, shards));
+
+}  // namespace
+}  // namespace retrograde::fuzz
