@@ -10,6 +10,7 @@
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
+#include "graph/associative_update.h"
 #include "graph/own_reads.h"
 #include "graph/race_checks.h"
 #include "ir/build.h"
@@ -31,7 +32,11 @@ constexpr int64_t most_terms = 1 << 30;     // that one loop counts
 class SumCutter {
  public:
   SumCutter(const FuncPtr& f, int stage, std::vector<StageLoop> loops, const SizeEstimate& sizes)
-      : f_(f), index_(stage), sizes_(sizes), loops_(std::move(loops)) {}
+      : f_(f),
+        index_(stage),
+        sizes_(sizes),
+        loops_(std::move(loops)),
+        commutes_(graph::can_prove_commutative(*f, f->stage(stage))) {}
 
   // 0: it is no such sum.
   int64_t parts() const {
@@ -40,29 +45,41 @@ class SumCutter {
     const int64_t elements = elements_that_meet();
     if (elements == 0) return 0;
     const int64_t most =
-        std::min({enough_threads / alone, terms / (terms_of_part * elements), fused_terms()});
-    if (most < least_parts || !graph::can_prove_commutative(*f_, update())) return 0;
+        std::min({enough_threads / alone, terms / (terms_of_part * elements), terms_in_parts()});
+    if (most < least_parts || (!commutes_ && !keeps_order())) return 0;
     return static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(most)));
   }
 
   // The partial sums, those of their sums too.
   std::vector<FuncPtr> cut(int64_t count) const {
     Stage stage(f_, index_);
-    RVar all(summed()[0].loop.name());
-    for (const StageLoop& loop : fused(summed())) {
-      if (loop.loop.name() == all.name()) continue;
+    const std::vector<StageLoop> one = fused(summed());
+    RVar all(one[0].loop.name());
+    for (size_t i = 1; i < one.size(); ++i) {
       const RVar both(new_loop(*f_, index_, "terms"));
-      stage.fuse(all, loop.loop, both);
+      stage.fuse(all, one[i].loop, both);
       all = both;
     }
-    std::vector<FuncPtr> made{factor(stage, all, "part", static_cast<int>(count))};
+    if (has_rows()) return cut_rows(stage, all, RVar(summed()[one.size()].loop.name()), count);
+    const RVar part = split(stage, all, "part", terms(), count);
+    std::vector<FuncPtr> made{factor(stage, {part})};
     if (count >= many_parts)
-      made.push_back(factor(stage, RVar(remaining_loop()), "group", parts_of_parts));
+      made.push_back(factor(stage, {split(stage, part, "group", count, parts_of_parts)}));
     return made;
   }
 
  private:
   const Definition& update() const { return f_->stage(index_); }
+
+  // Whether parts may be stretches of the domain: those of an argmin, of which the first of equals
+  // is wanted.
+  bool keeps_order() const {
+    const bool is_one_loop = std::ranges::all_of(loops_, [](const StageLoop& loop) {
+      return !loop.loop.is_rvar || (!loop.is_independent && loop.extent);
+    });
+    return is_one_loop && fused(summed()).size() == summed().size() &&
+           graph::prove_associative(*f_, update()).op;
+  }
 
   std::vector<StageLoop> summed() const {
     std::vector<StageLoop> result;
@@ -71,16 +88,22 @@ class SumCutter {
     return result;
   }
 
-  // Loops from the innermost on that are one, of a number that 32 bits count.
+  // Loops from the innermost on that are one, of a number that 32 bits count: all but the last of
+  // known extents, or nothing would be known of the places that they stand for.
   static std::vector<StageLoop> fused(const std::vector<StageLoop>& loops) {
     std::vector<StageLoop> result;
     int64_t product = 1;
     for (const StageLoop& loop : loops) {
       product *= std::max<int64_t>(loop.extent.value_or(unknown_terms), 1);
-      if (product > most_terms && !result.empty()) break;
+      if (!result.empty() && (product > most_terms || !result.back().extent)) break;
       result.push_back(loop);
     }
     return result;
+  }
+  // Whether parts are of two loops: one may be short.
+  bool has_rows() const {
+    const std::vector<StageLoop> one = fused(summed());
+    return commutes_ && one.size() < summed().size() && !one.back().extent;
   }
 
   static int64_t product_of(const std::vector<StageLoop>& loops) {
@@ -91,7 +114,7 @@ class SumCutter {
     return product;
   }
   int64_t terms() const { return summed().empty() ? 0 : product_of(summed()); }
-  int64_t fused_terms() const { return product_of(fused(summed())); }
+  int64_t terms_in_parts() const { return has_rows() ? terms() : product_of(fused(summed())); }
 
   // 0: they may be many.
   int64_t independent_elements() const {
@@ -117,21 +140,41 @@ class SumCutter {
     return elements;
   }
 
-  // The loop over parts that factoring has left.
-  std::string remaining_loop() const {
-    const auto& dims = update().schedule.dims;
-    return std::ranges::find_if(dims, [](const Dim& dim) { return dim.is_reduction; })->var;
+  // Sums of every so many points of every so many rows, and then of all rows.
+  std::vector<FuncPtr> cut_rows(Stage& stage, const RVar& all, const RVar& rows,
+                                int64_t count) const {
+    const int64_t points = std::min<int64_t>(count, parts_of_parts);
+    const RVar part = split(stage, all, "part", unknown_terms, points);
+    if (count == points) return {factor(stage, {part})};
+    const RVar row = split(stage, rows, "row", unknown_terms, count / points);
+    const FuncPtr first = factor(stage, {part, row});
+    return {first, factor(stage, {part})};
   }
 
-  // Of every so many terms one; parts lie beside each other.
-  FuncPtr factor(Stage& stage, const RVar& all, const std::string& name, int count) const {
+  // Into so many parts: of every so many terms one, where neighbours may read neighbours; else a
+  // stretch for each. The result: the loop over parts.
+  RVar split(Stage& stage, const RVar& all, const std::string& name, int64_t terms,
+             int64_t count) const {
     const RVar part(new_loop(*f_, index_, name));
-    const Var own(new_loop(*f_, index_, name + "s"));
-    stage.split(all, all, part, count, TailStrategy::GuardWithIf);
-    Func parts = stage.rfactor(part, own);
-    std::vector<Var> layout{own};
+    if (commutes_)
+      stage.split(all, all, part, static_cast<int>(count), TailStrategy::GuardWithIf);
+    else
+      stage.split(all, part, all, static_cast<int>((terms + count - 1) / count),
+                  TailStrategy::GuardWithIf);
+    return part;
+  }
+
+  // Partial results for each value of these loops, which lie beside each other.
+  FuncPtr factor(Stage& stage, const std::vector<RVar>& loops) const {
+    std::vector<std::pair<RVar, Var>> kept;
+    std::vector<Var> layout;
+    for (const RVar& loop : loops) {
+      layout.emplace_back(new_loop(*f_, index_, loop.name() + "s"));
+      kept.emplace_back(loop, layout.back());
+    }
+    Func parts = stage.rfactor(kept);
     for (const Var& arg : parts.args()) {
-      if (arg.name() != own.name()) layout.push_back(arg);
+      if (std::ranges::find(layout, arg.name(), &Var::name) == layout.end()) layout.push_back(arg);
     }
     parts.compute_root();
     if (layout.size() > 1) parts.reorder_storage(layout);
@@ -142,6 +185,7 @@ class SumCutter {
   const int index_;
   const SizeEstimate& sizes_;
   const std::vector<StageLoop> loops_;
+  const bool commutes_;
 };
 
 }  // namespace

@@ -4,9 +4,11 @@
 //                                   sums(v) += parts of every 128th, from v on
 //                                   loss() += sums(v)
 //
-// Partial sums are the threads of a kernel: neighbours read neighbours. Their number depends on the
+// Partial sums are the threads of a kernel: neighbours read neighbours, unless the order of terms matters,
+// as that of an argmin does among equals: then each has a stretch of them. Their number depends on the
 // program and its sizes alone, and so does every bit. So it is for sums at places that data decide, where
-// each part has few elements beside what is added to them.
+// each part has few elements beside what is added to them. Loops whose extents are known are cut as one; of
+// others, points of rows and rows apart.
 #pragma once
 
 #include <vector>

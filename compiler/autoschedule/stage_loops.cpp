@@ -34,7 +34,16 @@ class LoopFinder {
     const auto arg = std::ranges::find(f_.args, name);
     const auto dimension = static_cast<size_t>(arg - f_.args.begin());
     const auto extent = arg == f_.args.end() ? std::nullopt : sizes_.extent(f_, dimension);
-    return {Var(name), extent, true, first_dimension(name)};
+    return {Var(name), extent, reads_own_place(dimension), first_dimension(name)};
+  }
+
+  // Adjoints may read the place of another value, where a condition says that it is no other.
+  bool reads_own_place(size_t dimension) const {
+    return std::ranges::all_of(own_reads(f_, definition_), [&](const Expr& read) {
+      const auto* place =
+          dimension < f_.args.size() ? read.as<Call>()->args[dimension].as<Variable>() : nullptr;
+      return place && place->name == f_.args[dimension];
+    });
   }
 
   StageLoop of_reduction(const std::string& name) const {

@@ -504,6 +504,49 @@ TEST(GpuAutoSchedules, UpdateAtomicallyWhatBitsAllow) {
   }
 }
 
+TEST(GpuAutoSchedules, CutSumsOverDomainsOfAnySize) {
+  ImageParam in(Float(32), 2, "in");
+  Func scaled("scaled"), total("total");
+  RDom r(0, in.width(), 0, in.height(), "r");
+  scaled(x, y) = exp(in(x, y));
+  total() = 0.0f;
+  total() += scaled(r.x, r.y) * scaled(r.x, in.height() - 1 - r.y);
+  const std::string source = Pipeline(total).auto_schedule(with_gpu()).schedule_source;
+  EXPECT_NE(source.find("rfactor"), std::string::npos) << source;
+  for (const auto& [width, height] : {std::pair{50, 30}, std::pair{3, 7}, std::pair{1, 1}}) {
+    const Buffer<float> image = picture(width, height);
+    in.set(image);
+    double expected = 0;
+    for (int j = 0; j < height; ++j) {
+      for (int i = 0; i < width; ++i)
+        expected += std::exp(double{image(i, j)}) * std::exp(double{image(i, height - 1 - j)});
+    }
+    const Buffer<float> found = total.realize({}, with_gpu());
+    EXPECT_NEAR(found(), expected, 1e-4 * expected) << width << " x " << height;
+  }
+}
+
+// Of equals the first, as on the CPU.
+TEST(GpuAutoSchedules, FindTheFirstLeastOfMany) {
+  Func least("least");
+  RDom r(0, 90, 0, 100, "r");
+  const Expr value = abs((r.x * 37 + r.y * 53) % 200 - 100);
+  least() = Tuple(1000, -1, -1);
+  const Expr is_less = value < least()[0];
+  least() = Tuple(select(is_less, value, least()[0]), select(is_less, r.x, least()[1]),
+                  select(is_less, r.y, least()[2]));
+  const auto found = [&](const Target& target) {
+    Realization values = least.realize({}, target);
+    std::vector<int> result;
+    for (int i = 0; i < 3; ++i) result.push_back(Buffer<int>(values[i])());
+    return result;
+  };
+  const std::vector<int> expected = found(get_host_target());
+  const std::string source = Pipeline(least).auto_schedule(with_gpu()).schedule_source;
+  EXPECT_NE(source.find("rfactor"), std::string::npos) << source;
+  EXPECT_EQ(found(with_gpu()), expected) << source;
+}
+
 class Sharpen : public Generator<Sharpen> {
  public:
   Input<Buffer<float, 2>> in{"in"};
