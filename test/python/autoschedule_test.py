@@ -25,6 +25,17 @@ class Autoschedules(unittest.TestCase):
         want = a[:-1, :-1] + a[:-1, 1:] + a[1:, :-1] + a[1:, 1:]
         np.testing.assert_array_equal(vertical.realize([256, 256]), want)
 
+    def test_a_copy_gets_a_schedule_where_its_user_gave_none(self):
+        x, y = rg.Var("x"), rg.Var("y")
+        image, plain = rg.ImageParam("float32", 2, "image"), rg.Func("plain")
+        plain[x, y] = image[x, y] * 2
+        scheduled = rg.Pipeline(plain)._scheduled_copy(HOST)
+        self.assertEqual(len(rg.Pipeline(plain).schedule_log()), 0)
+        self.assertIn("parallel", str(scheduled.schedule_log()))
+        plain.vectorize(x, 4)
+        kept = rg.Pipeline(plain)._scheduled_copy(HOST)
+        self.assertEqual(str(kept.schedule_log()), str(rg.Pipeline(plain).schedule_log()))
+
     def test_by_rules(self):
         image, horizontal, vertical = blur()
         results = rg.Pipeline(vertical).auto_schedule(HOST)
