@@ -31,7 +31,7 @@ class Autoschedules(unittest.TestCase):
         plain[x, y] = image[x, y] * 2
         scheduled = rg.Pipeline(plain)._scheduled_copy(HOST)
         self.assertEqual(len(rg.Pipeline(plain).schedule_log()), 0)
-        self.assertIn("parallel", str(scheduled.schedule_log()))
+        self.assertIn("Parallel", str(scheduled.schedule_log()))
         plain.vectorize(x, 4)
         kept = rg.Pipeline(plain)._scheduled_copy(HOST)
         self.assertEqual(str(kept.schedule_log()), str(rg.Pipeline(plain).schedule_log()))
