@@ -23,9 +23,8 @@ struct DynamicCall {
   static Value value_of(const ir::Scalar& scalar) {
     return {nullptr, scalar, false, scalar.type, -1};
   }
-  static void call(const Callable& callable, const std::vector<Value>& values,
-                   JITUserContext* context = nullptr) {
-    callable.call(context, values);
+  static void call(const Callable& callable, const std::vector<Value>& values) {
+    callable.call(nullptr, values);
   }
 };
 
@@ -38,17 +37,6 @@ namespace {
 using frontend::DynamicCall;
 using py::arg;
 using Parameter = std::shared_ptr<graph::ParameterContents>;
-
-// A call that works on one stream of the context that is current.
-struct OnStream : JITUserContext {
-  explicit OnStream(void* given) : stream(given) {
-    handlers.custom_cuda_get_stream = [](JITUserContext* context, void*, void** result) {
-      *result = static_cast<OnStream*>(context)->stream;
-      return 0;
-    };
-  }
-  void* stream;
-};
 
 // Compiled again where an array comes whose innermost axis is not dense (any_stride.h): once.
 class Bound {
@@ -86,34 +74,6 @@ class Bound {
   // The same of tensors of PyTorch, whose element types are those of the pipeline: whoever calls has seen to that.
   // A number is a tensor without dimensions. Written for calls whose work is nothing.
   void call_tensors(const py::tuple& given) {
-    auto [tensors, elements] = tensors_of(given);
-    run(given, elements, std::move(tensors));
-  }
-
-  // The same of tensors in a device's memory, but for numbers, on a stream of the context that is current for this
-  // thread: it is in the stream when this is over, not done.
-  void call_tensors_on_device(const py::tuple& given, uintptr_t stream) {
-    auto [tensors, elements] = tensors_of(given);
-    const auto* cuda =
-        get_device_interface_for_device_api(DeviceAPI::CUDA, get_jit_target_from_environment());
-    OnStream context(reinterpret_cast<void*>(stream));
-    const py::gil_scoped_release release;
-    for (Runtime::Buffer<>& buffer : tensors.buffers) {
-      if (buffer.data()) move_to_device(buffer, cuda);
-    }
-    DynamicCall::call(callable_, tensors.values, &context);
-  }
-
- private:
-  // What a call touches, for as long as it runs. Values point into buffers, also of what it is moved to.
-  struct Tensors {
-    explicit Tensors(size_t count) : buffers(count), values(count) {}
-    std::vector<Runtime::Buffer<>> buffers;
-    std::vector<DynamicCall::Value> values;
-  };
-
-  // Of arguments and outputs, and how many elements these have. Compiles again, where one asks for that.
-  std::pair<Tensors, int64_t> tensors_of(const py::tuple& given) {
     if (given.size() != args_.size() + outputs_.size())
       throw py::type_error("a Callable takes its arguments, then its output buffers");
     Tensors tensors(given.size());
@@ -132,17 +92,16 @@ class Bound {
       tensors.values[i] = DynamicCall::value_of(buffer);
     }
     if (count_lifted() != lifted_) compile_again();
-    return {std::move(tensors), elements};
+    run(given, elements, std::move(tensors));
   }
 
-  // Its address is one of the device's, where what it holds is.
-  static void move_to_device(Runtime::Buffer<>& buffer, const halide_device_interface_t* device) {
-    halide_buffer_t& raw = *buffer.raw_buffer();
-    const auto address = reinterpret_cast<uintptr_t>(raw.host);
-    raw.host = nullptr;
-    buffer.device_wrap_native(device, address);
-    buffer.set_device_dirty();
-  }
+ private:
+  // What a call touches, for as long as it runs. Values point into buffers, also of what it is moved to.
+  struct Tensors {
+    explicit Tensors(size_t count) : buffers(count), values(count) {}
+    std::vector<Runtime::Buffer<>> buffers;
+    std::vector<DynamicCall::Value> values;
+  };
 
   // Another thread for the sake of Ctrl-C costs more than a call that is over before anybody could press it. Such a
   // call is one on no more elements than one that was seen to be short; a number among the arguments may be a count
@@ -278,7 +237,6 @@ void bind_callable(py::module_& m) {
   Class<Bound>(m, "Callable")
       .def("__call__", &Bound::call)
       .def("_call_tensors", &Bound::call_tensors)
-      .def("_call_tensors_on_device", &Bound::call_tensors_on_device)
       .def("defined", [](const Bound&) { return true; });
   py::class_<ExpectedCall>(m, "_ExpectedCall")
       .def(py::init<py::object, const py::iterable&, const py::iterable&>())

@@ -18,14 +18,10 @@ except ModuleNotFoundError:
     print("skipped: there is no PyTorch for", sys.executable)
     sys.exit(77)
 
-os.environ["RETROGRADE_GPU"] = "simulated"  # before the library looks for a driver
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "bench" / "torch"))
 from definitions import OPERATORS
 from formulations import FORMULATIONS
-import retrograde as rg
 from retrograde.torch import operator
-from retrograde.torch._device import SimulatedDevice
-from retrograde.torch._plan import GRADIENT
 
 NAME = sys.argv.pop(1)
 STEPS = int(os.environ.get("RETROGRADE_TORCH_STEPS", 1000))
@@ -162,38 +158,6 @@ class Derivatives(unittest.TestCase):
 
 
 @unittest.skipUnless(IS_NEW, f"PyTorch {torch.__version__} has neither opcheck nor torch.compile")
-class OnDevice(unittest.TestCase):
-    """Kernels, on the simulated device, beside the CPU's code."""
-
-    def on_device(self, path, tensors):
-        results = OP.plan_for(path, tensors).run_on_device(tensors, SimulatedDevice())
-        beside = rg.Buffer(rg.Float(32), [1])  # calls are in the stream until somebody waits for it
-        beside.copy_to_device()
-        beside.device_sync()
-        return results
-
-    def check(self, path, tensors):
-        expected = OP.plan_for(path, tensors).run(tensors)
-        for here, there in zip(expected, self.on_device(path, tensors)):
-            torch.testing.assert_close(there, here, rtol=1e-11, atol=1e-11)
-        return expected
-
-    def test_values(self):
-        results = self.check((), inputs())
-        self.assertTrue(any(result.abs().max() > 0 for result in results))
-
-    def test_gradients(self):
-        tensors = inputs()
-        seed = values(*OP.plan_for((), tensors).run(tensors)[0].shape, low=-1, seed=9)
-        results = self.check((GRADIENT, (1 << len(tensors)) - 1, 1), (*tensors, seed))
-        self.assertTrue(all(result.abs().max() > 0 for result in results))
-
-    def test_strides_and_a_batch(self):
-        tensors = [t.movedim(-1, 0).contiguous().movedim(0, -1) if t.dim() > 1 else t for t in inputs()]
-        self.check((), tuple(tensors))
-        self.check((), tuple(t.expand(2, *t.shape) for t in tensors))
-
-
 class TorchLibrary(unittest.TestCase):
     def test_opcheck(self):
         tensors = wanting(inputs())

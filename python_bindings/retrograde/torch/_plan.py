@@ -12,7 +12,6 @@ import torch
 
 from .. import _retrograde as rg
 from .._errors import CompileError, error
-from ._device import device_of
 
 DTYPES = {torch.float16: rg.Float(16), torch.bfloat16: rg.BFloat(16), torch.float32: rg.Float(32),
           torch.float64: rg.Float(64), torch.uint8: rg.UInt(8), torch.int8: rg.Int(8), torch.int16: rg.Int(16),
@@ -58,7 +57,6 @@ class Plan:
         self._images = [is_image(parameter) for parameter in self.inputs]
         self._last_kinds, self.expected = None, None  # see _expect
         self._lock, self._callable, self._derived = threading.RLock(), None, {}
-        self._on_devices = {}  # compiled, by target
         self._result_shapes, self._seeds = None, 0  # so many of the last inputs are seeds
         if sizes is not None:
             self._result_shapes = shapes([torch.empty(size, dtype=dtype, device="meta")
@@ -144,26 +142,6 @@ class Plan:
             self._call_each(self._call, batch, tensors, results)
         return results
 
-    def run_on_device(self, tensors, device=None):
-        """The same where images are a device's; `device`: which (_device.py). It is in the device's stream then."""
-        batch = self.batch(tensors) if self.check(tensors) else ()
-        place = self._place(tensors) or tensors[0].device
-        if place == _CPU and not device:  # numbers alone are elsewhere
-            return self.run([t.cpu() for t in tensors])
-        device = device or device_of(self.name, place)
-        with device.current():
-            results = self._results(self.shapes(tensors, batch), device.place)
-            if self._is_trivial(tensors, results):
-                return results
-            # A number is an argument of kernels, so the host must know it.
-            tensors = [t if image else t.cpu() for t, image in zip(tensors, self._images)]
-            call = functools.partial(self._call_on, device)
-            if not batch:
-                call(tensors, results)
-            else:
-                self._call_each(call, batch, tensors, results)
-        return results
-
     def _results(self, shapes, device):
         return [torch.empty(shape, dtype=dtype, device=device) for shape, dtype in zip(shapes, self.result_dtypes)]
 
@@ -188,20 +166,12 @@ class Plan:
         if self._callable is None:
             with self._lock:
                 if self._callable is None:
-                    self._callable = self._compile_for(rg.get_jit_target_from_environment())
+                    self._callable = self._compile()
         self._callable._call_tensors((*tensors, *results))
 
-    def _call_on(self, device, tensors, results):
-        found = self._on_devices.get(device.target)
-        if found is None:
-            with self._lock:
-                if device.target not in self._on_devices:
-                    self._on_devices[device.target] = self._compile_for(rg.Target(device.target))
-                found = self._on_devices[device.target]
-        found._call_tensors_on_device((*tensors, *results), device.stream())
-
-    def _compile_for(self, target):
-        """What nobody scheduled gets a schedule, in a copy: one for the CPU is none for a device."""
+    def _compile(self):
+        """Where nobody gave a schedule, the Funcs of a copy get one: those of the user stay as they are."""
+        target = rg.get_jit_target_from_environment()
         return rg.Pipeline(self.outputs)._scheduled_copy(target).compile_to_callable(self.inputs, target)
 
     def _expect(self, tensors, shapes):
