@@ -116,42 +116,29 @@ class Plan:
     def fake(self, tensors):
         """Results without values, for those who ask what shapes they would have."""
         self.check(tensors)
-        device = self._place(tensors)
-        return [torch.empty(shape, dtype=dtype, device=device)
-                for shape, dtype in zip(self.shapes(tensors, self.batch(tensors)), self.result_dtypes)]
-
-    def _place(self, tensors):
-        """The device of the images; None where there are none."""
         devices = {t.device for t, image in zip(tensors, self._images) if image}
         if len(devices) > 1:
             places = ", ".join(f"{name} on {t.device}" for name, t in zip(self.names, tensors))
             raise error(TypeError, f'call the operator "{self.name}"', "its tensors are on one device",
                         f"given are {places}", "Move them with tensor.to(device)")
-        return devices.pop() if devices else None
+        device = devices.pop() if devices else None
+        return [torch.empty(shape, dtype=dtype, device=device)
+                for shape, dtype in zip(self.shapes(tensors, self.batch(tensors)), self.result_dtypes)]
 
     def run(self, tensors):
         batch = self.batch(tensors) if self.check(tensors) else ()
         shapes = self.shapes(tensors, batch)
-        results = self._results(shapes, _CPU)
+        results = [torch.empty(shape, dtype=dtype, device=_CPU) for shape, dtype in zip(shapes, self.result_dtypes)]
         if self.sizes is None and self._is_trivial(tensors, results):
             return results
         if not batch:
             self._call(tensors, results)
             self._expect(tensors, shapes)
-        else:
-            self._call_each(self._call, batch, tensors, results)
+        elif 0 not in batch:
+            wide = [t.expand(batch + tuple(t.shape[t.dim() - rank:])) for t, rank in zip(tensors, self.ranks)]
+            for at in itertools.product(*map(range, batch)):
+                self._call([t[at] for t in wide], [t[at] for t in results])
         return results
-
-    def _results(self, shapes, device):
-        return [torch.empty(shape, dtype=dtype, device=device) for shape, dtype in zip(shapes, self.result_dtypes)]
-
-    def _call_each(self, call, batch, tensors, results):
-        """One call for each item of the batch."""
-        if 0 in batch:
-            return
-        wide = [t.expand(batch + tuple(t.shape[t.dim() - rank:])) for t, rank in zip(tensors, self.ranks)]
-        for at in itertools.product(*map(range, batch)):
-            call([t[at] for t in wide], [t[at] for t in results])
 
     def _is_trivial(self, tensors, results):
         """Of no elements, or linear in tensors of none, a gradient by its seeds: then filled with zeros. The pipeline's
