@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <chrono>
 #include <limits>
-#include <unordered_set>
 
 #include "graph/function.h"
 #include "outcome.h"
