@@ -146,7 +146,7 @@ void bind_schedulers(py::module_& m) {
 }
 
 // Another one of the same definitions, which has the schedule that auto_schedule() gives for the target; but where its
-// user gave directives, it stays as they say.
+// user gave directives, and the target has no kernels, it stays as they say.
 Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target) {
   const PipelineSpec spec = pipeline.spec();
   std::vector<Func> outputs;
@@ -154,7 +154,7 @@ Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target) {
     outputs.emplace_back(f);
   Pipeline copy(outputs);
   copy.set_autoschedule(spec.autoschedule);
-  if (copy.schedule_log().size() == 0) copy.auto_schedule(target);
+  if (target.has_gpu_feature() || copy.schedule_log().size() == 0) copy.auto_schedule(target);
   return copy;
 }
 

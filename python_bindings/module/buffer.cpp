@@ -294,6 +294,22 @@ void bind_elements(Class<Buffer<>>& c) {
       .def("__repr__", &repr);
 }
 
+// As NumPy's protocol describes memory.
+py::dict array_interface(const ArrayMemory& memory) {
+  using namespace py::literals;
+  if (format_of(memory.type).empty())
+    throw py::attribute_error("no array of NumPy has elements of type " + to_string(memory.type));
+  const char kind = memory.type.is_bool()   ? 'b'
+                    : memory.type.is_int()  ? 'i'
+                    : memory.type.is_uint() ? 'u'
+                                            : 'f';
+  return py::dict(
+      "version"_a = 3, "shape"_a = py::tuple(py::cast(memory.shape)),
+      "typestr"_a = text(memory.type.bytes() == 1 ? '|' : '<', kind, memory.type.bytes()),
+      "data"_a = py::make_tuple(reinterpret_cast<uintptr_t>(memory.data), memory.read_only),
+      "strides"_a = py::tuple(py::cast(memory.strides_bytes)));
+}
+
 void bind_arrays(Class<Buffer<>>& c) {
   c.def(
        "__dlpack__",
@@ -317,22 +333,15 @@ void bind_arrays(Class<Buffer<>>& c) {
                                   to_string(memory_of(b).type) + ": see Buffer.bits()");
            })
       .def("__dlpack_device__", [](const Buffer<>&) { return py::make_tuple(1, 0); })
-      .def_property_readonly("__array_interface__", [](const Buffer<>& b) {
-        using namespace py::literals;
-        const ArrayMemory memory = memory_of(b);
-        const std::string format = format_of(memory.type);
-        if (format.empty())
-          throw py::attribute_error("no array of NumPy has elements of type " +
-                                    to_string(memory.type));
-        const char kind = memory.type.is_bool()   ? 'b'
-                          : memory.type.is_int()  ? 'i'
-                          : memory.type.is_uint() ? 'u'
-                                                  : 'f';
-        return py::dict(
-            "version"_a = 3, "shape"_a = py::tuple(py::cast(memory.shape)),
-            "typestr"_a = text(memory.type.bytes() == 1 ? '|' : '<', kind, memory.type.bytes()),
-            "data"_a = py::make_tuple(reinterpret_cast<uintptr_t>(memory.data), memory.read_only),
-            "strides"_a = py::tuple(py::cast(memory.strides_bytes)));
+      .def_property_readonly("__array_interface__",
+                             [](const Buffer<>& b) { return array_interface(memory_of(b)); })
+      // Numba's protocol of the same for devices; there is no such attribute where there is no such memory.
+      .def_property_readonly("__cuda_array_interface__", [](const Buffer<>& b) {
+        if (!b.defined() || !b.has_device_allocation())
+          throw py::attribute_error("the Buffer has no memory on a device: see copy_to_device()");
+        py::dict interface = array_interface(device_memory_of(b));
+        interface["stream"] = 1;  // the default stream: where copies and runs are queued
+        return interface;
       });
 }
 

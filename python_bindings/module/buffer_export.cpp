@@ -98,20 +98,38 @@ std::string format_of(Type type) {
   return "";
 }
 
-ArrayMemory memory_of(const Buffer<>& buffer) {
+namespace {
+
+ArrayMemory memory_at(void* data, const Buffer<>& buffer) {
   ArrayMemory memory;
-  memory.data = buffer.data();
+  memory.data = data;
   memory.type = buffer.type();
   memory.read_only = is_read_only(buffer);
-  if (!memory.data && buffer.number_of_elements() > 0) {
-    user_error("take the elements of the Buffer " + quoted(buffer.name()), "it must have memory",
-               "it has only a shape", "Call allocate() on it first");
-  }
   for (int d = buffer.dimensions(); d-- > 0;) {
     memory.shape.push_back(buffer.extent(d));
     memory.strides_bytes.push_back(static_cast<int64_t>(buffer.stride(d)) * memory.type.bytes());
   }
   return memory;
+}
+
+}  // namespace
+
+ArrayMemory memory_of(const Buffer<>& buffer) {
+  const ArrayMemory memory = memory_at(buffer.data(), buffer);
+  if (!memory.data && buffer.number_of_elements() > 0) {
+    user_error("take the elements of the Buffer " + quoted(buffer.name()), "it must have memory",
+               "it has only a shape", "Call allocate() on it first");
+  }
+  return memory;
+}
+
+ArrayMemory device_memory_of(const Buffer<>& buffer) {
+  if (buffer.host_dirty()) {
+    user_error("take the device memory of the Buffer " + quoted(buffer.name()),
+               "its newest elements must be there", "they are on the host",
+               "Call copy_to_device() first");
+  }
+  return memory_at(reinterpret_cast<void*>(buffer.raw_buffer()->device), buffer);
 }
 
 void add_buffer_protocol(py::handle buffer_class) {

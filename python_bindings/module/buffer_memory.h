@@ -41,6 +41,8 @@ void check_writable(const Buffer<>& buffer, const std::string& asked);
 
 // The elements of a buffer that has memory, axes in Python's order; the owner is empty.
 ArrayMemory memory_of(const Buffer<>& buffer);
+// The same of one that has memory on a device; CompileError where the host's is newer.
+ArrayMemory device_memory_of(const Buffer<>& buffer);
 std::string format_of(Type type);  // as module struct writes it; "" where it knows no such type
 
 // dlpack.cpp

@@ -23,8 +23,9 @@ struct DynamicCall {
   static Value value_of(const ir::Scalar& scalar) {
     return {nullptr, scalar, false, scalar.type, -1};
   }
-  static void call(const Callable& callable, const std::vector<Value>& values) {
-    callable.call(nullptr, values);
+  static void call(const Callable& callable, const std::vector<Value>& values,
+                   JITUserContext* context = nullptr) {
+    callable.call(context, values);
   }
 };
 
@@ -37,6 +38,17 @@ namespace {
 using frontend::DynamicCall;
 using py::arg;
 using Parameter = std::shared_ptr<graph::ParameterContents>;
+
+// A call that works on one stream of the context that is current.
+struct OnStream : JITUserContext {
+  explicit OnStream(void* given) : stream(given) {
+    handlers.custom_cuda_get_stream = [](JITUserContext* context, void*, void** result) {
+      *result = static_cast<OnStream*>(context)->stream;
+      return 0;
+    };
+  }
+  void* stream;
+};
 
 // Compiled again where an array comes whose innermost axis is not dense (any_stride.h): once.
 class Bound {
@@ -74,6 +86,44 @@ class Bound {
   // The same of tensors of PyTorch, whose element types are those of the pipeline: whoever calls has seen to that.
   // A number is a tensor without dimensions. Written for calls whose work is nothing.
   void call_tensors(const py::tuple& given) {
+    auto [tensors, elements] = tensors_of(given);
+    run(given, elements, std::move(tensors));
+  }
+
+  // The same of tensors in a device's memory, but for numbers, on a stream of the context that is current for this
+  // thread: it is in the stream when this is over, not done.
+  // Requires: the driver knows the tensors' memory (RuntimeError); kernels alone use it (RuntimeError).
+  void call_tensors_on_device(const py::tuple& given, uintptr_t stream) {
+    auto [tensors, elements] = tensors_of(given);
+    OnStream context(reinterpret_cast<void*>(stream));
+    const py::gil_scoped_release release;
+    std::vector<Buffer<>> there;
+    for (size_t i = 0; i < given.size(); i++) {
+      if (tensors.buffers[i].number_of_elements() == 0 || !tensors.buffers[i].data()) continue;
+      there.push_back(on_device(tensors.buffers[i], parameter_of_argument(i)));
+      tensors.values[i] = DynamicCall::value_of(there.back());
+    }
+    try {
+      DynamicCall::call(callable_, tensors.values, &context);
+    } catch (const RuntimeError& failed) {
+      // A stage on the host asks for elements; of wrapped memory there is no copy there.
+      if (failed.code() != halide_error_code_copy_to_host_failed &&
+          failed.code() != halide_error_code_host_is_null)
+        throw;
+      refuse_host_stage(failed);
+    }
+  }
+
+ private:
+  // What a call touches, for as long as it runs. Values point into buffers, also of what it is moved to.
+  struct Tensors {
+    explicit Tensors(size_t count) : buffers(count), values(count) {}
+    std::vector<Runtime::Buffer<>> buffers;
+    std::vector<DynamicCall::Value> values;
+  };
+
+  // Of arguments and outputs, and how many elements these have. Compiles again, where one asks for that.
+  std::pair<Tensors, int64_t> tensors_of(const py::tuple& given) {
     if (given.size() != args_.size() + outputs_.size())
       throw py::type_error("a Callable takes its arguments, then its output buffers");
     Tensors tensors(given.size());
@@ -92,16 +142,27 @@ class Bound {
       tensors.values[i] = DynamicCall::value_of(buffer);
     }
     if (count_lifted() != lifted_) compile_again();
-    run(given, elements, std::move(tensors));
+    return {std::move(tensors), elements};
   }
 
- private:
-  // What a call touches, for as long as it runs. Values point into buffers, also of what it is moved to.
-  struct Tensors {
-    explicit Tensors(size_t count) : buffers(count), values(count) {}
-    std::vector<Runtime::Buffer<>> buffers;
-    std::vector<DynamicCall::Value> values;
-  };
+  [[noreturn]] static void refuse_host_stage(const RuntimeError& failed) {
+    call_error("run a pipeline on tensors of a device", "kernels alone read and write them",
+               text("a stage of it runs on the host, where: ", failed.what()),
+               "Give it no schedule, so that auto_schedule() makes kernels, or one with gpu_tile(); leave out print() "
+               "and stages of C functions; or move the tensors with tensor.cpu()",
+               failed.code());
+  }
+
+  // One whose address is the device's.
+  static Buffer<> on_device(const Runtime::Buffer<>& tensor, const Parameter& parameter) {
+    Buffer<> moved(tensor, parameter ? parameter->name : "");
+    halide_buffer_t& raw = *moved.raw_buffer();
+    const auto address = reinterpret_cast<uintptr_t>(raw.host);
+    raw.host = nullptr;
+    moved.device_wrap_native(DeviceAPI::CUDA, address);
+    moved.set_device_dirty();
+    return moved;
+  }
 
   // Another thread for the sake of Ctrl-C costs more than a call that is over before anybody could press it. Such a
   // call is one on no more elements than one that was seen to be short; a number among the arguments may be a count
@@ -237,6 +298,7 @@ void bind_callable(py::module_& m) {
   Class<Bound>(m, "Callable")
       .def("__call__", &Bound::call)
       .def("_call_tensors", &Bound::call_tensors)
+      .def("_call_tensors_on_device", &Bound::call_tensors_on_device)
       .def("defined", [](const Bound&) { return true; });
   py::class_<ExpectedCall>(m, "_ExpectedCall")
       .def(py::init<py::object, const py::iterable&, const py::iterable&>())

@@ -180,6 +180,62 @@ TEST_F(GpuRun, OneThreadDoesAll) {
       {40});
 }
 
+// What a call says of the device, and how often it was asked.
+struct Caller : JITUserContext {
+  Caller() {
+    handlers.custom_cuda_get_stream = [](JITUserContext* self, void* context, void** stream) {
+      auto& caller = *static_cast<Caller*>(self);
+      caller.streams++;
+      caller.context = context;
+      *stream = nullptr;
+      return caller.stream_code;
+    };
+  }
+  void give_context(void* given) {
+    context = given;
+    handlers.custom_cuda_acquire_context = [](JITUserContext* self, void** acquired, bool) {
+      auto& caller = *static_cast<Caller*>(self);
+      caller.acquired++;
+      *acquired = caller.context;
+      return 0;
+    };
+    handlers.custom_cuda_release_context = [](JITUserContext* self) {
+      static_cast<Caller*>(self)->released++;
+      return 0;
+    };
+  }
+  void* context = nullptr;
+  int acquired = 0, released = 0, streams = 0, stream_code = 0;
+};
+
+TEST_F(GpuRun, ACallHasItsOwnContextAndStream) {
+  Func out("out");
+  out(x, y) = cast<float>(x + y);
+  out.gpu_tile(x, y, xi, yi, 16, 8);
+  Pipeline pipeline(out);
+  Caller first;
+  Buffer<float> result = pipeline.realize(&first, {32, 16}, with_gpu());
+  EXPECT_EQ(result(3, 4), 7.0f);
+  EXPECT_GT(first.streams, 0);
+
+  Caller second;
+  second.give_context(first.context);
+  result = pipeline.realize(&second, {32, 16}, with_gpu());
+  EXPECT_EQ(result(3, 4), 7.0f);
+  EXPECT_GT(second.acquired, 0);
+  EXPECT_EQ(second.released, second.acquired);
+
+  Caller failing;
+  failing.stream_code = 17;
+  try {
+    pipeline.realize(&failing, {32, 16}, with_gpu());
+    FAIL() << "what the handler gave was ignored";
+  } catch (const RuntimeError& error) {
+    EXPECT_NE(std::string(error.what()).find("get_stream gave 17"), std::string::npos)
+        << error.what();
+  }
+}
+
 TEST_F(GpuRun, GradientsRunOnGpus) {
   const Buffer<float> in = ramp(66, 34);
   agrees(

@@ -129,6 +129,9 @@ JITHandlers merged(JITHandlers handlers, const JITUserContext* context) {
   take(handlers.custom_do_par_for, first.custom_do_par_for);
   take(handlers.custom_error, first.custom_error);
   take(handlers.custom_trace, first.custom_trace);
+  take(handlers.custom_cuda_acquire_context, first.custom_cuda_acquire_context);
+  take(handlers.custom_cuda_release_context, first.custom_cuda_release_context);
+  take(handlers.custom_cuda_get_stream, first.custom_cuda_get_stream);
   take(handlers.print, first.print);
   if (first.thread_limit > 0) handlers.thread_limit = first.thread_limit;
   return handlers;

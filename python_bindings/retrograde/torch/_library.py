@@ -5,7 +5,7 @@ its derivatives of every order and both modes (a path says which: Plan.derived).
 made, so that a compiled graph that PyTorch kept on disk finds them. Each has a kernel for
 
     CPU            runs the pipeline
-    CUDA           says that there is none
+    CUDA           runs it as kernels, on the stream that is current
     Meta (fake)    the shapes and types of the results
     Autograd       autograd.Function with backward and jvp, which call the derivative operator
     Autocast       the types of the pipeline, whatever the mode says
@@ -64,7 +64,7 @@ class Calls:
 
     def __init__(self, operator, library, namespace, name):
         self.operator, self._last, self._functions = operator, {}, {}
-        kernels = {"CPU": self.run, "CUDA": self.refuse, "Autograd": self.differentiate,
+        kernels = {"CPU": self.run, "CUDA": self.run_on_device, "Autograd": self.differentiate,
                    "AutocastCPU": self.cast, "AutocastCUDA": self.cast}
         for key, kernel in kernels.items():
             library.impl(name, self.of_operator(kernel), key)
@@ -122,10 +122,8 @@ class Calls:
     def fake(self, path, tensors):
         return self.operator.plan(path, tensors).fake(tensors)
 
-    def refuse(self, path, tensors):
-        devices = ", ".join(f"{name} on {t.device}" for name, t in zip(self.operator.argument_names, tensors))
-        raise error(Unsupported, f'call the operator "{self.operator.name}"', "its pipeline runs on the CPU",
-                    f"given are {devices}", "Move the tensors with tensor.cpu()")
+    def run_on_device(self, path, tensors):
+        return self.operator.plan_for(path, tensors).run_on_device(tensors)
 
     def differentiate(self, path, tensors):
         if forward_ad._current_level < 0 and not (torch.is_grad_enabled() and _any_requires_grad(*tensors)):

@@ -12,6 +12,7 @@ import torch
 
 from .. import _retrograde as rg
 from .._errors import CompileError, error
+from ._device import device_of
 
 DTYPES = {torch.float16: rg.Float(16), torch.bfloat16: rg.BFloat(16), torch.float32: rg.Float(32),
           torch.float64: rg.Float(64), torch.uint8: rg.UInt(8), torch.int8: rg.Int(8), torch.int16: rg.Int(16),
@@ -57,6 +58,7 @@ class Plan:
         self._images = [is_image(parameter) for parameter in self.inputs]
         self._last_kinds, self.expected = None, None  # see _expect
         self._lock, self._callable, self._derived = threading.RLock(), None, {}
+        self._on_devices = {}  # compiled, by target
         self._result_shapes, self._seeds = None, 0  # so many of the last inputs are seeds
         if sizes is not None:
             self._result_shapes = shapes([torch.empty(size, dtype=dtype, device="meta")
@@ -116,14 +118,18 @@ class Plan:
     def fake(self, tensors):
         """Results without values, for those who ask what shapes they would have."""
         self.check(tensors)
+        device = self.place(tensors)
+        return [torch.empty(shape, dtype=dtype, device=device)
+                for shape, dtype in zip(self.shapes(tensors, self.batch(tensors)), self.result_dtypes)]
+
+    def place(self, tensors):
+        """The device of the images; None where there are none."""
         devices = {t.device for t, image in zip(tensors, self._images) if image}
         if len(devices) > 1:
             places = ", ".join(f"{name} on {t.device}" for name, t in zip(self.names, tensors))
             raise error(TypeError, f'call the operator "{self.name}"', "its tensors are on one device",
                         f"given are {places}", "Move them with tensor.to(device)")
-        device = devices.pop() if devices else None
-        return [torch.empty(shape, dtype=dtype, device=device)
-                for shape, dtype in zip(self.shapes(tensors, self.batch(tensors)), self.result_dtypes)]
+        return devices.pop() if devices else None
 
     def run(self, tensors):
         batch = self.batch(tensors) if self.check(tensors) else ()
@@ -134,11 +140,41 @@ class Plan:
         if not batch:
             self._call(tensors, results)
             self._expect(tensors, shapes)
-        elif 0 not in batch:
-            wide = [t.expand(batch + tuple(t.shape[t.dim() - rank:])) for t, rank in zip(tensors, self.ranks)]
-            for at in itertools.product(*map(range, batch)):
-                self._call([t[at] for t in wide], [t[at] for t in results])
+        else:
+            self._call_each(self._call, batch, tensors, results)
         return results
+
+    def run_on(self, device, tensors):
+        """The same where images are a device's (_device.py): its stream has work to do then."""
+        batch = self.batch(tensors) if self.check(tensors) else ()
+        with device.current():
+            results = [device.empty(shape, dtype)
+                       for shape, dtype in zip(self.shapes(tensors, batch), self.result_dtypes)]
+            if self._is_trivial(tensors, results):
+                return results
+            # A number is an argument of kernels, so the host must know it.
+            tensors = [t if image else t.cpu() for t, image in zip(tensors, self._images)]
+            call = functools.partial(self._call_on, device)
+            if batch:
+                self._call_each(call, batch, tensors, results)
+            else:
+                call(tensors, results)
+        return results
+
+    def run_on_device(self, tensors):
+        """On the device that the images are on."""
+        place = self.place(tensors)
+        if place is None or place.type == "cpu":  # numbers alone are elsewhere
+            return self.run([t.cpu() for t in tensors])
+        return self.run_on(device_of(place), tensors)
+
+    def _call_each(self, call, batch, tensors, results):
+        """One call for each item of the batch."""
+        if 0 in batch:
+            return
+        wide = [t.expand(batch + tuple(t.shape[t.dim() - rank:])) for t, rank in zip(tensors, self.ranks)]
+        for at in itertools.product(*map(range, batch)):
+            call([t[at] for t in wide], [t[at] for t in results])
 
     def _is_trivial(self, tensors, results):
         """Of no elements, or linear in tensors of none, a gradient by its seeds: then filled with zeros. The pipeline's
@@ -153,12 +189,20 @@ class Plan:
         if self._callable is None:
             with self._lock:
                 if self._callable is None:
-                    self._callable = self._compile()
+                    self._callable = self._compile_for(rg.get_jit_target_from_environment())
         self._callable._call_tensors((*tensors, *results))
 
-    def _compile(self):
-        """Where nobody gave a schedule, the Funcs of a copy get one: those of the user stay as they are."""
-        target = rg.get_jit_target_from_environment()
+    def _call_on(self, device, tensors, results):
+        found = self._on_devices.get(device.target)
+        if found is None:
+            with self._lock:
+                if device.target not in self._on_devices:
+                    self._on_devices[device.target] = self._compile_for(rg.Target(device.target))
+                found = self._on_devices[device.target]
+        found._call_tensors_on_device((*tensors, *results), device.stream())
+
+    def _compile_for(self, target):
+        """What nobody scheduled gets a schedule, in a copy: one for the CPU is none for a device."""
         return rg.Pipeline(self.outputs)._scheduled_copy(target).compile_to_callable(self.inputs, target)
 
     def _expect(self, tensors, shapes):
