@@ -148,7 +148,8 @@ class Bound {
   [[noreturn]] static void refuse_host_stage(const RuntimeError& failed) {
     call_error("run a pipeline on tensors of a device", "kernels alone read and write them",
                text("a stage of it runs on the host, where: ", failed.what()),
-               "Give it no schedule, so that auto_schedule() makes kernels, or one with gpu_tile(); leave out print() "
+               "Give it no schedule, so that auto_schedule() makes kernels, or one with "
+               "gpu_tile(); leave out print() "
                "and stages of C functions; or move the tensors with tensor.cpu()",
                failed.code());
   }

@@ -126,6 +126,7 @@ class Shapes(unittest.TestCase):
 
     def test_devices_are_there_or_said_not_to_be(self):
         self.assertFalse(self.b.has_device_allocation())
+        self.assertFalse(hasattr(self.b, "__cuda_array_interface__"))
         self.b.set_host_dirty()
         try:
             self.b.copy_to_device()

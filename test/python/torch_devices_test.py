@@ -186,6 +186,17 @@ class OnDevice(unittest.TestCase):
             OP.plan_for((), tensors).run_on(DEVICE, tensors)
         self.check((), tensors)  # nothing is left behind
 
+    def test_arrays_of_a_device(self):
+        buffer = rg.Buffer(np.arange(6, dtype="int16").reshape(2, 3))
+        buffer.set_host_dirty()
+        buffer.copy_to_device()
+        described = buffer.__cuda_array_interface__
+        self.assertEqual((described["shape"], described["typestr"], described["strides"]), ((2, 3), "<i2", (6, 2)))
+        self.assertNotEqual(described["data"][0], buffer.__array_interface__["data"][0])
+        buffer.set_host_dirty()
+        with self.assertRaisesRegex(rg.CompileError, "newest elements must be there; they are on the host"):
+            buffer.__cuda_array_interface__
+
     def test_schedules_of_a_user(self):
         image, f, x, y, xi, yi = rg.ImageParam("float32", 2), rg.Func(), *(rg.Var() for _ in range(4))
         f[x, y] = image[x, y] * 2

@@ -37,10 +37,12 @@ struct JITHandlers {
   void (*custom_error)(JITUserContext*, const char*){nullptr};
   // Told of every event of a trace; gives its number, which other events name as their parent.
   int32_t (*custom_trace)(JITUserContext*, const halide_trace_event_t*){nullptr};
-  // Of GPU runtimes: no code that is generated calls them.
+  // Of runtimes that load libraries themselves: nothing calls them.
   void* (*custom_get_symbol)(const char* name){nullptr};
   void* (*custom_load_library)(const char* name){nullptr};
   void* (*custom_get_library_symbol)(void* library, const char* name){nullptr};
+  // The device's context and stream of a call; default: the thread's current context, or the device's primary
+  // one, and its default stream. A code other than 0 ends the call.
   int32_t (*custom_cuda_acquire_context)(JITUserContext*, void** context, bool create){nullptr};
   int32_t (*custom_cuda_release_context)(JITUserContext*){nullptr};
   int32_t (*custom_cuda_get_stream)(JITUserContext*, void* context, void** stream){nullptr};
