@@ -2,11 +2,13 @@
 #
 #   retrograde_add_torch_op(<target> FROM <generator-target> GENERATOR <name> [GRADIENT] [NAMESPACE <ns>]
 #     [PYTHON <interpreter>] [CXX_STANDARD 17|20] [SHAPE <output>=<sizes>...] [PARAMS <param=value>...]
-#     [AUTOSCHEDULER <name>])
+#     [AUTOSCHEDULER <name>] [FEATURES <feature>...] [SIMULATED_GPU])
 #     A module <target>.so that torch.ops.load_library loads; then torch.ops.<ns>.<target>(...) takes the generator's
 #     inputs and gives its outputs. NAMESPACE defaults to "retrograde".
 #     GRADIENT: autograd differentiates it, once, by images and by floating-point numbers that are given as tensors
 #     without dimensions; what is computed are the gradients that are asked for (-d separate).
+#     FEATURES cuda: for tensors of CUDA, by kernels on the stream that is current; others are refused. What the
+#     generator does not schedule needs AUTOSCHEDULER. SIMULATED_GPU: the simulated device's, which is PyTorch's CPU.
 #     PYTHON: whose PyTorch it is compiled for, "/usr/bin/python3" by default; include and library paths come from it,
 #     so that no CUDA toolkit is needed where that PyTorch knows CUDA.
 #     SHAPE: the sizes of an output as PyTorch orders them, C++ over the inputs' names, as in
@@ -47,8 +49,8 @@ print(torch.__version__)
 endfunction()
 
 function(retrograde_add_torch_op target)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "GRADIENT" "FROM;GENERATOR;NAMESPACE;PYTHON;CXX_STANDARD;AUTOSCHEDULER"
-    "SHAPE;PARAMS")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "GRADIENT;SIMULATED_GPU" "FROM;GENERATOR;NAMESPACE;PYTHON;CXX_STANDARD;AUTOSCHEDULER"
+    "SHAPE;PARAMS;FEATURES")
   set(asked "retrograde_add_torch_op(${target})")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "${asked}: unknown arguments ${arg_UNPARSED_ARGUMENTS}")
@@ -70,9 +72,17 @@ function(retrograde_add_torch_op target)
   if(arg_AUTOSCHEDULER)
     list(APPEND options AUTOSCHEDULER ${arg_AUTOSCHEDULER})
   endif()
+  if(arg_FEATURES)
+    list(APPEND options FEATURES ${arg_FEATURES})
+  endif()
+  set(place)
+  if(arg_SIMULATED_GPU)
+    list(APPEND options SIMULATED_GPU)
+    set(place "#define RETROGRADE_TORCH_DEVICE at::kCPU\n")
+  endif()
   set(parts ${target}_forward)
   add_retrograde_library(${target}_forward ${options} PYTORCH_WRAPPER wrapper)
-  set(text "// Written by retrograde_add_torch_op: the operator ${arg_NAMESPACE}::${target}.\n")
+  set(text "// Written by retrograde_add_torch_op: the operator ${arg_NAMESPACE}::${target}.\n${place}")
   if(arg_GRADIENT)
     list(APPEND parts ${target}_gradient)
     add_retrograde_library(${target}_gradient ${options} SEPARATE_GRADIENTS PYTORCH_WRAPPER gradient_wrapper)

@@ -146,7 +146,8 @@ class Outputs {
       case OutputFileType::registration:
         return aot::registration_text(declared_functions(module_), module_.target());
       case OutputFileType::pytorch_wrapper:
-        return aot::pytorch_wrapper_text(module_.name(), declared_functions(module_));
+        return aot::pytorch_wrapper_text(module_.name(), module_.target(),
+                                         declared_functions(module_));
       default:
         internal_error("no writer for an output that was checked");
     }
@@ -244,7 +245,8 @@ class MultitargetOutputs {
       return aot::header_text(name_, baseline().target(), functions);
     if (type == OutputFileType::registration)
       return aot::registration_text(functions, baseline().target());
-    if (type == OutputFileType::pytorch_wrapper) return aot::pytorch_wrapper_text(name_, functions);
+    if (type == OutputFileType::pytorch_wrapper)
+      return aot::pytorch_wrapper_text(name_, baseline().target(), functions);
     RETROGRADE_ASSERT(type == OutputFileType::static_library, "an output without a writer");
     std::vector<codegen::Member> members = members_;
     members.push_back({aot::name_parts(name_).back() + "_wrapper.o", wrapper_object()});

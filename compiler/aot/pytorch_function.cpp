@@ -56,8 +56,9 @@ std::string number_type(const ExportArgument& argument) {
   return argument.type.is_bool() ? "bool" : argument.type.is_float() ? "double" : "int64_t";
 }
 
-TorchFunction torch_function_of(const DeclaredFunction& declared) {
-  TorchFunction function{declared.name, declared.signature.user_context, {}, {}, {}};
+TorchFunction torch_function_of(const DeclaredFunction& declared, const Target& target) {
+  TorchFunction function{
+      declared.name, declared.signature.user_context, target.has_gpu_feature(), {}, {}, {}};
   if (name_parts(declared.name).size() > 1) {
     unsupported("write a wrapper for PyTorch of " + quoted(declared.name),
                 "what PyTorch calls has a name of C", "it is in a namespace",

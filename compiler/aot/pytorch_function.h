@@ -15,12 +15,13 @@ using codegen::ExportArgument;
 struct TorchFunction {
   std::string name;  // as C++ calls it
   bool user_context = false;
+  bool on_device = false;                               // its tensors are a GPU's
   std::vector<ExportArgument> inputs, outputs, images;  // images: those of the inputs
 };
 
 // Requires: what PyTorch calls has tensors and numbers that PyTorch has (Unsupported); what PyTorch
 // calls has a name of C (Unsupported).
-TorchFunction torch_function_of(const DeclaredFunction& declared);
+TorchFunction torch_function_of(const DeclaredFunction& declared, const Target& target);
 
 // A name as C++ writes it.
 std::string word(const std::string& name);

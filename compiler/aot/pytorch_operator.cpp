@@ -126,23 +126,25 @@ void add_arguments(const TorchFunction& function, TextValues& values) {
                                   : name_of(input);
   };
   const bool has_numbers = tensors.size() > images_wanting.size();
-  values.insert({{"function", function.name},
-                 {"arguments", listed(function.inputs, name_of)},
-                 {"parameters", listed(function.inputs, parameter)},
-                 {"types", listed(function.inputs, parameter_type)},
-                 {"schema", listed(function.inputs, schema)},
-                 {"tensor_parameters", listed(function.inputs, tensor_parameter)},
-                 {"tensor_types", listed(function.inputs, tensor_type)},
-                 {"tensor_schema", listed(function.inputs, tensor_schema)},
-                 {"tensors", joined(tensors)},
-                 {"values", listed(function.inputs, value)},
-                 {"boxed_arguments", listed(function.inputs, boxed)},
-                 {"any_requires_grad", joined(wanting, " || ")},
-                 {"any_image_requires_grad", joined(images_wanting, " || ")},
-                 {"overload", has_numbers ? "tensors" : ""},
-                 {"dot_overload", has_numbers ? ".tensors" : ""},
-                 {"run", has_numbers ? "run_of_tensors" : "run"},
-                 {"made", has_numbers ? "made_of_tensors" : "made"}});
+  values.insert(
+      {{"function", function.name},
+       {"place", text("retrograde_torch::Place::", function.on_device ? "device" : "host")},
+       {"arguments", listed(function.inputs, name_of)},
+       {"parameters", listed(function.inputs, parameter)},
+       {"types", listed(function.inputs, parameter_type)},
+       {"schema", listed(function.inputs, schema)},
+       {"tensor_parameters", listed(function.inputs, tensor_parameter)},
+       {"tensor_types", listed(function.inputs, tensor_type)},
+       {"tensor_schema", listed(function.inputs, tensor_schema)},
+       {"tensors", joined(tensors)},
+       {"values", listed(function.inputs, value)},
+       {"boxed_arguments", listed(function.inputs, boxed)},
+       {"any_requires_grad", joined(wanting, " || ")},
+       {"any_image_requires_grad", joined(images_wanting, " || ")},
+       {"overload", has_numbers ? "tensors" : ""},
+       {"dot_overload", has_numbers ? ".tensors" : ""},
+       {"run", has_numbers ? "run_of_tensors" : "run"},
+       {"made", has_numbers ? "made_of_tensors" : "made"}});
   values["numbers"] = has_numbers ? filled(pytorch_numbers_text, values) : "";
   values["register_numbers"] = has_numbers ? filled(pytorch_register_numbers_text, values) : "";
 }

@@ -116,17 +116,17 @@ inline Results autograd(c10::DispatchKeySet keys, $tensor_parameters$) {
   return found().redispatch(keys & c10::after_autograd_keyset, $arguments$);
 }
 
-inline Results refuse_device($tensor_parameters$) { refuse_cuda(name); }
+inline Results refuse_device($tensor_parameters$) { refuse_elsewhere(name, $place$); }
 $numbers$
 TORCH_LIBRARY_FRAGMENT(RETROGRADE_TORCH_NAMESPACE, library) {
   library.def(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "$dot_overload$($tensor_schema$) -> $results_schema$");
-  library.impl(tensors_name, c10::DispatchKey::CPU, TORCH_FN($run$));
-  library.impl(tensors_name, c10::DispatchKey::CUDA, TORCH_FN(refuse_device));
+  library.impl(tensors_name, key_of($place$), TORCH_FN($run$));
+  library.impl(tensors_name, other_key($place$), TORCH_FN(refuse_device));
   library.impl(tensors_name, c10::DispatchKey::Meta, TORCH_FN($made$));
   library.impl(tensors_name, c10::DispatchKey::Autograd, TORCH_FN(autograd));
 $register_numbers$#ifdef RETROGRADE_TORCH_GRADIENT
   library.def(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward($backward_schema$) -> Tensor[]");
-  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward", c10::DispatchKey::CPU, TORCH_FN(backward_run));
+  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward", key_of($place$), TORCH_FN(backward_run));
   library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward", c10::DispatchKey::Meta, TORCH_FN(backward_made));
   library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "_backward", c10::DispatchKey::Autograd,
                TORCH_FN(backward_autograd));
@@ -155,14 +155,14 @@ inline Results autograd_of_numbers(c10::DispatchKeySet keys, $parameters$) {
   return handle.redispatch(keys & c10::after_autograd_keyset, $arguments$);
 }
 
-inline Results refuse_device_of_numbers($parameters$) { refuse_cuda(name); }
+inline Results refuse_device_of_numbers($parameters$) { refuse_elsewhere(name, $place$); }
 )";
 
 // After that of tensors: a caller's tensor would become a number here, without a gradient.
 const char* const pytorch_register_numbers_text =
     R"(  library.def(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "($schema$) -> $results_schema$");
-  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::CPU, TORCH_FN(run));
-  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::CUDA, TORCH_FN(refuse_device_of_numbers));
+  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), key_of($place$), TORCH_FN(run));
+  library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), other_key($place$), TORCH_FN(refuse_device_of_numbers));
   library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::Meta, TORCH_FN(made));
   library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), c10::DispatchKey::Autograd, TORCH_FN(autograd_of_numbers));
 )";
@@ -175,15 +175,43 @@ const char* const pytorch_helpers = R"(
 
 namespace retrograde_torch {
 
-// A tensor of the CPU as a buffer, its axes in reverse; not copied, but where an input's last axis is not dense.
+// What the code is compiled for: the CPU, or kernels of a device of RETROGRADE_TORCH_DEVICE. Where the simulated device
+// runs these (RETROGRADE_GPU=simulated), that is at::kCPU, for its memory is the host's.
+enum class Place { host, device };
+#ifndef RETROGRADE_TORCH_DEVICE
+#define RETROGRADE_TORCH_DEVICE at::kCUDA
+#endif
+
+constexpr at::DeviceType type_of(Place place) { return place == Place::host ? at::kCPU : RETROGRADE_TORCH_DEVICE; }
+constexpr c10::DispatchKey key_of(Place place) {
+  return type_of(place) == at::kCPU ? c10::DispatchKey::CPU : c10::DispatchKey::CUDA;
+}
+constexpr c10::DispatchKey other_key(Place place) {
+  return type_of(place) == at::kCPU ? c10::DispatchKey::CUDA : c10::DispatchKey::CPU;
+}
+
+inline std::string& last_error() {
+  static thread_local std::string text;
+  return text;
+}
+inline void note_error(void*, const char* text) { last_error() = text; }
+inline void succeed(const char* name, int code) {
+  if (code == 0) return;
+  std::string why;
+  why.swap(last_error());
+  if (why.empty()) why = "cannot call \"" + std::string(name) + "\": error code " + std::to_string(code);
+  TORCH_CHECK(false, why);
+}
+
+// A tensor as a buffer, its axes in reverse; not copied, but where an input's last axis is not dense.
 template <int Rank>
 struct View {
   View(const char* function, const char* argument, const at::Tensor& tensor, halide_type_t type,
-       at::ScalarType scalar_type, bool is_output)
+       at::ScalarType scalar_type, bool is_output, Place place = Place::host)
       : kept(tensor) {
-    TORCH_CHECK(tensor.device().is_cpu() && tensor.scalar_type() == scalar_type && tensor.dim() == Rank,
-                "cannot call \"", function, "\": \"", argument, "\" is a tensor of the CPU of ", scalar_type, " over ",
-                Rank, " dimensions; given is one of ", tensor.device(), " of ", tensor.scalar_type(), " with sizes ",
+    TORCH_CHECK(tensor.device().type() == type_of(place) && tensor.scalar_type() == scalar_type && tensor.dim() == Rank,
+                "cannot call \"", function, "\": \"", argument, "\" is a tensor of ",
+                place == Place::host ? "the CPU" : "a GPU", " of ", scalar_type, " over ", Rank, " dimensions; given is one of ", tensor.device(), " of ", tensor.scalar_type(), " with sizes ",
                 tensor.sizes(), ". Convert it with tensor.to().");
     if (Rank > 0 && tensor.size(Rank - 1) > 1 && tensor.stride(Rank - 1) != 1) {
       TORCH_CHECK(!is_output, "cannot call \"", function, "\": the last axis of an output is dense; \"", argument,
@@ -203,6 +231,7 @@ struct View {
     raw.dimensions = Rank;
     raw.dim = dimensions;
   }
+  View(const View&) = delete;
   at::Tensor kept;
   halide_dimension_t dimensions[Rank > 0 ? Rank : 1];
   halide_buffer_t raw{};
@@ -221,26 +250,18 @@ inline double number_of(const char* function, const char* argument, const at::Te
   return number.is_meta() ? 0.0 : number.item<double>();
 }
 
-inline std::string& last_error() {
-  static thread_local std::string text;
-  return text;
-}
-inline void note_error(void*, const char* text) { last_error() = text; }
-inline void succeed(const char* name, int code) {
-  if (code == 0) return;
-  std::string why;
-  why.swap(last_error());
-  if (why.empty()) why = "cannot call \"" + std::string(name) + "\": error code " + std::to_string(code);
-  TORCH_CHECK(false, why);
-}
 [[noreturn]] inline void refuse_derivative(const char* name, const char* why) {
   TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot differentiate \"", name,
                               "\": derivatives are compiled ahead of time; ", why, ". Make the operator in Python, with retrograde.torch.operator.");
   throw std::logic_error("not reached");
 }
-[[noreturn]] inline void refuse_cuda(const char* name) {
-  TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot call \"", name, "\" on tensors of CUDA: its code is the CPU's; it was "
-                              "compiled for no GPU. Move the tensors with tensor.cpu().");
+[[noreturn]] inline void refuse_elsewhere(const char* name, Place place) {
+  if (place == Place::host) {
+    TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot call \"", name, "\" on tensors of CUDA: its code is the CPU's; it was "
+                                "compiled for no GPU. Move the tensors with tensor.cpu(), or compile it with FEATURES cuda.");
+  }
+  TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot call \"", name, "\" on tensors of the CPU: its code is a GPU's; it was "
+                              "compiled with FEATURES cuda. Move the tensors with tensor.cuda().");
   throw std::logic_error("not reached");
 }
 
@@ -249,6 +270,76 @@ template <class... Tensors>
 std::vector<at::Tensor> tensors_of(std::tuple<Tensors...> results) {
   return std::apply([](auto&&... each) { return std::vector<at::Tensor>{std::move(each)...}; }, std::move(results));
 }
+
+}  // namespace retrograde_torch
+#endif
+)";
+
+const char* const pytorch_device_helpers = R"(
+#ifndef RETROGRADE_TORCH_DEVICE_HELPERS
+#define RETROGRADE_TORCH_DEVICE_HELPERS
+#include <HalideRuntimeCuda.h>
+#include <c10/core/DeviceGuard.h>
+#include <c10/core/impl/VirtualGuardImpl.h>
+
+extern "C" int (*halide_set_cuda_get_stream(int (*)(void*, void*, void**)))(void*, void*, void**);
+
+namespace retrograde_torch {
+
+// One in a device's memory, where it stays.
+template <int Rank>
+struct DeviceView : View<Rank> {
+  DeviceView(const char* function, const char* argument, const at::Tensor& tensor, halide_type_t type,
+             at::ScalarType scalar_type, bool is_output)
+      : View<Rank>(function, argument, tensor, type, scalar_type, is_output, Place::device) {
+    if (this->kept.numel() == 0) return;
+    const auto address = reinterpret_cast<uintptr_t>(this->kept.data_ptr());
+    this->raw.host = nullptr;
+    succeed(function, halide_cuda_wrap_device_ptr(nullptr, &this->raw, address));
+    this->raw.set_device_dirty();
+  }
+  ~DeviceView() {
+    if (this->raw.device) halide_cuda_detach_device_ptr(nullptr, &this->raw);
+  }
+};
+
+// The driver's stream behind one of PyTorch's; before PyTorch 2 only the default one is known.
+template <class Stream>
+auto handle_of(const char*, const Stream& stream, int) -> decltype(static_cast<void*>(stream.native_handle())) {
+  return stream.native_handle();
+}
+template <class Stream>
+void* handle_of(const char* function, const Stream& stream, long) {
+  TORCH_CHECK(stream.id() == 0, "cannot call \"", function, "\" on ", stream, ": this PyTorch does not tell which of the "
+              "driver's it is. Call it on the default stream, or take a later PyTorch.");
+  return nullptr;
+}
+
+// While it lives, the device of a tensor is current, and kernels go into the stream that is current there.
+class OnDevice {
+ public:
+  OnDevice(const char* function, const at::Tensor& tensor) : guard_(tensor.device()), before_(stream()) {
+    static const bool is_known = (halide_set_cuda_get_stream(give_stream), true);
+    if (is_known && tensor.device().is_cuda()) {
+      const c10::impl::VirtualGuardImpl device(tensor.device().type());
+      stream() = handle_of(function, device.getStream(tensor.device()), 0);
+    }
+  }
+  OnDevice(const OnDevice&) = delete;
+  ~OnDevice() { stream() = before_; }
+
+ private:
+  static void*& stream() {
+    static thread_local void* current = nullptr;
+    return current;
+  }
+  static int give_stream(void*, void*, void** given) {
+    *given = stream();
+    return 0;
+  }
+  c10::DeviceGuard guard_;
+  void* before_;
+};
 
 }  // namespace retrograde_torch
 #endif

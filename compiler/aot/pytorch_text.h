@@ -8,6 +8,7 @@ extern const char* const pytorch_operator_text;  // the registration of one oper
 // Of one with floating-point numbers, besides: with numbers for them, where the above has tensors.
 extern const char* const pytorch_numbers_text;
 extern const char* const pytorch_register_numbers_text;
-extern const char* const pytorch_helpers;  // once in a program
+extern const char* const pytorch_helpers;         // once in a program
+extern const char* const pytorch_device_helpers;  // after them, where code is for a GPU
 
 }  // namespace retrograde::aot

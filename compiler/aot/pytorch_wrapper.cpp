@@ -13,6 +13,10 @@ namespace {
 
 std::string wrapper(const TorchFunction& function) {
   std::string views, call = function.user_context ? "nullptr" : "", parameters;
+  if (function.on_device && !function.images.empty()) {
+    views = "  const retrograde_torch::OnDevice on_device(\"" + function.name + "\", " +
+            word(function.images[0].name) + ");\n";
+  }
   const auto add = [&](const ExportArgument& argument) {
     const std::string name = word(argument.name);
     const bool is_output = argument.kind == ExportArgument::Kind::OutputBuffer;
@@ -23,10 +27,10 @@ std::string wrapper(const TorchFunction& function) {
       call += "static_cast<" + c_type(argument) + ">(" + name + ")";
       return;
     }
-    views +=
-        text("  retrograde_torch::View<", argument.dimensions, "> view_of_", name, "(\"",
-             function.name, "\", \"", argument.name, "\", ", name, ", ", element_type(argument),
-             ", ", scalar_type(argument), ", ", is_output ? "true" : "false", ");\n");
+    views += text("  retrograde_torch::", function.on_device ? "Device" : "", "View<",
+                  argument.dimensions, "> view_of_", name, "(\"", function.name, "\", \"",
+                  argument.name, "\", ", name, ", ", element_type(argument), ", ",
+                  scalar_type(argument), ", ", is_output ? "true" : "false", ");\n");
     call += "&view_of_" + name + ".raw";
   };
   for (const ExportArgument& argument : function.inputs) add(argument);
@@ -43,7 +47,7 @@ $views$  return ::$name$($call$);
 
 }  // namespace
 
-std::string pytorch_wrapper_text(const std::string& module_name,
+std::string pytorch_wrapper_text(const std::string& module_name, const Target& target,
                                  const std::vector<DeclaredFunction>& functions) {
   const std::string guard = "RETROGRADE_PYTORCH_" + word(module_name) + "_H";
   std::string result =
@@ -53,8 +57,9 @@ std::string pytorch_wrapper_text(const std::string& module_name,
       "\n\n#include <ATen/ATen.h>\n#include <HalideRuntime.h>\n\n#include <stdexcept>\n"
       "#include <string>\n#include <tuple>\n#include <vector>\n\n#include \"" +
       word(module_name) + ".h\"\n" + pytorch_helpers;
+  if (target.has_gpu_feature()) result += pytorch_device_helpers;
   for (const DeclaredFunction& declared : functions) {
-    const TorchFunction function = torch_function_of(declared);
+    const TorchFunction function = torch_function_of(declared, target);
     result += wrapper(function);
     if (!function.images.empty()) result += torch_operator_text(function);
   }

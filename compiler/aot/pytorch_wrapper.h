@@ -13,7 +13,7 @@ namespace retrograde::aot {
 // and, where the program defines RETROGRADE_TORCH_OP first, the registration of the operator. See the text's own
 // beginning, and retrograde_add_torch_op in cmake/RetrogradeTorch.cmake, which writes such programs.
 // Unsupported: elements that no tensor has; names in namespaces.
-std::string pytorch_wrapper_text(const std::string& module_name,
+std::string pytorch_wrapper_text(const std::string& module_name, const Target& target,
                                  const std::vector<DeclaredFunction>& functions);
 
 }  // namespace retrograde::aot

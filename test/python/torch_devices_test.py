@@ -208,7 +208,8 @@ class OnDevice(unittest.TestCase):
         g = rg.Func()
         g[x, y] = image[x, y] * 2
         g.gpu_tile(x, y, xi, yi, 8, 4)
-        result, = operator(f"devices::{NAME}_tiled", g, [image]).plan_for((), [tensor]).run_on(DEVICE, [on_device(tensor)])
+        tiled = operator(f"devices::{NAME}_tiled", g, [image]).plan_for((), [tensor])
+        result, = tiled.run_on(DEVICE, [on_device(tensor)])
         DEVICE.wait()
         self.assertTrue(torch.equal(result, 2 * tensor))
 

@@ -10,8 +10,8 @@
     op(torch.rand(64), weights).sum().backward()          # weights.grad is there
 
 Tensors have any strides and are not copied; the axis rule is the package's: t[y, x] == f[x, y]. Those of CUDA run as
-kernels on the stream that is current, with the schedule that auto_schedule() gives for the device; numbers are best left
-on the CPU, for kernels take them as arguments.
+kernels on the stream that is current, with the schedule that auto_schedule() gives for the device; numbers are best
+left on the CPU, for kernels take them as arguments.
 Gradients are pipelines, made when they are first asked for, of exactly those inputs that want one; they are operators
 themselves, so that they are differentiated again, as often as one likes. Their bits are the same from run to run.
 

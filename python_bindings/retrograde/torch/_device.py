@@ -1,5 +1,5 @@
-"""The devices on which operators run besides the CPU: where their tensors are, what is compiled for them, and the stream
-that all of it is put into.
+"""The devices on which operators run besides the CPU: where their tensors are, what is compiled for them, and the
+stream that all of it is put into.
 """
 import functools
 import os

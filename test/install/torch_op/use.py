@@ -1,14 +1,16 @@
 """Operators that were compiled ahead of time, as PyTorch sees them; nothing of ours is imported.
 
-    use.py FOLDER"""
+    use.py FOLDER DRIVER        DRIVER: libretrograde_simt.so"""
+import os
 import sys
 import timeit
 
 import torch
 from torch.utils._python_dispatch import TorchDispatchMode
 
-folder = sys.argv[1]
-for name in ("weighted", "sum_of_two"):
+folder, driver = sys.argv[1:]
+os.environ.update(RETROGRADE_GPU="simulated", RETROGRADE_SIMT_LIBRARY=driver)
+for name in ("weighted", "weighted_on_device", "sum_of_two"):
     torch.ops.load_library(f"{folder}/{name}.so")
 weighted, total = torch.ops.tests.weighted, torch.ops.tests.sum_of_two
 
@@ -90,6 +92,12 @@ raises(RuntimeError, "no second derivative", lambda: gradient.sum().backward())
 raises(RuntimeError, "made without GRADIENT", lambda: total(taps, taps).sum().backward())
 raises(RuntimeError, '"gain" is a floating-point number, or a tensor of one without dimensions',
        lambda: weighted(image, taps, torch.ones(1), False))
+
+# Of kernels, whose results use_wrapper.cpp looks at: memory that the driver does not know is refused.
+kernels = torch.ops.tests.weighted_on_device
+meta = kernels(torch.empty(5, 9, device="meta"), torch.empty(3, device="meta"), 1.0, False)
+assert [m.shape for m in meta] == [(5, 7), (5, 9)]
+raises(RuntimeError, "cuPointerGetAttribute", lambda: kernels(image.detach(), taps.detach(), 1.0, False))
 
 if hasattr(torch.library, "opcheck"):
     torch.library.opcheck(weighted.default, (image, taps, 1.5, False))
