@@ -211,7 +211,8 @@ struct View {
       : kept(tensor) {
     TORCH_CHECK(tensor.device().type() == type_of(place) && tensor.scalar_type() == scalar_type && tensor.dim() == Rank,
                 "cannot call \"", function, "\": \"", argument, "\" is a tensor of ",
-                place == Place::host ? "the CPU" : "a GPU", " of ", scalar_type, " over ", Rank, " dimensions; given is one of ", tensor.device(), " of ", tensor.scalar_type(), " with sizes ",
+                place == Place::host ? "the CPU" : "a GPU", " of ", scalar_type, " over ", Rank,
+                " dimensions; given is one of ", tensor.device(), " of ", tensor.scalar_type(), " with sizes ",
                 tensor.sizes(), ". Convert it with tensor.to().");
     if (Rank > 0 && tensor.size(Rank - 1) > 1 && tensor.stride(Rank - 1) != 1) {
       TORCH_CHECK(!is_output, "cannot call \"", function, "\": the last axis of an output is dense; \"", argument,
@@ -258,7 +259,8 @@ inline double number_of(const char* function, const char* argument, const at::Te
 [[noreturn]] inline void refuse_elsewhere(const char* name, Place place) {
   if (place == Place::host) {
     TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot call \"", name, "\" on tensors of CUDA: its code is the CPU's; it was "
-                                "compiled for no GPU. Move the tensors with tensor.cpu(), or compile it with FEATURES cuda.");
+                                "compiled for no GPU. Move the tensors with tensor.cpu(), or compile it with "
+                                "FEATURES cuda.");
   }
   TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot call \"", name, "\" on tensors of the CPU: its code is a GPU's; it was "
                               "compiled with FEATURES cuda. Move the tensors with tensor.cuda().");
@@ -310,8 +312,8 @@ auto handle_of(const char*, const Stream& stream, int) -> decltype(static_cast<v
 }
 template <class Stream>
 void* handle_of(const char* function, const Stream& stream, long) {
-  TORCH_CHECK(stream.id() == 0, "cannot call \"", function, "\" on ", stream, ": this PyTorch does not tell which of the "
-              "driver's it is. Call it on the default stream, or take a later PyTorch.");
+  TORCH_CHECK(stream.id() == 0, "cannot call \"", function, "\" on ", stream, ": this PyTorch does not tell which of "
+              "the driver's it is. Call it on the default stream, or take a later PyTorch.");
   return nullptr;
 }
 
