@@ -26,6 +26,7 @@
 #include "autoschedule/placement_limits.h"
 #include "autoschedule/reduction_chunks.h"
 #include "autoschedule/reduction_slices.h"
+#include "autoschedule/row_copies.h"
 #include "autoschedule/row_order.h"
 #include "autoschedule/row_sweeps.h"
 #include "autoschedule/scatter_schedule.h"
@@ -213,8 +214,10 @@ class LoopChooser {
     const auto packed = makes(Decision::LayoutStaging)
                             ? packed_operand(f_, definition(), *tile, lanes, sizes_)
                             : std::nullopt;
-    std::vector<VarOrRVar> loops = cut(*tile, {}, packed.has_value());
+    const auto rows = packed ? std::nullopt : copied_rows(*tile);
+    std::vector<VarOrRVar> loops = cut(*tile, {}, packed || rows);
     if (packed) loops = pack_inside(*packed, loops);
+    if (rows) copy_rows_inside(*rows, loops);
     run_in_parallel(loops, *tile);
     return true;
   }
@@ -251,6 +254,38 @@ class LoopChooser {
     stage_.reorder(order);
     pack(function_, operand, retrograde::LoopLevel(Func(function_), outside[0]), lanes);
     return outside;
+  }
+
+  std::optional<RowCopy> copied_rows(const RegisterTile& tile) const {
+    if (!makes(Decision::LayoutStaging)) return std::nullopt;
+    std::vector<size_t> order{0};  // of the loops that cut() makes
+    for (const RegisterTile::Side& side : tile.sides) order.push_back(side.dimension);
+    for (const size_t d : pure_) {
+      if (std::find(order.begin(), order.end(), d) == order.end()) order.push_back(d);
+    }
+    const auto copy = row_copy(f_, tile, lanes, order, sizes_);
+    return copy && !is_to_be_inlined(*copy->source) ? copy : std::nullopt;
+  }
+  bool is_to_be_inlined(const FuncContents& f) const {
+    const auto& inlined = request_.options.inlined;
+    return request_.recomputed.contains(f.name) ||
+           std::find(inlined.begin(), inlined.end(), FuncName(f.name)) != inlined.end();
+  }
+
+  // Several rows of tiles for one copy stand inside of its loop.
+  void copy_rows_inside(const RowCopy& copy, const std::vector<VarOrRVar>& loops) {
+    const Var rows = variable_of(copy.dimension);
+    if (copy.rows > 1) {
+      const Var row = inside(rows);
+      stage_.split(rows, rows, row, static_cast<int>(copy.rows), TailStrategy::GuardWithIf);
+      std::vector<VarOrRVar> order;
+      for (const VarOrRVar& loop : loops) {
+        if (loop.name() == rows.name()) order.push_back(row);
+        order.push_back(loop);
+      }
+      stage_.reorder(order);
+    }
+    copy_rows(function_, copy, retrograde::LoopLevel(Func(function_), rows), lanes);
   }
 
   // The outermost of them, and where that may be short the next one too: a loop in parallel inside of

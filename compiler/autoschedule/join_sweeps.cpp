@@ -10,6 +10,7 @@
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
 #include "graph/own_reads.h"
+#include "graph/wrappers.h"
 #include "ir/equal.h"
 #include "ir/lets.h"
 #include "ir/memory_reads.h"
@@ -121,7 +122,7 @@ std::optional<VarOrRVar> innermost_loop(const Sweep& sweep) {
 void join_sweeps(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& funcs,
                  const SizeEstimate& sizes) {
   std::unordered_set<std::string> hosts;  // of what is computed in their loops
-  for (const FuncPtr& f : topological_order(outputs)) hosts.insert(f->schedule.compute_level.func);
+  for (const FuncPtr& f : functions_of(outputs)) hosts.insert(f->schedule.compute_level.func);
   std::vector<Sweep> sweeps;
   for (const FuncPtr& f : funcs) {
     if (!is_at_root(*f) || hosts.contains(f->name)) continue;

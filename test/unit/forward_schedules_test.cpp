@@ -1,6 +1,6 @@
 // What the built-in autoscheduler does with forward programs: choices along small dimensions, rows along
 // long ones, chains behind transposed reads, slices that a reduction reads through what is inline,
-// parts of sums at places that data decide.
+// parts of sums at places that data decide, rows that tiles read through boundary conditions.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -297,6 +297,102 @@ TEST(ScattersToFewElements, HavePrivateParts) {
   EXPECT_TRUE(adds_parts(histograms.program.counts));
   EXPECT_TRUE(adds_parts(histograms.program.beside));
   histograms.expect_same_values({64});
+}
+
+// A layer of a network: what a tile of sums reads through a boundary condition, many times over.
+using Boundary = Func (*)(const Func&, const Region&);
+Func zeros_around(const Func& f, const Region& box) {
+  return BoundaryConditions::constant_exterior(f, 0.0f, box);
+}
+
+struct Layer {
+  Boundary boundary = zeros_around;
+  int step = 1, apart = 1, taps = 3, outputs = 8;
+  bool has_known_sizes = true;
+  AutoscheduleOptions options = {};
+};
+
+class RowCopies : public ::testing::Test {
+ protected:
+  static constexpr int planes = 6;
+
+  // Of `image`, and the weights; its sizes are known, or only when it runs.
+  Func layer_of(const Layer& layer, ImageParam& image, ImageParam& weights) {
+    Var x("x"), y("y"), c("c");
+    const Func source = lambda(x, y, c, image(x, y, c));
+    const Func padded = layer.boundary(
+        source, {{0, image.dim(0).extent()}, {0, image.dim(1).extent()}, {Expr(), Expr()}});
+    const RDom r(0, layer.taps, 0, layer.taps, 0,
+                 layer.has_known_sizes ? Expr(planes) : image.dim(2).extent());
+    Func result("layer");
+    const auto place = [&](const Expr& at, const Expr& tap) {
+      return at * layer.step + (tap - layer.taps / 2) * layer.apart;
+    };
+    result(x, y, c) = 0.5f;
+    result(x, y, c) += weights(r.x, r.y, r.z, c) * padded(place(x, r.x), place(y, r.y), r.z);
+    return result;
+  }
+
+  // The log of its schedule. Its values are those of the layer without one, for sizes with rests too.
+  std::string log_of(const Layer& layer) {
+    ImageParam image(Float(32), 3, "image"), weights(Float(32), 4, "weights");
+    const Func plain = layer_of(layer, image, weights);
+    Func scheduled = layer_of(layer, image, weights);
+    if (layer.has_known_sizes) scheduled.set_estimates({{0, 48}, {0, 64}, {0, layer.outputs}});
+    Pipeline pipeline(scheduled);
+    pipeline.auto_schedule(get_host_target(), layer.options);
+    for (const auto& [width, height] : {std::pair{48, 64}, std::pair{37, 13}, std::pair{1, 2}}) {
+      image.set(some_values({width, height, planes}));
+      weights.set(some_values({layer.taps, layer.taps, planes, layer.outputs}));
+      const std::vector<int> sizes = {(width + layer.step - 1) / layer.step,
+                                      (height + layer.step - 1) / layer.step, layer.outputs};
+      const Buffer<float> found = pipeline.realize(sizes)[0];
+      const Buffer<float> expected = Func(plain).realize(sizes);
+      int wrong = 0;
+      expected.for_each_element([&](const int* at) {
+        wrong += std::abs(found(at) - expected(at)) > 1e-4f * (1 + std::abs(expected(at)));
+      });
+      EXPECT_EQ(wrong, 0) << width << " x " << height;
+    }
+    return pipeline.schedule_log().to_text();
+  }
+
+  bool copies(const Layer& layer) { return log_of(layer).find("_in_layer") != std::string::npos; }
+
+ private:
+  static Buffer<float> some_values(const std::vector<int>& sizes) {
+    Buffer<float> values(sizes);
+    for (size_t i = 0; i < values.number_of_elements(); ++i)
+      values.data()[i] = static_cast<float>((i * 37 + i / 11) % 29) * 0.0625f - 0.75f;
+    return values;
+  }
+};
+
+TEST_F(RowCopies, OfWhatTilesReadThroughZerosAround) {
+  EXPECT_TRUE(copies({}));
+  EXPECT_TRUE(copies({.has_known_sizes = false}));
+}
+TEST_F(RowCopies, OfOtherTaps) {
+  EXPECT_TRUE(copies({.apart = 2}));
+  EXPECT_TRUE(copies({.taps = 5}));
+}
+TEST_F(RowCopies, OfOtherBoundaries) {
+  EXPECT_TRUE(
+      copies({.boundary = [](const Func& f,
+                             const Region& box) { return BoundaryConditions::repeat_edge(f, box); },
+              .outputs = 16}));
+  EXPECT_TRUE(copies(
+      {.boundary = [](const Func& f,
+                      const Region& box) { return BoundaryConditions::mirror_image(f, box); },
+       .outputs = 16}));
+}
+// One tap: each tile reads an element once, and few tiles do.
+TEST_F(RowCopies, NotOfWhatFewTilesRead) {
+  EXPECT_FALSE(copies({.taps = 1}));
+  EXPECT_FALSE(copies({.taps = 1, .has_known_sizes = false}));
+}
+TEST_F(RowCopies, NotWhereTheirDecisionIsSwitchedOff) {
+  EXPECT_FALSE(copies({.options = {.without = {Decision::LayoutStaging}}}));
 }
 
 }  // namespace
