@@ -49,8 +49,8 @@ print(torch.__version__)
 endfunction()
 
 function(retrograde_add_torch_op target)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "GRADIENT;SIMULATED_GPU" "FROM;GENERATOR;NAMESPACE;PYTHON;CXX_STANDARD;AUTOSCHEDULER"
-    "SHAPE;PARAMS;FEATURES")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "GRADIENT;SIMULATED_GPU"
+    "FROM;GENERATOR;NAMESPACE;PYTHON;CXX_STANDARD;AUTOSCHEDULER" "SHAPE;PARAMS;FEATURES")
   set(asked "retrograde_add_torch_op(${target})")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "${asked}: unknown arguments ${arg_UNPARSED_ARGUMENTS}")
