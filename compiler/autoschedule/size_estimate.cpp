@@ -2,6 +2,8 @@
 
 #include <HalideRuntime.h>
 
+#include <algorithm>
+
 #include "graph/own_reads.h"
 #include "graph/parameter_contents.h"
 #include "ir/build.h"
@@ -51,16 +53,32 @@ Scope<Interval> parameter_scope(const std::vector<FuncPtr>& outputs) {
   return scope;
 }
 
+void refine_by(Interval& known, const Expr& min, const Expr& extent,
+               const Scope<Interval>& parameters) {
+  const Interval all = interval_of(min, extent);
+  if (all.min.defined()) refine(known, {bounds_of(all.min, parameters).min, {}});
+  if (all.max.defined()) refine(known, {{}, bounds_of(all.max, parameters).max});
+}
+
 // What its user or its maker says of its size.
 Interval told(const FuncContents& f, size_t d, const Scope<Interval>& parameters) {
   Interval result;
   for (const auto* entries : {&f.schedule.bounds, &f.schedule.estimates}) {
     for (const Bound& b : *entries) {
-      if (b.var != f.args[d]) continue;
-      const Interval all = interval_of(b.min, b.extent);
-      if (all.min.defined()) refine(result, {bounds_of(all.min, parameters).min, {}});
-      if (all.max.defined()) refine(result, {{}, bounds_of(all.max, parameters).max});
+      if (b.var == f.args[d]) refine_by(result, b.min, b.extent, parameters);
     }
+  }
+  return constant_ends(result);
+}
+
+// The same of the buffer that an output of the pipeline fills.
+Interval told_of_buffer(const FuncContents& f, size_t d, const Scope<Interval>& parameters) {
+  Interval result;
+  for (const auto& buffer : f.outputs) {
+    if (d >= buffer->constraints.size()) continue;
+    const BufferConstraint& c = buffer->constraints[d];
+    refine_by(result, c.min, c.extent, parameters);
+    refine_by(result, c.min_estimate, c.extent_estimate, parameters);
   }
   return constant_ends(result);
 }
@@ -88,7 +106,11 @@ SizeEstimate::SizeEstimate(const std::vector<FuncPtr>& outputs, const MachineLim
     const FuncContents& f = **it;
     Box& found = boxes_[&f];
     found.resize(f.args.size());
-    for (size_t d = 0; d < f.args.size(); ++d) refine(found[d], told(f, d, parameters));
+    const bool is_output = std::ranges::find(outputs, *it) != outputs.end();
+    for (size_t d = 0; d < f.args.size(); ++d) {
+      refine(found[d], told(f, d, parameters));
+      if (is_output) refine(found[d], told_of_buffer(f, d, parameters));
+    }
     const Box box = found;
     for (int s = 0; s < f.stage_count(); ++s) {
       const Scope<Interval> scope = scope_of(f, f.stage(s), box, parameters);

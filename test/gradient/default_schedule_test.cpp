@@ -637,6 +637,25 @@ TEST_F(DefaultSchedule, SizesFollowFromThoseOfTheOutputs) {
   EXPECT_EQ(autoschedule::SizeEstimate({second.function()}).extent(*edge.function(), 1), 30);
 }
 
+TEST_F(DefaultSchedule, SizesFollowFromThoseOfTheBuffersOfOutputs) {
+  const Buffer<float> image(100, 80);
+  Func edge("edge"), sums("sums");
+  edge(x, y) = image(clamp(x, 0, 99), clamp(y, 0, 79));
+  RDom r(-1, 3);
+  sums(x, y) += edge(x + r, y);
+  sums.output_buffer().dim(0).set_bounds(2, 40);
+  edge.output_buffer().dim(1).set_bounds(0, 80);
+  const autoschedule::SizeEstimate bound({sums.function()});
+  EXPECT_EQ(bound.extent(*sums.function(), 0), 40);
+  EXPECT_EQ(bound.extent(*edge.function(), 0), 42);
+  EXPECT_EQ(bound.extent(*edge.function(), 1), std::nullopt) << "edge fills no buffer here";
+  sums.output_buffer().dim(1).set_estimate(0, 30);
+  EXPECT_EQ(autoschedule::SizeEstimate({sums.function()}).extent(*edge.function(), 1), 30);
+  sums.set_estimate(y, 0, 20);
+  EXPECT_EQ(autoschedule::SizeEstimate({sums.function()}).extent(*edge.function(), 1), 20)
+      << "what the Func says comes first";
+}
+
 TEST_F(DefaultSchedule, SumsToAFewElementsAreCut) {
   Buffer<float> image = gradient::random_image({300, 200, 5}, 0, 1, 3);
   Func energy("energy");
