@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <chrono>
 
 #include "autodiff/derivative.h"
 #include "diagnostics/error.h"
@@ -118,7 +117,7 @@ TEST_F(SearchOfSchedules, KeepsWhatAUserDecided) {
   EXPECT_TRUE(found.best.request.options.without.contains(Decision::Strips));
 }
 
-// 500 stages and their gradient.
+// 500 stages and their gradient. What one schedule of it takes is a matter of chain_growth_test.
 TEST(SearchOfLongChains, TriesFewAndEnds) {
   EXPECT_EQ(autoschedule::candidates_for(10), 96u);
   EXPECT_EQ(autoschedule::candidates_for(1000), 12u);
@@ -132,15 +131,17 @@ TEST(SearchOfLongChains, TriesFewAndEnds) {
     last = next;
   }
   const Func loss = gradient::weighted_sum(last, {60, 60});
-  const auto start = std::chrono::steady_clock::now();
+  std::atomic<size_t> asked = 0;
   const ScheduleSearch found = autoschedule::search_schedule(
       {loss.function(), propagate_adjoints(loss)(image).function()}, {}, Scheduling::Gradients,
-      [](const Funcs& scheduled) {
+      [&](const Funcs& scheduled) {
+        ++asked;
         return static_cast<double>(graph::schedule_log(scheduled).size());
       });
-  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   EXPECT_LE(found.best.cost, found.cost_of_rules);
-  EXPECT_LT(seconds.count(), 60);
+  EXPECT_GT(found.tried, 1u);
+  EXPECT_LE(found.tried, 12u);
+  EXPECT_LE(asked, 13u) << "with that of the rules";
 }
 
 }  // namespace
