@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <string>
@@ -179,63 +180,71 @@ void set_estimates(const Program& program) {
 // Of a machine with small caches, so that small programs meet the rules for large ones.
 const MachineParams small_machine(2, 8 << 10, 40);
 
-std::string log_without(const std::string& name, const std::set<Decision>& without) {
+Pipeline scheduled_without(const std::string& name, const std::set<Decision>& without) {
   const Program program = programs().at(name)();
   if (program.has_estimates) set_estimates(program);
   AutoscheduleOptions options;
   options.without = without;
   const Pipeline pipeline(program.outputs);
   pipeline.auto_schedule(get_host_target(), options, small_machine);
+  return pipeline;
+}
+
+std::string log_of(const std::string& name, const std::set<Decision>& without) {
+  return same_numbers(scheduled_without(name, without).schedule_log().to_text());
+}
+
+void expect_right_without(const std::string& name, const std::set<Decision>& without) {
   std::string how = "scheduled without";
-  for (Decision decision : without) how += " " + to_string(decision);
-  expect_right(name, pipeline, how);
-  return same_numbers(pipeline.schedule_log().to_text());
+  for (const Decision decision : without) how += " " + to_string(decision);
+  expect_right(name, scheduled_without(name, without), how);
 }
 
-class Without : public ::testing::TestWithParam<Decision> {};
+// A case for each program: what it is to compute is interpreted once.
+class EachProgram : public ::testing::TestWithParam<std::string> {};
 
-TEST_P(Without, SchedulesAreLegalAndRight) {
-  static std::map<std::string, std::string> with_all;
-  bool changes = false;
-  for (const auto& [name, make] : programs()) {
-    if (with_all[name].empty()) with_all[name] = log_without(name, {});
-    changes |= with_all[name] != log_without(name, {GetParam()});
-  }
-  EXPECT_TRUE(changes) << "no program shows what " << to_string(GetParam()) << " decides";
-}
-
-TEST_P(Without, GradientsAreCompiledSo) {
-  for (const auto& [name, make] : programs()) {
-    const Program program = make();
+TEST_P(EachProgram, IsRightWithoutAnyOfTheDecisions) {
+  const std::string& name = GetParam();
+  std::set<Decision> none;
+  for (const Decision decision : all_decisions()) {
+    none.insert(decision);
+    expect_right_without(name, {decision});
+    const Program program = programs().at(name)();
     Pipeline pipeline(program.outputs);
     AutoscheduleOptions options;
-    options.without = {GetParam()};
+    options.without = {decision};
     pipeline.set_autoschedule(options);
-    expect_right(name, pipeline, "compiled without " + to_string(GetParam()));
+    expect_right(name, pipeline, "compiled without " + to_string(decision));
   }
+  expect_right_without(name, none);
 }
 
-INSTANTIATE_TEST_SUITE_P(Each, Without, ::testing::ValuesIn(all_decisions()),
-                         [](const auto& info) { return to_string(info.param); });
-
-TEST(AutoscheduleOptions, WithoutAnyDecision) {
-  for (const auto& [name, make] : programs())
-    log_without(name, {all_decisions().begin(), all_decisions().end()});
+TEST_P(EachProgram, IsRightAndPredictedNoSlowerWhenItsScheduleIsSearched) {
+  const Program program = programs().at(GetParam())();
+  set_estimates(program);
+  AutoscheduleOptions options;
+  options.search = true;
+  options.deterministic = false;
+  const Pipeline pipeline(program.outputs);
+  const SearchedSchedules found =
+      pipeline.auto_schedule(get_host_target(), options, small_machine).search;
+  expect_right(GetParam(), pipeline, "searched");
+  EXPECT_GT(found.tried, 1u) << found.note;
+  EXPECT_LE(found.predicted_ms, found.rules_ms);
 }
 
-TEST(AutoscheduleOptions, SearchedSchedulesAreRightAndPredictedNoSlower) {
-  for (const auto& [name, make] : programs()) {
-    const Program program = make();
-    set_estimates(program);
-    AutoscheduleOptions options;
-    options.search = true;
-    options.deterministic = false;
-    const Pipeline pipeline(program.outputs);
-    const SearchedSchedules found =
-        pipeline.auto_schedule(get_host_target(), options, small_machine).search;
-    expect_right(name, pipeline, "searched");
-    EXPECT_GT(found.tried, 1u) << name << ": " << found.note;
-    EXPECT_LE(found.predicted_ms, found.rules_ms) << name;
+INSTANTIATE_TEST_SUITE_P(Options, EachProgram,
+                         ::testing::Values("stencils", "smoothing", "convolution", "product",
+                                           "warp", "shifts", "bands"),
+                         [](const auto& info) { return info.param; });
+
+TEST(AutoscheduleOptions, EachDecisionShowsInSomeSchedule) {
+  std::map<std::string, std::string> with_all;
+  for (const auto& [name, make] : programs()) with_all[name] = log_of(name, {});
+  for (const Decision decision : all_decisions()) {
+    const bool changes = std::ranges::any_of(
+        with_all, [&](const auto& log) { return log.second != log_of(log.first, {decision}); });
+    EXPECT_TRUE(changes) << "no program shows what " << to_string(decision) << " decides";
   }
 }
 
