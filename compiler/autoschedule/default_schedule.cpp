@@ -257,13 +257,15 @@ class LoopChooser {
   }
 
   std::optional<RowCopy> copied_rows(const RegisterTile& tile) const {
-    if (!makes(Decision::LayoutStaging)) return std::nullopt;
+    // Sums of the scheduler's own are few.
+    const bool is_own = f_.made && (f_.made->lanes > 0 || f_.made->has_parts);
+    if (is_own || !makes(Decision::LayoutStaging)) return std::nullopt;
     std::vector<size_t> order{0};  // of the loops that cut() makes
     for (const RegisterTile::Side& side : tile.sides) order.push_back(side.dimension);
     for (const size_t d : pure_) {
       if (std::find(order.begin(), order.end(), d) == order.end()) order.push_back(d);
     }
-    const auto copy = row_copy(f_, tile, lanes, order, sizes_);
+    const auto copy = row_copy(f_, tile, lanes, {order, {}}, sizes_);
     return copy && !is_to_be_inlined(*copy->source) ? copy : std::nullopt;
   }
   bool is_to_be_inlined(const FuncContents& f) const {
@@ -392,18 +394,22 @@ class LoopChooser {
     const std::vector<size_t> shifts = shifts_of(*block, own);
     compute_block(block, shifts);
     const std::vector<VarOrRVar> tiles = cut(own, shifts);
-    if (makes(Decision::LayoutStaging)) cut_into_chunks(*block, tiles, own);
+    const auto chunk =
+        makes(Decision::LayoutStaging) ? cut_into_chunks(*block, tiles, own) : std::nullopt;
+    if (chunk) copy_rows_of_chunk(block, tile, tiles, shifts, *chunk);
     run_in_parallel(tiles, own);
     for (int s = 0; s < block->stage_count(); ++s)
       LoopChooser(block, s, request_, sizes_).cut(tile);
   }
 
-  // The loops over tiles stand inside of those over chunks of the reduction.
-  void cut_into_chunks(const FuncContents& block, const std::vector<VarOrRVar>& tiles,
-                       const RegisterTile& tile) {
+  // The loops over tiles stand inside of those over chunks of the reduction. The result: iterations of
+  // its first loop that a chunk has.
+  std::optional<int64_t> cut_into_chunks(const FuncContents& block,
+                                         const std::vector<VarOrRVar>& tiles,
+                                         const RegisterTile& tile) {
     const std::vector<ReductionVariable> loops = reduction_loops(f_, definition());
     const auto chunk = reduction_chunk(f_, block, loops[0], tile, lanes, sizes_);
-    if (!chunk) return;
+    if (!chunk) return std::nullopt;
     const RVar iteration(loops[0].var), chunks(new_loop(f_, index_, "chunks"));
     stage_.split(iteration, chunks, iteration, static_cast<int>(*chunk));
     std::vector<VarOrRVar> order{iteration};
@@ -411,6 +417,28 @@ class LoopChooser {
     order.push_back(chunks);
     for (size_t i = 1; i < loops.size(); ++i) order.push_back(RVar(loops[i].var));
     stage_.reorder(order);
+    return chunk;
+  }
+
+  // What all blocks of a chunk read through a boundary condition, say; the tile is the block's.
+  void copy_rows_of_chunk(const FuncPtr& block, const RegisterTile& tile,
+                          const std::vector<VarOrRVar>& tiles, const std::vector<size_t>& shifts,
+                          int64_t chunk) {
+    const auto in_block = [&](const std::string& name) {
+      const auto arg = std::find(block->args.begin(), block->args.end(), name);
+      return static_cast<size_t>(arg - block->args.begin());
+    };
+    LoopsOfTiles loops;
+    for (const VarOrRVar& loop : tiles) loops.tiles.push_back(in_block(loop.name()));
+    for (const size_t d : shifts) loops.inside.push_back(in_block(f_.args[d]));
+    const auto number = number_along(f_, *block, reduction_loops(f_, definition())[0].var);
+    if (!number || std::ranges::count(loops.tiles, block->args.size()) > 0) return;
+    loops.inside.push_back(*number);
+    const auto copy =
+        row_copy(*block, tile, lanes, loops, sizes_.with_extent(*block, *number, chunk));
+    if (!copy || is_to_be_inlined(*copy->source)) return;
+    const Var rows(block->args[copy->dimension]);
+    copy_rows(block, *copy, retrograde::LoopLevel(Func(function_), rows), lanes);
   }
 
   // For each iteration of the innermost loop outside of the tile.

@@ -105,21 +105,6 @@ double tiles_along(const FuncContents& sums, size_t d, const RegisterTile& tile,
   return std::ceil(static_cast<double>(extent) / static_cast<double>(size));
 }
 
-// The argument of the block that the loop moves alone; empty: there is none.
-std::string number_along(const FuncContents& sums, const FuncContents& block,
-                         const std::string& loop) {
-  std::string result;
-  walk_definition(sums.updates[0], [&](const Expr& e) {
-    const auto* call = e.as<Call>();
-    if (!call || call->name != block.name) return;
-    for (size_t d = 0; d < call->args.size(); ++d) {
-      const auto* place = call->args[d].as<Variable>();
-      if (place && place->name == loop) result = block.args[d];
-    }
-  });
-  return result;
-}
-
 // Of a chunk: once, and as often as tiles read it.
 struct ChunkBytes {
   double once = 0, by_tiles = 0;
@@ -140,6 +125,20 @@ ChunkBytes bytes_of(const std::vector<ChunkOperand>& operands, const FuncContent
 
 }  // namespace
 
+std::optional<size_t> number_along(const FuncContents& sums, const FuncContents& block,
+                                   const std::string& loop) {
+  std::optional<size_t> result;
+  walk_definition(sums.updates[0], [&](const Expr& e) {
+    const auto* call = e.as<Call>();
+    if (!call || call->name != block.name) return;
+    for (size_t d = 0; d < call->args.size(); ++d) {
+      const auto* place = call->args[d].as<Variable>();
+      if (place && place->name == loop) result = d;
+    }
+  });
+  return result;
+}
+
 int64_t largest_part(int64_t extent, int64_t most) {
   int64_t part = std::max<int64_t>(1, std::min(extent, most));
   while (extent % part != 0) --part;
@@ -150,10 +149,11 @@ std::optional<int64_t> reduction_chunk(const FuncContents& sums, const FuncConte
                                        const ReductionVariable& loop, const RegisterTile& tile,
                                        int lanes, const SizeEstimate& sizes) {
   const auto extent = as_const_int(simplify(loop.extent));
-  const std::string number = number_along(sums, block, loop.var);
-  if (!extent || *extent <= 0 || number.empty()) return std::nullopt;
+  const auto number = number_along(sums, block, loop.var);
+  if (!extent || *extent <= 0 || !number) return std::nullopt;
   const auto chunk_of = [&](int64_t iterations) -> std::optional<ChunkBytes> {
-    const auto operands = ChunkReads(sums, block, number, iterations, sizes).operands();
+    const auto operands =
+        ChunkReads(sums, block, block.args[*number], iterations, sizes).operands();
     return operands ? std::optional(bytes_of(*operands, sums, tile, lanes, sizes)) : std::nullopt;
   };
   int64_t iterations = *extent;

@@ -17,6 +17,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "autoschedule/register_tile.h"
 
@@ -24,6 +25,10 @@ namespace retrograde::autoschedule {
 
 // The largest number of iterations, at most `most`, that divides a loop without a rest.
 int64_t largest_part(int64_t extent, int64_t most);
+
+// The dimension of a block that a loop of its sums moves alone.
+std::optional<size_t> number_along(const FuncContents& sums, const FuncContents& block,
+                                   const std::string& loop);
 
 // Of `sums`, whose update adds up what `block` computes for one iteration of the loop, in tiles: the
 // iterations of a chunk, a divisor of all. nullopt: the tiles read little again, or sizes are not

@@ -79,7 +79,7 @@ class InlinedCost {
 class ReadOfTiles {
  public:
   ReadOfTiles(const Call& call, const FuncContents& f, const RegisterTile& tile, int lanes,
-              const std::vector<size_t>& loops, const SizeEstimate& sizes)
+              const LoopsOfTiles& loops, const SizeEstimate& sizes)
       : f_(f), tile_(tile), lanes_(lanes), loops_(loops), sizes_(sizes) {
     for (const Expr& arg : call.args) index_.push_back(place(arg));
   }
@@ -87,8 +87,8 @@ class ReadOfTiles {
   // Along which rows lie: the innermost loop over tiles, but for that along rows, that moves the read.
   std::optional<size_t> row_dimension() const {
     const auto moves = [&](size_t d) { return d != 0 && is_moved_by(f_.args[d]); };
-    const auto found = std::find_if(loops_.begin(), loops_.end(), moves);
-    return found == loops_.end() ? std::nullopt : std::optional(*found);
+    const auto found = std::find_if(loops_.tiles.begin(), loops_.tiles.end(), moves);
+    return found == loops_.tiles.end() ? std::nullopt : std::optional(*found);
   }
 
   // Of one copy for so many tiles along that dimension.
@@ -124,7 +124,7 @@ class ReadOfTiles {
   // That have a copy of their own, if one is of so many tiles; 0: not known.
   double copies(size_t row, int64_t rows) const {
     double copies = 1;
-    for (const size_t d : loops_) {
+    for (const size_t d : loops_.tiles) {
       if (d == 0 || !is_moved_by(f_.args[d])) continue;
       const auto size = static_cast<double>(tile_.size_along(d, lanes_) * (d == row ? rows : 1));
       copies *= std::ceil(static_cast<double>(sizes_.extent(f_, d).value_or(0)) / size);
@@ -165,16 +165,23 @@ class ReadOfTiles {
   // loop count as one tile.
   Extents extents_of(size_t row, int64_t rows, bool& is_known) const {
     Extents extents;
-    bool is_inside = true;
-    for (const size_t d : loops_) {
-      is_inside &= d != row;
+    const auto add_all = [&](size_t d) {
       const auto tile = static_cast<double>(tile_.size_along(d, lanes_));
       const auto extent = sizes_.extent(f_, d);
       const double guess = d == 0 ? unknown_row : std::max(unknown_planes, tile);
-      is_known &= !is_inside || extent.has_value();
-      const double all = extent ? static_cast<double>(*extent) : guess;
-      extents[f_.args[d]] = is_inside ? std::ceil(all / tile) * tile
-                                      : tile * static_cast<double>(d == row ? rows : 1);
+      is_known &= extent.has_value();
+      extents[f_.args[d]] =
+          std::ceil((extent ? static_cast<double>(*extent) : guess) / tile) * tile;
+    };
+    for (const size_t d : loops_.inside) add_all(d);
+    bool is_inside = true;
+    for (const size_t d : loops_.tiles) {
+      is_inside &= d != row;
+      if (is_inside)
+        add_all(d);
+      else
+        extents[f_.args[d]] =
+            static_cast<double>(tile_.size_along(d, lanes_) * (d == row ? rows : 1));
     }
     for (const ReductionVariable& r : update().rvars) {
       const auto extent = as_const_int(simplify(r.extent));
@@ -187,7 +194,7 @@ class ReadOfTiles {
   const FuncContents& f_;
   const RegisterTile& tile_;
   const int lanes_;
-  const std::vector<size_t>& loops_;
+  const LoopsOfTiles& loops_;
   const SizeEstimate& sizes_;
   std::vector<Expr> index_;
 };
@@ -206,8 +213,8 @@ bool pays(const ReadOfTiles::Counts& counts, double operations) {
 }
 
 std::optional<RowCopy> copy_for(const Call& call, const FuncPtr& source, const FuncContents& f,
-                                const RegisterTile& tile, int lanes,
-                                const std::vector<size_t>& loops, const SizeEstimate& sizes) {
+                                const RegisterTile& tile, int lanes, const LoopsOfTiles& loops,
+                                const SizeEstimate& sizes) {
   const double operations = InlinedCost().of(*source);
   if (operations <= 0) return std::nullopt;
   const ReadOfTiles read(call, f, tile, lanes, loops, sizes);
@@ -216,7 +223,8 @@ std::optional<RowCopy> copy_for(const Call& call, const FuncPtr& source, const F
   double bytes = 0;  // of an element
   for (const Type& type : source->types) bytes += type.bytes();
   const auto extent = sizes.extent(f, *row);
-  for (int64_t rows = tile.size_along(*row, lanes) == 1 ? most_rows : 1; rows >= 1; rows /= 2) {
+  const bool may_share = loops.inside.empty() && tile.size_along(*row, lanes) == 1;
+  for (int64_t rows = may_share ? most_rows : 1; rows >= 1; rows /= 2) {
     const auto counts = read.counts(*row, rows);
     if (!counts) return std::nullopt;
     const bool divides = counts->is_known && extent && *extent % rows == 0;
@@ -243,10 +251,8 @@ bool reads(const Definition& stage, const FuncPtr& source) {
 }  // namespace
 
 std::optional<RowCopy> row_copy(const FuncContents& f, const RegisterTile& tile, int lanes,
-                                const std::vector<size_t>& loops, const SizeEstimate& sizes) {
-  // Sums of the scheduler's own are few.
-  if (f.updates.size() != 1 || (f.made && (f.made->lanes > 0 || f.made->has_parts)))
-    return std::nullopt;
+                                const LoopsOfTiles& loops, const SizeEstimate& sizes) {
+  if (f.updates.size() != 1) return std::nullopt;
   std::unordered_map<const Symbol*, int> reads_of;
   std::optional<RowCopy> result;
   walk_definition(f.updates[0], [&](const Expr& e) {

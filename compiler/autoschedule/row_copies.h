@@ -14,6 +14,9 @@
 // Cost: a copy saves, for each of its elements, what the tiles' reads would compute beyond a load, and
 // takes a way to a near cache. Both are counted for the rows of one copy; of sizes that are not known
 // only their ratios matter.
+//
+// The same is done for blocks of a long sum (autodiff/sweeps/blocked_sums.h), as of a convolution's gradient
+// by its weights, whose tiles run over chunks of it (reduction_chunks.h): a copy is of a chunk then.
 #pragma once
 
 #include <optional>
@@ -30,10 +33,17 @@ struct RowCopy {
   int64_t rows = 1;      // tiles along it that share one
 };
 
+// Dimensions of a Func.
+struct LoopsOfTiles {
+  std::vector<size_t> tiles;   // by the order of the loops over tiles, the innermost first
+  std::vector<size_t> inside;  // of which all is done for one tile before the next one
+};
+
 // The inlined Func that the only update of f reads, and is worth it, when the update has the tile;
-// nullopt: none. `loops`: dimensions of f, by the order of the loops over tiles, the innermost first.
+// nullopt: none. Other dimensions than those of the loops stay where they are while a copy is in use.
 std::optional<RowCopy> row_copy(const FuncContents& f, const RegisterTile& tile, int lanes,
-                                const std::vector<size_t>& loops, const SizeEstimate& sizes);
+                                const LoopsOfTiles& loops, const SizeEstimate& sizes);
+// The loop may be of another Func, in whose loops f is computed.
 void copy_rows(const FuncPtr& f, const RowCopy& copy, const retrograde::LoopLevel& loop, int lanes);
 
 }  // namespace retrograde::autoschedule

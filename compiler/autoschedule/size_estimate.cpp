@@ -142,6 +142,15 @@ std::optional<int64_t> SizeEstimate::extent(const FuncContents& f, size_t dimens
   return *as_const_int(i.max) - *as_const_int(i.min) + 1;
 }
 
+SizeEstimate SizeEstimate::with_extent(const FuncContents& f, size_t dimension,
+                                       int64_t extent) const {
+  SizeEstimate result = *this;
+  Box& box = result.boxes_[&f];
+  box.resize(f.args.size());
+  box[dimension] = {make_zero(Int(32)), make_const(Int(32), extent - 1)};
+  return result;
+}
+
 int64_t SizeEstimate::bytes(const FuncContents& f) const {
   int64_t result = 0;
   for (const Type& type : f.types) result += type.bytes();

@@ -7,6 +7,7 @@
 #include "autoschedule/loop_order.h"
 #include "autoschedule/read_estimate.h"
 #include "autoschedule/register_tile.h"
+#include "frontend/language/boundary_conditions.h"
 #include "frontend/language/func.h"
 #include "frontend/run/pipeline.h"
 #include "gradient/gradient_check.h"
@@ -534,6 +535,29 @@ TEST_F(DefaultSchedule, TilesOfLongSumsShareChunksOfLargeImages) {
   };
   EXPECT_NE(log_for(128, 48).find("chunks"), std::string::npos);
   EXPECT_EQ(log_for(32, 32).find("chunks"), std::string::npos) << "caches hold it";
+}
+
+// All blocks of a chunk read the same few rows again and again: without conditions at their ends.
+TEST_F(DefaultSchedule, BlocksOfAChunkReadRowsCopiedThroughZerosAround) {
+  constexpr int channels = 16;
+  const auto log_for = [&](bool has_zeros) {
+    const Buffer<float> image = gradient::random_image({130, 98, channels}, -1, 1, 1);
+    const Buffer<float> weights = gradient::random_image({3, 3, channels, channels}, -1, 1, 2);
+    const Buffer<float> seed = gradient::random_image({128, 96, channels}, -1, 1, 3);
+    Var x("x"), y("y"), c("c");
+    RDom r(0, 3, 0, 3, 0, channels);
+    Func around = BoundaryConditions::constant_exterior(image, 0.0f), sums("sums");
+    const int first = has_zeros ? -1 : 0;
+    const Expr at_x = x + r.x + first, at_y = y + r.y + first;
+    sums(x, y, c) +=
+        weights(r.x, r.y, r.z, c) * (has_zeros ? around(at_x, at_y, r.z) : image(at_x, at_y, r.z));
+    const Func gradient = propagate_adjoints(sums, seed)(weights);
+    return log_of(gradient, {3, 3, channels, channels});
+  };
+  const std::string with_zeros = log_for(true), without = log_for(false);
+  EXPECT_NE(with_zeros.find("constant_exterior.in("), std::string::npos) << with_zeros;
+  EXPECT_NE(without.find("chunks"), std::string::npos);
+  EXPECT_EQ(without.find(".in("), std::string::npos) << without;
 }
 
 // Few tiles use what one has read: its rows are in the cache yet.
