@@ -142,11 +142,11 @@ void Relaxed::define_mixture() {
   // A softmax does not change with what is taken from all of its arguments, so neither do gradients.
   share(at({x, y, q, i})) =
       lang::exp(score(at({x, y, q, i})) - lang::stop_gradient(top(at({x, y, q}))));
-  total(at({x, y, q})) = number(0);
-  total(at({x, y, q})) += share(at({x, y, q, r}));
-  sum(at({x, y, q})) = number(0);
-  sum(at({x, y, q})) += share(at({x, y, q, r})) * green(at({x, y, q, r}));
-  mixed(at({x, y, q})) = sum(at({x, y, q})) / total(at({x, y, q}));
+  const Expr part = share(at({x, y, q, r}));
+  weighed(at({x, y, q})) = lang::Tuple(number(0), number(0));
+  weighed(at({x, y, q})) = lang::Tuple(weighed(at({x, y, q}))[0] + part * green(at({x, y, q, r})),
+                                       weighed(at({x, y, q}))[1] + part);
+  mixed(at({x, y, q})) = weighed(at({x, y, q}))[0] / weighed(at({x, y, q}))[1];
 }
 
 void Relaxed::define_colour_differences() {

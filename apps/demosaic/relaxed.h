@@ -94,8 +94,8 @@ struct Relaxed {
       crossings{"crossings"}, chroma{"chroma"}, nearness{"nearness"}, steepnesses{"steepnesses"};
 
   lang::Func green{"green"}, close{"close"}, seen{"seen"}, score{"score"}, top{"top"},
-      share{"share"}, total{"total"}, sum{"sum"}, mixed{"mixed"}, difference{"difference"},
-      rough{"rough"}, pull{"pull"}, smooth{"smooth"}, estimate{"estimate"};
+      share{"share"}, weighed{"weighed"}, mixed{"mixed"}, difference{"difference"}, rough{"rough"},
+      pull{"pull"}, smooth{"smooth"}, estimate{"estimate"};
   lang::Func image;  // [3, height, width], and the batch
 
  private:

@@ -42,6 +42,7 @@
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
 #include "graph/copy_graph.h"
+#include "graph/give_directive.h"
 #include "graph/own_reads.h"
 #include "graph/wrappers.h"
 #include "ir/build.h"
@@ -536,7 +537,7 @@ void cut_sums(const std::vector<FuncPtr>& outputs, std::vector<FuncPtr>& stored,
 void move_and_join(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
                    const std::vector<FuncPtr>& given,
                    const std::unordered_set<const Symbol*>& whole, const SizeEstimate& sizes,
-                   const std::set<Decision>& without) {
+                   const std::set<Decision>& without, const GiveLoopsOfRows& give_rows) {
   const Readers readers(outputs, stored);  // before anything is moved
   if (!without.contains(Decision::Choices)) compute_beside_choices(readers, given, whole);
   const bool slices = !without.contains(Decision::Slices);
@@ -544,7 +545,8 @@ void move_and_join(const std::vector<FuncPtr>& outputs, const std::vector<FuncPt
   if (slices) compute_in_tiles(outputs, readers, given, whole, sizes);
   // Of chains of stencils, before these are put into strips of their own.
   if (slices) compute_in_reductions(outputs, readers, pure_primal(stored), whole, sizes);
-  if (!without.contains(Decision::Strips)) compute_in_strips(outputs, given, whole, sizes);
+  if (!without.contains(Decision::Strips))
+    compute_in_strips(outputs, given, whole, sizes, give_rows);
   if (slices) compute_in_slices(readers, stored, whole, sizes);
   if (slices) compute_in_reductions(outputs, readers, stored, whole, sizes);
   if (!without.contains(Decision::LayoutStaging)) run_along_rows(given, sizes);
@@ -627,7 +629,12 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
       given.push_back(f);
   }
   if (may_choose) unroll_choices(given, fixed, sizes);
-  move_and_join(outputs, stored, given, whole, sizes, request.options.without);
+  const auto give_rows = [&](const FuncPtr& sum, size_t dimension) {
+    std::erase(started, sum);
+    graph::take_back_loops(*sum);
+    give_loops(sum, request, sizes.with_extent(*sum, dimension, 1), started);
+  };
+  move_and_join(outputs, stored, given, whole, sizes, request.options.without, give_rows);
   for (const FuncPtr& f : started) start_sums(f, request, sizes);
   tasks.limit(outputs, request);
   name_inlined(outputs, order);

@@ -21,6 +21,7 @@
 #include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "simplify/simplify.h"
 
 namespace retrograde::autoschedule {
 
@@ -33,9 +34,12 @@ constexpr size_t most_members = 8;
 // What several of a group read, as a sum reads all steps of a chain, and a part of such a sum. If it did not join, no Func behind
 // it would either, and the images of all would be held until the group has run: so it may have more
 // company, and rows that wait for the last reader in a cache farther away.
+// So may a group with sums: what these read of many planes, a strip at a time, stays in such a cache at
+// least.
 constexpr size_t most_with_shared = 32;
 constexpr double shared_window_bytes = 4 << 20;
 constexpr double least_rows = 8, rows_a_halo = 8;
+constexpr double most_shared_reads = 64;  // more take longer than the way to memory
 constexpr int64_t least_bytes = 1 << 20;  // less stays in the caches on its way
 
 // How a Func's dimension moves with the loops of the last of its group.
@@ -59,6 +63,72 @@ struct StripLoops {
   int64_t rows = 0;             // of a strip
 };
 
+// Whether something is computed, or is to be, in the loops of a Func.
+bool has_guests(const FuncContents& f) {
+  const auto is_guest = [&](const Expr& e) {
+    const auto* call = e.as<Call>();
+    const FuncPtr callee = call && call->call_type == CallType::Func ? func_of(*call) : nullptr;
+    if (!callee) return false;
+    const graph::LoopLevel& level = callee->schedule.compute_level;
+    return (level.kind == graph::LoopLevel::Kind::At && level.func == f.name) ||
+           callee->wrappers.contains(f.name);
+  };
+  for (int s = 0; s < f.stage_count(); ++s) {
+    for (const Expr& root : roots_with_inlined(f.stage(s))) {
+      if (any_node(root, is_guest)) return true;
+    }
+  }
+  return false;
+}
+
+// Over a domain of so many iterations, known here, to the element that the pure variables say.
+bool is_sum_of_rows(const FuncContents& f) {
+  if (f.made || f.is_extern() || f.is_pure() || f.args.size() < 2) return false;
+  const bool are_sums = std::ranges::all_of(f.updates, [&](const Definition& update) {
+    bool stays = !read_elsewhere(f, update).defined();
+    for (size_t d = 0; d < f.args.size(); ++d) stays &= is_pure_position(f, update, d);
+    return stays && std::ranges::all_of(update.rvars, [](const ReductionVariable& r) {
+             return as_const_int(simplify(r.extent)).has_value();
+           });
+  });
+  return are_sums && !has_guests(f);
+}
+
+double iterations_of(const Definition& stage) {
+  double iterations = 1;
+  for (const ReductionVariable& r : stage.rvars)
+    iterations *= static_cast<double>(as_const_int(simplify(r.extent)).value_or(1));
+  return iterations;
+}
+
+// Of an element, what a tile over several rows loads once for all of them.
+double reads_shared_by_rows(const FuncContents& f, size_t row) {
+  double total = 0;
+  for (const Definition& update : f.updates) {
+    double reads = 0;
+    std::unordered_set<const ExprNode*> seen;
+    graph::walk(update, [&](const Expr& e) {
+      if (!seen.insert(e.get()).second) return false;
+      const auto* call = e.as<Call>();
+      const bool loads = call && call->call_type != CallType::Operator;
+      if (loads && !uses_variable(e, f.args[row])) ++reads;
+      return true;
+    });
+    if (is_split(update, f.args[row])) total += reads * iterations_of(update);
+  }
+  return total;
+}
+
+// Of an element.
+double operations_of_all_stages(const FuncContents& f) {
+  double total = 0;
+  for (int s = 0; s < f.stage_count(); ++s) {
+    total += iterations_of(f.stage(s)) *
+             operations_of_values(roots_with_inlined(f.stage(s)), [](const Call&) { return 1.0; });
+  }
+  return total;
+}
+
 class Group {
  public:
   Group(FuncPtr last, const SizeEstimate& sizes) : last_(std::move(last)), sizes_(sizes) {
@@ -68,16 +138,22 @@ class Group {
   const FuncPtr& last() const { return last_; }
   const std::vector<FuncPtr>& members() const { return members_; }
   const StripLoops& loops() const { return *loops_; }
+  // The dimension of a member that moves with the rows of the last.
+  size_t row_of(const FuncContents& member) const {
+    const Windows& windows = windows_.at(&member);
+    return static_cast<size_t>(moved_by(windows, loops_->row) - windows.data());
+  }
 
   // Whether it has joined: all of its reads are by Funcs of this group.
   bool join(const FuncPtr& f, const std::vector<StoredRead>& reads) {
     const auto windows = windows_of(*f, reads);
     const bool is_shared = reads.size() > 1 || is_running_sum(*f, *reads[0].reader);
-    if (!windows || members_.size() >= (is_shared ? most_with_shared : most_members)) return false;
+    const bool is_large = is_shared || has_sums() || !f->is_pure();
+    if (!windows || members_.size() >= (is_large ? most_with_shared : most_members)) return false;
     windows_[f.get()] = *windows;
     members_.push_back(f);
-    const auto loops = loops_of_all(is_shared ? shared_window_bytes : window_bytes);
-    if (loops && pays(*f, *windows, *loops)) {
+    const auto loops = loops_of_all(is_large ? shared_window_bytes : window_bytes);
+    if (loops && pays(*f, *windows, *loops) && may_be_rows(*f, *windows, *loops)) {
       loops_ = loops;
       return true;
     }
@@ -87,6 +163,9 @@ class Group {
   }
 
  private:
+  bool has_sums() const {
+    return std::ranges::any_of(members_, [](const FuncPtr& f) { return !f->is_pure(); });
+  }
   const Windows& of(const FuncContents& f) const {
     return &f == last_.get() ? own_ : windows_.at(&f);
   }
@@ -96,17 +175,17 @@ class Group {
     std::optional<Windows> all;
     for (const StoredRead& by : reads) {
       for (const Expr& call : by.calls) {
-        const auto windows = windows_of(*call.as<Call>(), *by.reader);
+        const auto windows = windows_of(*call.as<Call>(), *by.reader, by.stage);
         if (!windows || (all && !widen(*all, *windows))) return std::nullopt;
         if (!all) all = windows;
       }
     }
     return all && is_one_to_one(*all) && f.args.size() == all->size() ? all : std::nullopt;
   }
-  std::optional<Windows> windows_of(const Call& call, const FuncContents& reader) const {
+  std::optional<Windows> windows_of(const Call& call, const FuncContents& reader, int stage) const {
     Windows result;
     for (const Expr& arg : call.args) {
-      const auto along = along_of(arg, reader, of(reader));
+      const auto along = along_of(arg, reader, reader.stage(stage), of(reader));
       if (!along) return std::nullopt;
       result.push_back(*along);
     }
@@ -114,8 +193,8 @@ class Group {
   }
   // Of an index in a reader, whose own dimensions move as `outer` says.
   static std::optional<Along> along_of(const Expr& index, const FuncContents& reader,
-                                       const Windows& outer) {
-    const auto window = read_window(index, reader, *reader.pure);
+                                       const Definition& stage, const Windows& outer) {
+    const auto window = read_window(index, reader, stage);
     if (!window) return moved_by_data(index, reader, outer);
     Along along{std::nullopt, 0, window->low, window->high, window->low, {}};
     if (window->loop.empty()) return along;
@@ -211,6 +290,7 @@ class Group {
            std::find(loops.outside.begin(), loops.outside.end(), loop) != loops.outside.end();
   }
 
+  // Elements of sums are dear: where there are some, strips are as long as they can be.
   int64_t rows_of(size_t row, int64_t tasks) const {
     double halo = 0;  // in rows of the last
     for (const FuncPtr& f : members_) {
@@ -218,8 +298,9 @@ class Group {
       halo = std::max(halo, (along->high - along->low) / along->scale);
     }
     const double all = static_cast<double>(sizes_.extent(*last_, row).value_or(unknown_extent));
-    const double most = std::max(least_rows, all * static_cast<double>(tasks) / enough_strips);
-    const double rows = std::clamp(halo * rows_a_halo, least_rows, most);
+    const int64_t strips = has_sums() ? sizes_.machine().enough_tasks : enough_strips;
+    const double most = std::max(least_rows, all * static_cast<double>(tasks) / strips);
+    const double rows = has_sums() ? most : std::clamp(halo * rows_a_halo, least_rows, most);
     return static_cast<int64_t>(std::ceil(rows * sizes_.machine().strip_rows));
   }
 
@@ -249,9 +330,36 @@ class Group {
     const Along& row = *moved_by(windows, loops.row);
     const double own = static_cast<double>(loops.rows) * row.scale;
     const double twice = std::max(0.0, row.size() - row.scale) / own;
-    const double operations =
-        operations_of_values(roots_with_inlined(*f.pure), [](const Call&) { return 1.0; });
-    return operations * twice < way_to_memory;
+    return operations_of_all_stages(f) * twice < way_to_memory * (1 + planes_behind(f));
+  }
+
+  // A sum is not the last of a group: if it did not join, what it reads would go to memory, too. For
+  // each element of the sum, so many of these.
+  double planes_behind(const FuncContents& f) const {
+    const auto own = static_cast<double>(sizes_.bytes(f));
+    if (f.is_pure() || own <= 0) return 0;
+    std::unordered_set<const Symbol*> seen;
+    double bytes = 0;
+    for (int s = 0; s < f.stage_count(); ++s) {
+      for (const Expr& root : roots_with_inlined(f.stage(s))) {
+        walk(root, [&](const Expr& e) {
+          const auto* call = e.as<Call>();
+          if (!call || call->call_type != CallType::Func) return true;
+          const FuncPtr callee = func_of(*call);
+          const bool is_behind = callee.get() != &f && is_at_root(*callee);
+          if (is_behind && seen.insert(callee.get()).second)
+            bytes += static_cast<double>(sizes_.bytes(*callee));
+          return true;
+        });
+      }
+    }
+    return bytes / own;
+  }
+
+  // Matrix products and convolutions over many channels live by their tiles over rows.
+  static bool may_be_rows(const FuncContents& f, const Windows& windows, const StripLoops& loops) {
+    const auto row = static_cast<size_t>(moved_by(windows, loops.row) - windows.data());
+    return reads_shared_by_rows(f, row) <= most_shared_reads;
   }
 
   const FuncPtr last_;
@@ -269,7 +377,7 @@ bool has_plain_rows(const FuncContents& f) {
          loops.splits[0].old_var == f.args[0] && loops.splits[0].outer == f.args[0];
 }
 
-void give_strips(const Group& group) {
+void give_strips(const Group& group, const GiveLoopsOfRows& give_rows) {
   const FuncPtr& last = group.last();
   const StripLoops& loops = group.loops();
   const auto name = [&](size_t d) { return last->args[d]; };
@@ -291,6 +399,10 @@ void give_strips(const Group& group) {
   stage.reorder(order).parallel(strips);
   for (size_t d : loops.outside) stage.parallel(Var(name(d)));
   for (const FuncPtr& f : group.members()) {
+    const size_t own_row = group.row_of(*f);
+    const bool has_several = std::ranges::any_of(
+        f->updates, [&](const Definition& update) { return is_split(update, f->args[own_row]); });
+    if (has_several) give_rows(f, own_row);
     run_serially(f);
     Func(f).store_at(Func(last), strips).compute_at(Func(last), row);
   }
@@ -314,6 +426,7 @@ class Grouping {
       const bool is_alone = hosts_.is_output(f) || readers_.is_hidden(f) || apart.contains(f.get());
       Group* group = is_alone ? nullptr : group_that_reads(reads);
       if (!group || !group->join(f, reads)) {
+        if (!f->is_pure()) continue;
         groups.push_back(std::make_unique<Group>(f, sizes_));
         group = groups.back().get();
       }
@@ -342,7 +455,8 @@ class Grouping {
 
  private:
   bool may_run_in_strips(const FuncPtr& f) const {
-    return has_plain_rows(*f) && is_at_root(*f) && hosts_.is_inside(f) && !but_.contains(f.get());
+    return (has_plain_rows(*f) || is_sum_of_rows(*f)) && is_at_root(*f) && hosts_.is_inside(f) &&
+           !but_.contains(f.get());
   }
   Group* group_that_reads(const std::vector<StoredRead>& reads) const {
     Group* only = nullptr;
@@ -365,13 +479,14 @@ class Grouping {
 }  // namespace
 
 void compute_in_strips(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& given,
-                       const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes) {
+                       const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes,
+                       const GiveLoopsOfRows& give_rows) {
   Grouping grouping(outputs, given, but, sizes);
   auto groups = grouping.groups({});
   const auto apart = grouping.that_keep_others(groups);
   if (!apart.empty()) groups = grouping.groups(apart);
   for (const auto& group : groups) {
-    if (!group->members().empty()) give_strips(*group);
+    if (!group->members().empty()) give_strips(*group, give_rows);
   }
 }
 

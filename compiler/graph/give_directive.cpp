@@ -109,6 +109,16 @@ void give_directive(const SchedulePlace& place, Directive directive) {
   log_directive(place, std::move(directive));
 }
 
+void take_back_loops(FuncContents& f) {
+  std::erase_if(f.log, [](const LoggedDirective& given) { return given.stage >= 0; });
+  for (int s = 0; s < f.stage_count(); ++s) {
+    Definition& stage = f.stage(s);
+    stage.schedule = StageLoops();
+    stage.schedule.dims = first_loops(f, stage);
+  }
+  f.version++;
+}
+
 bool is_touched(const FuncContents& f) {
   if (f.schedule.is_given) return true;
   for (int s = 0; s < f.stage_count(); ++s) {

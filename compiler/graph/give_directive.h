@@ -30,6 +30,10 @@ void give_directive(const SchedulePlace& place, Directive directive);
 // Appends it to the log: of what makes Funcs, by who made them.
 void log_directive(const SchedulePlace& place, Directive directive);
 
+// Takes back all that was given to its stages: they have the loops again that they were defined with.
+// Nothing may have been computed in these loops, or in the same loops as they.
+void take_back_loops(FuncContents& f);
+
 // Whether a directive was given to it or to one of its stages, other than of sizes.
 bool is_touched(const FuncContents& f);
 

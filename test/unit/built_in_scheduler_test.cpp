@@ -398,6 +398,70 @@ TEST(StripsOfRows, AreThoseOfAChainAsLongAsItsWindowsFit) {
   EXPECT_LE(at_root, 8);
 }
 
+// Several sums over a window, of planes that a next one mixes, on to what a pure Func reads.
+struct WindowSums {
+  explicit WindowSums(int taps = 3, int side = 1024) {
+    const auto at = [&](const Expr& px, const Expr& py) {
+      return picture(clamp(px, 0, 63), clamp(py, 0, 63));
+    };
+    heavy(x, y, i) = exp(at(x, y + i)) * sin(at(x + i, y - 1));
+    const RDom r(0, taps, 0, taps), all(0, planes);
+    around(x, y, i) = 0.0f;
+    around(x, y, i) += heavy(x + r.x - 1, y + r.y - 1, i) * picture(r.x, r.y + i);
+    largest(x, y) = around(x, y, 0);
+    largest(x, y) = max(largest(x, y), around(x, y + 1, all));
+    mixed(x, y) = Tuple(largest(x, y), 1.0f);
+    mixed(x, y) = Tuple(mixed(x, y)[0] + around(x, y, all), mixed(x, y)[1] * 0.5f);
+    out(x, y) = mixed(x / 2, y / 2)[0] * mixed(x / 2, y / 2 + 1)[1] + mixed(x / 2, y / 2 + 1)[0];
+    out.set_estimate(x, 0, side).set_estimate(y, 0, side);
+    for (int py = 0; py < 64; py++) {
+      for (int px = 0; px < 64; px++)
+        picture(px, py) = static_cast<float>((px * 7 + py * 13) % 11) / 16;
+    }
+  }
+  void schedule() { Pipeline(out).auto_schedule(get_host_target()); }
+  bool is_in_strips(const Func& f) const {
+    const auto& placed = f.function()->schedule;
+    return placed.store_level.kind == graph::LoopLevel::Kind::At &&
+           placed.store_level.func == out.name() && placed.compute_level.func == out.name();
+  }
+  static constexpr int planes = 12;
+  Var x{"x"}, y{"y"}, i{"i"};
+  Buffer<float> picture{64, 64};
+  Func heavy{"heavy"}, around{"around"}, largest{"largest"}, mixed{"mixed"}, out{"out"};
+};
+
+TEST(StripsOfRows, TakeSumsOverSmallWindowsAlong) {
+  WindowSums scheduled, plain;
+  scheduled.schedule();
+  for (const Func* f : {&scheduled.heavy, &scheduled.around, &scheduled.largest, &scheduled.mixed})
+    EXPECT_TRUE(scheduled.is_in_strips(*f)) << f->name();
+  for (const auto& [width, height] : {std::pair(150, 301), std::pair(3, 1)}) {
+    const Buffer<float> found = scheduled.out.realize({width, height}),
+                        expected = plain.out.realize({width, height});
+    for (int y = 0; y < height; y++) {
+      for (int x = 0; x < width; x++)
+        ASSERT_NEAR(found(x, y), expected(x, y), 1e-5 * std::abs(expected(x, y)) + 1e-6)
+            << x << ", " << y;
+    }
+  }
+}
+
+TEST(StripsOfRows, ComputeSumsOneRowAtATime) {
+  WindowSums sums;
+  sums.schedule();
+  for (const Func* f : {&sums.around, &sums.largest, &sums.mixed}) {
+    for (const graph::Split& split : f->function()->updates[0].schedule.splits)
+      EXPECT_NE(split.old_var, "y") << f->name();
+  }
+}
+
+TEST(StripsOfRows, LeaveSumsOverLargeWindowsWhoseRowsAreDear) {
+  WindowSums sums(21);
+  sums.schedule();
+  EXPECT_FALSE(sums.is_in_strips(sums.around));
+}
+
 // Steps from an image to how far the last of them is from zero, and the gradient by the image.
 struct Steps {
   using Step =
