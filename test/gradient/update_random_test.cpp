@@ -12,7 +12,11 @@
 namespace retrograde::gradient {
 namespace {
 
+#ifdef RETROGRADE_MANY_PROGRAMS
 constexpr unsigned programs = 300;
+#else
+constexpr unsigned programs = 150;
+#endif
 
 AdversaryProgram program_of(unsigned seed, const AdjointOptions& options) {
   Choices choices(seed);
@@ -34,28 +38,30 @@ std::map<Judgement, unsigned> judge_all(unsigned count, const AdjointOptions& op
 }
 
 TEST(RandomUpdates, AreRightWhenValuesAreKeptWithinABudget) {
-  auto judged = judge_all(programs / 3, {});
+  constexpr unsigned count = programs / 3;
+  auto judged = judge_all(count, {});
   EXPECT_EQ(judged[Judgement::Refused], 0u);
-  EXPECT_GT(judged[Judgement::Right], programs / 6);
+  EXPECT_GT(2 * judged[Judgement::Right], count);
 }
 
 TEST(RandomUpdates, AreRightWhenValuesMayBeKept) {
   auto judged = judge_all(programs, {.overwritten = Overwritten::Store});
   EXPECT_EQ(judged[Judgement::Refused], 0u);
-  EXPECT_GT(judged[Judgement::Right], programs / 2);
+  EXPECT_GT(2 * judged[Judgement::Right], programs);
 }
 
 // Most overwrite what a partial needs, which Overwritten::Refuse is there to refuse.
 TEST(RandomUpdates, AreRightOrRefusedWhenValuesMayNotBeKept) {
   auto judged = judge_all(programs, {.overwritten = Overwritten::Refuse});
-  EXPECT_LE(judged[Judgement::Refused], programs * 6 / 10);
+  EXPECT_LE(10 * judged[Judgement::Refused], 6 * programs);
   EXPECT_GT(judged[Judgement::Refused], 0u);
 }
 
 // The same products, added in another order.
 TEST(RandomUpdates, AreTheSameWithABudgetForStates) {
+  constexpr unsigned count = programs / 2;
   unsigned compared = 0;
-  for (unsigned seed = 0; seed < programs / 2; ++seed) {
+  for (unsigned seed = 0; seed < count; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const AdversaryProgram p = program_of(seed, {});
     Weights weights(seed);
@@ -79,7 +85,7 @@ TEST(RandomUpdates, AreTheSameWithABudgetForStates) {
       ASSERT_NEAR(found[i].scalar.as_double(), expected[i].scalar.as_double(), 1e-12 * scale);
     compared += std::isfinite(scale);
   }
-  EXPECT_GT(compared, programs / 4);
+  EXPECT_GT(2 * compared, count);
 }
 
 }  // namespace
