@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "common/images.h"
 #include "common/progress.h"
@@ -134,10 +135,20 @@ class Run {
     report_.own["picture"]["blurred"] = blurred_db_;
   }
 
+  // Methods of one shape are compiled once.
+  Deconvolver& deconvolver_of(const Method& method) {
+    if (deconvolver_ && deconvolver_->shape() == method.weights.shape) {
+      deconvolver_->use(method);
+    } else {
+      deconvolver_.emplace(method, picture_.extent(), options_.common.threads,
+                           Accuracy{options_.iterations, usual_accuracy.tolerance});
+    }
+    return *deconvolver_;
+  }
+
   // A channel that is not reached stays blurred.
   void deconvolve(const Method& method, apps::Progress& progress) {
-    Deconvolver deconvolver(method, picture_.extent(), options_.common.threads,
-                            {options_.iterations, usual_accuracy.tolerance});
+    Deconvolver& deconvolver = deconvolver_of(method);
     Planes planes;
     apps::PlotSeries series{method.name, {}, {}};
     const auto begin = std::chrono::steady_clock::now();
@@ -199,6 +210,7 @@ class Run {
   const std::vector<Method>& methods_;
   apps::Report& report_;
   Picture picture_;
+  std::optional<Deconvolver> deconvolver_;
   std::vector<apps::PlotSeries> series_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   long done_ = 0;

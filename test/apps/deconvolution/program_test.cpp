@@ -72,7 +72,8 @@ TEST_F(DeconvolutionProgram, BlursAPhotographAndMakesItSharp) {
 TEST_F(DeconvolutionProgram, TakesABlurredOneAndAFunctionAsAnImage) {
   apps::Image psf{3, 3, 8, std::vector<float>(27, 0.5f)};
   apps::write_image(folder_.path() / "psf.png", psf);
-  run({"--input", photograph("a.png", 41, 33), "--psf", folder_.path() / "psf.png", "--blurred"});
+  run({"--input", photograph("a.png", 41, 33), "--psf", folder_.path() / "psf.png", "--blurred",
+       "--brief"});
   expect_files({"blurred.png", "result.png"});
   EXPECT_FALSE(fs::exists(out() / "truth.png"));
   EXPECT_EQ(apps::read_image(out() / "result.png").width, 41);
@@ -84,7 +85,7 @@ TEST_F(DeconvolutionProgram, PicturesOfFloatsStayFloats) {
   for (int k = 0; k < 40 * 36 * 3; ++k)
     image.pixels.push_back(0.2f + 0.3f * static_cast<float>(k / 60 % 2));
   apps::write_image(folder_.path() / "light.exr", image);
-  run({"--input", folder_.path() / "light.exr", "--psf", "disc:1.5"});
+  run({"--input", folder_.path() / "light.exr", "--psf", "disc:1.5", "--brief"});
   const apps::Image result = apps::read_image(out() / "result.exr");
   EXPECT_EQ(result.bits, 32);
   EXPECT_NEAR(result.pixels[3 * (17 * 38 + 19)], 0.35, 0.2);
