@@ -5,6 +5,7 @@
 // roundings a compiler may move (testing/tracked_value.h).
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <regex>
 
 #include "differential/side.h"
@@ -18,8 +19,11 @@ using retrograde::oracle::Comparison;
 // What may be left uncompared: elements whose discrete choices hang on a rounding.
 constexpr double max_unstable_fraction = 0.05;
 
-void expect_agreement(const std::vector<Array>& expected, const std::vector<HostBuffer>& actual,
-                      const std::string& who) {
+// When `who` throws, the others are compared all the same.
+void expect_agreement(const std::vector<Array>& expected, const std::string& who,
+                      const std::function<std::vector<HostBuffer>()>& run) {
+  std::vector<HostBuffer> actual;
+  ASSERT_NO_THROW(actual = run()) << who;
   ASSERT_EQ(expected.size(), actual.size()) << who;
   for (size_t i = 0; i < expected.size(); ++i) {
     const halide_buffer_t& buffer = *actual[i].raw_buffer();
@@ -43,8 +47,8 @@ std::string comparable(const std::string& nest) {
   return std::regex_replace(numbered, std::regex("\\.(:| in )"), "$1");
 }
 
-// These come first: what is made of a Func holds its name, of which Halide shows nothing when it has a
-// number, as it has when a name of the other cases falls on the same counter.
+// These come first, in each process: what is made of a Func holds its name, of which Halide shows
+// nothing when it has a number, as it has when a name of the other cases falls on the same counter.
 class LoopNests : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(LoopNests, AreShownAsHalideShowsThem) {
@@ -59,15 +63,15 @@ TEST_P(LoopNests, AreShownAsHalideShowsThem) {
 
 class Differential : public ::testing::TestWithParam<std::string> {};
 
-TEST_P(Differential, InterpreterAgreesWithHalide) {
-  expect_agreement(interpret(GetParam()), run_in_halide(GetParam(), false), "Halide");
-}
-
-TEST_P(Differential, MachineCodeAgreesWithHalide) {
-  const std::vector<Array> expected = interpret(GetParam());
-  expect_agreement(expected, run_in_halide(GetParam(), true), "Halide, scheduled");
-  expect_agreement(expected, run_in_retrograde(GetParam(), false), "Retrograde");
-  expect_agreement(expected, run_in_retrograde(GetParam(), true), "Retrograde, scheduled");
+TEST_P(Differential, HalideAndMachineCodeAgreeWithTheInterpreter) {
+  const std::string& name = GetParam();
+  const std::vector<Array> expected = interpret(name);
+  for (const bool scheduled : {false, true}) {
+    const std::string how = scheduled ? ", scheduled" : "";
+    expect_agreement(expected, "Halide" + how, [&] { return run_in_halide(name, scheduled); });
+    expect_agreement(expected, "Retrograde" + how,
+                     [&] { return run_in_retrograde(name, scheduled); });
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Schedules, LoopNests, ::testing::ValuesIn(nest_names()),
