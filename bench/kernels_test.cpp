@@ -14,62 +14,50 @@ namespace bench {
 
 namespace {
 
-class Kernel : public testing::TestWithParam<std::string> {};
+class Kernel : public testing::TestWithParam<std::string> {
+ protected:
+  Kernel() { std::filesystem::create_directories(scratch_); }
+  ~Kernel() override { std::filesystem::remove_all(scratch_); }
 
-// Or, of a gradient, what differences say, where Halide's gradient does not.
-TEST_P(Kernel, GivesWhatHalideGives) {
-  const std::filesystem::path scratch =
+  // Or, of a gradient, what differences say, where Halide's gradient does not.
+  void expect_what_halide_gives(Pair& pair) const {
+    pair.run();
+    const PairResult result = pair.result(scratch_);
+    EXPECT_FALSE(is_wrong(result)) << table_row(result, {});
+    EXPECT_GT(result.operations, 0);
+  }
+
+  const std::filesystem::path scratch_ =
       std::filesystem::path(testing::TempDir()) / ("kernel_" + GetParam());
-  std::filesystem::create_directories(scratch);
-  Pair pair({GetParam(), true, 2, is_gradient(GetParam())}, BENCH_PROGRAMS);
-  pair.run();
-  const PairResult result = pair.result(scratch);
-  std::filesystem::remove_all(scratch);
-  EXPECT_FALSE(is_wrong(result)) << table_row(result, {});
-  EXPECT_GT(result.operations, 0);
+};
+
+class ForwardKernel : public Kernel {};
+
+TEST_P(ForwardKernel, GivesWhatHalideGivesByHandAndByTheAutoscheduler) {
+  Pair pair({GetParam(), true, 2}, BENCH_PROGRAMS);
+  expect_what_halide_gives(pair);
+  const WorkerCommand command{std::filesystem::path(BENCH_PROGRAMS) / "bench_kernels_retrograde",
+                              {GetParam(), "small", "2", "Retrograde"}};
+  Worker scheduled(Side::Retrograde, command, 2);
+  scheduled.run();
+  EXPECT_LE(max_relative_error(scheduled.outputs(scratch_), pair.retrograde().outputs(scratch_)),
+            1e-4)
+      << "scheduled by the autoscheduler, against by hand";
 }
 
-INSTANTIATE_TEST_SUITE_P(Forward, Kernel, testing::ValuesIn(kernel_names()),
+INSTANTIATE_TEST_SUITE_P(Forward, ForwardKernel, testing::ValuesIn(kernel_names()),
                          [](const auto& test) { return test.param; });
 
-INSTANTIATE_TEST_SUITE_P(Gradient, Kernel, testing::ValuesIn(gradient_names()),
-                         [](const auto& test) { return test.param; });
+class GradientKernel : public Kernel {};
 
-class GradientKernel : public testing::TestWithParam<std::string> {};
-
-TEST_P(GradientKernel, HasTheSameBitsOnAnyThreads) {
-  const auto scratch = std::filesystem::path(testing::TempDir()) / ("threads_" + GetParam());
-  std::filesystem::create_directories(scratch);
-  Worker worker(Side::Retrograde, {GetParam(), true, 5, true}, BENCH_PROGRAMS);
-  EXPECT_TRUE(has_same_bits_on({1, 2, 3, 5, 5}, worker, scratch));
-  std::filesystem::remove_all(scratch);
+TEST_P(GradientKernel, GivesWhatHalideGivesInTheSameBitsOnAnyThreads) {
+  Pair pair({GetParam(), true, 5, true}, BENCH_PROGRAMS);
+  expect_what_halide_gives(pair);
+  EXPECT_TRUE(has_same_bits_on({1, 2, 3, 5, 5}, pair.retrograde(), scratch_))
+      << "the bits depend on how many threads there are";
 }
 
 INSTANTIATE_TEST_SUITE_P(Gradient, GradientKernel, testing::ValuesIn(gradient_names()),
-                         [](const auto& test) { return test.param; });
-
-// Outputs of our worker, scheduled by hand or by the autoscheduler of that name.
-std::vector<Values> outputs_of(const std::string& kernel, const std::string& schedule) {
-  const auto scratch = std::filesystem::path(testing::TempDir()) / ("auto_" + kernel + schedule);
-  std::filesystem::create_directories(scratch);
-  WorkerCommand command{std::filesystem::path(BENCH_PROGRAMS) / "bench_kernels_retrograde",
-                        {kernel, "small", "2"}};
-  if (!schedule.empty()) command.arguments.push_back(schedule);
-  Worker worker(Side::Retrograde, command, 2);
-  worker.run();
-  const std::vector<Values> outputs = worker.outputs(scratch);
-  std::filesystem::remove_all(scratch);
-  return outputs;
-}
-
-class AutoscheduledKernel : public testing::TestWithParam<std::string> {};
-
-TEST_P(AutoscheduledKernel, GivesWhatItGivesByHand) {
-  EXPECT_LE(max_relative_error(outputs_of(GetParam(), "Retrograde"), outputs_of(GetParam(), "")),
-            1e-4);
-}
-
-INSTANTIATE_TEST_SUITE_P(Forward, AutoscheduledKernel, testing::ValuesIn(kernel_names()),
                          [](const auto& test) { return test.param; });
 
 TEST(MaxRelativeError, IsRelativeToTheLargerOfElementAndScale) {

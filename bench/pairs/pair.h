@@ -53,6 +53,8 @@ class Pair {
   PairResult result(const std::filesystem::path& scratch);
   // Of gradients that have run: how far each is from differences of the program in a library.
   void check_slopes(PairResult& result, const std::filesystem::path& primal);
+  // Ours, for what is not asked of both.
+  Worker& retrograde() { return retrograde_; }
 
  private:
   void warm_up();
