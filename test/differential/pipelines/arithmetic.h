@@ -17,6 +17,25 @@ PIPELINE(arithmetic_uint16) { return integer_arithmetic<uint16_t>(); }
 PIPELINE(arithmetic_uint32) { return integer_arithmetic<uint32_t>(); }
 PIPELINE(arithmetic_uint64) { return integer_arithmetic<uint64_t>(); }
 
+// Chains of minima and maxima, of negations among others; by a loop, too.
+template <typename T>
+Built minima() {
+  Buffer<T> a = edges<T>({61, 7}, 1), b = edges<T>({61, 7}, 2), c = edges<T>({61, 7}, 3);
+  Expr p = a(x, y), q = -(b(x, y) / 2), s = c(x, y);
+  RDom r(0, 7, "r");
+  Func f("f"), g("g");
+  f(x, y) = Tuple(min(min(p, q), s), max(max(p, q), s), max(max(q, -q), s),
+                  min(min(p, q), -(s / 2)), max(min(max(p, q), s), q), min(min(min(p, s), q), ~s));
+  g(x, y) = Tuple(a(x, y), a(x, y));
+  Expr next = -(b(x, r) / 2);
+  g(x, y) = Tuple(min(g(x, y)[0], next), max(g(x, y)[1], next));
+  return {{f, g}, {{61, 7}, {61, 7}}, {}};
+}
+PIPELINE(minima_int8) { return minima<int8_t>(); }
+PIPELINE(minima_int16) { return minima<int16_t>(); }
+PIPELINE(minima_int32) { return minima<int32_t>(); }
+PIPELINE(minima_uint32) { return minima<uint32_t>(); }
+
 template <typename T>
 Built float_arithmetic() {
   Buffer<T> a = noise<T>({61, 7}, 1), b = noise<T>({61, 7}, 2);
