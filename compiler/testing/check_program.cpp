@@ -5,8 +5,8 @@
 #include <cstring>
 #include <optional>
 
-#include "diagnostics/error.h"
 #include "frontend/run/pipeline.h"
+#include "retrograde_runtime.h"
 #include "testing/interpreter.h"
 
 namespace retrograde::fuzz {
@@ -106,19 +106,19 @@ void compare_outputs(const Regions& regions, const RandomProgram& program,
   }
 }
 
-// Where kernels run, races and accesses out of bounds are errors of the run; too little memory is not.
+// Where kernels run, races and accesses out of bounds are errors of the run.
 bool is_finding(const RuntimeError& error, const Target& target) {
-  const std::string_view message = error.what();
-  const auto says = [&](const char* words) {
-    return message.find(words) != std::string_view::npos;
-  };
-  return target.has_feature(Target::CUDA) && !says("bytes of shared memory") &&
-         !says("OUT_OF_MEMORY");
+  return target.has_feature(Target::CUDA) && !lacks_memory(error);
 }
 
 int ignore_event(void*, const halide_trace_event_t*) { return 0; }
 
 }  // namespace
+
+bool lacks_memory(const RuntimeError& error) {
+  return error.code() == retrograde_error_out_of_memory ||
+         std::string_view(error.what()).find("OUT_OF_MEMORY") != std::string_view::npos;
+}
 
 Judged check_program(const RandomProgram& program, const ScheduleLog& schedule,
                      const Target& target) {

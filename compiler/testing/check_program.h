@@ -4,6 +4,7 @@
 #include <functional>
 #include <vector>
 
+#include "diagnostics/error.h"
 #include "ir/target.h"
 #include "testing/judgement.h"
 #include "testing/random_schedule.h"
@@ -20,5 +21,8 @@ Judged check_program(const RandomProgram& program, const ScheduleLog& schedule,
 Judged check_with_schedule(const RandomProgram& program, const std::function<void()>& schedule,
                            const Target& target,
                            const std::vector<std::function<void()>>& preparations = {[] {}});
+
+// Of a run: what there is of some memory, of a device among others, was not enough. No finding.
+bool lacks_memory(const RuntimeError&);
 
 }  // namespace retrograde::fuzz

@@ -119,11 +119,14 @@ int32_t refuse_in_capture(const Session& session) {
 // The driver has read pageable memory when it returns; memory that is locked to its pages it reads
 // later, when the caller may have changed it.
 int32_t wait_for_locked_memory(const Session& session, const void* host) {
+  // The form for several attributes: memory that the driver does not know is no error for it.
   unsigned type = 0;
-  const Result result = session.driver().cuPointerGetAttribute(&type, pointer_memory_type,
-                                                               reinterpret_cast<Address>(host));
-  if (result == invalid_value) return 0;
-  return result == success ? wait(session) : session.failed("cuPointerGetAttribute", result);
+  const int attribute = pointer_memory_type;
+  void* value = &type;
+  const Result result = session.driver().cuPointerGetAttributes(1, &attribute, &value,
+                                                                reinterpret_cast<Address>(host));
+  if (result != success) return session.failed("cuPointerGetAttributes", result);
+  return type == 0 ? 0 : wait(session);
 }
 
 int32_t copy_in(const Session& session, halide_buffer_t& buffer) {

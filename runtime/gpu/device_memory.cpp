@@ -138,9 +138,35 @@ int32_t shrink_unused(const Session& session, size_t keep_bytes, Which which) {
   return 0;
 }
 
-int32_t new_block(const Session& session, size_t bytes, Address& base) {
+// While it lives, the calling thread may call what a capture of a graph forbids otherwise, for fear that
+// the graph would want it again: memory that stays is there for each launch.
+class RelaxedCapture {
+ public:
+  RelaxedCapture(const Session& session, bool is_wanted) : session_(session) {
+    if (is_wanted) result_ = session.driver().cuThreadExchangeStreamCaptureMode(&mode_);
+    is_changed_ = is_wanted && result_ == success;
+  }
+  ~RelaxedCapture() {
+    if (is_changed_) session_.driver().cuThreadExchangeStreamCaptureMode(&mode_);
+  }
+  RelaxedCapture(const RelaxedCapture&) = delete;
+  RelaxedCapture& operator=(const RelaxedCapture&) = delete;
+  Result result() const { return result_; }
+
+ private:
+  const Session& session_;
+  int mode_ = capture_mode_relaxed;
+  Result result_ = success;
+  bool is_changed_ = false;
+};
+
+int32_t new_block(const Session& session, size_t bytes, uint64_t capture, Address& base) {
+  const RelaxedCapture relaxed(session, capture != 0);
+  if (relaxed.result() != success)
+    return session.failed("cuThreadExchangeStreamCaptureMode", relaxed.result());
   Result result = session.driver().cuMemAlloc_v2(&base, bytes);
-  if (result == out_of_memory && session.device().unused_bytes > 0) {
+  // To free memory would wait for work on it, and a capture may not wait.
+  if (result == out_of_memory && session.device().unused_bytes > 0 && capture == 0) {
     if (const int32_t code = shrink_unused(session, 0, Which::not_of_graphs)) return code;
     result = session.driver().cuMemAlloc_v2(&base, bytes);
   }
@@ -177,19 +203,16 @@ int32_t allocate_of_driver(const Session& session, size_t bytes, Address& base) 
   if (const int32_t code = session.capture(capture)) return code;
   if (const int32_t code = reuse_block(session, bytes, capture, base)) return code;
   if (base != 0) return 0;
-  if (capture != 0)
-    return session.request.refuse(
-        "nothing is allocated while a graph is captured",
-        Line("no unused block of %u bytes is left of earlier runs", uint64_t{bytes}),
-        "Run the pipeline once on this stream before the capture, with "
-        "halide_reuse_device_allocations(true)");
-  const size_t most = may_reuse(session.request.caller) ? session.device().memory_bytes / 4 : 0;
-  if (const int32_t code = shrink_unused(session, most, Which::not_of_graphs)) return code;
-  if (const int32_t code = new_block(session, bytes, base)) return code;
+  if (capture == 0) {
+    const size_t most = may_reuse(session.request.caller) ? session.device().memory_bytes / 4 : 0;
+    if (const int32_t code = shrink_unused(session, most, Which::not_of_graphs)) return code;
+  }
+  if (const int32_t code = new_block(session, bytes, capture, base)) return code;
   Block block;
   block.base = base;
   block.bytes = bytes;
   block.device = &session.device();
+  block.capture = capture;
   return make_live(session, block);
 }
 

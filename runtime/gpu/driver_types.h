@@ -63,6 +63,7 @@ enum : int { function_max_threads = 0, function_max_shared_bytes = 8 };
 enum : int { pointer_context = 1, pointer_memory_type = 2 };
 enum : int { jit_error_log = 5, jit_error_log_bytes = 6 };
 enum : unsigned { memory_host = 1, memory_device = 2 };
+enum : int { capture_mode_global = 0, capture_mode_of_thread = 1, capture_mode_relaxed = 2 };
 enum : int { capture_none = 0, capture_active = 1, capture_is_invalidated = 2 };
 
 // CUDA_MEMCPY2D

@@ -136,9 +136,12 @@ int32_t Program::allow_shared(const Session& session, LoadedKernel& kernel, int3
   if (session.driver().cuDeviceGetAttribute(&most, attribute_shared_bytes_opt_in,
                                             session.device().number) != success)
     return session.failed("cuFuncSetAttribute", result, asked);
-  return session.failed(
-      "cuFuncSetAttribute", result,
-      Line("%s; this device has %i for a block", static_cast<const char*>(asked), int64_t{most}));
+  if (bytes <= most) return session.failed("cuFuncSetAttribute", result, asked);
+  return session.request.refuse(
+      retrograde_error_out_of_memory,
+      "a block uses no more shared memory than the device has for one",
+      Line("it needs %i bytes, and there are %i", int64_t{bytes}, int64_t{most}),
+      "Compute less at a time of what is stored there, or store it in MemoryType::Heap");
 }
 
 LoadedProgram Program::take(const DeviceState* device) {

@@ -105,6 +105,19 @@ bool is_legal(const Copy2D& c) {
          c.target_pitch >= c.width_bytes && c.source_pitch <= most && c.target_pitch <= most;
 }
 
+// False: there is none of that kind.
+bool attribute_of(Address address, int attribute, void* value) {
+  DeviceMemory* memory = find_memory(address, 1);
+  if (attribute == pointer_memory_type) {
+    if (!memory && !is_locked(pointer(address))) return false;
+    *static_cast<unsigned*>(value) = memory ? memory_device : memory_host;
+    return true;
+  }
+  if (attribute != pointer_context || !memory) return false;
+  *static_cast<Context*>(value) = memory->find(address, 1)->context;
+  return true;
+}
+
 // Work that may not be on a captured stream's default stream, and so on.
 template <typename Work>
 Result copy_on(const char* function, Stream handle, Work work) {
@@ -162,15 +175,20 @@ RETROGRADE_SIMT_EXPORT Result cuMemHostUnregister(void* host) {
 
 RETROGRADE_SIMT_EXPORT Result cuPointerGetAttribute(void* value, int attribute, Address address) {
   return call_in_context("cuPointerGetAttribute", [&](ContextState&) -> Result {
-    DeviceMemory* memory = find_memory(address, 1);
-    if (attribute == pointer_memory_type) {
-      const bool locked = is_locked(pointer(address));
-      if (!memory && !locked) return invalid_value;
-      *static_cast<unsigned*>(value) = memory ? memory_device : memory_host;
-      return success;
+    return attribute_of(address, attribute, value) ? success : Result{invalid_value};
+  });
+}
+
+// What is not known is 0, and no error.
+RETROGRADE_SIMT_EXPORT Result cuPointerGetAttributes(unsigned count, const int* attributes,
+                                                     void** values, Address address) {
+  return call_in_context("cuPointerGetAttributes", [&](ContextState&) -> Result {
+    for (unsigned i = 0; i < count; i++) {
+      const bool is_context = attributes[i] == pointer_context;
+      if (!is_context && attributes[i] != pointer_memory_type) return invalid_value;
+      std::memset(values[i], 0, is_context ? sizeof(Context) : sizeof(unsigned));
+      attribute_of(address, attributes[i], values[i]);
     }
-    if (attribute != pointer_context || !memory) return invalid_value;
-    *static_cast<Context*>(value) = memory->find(address, 1)->context;
     return success;
   });
 }

@@ -1,5 +1,7 @@
 // The simulated driver: streams, events, graphs. A capture is of one stream: work that another stream
 // would join by events is refused.
+#include <utility>
+
 #include "simt/call.h"
 
 using namespace retrograde::simt;
@@ -122,6 +124,15 @@ RETROGRADE_SIMT_EXPORT Result cuStreamGetCaptureInfo_v2(Stream handle, int* stat
     if (graph) *graph = stream.capture.get();
     if (dependencies) *dependencies = nullptr;
     if (count) *count = 0;
+    return success;
+  });
+}
+
+// With these modes of threads and of captures say what may be called: see refuse_in_capture().
+RETROGRADE_SIMT_EXPORT Result cuThreadExchangeStreamCaptureMode(int* mode) {
+  return call("cuThreadExchangeStreamCaptureMode", [&]() -> Result {
+    if (*mode < capture_mode_global || *mode > capture_mode_relaxed) return invalid_value;
+    std::swap(*mode, capture_mode_of_this_thread());
     return success;
   });
 }

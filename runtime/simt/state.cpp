@@ -23,6 +23,11 @@ const void* this_thread() {
   return &place;
 }
 
+int& capture_mode_of_this_thread() {
+  thread_local int mode = 0;
+  return mode;
+}
+
 namespace {
 std::string& last_finding() {
   static std::string& text = *new std::string;

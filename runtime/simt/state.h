@@ -114,6 +114,7 @@ State& state();
 ContextState*& current_context();  // of this thread
 // Identifies the thread.
 const void* this_thread();
+int& capture_mode_of_this_thread();
 
 // The element of a set of pointers, or null.
 template <typename T>
@@ -142,8 +143,8 @@ Result enqueue(StreamState&, std::function<Result()>);
 Result complete(ContextState&, const std::vector<OperationPtr>&);
 Result complete_all(ContextState&);
 Result complete_stream(StreamState&);
-// Refuses what may not be called while this thread, or anyone in global mode, captures; the captures
-// are invalid then.
+// Refuses what may not be called while this thread, or anyone in global mode, captures, unless this
+// thread is in relaxed mode; the captures are invalid then.
 Result refuse_in_capture();
 Result refuse_on(StreamState&);  // of work that a captured stream cannot have
 

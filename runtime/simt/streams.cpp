@@ -116,10 +116,14 @@ Result complete_stream(StreamState& stream) {
 
 Result refuse_in_capture() {
   Result result = success;
+  const int mode = capture_mode_of_this_thread();
+  if (mode == capture_mode_relaxed) return result;
   for_each_capture([&](StreamState& stream) {
-    const bool concerns = stream.capture_mode == 0 ||
-                          (stream.capture_mode == 1 && stream.capture_thread == this_thread());
-    if (!concerns) return;
+    if (stream.capture_mode == capture_mode_relaxed) return;
+    const bool is_own = stream.capture_thread == this_thread();
+    const bool is_global =
+        stream.capture_mode == capture_mode_global && mode == capture_mode_global;
+    if (!is_own && !is_global) return;
     stream.is_invalidated = true;
     result = capture_unsupported;
   });

@@ -72,8 +72,8 @@ TEST_F(GpuRuntime, LaunchesAreChecked) {
   expect_error(run("saxpy", 2000, 0, sizes), failed,
                {"cuLaunchKernel gave CUDA_ERROR_INVALID_VALUE",
                 "1 x 1 x 1 blocks of 2000 x 1 x 1 threads", "can have 1024 threads"});
-  expect_error(run("saxpy", 32, 300000, sizes), failed,
-               {"cuFuncSetAttribute", "300000 bytes of shared memory; this device has 232448"});
+  expect_error(run("saxpy", 32, 300000, sizes), halide_error_code_out_of_memory,
+               {"no more shared memory than the device has", "300000 bytes, and there are 232448"});
   expect_error(run("saxpy", -1, 0, sizes), failed, {"no negative extents"});
   EXPECT_EQ(run("saxpy", 32, 200000, sizes), 0) << errors;
 }

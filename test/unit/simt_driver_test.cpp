@@ -187,6 +187,23 @@ TEST_F(Simt, CaptureRefusesWhatItCannotRecord) {
   refused([&] { return cuMemcpyDtoDAsync_v2(data, data, 16, nullptr); });
 }
 
+TEST_F(Simt, ARelaxedThreadMayAllocateDuringACapture) {
+  Graph graph = nullptr;
+  Address memory = 0;
+  int mode = capture_mode_relaxed;
+  ASSERT_EQ(cuStreamBeginCapture_v2(stream, capture_mode_global), success);
+  ASSERT_EQ(cuThreadExchangeStreamCaptureMode(&mode), success);
+  EXPECT_EQ(mode, capture_mode_global);
+  EXPECT_EQ(cuMemAlloc_v2(&memory, 16), success);
+  ASSERT_EQ(cuThreadExchangeStreamCaptureMode(&mode), success);
+  EXPECT_EQ(mode, capture_mode_relaxed);
+  EXPECT_EQ(cuStreamEndCapture(stream, &graph), success);
+  EXPECT_EQ(cuGraphDestroy(graph), success);
+  EXPECT_EQ(cuMemFree_v2(memory), success);
+  mode = 3;
+  EXPECT_EQ(cuThreadExchangeStreamCaptureMode(&mode), invalid_value);
+}
+
 // ---- what the driver checks ----
 
 TEST_F(Simt, ChecksCalls) {

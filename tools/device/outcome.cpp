@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "diagnostics/error.h"
+#include "testing/check_program.h"
 
 namespace device_check {
 
@@ -42,9 +42,12 @@ Record recorded(const std::string& name, const std::function<std::string()>& com
   record.name = name;
   try {
     record.bytes = compute();
+  } catch (const RuntimeError& error) {
+    // How much memory a program needs may be known only when it runs.
+    record.state = fuzz::lacks_memory(error) ? Record::State::Refused : Record::State::Failed;
+    record.bytes = error.what();
   } catch (const UserError& error) {
-    record.state =
-        dynamic_cast<const RuntimeError*>(&error) ? Record::State::Failed : Record::State::Refused;
+    record.state = Record::State::Refused;
     record.bytes = error.what();
   } catch (const Unsupported& error) {
     record.state = Record::State::Refused;
