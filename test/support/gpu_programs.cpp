@@ -7,7 +7,7 @@ namespace {
 
 using namespace retrograde;
 
-Var x("x"), y("y"), z("z"), c("c"), k("k"), xi("xi"), yi("yi"), u("u");
+Var x("x"), y("y"), z("z"), c("c"), k("k"), xi("xi"), yi("yi"), u("u"), v("v");
 
 Buffer<float> picture(int width, int height) {
   Buffer<float> image(width, height);
@@ -24,11 +24,14 @@ Func tiled(Func f, bool on_gpu, int width = 16, int height = 8) {
 
 // ---- from linear algebra ----
 
+// A block's part of both in shared memory, 16 products at a time; each thread has a square of sums in
+// registers, 16 apart, so that threads beside each other read words beside each other.
 Func matrix_product(bool on_gpu, int scale) {
-  const int n = 64 * scale;
+  const int n = 64 * scale, threads = 16, each = scale == 1 ? 4 : 8, steps = 16;
   const Buffer<float> a = picture(n, n), b = picture(n, n);
   RDom r(0, n, "r");
   RVar ro("ro"), ri("ri");
+  Var xt("xt"), yt("yt");
   Func sum("sum"), out("out"), left("left"), right("right");
   left(x, y) = a(x, y);
   right(x, y) = b(x, y);
@@ -36,11 +39,27 @@ Func matrix_product(bool on_gpu, int scale) {
   sum(x, y) += left(r, y) * right(x, r);
   out(x, y) = sum(x, y);
   if (on_gpu) {
-    out.gpu_tile(x, y, xi, yi, 16, 16);
-    sum.compute_at(out, x).store_in(MemoryType::Register).gpu_threads(x, y);
-    sum.update().split(r, ro, ri, 16).reorder(ri, x, y, ro).gpu_threads(x, y);
-    left.compute_at(sum, ro).gpu_threads(x, y);
-    right.compute_at(sum, ro).gpu_threads(x, y);
+    const auto square = [&](Stage stage, const Var& columns, const Var& rows) {
+      return stage.split(columns, u, xt, threads).split(rows, v, yt, threads).unroll(u).unroll(v);
+    };
+    out.tile(x, y, xi, yi, threads * each, threads * each).gpu_blocks(x, y);
+    square(out, xi, yi).reorder(u, v, xt, yt, x, y).gpu_threads(xt, yt);
+    sum.compute_at(out, x).store_in(MemoryType::Register);
+    square(sum, x, y).reorder(u, v, xt, yt).gpu_threads(xt, yt);
+    square(sum.update().split(r, ro, ri, steps), x, y)
+        .reorder(u, v, ri, xt, yt, ro)
+        .unroll(ri)
+        .gpu_threads(xt, yt);
+    left.compute_at(sum, ro)
+        .split(y, v, yt, threads)
+        .reorder(v, x, yt)
+        .unroll(v)
+        .gpu_threads(x, yt);
+    right.compute_at(sum, ro)
+        .split(x, u, xt, threads)
+        .reorder(u, xt, y)
+        .unroll(u)
+        .gpu_threads(xt, y);
   }
   return out;
 }
@@ -240,15 +259,11 @@ Func training_step(bool on_gpu, int scale) {
   loss() = 0.0f;
   loss() += error * error / static_cast<float>(width * height);
   const Derivative d = propagate_adjoints(loss);
-  Func gradient = d(weights);
+  const Func gradient = d(weights);
   step(x, y) = weights(x, y) - 0.1f * gradient(x, y);
-  if (on_gpu) {
-    for (Func f : {weights, filtered, gradient}) f.compute_root();
-    weights.gpu_tile(x, y, xi, yi, 3, 3);
-    filtered.gpu_tile(x, y, xi, yi, 16, 8, TailStrategy::GuardWithIf);
-    filtered.update().gpu_tile(x, y, xi, yi, 16, 8, TailStrategy::GuardWithIf);
-    step.gpu_tile(x, y, xi, yi, 3, 3);
-  }
+  // Stages that were derived have no names to schedule them by.
+  step.set_estimates({{0, 3}, {0, 3}});
+  if (on_gpu) Pipeline(step).auto_schedule(get_host_target().with_feature(Target::CUDA));
   return step;
 }
 
@@ -258,7 +273,7 @@ float reduced_value(int i) { return static_cast<float>(i % 1000) / 1024; }
 
 Program reduction(int values) {
   const auto build = [values](bool on_gpu) {
-    const int threads = std::min(values / 4, 1 << 16), block = 256;
+    const int block = 256, threads = std::clamp(values / 64, block, 1 << 18);
     Buffer<float> in(values);
     in.for_each_element([&](int i) { in(i) = reduced_value(i); });
     RDom r(0, values, "r");
@@ -268,14 +283,17 @@ Program reduction(int values) {
     total(x) = sum();
     if (on_gpu) {
       sum.compute_root();
-      // Neighbouring threads read neighbours; then a block adds up their sums, then a thread those.
-      RVar ro("ro"), ri("ri"), rio("rio"), rii("rii");
-      Func parts = sum.update().split(r, ro, ri, threads).rfactor(ri, u);
-      Func of_block = sum.update().split(ri, rio, rii, block).rfactor(rii, k);
-      for (Stage stage : {Stage(parts), parts.update()}) stage.gpu_tile(u, xi, block);
-      for (Stage stage : {Stage(of_block), of_block.update()}) stage.gpu_tile(k, xi, block);
-      parts.compute_root();
-      of_block.compute_root();
+      // Neighbouring threads read neighbours; then fewer threads add up their sums, 64 each, until there is
+      // one.
+      RVar left = r;
+      for (int parts = threads; parts > 1; parts = parts > 64 ? parts / 64 : 1) {
+        const std::string number = std::to_string(parts);
+        RVar outer("outer" + number), inner("inner" + number);
+        Func sums = sum.update().split(left, outer, inner, parts).rfactor(inner, u);
+        sums.compute_root().gpu_tile(u, xi, std::min(parts, block));
+        sums.update().reorder(outer, u).gpu_tile(u, xi, std::min(parts, block));
+        left = inner;
+      }
       sum.update().gpu_single_thread();
     }
     return total;

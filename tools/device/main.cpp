@@ -27,7 +27,9 @@
 #include <fstream>
 #include <future>
 #include <iostream>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "child.h"
 #include "device.h"
@@ -155,6 +157,12 @@ class TemporaryFolder {
   fs::path path_;
 };
 
+// Of random pipelines, one after another.
+struct Seeds {
+  uint64_t first = 1;
+  int count = 0;
+};
+
 class Check {
  public:
   Check(const Arguments& arguments, const Device& device)
@@ -188,6 +196,7 @@ class Check {
   const TemporaryFolder folder_;
   Json json_;
   std::vector<std::string> problems_;
+  std::vector<Record> results_;  // of the programs, on the device
 
   double seconds_used() const {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
@@ -198,8 +207,25 @@ class Check {
     problems_.push_back(text);
   }
 
-  std::vector<std::string> worker(const std::string& part, const std::string& file,
-                                  double seconds) const {
+  // Of the random pipelines, for workers beside each other: half of the processors' for the device, half for
+  // the executor.
+  std::vector<Seeds> shares() const {
+    constexpr int most = 8;
+    const int workers =
+        std::clamp(static_cast<int>(std::thread::hardware_concurrency()) / 2, 1, most);
+    std::vector<Seeds> all;
+    uint64_t first = arguments_.first_seed;
+    for (int i = 0, left = arguments_.random; i < workers && left > 0; ++i) {
+      const int count = (left + workers - i - 1) / (workers - i);
+      all.push_back({first, count});
+      first += static_cast<uint64_t>(count);
+      left -= count;
+    }
+    return all;
+  }
+
+  std::vector<std::string> worker(const std::string& part, const std::string& file, double seconds,
+                                  const Seeds& seeds = {}) const {
     std::vector<std::string> words = {fs::read_symlink("/proc/self/exe").string(),
                                       "--worker",
                                       part,
@@ -210,9 +236,9 @@ class Check {
                                       "--seconds",
                                       std::to_string(seconds),
                                       "--random",
-                                      std::to_string(arguments_.random),
+                                      std::to_string(seeds.count),
                                       "--first-seed",
-                                      std::to_string(arguments_.first_seed)};
+                                      std::to_string(seeds.first)};
     for (const std::string& name : arguments_.only) words.insert(words.end(), {"--only", name});
     if (arguments_.is_simulated) words.push_back("--simulated");
     return words;
@@ -252,22 +278,47 @@ class Check {
               << std::endl;
   }
 
+  // What one worker left, and how it ended.
+  struct Told {
+    Ended ended;
+    std::vector<Record> records;
+  };
+  std::future<Told> start(const std::vector<std::string>& words, const std::string& file,
+                          const std::map<std::string, std::string>& variables, double seconds) {
+    return std::async(std::launch::async, [=] {
+      Ended ended = run_child(words, variables, seconds);
+      return Told{std::move(ended), read_records(file)};
+    });
+  }
+  // All records; that a worker ended early is a problem.
+  std::vector<Record> records_of(const std::string& part, const std::string& where,
+                                 std::vector<std::future<Told>>& workers) {
+    std::vector<Record> all;
+    for (std::future<Told>& worker : workers) {
+      Told told = worker.get();
+      std::ranges::move(told.records, std::back_inserter(all));
+      if (told.ended.succeeded()) continue;
+      problem(part + " end early on " + where +
+              (told.ended.timed_out ? ", its time was over" : "") + ", status " +
+              std::to_string(told.ended.status) + ": " + told.ended.err);
+    }
+    return all;
+  }
+
   void compare_part(const std::string& part, double share) {
     std::cout << part << ": on " << device_.name << " and on the executor" << std::endl;
     const double seconds = share * seconds_left(), grace = seconds + 20;
-    const std::string own = folder_.file(part + ".device"),
-                      other = folder_.file(part + ".executor");
-    auto expected =
-        std::async(std::launch::async, run_child, worker(part, other, seconds), executor(), grace);
-    const Ended ended = run_child(worker(part, own, seconds), environment(), grace);
-    const Ended ended_other = expected.get();
-    for (const auto& [where, one] :
-         {std::pair{"the device", &ended}, {"the executor", &ended_other}}) {
-      if (!one->succeeded())
-        problem(part + " end early on " + where + (one->timed_out ? ", its time was over" : "") +
-                ", status " + std::to_string(one->status) + ": " + one->err);
+    std::vector<std::future<Told>> there, here;
+    for (const Seeds& seeds : part == "random" ? shares() : std::vector<Seeds>{{}}) {
+      const std::string number = std::to_string(seeds.first),
+                        own = folder_.file(part + ".device" + number),
+                        other = folder_.file(part + ".executor" + number);
+      here.push_back(start(worker(part, other, seconds, seeds), other, executor(), grace));
+      there.push_back(start(worker(part, own, seconds, seeds), own, environment(), grace));
     }
-    const Agreement agreement = compare(read_records(own), read_records(other));
+    std::vector<Record> own = records_of(part, "the device", there);
+    const std::vector<Record> other = records_of(part, "the executor", here);
+    const Agreement agreement = compare(own, other);
     for (const std::string& text : agreement.problems) problem(text);
     if (agreement.compared == 0) problem("of the " + part + " none was compared");
     std::cout << "  " << agreement.compared << " compared bit for bit, " << agreement.refused
@@ -278,6 +329,7 @@ class Check {
                    {"bytes", agreement.bytes},
                    {"problems", agreement.problems}};
     if (part == "random") json_[part]["first_seed"] = arguments_.first_seed;
+    if (part == "programs") results_ = std::move(own);
   }
 
   void sanitize() {
@@ -342,7 +394,7 @@ class Check {
         {"device", arguments_.is_simulated ? "cpu" : "cuda"},
         {"seconds", arguments_.is_simulated ? 1.0 : std::min(60.0, seconds_left())},
         {"programs", json_["times"].is_object() ? json_["times"]["programs"] : Json::array()}};
-    for (const Record& record : read_records(folder_.file("programs.device"))) {
+    for (const Record& record : results_) {
       if (record.state != Record::State::Done) continue;
       const std::string file = folder_.file(record.name + ".raw");
       std::ofstream(file, std::ios::binary) << record.bytes;
@@ -376,8 +428,9 @@ class Check {
 
 // Before minutes are spent on it.
 void check_writable(const std::string& path) {
+  if (path.empty()) return;
   const fs::path folder = fs::absolute(path).parent_path();
-  if (!path.empty() && (fs::is_directory(path) || access(folder.c_str(), W_OK) != 0))
+  if (fs::is_directory(path) || access(folder.c_str(), W_OK) != 0)
     usage("\"" + path + "\" cannot be written");
 }
 
