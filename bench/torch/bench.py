@@ -2,12 +2,14 @@
 """bench.py -- eight operators of PyTorch made of pipelines beside PyTorch's own, in one run.
 
     bench.py PACKAGE [--operator NAME]... [--rounds N] [--threads N] [--small] [--output FILE] [--plot FILE]
+             [--device cuda]
 
 PACKAGE is the folder that holds the Python package. PyTorch is that of the virtual environment of
 ../operators/peers.py, which is made when it is not there. What PyTorch has for the same (formulations.py) runs as it
 is and through torch.compile; all run in turn, on the same tensors and as many threads: forward alone, and forward
 with backward by all inputs. Errors are the largest |a - b| / max(|b|, root mean square of b) over the result and all
-gradients, b being PyTorch's own in float64. `ratio` is that of the better of PyTorch's two to ours. At the end stands
+gradients, b being PyTorch's own in float64. --device cuda: all of it on the GPU, with the PyTorch of the interpreter
+that runs this; a turn is then CUDA_CALLS calls and the end of the last. `ratio` is that of the better of PyTorch's two to ours. At the end stands
 what a call costs where there is nothing to compute (overhead.py).
 """
 import argparse
@@ -29,6 +31,7 @@ SIDES = ("retrograde", "eager", "compiled")
 PAUSE_SECONDS = 0.03  # before a turn: threads of OpenMP that have no work look for some for so long
 WARM_SECONDS = 0.02  # of untimed runs in a turn: after the pause caches and clocks are not as in use
 MOST_SECONDS = 3  # of all rounds of one that is slow
+CUDA_CALLS = 20  # of a turn on a GPU, which works while the next is called
 
 
 def sized(small):
@@ -57,8 +60,9 @@ def sized(small):
 class Side:
     """One way to compute an operator, timed."""
 
-    def __init__(self, name, function, tensors):
+    def __init__(self, name, function, tensors, device):
         self.name, self.function, self.tensors = name, function, tensors
+        self.on_gpu = device != "cpu"
         self.forward_ms, self.both_ms, self.spent = [], [], 0.0
 
     def forward(self):
@@ -73,18 +77,27 @@ class Side:
         result = self.function(*self.tensors)
         return [result.detach(), *torch.autograd.grad(result, self.tensors, self.seed)]
 
+    def wait(self):
+        import torch
+
+        if self.on_gpu:
+            torch.cuda.synchronize()
+
     def timed(self, run, times):
         if self.spent > MOST_SECONDS and times:
             return
         time.sleep(PAUSE_SECONDS)
         warm = time.perf_counter()
+        calls = CUDA_CALLS if self.on_gpu else 1
         while True:
             start = time.perf_counter()
-            run()
+            for _ in range(calls):
+                run()
+            self.wait()
             end = time.perf_counter()
             if end - warm > WARM_SECONDS:
                 break
-        times.append(1e3 * (end - start))
+        times.append(1e3 * (end - start) / calls)
         self.spent += end - warm
 
 
@@ -92,7 +105,7 @@ def largest_error(results, exact):
     worst = 0.0
     for a, b in zip(results, exact):
         scale = b.square().mean().sqrt().clamp(min=1e-300)
-        worst = max(worst, ((a.double() - b).abs() / b.abs().maximum(scale)).max().item())
+        worst = max(worst, ((a.cpu().double() - b).abs() / b.abs().maximum(scale)).max().item())
     return worst
 
 
@@ -106,13 +119,15 @@ def measure(name, options):
     exact = FORMULATIONS[name](*exact_inputs)
     seed = 2 * torch.rand(exact.shape, generator=torch.Generator().manual_seed(3), dtype=torch.float64) - 1
     exact = [exact.detach(), *torch.autograd.grad(exact, exact_inputs, seed)]
-    tensors = [t.detach().float().requires_grad_() for t in exact_inputs]
-    sides = [Side("retrograde", operator(f"bench::{name}", OPERATORS[name]), tensors),
-             Side("eager", FORMULATIONS[name], tensors),
-             Side("compiled", torch.compile(FORMULATIONS[name], fullgraph=True, dynamic=False), tensors)]
+    # Numbers are the host's.
+    tensors = [(t.detach().float().to(options.device) if t.dim() else t.detach().float()).requires_grad_()
+               for t in exact_inputs]
+    functions = {"retrograde": operator(f"bench::{name}", OPERATORS[name]), "eager": FORMULATIONS[name],
+                 "compiled": torch.compile(FORMULATIONS[name], fullgraph=True, dynamic=False)}
+    sides = [Side(side, functions[side], tensors, options.device) for side in SIDES]
     row, failures = {"operator": name, "sizes": [list(t.shape) for t in tensors]}, {}
     for side in list(sides):
-        side.seed = seed.float()
+        side.seed = seed.float().to(options.device)
         start = time.perf_counter()
         try:
             row[f"{side.name}_error"] = largest_error(side.both(), exact)
@@ -170,13 +185,14 @@ def read_options():
     parser.add_argument("--small", action="store_true")
     parser.add_argument("--output", default="out/bench/torch.json")
     parser.add_argument("--plot")
+    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu")
     return parser.parse_args()
 
 
 def main():
     options = read_options()
     os.environ["HL_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = str(options.threads)
-    if sys.prefix != peers.PEERS:
+    if options.device == "cpu" and sys.prefix != peers.PEERS:
         peers.make_peers(["pytorch"])
         python = os.path.join(peers.PEERS, "bin", "python")
         done = os.spawnv(os.P_WAIT, python, [python, *sys.argv])
@@ -190,7 +206,11 @@ def main():
 
     torch.set_num_threads(options.threads)
     report = {"pytorch": torch.__version__, "threads": options.threads, "operators": []}
-    print(f"PyTorch {torch.__version__}, {options.threads} threads; ms: ours, eager, torch.compile")
+    place = f"{options.threads} threads"
+    if options.device == "cuda":
+        torch.backends.cuda.matmul.allow_tf32 = torch.backends.cudnn.allow_tf32 = False
+        place = report["device"] = torch.cuda.get_device_name()
+    print(f"PyTorch {torch.__version__}, {place}; ms: ours, eager, torch.compile")
     for name in options.operators or sized(True):
         row = measure(name, options)
         report["operators"].append(row)
@@ -201,7 +221,7 @@ def main():
             + f" ({row.get(what + '_ratio', 0):5.2f})" for what in ("forward", "both"))
         errors = " ".join(f"{row.get(f'{side}_error', float('nan')):.0e}" for side in SIDES)
         print(f"{name:20}{cells}  errors {errors}", *row["failures"].items(), flush=True)
-    if not options.operators:
+    if not options.operators and options.device == "cpu":
         report["overhead_us"] = overhead.measure()
         overhead.show(report["overhead_us"])
     for what in ("forward", "both"):

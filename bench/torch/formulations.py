@@ -10,7 +10,7 @@ BINS = 8  # of soft_histogram
 
 def _centres(size, like):
     """Of pixels from -1 to 1, as grid_sample counts them."""
-    return (torch.arange(size, dtype=like.dtype) + 0.5) * (2 / size) - 1
+    return (torch.arange(size, dtype=like.dtype, device=like.device) + 0.5) * (2 / size) - 1
 
 
 def bilateral_slice(image, guide, grid):
@@ -26,8 +26,8 @@ def bilateral_slice(image, guide, grid):
 def flow_warp(image, flow):
     """What stands where each pixel's flow says, at most at the edge."""
     _, height, width = image.shape
-    x = torch.arange(width, dtype=image.dtype) + flow[0]
-    y = torch.arange(height, dtype=image.dtype)[:, None] + flow[1]
+    x = torch.arange(width, dtype=image.dtype, device=image.device) + flow[0]
+    y = torch.arange(height, dtype=image.dtype, device=image.device)[:, None] + flow[1]
     places = torch.stack([x * (2 / (width - 1)) - 1, y * (2 / (height - 1)) - 1], -1)
     return F.grid_sample(image[None], places[None], padding_mode="border", align_corners=True)[0]
 
@@ -52,11 +52,11 @@ def recursive_filter(image, mix):
     """Along the rows, then along the columns: a lower triangular matrix of powers, which is what there is to be had
     in one call."""
     def matrix(size):
-        i = torch.arange(size, dtype=image.dtype)
+        i = torch.arange(size, dtype=image.dtype, device=image.device)
         apart = i[:, None] - i
         powers = (1 - mix) ** apart.clamp(min=0)
         first = (i == 0).to(image.dtype)
-        return torch.where(apart >= 0, powers * (mix + (1 - mix) * first), torch.zeros((), dtype=image.dtype))
+        return torch.where(apart >= 0, powers * (mix + (1 - mix) * first), powers.new_zeros(()))
 
     height, width = image.shape
     return matrix(height) @ image @ matrix(width).T
@@ -83,7 +83,7 @@ def soft_histogram(image):
     at = (image.clamp(0, 1) * (BINS - 1)).flatten()
     i = at.detach().floor().long().clamp(0, BINS - 1)
     w = at - i
-    zeros = torch.zeros(BINS, dtype=image.dtype)
+    zeros = torch.zeros(BINS, dtype=image.dtype, device=image.device)
     return zeros.index_add(0, i, 1 - w).index_add(0, (i + 1).clamp(max=BINS - 1), w)
 
 
