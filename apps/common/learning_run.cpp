@@ -45,8 +45,8 @@ void LearningRun::learn(Learner& learner) {
     std::snprintf(note, sizeof note, "held out %.2f dB", quality_.y.back());
     progress.show(static_cast<int>(steps_), note);
   }
-  if (looked_at != steps_) look(learner);
   save(learner);
+  if (looked_at != steps_) look(learner);
 }
 
 bool LearningRun::is_over() const {
@@ -66,9 +66,13 @@ void LearningRun::step(Learner& learner) {
   loss_.y.push_back(smooth);
 }
 
+// Whoever stops a run does not wait for looks; one that was stopped says nothing.
 void LearningRun::look(Learner& learner) {
+  if (stop_requested()) return;
+  const double quality = learner.look(steps_);
+  if (stop_requested()) return;
   quality_.x.push_back(seconds_);
-  quality_.y.push_back(learner.look(steps_));
+  quality_.y.push_back(quality);
 }
 
 void LearningRun::save(Learner& learner) const {

@@ -23,8 +23,8 @@ class Learner {
   virtual ~Learner() = default;
 
   virtual double step() = 0;  // returns the loss before it
-  virtual double look(
-      long steps) = 0;  // the quality on what is held out, in dB, after so many steps
+  // The quality on what is held out, in dB, after so many steps; any number once somebody stops it.
+  virtual double look(long steps) = 0;
   // Into the state; files of its own, as of weights, are written beside it.
   virtual void save(State& state) = 0;
   virtual void restore(const State& state) = 0;
@@ -45,7 +45,7 @@ class LearningRun {
   LearningRun(std::string program, const CommonOptions& options, const Plan& plan);
 
   // Steps until they are done, --seconds are over or somebody stops it. What looks and files take does not count. The
-  // last look is at what is left in the learner.
+  // last look is at what is left in the learner, unless somebody stops it: then there is no more look.
   void learn(Learner& learner);
 
   // Both curves, error_vs_time.png and psnr_vs_time.png, and the time of a step.

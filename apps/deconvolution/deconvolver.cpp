@@ -16,17 +16,15 @@ std::vector<float> Deconvolver::run(const Problem& problem, const Watch& watch) 
   solver_.set(problem);
   stages_.clear();
   std::vector<float> images = padded<float>(problem);
-  int iterations = 0;
-  bool stopped = false;
-  for (int stage = 0; stage < method_.weights.stages && !stopped; ++stage) {
+  stopped_ = false;
+  for (int stage = 0; stage < method_.weights.stages && !stopped_; ++stage) {
     solver_.set(std::as_const(method_.weights).of(stage));
-    images = solver_.solve(images, accuracy_, [&](const lang::Buffer<float>& now) {
-      ++iterations;
-      stopped = watch && !watch(iterations, now);
-      return !stopped;
-    });
     // A stage may end early, and what is shown goes on from where it could have ended.
-    iterations = accuracy_.iterations * (stage + 1);
+    const int before = accuracy_.iterations * stage;
+    images = solver_.solve(images, accuracy_, [&](const lang::Buffer<float>& now) {
+      stopped_ = watch && !watch(before + solver_.iterations(), now);
+      return !stopped_;
+    });
     stages_.push_back(cropped(images, problem.extent));
   }
   return stages_.back();

@@ -32,20 +32,22 @@ class Deconvolver {
   // Another one whose weights have the same shape.
   void use(Method method) { method_ = std::move(method); }
 
-  // After each iteration: how many there were, and the images [count, full height, full width]. False stops,
-  // and the images are the result.
+  // Before a stage's first iteration and after each: how many there were, and the images [count, full height, full
+  // width]. False stops, and the images are the result.
   using Watch = std::function<bool(int iterations, const lang::Buffer<float>& images)>;
 
   // [count, height, width]
   std::vector<float> run(const Problem& problem, const Watch& watch = {});
   // What each stage made of it, at the last run.
   const std::vector<std::vector<float>>& stages() const { return stages_; }
+  bool stopped() const { return stopped_; }  // by its watch, at the last run
 
  private:
   Method method_;
   Accuracy accuracy_;
   Solver<float> solver_;
   std::vector<std::vector<float>> stages_;
+  bool stopped_ = false;
 };
 
 }  // namespace deconvolution

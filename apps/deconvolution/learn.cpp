@@ -1,6 +1,8 @@
 // learn.cpp -- see learn.h.
 #include "learn.h"
 
+#include <utility>
+
 #include "common/learning_run.h"
 #include "common/stop.h"
 #include "diagnostics/error.h"
@@ -38,7 +40,7 @@ class StagesLearner : public apps::Learner {
 
   double look(long steps) override {
     method_.use({retrograde::text("learned, ", steps, " steps"), trainer_.weights()});
-    measured_ = held_out_.measure(method_);
+    if (auto measured = held_out_.measure(method_)) measured_ = *std::move(measured);
     return measured_.mean_db;
   }
 
@@ -51,7 +53,8 @@ class StagesLearner : public apps::Learner {
   void restore(const apps::State& state) override { trainer_.restore(state); }
 
   const Trainer& trainer() const { return trainer_; }
-  const Measured& measured() const { return measured_; }  // at the last look
+  // At the last look that nobody stopped.
+  const Measured& measured() const { return measured_; }
 
  private:
   const Options& options_;

@@ -11,7 +11,7 @@ namespace deconvolution {
 
 struct Learned {
   Weights weights;
-  Measured held_out;
+  Measured held_out;  // at the last look; no photographs when it was stopped before
   long steps = 0;
   bool stopped = false;
 };

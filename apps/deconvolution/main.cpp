@@ -39,6 +39,15 @@ std::vector<Method> methods_of(const Options& options) {
   return methods;
 }
 
+// Whoever stops a run does not wait for comparisons.
+void enter_stopped(const std::optional<Learned>& learned, apps::Report& report) {
+  report.add_note("stopped before any method was measured");
+  if (!learned || learned->held_out.each_db.empty()) return;
+  const Measured& m = learned->held_out;
+  report.own["held_out"][m.name] = m.mean_db;
+  report.add_number("PSNR, held out", m.mean_db, "dB");
+}
+
 // Photographs: scan, learn or measure. Gives the steps taken.
 long use_dataset(const Options& options, std::vector<Method>& methods, apps::Report& report) {
   const auto dataset = demosaic::read_dataset(options.dataset);
@@ -51,11 +60,13 @@ long use_dataset(const Options& options, std::vector<Method>& methods, apps::Rep
   std::optional<Learned> learned;
   if (!options.compare) learned = learn(options, dataset, gallery, report);
   std::vector<Measured> measured = gallery.measure(methods, options.common.threads);
-  if (learned) {
-    measured.push_back(learned->held_out);
-    methods.push_back({learned->held_out.name, learned->weights});
+  if (learned) methods.push_back({learned->held_out.name, learned->weights});
+  if (measured.empty()) {
+    enter_stopped(learned, report);
+  } else {
+    if (learned) measured.push_back(learned->held_out);
+    enter(gallery, measured, report);
   }
-  enter(gallery, measured, report);
   return learned ? learned->steps : 0;
 }
 
@@ -70,7 +81,9 @@ void run(const Options& options) {
   std::vector<Method> methods = methods_of(options);
   long steps = 0;
   if (!options.dataset.empty()) steps = use_dataset(options, methods, report);
-  if (!options.common.input.empty()) steps += deconvolve_input(options, methods, report);
+  const bool stopped_before = !options.dataset.empty() && apps::stop_requested();
+  if (!options.common.input.empty() && !stopped_before)
+    steps += deconvolve_input(options, methods, report);
   report.write(steps, apps::stop_requested());
   std::printf("results in %s\n", options.common.output.c_str());
 }

@@ -6,7 +6,7 @@
 #include <chrono>
 #include <cstdio>
 #include <numeric>
-#include <optional>
+#include <utility>
 
 #include "common/stop.h"
 #include "diagnostics/error.h"
@@ -73,12 +73,15 @@ double Gallery::blurred_db() const {
   return sum / static_cast<double>(problems_.size());
 }
 
-Measured Gallery::measure(Deconvolver& method) const {
+std::optional<Measured> Gallery::measure(Deconvolver& method) const {
+  const auto goes_on = [](int, const lang::Buffer<float>&) { return !apps::stop_requested(); };
   Measured result{method.name(), 0, {}, {}, 0};
   const auto count = static_cast<double>(problems_.size());
   const auto begin = std::chrono::steady_clock::now();
   for (const Simulated& s : problems_) {
-    result.each_db.push_back(each_psnr_db(method.run(s.problem), s));
+    const std::vector<float> images = method.run(s.problem, goes_on);
+    if (method.stopped()) return std::nullopt;
+    result.each_db.push_back(each_psnr_db(images, s));
     result.mean_db += mean(result.each_db.back()) / count;
     const auto& stages = method.stages();
     result.stages_db.resize(stages.size(), 0.0);
@@ -96,13 +99,15 @@ std::vector<Measured> Gallery::measure(const std::vector<Method>& methods, int t
   std::vector<Measured> measured;
   std::optional<Deconvolver> deconvolver;
   for (const Method& method : methods) {
-    if (apps::stop_requested() && !measured.empty()) break;
+    if (apps::stop_requested()) break;
     if (deconvolver && deconvolver->shape() == method.weights.shape) {
       deconvolver->use(method);
     } else {
       deconvolver.emplace(method, extent(), threads);
     }
-    measured.push_back(measure(*deconvolver));
+    std::optional<Measured> one = measure(*deconvolver);
+    if (!one) break;
+    measured.push_back(*std::move(one));
   }
   return measured;
 }

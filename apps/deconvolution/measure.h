@@ -1,6 +1,7 @@
 // measure.h -- how good a method is on photographs that were blurred, and how long it takes.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,8 +32,10 @@ class Gallery {
   const Extent& extent() const { return problems_.front().problem.extent; }
   const std::vector<std::string>& names() const { return names_; }
   double blurred_db() const;
-  Measured measure(Deconvolver& method) const;
-  // What has the shape of the one before is not compiled again. Ends early when somebody stops it.
+  // Nothing when somebody stops it.
+  std::optional<Measured> measure(Deconvolver& method) const;
+  // What has the shape of the one before is not compiled again. When somebody stops it, those that were measured
+  // by then.
   std::vector<Measured> measure(const std::vector<Method>& methods, int threads) const;
 
  private:

@@ -2,6 +2,7 @@
 #include "one_picture.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <optional>
@@ -95,18 +96,23 @@ void write_psf(const Options& options) {
 // The methods on one picture, their clock and their curves.
 class Run {
  public:
-  Run(const Options& options, const std::vector<Method>& methods, apps::Report& report)
-      : options_(options), methods_(methods), report_(report), picture_(read_picture(options)) {}
+  Run(const Options& options, const std::vector<Method>& methods, apps::Report& report,
+      const Heard& heard)
+      : options_(options),
+        methods_(methods),
+        report_(report),
+        heard_(heard),
+        picture_(read_picture(options)) {}
 
   long run() {
     show_blurred();
     int total = 0;
     for (const Method& m : methods_) total += channels * iterations_of(m);
     apps::Progress progress(stderr, total);
-    for (const Method& m : methods_) {
-      deconvolve(m, progress);
-      if (is_over()) break;
-    }
+    bool whole = true;
+    for (size_t m = 0; m < methods_.size() && whole; ++m)
+      whole = !is_over() && deconvolve(methods_[m], progress);
+    if (!whole) keep_best();
     enter();
     return done_;
   }
@@ -119,16 +125,16 @@ class Run {
   }
 
   void show_blurred() {
-    Planes blurred, truth;
+    Planes truth;
     for (const Simulated& s : picture_.channels) {
-      blurred.push_back(s.problem.blurred);
+      best_.push_back(s.problem.blurred);
       truth.push_back(s.truth);
     }
-    write("blurred.png", blurred);
+    write("blurred.png", best_);
     write_psf(options_);
     report_.add_picture("psf.png", "the point-spread function, enlarged by your viewer");
     if (!picture_.has_truth) return report_.add_picture("blurred.png", "the input");
-    blurred_db_ = psnr_of(picture_, blurred);
+    blurred_db_ = psnr_of(picture_, best_);
     write("truth.png", truth);
     report_.add_picture("truth.png", "the photograph");
     show("blurred.png", "blurred", blurred_db_);
@@ -146,47 +152,79 @@ class Run {
     return *deconvolver_;
   }
 
-  // A channel that is not reached stays blurred.
-  void deconvolve(const Method& method, apps::Progress& progress) {
+  // False when it was stopped.
+  bool deconvolve(const Method& method, apps::Progress& progress) {
     Deconvolver& deconvolver = deconvolver_of(method);
-    Planes planes;
     apps::PlotSeries series{method.name, {}, {}};
     const auto begin = std::chrono::steady_clock::now();
-    for (size_t c = 0; c < channels; ++c) {
-      const Simulated& channel = picture_.channels[c];
-      if (is_over()) {
-        planes.push_back(channel.problem.blurred);
-        continue;
-      }
-      const long before = done_;
-      const auto channel_start = std::chrono::steady_clock::now();
-      planes.push_back(deconvolver.run(channel.problem, [&](int count, const auto& images) {
-        progress.show(static_cast<int>(before) + count, method.name);
-        if (c == watched && picture_.has_truth) {
-          const std::vector<float> now(images.begin(), images.end());
-          series.x.push_back(apps::seconds_since(channel_start));
-          series.y.push_back(psnr_db(cropped(now, channel.problem.extent), channel.truth));
-        }
-        return !is_over();
-      }));
-      done_ = before + iterations_of(method);
-    }
-    keep(method, planes, apps::seconds_since(begin));
+    bool whole = true;
+    for (size_t c = 0; c < channels && whole; ++c)
+      whole = !is_over() && deconvolve_channel(method, c, deconvolver, series, progress);
+    if (whole) keep(method, apps::seconds_since(begin));
     if (!series.x.empty()) series_.push_back(series);
+    return whole;
   }
 
-  void keep(const Method& method, const Planes& planes, double seconds) {
-    const bool last = &method == &methods_.back() || is_over();
-    const std::string file = last ? "result.png" : method.name + ".png";
-    write(file, planes);
-    if (last && picture_.bits == 32)
-      apps::write_image(options_.common.output / "result.exr", image_of(picture_, planes, true));
+  bool deconvolve_channel(const Method& method, size_t c, Deconvolver& deconvolver,
+                          apps::PlotSeries& series, apps::Progress& progress) {
+    const Simulated& channel = picture_.channels[c];
+    const long before = done_;
+    const auto begin = std::chrono::steady_clock::now();
+    std::vector<float> plane = deconvolver.run(channel.problem, [&](int count, const auto& images) {
+      done_ = before + count;
+      progress.show(static_cast<int>(done_), method.name);
+      if (c == watched && picture_.has_truth) {
+        const std::vector<float> now(images.begin(), images.end());
+        series.x.push_back(apps::seconds_since(begin));
+        series.y.push_back(psnr_db(cropped(now, channel.problem.extent), channel.truth));
+      }
+      if (heard_) heard_(method.name, c, count);
+      return !is_over();
+    });
+    const bool whole = !deconvolver.stopped();
+    if (whole) done_ = before + iterations_of(method);
+    keep_if_better(method, c, std::move(plane), whole);
+    return whole;
+  }
+
+  // The first stages of a method are worse than the whole of the one before it, but better than nothing.
+  void keep_if_better(const Method& method, size_t c, std::vector<float> plane, bool whole) {
+    if (!whole && is_deconvolved_[c]) return;
+    best_[c] = std::move(plane);
+    best_by_[c] = whole ? method.name : text("unfinished by ", method.name);
+    is_deconvolved_[c] = is_deconvolved_[c] || whole;
+  }
+
+  void keep(const Method& method, double seconds) {
     report_.own["seconds"][method.name] = seconds;
-    if (!picture_.has_truth) return report_.add_picture(file, method.name);
-    const double db = psnr_of(picture_, planes);
-    report_.own["picture"][method.name] = db;
-    show(file, method.name, db);
-    if (last) report_.add_number("PSNR of the picture", db, "dB", blurred_db_);
+    if (&method == &methods_.back()) return keep_result(method.name);
+    keep_as(method.name + ".png", method.name);
+  }
+
+  void keep_best() {
+    report_.add_note(text("ended early: of result.png, red is ", best_by_[0], ", green ",
+                          best_by_[1], ", blue ", best_by_[2]));
+    keep_result("best so far");
+  }
+
+  void keep_result(const std::string& name) {
+    const double db = keep_as("result.png", name);
+    if (picture_.bits == 32)
+      apps::write_image(options_.common.output / "result.exr", image_of(picture_, best_, true));
+    if (picture_.has_truth) report_.add_number("PSNR of the picture", db, "dB", blurred_db_);
+  }
+
+  // Gives the decibels of what is best now; 0 without a truth.
+  double keep_as(const std::string& file, const std::string& name) {
+    write(file, best_);
+    if (!picture_.has_truth) {
+      report_.add_picture(file, name);
+      return 0;
+    }
+    const double db = psnr_of(picture_, best_);
+    report_.own["picture"][name] = db;
+    show(file, name, db);
+    return db;
   }
 
   void enter() {
@@ -209,7 +247,12 @@ class Run {
   const Options& options_;
   const std::vector<Method>& methods_;
   apps::Report& report_;
+  const Heard& heard_;
   Picture picture_;
+  // The best so far of each channel, who made it, and whether that was a whole method.
+  Planes best_;
+  std::array<std::string, channels> best_by_{"blurred", "blurred", "blurred"};
+  std::array<bool, channels> is_deconvolved_{};
   std::optional<Deconvolver> deconvolver_;
   std::vector<apps::PlotSeries> series_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
@@ -220,8 +263,8 @@ class Run {
 }  // namespace
 
 long deconvolve_input(const Options& options, const std::vector<Method>& methods,
-                      apps::Report& report) {
-  return Run(options, methods, report).run();
+                      apps::Report& report, const Heard& heard) {
+  return Run(options, methods, report, heard).run();
 }
 
 }  // namespace deconvolution

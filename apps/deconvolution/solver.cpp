@@ -160,7 +160,8 @@ typename Solver<T>::Image Solver<T>::iterate(Vectors at, const Accuracy& accurac
     }
     return worst;
   };
-  while (iterations_ < accuracy.iterations && largest(at.square) > 0 && left() > limit) {
+  while ((!watch || watch(at.x)) && iterations_ < accuracy.iterations && largest(at.square) > 0 &&
+         left() > limit) {
     x_.set(at.x);
     r_.set(at.r);
     p_.set(at.p);
@@ -168,7 +169,6 @@ typename Solver<T>::Image Solver<T>::iterate(Vectors at, const Accuracy& accurac
     step_.realize(lang::Realization(std::vector<Buffer<>>{next.x, next.r, next.p, next.square}));
     std::swap(at, next);
     ++iterations_;
-    if (watch && !watch(at.x)) break;
   }
   reduction_ = std::sqrt(left());
   return {at.x.begin(), at.x.end()};

@@ -61,7 +61,7 @@ class Solver {
   void set(const Problem& problem) { bind_problem<T>(stage_, problem); }
   void set(std::span<const T> numbers) { bind_numbers<T>(stage_, numbers); }
 
-  // Sees the image after each iteration; false ends them.
+  // Sees the image before the first iteration and after each; false ends them.
   using Watch = std::function<bool(const lang::Buffer<T>& image)>;
 
   // A stage after the image `before`, from which it starts, too.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 
 #include "common/stop.h"
 #include "measure.h"
@@ -35,8 +36,9 @@ class Scan {
         method_({"tuned", original()}, gallery_.extent(), options.common.threads) {}
 
   void run() {
-    best_db_ = measure(best_);
-    published_db_ = best_db_;
+    const auto published = measure(best_);
+    if (!published) return;
+    best_db_ = published_db_ = *published;
     double step = first_step;
     for (int k = 0; k < refinements; ++k, step = std::sqrt(step)) {
       for (const Number& number : numbers) improve(number, step);
@@ -48,9 +50,12 @@ class Scan {
   double published_db() const { return published_db_; }
 
  private:
-  double measure(const Priors& priors) {
+  // Nothing when somebody stops it.
+  std::optional<double> measure(const Priors& priors) {
     method_.use({"tuned", original(priors)});
-    return gallery_.measure(method_).mean_db;
+    const auto measured = gallery_.measure(method_);
+    if (!measured) return std::nullopt;
+    return measured->mean_db;
   }
 
   void improve(const Number& number, double step) {
@@ -64,18 +69,18 @@ class Scan {
     Priors next = best_;
     next.*number.value *= factor;
     if (next.*number.value > number.most) return false;
-    const double db = measure(next);
-    if (!(db > best_db_)) return false;
-    best_db_ = db;
+    const auto db = measure(next);
+    if (!db || !(*db > best_db_)) return false;
+    best_db_ = *db;
     best_ = next;
-    std::printf("%-32s %9.4g: %.3f dB\n", number.name, best_.*number.value, db);
+    std::printf("%-32s %9.4g: %.3f dB\n", number.name, best_.*number.value, *db);
     return true;
   }
 
   Gallery gallery_;
   Deconvolver method_;
   Priors best_;
-  double best_db_ = 0, published_db_ = 0;
+  double best_db_ = NAN, published_db_ = NAN;
 };
 
 }  // namespace

@@ -99,6 +99,7 @@ TEST_F(LearningRun, StopsWithWhatItHas) {
   stopped.learn(learner);
   EXPECT_EQ(stopped.steps(), 2);
   EXPECT_EQ(learner.saves.back(), 2);
+  EXPECT_EQ(learner.looks, (std::vector<long>{0}));
   apps::request_stop(false);
   options_.seconds = 1e-9;
   Halving other;

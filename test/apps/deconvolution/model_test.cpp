@@ -205,6 +205,30 @@ TEST(Deconvolver, TheOriginalMethodSharpens) {
   for (size_t k = 0; k < 2; ++k) EXPECT_GT(after[k], first[k]) << k;
 }
 
+TEST(Deconvolver, EndsWhereItsWatchSaysSo) {
+  const Simulated problem = small_problem(24, 20, 5);
+  Deconvolver method({"original", original()}, problem.problem.extent, 2);
+  const auto none = method.run(problem.problem, [](int, const auto&) { return false; });
+  EXPECT_EQ(none, problem.problem.blurred);
+  EXPECT_TRUE(method.stopped());
+  int calls = 0;
+  std::vector<float> seen;
+  const auto few = method.run(problem.problem, [&](int iterations, const auto& images) {
+    EXPECT_EQ(iterations, calls);
+    ++calls;
+    seen.assign(images.begin(), images.end());
+    return iterations < 3;
+  });
+  EXPECT_EQ(calls, 4);
+  EXPECT_EQ(few, cropped(seen, problem.problem.extent));
+  EXPECT_NE(few, none);
+  EXPECT_EQ(method.stages().size(), 1u);
+  EXPECT_TRUE(method.stopped());
+  method.run(problem.problem);
+  EXPECT_EQ(method.stages().size(), 2u);
+  EXPECT_FALSE(method.stopped());
+}
+
 TEST(Deconvolver, WhatWasLearnedIsBetterThanTheOriginal) {
   Simulated problem;
   Random random(2);

@@ -119,6 +119,7 @@ TEST_F(DeconvolutionProgram, GoesOnAndStopsWithWhatItHas) {
   apps::request_stop(false);
   EXPECT_TRUE(learned.stopped);
   EXPECT_EQ(learned.steps, 3);
+  EXPECT_TRUE(learned.held_out.each_db.empty());
   EXPECT_TRUE(fs::exists(out() / "weights.json"));
 }
 
@@ -137,6 +138,58 @@ TEST_F(DeconvolutionProgram, LeavesThePictureThatItHas) {
   EXPECT_FALSE(fs::exists(out() / "again.png"));
 }
 
+// One channel of a picture.
+std::vector<float> plane_of(const apps::Image& image, size_t c) {
+  std::vector<float> plane;
+  for (size_t k = c; k < image.pixels.size(); k += 3) plane.push_back(image.pixels[k]);
+  return plane;
+}
+
+TEST_F(DeconvolutionProgram, StopsBeforeTheNextIterationWithTheBestOfEachChannel) {
+  Options options;
+  options.common.input = photograph("a.png", 60, 50);
+  options.common.output = out();
+  options.psf = "disc:2";
+  fs::create_directory(out());
+  const std::vector<Method> methods{{"original", original()}, {"other", original({.mix = 0.5})}};
+  const auto picture = [&](const std::string& name) { return apps::read_image(out() / name); };
+  apps::Report whole("deconvolution", options.common), first("deconvolution", options.common),
+      second("deconvolution", options.common);
+  const long all = deconvolve_input(options, methods, whole);
+  EXPECT_EQ(all, 2 * 3 * 2 * options.iterations);
+  const apps::Image by_original = picture("original.png"), by_other = picture("result.png");
+
+  int heard = 0;
+  const auto stop_at = [&](const std::string& method, size_t c, int iterations) {
+    return [=, &heard](const std::string& now, size_t channel, int count) {
+      if (apps::stop_requested()) ++heard;
+      if (now == method && channel == c && count == iterations) apps::request_stop();
+    };
+  };
+  // Green of the second method: red is its own, the others are the first one's.
+  const long half = deconvolve_input(options, methods, second, stop_at("other", 1, 3));
+  apps::request_stop(false);
+  EXPECT_EQ(heard, 0);
+  EXPECT_EQ(half, all / 2 + 2 * options.iterations + 3);
+  EXPECT_EQ(plane_of(picture("result.png"), 0), plane_of(by_other, 0));
+  EXPECT_EQ(plane_of(picture("result.png"), 1), plane_of(by_original, 1));
+  EXPECT_EQ(plane_of(picture("result.png"), 2), plane_of(by_original, 2));
+  EXPECT_FALSE(second.own["seconds"].contains("other"));
+  EXPECT_EQ(second.own["picture"]["original"], whole.own["picture"]["original"]);
+  EXPECT_GT(second.own["picture"]["best so far"], second.own["picture"]["blurred"]);
+
+  // Green of the first method: as far as it came, and blue is blurred.
+  fs::remove(out() / "original.png");
+  deconvolve_input(options, methods, first, stop_at("original", 1, 3));
+  apps::request_stop(false);
+  EXPECT_EQ(heard, 0);
+  EXPECT_FALSE(fs::exists(out() / "original.png"));
+  EXPECT_EQ(plane_of(picture("result.png"), 0), plane_of(by_original, 0));
+  EXPECT_NE(plane_of(picture("result.png"), 1), plane_of(picture("blurred.png"), 1));
+  EXPECT_EQ(plane_of(picture("result.png"), 2), plane_of(picture("blurred.png"), 2));
+  EXPECT_GT(first.own["picture"]["best so far"], first.own["picture"]["blurred"]);
+}
+
 TEST_F(DeconvolutionProgram, ChecksItself) {
   // Few numbers for the table of inexact solutions, of which nothing is required.
   const fs::path weights = folder_.path() / "weights.json";
@@ -151,6 +204,16 @@ TEST_F(DeconvolutionProgram, SurvivesExtremes) {
     EXPECT_LT(row.primal_error, 0.1) << row.name;
     EXPECT_FALSE(std::isnan(row.gradient_error)) << row.name;
   }
+}
+
+TEST(Gallery, LeavesOutWhatSomebodyStopped) {
+  const Gallery gallery({scene(60, 60)}, 0.01, 32);
+  apps::request_stop();
+  EXPECT_TRUE(gallery.measure({{"original", original()}}, 2).empty());
+  Deconvolver method({"original", original()}, gallery.extent(), 2);
+  EXPECT_FALSE(gallery.measure(method).has_value());
+  apps::request_stop(false);
+  EXPECT_TRUE(gallery.measure(method).has_value());
 }
 
 TEST(Gallery, MeasuresOnTheMiddleOfEachPhotograph) {
