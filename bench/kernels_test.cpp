@@ -51,9 +51,11 @@ INSTANTIATE_TEST_SUITE_P(Forward, ForwardKernel, testing::ValuesIn(kernel_names(
 class GradientKernel : public Kernel {};
 
 TEST_P(GradientKernel, GivesWhatHalideGivesInTheSameBitsOnAnyThreads) {
-  Pair pair({GetParam(), true, 5, true}, BENCH_PROGRAMS);
+  Pair pair({GetParam(), true, 2, true}, BENCH_PROGRAMS);
   expect_what_halide_gives(pair);
-  EXPECT_TRUE(has_same_bits_on({1, 2, 3, 5, 5}, pair.retrograde(), scratch_))
+  // Of more threads than Halide's schedulers take well.
+  Worker worker(Side::Retrograde, {GetParam(), true, 5, true}, BENCH_PROGRAMS);
+  EXPECT_TRUE(has_same_bits_on({1, 2, 3, 5, 5}, worker, scratch_))
       << "the bits depend on how many threads there are";
 }
 
