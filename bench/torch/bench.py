@@ -8,9 +8,11 @@ PACKAGE is the folder that holds the Python package. PyTorch is that of the virt
 ../operators/peers.py, which is made when it is not there. What PyTorch has for the same (formulations.py) runs as it
 is and through torch.compile; all run in turn, on the same tensors and as many threads: forward alone, and forward
 with backward by all inputs. Errors are the largest |a - b| / max(|b|, root mean square of b) over the result and all
-gradients, b being PyTorch's own in float64. --device cuda: all of it on the GPU, with the PyTorch of the interpreter
-that runs this; a turn is then CUDA_CALLS calls and the end of the last. `ratio` is that of the better of PyTorch's two to ours. At the end stands
+gradients, b being PyTorch's own in float64. `ratio` is that of the better of PyTorch's two to ours. At the end stands
 what a call costs where there is nothing to compute (overhead.py).
+
+--device cuda: all of it on the GPU, with the PyTorch of the interpreter that runs this; a turn is CUDA_CALLS calls and
+the end of the last.
 """
 import argparse
 import json

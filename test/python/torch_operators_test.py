@@ -161,7 +161,7 @@ class TorchLibrary(unittest.TestCase):
             torch.testing.assert_close(all_items, torch.stack(items), rtol=0, atol=0)
 
     def test_compiled_as_eager(self):
-        compiled = torch.compile(lambda *tensors: OP(*tensors).sin(), fullgraph=True, dynamic=True)
+        compiled = torch.compile(lambda *tensors: OP(*tensors).square(), fullgraph=True, dynamic=True)
         for more in range(3):
             tensors = inputs(torch.float32)
             if NAME != "bilateral_slice":
@@ -169,7 +169,7 @@ class TorchLibrary(unittest.TestCase):
             if NAME == "flow_warp":
                 tensors = (tensors[0], torch.cat([tensors[1]] * (more + 1), -1))
             ours, theirs = wanting(tensors), wanting(tensors)
-            a, b = compiled(*ours), OP(*theirs).sin()
+            a, b = compiled(*ours), OP(*theirs).square()
             torch.testing.assert_close(a, b, rtol=1e-6, atol=1e-6)
             a.sum().backward()
             b.sum().backward()
