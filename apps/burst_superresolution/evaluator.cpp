@@ -21,6 +21,22 @@ std::vector<std::string> left_out(const Shape& shape, const Smoothness& smoothne
   return out;
 }
 
+namespace {
+
+// The sums of a homography's gradient read the same places, samples and adjoints: kept, each is computed once. That
+// is some ten numbers for each sample, more than the scheduler keeps unless it is told so. Where the picture moves,
+// too, it keeps them anyway, for its scatter has more than that.
+template <typename T>
+lang::AutoscheduleOptions schedule_options(const Shape& shape, const Moves& moves) {
+  constexpr int64_t kept_a_sample = 10 * sizeof(T), allowed = int64_t{1} << 30;
+  const auto samples = static_cast<int64_t>(shape.size.pixels()) * shape.frames;
+  lang::AutoscheduleOptions options;
+  if (!moves.image && kept_a_sample * samples <= allowed) options.memory_budget = allowed;
+  return options;
+}
+
+}  // namespace
+
 template <typename T>
 Evaluator<T>::Evaluator(const Shape& shape, const Smoothness& smoothness, const Moves& moves,
                         int threads)
@@ -32,7 +48,7 @@ Evaluator<T>::Evaluator(const Shape& shape, const Smoothness& smoothness, const 
   const auto start = std::chrono::steady_clock::now();
   pipeline_ = lang::Pipeline(outputs());
   const auto target = lang::get_jit_target_from_environment();
-  pipeline_.auto_schedule(target, demosaic::machine_of(threads));
+  pipeline_.auto_schedule(target, schedule_options<T>(shape, moves), demosaic::machine_of(threads));
   pipeline_.compile_jit(target);
   compile_seconds_ =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
