@@ -13,7 +13,7 @@ using retrograde::text;
 namespace {
 
 constexpr double last_rate_factor = 0.02;
-constexpr double apart_share = 0.1;  // of the steps, in which each stage is learned by itself
+constexpr double apart_share = 0.25;  // of the steps, in which each stage is learned by itself
 // Of the noise of a piece, and of the functions that blur it.
 constexpr double least_noise = 0.005, most_noise = 0.02;
 constexpr double motion_share = 0.65, least_radius = 1.5;

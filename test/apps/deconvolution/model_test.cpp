@@ -254,7 +254,7 @@ TEST(Learning, GradientsAreWithinTheirLimits) {
 }
 
 TEST(Learning, StagesAreLearnedByThemselvesAndThenTogether) {
-  EXPECT_EQ(steps_apart(1000, 4), 25);
+  EXPECT_EQ(steps_apart(1000, 4), 62);
   EXPECT_EQ(learned_at(0, 25, 4).first, 0);
   EXPECT_EQ(learned_at(24, 25, 4).last, 0);
   EXPECT_EQ(learned_at(99, 25, 4).first, 3);
