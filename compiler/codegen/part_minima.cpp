@@ -1,7 +1,8 @@
 #include "codegen/part_minima.h"
 
+#include <algorithm>
 #include <array>
-#include <optional>
+#include <initializer_list>
 #include <set>
 #include <string_view>
 #include <vector>

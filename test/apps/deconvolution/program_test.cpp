@@ -37,6 +37,15 @@ class DeconvolutionProgram : public testing::Test {
       photograph("set/" + std::to_string(k) + ".png", 100 + 2 * k, 102, k);
     return folder_.path() / "set";
   }
+  // Of a run in this process on a small picture; the folder is there.
+  Options of_a_picture() {
+    Options options;
+    options.common.input = photograph("a.png", 60, 50);
+    options.common.output = out();
+    options.psf = "disc:2";
+    fs::create_directory(out());
+    return options;
+  }
 
   void run(const std::vector<std::string>& more) {
     std::vector<std::string> words{DECONVOLUTION_PROGRAM, "--output", out(), "--threads", "2"};
@@ -124,11 +133,7 @@ TEST_F(DeconvolutionProgram, GoesOnAndStopsWithWhatItHas) {
 }
 
 TEST_F(DeconvolutionProgram, LeavesThePictureThatItHas) {
-  Options options;
-  options.common.input = photograph("a.png", 60, 50);
-  options.common.output = out();
-  options.psf = "disc:2";
-  fs::create_directory(out());
+  const Options options = of_a_picture();
   apps::Report report("deconvolution", options.common);
   apps::request_stop();
   const std::vector<Method> methods{{"original", original()}, {"again", original()}};
@@ -146,11 +151,7 @@ std::vector<float> plane_of(const apps::Image& image, size_t c) {
 }
 
 TEST_F(DeconvolutionProgram, StopsBeforeTheNextIterationWithTheBestOfEachChannel) {
-  Options options;
-  options.common.input = photograph("a.png", 60, 50);
-  options.common.output = out();
-  options.psf = "disc:2";
-  fs::create_directory(out());
+  const Options options = of_a_picture();
   const std::vector<Method> methods{{"original", original()}, {"other", original({.mix = 0.5})}};
   const auto picture = [&](const std::string& name) { return apps::read_image(out() / name); };
   apps::Report whole("deconvolution", options.common), first("deconvolution", options.common),
