@@ -5,11 +5,13 @@
 #include <set>
 
 #include "autodiff/sweeps/blocked_sums.h"
+#include "autodiff/sweeps/border_conditions.h"
 #include "autodiff/sweeps/gather_places.h"
 #include "autodiff/sweeps/join_borders.h"
 #include "autodiff/sweeps/made_definitions.h"
 #include "autodiff/sweeps/private_parts.h"
 #include "autodiff/sweeps/running_sums.h"
+#include "autodiff/sweeps/zero_borders.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "ir/build.h"
@@ -18,58 +20,6 @@
 namespace retrograde::autodiff {
 
 namespace {
-
-// Conditions on ranges are true but for borders; those on residues are not.
-bool is_range_condition(const Expr& e) {
-  bool result = true;
-  walk(e, [&](const Expr& node) {
-    Kind k = node.kind();
-    bool ordered =
-        k == Kind::LT || k == Kind::LE || k == Kind::GT || k == Kind::GE || k == Kind::And;
-    bool arithmetic =
-        k == Kind::Add || k == Kind::Sub || k == Kind::Mul || k == Kind::Min || k == Kind::Max;
-    result &= ordered || arithmetic || as_op(node, Op::likely) || k == Kind::Variable ||
-              k == Kind::IntImm;
-    return result;
-  });
-  return result;
-}
-
-// The conditions of a gather that fail in a border only: those on ranges, in which reduction
-// variables move no further than a stencil does. Loops are cut there. What a wider reduction
-// variable decides becomes the ends of its own loop (trim_loops).
-constexpr double stencil_reach = 64;
-bool fails_in_a_border(const Expr& e, const std::vector<ReductionVariable>& rvars) {
-  if (!is_range_condition(e)) return false;
-  return std::ranges::all_of(rvars, [&](const ReductionVariable& r) {
-    auto extent = as_const_int(r.extent);
-    return !uses_variable(e, r.var) || (extent && static_cast<double>(*extent) <= stencil_reach);
-  });
-}
-Expr with_likely_parts(const Expr& predicate, const std::vector<ReductionVariable>& rvars) {
-  if (const auto* both = predicate.as<And>())
-    return with_likely_parts(both->a, rvars) && with_likely_parts(both->b, rvars);
-  return fails_in_a_border(predicate, rvars) ? likely(predicate) : predicate;
-}
-
-Expr masked(const Expr& predicate, const Expr& value) {
-  if (!predicate.defined()) return value;
-  Expr condition = is_range_condition(predicate) ? likely(predicate) : predicate;
-  return make_select(condition, value, make_zero(value.type()));
-}
-
-// Whether a gather sums a few terms, which its condition leaves out in borders alone.
-bool has_borders(const Gather& g) {
-  if (!g.rdom || g.scatters || !g.predicate.defined()) return false;
-  double iterations = 1;
-  for (const ReductionVariable& r : g.rdom->vars)
-    iterations *= static_cast<double>(as_const_int(r.extent).value_or(many_terms));
-  std::vector<Expr> conditions;
-  add_conjuncts(g.predicate, conditions);
-  return iterations < many_terms && std::ranges::all_of(conditions, [&](const Expr& e) {
-           return fails_in_a_border(e, g.rdom->vars);
-         });
-}
 
 // Gathers over one domain that differ in their borders share an update: beyond its border each adds
 // 0. Then what they sum is gone through once. Only a few: one body has all that they read.
@@ -292,6 +242,7 @@ namespace {
 AdjointFunc make_sum(const AdjointTarget& target, const std::string& name,
                      std::vector<Contribution> contributions, const std::vector<Expr>& initial) {
   join_borders(contributions, target);
+  leave_zeros_to_adjoints(contributions, target);
   share_domains(contributions);
   for (Contribution& c : contributions) c.gather = with_safe_places(c.gather, target);
   return Builder(target, name).build(contributions, initial);

@@ -1,0 +1,119 @@
+// Gathers of a stencil over an adjoint that is zero outside of its box have no conditions for that.
+#include <gtest/gtest.h>
+
+#include <retrograde/retrograde.h>
+
+#include <cmath>
+#include <limits>
+
+#include "graph/graph.h"
+#include "ir/build.h"
+
+namespace retrograde {
+namespace {
+
+struct Stencil {
+  static constexpr int width = 37, taps = 5, channels = 3;
+  Stencil() {
+    for (int i = 0; i < width + taps - 1; i++) {
+      for (int k = 0; k < channels; k++) image(i, k) = static_cast<float>((i * 7 + k) % 5) - 2.0f;
+    }
+    for (int i = 0; i < taps; i++) {
+      for (int k = 0; k < channels; k++) weights(i, k) = static_cast<float>((i * 3 + k) % 4) - 1.5f;
+    }
+    for (int i = 0; i < width; i++) seed(i) = static_cast<float>((i * 5) % 7) - 3.0f;
+    RDom r(0, taps, 0, channels, "r");
+    out(x) = 0.0f;
+    out(x) += image(x + r.x, r.y) * weights(r.x, r.y);
+  }
+  Func gradient() { return propagate_adjoints(out, Func(seed), {{0, width}})(image); }
+  // By the image, term by term.
+  float expected(int i, int k) const {
+    float sum = 0;
+    for (int tap = 0; tap < taps; tap++) {
+      if (i - tap >= 0 && i - tap < width) sum += seed(i - tap) * weights(tap, k);
+    }
+    return sum;
+  }
+  Var x{"x"};
+  Buffer<float> image{width + taps - 1, channels}, weights{taps, channels}, seed{width};
+  Func out{"out"};
+};
+
+// The conditions of the update that sums the gradient.
+std::vector<Expr> conditions_of(const Func& gradient) {
+  std::vector<Expr> result;
+  for (const graph::FuncPtr& f : graph::topological_order({gradient.function()})) {
+    for (const graph::Definition& update : f->updates) add_conjuncts(update.predicate, result);
+  }
+  return result;
+}
+bool depends_on_a_tap(const Expr& condition) {
+  return any_node(condition,
+                  [](const ir::Variable& v) { return v.name.find("rho") != std::string::npos; });
+}
+
+TEST(ZeroBorders, HaveNoConditions) {
+  Stencil stencil;
+  const Func gradient = stencil.gradient();
+  for (const Expr& condition : conditions_of(gradient))
+    EXPECT_FALSE(depends_on_a_tap(condition)) << condition;
+}
+
+TEST(ZeroBorders, LeaveTheGradientAsItIs) {
+  for (const bool is_scheduled : {false, true}) {
+    Stencil stencil;
+    Func gradient = stencil.gradient();
+    if (is_scheduled) {
+      gradient.set_estimates({{0, Stencil::width + Stencil::taps - 1}, {0, Stencil::channels}});
+      Pipeline(gradient).auto_schedule(get_host_target());
+    }
+    const Buffer<float> found =
+        gradient.realize({Stencil::width + Stencil::taps - 1, Stencil::channels});
+    for (int i = 0; i < Stencil::width + Stencil::taps - 1; i++) {
+      for (int k = 0; k < Stencil::channels; k++)
+        EXPECT_FLOAT_EQ(found(i, k), stencil.expected(i, k)) << i << ", " << k;
+    }
+  }
+}
+
+// The first element is not read by the second tap, whose weight is infinite.
+TEST(ZeroBorders, StayZeroBesideInfinity) {
+  Stencil stencil;
+  for (int k = 0; k < Stencil::channels; k++)
+    stencil.weights(1, k) = std::numeric_limits<float>::infinity();
+  const Buffer<float> found =
+      stencil.gradient().realize({Stencil::width + Stencil::taps - 1, Stencil::channels});
+  const int last = Stencil::width + Stencil::taps - 2;
+  for (int k = 0; k < Stencil::channels; k++) {
+    EXPECT_FLOAT_EQ(found(0, k), stencil.seed(0) * stencil.weights(0, k));
+    EXPECT_FLOAT_EQ(found(last, k),
+                    stencil.seed(Stencil::width - 1) * stencil.weights(Stencil::taps - 1, k));
+    EXPECT_TRUE(std::isinf(found(1, k)));
+  }
+}
+
+// A factor at a place of its own stays where the domain is: its image ends there.
+TEST(ZeroBorders, ReadOtherFactorsInsideOfTheirImages) {
+  Stencil stencil;
+  Buffer<float> gains(Stencil::width);
+  for (int i = 0; i < Stencil::width; i++) gains(i) = static_cast<float>(i % 3) + 0.5f;
+  RDom r(0, Stencil::taps, "r");
+  Func weighted("weighted");
+  weighted(stencil.x) = 0.0f;
+  weighted(stencil.x) += stencil.image(stencil.x + r, 0) * gains(stencil.x);
+  const Buffer<float> found =
+      propagate_adjoints(weighted, Func(stencil.seed), {{0, Stencil::width}})(stencil.image)
+          .realize({Stencil::width + Stencil::taps - 1, 1});
+  for (int i = 0; i < Stencil::width + Stencil::taps - 1; i++) {
+    float sum = 0;
+    for (int tap = 0; tap < Stencil::taps; tap++) {
+      const int at = i - tap;
+      if (at >= 0 && at < Stencil::width) sum += stencil.seed(at) * gains(at);
+    }
+    EXPECT_FLOAT_EQ(found(i, 0), sum) << i;
+  }
+}
+
+}  // namespace
+}  // namespace retrograde
