@@ -35,6 +35,7 @@
 #include "autoschedule/start_in_tiles.h"
 #include "autoschedule/stored_funcs.h"
 #include "autoschedule/strips.h"
+#include "autoschedule/sum_blocks.h"
 #include "autoschedule/task_sizes.h"
 #include "autoschedule/tile_chains.h"
 #include "diagnostics/large_stack.h"
@@ -533,24 +534,37 @@ void cut_sums(const std::vector<FuncPtr>& outputs, std::vector<FuncPtr>& stored,
   if (!without.contains(Decision::ScatterStrategy)) cut_scatters(outputs, sizes, whole);
 }
 
+// Funcs that have loops of this scheduler's, and what must be known to move them.
+struct Movable {
+  const std::vector<FuncPtr>& outputs;
+  const std::vector<FuncPtr>& stored;
+  const std::vector<FuncPtr>& given;  // of these: loops, at root
+  const std::unordered_set<const Symbol*>& whole;
+  const Readers& before;  // before loops were given
+  const SizeEstimate& sizes;
+};
+
 // What is computed in the loops of others, and which loops are shared.
-void move_and_join(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
-                   const std::vector<FuncPtr>& given,
-                   const std::unordered_set<const Symbol*>& whole, const SizeEstimate& sizes,
-                   const std::set<Decision>& without, const GiveLoopsOfRows& give_rows) {
+void move_and_join(const Movable& funcs, const std::set<Decision>& without,
+                   const GiveLoopsOfRows& give_rows) {
+  const auto& [outputs, stored, given, whole, before, sizes] = funcs;
   const Readers readers(outputs, stored);  // before anything is moved
   if (!without.contains(Decision::Choices)) compute_beside_choices(readers, given, whole);
   const bool slices = !without.contains(Decision::Slices);
+  const bool joins = !without.contains(Decision::JoinSweeps);
+  std::unordered_set<const Symbol*> together = whole;  // what is to share loops does not move
+  if (slices && joins) together.merge(sweeps_that_join(outputs, given, sizes));
   if (slices) compute_in_column_blocks(readers, stored, whole, sizes);
   if (slices) compute_in_tiles(outputs, readers, given, whole, sizes);
   // Of chains of stencils, before these are put into strips of their own.
   if (slices) compute_in_reductions(outputs, readers, pure_primal(stored), whole, sizes);
   if (!without.contains(Decision::Strips))
     compute_in_strips(outputs, given, whole, sizes, give_rows);
+  if (slices) compute_sums_in_blocks(outputs, before, given, together, sizes);
   if (slices) compute_in_slices(readers, stored, whole, sizes);
   if (slices) compute_in_reductions(outputs, readers, stored, whole, sizes);
   if (!without.contains(Decision::LayoutStaging)) run_along_rows(given, sizes);
-  if (!without.contains(Decision::JoinSweeps)) join_sweeps(outputs, given, sizes);
+  if (joins) join_sweeps(outputs, given, sizes);
 }
 
 // So that the log tells of every Func.
@@ -609,6 +623,7 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   const LaneDimensions along(
       outputs, makes(Decision::LayoutStaging) ? stored : std::vector<FuncPtr>(), lanes, sizes);
   const AtomicScatters atomic(outputs, stored, whole, request, sizes);
+  const Readers before(outputs, stored);
   std::vector<FuncPtr> given;    // loops, at root
   std::vector<FuncPtr> started;  // sums of these, in their tiles
   for (const FuncPtr& f : stored) {
@@ -634,7 +649,7 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
     graph::take_back_loops(*sum);
     give_loops(sum, request, sizes.with_extent(*sum, dimension, 1), started);
   };
-  move_and_join(outputs, stored, given, whole, sizes, request.options.without, give_rows);
+  move_and_join({outputs, stored, given, whole, before, sizes}, request.options.without, give_rows);
   for (const FuncPtr& f : started) start_sums(f, request, sizes);
   tasks.limit(outputs, request);
   name_inlined(outputs, order);

@@ -117,10 +117,14 @@ std::optional<VarOrRVar> innermost_loop(const Sweep& sweep) {
   return std::nullopt;
 }
 
-}  // namespace
+struct SharedLoops {
+  Sweep with, joining;
+  VarOrRVar innermost;
+};
 
-void join_sweeps(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& funcs,
-                 const SizeEstimate& sizes) {
+std::vector<SharedLoops> shared_loops(const std::vector<FuncPtr>& outputs,
+                                      const std::vector<FuncPtr>& funcs,
+                                      const SizeEstimate& sizes) {
   std::unordered_set<std::string> hosts;  // of what is computed in their loops
   for (const FuncPtr& f : functions_of(outputs)) hosts.insert(f->schedule.compute_level.func);
   std::vector<Sweep> sweeps;
@@ -130,6 +134,7 @@ void join_sweeps(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>
     Sweep sweep{f, 1, looked_up_in(*f, f->updates[0], sizes)};
     if (!sweep.looked_up.empty()) sweeps.push_back(std::move(sweep));
   }
+  std::vector<SharedLoops> result;
   for (size_t i = 1; i < sweeps.size(); ++i) {
     for (size_t k = i > sweeps_back ? i - sweeps_back : 0; k < i && !sweeps[i].is_joined; ++k) {
       Sweep &with = sweeps[k], &joining = sweeps[i];
@@ -138,10 +143,28 @@ void join_sweeps(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>
         continue;
       const auto level = innermost_loop(with);
       if (!level || depends_on(joining.func, with.func)) continue;
-      Stage(joining.func, joining.stage).compute_with(Stage(with.func, with.stage), *level);
+      result.push_back({with, joining, *level});
       with.is_joined = joining.is_joined = true;
     }
   }
+  return result;
+}
+
+}  // namespace
+
+std::unordered_set<const Symbol*> sweeps_that_join(const std::vector<FuncPtr>& outputs,
+                                                   const std::vector<FuncPtr>& funcs,
+                                                   const SizeEstimate& sizes) {
+  std::unordered_set<const Symbol*> result;
+  for (const SharedLoops& loops : shared_loops(outputs, funcs, sizes))
+    result.insert({loops.with.func.get(), loops.joining.func.get()});
+  return result;
+}
+
+void join_sweeps(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& funcs,
+                 const SizeEstimate& sizes) {
+  for (const auto& [with, joining, innermost] : shared_loops(outputs, funcs, sizes))
+    Stage(joining.func, joining.stage).compute_with(Stage(with.func, with.stage), innermost);
 }
 
 }  // namespace retrograde::autoschedule

@@ -8,6 +8,7 @@
 // load once where they run together (compute_with).
 #pragma once
 
+#include <unordered_set>
 #include <vector>
 
 #include "autoschedule/size_estimate.h"
@@ -19,5 +20,9 @@ namespace retrograde::autoschedule {
 // nothing computed in their loops. Producers first.
 void join_sweeps(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& funcs,
                  const SizeEstimate& sizes);
+// Those that it would join as they stand.
+std::unordered_set<const Symbol*> sweeps_that_join(const std::vector<FuncPtr>& outputs,
+                                                   const std::vector<FuncPtr>& funcs,
+                                                   const SizeEstimate& sizes);
 
 }  // namespace retrograde::autoschedule

@@ -43,6 +43,12 @@ bool is_at_root(const FuncContents& f) {
   return f.schedule.compute_level.kind == graph::LoopLevel::Kind::Root;
 }
 
+bool has_plain_rows(const FuncContents& f) {
+  const StageLoops& loops = f.pure->schedule;
+  return f.is_pure() && !f.is_extern() && f.args.size() > 1 && loops.splits.size() == 1 &&
+         loops.splits[0].old_var == f.args[0] && loops.splits[0].outer == f.args[0];
+}
+
 bool is_split(const Definition& stage, const std::string& var) {
   const auto& splits = stage.schedule.splits;
   return std::any_of(splits.begin(), splits.end(), [&](const Split& split) {

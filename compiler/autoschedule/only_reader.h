@@ -40,6 +40,8 @@ class Readers {
 };
 
 bool is_at_root(const FuncContents& f);
+// Of a pure Func of rows: vectors along these, the first dimension, are all that was cut off.
+bool has_plain_rows(const FuncContents& f);
 // Whether a loop of the stage was split, or comes from a split.
 bool is_split(const Definition& stage, const std::string& var);
 

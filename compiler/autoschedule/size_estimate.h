@@ -19,6 +19,10 @@ struct MachineLimits {
   int64_t enough_tasks = 8;
   // More bytes than stay in the caches near a core.
   int64_t more_than_caches = 16 << 20;
+  // Less stays in the caches on its way from one loop to the next.
+  int64_t passes_caches = 1 << 20;
+  // What one task may hold of what it computes: half of a cache near a core.
+  int64_t block_bytes = 384 << 10;
   // Of the rows of a strip, beside those that the rules choose.
   double strip_rows = 1;
 };

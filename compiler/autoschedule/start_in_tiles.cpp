@@ -15,13 +15,6 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-// A loop over a dimension, over its parts, or over one of these.
-struct TileLoop {
-  Dim loop;
-  std::string dimension;
-  const Split* split;  // of the dimension; null: none
-};
-
 // nullopt: it is of the reduction, runs over lanes, or its dimension was cut in more than one place.
 std::optional<TileLoop> tile_loop(const FuncContents& f, const Definition& stage, const Dim& loop) {
   const bool runs = loop.runs == ForType::Serial || loop.runs == ForType::Parallel;
@@ -44,7 +37,14 @@ std::optional<TileLoop> tile_loop(const FuncContents& f, const Definition& stage
   return is_pure && cuts <= 1 ? std::optional(result) : std::nullopt;
 }
 
-// Of a stage, the outermost first, up to the first that is none.
+bool has_reduction_inside(const Definition& stage, size_t shared) {
+  const std::vector<Dim>& dims = stage.schedule.dims;
+  return std::any_of(dims.begin(), dims.end() - static_cast<long>(shared),
+                     [](const Dim& loop) { return loop.is_reduction; });
+}
+
+}  // namespace
+
 std::vector<TileLoop> tile_loops(const FuncContents& f, const Definition& stage) {
   std::vector<TileLoop> result;
   const std::vector<Dim>& dims = stage.schedule.dims;
@@ -59,14 +59,6 @@ std::vector<TileLoop> tile_loops(const FuncContents& f, const Definition& stage)
   }
   return result;
 }
-
-bool has_reduction_inside(const Definition& stage, size_t shared) {
-  const std::vector<Dim>& dims = stage.schedule.dims;
-  return std::any_of(dims.begin(), dims.end() - static_cast<long>(shared),
-                     [](const Dim& loop) { return loop.is_reduction; });
-}
-
-}  // namespace
 
 bool has_tiles(const FuncContents& f) {
   if (f.updates.empty() || f.updates[0].schedule.fuse_level.kind == graph::LoopLevel::Kind::At)

@@ -6,9 +6,21 @@
 // a convolution's, that is a good part of its time.
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "graph/function.h"
 
 namespace retrograde::autoschedule {
+
+// A loop over a dimension, over its parts, or over one of these.
+struct TileLoop {
+  Dim loop;
+  std::string dimension;
+  const Split* split;  // of the dimension; null: none
+};
+// Of a stage, the outermost first, up to the first that is none.
+std::vector<TileLoop> tile_loops(const FuncContents& f, const Definition& stage);
 
 // Whether the first update of f has loops over tiles of the result outside of those of its
 // reduction, so that what comes before can share them.

@@ -27,9 +27,8 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr double window_bytes = 384 << 10;  // of a group: half of a cache near a core
-constexpr int64_t unknown_extent = 1024;    // of rows and columns of an image
-constexpr int64_t enough_strips = 16;       // each is a task
+constexpr int64_t unknown_extent = 1024;  // of rows and columns of an image
+constexpr int64_t enough_strips = 16;     // each is a task
 constexpr size_t most_members = 8;
 // What several of a group read, as a sum reads all steps of a chain, and a part of such a sum. If it did not join, no Func behind
 // it would either, and the images of all would be held until the group has run: so it may have more
@@ -40,7 +39,6 @@ constexpr size_t most_with_shared = 32;
 constexpr double shared_window_bytes = 4 << 20;
 constexpr double least_rows = 8, rows_a_halo = 8;
 constexpr double most_shared_reads = 64;  // more take longer than the way to memory
-constexpr int64_t least_bytes = 1 << 20;  // less stays in the caches on its way
 
 // How a Func's dimension moves with the loops of the last of its group.
 struct Along {
@@ -152,7 +150,8 @@ class Group {
     if (!windows || members_.size() >= (is_large ? most_with_shared : most_members)) return false;
     windows_[f.get()] = *windows;
     members_.push_back(f);
-    const auto loops = loops_of_all(is_large ? shared_window_bytes : window_bytes);
+    const auto loops = loops_of_all(is_large ? shared_window_bytes
+                                             : static_cast<double>(sizes_.machine().block_bytes));
     if (loops && pays(*f, *windows, *loops) && may_be_rows(*f, *windows, *loops)) {
       loops_ = loops;
       return true;
@@ -326,7 +325,7 @@ class Group {
   // What is computed twice at borders, beside the way to memory.
   bool pays(const FuncContents& f, const Windows& windows, const StripLoops& loops) const {
     const int64_t bytes = sizes_.bytes(f);
-    if (bytes > 0 && bytes < least_bytes) return false;
+    if (bytes > 0 && bytes < sizes_.machine().passes_caches) return false;
     const Along& row = *moved_by(windows, loops.row);
     const double own = static_cast<double>(loops.rows) * row.scale;
     const double twice = std::max(0.0, row.size() - row.scale) / own;
@@ -369,13 +368,6 @@ class Group {
   std::unordered_map<const Symbol*, Windows> windows_;
   std::optional<StripLoops> loops_;
 };
-
-// Vectors along rows, the first dimension, are all that was cut off.
-bool has_plain_rows(const FuncContents& f) {
-  const StageLoops& loops = f.pure->schedule;
-  return f.is_pure() && !f.is_extern() && f.args.size() > 1 && loops.splits.size() == 1 &&
-         loops.splits[0].old_var == f.args[0] && loops.splits[0].outer == f.args[0];
-}
 
 void give_strips(const Group& group, const GiveLoopsOfRows& give_rows) {
   const FuncPtr& last = group.last();

@@ -19,9 +19,6 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int64_t chain_bytes = 384 << 10;  // of blocks: half of a cache near a core
-constexpr int64_t stays_in_caches = 1 << 20;
-
 // Of a tiled stage, from that of the rows of tiles outwards.
 struct TileLoops {
   std::vector<size_t> dimensions;
@@ -62,7 +59,8 @@ class Chain {
     if (!moved_by) return;
     if (is_at_root(*f)) {
       const int64_t all = sizes_.bytes(*f), block = bytes_of_block(*f, *moved_by);
-      if (!may_move || all < stays_in_caches || bytes_ + block > chain_bytes) return;
+      const MachineLimits& machine = sizes_.machine();
+      if (!may_move || all < machine.passes_caches || bytes_ + block > machine.block_bytes) return;
       bytes_ += block;
       members_.push_back(f);
     }

@@ -1,0 +1,158 @@
+// Sums in tiles that one Func alone reads: a block at a time in its loops.
+#include <gtest/gtest.h>
+
+#include <retrograde/retrograde.h>
+
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "graph/graph.h"
+#include "ir/target.h"
+
+namespace retrograde {
+namespace {
+
+using Reading = std::function<Expr(const Func& sum, const Var& x, const Var& y, const Var& c)>;
+
+// A convolution of all channels of an image, and what reads it.
+struct Layer {
+  explicit Layer(const Reading& read, int size = 200, int channels = 16)
+      : size(size), image(size, size, channels), weights(3, 3, channels, channels) {
+    fill(image, 0.5f);
+    fill(weights, 0.02f);
+    const Func padded = BoundaryConditions::constant_exterior(image, 0.0f);
+    RDom r({{0, 3}, {0, 3}, {0, channels}}, "r");
+    convolved(x, y, c) = 0.0f;
+    convolved(x, y, c) += weights(r.x, r.y, r.z, c) * padded(x + r.x - 1, y + r.y - 1, r.z);
+    result(x, y, c) = read(convolved, x, y, c);
+    result.set_estimates({{0, size}, {0, size}, {0, channels}});
+  }
+  template <typename B>
+  static void fill(B& buffer, float scale) {
+    int at = 0;
+    for (int i = 0; i < static_cast<int>(buffer.number_of_elements()); i++, at = (at * 7 + 5) % 31)
+      buffer.data()[i] = scale * static_cast<float>(at - 15);
+  }
+  static const graph::LoopLevel& level(const Func& f) {
+    return f.function()->schedule.compute_level;
+  }
+  bool is_in_blocks(const Func& f) const {
+    return level(f).kind == graph::LoopLevel::Kind::At && level(f).func == result.name();
+  }
+  void schedule() { Pipeline(result).auto_schedule(get_host_target()); }
+  Buffer<float> found(int rows) { return result.realize({size, rows, image.channels()}); }
+
+  int size;
+  Var x{"x"}, y{"y"}, c{"c"};
+  Buffer<float> image, weights;
+  Func convolved{"convolved"}, result{"result"};
+};
+
+void expect_same(const Buffer<float>& found, const Buffer<float>& expected, const std::string& of) {
+  ASSERT_EQ(found.number_of_elements(), expected.number_of_elements());
+  for (size_t i = 0; i < found.number_of_elements(); i++)
+    ASSERT_NEAR(found.data()[i], expected.data()[i], 1e-4f) << of << ", element " << i;
+}
+
+Expr positive(const Func& sum, const Var& x, const Var& y, const Var& c) {
+  return max(sum(x, y, c), 0.0f);
+}
+
+TEST(SumBlocks, AreInTheLoopsOfTheOnlyReader) {
+  const std::vector<std::pair<std::string, Reading>> readings{
+      {"activation", positive},
+      {"neighbours in a row", [](const Func& sum, const Var& x, const Var& y,
+                                 const Var& c) { return sum(x - 1, y, c) - sum(x + 1, y, c); }},
+      {"every channel of a pixel", [](const Func& sum, const Var& x, const Var& y, const Var& c) {
+         return sum(x, y, c) / (abs(sum(x, y, 0)) + abs(sum(x, y, 1)) + 1.0f);
+       }}};
+  for (const auto& [name, read] : readings) {
+    Layer layer(read), plain(read);
+    layer.schedule();
+    EXPECT_TRUE(layer.is_in_blocks(layer.convolved)) << name;
+    plain.convolved.compute_root();
+    for (const int rows : {200, 77, 1}) expect_same(layer.found(rows), plain.found(rows), name);
+  }
+}
+
+TEST(SumBlocks, ArePartOfTheSchedulesText) {
+  Layer layer(positive);
+  const std::string text = Pipeline(layer.result).auto_schedule(get_host_target()).schedule_source;
+  EXPECT_NE(text.find("convolved.compute_at(LoopLevel(result, "), std::string::npos) << text;
+}
+
+// By rows, that is: a slice of one channel is what the reader's loops make of it.
+TEST(SumBlocks, AreNotOfWhatStaysInACache) {
+  Layer layer(positive, 60, 16);
+  layer.schedule();
+  EXPECT_NE(Layer::level(layer.convolved).var, "y");
+}
+
+TEST(SumBlocks, AreNotWhereOtherRowsAreRead) {
+  Layer layer([](const Func& sum, const Var& x, const Var& y, const Var& c) {
+    return sum(x, y, c) + sum(x, y + 1, c);
+  });
+  layer.schedule();
+  EXPECT_FALSE(layer.is_in_blocks(layer.convolved) && Layer::level(layer.convolved).var == "y");
+}
+
+TEST(SumBlocks, AreNotWhereTwoReadThem) {
+  Layer layer(positive);
+  Func other("other");
+  other(layer.x, layer.y, layer.c) = exp(layer.convolved(layer.x, layer.y, layer.c));
+  other.set_estimates({{0, 200}, {0, 200}, {0, 16}});
+  Pipeline({layer.result, other}).auto_schedule(get_host_target());
+  EXPECT_EQ(Layer::level(layer.convolved).kind, graph::LoopLevel::Kind::Root);
+}
+
+// Blocks of the one may be those of the other or not; what both give is.
+TEST(SumBlocks, OfTwoSumsThatOneReads) {
+  const auto both = [](Layer& layer, Func& second) {
+    RDom k(0, 5, 0, 16, "k");
+    second(layer.x, layer.y, layer.c) = 1.0f;
+    second(layer.x, layer.y, layer.c) +=
+        layer.weights(k.x % 3, 1, k.y, layer.c) *
+        layer.image(clamp(layer.x + k.x, 0, layer.size - 1), layer.y, k.y);
+    Func product("product");
+    product(layer.x, layer.y, layer.c) =
+        layer.convolved(layer.x, layer.y, layer.c) * second(layer.x, layer.y, layer.c);
+    product.set_estimates({{0, layer.size}, {0, layer.size}, {0, 16}});
+    return product;
+  };
+  Layer layer(positive), plain(positive);
+  Func second("second"), plain_second("second");
+  Func product = both(layer, second), plain_product = both(plain, plain_second);
+  Pipeline(product).auto_schedule(get_host_target());
+  EXPECT_EQ(Layer::level(layer.convolved).func, product.name());
+  plain.convolved.compute_root();
+  plain_second.compute_root();
+  expect_same(product.realize({200, 200, 16}), plain_product.realize({200, 200, 16}), "product");
+}
+
+// The gradient by an image is the padded image's, where the image is.
+TEST(SumBlocks, AreThoseOfAGradientThroughABoundaryCondition) {
+  Layer layer(positive), plain(positive);
+  const auto gradient = [](Layer& of) {
+    RDom all(0, of.size, 0, of.size, 0, 16, "all");
+    Func loss("loss");
+    loss() = 0.0f;
+    loss() += 0.5f * of.result(all.x, all.y, all.z) * of.result(all.x, all.y, all.z);
+    Func result = propagate_adjoints(loss)(of.image);
+    result.set_estimates({{0, of.size}, {0, of.size}, {0, 16}});
+    return result;
+  };
+  Func found = gradient(layer), expected = gradient(plain);
+  Pipeline(found).auto_schedule(get_host_target());
+  int in_blocks = 0;
+  for (const graph::FuncPtr& f : graph::topological_order({found.function()}))
+    in_blocks += f->schedule.compute_level.func == found.name();
+  EXPECT_EQ(in_blocks, 1);
+  for (const graph::FuncPtr& f : graph::topological_order({expected.function()}))
+    Func(f).compute_root();
+  expect_same(found.realize({200, 200, 16}), expected.realize({200, 200, 16}), "gradient");
+}
+
+}  // namespace
+}  // namespace retrograde
