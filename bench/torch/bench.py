@@ -15,6 +15,7 @@ what a call costs where there is nothing to compute (overhead.py).
 the end of the last.
 """
 import argparse
+import ctypes
 import json
 import math
 import os
@@ -101,6 +102,14 @@ class Side:
                 break
         times.append(1e3 * (end - start) / calls)
         self.spent += end - warm
+
+
+def show_functions_to_compiled_code():
+    """What torch.compile makes of exp, pow and their like calls functions of libtorch_cpu.so that PyTorch 2.13's wheel
+    does not link it with."""
+    import torch
+
+    ctypes.CDLL(os.path.join(os.path.dirname(torch.__file__), "lib", "libtorch_cpu.so"), mode=ctypes.RTLD_GLOBAL)
 
 
 def largest_error(results, exact):
@@ -207,6 +216,8 @@ def main():
     import torch
 
     torch.set_num_threads(options.threads)
+    if options.device == "cpu":
+        show_functions_to_compiled_code()
     report = {"pytorch": torch.__version__, "threads": options.threads, "operators": []}
     place = f"{options.threads} threads"
     if options.device == "cuda":

@@ -304,6 +304,7 @@ void bind_callable(py::module_& m) {
   py::class_<ExpectedCall>(m, "_ExpectedCall")
       .def(py::init<py::object, const py::iterable&, const py::iterable&>())
       .def("__call__", &ExpectedCall::call);
+  m.def("_use_huge_pages", &use_huge_pages);
   bind_compile(reopened<Func>(m, "Func", {"Runnable"}));
   bind_compile(reopened<Pipeline>(m, "Pipeline", {"Runnable"}));
 }

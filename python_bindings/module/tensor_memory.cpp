@@ -1,6 +1,8 @@
 // tensor_memory.cpp -- see tensor_memory.h.
 #include "tensor_memory.h"
 
+#include <sys/mman.h>
+
 #include <climits>
 #include <cstring>
 
@@ -74,6 +76,17 @@ Runtime::Buffer<> buffer_of_tensor(py::handle tensor, Type type) {
                            part(PyTuple_GET_ITEM(strides.ptr(), axis), "strides"));
   }
   return Runtime::Buffer<>(to_halide_type(type), data ? data : nothing, rank, dimensions);
+}
+
+void use_huge_pages(uintptr_t first, size_t bytes) {
+#ifdef MADV_HUGEPAGE
+  constexpr uintptr_t page = 2 << 20;
+  const uintptr_t begin = (first + page - 1) / page * page, end = (first + bytes) / page * page;
+  // Only advice: failure changes nothing.
+  if (begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
+#else
+  (void)first, (void)bytes;
+#endif
 }
 
 ir::Scalar scalar_of_tensor(py::handle tensor, Type type) {

@@ -4,6 +4,9 @@
 
 #include <pybind11/pybind11.h>
 
+#include <cstddef>
+#include <cstdint>
+
 #include "frontend/data/buffer.h"
 
 namespace retrograde::python {
@@ -15,6 +18,10 @@ namespace py = pybind11;
 // ask for the region that is needed (see runtime/README.md).
 // Requires: extents and strides fit int32 (CompileError).
 Runtime::Buffer<> buffer_of_tensor(py::handle tensor, Type type);
+
+// Advises huge pages for new memory of the CPU, from the first byte to the last: without, each page of a large
+// result is a fault, and all of them take longer than what fills it.
+void use_huge_pages(uintptr_t first, size_t bytes);
 
 // The one element of a tensor without dimensions.
 ir::Scalar scalar_of_tensor(py::handle tensor, Type type);

@@ -160,6 +160,25 @@ class Operators(unittest.TestCase):
             torch.testing.assert_close(gradient, torch.autograd.grad(want.sum(), taps)[0])
             self.assertEqual(op(image[::2], taps).shape, ((n + 1) // 2 - 2,))
 
+    def test_large_results(self):
+        """Ask for huge pages, in the first call, in those of sizes that came before, and in the gradient."""
+        image = rg.ImageParam("float32", 2, "image")
+        f = rg.Func("squares")
+        f[x, y] = image[x, y] * image[x, y]
+        op, pixels = operator(f, [image]), torch.rand(1501, 1503, requires_grad=True)
+        module = rg._retrograde
+        with mock.patch.object(module, "_use_huge_pages", wraps=module._use_huge_pages) as asked:
+            for _ in range(4):
+                result = op(pixels)
+                self.assertTrue(torch.equal(result, pixels * pixels))
+                asked.assert_called_with(result.data_ptr(), 4 * 1501 * 1503)
+            self.assertEqual(asked.call_count, 4)
+            gradient, = torch.autograd.grad(result.sum(), pixels)
+            self.assertEqual(asked.call_count, 5)
+            op(pixels[:100])
+            self.assertEqual(asked.call_count, 5)
+        self.assertTrue(torch.equal(gradient, 2 * pixels.detach()))
+
     def test_sizes_that_values_say(self):
         count, f = rg.ImageParam("int64", 1, "count"), rg.Func("f")
         f[x] = count[0] + rg.cast("int64", x)

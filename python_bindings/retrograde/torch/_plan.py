@@ -20,6 +20,7 @@ DTYPES = {torch.float16: rg.Float(16), torch.bfloat16: rg.BFloat(16), torch.floa
 TYPES = {str(kind): dtype for dtype, kind in DTYPES.items()}
 GRADIENT, TANGENT = 0, 1  # the steps of a path: see Plan.derived
 _CPU = torch.device("cpu")
+_HUGE = 8 << 20  # bytes, from which huge pages are asked for
 _numbers = itertools.count()
 
 
@@ -134,7 +135,7 @@ class Plan:
     def run(self, tensors):
         batch = self.batch(tensors) if self.check(tensors) else ()
         shapes = self.shapes(tensors, batch)
-        results = [torch.empty(shape, dtype=dtype, device=_CPU) for shape, dtype in zip(shapes, self.result_dtypes)]
+        results = [_empty(shape, dtype) for shape, dtype in zip(shapes, self.result_dtypes)]
         if self.sizes is None and self._is_trivial(tensors, results):
             return results
         if not batch:
@@ -278,7 +279,17 @@ def _maker(shape, dtype):
     which is where a tensor is small, there is another."""
     if math.prod(shape) <= 4096:
         return functools.partial(torch.empty_like, torch.empty(shape, dtype=dtype, device=_CPU))
-    return functools.partial(torch.empty, shape, dtype=dtype, device=_CPU)
+    return functools.partial(_empty, shape, dtype)
+
+
+def _empty(shape, dtype):
+    """A result without values. A large one is new memory each time, whose pages are faulted in when they are written:
+    fewer, larger ones where the system has some, as for large arrays of NumPy and for temporaries of a pipeline."""
+    result = torch.empty(shape, dtype=dtype, device=_CPU)
+    size = result.numel() * result.element_size()
+    if size >= _HUGE:
+        rg._use_huge_pages(result.data_ptr(), size)
+    return result
 
 
 def _set_bounds(buffer, size):
