@@ -16,6 +16,7 @@
 #include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/lets.h"
+#include "ir/markers.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
@@ -207,6 +208,25 @@ FuncPtr inlined_source(const Call& call) {
   return is_free ? source : nullptr;
 }
 
+// Whether the read needs no border of the source: where its elements lie, as far as sizes are known, the
+// condition has one outcome. A copy of these saves little.
+bool is_inside(const Call& call, const FuncContents& source, const FuncContents& f,
+               const SizeEstimate& sizes) {
+  simplification::BoundsMap bounds;
+  for (size_t d = 0; d < f.args.size(); ++d) bounds[f.args[d]] = sizes.range(f, d);
+  for (const ReductionVariable& r : f.updates[0].rvars)
+    bounds[r.var] = {simplify(r.min), simplify(r.min + r.extent - 1)};
+  Substitution places;
+  for (size_t d = 0; d < source.args.size(); ++d)
+    places[source.args[d]] = without_likely(without_lets(call.args[d]));
+  return std::ranges::all_of(source.pure->values, [&](const Expr& value) {
+    const auto* choice = value.as<Select>();
+    if (!choice) return false;
+    const Expr here = substitute(without_likely(choice->condition), places);
+    return can_prove(here, bounds) || can_prove(!here, bounds);
+  });
+}
+
 bool pays(const ReadOfTiles::Counts& counts, double operations) {
   const double uses = counts.reads / counts.elements;
   return uses >= least_uses && uses * operations >= way_to_near_cache;
@@ -216,7 +236,7 @@ std::optional<RowCopy> copy_for(const Call& call, const FuncPtr& source, const F
                                 const RegisterTile& tile, int lanes, const LoopsOfTiles& loops,
                                 const SizeEstimate& sizes) {
   const double operations = InlinedCost().of(*source);
-  if (operations <= 0) return std::nullopt;
+  if (operations <= 0 || is_inside(call, *source, f, sizes)) return std::nullopt;
   const ReadOfTiles read(call, f, tile, lanes, loops, sizes);
   const auto row = read.row_dimension();
   if (!row) return std::nullopt;

@@ -142,6 +142,11 @@ std::optional<int64_t> SizeEstimate::extent(const FuncContents& f, size_t dimens
   return *as_const_int(i.max) - *as_const_int(i.min) + 1;
 }
 
+Interval SizeEstimate::range(const FuncContents& f, size_t dimension) const {
+  const auto found = boxes_.find(&f);
+  return found == boxes_.end() ? Interval::everything() : found->second[dimension];
+}
+
 SizeEstimate SizeEstimate::with_extent(const FuncContents& f, size_t dimension,
                                        int64_t extent) const {
   SizeEstimate result = *this;

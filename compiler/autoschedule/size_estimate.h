@@ -36,6 +36,8 @@ class SizeEstimate {
   explicit SizeEstimate(const std::vector<FuncPtr>& outputs, const MachineLimits& machine = {});
   // Elements of a dimension that are computed; nullopt: not known.
   std::optional<int64_t> extent(const FuncContents& f, size_t dimension) const;
+  // Between which elements these lie; unbounded: not known.
+  Interval range(const FuncContents& f, size_t dimension) const;
   // The same, but that so much of one dimension is computed at a time.
   SizeEstimate with_extent(const FuncContents& f, size_t dimension, int64_t extent) const;
   // Of all that is computed; 0 where some extent is not known.
