@@ -9,7 +9,9 @@ PACKAGE is the folder that holds the Python package. PyTorch is that of the virt
 is and through torch.compile; all run in turn, on the same tensors and as many threads: forward alone, and forward
 with backward by all inputs. Errors are the largest |a - b| / max(|b|, root mean square of b) over the result and all
 gradients, b being PyTorch's own in float64. `ratio` is that of the better of PyTorch's two to ours. At the end stands
-what a call costs where there is nothing to compute (overhead.py).
+what a call costs where there is nothing to compute (overhead.py). malloc keeps what is freed: whether it does so by
+itself, and whether half of the time of a large result is that of page faults, would be luck from run to run, on all
+sides.
 
 --device cuda: all of it on the GPU, with the PyTorch of the interpreter that runs this; a turn is CUDA_CALLS calls and
 the end of the last.
@@ -34,6 +36,7 @@ SIDES = ("retrograde", "eager", "compiled")
 PAUSE_SECONDS = 0.03  # before a turn: threads of OpenMP that have no work look for some for so long
 WARM_SECONDS = 0.02  # of untimed runs in a turn: after the pause caches and clocks are not as in use
 MOST_SECONDS = 3  # of all rounds of one that is slow
+KEPT_BYTES = str(1 << 33)  # by malloc
 CUDA_CALLS = 20  # of a turn on a GPU, which works while the next is called
 
 
@@ -205,6 +208,7 @@ def main():
     os.environ["HL_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = str(options.threads)
     if options.device == "cpu" and sys.prefix != peers.PEERS:
         peers.make_peers(["pytorch"])
+        os.environ["MALLOC_MMAP_THRESHOLD_"], os.environ["MALLOC_TRIM_THRESHOLD_"] = KEPT_BYTES, KEPT_BYTES
         python = os.path.join(peers.PEERS, "bin", "python")
         done = os.spawnv(os.P_WAIT, python, [python, *sys.argv])
         if done == 0 and options.plot:  # with Debian's matplotlib

@@ -165,13 +165,13 @@ class Operators(unittest.TestCase):
         image = rg.ImageParam("float32", 2, "image")
         f = rg.Func("squares")
         f[x, y] = image[x, y] * image[x, y]
-        op, pixels = operator(f, [image]), torch.rand(1501, 1503, requires_grad=True)
+        op, pixels = operator(f, [image]), torch.rand(2901, 2903, requires_grad=True)
         module = rg._retrograde
         with mock.patch.object(module, "_use_huge_pages", wraps=module._use_huge_pages) as asked:
             for _ in range(4):
                 result = op(pixels)
                 self.assertTrue(torch.equal(result, pixels * pixels))
-                asked.assert_called_with(result.data_ptr(), 4 * 1501 * 1503)
+                asked.assert_called_with(result.data_ptr(), 4 * 2901 * 2903)
             self.assertEqual(asked.call_count, 4)
             gradient, = torch.autograd.grad(result.sum(), pixels)
             self.assertEqual(asked.call_count, 5)

@@ -20,7 +20,7 @@ DTYPES = {torch.float16: rg.Float(16), torch.bfloat16: rg.BFloat(16), torch.floa
 TYPES = {str(kind): dtype for dtype, kind in DTYPES.items()}
 GRADIENT, TANGENT = 0, 1  # the steps of a path: see Plan.derived
 _CPU = torch.device("cpu")
-_HUGE = 8 << 20  # bytes, from which huge pages are asked for
+_HUGE = 32 << 20  # bytes, from which malloc maps memory for each block
 _numbers = itertools.count()
 
 
