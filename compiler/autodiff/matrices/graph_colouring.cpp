@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "ir/lists.h"
+
 namespace retrograde::autodiff {
 
 namespace {
@@ -48,7 +50,8 @@ class StarColouring {
       : graph_(graph), colours_(graph.size(), -1), forbidden_(graph.size()) {}
 
   VertexColours run() {
-    const auto degrees = mapped(graph_, [&](const auto& neighbours) { return neighbours.size(); });
+    const auto degrees =
+        ir::mapped(graph_, [&](const auto& neighbours) { return neighbours.size(); });
     for (int v : largest_first(degrees)) {
       forbidden_.start(v);
       for (int w : near(v)) forbid_by(v, w);
