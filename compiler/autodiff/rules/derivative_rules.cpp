@@ -388,12 +388,12 @@ Type adjoint_type(Type type) {
   return is_kept ? type : Float(32, type.lanes());
 }
 
-namespace {
-
 bool is_finite_constant(const Expr& e) {
   auto value = as_const_float(e);
   return value && std::isfinite(*value);
 }
+
+namespace {
 
 bool is_cut(Strength strength) { return strength == Strength::Cut || strength == Strength::Both; }
 

@@ -60,6 +60,9 @@ const DerivativeRule& derivative_rule(Op op);
 const DerivativeRule& derivative_rule(Kind kind);
 bool has_derivative_rule(Kind kind);  // whether the table has a row for the kind
 
+// A number that keeps a zero that it multiplies.
+bool is_finite_constant(const Expr& e);
+
 // The type in which the adjoint of a value of floating `type` is accumulated: float32 for the
 // 16-bit floats.
 Type adjoint_type(Type type);

@@ -1,7 +1,6 @@
 #include "autodiff/sweeps/zero_borders.h"
 
-#include <cmath>
-
+#include "autodiff/rules/derivative_rules.h"
 #include "autodiff/sweeps/border_conditions.h"
 #include "graph/function.h"
 #include "ir/build.h"
@@ -38,11 +37,6 @@ Expr before_clamps(const Expr& index) {
   if (const auto* n = index.as<Min>()) return inner(n->a, n->b);
   if (const auto* n = index.as<Max>()) return inner(n->a, n->b);
   return as_op(index, Op::likely) ? without_likely(index) : index;
-}
-
-bool is_finite_number(const Expr& e) {
-  const auto number = as_const_float(e);
-  return number && std::isfinite(*number);
 }
 
 // The call of an adjoint that is zero where the condition is false, at the place before it was clamped;
@@ -83,7 +77,7 @@ Expr zero_without(const Expr& term, const Expr& condition) {
     return a.defined() ? call_op(Op::strong_mul, term.type(), {a, product->args[1]}) : Expr();
   }
   if (const auto* n = term.as<Mul>()) {
-    if (!is_finite_number(n->b)) return {};
+    if (!is_finite_constant(n->b)) return {};
     const Expr a = in(n->a);
     return a.defined() ? a * n->b : Expr();
   }
