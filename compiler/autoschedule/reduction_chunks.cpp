@@ -17,8 +17,9 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr double chunk_bytes = 512 << 10;  // half of a second-level cache
-constexpr double worth_a_chunk = 3;        // times as many bytes without: sums are read and written
+// For all tiles, as much as a second-level cache holds: those that a thread is at read a part of it.
+constexpr double chunk_bytes = 1 << 20;
+constexpr double worth_a_chunk = 3;  // times as many bytes without: sums are read and written
 
 // What one Func or image is read of.
 struct ChunkOperand {

@@ -9,13 +9,15 @@
 
 #include "autodiff/derivative.h"
 #include "frontend/language/func.h"
+#include "graph/copy_graph.h"
+#include "ir/build.h"
 #include "support/errors.h"
 
 namespace retrograde {
 namespace {
 
 constexpr int many = 12'000'000;
-constexpr float huge = 1e37f;  // of which a block can add up its terms
+constexpr float huge = 5e36f;  // of which two lanes of a block can add up their terms
 
 struct Nature {
   const char* name;
@@ -106,6 +108,31 @@ TEST(LongSums, OfScattersToFewAndToManyElements) {
   check_scatter(3, constant);
   check_scatter(3, cancelling);
   check_scatter(1000, cancelling);
+}
+
+// Of float32, before they are added in double: longer ones where a lane has many.
+TEST(LongSums, HaveBlocksOf32TermsAndShortOnesOf16) {
+  const auto terms_of_a_block = [](int columns, int rows) {
+    Var x("x");
+    Func loss("loss"), sums("sums");
+    Buffer<float> gain(1000), all(1000, columns, rows);
+    gain.fill(1);
+    RDom r(0, columns, 0, rows), all_sums(0, 1000);
+    sums(x) += gain(x) * all(x, r.x, r.y);
+    loss() += sums(all_sums);
+    Derivative d = propagate_adjoints(loss);
+    int64_t terms = 0;
+    for (const graph::FuncPtr& f : graph::topological_order({d(gain).function()})) {
+      if (!f->made || f->made->blocks == 0) continue;
+      terms = 1;
+      for (const graph::ReductionVariable& loop : f->updates[0].rvars)
+        terms *= *ir::as_const_int(loop.extent);
+    }
+    return terms;
+  };
+  EXPECT_EQ(terms_of_a_block(1024, 256), 32);
+  EXPECT_EQ(terms_of_a_block(64, 1024), 16) << "a part has 128 terms";
+  EXPECT_EQ(terms_of_a_block(16, 64), 0) << "of which none is worth it";
 }
 
 TEST(LongSums, UnderSchedulesByHand) {

@@ -157,17 +157,18 @@ class Builder {
     return is_wide_ && !update.over.scatters && is_long(update) &&
            std::ranges::all_of(target_.types, [](Type t) { return t == Float(32); });
   }
-  // Has terms added up by a block, where there is one, so that the rest of the update adds blocks.
-  void take_blocks(const std::vector<Expr>& point, int lanes, std::vector<ReductionVariable>& rvars,
+  // Has terms added up by a block, so that the rest of the update adds blocks; false: there is none.
+  bool take_blocks(const std::vector<Expr>& point, int lanes, std::vector<ReductionVariable>& rvars,
                    std::vector<Expr>& terms, Expr& predicate) {
     const auto sum = sum_in_blocks(name_, target_.name, point, rvars, terms, predicate);
-    if (!sum) return;
+    if (!sum) return false;
     sum->block->made->lanes = lanes;
     estimate(sum->block);
     result_.helpers.push_back(sum->block);
     rvars = sum->rvars;
     terms = sum->values;
     predicate = Expr();
+    return true;
   }
 
   void add_update(const Iterations& update) {
@@ -210,15 +211,27 @@ class Builder {
     std::vector<Expr> terms = mapped(sums, here);
     Expr predicate = conjunction(slice.conditions);
     const std::vector<Expr> lhs = parts_point(g, element, lane, part);
-    if (has_blocks(update)) take_blocks(lhs, parts->made->lanes, slice.rvars, terms, predicate);
+    if (has_blocks(update) && take_blocks(lhs, parts->made->lanes, slice.rvars, terms, predicate))
+      add_lanes_in_pairs(parts, lane, terms);
     append_sums(parts, lhs, terms, slice.rvars, predicate);
     result_.helpers.push_back(parts);
     sum_parts(g, parts, plan);
     if (!plan.note.empty()) result_.notes.push_back(plan.note);
   }
+  // Lanes of blocks are added in pairs before they come to the sums in double, which then are half as
+  // many: a conversion, an addition and a way to memory each.
+  static void add_lanes_in_pairs(const FuncPtr& parts, const Expr& lane, std::vector<Expr>& terms) {
+    if (!lane.defined()) return;
+    const int half = parts->made->lanes / 2;
+    const Substitution other{{lane.as<Variable>()->name, lane + half}};
+    for (Expr& term : terms) {
+      if (term.defined()) term = term + substitute(term, other);
+    }
+    parts->made->lanes = half;
+  }
   void sum_parts(const Gather& g, const FuncPtr& parts, const PartPlan& plan) {
     const DomainPtr rdom = make_domain();
-    const Expr zero = make_zero(Int(32)), lanes = make_const(Int(32), lane_count);
+    const Expr zero = make_zero(Int(32)), lanes = make_const(Int(32), parts->made->lanes);
     const Expr lane = plan.has_lanes ? add_loop(rdom, "lane", zero, lanes) : Expr(),
                part = plan.has_parts ? add_loop(rdom, "part", zero, plan.count) : Expr();
     const std::vector<Expr>& lhs = g.scatters ? args_ : g.lhs;

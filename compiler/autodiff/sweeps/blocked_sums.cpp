@@ -12,10 +12,28 @@ namespace retrograde::autodiff {
 
 namespace {
 
+// Terms of a block, one after the other; lanes have blocks of their own.
+constexpr int64_t short_block = 16, long_block = 32;
+// Blocks of a sum from which on they are long.
+constexpr int64_t enough_blocks = 16;
 // Fewer terms are not worth a block.
 constexpr int64_t least_terms = 8;
-// Iterations from which on rounding their number up to whole blocks costs little.
-constexpr int64_t least_to_round = 8 * block_terms;
+// Blocks of a loop from which on rounding up to whole ones costs little.
+constexpr int64_t least_to_round = 8;
+
+// Of a sum of so many terms, INT64_MAX: unknown.
+int64_t terms_of_block(int64_t terms) {
+  return terms / long_block >= enough_blocks ? long_block : short_block;
+}
+
+int64_t number_of_terms(const std::vector<ReductionVariable>& rvars) {
+  int64_t terms = 1;
+  for (const ReductionVariable& r : rvars) {
+    const auto extent = as_const_int(simplify(r.extent));
+    if (!extent || __builtin_mul_overflow(terms, *extent, &terms)) return INT64_MAX;
+  }
+  return terms;
+}
 
 // So many neighbouring iterations of a loop, at most `most`: a divisor of the extent where one is
 // near.
@@ -29,7 +47,7 @@ int64_t cut_of(int64_t extent, int64_t most) {
 class Cutter {
  public:
   Cutter(const std::vector<ReductionVariable>& rvars) {
-    int64_t room = block_terms;
+    int64_t room = terms_of_block(number_of_terms(rvars));
     for (const ReductionVariable& r : rvars) {
       const auto extent = as_const_int(simplify(r.extent));
       if (extent && *extent <= room) {
@@ -93,8 +111,9 @@ class Cutter {
 
 Expr in_whole_blocks(const Expr& extent) {
   const auto known = as_const_int(extent);
-  if (!known || *known < least_to_round) return extent;
-  return make_const(Int(32), (*known + block_terms - 1) / block_terms * block_terms);
+  if (!known) return extent;
+  const int64_t block = terms_of_block(*known), blocks = (*known + block - 1) / block;
+  return *known < least_to_round * block ? extent : make_const(Int(32), blocks * block);
 }
 
 std::optional<SumOfBlocks> sum_in_blocks(const std::string& name, const std::string& of,
