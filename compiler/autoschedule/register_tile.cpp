@@ -19,10 +19,13 @@ constexpr int64_t most_of_known = 8;  // of a dimension that it divides: there a
 constexpr double split_lines = 2;     // loads for a vector at any place: it crosses cache lines
 constexpr double far_lines = 4;       // of a row of its own in each iteration: none is at hand yet
 constexpr double worth_while = 0.8;   // of the cycles without a tile
+constexpr double a_rest = 1.03;       // of the cycles
+constexpr double rows_apart = 1.1;    // of the cycles: vectors of several images, say
 
 // What an iteration of a reduction loads, by the dimensions that the place depends on.
 struct Operand {
   std::vector<bool> depends_on;  // by dimension
+  std::vector<bool> is_apart;    // by dimension: a step goes to what no iteration reads beside
   bool is_far = false;           // each iteration reads other rows
 };
 
@@ -37,6 +40,11 @@ bool walks_afar(const Call& call, const Definition& stage) {
     }
   }
   return moves && is_far;
+}
+
+bool moves_in(const Definition& stage, const Expr& index) {
+  return std::ranges::any_of(
+      stage.rvars, [&](const ReductionVariable& r) { return uses_variable(index, r.var); });
 }
 
 // nullopt: the update reads other elements of its own.
@@ -54,11 +62,13 @@ std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Def
       is_plain &= same_args(call->args, stage.args);
       return false;
     }
-    Operand operand{{}, walks_afar(*call, stage)};
-    for (const std::string& arg : f.args)
-      operand.depends_on.push_back(
-          std::any_of(call->args.begin(), call->args.end(),
-                      [&](const Expr& index) { return uses_variable(index, arg); }));
+    Operand operand{{}, {}, walks_afar(*call, stage)};
+    for (const std::string& arg : f.args) {
+      const auto moves = [&](const Expr& index) { return uses_variable(index, arg); };
+      operand.depends_on.push_back(std::ranges::any_of(call->args, moves));
+      operand.is_apart.push_back(std::ranges::any_of(
+          call->args, [&](const Expr& index) { return moves(index) && !moves_in(stage, index); }));
+    }
     operands.push_back(std::move(operand));
     return true;
   };
@@ -99,6 +109,17 @@ bool shares_loads(const RegisterTile& tile, const std::vector<Operand>& operands
   return std::any_of(operands.begin(), operands.end(), is_shared);
 }
 
+// Whether vectors of one operand come from several images at once, or the like. Their lines may meet in one
+// set of a cache, and loops over them do not stand where a copy of their rows (row_copies.h) would.
+bool reads_rows_apart(const RegisterTile& tile, const std::vector<Operand>& operands) {
+  return std::ranges::any_of(operands, [&](const Operand& operand) {
+    return operand.depends_on[0] &&
+           std::ranges::any_of(tile.sides, [&](const RegisterTile::Side& side) {
+             return operand.is_apart[side.dimension];
+           });
+  });
+}
+
 // That the functions of a term take, of which nothing is shared.
 double adds_of_functions(const Definition& stage) {
   double adds = 0;
@@ -121,13 +142,14 @@ double cycles(const RegisterTile& tile, const std::vector<Operand>& operands, do
                    (1 + adds) / products_a_cycle, latency / sums});
 }
 
-// Iterations of the tile for each that has an element.
+// Iterations of the tile for each that has an element; a rest has its own loops.
 double iterations_an_element(const RegisterTile& tile, int lanes, const FuncContents& f,
                              const SizeEstimate& sizes) {
   const auto lost = [&](size_t dimension, int64_t size) {
     const auto extent = sizes.extent(f, dimension);
     if (!extent || *extent <= 0) return 1.0;
-    return static_cast<double>((*extent + size - 1) / size * size) / static_cast<double>(*extent);
+    const int64_t all = (*extent + size - 1) / size * size;
+    return (all == *extent ? 1 : a_rest) * static_cast<double>(all) / static_cast<double>(*extent);
   };
   double result = lost(0, tile.vectors * lanes);
   for (const RegisterTile::Side& side : tile.sides) result *= lost(side.dimension, side.size);
@@ -182,7 +204,8 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
       std::max(1.0, static_cast<double>(vector_bytes) / static_cast<double>(unit.register_bytes));
   RegisterTile best;
   const auto cost = [&](const RegisterTile& tile) {
-    return cycles(tile, *operands, adds, registers) * iterations_an_element(tile, lanes, f, sizes);
+    return cycles(tile, *operands, adds, registers) * iterations_an_element(tile, lanes, f, sizes) *
+           (reads_rows_apart(tile, *operands) ? rows_apart : 1);
   };
   double least = cost(best) * worth_while;
   const auto consider = [&](RegisterTile tile) {

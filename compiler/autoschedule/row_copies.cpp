@@ -26,6 +26,7 @@ namespace {
 
 constexpr int64_t copy_bytes = 192 << 10;  // a part of a cache near a core
 constexpr int64_t most_rows = 8;           // that share a copy
+constexpr int64_t least_full_copies = 4;   // for one that holds fewer at the end
 // Of loops whose extents are not known: elements of a row, channels and the like.
 constexpr double unknown_row = 256, unknown_planes = 16;
 constexpr double least_uses = 4;  // of an element of the copy
@@ -247,10 +248,11 @@ std::optional<RowCopy> copy_for(const Call& call, const FuncPtr& source, const F
   for (int64_t rows = may_share ? most_rows : 1; rows >= 1; rows /= 2) {
     const auto counts = read.counts(*row, rows);
     if (!counts) return std::nullopt;
-    const bool divides = counts->is_known && extent && *extent % rows == 0;
+    const bool fits =
+        counts->is_known && extent && (*extent % rows == 0 || *extent >= least_full_copies * rows);
     const bool leaves_tasks =
         read.copies(*row, rows) >= static_cast<double>(sizes.machine().enough_tasks);
-    if (rows > 1 && (!divides || !leaves_tasks || counts->elements * bytes > copy_bytes)) continue;
+    if (rows > 1 && (!fits || !leaves_tasks || counts->elements * bytes > copy_bytes)) continue;
     const bool is_small =
         counts->is_known ? counts->elements * bytes <= 2 * copy_bytes : read.is_a_window(*row);
     return is_small && pays(*counts, operations) ? std::optional(RowCopy{source, *row, rows})
