@@ -98,10 +98,13 @@ void start_in_tiles(const FuncPtr& f, int lanes) {
   const std::vector<VarOrRVar> held = order;
   order.insert(order.end(), shared.begin(), shared.end());
   start.reorder(order);
-  const bool is_one_vector = std::any_of(tiles.begin(), tiles.end(), [&](const TileLoop& tile) {
-    return tile.split && tile.dimension == f->args[0] && is_const_int(tile.split->factor, lanes);
+  // As the update has them: then its sums start in registers.
+  const std::string row = held.empty() ? "" : held.front().name();
+  const std::vector<Dim>& loops = f->updates[0].schedule.dims;
+  const bool is_whole = std::any_of(loops.begin(), loops.end(), [&](const Dim& loop) {
+    return loop.var == row && loop.runs == ForType::Vectorized;
   });
-  if (has_rows && is_one_vector)
+  if (has_rows && is_whole)
     start.vectorize(held.front());
   else if (has_rows)
     vectorize(start, held.front(), lanes, TailStrategy::GuardWithIf);

@@ -12,6 +12,13 @@
 //                                               unrolled for (c, 0, 8) { f(x, c) = kept(c) }
 //                                             }
 //
+// What gives the elements their first values right before is made to fill kept, and f is not touched
+// until the end:
+//
+//   for (c, 0, 8) { f(x, c) = bias(c) }       realize kept [0, 8] {
+//   for (r, 0, n) { ... }                =>     unrolled for (c, 0, 8) { kept(c) = bias(c) }
+//                                               for (r, 0, n) { ... }
+//
 // Why: the storage of f may be as large as an image, with strides known at run time only, and LLVM
 //      cannot tell that other elements are not these. An array of constant size with constant
 //      indices becomes registers.
@@ -22,19 +29,24 @@
 //         which reads its Func at this point alone. Conditions that hold for all iterations of the
 //         serial loops or for none, as those of tails do, also stand around the copies; others
 //         only around the update, so that a point may be written that was not: by what it holds.
-//         No other task writes it, since all parallel loops around are over pure variables.
+//         No other task writes it, since all parallel loops around are over pure variables. First
+//         values come from a nest of loops that are those of the update one by one, under the same
+//         conditions: then both have the same elements.
 // Not done: more elements than registers hold; Funcs all of which fit registers as they are.
 // Source: scalar replacement (Callahan, Carr and Kennedy, PLDI 1990).
 // Tests: test/golden/lower/keep_accumulators/, codegen_idioms_test.
 #include "lower/loops/keep_accumulators.h"
 
 #include <algorithm>
+#include <functional>
+#include <map>
 #include <optional>
 #include <unordered_set>
 #include <vector>
 
 #include "ir/build.h"
 #include "ir/equal.h"
+#include "ir/markers.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
@@ -148,6 +160,113 @@ class UpdateFinder {
   std::vector<Expr> around_;  // what is computed on the way
 };
 
+// A nest of loops that gives the elements of an update their first values.
+class Start {
+ public:
+  // `around`: lets in which the update stands, and the nest does not.
+  static std::optional<Start> of(const KeptUpdate& update, const Substitution& around,
+                                 const Stmt& nest, const std::function<bool(const For&)>& is_pure) {
+    Start start;
+    const bool found = start.descend(nest, update, is_pure) && start.pair_loops(update, around) &&
+                       start.is_at(update, around) && start.has_conditions_of(update, around);
+    return found ? std::optional(std::move(start)) : std::nullopt;
+  }
+
+  // The same for an array of the elements, whose coordinates are the update's lanes, the last first.
+  Stmt filling(const Stmt& nest, const std::string& array, const KeptUpdate& update) const {
+    std::vector<Expr> args;
+    for (size_t i = update.lanes.size(); i-- > 0;)
+      args.push_back(variable(of_lane_.at(update.lanes[i])->name));
+    return rewrite_statements(nest, [&](const Stmt& s, auto& all) {
+      if (s.get() == provide_) return make_provide(array, provide_->values, args);
+      const auto* loop = s.template as<For>();
+      if (!loop || loop->runs != ForType::Serial) return all.children(s);
+      return make_for(loop->name, loop->min, loop->extent, ForType::Unrolled, all(loop->body),
+                      loop->partition);
+    });
+  }
+
+ private:
+  bool descend(const Stmt& s, const KeptUpdate& update,
+               const std::function<bool(const For&)>& is_pure) {
+    const auto reads_own = [&](const Expr& e) {
+      return any_node(e, [&](const Expr& part) { return update.as_own(part) != nullptr; });
+    };
+    const auto inside = [&](const Stmt& body) { return descend(body, update, is_pure); };
+    return match(
+        s,
+        [&](const For& n) {
+          loops_.push_back(&n);
+          return (is_lane_loop(n) || n.runs == ForType::Serial) && is_pure(n) && inside(n.body);
+        },
+        [&](const LetStmt& n) {
+          lets_[n.name] = substitute(n.value, lets_);
+          return !reads_own(n.value) && inside(n.body);
+        },
+        [&](const IfThenElse& n) {
+          add_conjuncts(n.condition, conditions_);
+          return !n.when_false.defined() && !reads_own(n.condition) && inside(n.when_true);
+        },
+        [&](const Provide& n) {
+          provide_ = &n;
+          return n.name == update.provide->name && !n.predicate.defined() &&
+                 std::ranges::none_of(n.values, reads_own);
+        },
+        [](const StmtNode&) { return false; });
+  }
+
+  // Along each dimension as many loops as the update has, of the same extents.
+  bool pair_loops(const KeptUpdate& update, const Substitution& around) {
+    for (size_t d = 0; d < update.point.size(); ++d) {
+      const Expr here = substitute(provide_->args[d], lets_);
+      const Expr there = substitute(update.point[d], around);
+      std::vector<const For*> own, lanes;
+      for (const For* loop : loops_)
+        if (uses_variable(here, loop->name)) own.push_back(loop);
+      for (const For* lane : update.lanes)
+        if (uses_variable(there, lane->name)) lanes.push_back(lane);
+      if (own.size() != lanes.size()) return false;
+      for (size_t i = 0; i < own.size(); ++i) {
+        if (!equal(own[i]->min, lanes[i]->min) || !equal(own[i]->extent, lanes[i]->extent) ||
+            !of_lane_.emplace(lanes[i], own[i]).second)
+          return false;
+        names_[own[i]->name] = variable(lanes[i]->name);
+      }
+    }
+    return of_lane_.size() == update.lanes.size() && of_lane_.size() == loops_.size();
+  }
+
+  // As the update writes it.
+  Expr renamed(const Expr& e) const {
+    return without_likely(substitute(substitute(e, lets_), names_));
+  }
+
+  bool is_at(const KeptUpdate& update, const Substitution& around) const {
+    return std::ranges::equal(
+        provide_->args, update.point, [&](const Expr& own, const Expr& other) {
+          return equal(renamed(own), without_likely(substitute(other, around)));
+        });
+  }
+
+  bool has_conditions_of(const KeptUpdate& update, const Substitution& around) const {
+    const auto own = mapped(conditions_, [&](const Expr& e) { return renamed(e); });
+    const auto others = mapped(
+        update.conditions, [&](const Expr& e) { return without_likely(substitute(e, around)); });
+    const auto are_among = [](const std::vector<Expr>& some, const std::vector<Expr>& all) {
+      return std::ranges::all_of(some, [&](const Expr& e) {
+        return std::ranges::any_of(all, [&](const Expr& other) { return equal(e, other); });
+      });
+    };
+    return are_among(own, others) && are_among(others, own);
+  }
+
+  const Provide* provide_ = nullptr;
+  std::vector<const For*> loops_;  // outermost first
+  std::vector<Expr> conditions_;
+  Substitution lets_, names_;  // names: of the update's lanes, by the loops here
+  std::map<const For*, const For*> of_lane_;
+};
+
 // The elements that an update adds to, as an array of its own.
 class Kept : public Rewriter {
  public:
@@ -213,13 +332,10 @@ class KeepAccumulators : public StatementRewriter {
  protected:
   Stmt rewrite(const Stmt& s) override {
     if (const auto* realize = s.as<Realize>()) return in_storage(*realize, s);
+    if (const auto* block = s.as<Block>()) return in_order(*block);
     const auto* loop = s.as<For>();
     if (!loop) return children(s);
-    if (loop->runs == ForType::Serial && !shares_) {
-      if (auto update = UpdateFinder(is_pure_).update_in(*loop);
-          update && !small_.contains(update->provide->name))
-        return kept(s, std::move(*update));
-    }
+    if (auto update = update_in(*loop)) return kept(s, std::move(*update), {});
     const bool outside = shares_;
     shares_ |= runs_at_once(loop->runs) && !is_pure_(*loop);
     Stmt result = children(s);
@@ -241,11 +357,47 @@ class KeepAccumulators : public StatementRewriter {
     return children(s);
   }
 
-  Stmt kept(const Stmt& loop, KeptUpdate update) {
+  std::optional<KeptUpdate> update_in(const For& loop) const {
+    if (loop.runs != ForType::Serial || shares_) return std::nullopt;
+    auto update = UpdateFinder(is_pure_).update_in(loop);
+    return update && !small_.contains(update->provide->name) ? std::move(update) : std::nullopt;
+  }
+
+  Stmt in_order(const Block& block) {
+    std::vector<Stmt> result;
+    for (size_t i = 0; i < block.stmts.size(); ++i) {
+      const bool has_next = i + 1 < block.stmts.size();
+      const Stmt both = has_next ? started(block.stmts[i], block.stmts[i + 1], {}) : Stmt();
+      result.push_back(both.defined() ? both : (*this)(block.stmts[i]));
+      i += both.defined() ? 1 : 0;
+    }
+    return make_block(result);
+  }
+
+  // The loop of an update, in lets, whose elements the nest before it starts; undefined: they are not.
+  Stmt started(const Stmt& nest, const Stmt& next, Substitution lets) {
+    if (const auto* let = next.as<LetStmt>()) {
+      lets[let->name] = substitute(let->value, lets);
+      const Stmt body = started(nest, let->body, std::move(lets));
+      return body.defined() ? make_let(let->name, let->value, body) : Stmt();
+    }
+    const auto* loop = next.as<For>();
+    auto update = loop && nest.as<For>() ? update_in(*loop) : std::nullopt;
+    const auto start = update ? Start::of(*update, lets, nest, is_pure_) : std::nullopt;
+    if (!start) return {};
+    return kept(next, std::move(*update), [&](const std::string& array, const KeptUpdate& of) {
+      return start->filling(nest, array, of);
+    });
+  }
+
+  using Filling = std::function<Stmt(const std::string& array, const KeptUpdate& update)>;
+  // `filling` gives the elements their first values; without one they are those of the Func.
+  Stmt kept(const Stmt& loop, KeptUpdate update, const Filling& filling) {
     const std::string name = fresh_(update.provide->name + ".kept");
+    const Stmt start = filling ? filling(name, update) : Stmt();
     Kept array(std::move(update), name);
-    return array.around(make_block({copy_statement(array.fetch(), fresh_), array(loop),
-                                    copy_statement(array.give_back(), fresh_)}));
+    return array.around(make_block({start.defined() ? start : copy_statement(array.fetch(), fresh_),
+                                    array(loop), copy_statement(array.give_back(), fresh_)}));
   }
 
   const std::function<bool(const For&)>& is_pure_;
