@@ -13,6 +13,7 @@
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/cut_reductions.h"
 #include "autoschedule/cut_scatters.h"
+#include "autoschedule/epilogues.h"
 #include "autoschedule/gpu_schedule.h"
 #include "autoschedule/inlined_reads.h"
 #include "autoschedule/join_sweeps.h"
@@ -140,6 +141,12 @@ class LoopChooser {
     if (pure_.size() == 1 && reduces) stage_.parallel(variable_of(0));  // of the vectors
   }
 
+  // Of one tile, in the loops of another Func over all of them.
+  void give_tile(const RegisterTile& tile) {
+    if (makes(Decision::ScatterStrategy)) unroll_taps(definition(), stage_);
+    cut(tile, {}, true);
+  }
+
   // Of a pure Func: rows, in memory too, along another dimension than the first.
   void give_along(size_t dimension) {
     std::vector<Var> order{variable_of(dimension)};
@@ -163,8 +170,13 @@ class LoopChooser {
   Var variable_of(size_t dimension) const { return Var(f_.args[dimension]); }
   Var inside(const Var& loop) const { return Var(inner_loop(f_, index_, loop.name())); }
 
+  // Private sums may be of fewer lanes.
+  int most_lanes() const {
+    return f_.made && f_.made->lanes > 0 ? std::min(lanes, f_.made->lanes) : lanes;
+  }
   // A register of narrow numbers holds more of them.
   int lanes_of_values() const {
+    if (most_lanes() < lanes) return most_lanes();
     return std::clamp(lanes * 32 / bits_of_values(definition().values), lanes, 4 * lanes);
   }
 
@@ -331,7 +343,7 @@ class LoopChooser {
       inner.push_back(part);
       outer.push_back(all);
     };
-    cut(0, tile.vectors * lanes);
+    cut(0, tile.vectors * most_lanes());
     for (const RegisterTile::Side& side : tile.sides) cut(side.dimension, side.size);
     std::vector<VarOrRVar> order = inner;
     for (size_t d : between) order.push_back(variable_of(d));
@@ -537,23 +549,30 @@ void cut_sums(const std::vector<FuncPtr>& outputs, std::vector<FuncPtr>& stored,
 // Funcs that have loops of this scheduler's, and what must be known to move them.
 struct Movable {
   const std::vector<FuncPtr>& outputs;
-  const std::vector<FuncPtr>& stored;
-  const std::vector<FuncPtr>& given;  // of these: loops, at root
+  std::vector<FuncPtr> stored;
+  std::vector<FuncPtr> given;  // of these: loops, at root
   const std::unordered_set<const Symbol*>& whole;
   const Readers& before;  // before loops were given
   const SizeEstimate& sizes;
 };
 
-// What is computed in the loops of others, and which loops are shared.
-void move_and_join(const Movable& funcs, const std::set<Decision>& without,
-                   const GiveLoopsOfRows& give_rows) {
-  const auto& [outputs, stored, given, whole, before, sizes] = funcs;
-  const Readers readers(outputs, stored);  // before anything is moved
-  if (!without.contains(Decision::Choices)) compute_beside_choices(readers, given, whole);
+// What is computed in the loops of others, and which loops are shared. What belongs to tiles of sums
+// moves first, and then no more.
+void move_and_join(Movable funcs, const std::set<Decision>& without,
+                   const GiveLoopsOfRows& give_rows, const GiveLoopsOfTile& give_tile) {
+  auto& [outputs, stored, given, whole, before, sizes] = funcs;
   const bool slices = !without.contains(Decision::Slices);
   const bool joins = !without.contains(Decision::JoinSweeps);
   std::unordered_set<const Symbol*> together = whole;  // what is to share loops does not move
   if (slices && joins) together.merge(sweeps_that_join(outputs, given, sizes));
+  if (slices) {
+    for (const FuncPtr& f : compute_epilogues(outputs, before, given, together, lanes, give_tile)) {
+      std::erase(stored, f);
+      std::erase(given, f);
+    }
+  }
+  const Readers readers(outputs, stored);
+  if (!without.contains(Decision::Choices)) compute_beside_choices(readers, given, whole);
   if (slices) compute_in_column_blocks(readers, stored, whole, sizes);
   if (slices) compute_in_tiles(outputs, readers, given, whole, sizes);
   // Of chains of stencils, before these are put into strips of their own.
@@ -649,7 +668,14 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
     graph::take_back_loops(*sum);
     give_loops(sum, request, sizes.with_extent(*sum, dimension, 1), started);
   };
-  move_and_join({outputs, stored, given, whole, before, sizes}, request.options.without, give_rows);
+  const auto give_tile = [&](const FuncPtr& sum, const RegisterTile& tile) {
+    std::erase(started, sum);
+    graph::take_back_loops(*sum);
+    for (int s = 0; s < sum->stage_count(); ++s)
+      LoopChooser(sum, s, request, sizes).give_tile(tile);
+  };
+  move_and_join({outputs, stored, given, whole, before, sizes}, request.options.without, give_rows,
+                give_tile);
   for (const FuncPtr& f : started) start_sums(f, request, sizes);
   tasks.limit(outputs, request);
   name_inlined(outputs, order);
