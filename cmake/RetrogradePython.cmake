@@ -15,3 +15,18 @@ if(RETROGRADE_PYTHON AND NOT pybind11_FOUND)
   message(FATAL_ERROR "RETROGRADE_PYTHON needs Python 3.9 with its headers and pybind11 2.10 or newer: "
     "python3-dev and pybind11-dev of Debian. Or set it to OFF.")
 endif()
+
+# What an interpreter must be told that loads the package from the build: a sanitized module needs its sanitizer to be
+# there before it. What Python itself keeps to the end are no leaks of ours.
+set(RETROGRADE_PYTHON_ENVIRONMENT "")
+if(RETROGRADE_SANITIZER MATCHES "^(address|thread)$")
+  string(SUBSTRING ${RETROGRADE_SANITIZER} 0 1 initial)
+  foreach(library lib${initial}san.so libstdc++.so)
+    execute_process(COMMAND ${CMAKE_CXX_COMPILER} -print-file-name=${library} OUTPUT_VARIABLE file
+      OUTPUT_STRIP_TRAILING_WHITESPACE)
+    list(APPEND preloaded ${file})
+  endforeach()
+  string(REPLACE ";" ":" preloaded "${preloaded}")
+  set(RETROGRADE_PYTHON_ENVIRONMENT LD_PRELOAD=${preloaded} ASAN_OPTIONS=detect_leaks=0
+    TSAN_OPTIONS=ignore_noninstrumented_modules=1)
+endif()

@@ -4,6 +4,7 @@
 #include "codegen/function_generator.h"
 #include "codegen/kernels.h"
 #include "diagnostics/error.h"
+#include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
