@@ -364,8 +364,8 @@ TEST_F(DefaultSchedule, ReductionsKeepATileOfTheirSumsInRegisters) {
   ASSERT_GE(loops.size(), 5u);
   EXPECT_EQ(loops[0].runs, ForType::Vectorized);
   EXPECT_EQ(loops[1].runs, ForType::Unrolled);
-  const bool has_vectors = loops[2].runs == ForType::Unrolled;  // of a row, each for itself
-  EXPECT_TRUE(loops[has_vectors ? 3 : 2].is_reduction);
+  EXPECT_EQ(loops[2].runs, ForType::Unrolled);
+  EXPECT_TRUE(loops[3].is_reduction);
   EXPECT_EQ(loops.back().runs, ForType::Parallel);
 }
 
