@@ -70,7 +70,7 @@ AtomicScatters::AtomicScatters(const std::vector<FuncPtr>& outputs,
                                const std::unordered_set<const Symbol*>& but,
                                const ScheduleRequest& request, const SizeEstimate& sizes)
     : is_on_(!request.options.deterministic && threads_of(request) != 1 &&
-             !request.options.without.contains(Decision::ScatterStrategy)),
+             request.makes(Decision::ScatterStrategy)),
       sizes_(sizes) {
   if (!is_on_ || !request.atomic_parts) return;
   const Readers readers(outputs, stored);

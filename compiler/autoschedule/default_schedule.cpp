@@ -1,8 +1,6 @@
 #include "autoschedule/default_schedule.h"
 
 #include <algorithm>
-#include <cmath>
-#include <functional>
 #include <optional>
 #include <unordered_set>
 
@@ -10,24 +8,18 @@
 #include "autoschedule/choices.h"
 #include "autoschedule/chosen_places.h"
 #include "autoschedule/column_blocks.h"
-#include "autoschedule/cost_estimate.h"
 #include "autoschedule/cut_reductions.h"
 #include "autoschedule/cut_scatters.h"
 #include "autoschedule/epilogues.h"
 #include "autoschedule/gpu_schedule.h"
-#include "autoschedule/inlined_reads.h"
 #include "autoschedule/join_sweeps.h"
 #include "autoschedule/lane_dimension.h"
-#include "autoschedule/look_ups.h"
-#include "autoschedule/loop_order.h"
 #include "autoschedule/memory_budget.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/only_reader.h"
-#include "autoschedule/packed_operand.h"
 #include "autoschedule/placement_limits.h"
-#include "autoschedule/reduction_chunks.h"
 #include "autoschedule/reduction_slices.h"
-#include "autoschedule/row_copies.h"
+#include "autoschedule/root_loops.h"
 #include "autoschedule/row_order.h"
 #include "autoschedule/row_sweeps.h"
 #include "autoschedule/scatter_schedule.h"
@@ -41,466 +33,29 @@
 #include "autoschedule/tile_chains.h"
 #include "diagnostics/large_stack.h"
 #include "frontend/language/func.h"
-#include "frontend/language/rdom.h"
-#include "frontend/schedule/stage.h"
 #include "graph/copy_graph.h"
 #include "graph/give_directive.h"
 #include "graph/own_reads.h"
 #include "graph/wrappers.h"
-#include "ir/build.h"
-#include "ir/memory_reads.h"
-#include "ir/visit.h"
 
 namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int lanes = 16;
-constexpr int scan_vectors = 8;      // of a row, in a block of columns
-constexpr int64_t small_shift = 16;  // values of a dimension, such as the taps of a filter
-
-// The dimension along which what is read lies next to each other in memory.
-size_t innermost_dimension(const Call& call) {
-  const FuncPtr callee = call.call_type == CallType::Func ? func_of(call) : nullptr;
-  if (!callee || callee->schedule.storage_dims.empty()) return 0;
-  const auto& args = callee->args;
-  const auto found = std::find(args.begin(), args.end(), callee->schedule.storage_dims[0]);
-  return static_cast<size_t>(found - args.begin()) % args.size();
-}
-
-// A dimension beyond the first that runs along the rows of what a pure stage reads, through what is
-// computed inline too, while the first one runs across them.
-std::optional<size_t> transposed_dimension(const FuncContents& f, const Definition& stage) {
-  std::optional<size_t> result;
-  if (!stage.rvars.empty() || f.args.size() < 2) return result;
-  for (const Expr& root : roots_with_inlined(stage)) {
-    walk(root, [&](const Expr& e) {
-      const auto* call = e.as<Call>();
-      if (!call || call->call_type == CallType::Operator || call->args.size() < 2) return true;
-      const Expr& row = call->args[innermost_dimension(*call)];
-      const bool across = !uses_variable(row, f.args[0]) &&
-                          std::any_of(call->args.begin(), call->args.end(), [&](const Expr& arg) {
-                            return uses_variable(arg, f.args[0]);
-                          });
-      for (size_t d = 1; across && d < f.args.size(); ++d) {
-        if (is_pure_position(f, stage, d) && uses_variable(row, f.args[d])) result = d;
-      }
-      return true;
-    });
-  }
-  return result;
-}
-
-// The blocks that a stage adds up, where they are computed for it alone.
-FuncPtr block_of(const Definition& stage) {
-  FuncPtr result;
-  for_each_expr(stage, [&](const Expr& root) {
-    walk(root, [&](const Expr& e) {
-      const auto* call = e.as<Call>();
-      const FuncPtr callee = call && call->call_type == CallType::Func ? func_of(*call) : nullptr;
-      const bool is_block = callee && callee->made && callee->made->blocks > 0;
-      if (is_block && !is_touched(*callee)) result = callee;
-      return true;
-    });
-  });
-  return result;
-}
-
-// The directives of one stage of a Func that is computed at root. Pure dimensions only: their
-// iterations are independent whatever the stage does.
-class LoopChooser {
- public:
-  LoopChooser(const FuncPtr& f, int stage, const ScheduleRequest& request,
-              const SizeEstimate& sizes)
-      : function_(f), f_(*f), index_(stage), stage_(f, stage), request_(request), sizes_(sizes) {
-    for (size_t d = 0; d < f_.args.size(); ++d) {
-      if (is_pure_position(f_, definition(), d)) pure_.push_back(d);
-    }
-  }
-
-  void give() {
-    const bool may_scatter = makes(Decision::ScatterStrategy);
-    const bool scatters = may_scatter && scatters_in_order(f_, definition());
-    if (scatters)
-      schedule_scatter_in_order(f_, index_, stage_);
-    else if (may_scatter)
-      unroll_taps(definition(), stage_);
-    if (const FuncPtr block = block_of(definition())) return give_blocks(block);
-    if (pure_.empty()) return;
-    const bool stages = makes(Decision::LayoutStaging);
-    if (auto d = stages && pure_[0] == 0 ? transposed_dimension(f_, definition()) : std::nullopt)
-      return tile(*d);
-    if (stages && !scatters && schedule_look_ups(f_, index_, stage_, lanes_of_values(), sizes_))
-      return;
-    if (!scatters && pure_[0] == 0 && tile_in_registers()) return;
-    if (pure_[0] == 0 && scans_rows()) return cut_scan();
-    make_tasks();
-    if (pure_[0] != 0) return;
-    vectorize(stage_, variable_of(0), lanes_of_values(), TailStrategy::GuardWithIf);
-    const bool reduces = !definition().rvars.empty();
-    if (pure_.size() == 1 && reduces) stage_.parallel(variable_of(0));  // of the vectors
-  }
-
-  // Of one tile, in the loops of another Func over all of them.
-  void give_tile(const RegisterTile& tile) {
-    if (makes(Decision::ScatterStrategy)) unroll_taps(definition(), stage_);
-    cut(tile, {}, true);
-  }
-
-  // Of a pure Func: rows, in memory too, along another dimension than the first.
-  void give_along(size_t dimension) {
-    std::vector<Var> order{variable_of(dimension)};
-    for (size_t d = 0; d < f_.args.size(); ++d) {
-      if (d != dimension) order.push_back(variable_of(d));
-    }
-    Func(function_).reorder_storage(order);
-    stage_.reorder(std::vector<VarOrRVar>(order.begin(), order.end()));
-    int64_t tasks = 1;
-    for (size_t d = f_.args.size(); d-- > 0 && tasks < sizes_.machine().enough_tasks;) {
-      if (d == dimension) continue;
-      stage_.parallel(variable_of(d));
-      tasks *= sizes_.extent(f_, d).value_or(sizes_.machine().enough_tasks);
-    }
-    vectorize(stage_, order[0], lanes_of_values(), TailStrategy::GuardWithIf);
-  }
-
- private:
-  bool makes(Decision decision) const { return !request_.options.without.contains(decision); }
-  const Definition& definition() const { return f_.stage(index_); }
-  Var variable_of(size_t dimension) const { return Var(f_.args[dimension]); }
-  Var inside(const Var& loop) const { return Var(inner_loop(f_, index_, loop.name())); }
-
-  // Private sums may be of fewer lanes.
-  int most_lanes() const {
-    return f_.made && f_.made->lanes > 0 ? std::min(lanes, f_.made->lanes) : lanes;
-  }
-  // A register of narrow numbers holds more of them.
-  int lanes_of_values() const {
-    if (most_lanes() < lanes) return most_lanes();
-    return std::clamp(lanes * 32 / bits_of_values(definition().values), lanes, 4 * lanes);
-  }
-
-  // The outermost loop, and those inside of it while their iterations are few; not that of the
-  // vectors. How many private parts there are may be known at run time only: few, where the target
-  // is large.
-  void make_tasks() {
-    const int64_t unknown = f_.made && f_.made->has_parts ? 1 : sizes_.machine().enough_tasks;
-    int64_t tasks = 1;
-    for (size_t i = pure_.size();
-         i-- > 0 && tasks < sizes_.machine().enough_tasks && pure_[i] != 0;) {
-      stage_.parallel(variable_of(pure_[i]));
-      tasks *= sizes_.extent(f_, pure_[i]).value_or(unknown);
-    }
-  }
-
-  // Whether an update takes elements of other rows that it has made before.
-  bool scans_rows() const {
-    const Definition& update = definition();
-    if (index_ == 0 || !read_elsewhere(f_, update).defined()) return false;
-    const auto moves_row = [&](const ReductionVariable& r) {
-      return std::any_of(update.args.begin() + 1, update.args.end(),
-                         [&](const Expr& arg) { return uses_variable(arg, r.var); });
-    };
-    return !update.rvars.empty() &&
-           std::all_of(update.rvars.begin(), update.rvars.end(), moves_row);
-  }
-
-  // Row after row, in blocks of columns that are the tasks: a row of one is a few lines of a cache.
-  void cut_scan() {
-    const Var x = variable_of(0), vectors = inside(x);
-    const Var lane(new_loop(f_, index_, "lane"));
-    stage_.split(x, x, vectors, scan_vectors * lanes, TailStrategy::GuardWithIf);
-    stage_.split(vectors, vectors, lane, lanes, TailStrategy::GuardWithIf).vectorize(lane);
-    std::vector<VarOrRVar> order{lane, vectors};
-    for (const ReductionVariable& r : definition().rvars) order.push_back(RVar(r.var));
-    order.push_back(x);
-    for (size_t d : pure_) {
-      if (d != 0) order.push_back(variable_of(d));
-    }
-    stage_.reorder(order).parallel(x);
-    make_tasks();
-  }
-
-  // Whether there is a tile.
-  bool tile_in_registers() {
-    const auto tile = tile_of(f_, definition());
-    if (!tile) return false;
-    const auto packed = makes(Decision::LayoutStaging)
-                            ? packed_operand(f_, definition(), *tile, lanes, sizes_)
-                            : std::nullopt;
-    const auto rows = packed ? std::nullopt : copied_rows(*tile);
-    std::vector<VarOrRVar> loops = cut(*tile, {}, packed || rows);
-    if (packed) loops = pack_inside(*packed, loops);
-    if (rows) copy_rows_inside(*rows, loops);
-    run_in_parallel(loops, *tile);
-    return true;
-  }
-
-  // Of the loops over tiles, those that do not move the operand come first. The result: the others,
-  // around the blocks of the reduction, where one copy is of a block.
-  std::vector<VarOrRVar> pack_inside(const PackedOperand& operand,
-                                     const std::vector<VarOrRVar>& loops) {
-    const auto moves = [&](const VarOrRVar& loop) {
-      const auto arg = std::find(f_.args.begin(), f_.args.end(), loop.name());
-      return bool(operand.depends_on[static_cast<size_t>(arg - f_.args.begin())]);
-    };
-    std::vector<VarOrRVar> order = loops;
-    const auto first = std::stable_partition(order.begin(), order.end(), std::not_fn(moves));
-    const std::vector<VarOrRVar> outside(first, order.end());
-    if (operand.rows) return pack_rows(operand, std::move(order), outside);
-    VarOrRVar level = outside[0];
-    if (operand.block) {
-      const RVar iteration(operand.block->loop), blocks(new_loop(f_, index_, "blocks"));
-      stage_.split(iteration, blocks, iteration, static_cast<int>(operand.block->iterations));
-      level = *order.insert(first, blocks);
-    }
-    stage_.reorder(order);
-    pack(function_, operand, retrograde::LoopLevel(Func(function_), level), lanes);
-    return outside;
-  }
-
-  // One copy for several rows of tiles: their loop stands inside of those that move the operand.
-  std::vector<VarOrRVar> pack_rows(const PackedOperand& operand, std::vector<VarOrRVar> order,
-                                   const std::vector<VarOrRVar>& outside) {
-    const Var rows = variable_of(operand.rows->dimension), row = inside(rows);
-    stage_.split(rows, rows, row, static_cast<int>(operand.rows->count), TailStrategy::GuardWithIf);
-    order.insert(order.end() - static_cast<long>(outside.size()), row);
-    stage_.reorder(order);
-    pack(function_, operand, retrograde::LoopLevel(Func(function_), outside[0]), lanes);
-    return outside;
-  }
-
-  std::optional<RowCopy> copied_rows(const RegisterTile& tile) const {
-    // Sums of the scheduler's own are few.
-    const bool is_own = f_.made && (f_.made->lanes > 0 || f_.made->has_parts);
-    if (is_own || !makes(Decision::LayoutStaging)) return std::nullopt;
-    std::vector<size_t> order{0};  // of the loops that cut() makes
-    for (const RegisterTile::Side& side : tile.sides) order.push_back(side.dimension);
-    for (const size_t d : pure_) {
-      if (std::find(order.begin(), order.end(), d) == order.end()) order.push_back(d);
-    }
-    const auto copy = row_copy(f_, tile, lanes, {order, {}}, sizes_);
-    return copy && !is_to_be_inlined(*copy->source) ? copy : std::nullopt;
-  }
-  bool is_to_be_inlined(const FuncContents& f) const {
-    const auto& inlined = request_.options.inlined;
-    return request_.recomputed.contains(f.name) ||
-           std::find(inlined.begin(), inlined.end(), FuncName(f.name)) != inlined.end();
-  }
-
-  // Several rows of tiles for one copy stand inside of its loop.
-  void copy_rows_inside(const RowCopy& copy, const std::vector<VarOrRVar>& loops) {
-    const Var rows = variable_of(copy.dimension);
-    if (copy.rows > 1) {
-      const Var row = inside(rows);
-      stage_.split(rows, rows, row, static_cast<int>(copy.rows), TailStrategy::GuardWithIf);
-      std::vector<VarOrRVar> order;
-      for (const VarOrRVar& loop : loops) {
-        if (loop.name() == rows.name()) order.push_back(row);
-        order.push_back(loop);
-      }
-      stage_.reorder(order);
-    }
-    copy_rows(function_, copy, retrograde::LoopLevel(Func(function_), rows), lanes);
-  }
-
-  // The outermost of them, and where that may be short the next one too: a loop in parallel inside of
-  // another is launched for each of its iterations.
-  void run_in_parallel(const std::vector<VarOrRVar>& loops, const RegisterTile& tile) {
-    stage_.parallel(loops.back());
-    if (loops.size() > 2 && iterations_of(loops.back(), tile) < sizes_.machine().enough_tasks)
-      stage_.parallel(loops[loops.size() - 2]);
-  }
-
-  // Of a loop over tiles; 0: not known.
-  int64_t iterations_of(const VarOrRVar& loop, const RegisterTile& tile) const {
-    const auto arg = std::find(f_.args.begin(), f_.args.end(), loop.name());
-    if (arg == f_.args.end()) return 0;
-    const auto dimension = static_cast<size_t>(arg - f_.args.begin());
-    const int64_t size = tile.size_along(dimension, lanes);
-    return (sizes_.extent(f_, dimension).value_or(0) + size - 1) / size;
-  }
-
-  std::optional<RegisterTile> tile_of(const FuncContents& f, const Definition& reduction) const {
-    if (!makes(Decision::RegisterTiles)) return std::nullopt;
-    const bool has_lanes = f.made && f.made->lanes > 0;
-    VectorUnit unit = request_.unit;
-    unit.accumulator_bytes =
-        static_cast<int64_t>(std::ldexp(unit.accumulator_bytes, request_.scales.register_tile));
-    return register_tile(f, reduction, lanes, has_lanes ? 1 : 4, unit, sizes_);
-  }
-
-  // Its loops stand inside of those of the reduction; those over tiles outside, of the sides first,
-  // so that what the last dimensions run over stays in the cache; `between` just inside of those of
-  // the reduction. The result: those outside.
-  // `is_whole`: vectors of one row are one loop, of which bounds know where its guard ends it.
-  std::vector<VarOrRVar> cut(const RegisterTile& tile, const std::vector<size_t>& between = {},
-                             bool is_whole = false) {
-    std::vector<VarOrRVar> inner, outer;
-    const auto cut = [&](size_t d, int64_t size) {
-      const Var all = variable_of(d), part = inside(all);
-      stage_.split(all, all, part, Expr(static_cast<int>(size)), TailStrategy::GuardWithIf);
-      inner.push_back(part);
-      outer.push_back(all);
-    };
-    cut(0, tile.vectors * most_lanes());
-    for (const RegisterTile::Side& side : tile.sides) cut(side.dimension, side.size);
-    std::vector<VarOrRVar> order = inner;
-    for (size_t d : between) order.push_back(variable_of(d));
-    for (const ReductionVariable& r : reduction_loops(f_, definition()))
-      order.push_back(RVar(r.var));
-    for (size_t d : pure_) {
-      const Var all = variable_of(d);
-      const auto is_it = [&](const VarOrRVar& loop) { return loop.name() == all.name(); };
-      if (std::none_of(outer.begin(), outer.end(), is_it) &&
-          std::none_of(order.begin(), order.end(), is_it))
-        outer.push_back(all);
-    }
-    order.insert(order.end(), outer.begin(), outer.end());
-    stage_.reorder(order);
-    if (tile.vectors > 1 && !is_whole) {
-      const Var vector(new_loop(f_, index_, "vector"));
-      stage_.split(inner[0], inner[0], vector, lanes).vectorize(vector).unroll(inner[0]);
-    } else {
-      stage_.vectorize(inner[0]);
-    }
-    for (size_t i = 1; i < inner.size(); ++i) stage_.unroll(inner[i]);
-    return outer;
-  }
-
-  // A tile of another Func by the same variables' dimensions of this one.
-  RegisterTile renumbered(RegisterTile tile, const FuncContents& other) const {
-    for (RegisterTile::Side& side : tile.sides) {
-      const auto found = std::find(f_.args.begin(), f_.args.end(), other.args[side.dimension]);
-      side.dimension = static_cast<size_t>(found - f_.args.begin());
-    }
-    return tile;
-  }
-
-  // Small dimensions along which a step moves what a block reads by a little only: all of one part
-  // of the reduction is done for each of them, while it is in the cache. The other tiles must be
-  // tasks enough.
-  std::vector<size_t> shifts_of(const FuncContents& block, const RegisterTile& tile) const {
-    std::vector<size_t> shifts;
-    int64_t tasks = 1;
-    for (size_t d : pure_) {
-      const int64_t size = tile.size_along(d, lanes);
-      const auto arg = std::find(block.args.begin(), block.args.end(), f_.args[d]);
-      const auto in_block = static_cast<size_t>(arg - block.args.begin());
-      const int64_t extent = sizes_.extent(f_, d).value_or(sizes_.machine().enough_tasks * size);
-      const bool is_shift = size == 1 && extent <= small_shift && sizes_.extent(f_, d) &&
-                            arg != block.args.end() &&
-                            shifts_reads(block, block.updates[0], in_block);
-      if (is_shift)
-        shifts.push_back(d);
-      else
-        tasks *= (extent + size - 1) / size;
-    }
-    return tasks >= sizes_.machine().enough_tasks ? shifts : std::vector<size_t>();
-  }
-
-  // The sums of a tile: a block of each after the other, in registers, is added to what memory
-  // holds.
-  void give_blocks(const FuncPtr& block) {
-    if (pure_.empty() || pure_[0] != 0) return compute_block(block, {});
-    const RegisterTile tile = tile_of(*block, block->updates[0]).value_or(RegisterTile());
-    const RegisterTile own = renumbered(tile, *block);
-    const std::vector<size_t> shifts = shifts_of(*block, own);
-    compute_block(block, shifts);
-    const std::vector<VarOrRVar> tiles = cut(own, shifts);
-    const auto chunk =
-        makes(Decision::LayoutStaging) ? cut_into_chunks(*block, tiles, own) : std::nullopt;
-    if (chunk) copy_rows_of_chunk(block, tile, tiles, shifts, *chunk);
-    run_in_parallel(tiles, own);
-    for (int s = 0; s < block->stage_count(); ++s)
-      LoopChooser(block, s, request_, sizes_).cut(tile);
-  }
-
-  // The loops over tiles stand inside of those over chunks of the reduction. The result: iterations of
-  // its first loop that a chunk has.
-  std::optional<int64_t> cut_into_chunks(const FuncContents& block,
-                                         const std::vector<VarOrRVar>& tiles,
-                                         const RegisterTile& tile) {
-    const std::vector<ReductionVariable> loops = reduction_loops(f_, definition());
-    const auto chunk = reduction_chunk(f_, block, loops[0], tile, lanes, sizes_);
-    if (!chunk) return std::nullopt;
-    const RVar iteration(loops[0].var), chunks(new_loop(f_, index_, "chunks"));
-    stage_.split(iteration, chunks, iteration, static_cast<int>(*chunk));
-    std::vector<VarOrRVar> order{iteration};
-    order.insert(order.end(), tiles.begin(), tiles.end());
-    order.push_back(chunks);
-    for (size_t i = 1; i < loops.size(); ++i) order.push_back(RVar(loops[i].var));
-    stage_.reorder(order);
-    return chunk;
-  }
-
-  // What all blocks of a chunk read through a boundary condition, say; the tile is the block's.
-  void copy_rows_of_chunk(const FuncPtr& block, const RegisterTile& tile,
-                          const std::vector<VarOrRVar>& tiles, const std::vector<size_t>& shifts,
-                          int64_t chunk) {
-    const auto in_block = [&](const std::string& name) {
-      const auto arg = std::find(block->args.begin(), block->args.end(), name);
-      return static_cast<size_t>(arg - block->args.begin());
-    };
-    LoopsOfTiles loops;
-    for (const VarOrRVar& loop : tiles) loops.tiles.push_back(in_block(loop.name()));
-    for (const size_t d : shifts) loops.inside.push_back(in_block(f_.args[d]));
-    const auto number = number_along(f_, *block, reduction_loops(f_, definition())[0].var);
-    if (!number || std::ranges::count(loops.tiles, block->args.size()) > 0) return;
-    loops.inside.push_back(*number);
-    const auto copy =
-        row_copy(*block, tile, lanes, loops, sizes_.with_extent(*block, *number, chunk));
-    if (!copy || is_to_be_inlined(*copy->source)) return;
-    const Var rows(block->args[copy->dimension]);
-    copy_rows(block, *copy, retrograde::LoopLevel(Func(function_), rows), lanes);
-  }
-
-  // For each iteration of the innermost loop outside of the tile.
-  void compute_block(const FuncPtr& block, const std::vector<size_t>& shifts) {
-    if (shifts.empty()) {
-      const RVar each(reduction_loops(f_, definition())[0].var);
-      Func(block).compute_at(Func(function_), each);
-    } else {
-      Func(block).compute_at(Func(function_), variable_of(shifts[0]));
-    }
-  }
-
-  // Squares, whose rows stay in the cache until their columns are read, one row of them after the
-  // other.
-  void tile(size_t dimension) {
-    const Var x = variable_of(0), y = variable_of(dimension), xi = inside(x);
-    stage_.split(x, x, xi, lanes, TailStrategy::GuardWithIf);
-    const Var yi = inside(y);
-    stage_.split(y, y, yi, lanes, TailStrategy::GuardWithIf);
-    std::vector<VarOrRVar> order{xi, yi};
-    for (const size_t d : pure_) order.push_back(variable_of(d));
-    stage_.reorder(order).vectorize(xi);
-    stage_.parallel(variable_of(pure_.back()));
-  }
-
-  const FuncPtr function_;
-  const FuncContents& f_;
-  const int index_;
-  Stage stage_;
-  const ScheduleRequest& request_;
-  const SizeEstimate& sizes_;
-  std::vector<size_t> pure_;  // dimensions
-};
-
 // The updates before what they start from: a sum that gets tiles starts in them (`started`), when it
 // is known which loops they end up in.
 void give_loops(const FuncPtr& f, const ScheduleRequest& request, const SizeEstimate& sizes,
                 std::vector<FuncPtr>& started) {
-  for (int s = 1; s < f->stage_count(); ++s) LoopChooser(f, s, request, sizes).give();
-  if (!request.options.without.contains(Decision::RegisterTiles) && has_tiles(*f))
+  for (int s = 1; s < f->stage_count(); ++s) give_root_loops(f, s, request, sizes);
+  if (request.makes(Decision::RegisterTiles) && has_tiles(*f))
     started.push_back(f);
   else
-    LoopChooser(f, 0, request, sizes).give();
+    give_root_loops(f, 0, request, sizes);
 }
 
 void start_sums(const FuncPtr& f, const ScheduleRequest& request, const SizeEstimate& sizes) {
   if (has_tiles(*f)) return start_in_tiles(f, lanes);
-  LoopChooser(f, 0, request, sizes).give();
+  give_root_loops(f, 0, request, sizes);
   if (!is_at_root(*f)) run_serially(f);
 }
 
@@ -508,7 +63,7 @@ void start_sums(const FuncPtr& f, const ScheduleRequest& request, const SizeEsti
 void compute_at_root(const std::vector<FuncPtr>& funcs, const ScheduleRequest& request) {
   for (const FuncPtr& f : funcs) {
     Func(f).compute_root();
-    LoopChooser(f, 0, request, SizeEstimate()).give();
+    give_root_loops(f, 0, request, SizeEstimate());
   }
 }
 
@@ -537,13 +92,13 @@ std::vector<FuncPtr> pure_primal(std::vector<FuncPtr> funcs) {
 // Sums to a few elements. What has its loops after that is no longer among the stored.
 void cut_sums(const std::vector<FuncPtr>& outputs, std::vector<FuncPtr>& stored,
               const std::unordered_set<const Symbol*>& whole, const ChosenPlaces& chosen,
-              const SizeEstimate& sizes, const std::set<Decision>& without) {
-  if (without.contains(Decision::CutReductions)) return;
+              const ScheduleRequest& request, const SizeEstimate& sizes) {
+  if (!request.makes(Decision::CutReductions)) return;
   std::unordered_set<const Symbol*> kept = whole;  // at root
   kept.insert(chosen.store.begin(), chosen.store.end());
-  if (!without.contains(Decision::JoinSweeps)) sweep_rows(outputs, stored, kept, sizes);
+  if (request.makes(Decision::JoinSweeps)) sweep_rows(outputs, stored, kept, sizes);
   cut_reductions(outputs, sizes, whole);
-  if (!without.contains(Decision::ScatterStrategy)) cut_scatters(outputs, sizes, whole);
+  if (request.makes(Decision::ScatterStrategy)) cut_scatters(outputs, sizes, whole);
 }
 
 // Funcs that have loops of this scheduler's, and what must be known to move them.
@@ -558,11 +113,11 @@ struct Movable {
 
 // What is computed in the loops of others, and which loops are shared. What belongs to tiles of sums
 // moves first, and then no more.
-void move_and_join(Movable funcs, const std::set<Decision>& without,
-                   const GiveLoopsOfRows& give_rows, const GiveLoopsOfTile& give_tile) {
+void move_and_join(Movable funcs, const ScheduleRequest& request, const GiveLoopsOfRows& give_rows,
+                   const GiveLoopsOfTile& give_tile) {
   auto& [outputs, stored, given, whole, before, sizes] = funcs;
-  const bool slices = !without.contains(Decision::Slices);
-  const bool joins = !without.contains(Decision::JoinSweeps);
+  const bool slices = request.makes(Decision::Slices);
+  const bool joins = request.makes(Decision::JoinSweeps);
   std::unordered_set<const Symbol*> together = whole;  // what is to share loops does not move
   if (slices && joins) together.merge(sweeps_that_join(outputs, given, sizes));
   if (slices) {
@@ -572,17 +127,16 @@ void move_and_join(Movable funcs, const std::set<Decision>& without,
     }
   }
   const Readers readers(outputs, stored);
-  if (!without.contains(Decision::Choices)) compute_beside_choices(readers, given, whole);
+  if (request.makes(Decision::Choices)) compute_beside_choices(readers, given, whole);
   if (slices) compute_in_column_blocks(readers, stored, whole, sizes);
   if (slices) compute_in_tiles(outputs, readers, given, whole, sizes);
   // Of chains of stencils, before these are put into strips of their own.
   if (slices) compute_in_reductions(outputs, readers, pure_primal(stored), whole, sizes);
-  if (!without.contains(Decision::Strips))
-    compute_in_strips(outputs, given, whole, sizes, give_rows);
+  if (request.makes(Decision::Strips)) compute_in_strips(outputs, given, whole, sizes, give_rows);
   if (slices) compute_sums_in_blocks(outputs, before, given, together, sizes);
   if (slices) compute_in_slices(readers, stored, whole, sizes);
   if (slices) compute_in_reductions(outputs, readers, stored, whole, sizes);
-  if (!without.contains(Decision::LayoutStaging)) run_along_rows(given, sizes);
+  if (request.makes(Decision::LayoutStaging)) run_along_rows(given, sizes);
   if (joins) join_sweeps(outputs, given, sizes);
 }
 
@@ -601,7 +155,7 @@ SizeEstimate give_gpu_schedule(const std::vector<FuncPtr>& outputs,
                                const ScheduleRequest& request) {
   GpuSchedule schedule = schedule_on_gpu(outputs, stored, limits.levels, request);
   for (const HostStage& left : schedule.on_host)
-    LoopChooser(left.func, left.stage, request, schedule.sizes).give();
+    give_root_loops(left.func, left.stage, request, schedule.sizes);
   return schedule.sizes;
 }
 
@@ -620,9 +174,8 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   std::unordered_set<const Symbol*> whole = limits.stay;
   whole.insert(limits.levels.begin(), limits.levels.end());
   // Before sums are cut: what that schedules would pass for the user's.
-  const auto makes = [&](Decision d) { return !request.options.without.contains(d); };
   const FixedDimensions fixed(outputs);
-  const bool may_choose = makes(Decision::Choices);
+  const bool may_choose = request.makes(Decision::Choices);
   std::vector<FuncPtr> stored =
       what == Scheduling::Everything
           ? stored_in_all(outputs, limits, chosen, may_choose ? &fixed : nullptr)
@@ -635,12 +188,14 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
     return sizes;
   }
   SizeEstimate sizes(outputs, limits_of(request));
-  cut_sums(outputs, stored, whole, chosen, sizes, request.options.without);
-  const bool slices_scatters = makes(Decision::ScatterStrategy) && makes(Decision::Slices);
+  cut_sums(outputs, stored, whole, chosen, request, sizes);
+  const bool slices_scatters =
+      request.makes(Decision::ScatterStrategy) && request.makes(Decision::Slices);
   const SlicedScatters slices(outputs, slices_scatters ? stored : std::vector<FuncPtr>(), whole,
                               sizes);
   const LaneDimensions along(
-      outputs, makes(Decision::LayoutStaging) ? stored : std::vector<FuncPtr>(), lanes, sizes);
+      outputs, request.makes(Decision::LayoutStaging) ? stored : std::vector<FuncPtr>(), lanes,
+      sizes);
   const AtomicScatters atomic(outputs, stored, whole, request, sizes);
   const Readers before(outputs, stored);
   std::vector<FuncPtr> given;    // loops, at root
@@ -649,12 +204,12 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
     if (is_touched(*f)) continue;
     Func(f).compute_root();
     if (f->is_extern() || limits.levels.contains(f.get()) || atomic.schedule(f)) continue;
-    if (makes(Decision::ScatterStrategy) && schedule_scatter(f, slices, sizes)) {
+    if (request.makes(Decision::ScatterStrategy) && schedule_scatter(f, slices, sizes)) {
       if (atomic.is_part(*f)) run_serially(f);
       continue;
     }
     if (const size_t d = along.of(*f); d > 0)
-      LoopChooser(f, 0, request, sizes).give_along(d);
+      give_loops_along(f, d, request, sizes);
     else
       give_loops(f, request, sizes, started);
     if (atomic.is_part(*f))
@@ -671,11 +226,9 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   const auto give_tile = [&](const FuncPtr& sum, const RegisterTile& tile) {
     std::erase(started, sum);
     graph::take_back_loops(*sum);
-    for (int s = 0; s < sum->stage_count(); ++s)
-      LoopChooser(sum, s, request, sizes).give_tile(tile);
+    for (int s = 0; s < sum->stage_count(); ++s) give_loops_of_tile(sum, s, tile, request, sizes);
   };
-  move_and_join({outputs, stored, given, whole, before, sizes}, request.options.without, give_rows,
-                give_tile);
+  move_and_join({outputs, stored, given, whole, before, sizes}, request, give_rows, give_tile);
   for (const FuncPtr& f : started) start_sums(f, request, sizes);
   tasks.limit(outputs, request);
   name_inlined(outputs, order);

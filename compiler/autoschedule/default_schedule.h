@@ -10,44 +10,17 @@
 // reduction_slices.h).
 #pragma once
 
-#include <set>
-#include <string>
+#include <cstdint>
 #include <vector>
 
-#include "autoschedule/register_tile.h"
-#include "frontend/schedule/autoschedule_options.h"
-#include "frontend/schedule/autoscheduler.h"
+#include "autoschedule/schedule_request.h"
+#include "autoschedule/size_estimate.h"
 #include "graph/function.h"
 
 namespace retrograde::autoschedule {
 
 // Of which Funcs of a graph: adjoints and what is computed with them, or all.
 enum class Scheduling : uint8_t { Gradients, Everything };
-
-// What the rules choose by a number of theirs: how often a search doubles it; -1: half of it.
-struct ScheduleScales {
-  int register_tile = 0;  // bytes of sums in registers
-  int tasks = 0;          // that make enough of them
-  int strip_rows = 0;
-  int caches = 0;  // bytes that stay in them
-  friend bool operator==(const ScheduleScales&, const ScheduleScales&) = default;
-};
-
-// What a schedule is made for, and what its user said of it.
-struct ScheduleRequest {
-  VectorUnit unit = {};
-  AutoscheduleOptions options = {};
-  MachineParams machine = {};
-  // What a search or a budget (memory_budget.h) wants computed where it is read, and what stored,
-  // where that can be.
-  std::set<std::string> recomputed = {}, stored = {};
-  ScheduleScales scales = {};
-  // Private parts one for each thread, added up by atomic updates (atomic_scatters.h): what a budget
-  // wants of a schedule whose bits may differ.
-  bool atomic_parts = false;
-  // All of a pipeline is scheduled for a device: its stages are kernels (gpu_schedule.h).
-  bool on_gpu = false;
-};
 
 // Gives the directives to the Funcs of this graph, whose wrappers have been applied. The result: how
 // large these Funcs are; of those that the schedule makes, which are small, nothing is known.

@@ -201,7 +201,7 @@ std::vector<FuncPtr> cut_sums_for_device(const std::vector<FuncPtr>& funcs,
       const std::vector<StageLoop> loops = loops_of_stage(*f, s, sizes);
       const bool scatters = iterations_may_meet(*f, s, loops);
       const Decision decision = scatters ? Decision::ScatterStrategy : Decision::CutReductions;
-      if (request.options.without.contains(decision)) continue;
+      if (!request.makes(decision)) continue;
       if (scatters && may_be_atomic(*f, s, request)) continue;
       const SumCutter cutter(f, s, loops, sizes);
       if (const int64_t parts = cutter.parts(); parts > 0) {
@@ -224,8 +224,7 @@ bool iterations_may_meet(const FuncContents& f, int stage, const std::vector<Sta
 
 // Sums, products, extremes and bits of integers are the same in any order.
 bool may_be_atomic(const FuncContents& f, int stage, const ScheduleRequest& request) {
-  if (request.options.without.contains(Decision::ScatterStrategy) || f.types.size() != 1)
-    return false;
+  if (!request.makes(Decision::ScatterStrategy) || f.types.size() != 1) return false;
   const Type type = f.types[0];
   const bool keeps_bits = type.is_int() || type.is_uint();
   const bool has_operation = type.is_scalar() && (type.bits() == 32 || type.bits() == 64);

@@ -49,7 +49,7 @@ TaskSizes::TaskSizes(const std::vector<FuncPtr>& order) {
 
 void TaskSizes::limit(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request) const {
   const bool is_one_thread = threads_of(request) == 1;
-  if (!is_one_thread && !request.options.without.contains(Decision::TaskSizes)) return;
+  if (!is_one_thread && request.makes(Decision::TaskSizes)) return;
   for (const FuncPtr& f : topological_order(outputs)) {
     if (touched_.contains(f.get()) || f->is_extern()) continue;
     for (int s = 0; s < f->stage_count(); ++s) keep_parallel(f, s, is_one_thread ? 0 : 1);

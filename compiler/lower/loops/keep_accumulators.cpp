@@ -39,233 +39,20 @@
 
 #include <algorithm>
 #include <functional>
-#include <map>
 #include <optional>
 #include <unordered_set>
 #include <vector>
 
 #include "ir/build.h"
-#include "ir/equal.h"
-#include "ir/markers.h"
 #include "ir/visit.h"
+#include "lower/loops/kept_start.h"
+#include "lower/loops/kept_update.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
 
 namespace retrograde::lower {
 
 namespace {
-
-constexpr int64_t register_file = 2048;  // bytes: 32 registers of 64
-
-bool is_lane_loop(const For& loop) {
-  return loop.runs == ForType::Vectorized || loop.runs == ForType::Unrolled;
-}
-
-// The way from a serial loop to the one Provide in it.
-struct KeptUpdate {
-  std::vector<const For*> lanes;  // outermost first
-  std::vector<Expr> conditions;   // that are the same for all iterations; lets are substituted
-  const Provide* provide = nullptr;
-  std::vector<Expr> point;  // of the Provide; lets are substituted
-
-  // The value of a Func at the point.
-  const Call* as_own(const Expr& e) const {
-    const auto* call = e.as<Call>();
-    return call && call->call_type == CallType::Func && call->name == provide->name ? call
-                                                                                    : nullptr;
-  }
-};
-
-class UpdateFinder {
- public:
-  explicit UpdateFinder(const std::function<bool(const For&)>& is_pure) : is_pure_(is_pure) {}
-
-  std::optional<KeptUpdate> update_in(const For& loop) {
-    const bool found = enter(loop) && descend(loop.body) && !update_.lanes.empty() && is_small() &&
-                       stays_in_place();
-    return found ? std::optional(std::move(update_)) : std::nullopt;
-  }
-
- private:
-  bool descend(const Stmt& s) {
-    return match(
-        s, [&](const For& n) { return enter(n) && descend(n.body); },
-        [&](const LetStmt& n) {
-          around_.push_back(n.value);
-          lets_[n.name] = substitute(n.value, lets_);
-          return descend(n.body);
-        },
-        [&](const IfThenElse& n) {
-          around_.push_back(n.condition);
-          std::vector<Expr> conjuncts;
-          add_conjuncts(n.condition, conjuncts);
-          for (const Expr& conjunct : conjuncts) {
-            const Expr condition = substitute(conjunct, lets_);
-            if (!varies(condition)) update_.conditions.push_back(condition);
-          }
-          return !n.when_false.defined() && descend(n.when_true);
-        },
-        [&](const Provide& n) {
-          update_.provide = &n;
-          return !n.predicate.defined();
-        },
-        [](const StmtNode&) { return false; });
-  }
-
-  bool enter(const For& loop) {
-    if (is_lane_loop(loop)) {
-      update_.lanes.push_back(&loop);
-      return is_const(loop.min) && as_const_int(loop.extent) && is_pure_(loop);
-    }
-    around_.push_back(loop.extent);
-    varying_.insert(loop.name);
-    return loop.runs == ForType::Serial && update_.lanes.empty();
-  }
-
-  bool is_small() const {
-    int64_t bytes = 0;
-    for (const Expr& value : update_.provide->values) bytes += value.type().bytes();
-    for (const For* lane : update_.lanes) bytes *= *as_const_int(lane->extent);
-    return bytes <= register_file;
-  }
-
-  // Every iteration reads and writes the same points of the Func, and no other.
-  bool stays_in_place() {
-    const std::vector<Expr>& args = update_.provide->args;
-    for (const Expr& arg : args) {
-      update_.point.push_back(substitute(arg, lets_));
-      if (varies(update_.point.back())) return false;
-    }
-    const auto is_own = [&](const Expr& e) { return update_.as_own(e) != nullptr; };
-    const auto reads_own = [&](const Expr& e) { return any_node(e, is_own); };
-    const auto is_elsewhere = [&](const Expr& e) {
-      const Call* own = update_.as_own(e);
-      return own && !std::equal(args.begin(), args.end(), own->args.begin(), own->args.end(),
-                                [](const Expr& a, const Expr& b) { return equal(a, b); });
-    };
-    const std::vector<Expr>& values = update_.provide->values;
-    return std::none_of(around_.begin(), around_.end(), reads_own) &&
-           std::none_of(args.begin(), args.end(), reads_own) &&
-           std::any_of(values.begin(), values.end(), reads_own) &&
-           std::none_of(values.begin(), values.end(),
-                        [&](const Expr& value) { return any_node(value, is_elsewhere); });
-  }
-
-  bool varies(const Expr& e) const { return uses_any_variable(e, varying_); }
-
-  const std::function<bool(const For&)>& is_pure_;
-  KeptUpdate update_;
-  std::unordered_set<std::string> varying_;  // serial loops
-  Substitution lets_;
-  std::vector<Expr> around_;  // what is computed on the way
-};
-
-// A nest of loops that gives the elements of an update their first values.
-class Start {
- public:
-  // `around`: lets in which the update stands, and the nest does not.
-  static std::optional<Start> of(const KeptUpdate& update, const Substitution& around,
-                                 const Stmt& nest, const std::function<bool(const For&)>& is_pure) {
-    Start start;
-    const bool found = start.descend(nest, update, is_pure) && start.pair_loops(update, around) &&
-                       start.is_at(update, around) && start.has_conditions_of(update, around);
-    return found ? std::optional(std::move(start)) : std::nullopt;
-  }
-
-  // The same for an array of the elements, whose coordinates are the update's lanes, the last first.
-  Stmt filling(const Stmt& nest, const std::string& array, const KeptUpdate& update) const {
-    std::vector<Expr> args;
-    for (size_t i = update.lanes.size(); i-- > 0;)
-      args.push_back(variable(of_lane_.at(update.lanes[i])->name));
-    return rewrite_statements(nest, [&](const Stmt& s, auto& all) {
-      if (s.get() == provide_) return make_provide(array, provide_->values, args);
-      const auto* loop = s.template as<For>();
-      if (!loop || loop->runs != ForType::Serial) return all.children(s);
-      return make_for(loop->name, loop->min, loop->extent, ForType::Unrolled, all(loop->body),
-                      loop->partition);
-    });
-  }
-
- private:
-  bool descend(const Stmt& s, const KeptUpdate& update,
-               const std::function<bool(const For&)>& is_pure) {
-    const auto reads_own = [&](const Expr& e) {
-      return any_node(e, [&](const Expr& part) { return update.as_own(part) != nullptr; });
-    };
-    const auto inside = [&](const Stmt& body) { return descend(body, update, is_pure); };
-    return match(
-        s,
-        [&](const For& n) {
-          loops_.push_back(&n);
-          return (is_lane_loop(n) || n.runs == ForType::Serial) && is_pure(n) && inside(n.body);
-        },
-        [&](const LetStmt& n) {
-          lets_[n.name] = substitute(n.value, lets_);
-          return !reads_own(n.value) && inside(n.body);
-        },
-        [&](const IfThenElse& n) {
-          add_conjuncts(n.condition, conditions_);
-          return !n.when_false.defined() && !reads_own(n.condition) && inside(n.when_true);
-        },
-        [&](const Provide& n) {
-          provide_ = &n;
-          return n.name == update.provide->name && !n.predicate.defined() &&
-                 std::ranges::none_of(n.values, reads_own);
-        },
-        [](const StmtNode&) { return false; });
-  }
-
-  // Along each dimension as many loops as the update has, of the same extents.
-  bool pair_loops(const KeptUpdate& update, const Substitution& around) {
-    for (size_t d = 0; d < update.point.size(); ++d) {
-      const Expr here = substitute(provide_->args[d], lets_);
-      const Expr there = substitute(update.point[d], around);
-      std::vector<const For*> own, lanes;
-      for (const For* loop : loops_)
-        if (uses_variable(here, loop->name)) own.push_back(loop);
-      for (const For* lane : update.lanes)
-        if (uses_variable(there, lane->name)) lanes.push_back(lane);
-      if (own.size() != lanes.size()) return false;
-      for (size_t i = 0; i < own.size(); ++i) {
-        if (!equal(own[i]->min, lanes[i]->min) || !equal(own[i]->extent, lanes[i]->extent) ||
-            !of_lane_.emplace(lanes[i], own[i]).second)
-          return false;
-        names_[own[i]->name] = variable(lanes[i]->name);
-      }
-    }
-    return of_lane_.size() == update.lanes.size() && of_lane_.size() == loops_.size();
-  }
-
-  // As the update writes it.
-  Expr renamed(const Expr& e) const {
-    return without_likely(substitute(substitute(e, lets_), names_));
-  }
-
-  bool is_at(const KeptUpdate& update, const Substitution& around) const {
-    return std::ranges::equal(
-        provide_->args, update.point, [&](const Expr& own, const Expr& other) {
-          return equal(renamed(own), without_likely(substitute(other, around)));
-        });
-  }
-
-  bool has_conditions_of(const KeptUpdate& update, const Substitution& around) const {
-    const auto own = mapped(conditions_, [&](const Expr& e) { return renamed(e); });
-    const auto others = mapped(
-        update.conditions, [&](const Expr& e) { return without_likely(substitute(e, around)); });
-    const auto are_among = [](const std::vector<Expr>& some, const std::vector<Expr>& all) {
-      return std::ranges::all_of(some, [&](const Expr& e) {
-        return std::ranges::any_of(all, [&](const Expr& other) { return equal(e, other); });
-      });
-    };
-    return are_among(own, others) && are_among(others, own);
-  }
-
-  const Provide* provide_ = nullptr;
-  std::vector<const For*> loops_;  // outermost first
-  std::vector<Expr> conditions_;
-  Substitution lets_, names_;  // names: of the update's lanes, by the loops here
-  std::map<const For*, const For*> of_lane_;
-};
 
 // The elements that an update adds to, as an array of its own.
 class Kept : public Rewriter {
@@ -359,7 +146,7 @@ class KeepAccumulators : public StatementRewriter {
 
   std::optional<KeptUpdate> update_in(const For& loop) const {
     if (loop.runs != ForType::Serial || shares_) return std::nullopt;
-    auto update = UpdateFinder(is_pure_).update_in(loop);
+    auto update = kept_update(loop, is_pure_);
     return update && !small_.contains(update->provide->name) ? std::move(update) : std::nullopt;
   }
 
@@ -383,7 +170,7 @@ class KeepAccumulators : public StatementRewriter {
     }
     const auto* loop = next.as<For>();
     auto update = loop && nest.as<For>() ? update_in(*loop) : std::nullopt;
-    const auto start = update ? Start::of(*update, lets, nest, is_pure_) : std::nullopt;
+    const auto start = update ? KeptStart::of(*update, lets, nest, is_pure_) : std::nullopt;
     if (!start) return {};
     return kept(next, std::move(*update), [&](const std::string& array, const KeptUpdate& of) {
       return start->filling(nest, array, of);
