@@ -5,6 +5,7 @@
 
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "simplify/simplify.h"
 
 namespace retrograde::autoschedule {
 
@@ -75,6 +76,15 @@ double operations_of_values(const std::vector<Expr>& values,
     });
   }
   return total;
+}
+
+double terms_of(const Definition& stage, double of_unknown) {
+  double terms = 1;
+  for (const ReductionVariable& r : stage.rvars) {
+    const auto extent = as_const_int(simplify(r.extent));
+    terms *= extent ? static_cast<double>(*extent) : of_unknown;
+  }
+  return terms;
 }
 
 int bits_of_values(const std::vector<Expr>& values) {

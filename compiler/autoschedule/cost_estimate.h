@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "graph/function.h"
 #include "ir/expr.h"
 #include "ir/visit.h"
 
@@ -27,6 +28,9 @@ double operations_of(const Expr& node);
 // `of_call` says, beside its indices. Integer values are work, too: a vector holds more of narrow ones.
 double operations_of_values(const std::vector<Expr>& values,
                             FunctionRef<double(const Call&)> of_call);
+// Iterations of its reduction domain: what a sum adds up for an element. Of a loop whose extent is not
+// known so many as given.
+double terms_of(const Definition& stage, double of_unknown);
 // Of the widest number that a value is made of, indices aside.
 int bits_of_values(const std::vector<Expr>& values);
 

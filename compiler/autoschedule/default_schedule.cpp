@@ -218,10 +218,12 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
       given.push_back(f);
   }
   if (may_choose) unroll_choices(given, fixed, sizes);
-  const auto give_rows = [&](const FuncPtr& sum, size_t dimension) {
+  const auto give_rows = [&](const FuncPtr& sum, const std::vector<size_t>& dimensions) {
     std::erase(started, sum);
     graph::take_back_loops(*sum);
-    give_loops(sum, request, sizes.with_extent(*sum, dimension, 1), started);
+    SizeEstimate of_rows = sizes;
+    for (const size_t d : dimensions) of_rows = of_rows.with_extent(*sum, d, 1);
+    give_loops(sum, request, of_rows, started);
   };
   const auto give_tile = [&](const FuncPtr& sum, const RegisterTile& tile) {
     std::erase(started, sum);

@@ -38,7 +38,9 @@ constexpr size_t most_members = 8;
 constexpr size_t most_with_shared = 32;
 constexpr double shared_window_bytes = 4 << 20;
 constexpr double least_rows = 8, rows_a_halo = 8;
-constexpr double most_shared_reads = 64;  // more take longer than the way to memory
+// More take longer than the way to memory: matrix products and convolutions over many channels live
+// by their tiles over rows.
+constexpr double most_shared_reads = 64;
 
 // How a Func's dimension moves with the loops of the last of its group.
 struct Along {
@@ -92,15 +94,8 @@ bool is_sum_of_rows(const FuncContents& f) {
   return are_sums && !has_guests(f);
 }
 
-double iterations_of(const Definition& stage) {
-  double iterations = 1;
-  for (const ReductionVariable& r : stage.rvars)
-    iterations *= static_cast<double>(as_const_int(simplify(r.extent)).value_or(1));
-  return iterations;
-}
-
-// Of an element, what a tile over several rows loads once for all of them.
-double reads_shared_by_rows(const FuncContents& f, size_t row) {
+// Of an element, what a tile over several values of these dimensions loads once for all of them.
+double reads_shared_along(const FuncContents& f, const std::vector<size_t>& dimensions) {
   double total = 0;
   for (const Definition& update : f.updates) {
     double reads = 0;
@@ -109,10 +104,13 @@ double reads_shared_by_rows(const FuncContents& f, size_t row) {
       if (!seen.insert(e.get()).second) return false;
       const auto* call = e.as<Call>();
       const bool loads = call && call->call_type != CallType::Operator;
-      if (loads && !uses_variable(e, f.args[row])) ++reads;
+      const bool is_shared = loads && std::ranges::any_of(dimensions, [&](size_t d) {
+                               return is_split(update, f.args[d]) && !uses_variable(e, f.args[d]);
+                             });
+      if (is_shared) ++reads;
       return true;
     });
-    if (is_split(update, f.args[row])) total += reads * iterations_of(update);
+    total += reads * terms_of(update, 1);
   }
   return total;
 }
@@ -121,7 +119,7 @@ double reads_shared_by_rows(const FuncContents& f, size_t row) {
 double operations_of_all_stages(const FuncContents& f) {
   double total = 0;
   for (int s = 0; s < f.stage_count(); ++s) {
-    total += iterations_of(f.stage(s)) *
+    total += terms_of(f.stage(s), 1) *
              operations_of_values(roots_with_inlined(f.stage(s)), [](const Call&) { return 1.0; });
   }
   return total;
@@ -136,10 +134,10 @@ class Group {
   const FuncPtr& last() const { return last_; }
   const std::vector<FuncPtr>& members() const { return members_; }
   const StripLoops& loops() const { return *loops_; }
-  // The dimension of a member that moves with the rows of the last.
-  size_t row_of(const FuncContents& member) const {
-    const Windows& windows = windows_.at(&member);
-    return static_cast<size_t>(moved_by(windows, loops_->row) - windows.data());
+  // The dimensions of a member that move with the loops which are cut: it computes an element of each
+  // at a time.
+  std::vector<size_t> cut_of(const FuncContents& member) const {
+    return cut_dimensions(windows_.at(&member), *loops_);
   }
 
   // Whether it has joined: all of its reads are by Funcs of this group.
@@ -152,7 +150,8 @@ class Group {
     members_.push_back(f);
     const auto loops = loops_of_all(is_large ? shared_window_bytes
                                              : static_cast<double>(sizes_.machine().block_bytes));
-    if (loops && pays(*f, *windows, *loops) && may_be_rows(*f, *windows, *loops)) {
+    if (loops && pays(*f, *windows, *loops) &&
+        reads_shared_along(*f, cut_dimensions(*windows, *loops)) <= most_shared_reads) {
       loops_ = loops;
       return true;
     }
@@ -253,8 +252,8 @@ class Group {
     });
   }
 
-  // Rows are cut along the outermost dimension in which windows overlap, or, without one, which moves
-  // all; what each iteration has for itself stays outside.
+  // Rows are cut along the outermost dimension in which windows overlap, or, without one, the innermost
+  // that moves all; what each iteration has for itself stays outside.
   std::optional<StripLoops> loops_of_all(double most_bytes) const {
     StripLoops loops;
     const auto anything = [](const Along&) { return true; };
@@ -262,7 +261,7 @@ class Group {
     for (size_t d = last_->args.size(); d-- > 1 && loops.row == 0;) {
       if (all_moved_by(d, anything) && !all_moved_by(d, same)) loops.row = d;
     }
-    for (size_t d = last_->args.size(); d-- > 1 && loops.row == 0;) {
+    for (size_t d = 1; d < last_->args.size() && loops.row == 0; ++d) {
       if (all_moved_by(d, same)) loops.row = d;
     }
     if (loops.row == 0) return std::nullopt;
@@ -287,6 +286,14 @@ class Group {
   static bool is_cut_by(size_t loop, const StripLoops& loops) {
     return loop == loops.row ||
            std::find(loops.outside.begin(), loops.outside.end(), loop) != loops.outside.end();
+  }
+
+  static std::vector<size_t> cut_dimensions(const Windows& windows, const StripLoops& loops) {
+    std::vector<size_t> result;
+    for (size_t d = 0; d < windows.size(); ++d) {
+      if (windows[d].loop && is_cut_by(*windows[d].loop, loops)) result.push_back(d);
+    }
+    return result;
   }
 
   // Elements of sums are dear: where there are some, strips are as long as they can be.
@@ -355,12 +362,6 @@ class Group {
     return bytes / own;
   }
 
-  // Matrix products and convolutions over many channels live by their tiles over rows.
-  static bool may_be_rows(const FuncContents& f, const Windows& windows, const StripLoops& loops) {
-    const auto row = static_cast<size_t>(moved_by(windows, loops.row) - windows.data());
-    return reads_shared_by_rows(f, row) <= most_shared_reads;
-  }
-
   const FuncPtr last_;
   const SizeEstimate& sizes_;
   Windows own_;
@@ -391,10 +392,11 @@ void give_strips(const Group& group, const GiveLoopsOfRows& give_rows) {
   stage.reorder(order).parallel(strips);
   for (size_t d : loops.outside) stage.parallel(Var(name(d)));
   for (const FuncPtr& f : group.members()) {
-    const size_t own_row = group.row_of(*f);
-    const bool has_several = std::ranges::any_of(
-        f->updates, [&](const Definition& update) { return is_split(update, f->args[own_row]); });
-    if (has_several) give_rows(f, own_row);
+    const std::vector<size_t> cut = group.cut_of(*f);
+    const bool has_several = std::ranges::any_of(f->updates, [&](const Definition& update) {
+      return std::ranges::any_of(cut, [&](size_t d) { return is_split(update, f->args[d]); });
+    });
+    if (has_several) give_rows(f, cut);
     run_serially(f);
     Func(f).store_at(Func(last), strips).compute_at(Func(last), row);
   }

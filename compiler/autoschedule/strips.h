@@ -22,8 +22,9 @@
 
 namespace retrograde::autoschedule {
 
-// Gives a sum other loops: its dimension is computed an element at a time.
-using GiveLoopsOfRows = std::function<void(const FuncPtr& sum, size_t dimension)>;
+// Gives a sum other loops: of these dimensions an element is computed at a time.
+using GiveLoopsOfRows =
+    std::function<void(const FuncPtr& sum, const std::vector<size_t>& dimensions)>;
 
 // Moves those of `given`, which this scheduler has computed at root and given loops, into the strips
 // of the only group of such Funcs that reads them, where that is less work than a way to memory.

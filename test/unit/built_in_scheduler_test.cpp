@@ -456,6 +456,28 @@ TEST(StripsOfRows, ComputeSumsOneRowAtATime) {
   }
 }
 
+// Planes of several images, whose strips are tasks of their own.
+TEST(StripsOfRows, ComputeSumsOneElementOfAllThatIsOutsideAtATime) {
+  const auto stencil_of = [](Func& around) {
+    Var x("x"), y("y"), c("c"), n("n");
+    const RDom r(0, 3, 0, 3);
+    around(x, y, c, n) += exp(cast<float>(x + r.x + n)) * cast<float>((y + r.y) * r.x + c);
+    Func out("out");
+    out(x, y, c, n) = around(x, y, c, n) - around(x, y + 1, c, n);
+    out.set_estimates({{0, 300}, {0, 300}, {0, 16}, {0, 4}});
+    return out;
+  };
+  Func around("around"), plain("plain");
+  Func out = stencil_of(around), expected = stencil_of(plain);
+  Pipeline(out).auto_schedule(get_host_target());
+  EXPECT_EQ(around.function()->schedule.compute_level.func, out.name());
+  for (const graph::Split& split : around.function()->updates[0].schedule.splits)
+    EXPECT_EQ(split.old_var, "x");
+  const Buffer<float> found = out.realize({70, 20, 5, 2}), all = expected.realize({70, 20, 5, 2});
+  for (size_t i = 0; i < all.number_of_elements(); i++)
+    ASSERT_NEAR(found.data()[i], all.data()[i], 1e-4 * std::abs(all.data()[i])) << i;
+}
+
 TEST(StripsOfRows, LeaveSumsOverLargeWindowsWhoseRowsAreDear) {
   WindowSums sums(21);
   sums.schedule();
