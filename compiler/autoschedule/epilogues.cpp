@@ -9,6 +9,7 @@
 #include "autoschedule/new_loop.h"
 #include "autoschedule/read_estimate.h"
 #include "autoschedule/start_in_tiles.h"
+#include "autoschedule/stored_reads.h"
 #include "frontend/language/func.h"
 #include "frontend/schedule/loop_level.h"
 #include "frontend/schedule/stage.h"
@@ -17,24 +18,15 @@
 #include "graph/wrappers.h"
 #include "ir/build.h"
 #include "ir/lets.h"
-#include "simplify/simplify.h"
 
 namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr double enough_terms = 32;      // of a sum
+constexpr double many_terms = 32;        // of a sum that strips would not take
+constexpr double enough_terms = 8;       // of any
 constexpr double terms_of_unknown = 16;  // of a loop whose extent is not known
 constexpr double most_operations = 64;   // of the reader, of which a tile has many copies
-
-double terms_of(const Definition& update) {
-  double terms = 1;
-  for (const ReductionVariable& r : update.rvars) {
-    const auto extent = as_const_int(simplify(r.extent));
-    terms *= extent ? static_cast<double>(*extent) : terms_of_unknown;
-  }
-  return terms;
-}
 
 // Whether a loop of the reduction moves along a dimension of its own of all that is read, as over channels or
 // the inner dimension of a product; those of a stencil move along rows and columns of the result.
@@ -63,11 +55,23 @@ bool may_host(const FuncContents& f) {
   });
 }
 
-// One update, of many terms, whose tiles are added up each for itself.
-bool is_long_sum(const FuncContents& f) {
+bool has_many_terms(const FuncContents& f) {
+  return !f.updates.empty() && terms_of(f.updates[0], terms_of_unknown) >= many_terms;
+}
+
+// One update, whose tiles are added up each for itself.
+bool is_sum_in_tiles(const FuncContents& f) {
   const bool is_partial = f.made && (f.made->lanes > 0 || f.made->has_parts || f.made->blocks > 0);
   return !is_partial && !f.is_extern() && f.updates.size() == 1 && has_tiles(f) &&
-         terms_of(f.updates[0]) >= enough_terms && (is_contraction(f) || !may_host(f));
+         terms_of(f.updates[0], terms_of_unknown) >= enough_terms;
+}
+
+// Whether strips could be better: the sum, or what reads the Func it ends in, would run in them.
+bool is_for_strips(const FuncContents& sum, const FuncPtr& end, const StoredReads& reads) {
+  if (has_many_terms(sum)) return !is_contraction(sum) && may_host(sum);
+  return may_host(sum) || reads.is_hidden(end) ||
+         !std::ranges::all_of(reads.of(end),
+                              [](const StoredRead& by) { return has_many_terms(*by.reader); });
 }
 
 bool reads_the_same_place(const Reader& reader) {
@@ -228,17 +232,20 @@ std::vector<FuncPtr> compute_epilogues(const std::vector<FuncPtr>& outputs, cons
                                        const std::vector<FuncPtr>& given,
                                        const std::unordered_set<const Symbol*>& but, int lanes,
                                        const GiveLoopsOfTile& give_loops) {
+  const StoredReads reads(outputs);
   std::vector<FuncPtr> result;
   const auto is_free = [&](const FuncPtr& f) {
     return std::ranges::count(given, f) > 0 && is_at_root(*f) && !but.contains(f.get()) &&
            std::ranges::count(result, f) == 0;
   };
   for (const FuncPtr& sum : given) {
-    if (!is_free(sum) || !readers.is_inside(sum) || readers.is_output(sum) || !is_long_sum(*sum))
+    if (!is_free(sum) || !readers.is_inside(sum) || readers.is_output(sum) ||
+        !is_sum_in_tiles(*sum))
       continue;
     const auto reader = readers.only_reader(sum);
     if (!reader || !is_free(reader->func) || !has_plain_rows(*reader->func) ||
-        !reads_the_same_place(*reader) || !is_light(*reader->func))
+        !reads_the_same_place(*reader) || !is_light(*reader->func) ||
+        is_for_strips(*sum, reader->func, reads))
       continue;
     const auto passed = passed_loops(*sum, lanes);
     const Hosted hosted(outputs, *sum);

@@ -1,5 +1,5 @@
-// epilogues.h -- what a sum of many terms gives to one pure Func alone, at the same place, stays in registers
-// until that Func has used it: each tile of sums is computed in the loops of the Func.
+// epilogues.h -- what a sum gives to one pure Func alone, at the same place, stays in registers until that
+// Func has used it: each tile of sums is computed in the loops of the Func.
 //
 //   convolved(x, y, c) += ...;  result(x, y, c) = max(convolved(x, y, c), 0)
 //
@@ -8,8 +8,8 @@
 //                                            result = ...
 //
 // The Func takes the loops over tiles, and what they host, such as the rows that tiles read copied. The
-// other way, what the sum reads computed in its loops (strips.h), is better for sums of few terms, and for
-// stencils of any size that read what is computed, too.
+// other way, windows of rows (strips.h), is better for stencils that read what is computed, too, and for
+// sums of few terms behind which a chain of stencils goes on.
 // Source: the epilogues of matrix products (CUTLASS), which a tile passes on its way to memory.
 #pragma once
 

@@ -13,6 +13,7 @@
 #include "frontend/schedule/loop_level.h"
 #include "frontend/schedule/stage.h"
 #include "graph/own_reads.h"
+#include "graph/wrappers.h"
 #include "ir/build.h"
 
 namespace retrograde::autoschedule {
@@ -41,7 +42,7 @@ bool is_sum_in_tiles(const FuncContents& f) {
 class Hosts {
  public:
   explicit Hosts(const std::vector<FuncPtr>& outputs) {
-    for (const FuncPtr& f : topological_order(outputs)) {
+    for (const FuncPtr& f : graph::functions_of(outputs)) {
       for (const graph::LoopLevel& level : {f->schedule.compute_level, f->schedule.store_level}) {
         if (level.kind == graph::LoopLevel::Kind::At) loops_.insert({level.func, level.var});
       }

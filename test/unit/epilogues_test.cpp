@@ -1,4 +1,4 @@
-// Sums of many terms that one Func alone reads, at the same place: tile by tile in its loops.
+// Sums that one Func alone reads, at the same place: tile by tile in its loops.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -94,10 +94,41 @@ TEST(Epilogues, ArePartOfTheSchedulesText) {
     EXPECT_NE(text.find(directive), std::string::npos) << directive << " in\n" << text;
 }
 
-TEST(Epilogues, AreNotOfSumsOfFewTerms) {
-  Layer layer(positive, {.width = 70, .height = 50, .channels = 3});
+// Where it ends in the output, or in what sums of many terms read.
+TEST(Epilogues, OfASumOfFewTerms) {
+  const Sizes few{.width = 70, .height = 50, .channels = 3};
+  Layer layer(positive, few), plain(positive, few);
+  layer.schedule();
+  EXPECT_TRUE(layer.is_in_tiles());
+  plain.convolved.compute_root();
+  expect_same(layer.found({70, 50, 3, 3}), plain.found({70, 50, 3, 3}), "few terms");
+
+  Layer first([](const Layer& l) { return l.here() / (1.0f + exp(-l.here())); }, few);
+  Func second("second");
+  RDom k(0, 3, 0, 12, "k");
+  second(first.x, first.y, first.c, first.n) +=
+      first.result(first.x, first.y, k.x, first.n) * cast<float>(k.y + first.c);
+  second.set_estimates({{0, 60}, {0, 40}, {0, 3}, {0, 3}});
+  Pipeline(second).auto_schedule(get_host_target());
+  EXPECT_TRUE(first.is_in_tiles());
+}
+
+TEST(Epilogues, AreNotOfAFewTermsMore) {
+  Layer layer(positive, {.width = 70, .height = 50, .channels = 1, .kernel = 2});
   layer.schedule();
   EXPECT_FALSE(layer.is_in_tiles());
+}
+
+// All of it runs in strips together.
+TEST(Epilogues, AreNotOfSumsOfFewTermsBehindWhichAStencilGoesOn) {
+  Layer layer(positive, {.width = 300, .height = 300, .channels = 3});
+  Func edges("edges");
+  edges(layer.x, layer.y, layer.c, layer.n) = layer.result(layer.x, layer.y + 1, layer.c, layer.n) -
+                                              layer.result(layer.x, layer.y, layer.c, layer.n);
+  edges.set_estimates({{0, 299}, {0, 299}, {0, 3}, {0, 3}});
+  Pipeline(edges).auto_schedule(get_host_target());
+  EXPECT_FALSE(layer.is_in_tiles());
+  EXPECT_EQ(layer.level().func, edges.name());
 }
 
 // The blur of rows runs in strips with that of columns, which it reads.
