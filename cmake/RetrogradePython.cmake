@@ -29,5 +29,6 @@ if(RETROGRADE_SANITIZER MATCHES "^(address|thread)$")
   endforeach()
   string(REPLACE ";" ":" preloaded "${preloaded}")
   set(RETROGRADE_PYTHON_ENVIRONMENT LD_PRELOAD=${preloaded} ASAN_OPTIONS=detect_leaks=0:quarantine_size_mb=4
-    TSAN_OPTIONS=ignore_noninstrumented_modules=1 RETROGRADE_SANITIZER=${RETROGRADE_SANITIZER})
+    TSAN_OPTIONS=ignore_noninstrumented_modules=1:die_after_fork=0
+    RETROGRADE_SANITIZER=${RETROGRADE_SANITIZER})
 endif()

@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 namespace retrograde::python {
 
@@ -131,7 +132,9 @@ void run_unlocked(Work work) {
   Worker& on = worker();
   on.start(job);
   wait_for(job, on);
-  if (job->error) std::rethrow_exception(job->error);
+  // Taken from the job, of which the other thread may let go later than this one.
+  if (std::exception_ptr error = std::exchange(job->error, nullptr))
+    std::rethrow_exception(std::move(error));
 }
 
 }  // namespace retrograde::python
