@@ -1,9 +1,10 @@
 #!/usr/bin/python3
 """overhead.py -- what a call of one of our operators costs beside one of PyTorch's own, on tensors of one element.
 
-    overhead.py PACKAGE [--output FILE]
+    overhead.py PACKAGE [--from-cpp PREFIX] [--output FILE]
 
-PACKAGE is the folder that holds the Python package; runs with the interpreter's own PyTorch, one thread. Microseconds,
+PACKAGE is the folder that holds the Python package, PREFIX where Retrograde is installed: an operator made there of a
+generator is called from C++, too (from_cpp/, built in out/bench/from_cpp). Runs with the interpreter's own PyTorch, one thread. Microseconds,
 the least of many rounds, in which all take turns. Both add two tensors. Beside them stands what PyTorch itself asks for
 an operator that does nothing but make its result: as a function of Python that torch.library has registered, and as an
 autograd.Function that keeps its inputs.
@@ -11,8 +12,10 @@ autograd.Function that keeps its inputs.
 import argparse
 import json
 import os
+import subprocess
 import sys
 import time
+from pathlib import Path
 
 ROUNDS, CALLS = 200, 40
 
@@ -93,6 +96,18 @@ def measure():
     return best
 
 
+def measure_from_cpp(prefix):
+    """The same of calls from C++, with the PyTorch of this interpreter."""
+    source = Path(__file__).resolve().parent / "from_cpp"
+    build = source.parents[2] / "out/bench/from_cpp"
+    for command in (["cmake", "-S", source, "-B", build, "-G", "Ninja", f"-DPYTHON={sys.executable}",
+                     f"-DCMAKE_PREFIX_PATH={Path(prefix).resolve()}"], ["cmake", "--build", build]):
+        made = subprocess.run(command, capture_output=True, text=True)
+        if made.returncode != 0:
+            raise SystemExit(f"cannot build {source} with {prefix}:\n{made.stdout[-2000:]}{made.stderr[-2000:]}")
+    return json.loads(subprocess.check_output([build / "calls", build / "total.so"]))
+
+
 def show(report):
     ways = list(report["PyTorch"])
     print(f"{'us for a call on one element':32}" + "".join(f"{way:>34}" for way in ways))
@@ -104,6 +119,7 @@ def show(report):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("package")
+    parser.add_argument("--from-cpp", metavar="PREFIX")
     parser.add_argument("--output")
     options = parser.parse_args()
     sys.path.insert(0, os.path.abspath(options.package))
@@ -112,9 +128,14 @@ def main():
     print(f"PyTorch {torch.__version__}")
     report = measure()
     show(report)
+    result = {"pytorch": torch.__version__, "overhead_us": report}
+    if options.from_cpp:
+        print("from C++")
+        result["overhead_from_cpp_us"] = measure_from_cpp(options.from_cpp)
+        show(result["overhead_from_cpp_us"])
     if options.output:
         with open(options.output, "w", encoding="utf-8") as file:
-            json.dump({"pytorch": torch.__version__, "overhead_us": report}, file, indent=1)
+            json.dump(result, file, indent=1)
 
 
 if __name__ == "__main__":
