@@ -229,8 +229,7 @@ bool SteadyRewriter::holds(const Expr& condition, bool is_true, bool is_choice) 
   const std::unordered_set<std::string> names = variables_of(expanded);
   const auto is_in = [&](const std::string& name) { return names.count(name) != 0; };
   if (std::ranges::none_of(dependent_, is_in)) return false;
-  const bool is_in_row = !enclosing_.empty() && decide_alone_.contains(enclosing_.back());
-  if (is_in_row || std::ranges::any_of(decide_alone_, is_in)) return false;
+  if (std::ranges::any_of(decide_alone_, is_in)) return false;
   auto solution = solve_for(expanded, loop_.name, context_.ranges());
   if (!solution) return false;
   ++steady_.solved;
