@@ -5,9 +5,9 @@
 
 PACKAGE is the folder that holds the Python package, PREFIX where Retrograde is installed: an operator made of a generator
 is called from C++, too (from_cpp/, built in out/bench/from_cpp). Runs with the interpreter's own PyTorch, one thread.
-Microseconds, the least of many rounds, in which all take turns. Both add two tensors. Beside them stands what PyTorch itself asks for
-an operator that does nothing but make its result: as a function of Python that torch.library has registered, and as an
-autograd.Function that keeps its inputs.
+Microseconds, the least of many rounds, in which all take turns. Both add two tensors. Beside them stands what PyTorch
+itself asks for an operator that does nothing but make its result: as a function of Python that torch.library has
+registered, and as an autograd.Function that keeps its inputs.
 """
 import argparse
 import json
