@@ -126,8 +126,9 @@ std::string Machine::math_symbol(const std::string& stem, const std::string& pre
 
 namespace {
 
+// ASAN asks for checks of every access, which lowering makes (check_accesses).
 void refuse_sanitizers(const Target& target) {
-  for (const F sanitizer : {F::MSAN, F::TSAN, F::ASAN, F::SanitizerCoverage}) {
+  for (const F sanitizer : {F::MSAN, F::TSAN, F::SanitizerCoverage}) {
     if (!target.has_feature(sanitizer)) continue;
     const std::string name = quoted(Target::feature_to_name(sanitizer));
     unsupported("generate code for target \"" + target.to_string() + "\"",

@@ -9,6 +9,7 @@
 #include "ir/print.h"
 #include "ir/validate.h"
 #include "lower/device/make_kernels.h"
+#include "lower/instrumentation/check_accesses.h"
 #include "lower/instrumentation/inject_profiling.h"
 #include "lower/instrumentation/inject_tracing.h"
 #include "lower/instrumentation/loop_nest_text.h"
@@ -202,6 +203,13 @@ constexpr Pass passes[] = {
      }},
     {"free_early", Phase::Vector, alone<free_early>},
     {"drop_asserts", Phase::Vector, wanted<Target::NoAsserts, drop_asserts>},
+    {"check_accesses", Phase::Vector,
+     [](Lowering& lowering, const Stmt& s) {
+       const Target& target = lowering.options.target;
+       const bool wanted =
+           target.has_feature(Target::CheckedAccesses) || target.has_feature(Target::ASAN);
+       return wanted ? check_accesses(s, lowering.args) : s;
+     }},
 };
 
 std::vector<std::string> names_of(const std::vector<LoweredArgument>& args) {

@@ -1,5 +1,6 @@
 #include "lower/statement_passes.h"
 
+#include "lower/instrumentation/check_accesses.h"
 #include "lower/loops/flatten_storage.h"
 #include "lower/loops/keep_accumulators.h"
 #include "lower/vectors/vectorize_inner_loops.h"
@@ -11,6 +12,8 @@ const std::vector<StatementPass>& statement_passes() {
   static const std::vector<StatementPass> passes = {
       {"accumulate_vectors", accumulate_vectors},
       {"blend_masked_stores", blend_masked_stores},
+      {"check_accesses",  // of allocations alone: a statement does not name its buffers
+       [](const Stmt& s) { return check_accesses(s, {}); }},
       {"check_promises", check_promises},
       {"deinterleave_loads", deinterleave_loads},
       {"drop_asserts", drop_asserts},

@@ -106,8 +106,9 @@ void compare_outputs(const Regions& regions, const RandomProgram& program,
   }
 }
 
-// Where kernels run, races and accesses out of bounds are errors of the run.
+// What the checks of accesses find; where kernels run, races and their accesses out of bounds, too.
 bool is_finding(const RuntimeError& error, const Target& target) {
+  if (std::string_view(error.what()).find("checked_accesses") != std::string_view::npos) return true;
   return target.has_feature(Target::CUDA) && !lacks_memory(error);
 }
 
@@ -130,6 +131,7 @@ Judged check_with_schedule(const RandomProgram& program, const std::function<voi
                            const Target& target,
                            const std::vector<std::function<void()>>& preparations) {
   Judged judged;
+  const Target checked = target.with_feature(Target::CheckedAccesses);
   try {
     schedule();
     Pipeline compiled(program.outputs);
@@ -139,7 +141,7 @@ Judged check_with_schedule(const RandomProgram& program, const std::function<voi
       std::optional<std::vector<oracle::Array>> expected;  // of what runs at all
       for (const std::function<void()>& prepare : preparations) {
         prepare();
-        const std::vector<GuardedOutput> actual = run(compiled, regions, program, target);
+        const std::vector<GuardedOutput> actual = run(compiled, regions, program, checked);
         if (!expected) expected = interpreter.realize(outputs_of(program), regions);
         compare_outputs(regions, program, *expected, actual, judged);
       }

@@ -14,6 +14,7 @@ namespace retrograde::fuzz {
 // Floats may differ by twice the error that contraction to FMA and the stated ULP of math functions
 // can cause in this very computation (tracked_value.h); everything else is compared bit for bit. The
 // program has the schedule afterwards. Counts: "values", and those "unstable", which say nothing.
+// Accesses and promises of the machine code are checked (Target::CheckedAccesses): a false one is a finding.
 Judged check_program(const RandomProgram& program, const ScheduleLog& schedule,
                      const Target& target);
 // The same; `schedule` gives the schedule. What is compiled runs once after each of `preparations`, which

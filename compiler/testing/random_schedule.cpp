@@ -25,7 +25,6 @@ namespace {
 using namespace graph;
 
 constexpr int max_reads_inlined = 40;
-constexpr int max_nesting = 3;       // of Funcs computed in loops of each other
 constexpr int ample_storage = 1024;  // more than any dimension ever needs
 
 // A loop by the Func and stage that it belongs to; root: no Func.
@@ -51,7 +50,8 @@ struct Companion {
 
 class Scheduler {
  public:
-  Scheduler(const RandomProgram& program, Choices& choices) : program_(program), random_(choices) {
+  Scheduler(const RandomProgram& program, Choices& choices, const ScheduleStyle& style)
+      : program_(program), random_(choices), style_(style) {
     Param<int> selector("selector");
     selector_.value = random_.below(3);
     selector.set(selector_.value);
@@ -376,13 +376,13 @@ class Scheduler {
     const int choice = random_.below(100);
     // How often the inlined body is repeated grows along chains of inlined Funcs.
     const int cost = reads_of(f) * static_cast<int>(sites_[f].size() + 1);
-    const bool inlines = choice < (is_pure(f) ? 25 : 8) && !is_shared(f) &&
+    const bool inlines = choice < (is_pure(f) ? style_.inlined : style_.inlined / 3) && !is_shared(f) &&
                          inlined_reads_ * cost <= max_reads_inlined;
     if (inlines) {
       placements_[f].where = Where::Inlined;
       inlined_reads_ *= cost;
       if (is_pure(f) && random_.chance(50)) add(f, ComputeAt{});
-    } else if (choice < 75 && !is_shared(f) && place_at(f)) {
+    } else if (choice < style_.inlined + style_.at && !is_shared(f) && place_at(f)) {
       return;
     } else {
       add(f, ComputeAt{{root}});
@@ -448,14 +448,14 @@ class Scheduler {
     std::vector<int> legal;
     for (size_t i = 0; i < around.size(); ++i) {
       const bool is_legal = is_legal_level(around[i]) && is_around_all_sites(around[i], f);
-      if (is_legal && share_of_nesting(f) + nesting_of(around[i]) <= max_nesting)
+      if (is_legal && share_of_nesting(f) + nesting_of(around[i]) <= style_.most_nested)
         legal.push_back(static_cast<int>(i));
     }
     if (legal.empty()) return false;
     const int compute = random_.pick(legal);
     placements_[f].where = Where::At;
     placements_[f].compute = around[compute];
-    if (random_.chance(55)) choose_store_level(f, around, compute);
+    if (random_.chance(style_.stored_outside)) choose_store_level(f, around, compute);
     add(f, ComputeAt{{loop_level(around[compute])}});
     return true;
   }
@@ -568,6 +568,7 @@ class Scheduler {
 
   const RandomProgram& program_;
   Choices& random_;
+  const ScheduleStyle style_;
   LoopNames names_;
   ScheduleLog log_;
   Selector selector_;
@@ -583,8 +584,13 @@ class Scheduler {
 
 }  // namespace
 
-ScheduleLog random_schedule(const RandomProgram& program, Choices& choices) {
-  return Scheduler(program, choices).run();
+ScheduleStyle ScheduleStyle::windows() {
+  return {.inlined = 8, .at = 82, .stored_outside = 85, .most_nested = 6};
+}
+
+ScheduleLog random_schedule(const RandomProgram& program, Choices& choices,
+                            const ScheduleStyle& style) {
+  return Scheduler(program, choices, style).run();
 }
 
 }  // namespace retrograde::fuzz

@@ -2,6 +2,7 @@
 // arguments are those of support/fuzz.h, and
 //
 //   --without DIRECTIVE    leaves it out of all schedules
+//   --style STYLE          only chains, or only pipelines (testing/programs/program.h)
 //   --only DIRECTIVE       seeds whose schedules do not use it are passed over and not counted
 //
 // A random schedule may well ask for a thousand times the work: a few may compute for too long.
@@ -23,6 +24,7 @@ struct Scheduled {
 
 std::vector<std::string> without;
 std::string only;
+std::string style;  // of the programs; empty: one or the other
 
 // Takes every use of it out of the schedule, with what hangs on it.
 ScheduleLog leave_out(ScheduleLog log, const std::string& directive) {
@@ -33,14 +35,20 @@ ScheduleLog leave_out(ScheduleLog log, const std::string& directive) {
 }
 
 Scheduled make(Choices& choices) {
-  Scheduled result{make_program(choices, Style::pipelines()), {}};
-  result.schedule = random_schedule(result.program, choices);
+  const bool is_chain = style == "chains" || (style.empty() && choices.chance(50));
+  Scheduled result{make_program(choices, is_chain ? Style::chains() : Style::pipelines()), {}};
+  result.schedule =
+      random_schedule(result.program, choices, is_chain ? ScheduleStyle::windows() : ScheduleStyle());
   for (const std::string& directive : without)
     result.schedule = leave_out(result.schedule, directive);
   return result;
 }
 
 bool take(const std::string& name, const std::string& directive) {
+  if (name == "--style") {
+    style = directive;
+    return style == "chains" || style == "pipelines";
+  }
   const std::vector<std::string> known = graph::directive_names();
   if (std::find(known.begin(), known.end(), directive) == known.end()) return false;
   if (name == "--without") without.push_back(directive);

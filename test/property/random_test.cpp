@@ -24,12 +24,21 @@ constexpr int step = 2;  // 160 programs: every second shard
 constexpr double max_refused_fraction = 0.15;  // of one shard
 constexpr double max_unstable_fraction = 0.1;
 
+// What is drawn, under the name that the fuzzer knows it by.
+struct Kind {
+  const char* name;
+  Style style;
+  ScheduleStyle schedules;
+};
+Kind pipelines() { return {"pipelines", Style::pipelines(), {}}; }
+Kind chains() { return {"chains", Style::chains(), ScheduleStyle::windows()}; }
+
 class Total {
  public:
-  void add(uint64_t seed) {
+  void add(uint64_t seed, const Kind& kind) {
     Choices choices(seed);
-    const RandomProgram program = make_program(choices, Style::pipelines());
-    const ScheduleLog schedule = random_schedule(program, choices);
+    const RandomProgram program = make_program(choices, kind.style);
+    const ScheduleLog schedule = random_schedule(program, choices, kind.schedules);
     const std::string text = to_text(program, schedule);
     Judged judged = check_program(program, schedule, get_jit_target_from_environment());
     compared += judged.counts["values"];
@@ -37,7 +46,7 @@ class Total {
     refused += judged.judgement == Judgement::Refused;
     EXPECT_LE(judged.judgement, Judgement::Refused)
         << "seed " << seed << " is " << name_of(judged.judgement) << ": " << judged.detail << "\n"
-        << text << "Shrink it: fuzz_pipelines --seed " << seed;
+        << text << "Shrink it: fuzz_pipelines --style " << kind.name << " --seed " << seed;
   }
   uint64_t compared = 0, unstable = 0;
   int refused = 0;
@@ -47,8 +56,11 @@ class RandomPrograms : public ::testing::TestWithParam<int> {};
 
 TEST_P(RandomPrograms, MachineCodeAgreesWithTheInterpreter) {
   Total total;
-  for (int i = 0; i < programs_per_shard; ++i)
-    total.add(first_seed + static_cast<uint64_t>(GetParam() * programs_per_shard + i));
+  for (int i = 0; i < programs_per_shard; ++i) {
+    const auto seed = first_seed + static_cast<uint64_t>(GetParam() * programs_per_shard + i);
+    total.add(seed, pipelines());
+    if (i % 2 == 0) total.add(seed, chains());
+  }
   EXPECT_LE(total.refused, max_refused_fraction * programs_per_shard);
   EXPECT_GT(total.compared, 0u);
   EXPECT_LE(total.unstable, max_unstable_fraction * total.compared);

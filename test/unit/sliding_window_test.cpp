@@ -459,5 +459,88 @@ TEST_F(StorageDirectives, AlignsTheStorage) {
   expect_values(g);
 }
 
+// ---- Funcs beside those that slide, in the iterations that run for these alone: every access is checked ----
+
+void expect_same_and_inside(const std::function<Func(bool)>& make,
+                            std::initializer_list<int> sizes = {1, 2, 3, 7, 13, 50, 64}) {
+  const Target target = get_jit_target_from_environment().with_feature(Target::CheckedAccesses);
+  Func scheduled = make(true);
+  for (const int size : sizes) {
+    Buffer<int> expected = make(false).realize({size}), found = scheduled.realize({size}, target);
+    expected.for_each_element([&](int i) { EXPECT_EQ(expected(i), found(i)) << i << " of " << size; });
+  }
+}
+
+TEST_F(SlidingWindow, WarmUpOfAnUpsampledFuncLeavesTheOthersInside) {
+  expect_same_and_inside([&](bool scheduled) {
+    Func in("in"), low("low"), out("out");
+    in(y) = y;
+    low(y) = in(y);
+    out(y) = in(y) + low(y / 2) + low(y / 2 + 1);
+    if (!scheduled) return out;
+    out.split(y, yo, y, 4, TailStrategy::GuardWithIf);
+    in.store_root().compute_at(out, y);
+    low.store_root().compute_at(out, y);
+    return out;
+  });
+}
+
+TEST_F(SlidingWindow, WarmUpLeavesVectorsAlongTheWindowInside) {
+  expect_same_and_inside([&](bool scheduled) {
+    Func f0("f0"), f1("f1"), f2("f2"), f4("f4");
+    f0(y) = y * 3;
+    f1(y) = f0(y / 2 + 1) + f0(y / 2);
+    f2(y) = f1(y / 2 + 1);
+    f4(y) = f2(y - 1) + f2(y - 2) + f1(y + 1);
+    for (Func* f : {&f0, &f1, &f2}) {
+      f->compute_root();
+      if (scheduled) f->store_root().compute_at(f4, y);
+    }
+    if (scheduled) f1.vectorize(y, 4);
+    return f4;
+  });
+}
+
+// l4 runs from the loop's first iteration on, l3 from twelve before it, and l1 is read by both.
+TEST_F(SlidingWindow, NamesOfWhatStartsLaterAreNotReadBeforeIt) {
+  Var outer("outer"), inner("inner"), block("block"), lane("lane"), group("group"), rest("rest"), t("t");
+  expect_same_and_inside([&](bool scheduled) {
+    Func l1("l1"), l3("l3"), l4("l4"), l5("l5"), out("out");
+    l1(x) = x * 9;
+    l3(x) = l1(x / 2 + 2) + l1(x - 1) * 2;
+    l4(x) = l3(x - 1) + l1(x + 2);
+    l5(x) = l4(x - 1);
+    out(x) = l5(x);
+    for (Func* f : {&l1, &l3, &l4, &l5}) f->compute_root();
+    if (!scheduled) return out;
+    out.split(x, xo, xi, 3, TailStrategy::Predicate);
+    l5.compute_at(out, xo).split(x, block, lane, 4, TailStrategy::ShiftInwards).vectorize(lane);
+    for (Func* f : {&l1, &l3, &l4}) f->store_at(out, xo).compute_at(l5, block);
+    l4.split(x, outer, inner, 16, TailStrategy::GuardWithIf)
+        .split(outer, group, rest, 4, TailStrategy::ShiftInwards)
+        .fuse(rest, group, t);
+    l1.split(x, outer, inner, 4).split(outer, group, lane, 4, TailStrategy::RoundUp).vectorize(lane);
+    return out;
+  });
+}
+
+// A part of the window is empty in two of three iterations; what is computed from its ends is not.
+TEST_F(SlidingWindow, EmptyPartsAskForNothingOutside) {
+  expect_same_and_inside([&](bool scheduled) {
+    Func f("f"), g("g"), h("h"), out("out");
+    f(x) = x * 5;
+    g(x) = f(x + 2) + f(x / 4 - 1) + f(x - 1);
+    h(x) = g(x - 1) + g(x + 1);
+    out(x) = h(x / 3) * 3 + f(x / 3);
+    for (Func* p : {&f, &g, &h}) {
+      p->compute_root();
+      if (scheduled) p->store_root().compute_at(out, x);
+    }
+    if (scheduled)
+      f.split(x, xo, xi, 2, TailStrategy::ShiftInwards).split(xo, xo, yi, 16, TailStrategy::ShiftInwards);
+    return out;
+  });
+}
+
 }  // namespace
 }  // namespace retrograde

@@ -1,5 +1,7 @@
 #include "lower/nests/compute_place.h"
 
+#include <algorithm>
+
 #include "ir/build.h"
 #include "simplify/simplify.h"
 
@@ -45,6 +47,8 @@ Range ComputePlace::bind_part(const std::string& name, const Slide& slide, Inter
   } else {
     range.max = this->name(name + ".max", part.max, true);
     extent = simplify(range.max - range.min + 1);
+    for (const Expr& end : {range.min, range.max})
+      varying_parts_.push_back(end.as<Variable>()->name);
     note_part(range.min, whole, end_of_part(part.min, touched.min, touched));
     note_part(range.max, whole, end_of_part(part.max, touched.max, touched));
   }
@@ -56,6 +60,12 @@ void ComputePlace::note_part(const Expr& end, const Interval& whole, const Inter
   parts_.push_back(name);
   whole_.push(name, whole);
   touched_.push(name, touched);
+}
+
+bool ComputePlace::mentions_parts(const Interval& side) const {
+  return std::ranges::any_of(varying_parts_, [&](const std::string& part) {
+    return uses_variable(side.min, part) || uses_variable(side.max, part);
+  });
 }
 
 void ComputePlace::learn_names() {

@@ -32,6 +32,8 @@ class ComputePlace {
   // Boxes in terms of what lies around the site.
   Box whole(const Box& box) { return expand(box, whole_); }
   Box touched(const Box& box) { return expand(box, touched_); }
+  // Whether an end depends on what a Func that slides computes, if that may be nothing.
+  bool mentions_parts(const Interval& side) const;
   bool has_names() const { return !bindings.empty(); }
   // The same value without names that stand for one.
   Expr without_names(const Expr& e);
@@ -39,7 +41,7 @@ class ComputePlace {
  private:
   Substitution values_;  // of names that stand for one value, in terms of parts and outer names
   size_t known_ = 0;     // bindings that values_ has
-  std::vector<std::string> parts_;
+  std::vector<std::string> parts_, varying_parts_;  // names of ends; those of parts whose extent varies
   Scope<Interval> whole_, touched_;
 
   Expr name(const std::string& name, const Expr& value, bool always);

@@ -98,18 +98,29 @@ int slide_lead(const std::vector<Slide>& slides, int lead, const ComputePlace& s
   return lead;
 }
 
-// Iterations before the first of a loop run for some consumers only; what the others would read
-// in them may lie outside of all that is ever needed. (A part that slides begins where it must.)
-void clamp_to_needed(Box& required, const std::vector<Slide>& slides, ComputePlace& site) {
-  const std::string& loop = site.around[0].name;
-  const Box whole = site.whole(required), ever = ranged_over({site.around[0]}, whole);
+// What is computed of a Func that does not slide over the loop around, next to Funcs that do.
+//
+// Before the loop's first iteration it is what the first needs: only consumers that slide run there, and compute
+// parts of what the first iteration needs; what the others would read lies outside of all that is ever needed.
+// A part may be empty, and then begins right behind or ends right before what its iteration needs. Reads that
+// follow from its ends are kept inside of the reads of that whole, for storage and inputs hold no more.
+void keep_inside_needs(Box& required, const std::vector<Slide>& slides, bool is_early,
+                       ComputePlace& site) {
+  const Loop& loop = site.around[0];
+  const Box whole = site.whole(required);
   for (size_t d = 0; d < required.size(); d++) {
-    bool slid = std::any_of(slides.begin(), slides.end(), [&](const Slide& slide) {
-      return slide.dimension == static_cast<int>(d) && slide.loop.name == loop;
+    const bool slides_over_it = std::any_of(slides.begin(), slides.end(), [&](const Slide& slide) {
+      return slide.dimension == static_cast<int>(d) && slide.loop.name == loop.name;
     });
-    if (slid) continue;
-    if (uses_variable(whole[d].min, loop)) required[d].min = max(required[d].min, ever[d].min);
-    if (uses_variable(whole[d].max, loop)) required[d].max = min(required[d].max, ever[d].max);
+    if (slides_over_it) continue;
+    Interval& side = required[d];
+    const bool may_be_empty = site.mentions_parts(side);
+    if (is_early) {  // names that others gave speak of their own iterations, too
+      side = held_from_first({site.without_names(side.min), site.without_names(side.max)}, loop);
+    }
+    if (!may_be_empty) continue;
+    const auto [first, last] = is_early ? held_from_first(whole[d], loop) : whole[d];
+    side = {clamp(side.min, first, last), clamp(side.max, first, last)};
   }
 }
 
@@ -159,7 +170,8 @@ NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& cod
   const Wanted want = slide_together(members, wanted, site);
   piece.lead = want.first;
   for (Member& member : members) {
-    if (want.first != want.last) clamp_to_needed(member.need, member.slides, site);
+    if (!site.around.empty())
+      keep_inside_needs(member.need, member.slides, want.first > 0, site);
   }
   for (Member& member : members) member.required = member.need;
   Emitted made = emit_members(group, members, site, std::move(checks));

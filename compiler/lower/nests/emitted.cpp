@@ -1,6 +1,7 @@
 #include "lower/nests/emitted.h"
 
 #include "ir/build.h"
+#include "ir/visit.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::lower {
@@ -49,7 +50,20 @@ void merge_code(Emitted& into, const Emitted& from) {
   into.has_vectors |= from.has_vectors;
 }
 
+namespace {
+
+// Splits promise where the coordinates of a loop's iterations lie, not those of iterations before its first.
+Stmt without_promises_about(const std::string& loop, const Stmt& s) {
+  return rewrite(s, [&](const Expr& e, const auto& recurse) {
+    const auto* promise = as_op(e, Op::promise_clamped);
+    return promise && uses_variable(e, loop) ? recurse(promise->args[0]) : Expr();
+  });
+}
+
+}  // namespace
+
 void wrap(const Loop& loop, Emitted& code) {
+  if (code.lead > 0) code.stmt = without_promises_about(loop.name, code.stmt);
   Expr min = code.lead > 0 ? simplify(loop.min - code.lead) : loop.min;
   Expr extent = code.lead > 0 ? simplify(loop.extent + code.lead) : loop.extent;
   code.stmt = make_for(loop.name, min, extent, loop.runs, code.stmt, loop.partition);

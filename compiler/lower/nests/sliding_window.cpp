@@ -20,6 +20,14 @@ BoundsMap facts_of(const std::vector<Loop>& loops) {
   return facts;
 }
 
+Interval held_from_first(const Interval& side, const Loop& loop) {
+  const auto held = [&](const Expr& end) {
+    if (!end.defined() || !uses_variable(end, loop.name)) return end;
+    return simplify(substitute(end, loop.name, max(variable(loop.name), loop.min)));
+  };
+  return {held(side.min), held(side.max)};
+}
+
 namespace {
 
 // A split promises where its loop variable lies. It does not speak of the iterations of a warm-up,
@@ -53,6 +61,11 @@ class Slider {
   Slider(const LoopedFunc& f, const Box& box, const std::vector<Loop>& around)
       : f_(f), box_(box), slid_(box.size(), false), facts_(facts_of(around)) {}
 
+  // From here on of loops further out, each iteration of which has those before the first of `inner`, too.
+  void hold(const Loop& inner) {
+    for (Interval& side : box_) side = held_from_first(side, inner);
+  }
+
   std::optional<Slide> over(const Loop& loop, bool is_directly_around, int lead) {
     int d = only_moving_dimension(loop.name);
     if (d < 0 || slid_[d] || !is_pure_in(f_, d)) return {};
@@ -68,7 +81,7 @@ class Slider {
 
  private:
   const LoopedFunc& f_;
-  const Box& box_;
+  Box box_;
   std::vector<bool> slid_;
   const BoundsMap facts_;
 
@@ -195,8 +208,8 @@ class Slider {
     else if (const auto reach = reach_of_first_part(slide, first))
       slide.touched = without_promises(from(at_least_as_far_back(*fresh, *reach)));
     const Expr start = simplify(slide.loop.min - slide.lead);
-    slide.part = from(select(variable(slide.loop.name) <= start, first, *fresh));
-    if (slide.lead > 0) slide.part = without_promises(slide.part);
+    slide.part =
+        without_promises(from(select(variable(slide.loop.name) <= start, first, *fresh)));
     return true;
   }
 
@@ -227,7 +240,9 @@ std::vector<Slide> slides_of(const LoopedFunc& f, const Box& box, const std::vec
   std::vector<Slide> slides;
   Slider slider(f, box, around);
   for (size_t i = 0; i < loops.size() && can_slide_over(loops[i]); i++) {
-    if (auto slide = slider.over(loops[i], i == 0, i == 0 ? lead : 0)) slides.push_back(*slide);
+    const auto slide = slider.over(loops[i], i == 0, i == 0 ? lead : 0);
+    if (slide) slides.push_back(*slide);
+    if (i == 0 && (slide ? slide->lead : lead) > 0) slider.hold(loops[0]);
   }
   return slides;
 }

@@ -37,6 +37,9 @@ struct Slide {
   Interval touched;  // no less than the part, without the choice between the first and others
 };
 
+// The same from the loop's first iteration on; before it as in the first.
+Interval held_from_first(const Interval& side, const Loop& loop);
+
 // `box`: what one iteration needs of f. `loops`: between f's computation and its storage, innermost
 // first. `around`: all loops of the consumer from there on, whose ranges may be relied upon.
 // `lead`: how many iterations before the first of loops[0] f is wanted already.

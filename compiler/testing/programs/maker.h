@@ -2,7 +2,8 @@
 //
 // program.cpp: the styles, the order of things, regions. places.cpp: indices. inputs.cpp: images, and
 // reads of them and of Funcs. values.cpp: expressions. functions.cpp: smooth functions, kinks, guarded
-// branches. stages.cpp: Funcs, updates, reductions, loops over time. structures.cpp: what programs of
+// branches. stages.cpp: Funcs, updates, reductions, loops over time. chains.cpp: Funcs
+// at changing resolution. structures.cpp: what programs of
 // users are made of. pieces.cpp: the same of images of any size. rules.cpp: derivatives that the
 // author writes.
 #pragma once
@@ -91,6 +92,11 @@ class Maker {
   void add_sine();
   void add_stencil();
   void add_output();
+
+  // ---- chains ----
+  Expr resampled(const Expr& u, int factor, bool reads_coarser);
+  void add_link();
+
   Expr write_place(const RDom& r, size_t d, const std::vector<Var>& vars);
   Expr reached(const RVar& r, size_t d);
   void add_update(Func& f, const std::vector<Var>& vars);

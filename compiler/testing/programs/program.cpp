@@ -79,6 +79,17 @@ Style Style::pipelines() {
   return s;
 }
 
+Style Style::chains() {
+  Style s;
+  s.parts = {{Structure::Link, 100, 5, 12}};
+  s.image_types = s.value_types = {Int(32), Int(32), UInt(8)};
+  s.dimensions = {1, 1, 2};
+  s.image_dimensions = 2;
+  s.strides = 3;
+  s.has_integers = s.has_runs = true;
+  return s;
+}
+
 void Maker::run() {
   make_inputs();
   for (const Part& part : s_.parts) {
@@ -104,7 +115,8 @@ void Maker::add(Structure what) {
                                               &Maker::add_loop,
                                               &Maker::add_custom,
                                               &Maker::add_structure,
-                                              &Maker::add_piece};
+                                              &Maker::add_piece,
+                                              &Maker::add_link};
   (this->*adds[static_cast<size_t>(what)])();
 }
 

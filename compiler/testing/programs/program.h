@@ -59,6 +59,7 @@ enum class Structure : uint8_t {
   Ruled,    // with derivatives that the author writes
   OfUsers,  // what programs of users are made of, over the last Func
   Piece,    // the same of images: it reads no more than what is there
+  Link,     // reads the Funcs before it at another resolution
 };
 
 // So many of a structure, in so many programs of a hundred.
@@ -88,6 +89,7 @@ struct Style {
   static Style updates();    // Funcs that overwrite themselves at random places
   static Style pieces();     // of programs for images, at sizes that no vector divides
   static Style pipelines();  // all types and schedules: made to break the compiler
+  static Style chains();     // of five to twelve Funcs at changing resolution: made to break sliding windows
 };
 
 // Elements in each dimension of what updates work on.

@@ -1,0 +1,259 @@
+// check_accesses -- every load and store of the host's code looks whether it stays inside its storage.
+//
+// In:  Vector, as code generation gets it. Out: Vector; the same stores; a call fails at the first access that
+//      leaves its allocation or buffer, before it happens, and where a promise of the compiler's is false.
+//
+//   allocate f[int64(n)]:float32 {         let f.last = int64(n) - 1
+//     f[i] = g[ramp(j, 1, 8)]        =>    allocate f[int64(n)]:float32 {
+//   }                                        assert(0 <= i && i <= f.last, "f is written at i by stage ...")
+//                                            f[i] = require(0 <= ramp(j, 1, 8) && ..., g[ramp(j, 1, 8)], "g ...")
+//                                          }
+//
+// Method: it runs last, so that the code that it checks is the code that runs without it. A load is checked where
+//         its value is computed, under the conditions of the choices around it. Lanes that a predicate turns off
+//         may be anywhere, and their coordinates break what their loops promise. Inside of Atomic nothing changes, for its form is what makes it one instruction: the
+//         same checks stand before it.
+// Not done: kernels, whose accesses the simulated device checks; what extern stages do.
+// Tests: test/golden/lower/check_accesses/, test/unit/checked_accesses_test.cpp.
+#include "lower/instrumentation/check_accesses.h"
+
+#include <optional>
+#include <unordered_map>
+
+#include "ir/build.h"
+#include "ir/visit.h"
+#include "lower/nests/copy_statement.h"
+#include "lower/nests/run_time_check.h"
+#include "retrograde_runtime.h"
+
+namespace retrograde::lower {
+namespace {
+
+// Elements that may be touched, as int64 offsets from where the memory is addressed.
+struct Room {
+  Expr first, last;
+};
+
+bool runs_on_device(const Stmt& s) { return s.kind() == Kind::Launch; }
+
+Expr as_int64(const Expr& e) { return cast_to(Int(64, e.type().lanes()), e); }
+
+Expr lanes_like(const Expr& scalar, const Expr& e) {
+  return e.type().is_scalar() ? scalar : make_broadcast(scalar, e.type().lanes());
+}
+
+// Of a vector the lane that lies lowest, or highest; a lane that is off counts as the place `neutral`.
+Expr extreme(Kind which, const Expr& index, const Expr& predicate, const Expr& neutral) {
+  Expr places = as_int64(index);
+  if (predicate.defined()) places = make_select(predicate, places, lanes_like(neutral, places));
+  return places.type().is_scalar() ? places : make_vector_reduce(which, places, 1);
+}
+
+class AccessChecker : public Rewriter {
+ public:
+  explicit AccessChecker(std::unordered_map<std::string, Room> rooms) : rooms_(std::move(rooms)) {}
+
+ protected:
+  Expr rewrite(const Expr& e) override {
+    if (const auto* call = as_op(e, Op::address_of)) return address(e, *call);
+    if (as_op(e, Op::promise_clamped)) return checked_promise(children(e));
+    if (const auto* load = e.as<Load>()) return checked_load(*load);
+    return children(e);
+  }
+
+  Stmt rewrite(const Stmt& s) override {
+    if (runs_on_device(s)) return s;
+    return match(
+        s, [&](const Allocate& n) { return visit_allocate(s, n); },
+        [&](const For& n) { return visit_loop(s, n); },
+        [&](const Store& n) {
+          const Stmt check = store_check(n);
+          return make_block({check, under(n.predicate, [&] { return children(s); })});
+        },
+        [&](const Atomic& n) { return make_block({checks_of(n.body), s}); },
+        [&](const StmtNode&) { return children(s); });
+  }
+
+ private:
+  std::unordered_map<std::string, Room> rooms_;
+  LoopName stage_;
+  Expr mask_;  // of the access around: what its lanes that are off compute is of no matter
+
+  // What a predicate's access evaluates; without one, the mask around it stays.
+  template <class Part>
+  auto under(const Expr& predicate, const Part& part) -> decltype(part()) {
+    if (!predicate.defined()) return part();
+    const Expr around = mask_;
+    mask_ = predicate;
+    forget();
+    auto result = part();
+    mask_ = around;
+    forget();
+    return result;
+  }
+
+  // ---- rooms ----
+
+  Stmt visit_allocate(const Stmt& s, const Allocate& n) {
+    const Expr last = binary(Kind::Sub, n.elements, make_const(Int(64), 1));
+    const Expr name = is_const(last) ? last : variable(n.name + ".last", Int(64));
+    rooms_[n.name] = {make_const(Int(64), 0), name};
+    const Stmt result = children(s);
+    return is_const(last) ? result : make_let(n.name + ".last", last, result);
+  }
+
+  Stmt visit_loop(const Stmt& s, const For& n) {
+    const LoopName around = stage_;
+    stage_ = decode_loop_name(n.name);
+    forget();  // messages name the stage
+    const Stmt result = children(s);
+    stage_ = around;
+    forget();
+    return result;
+  }
+
+  // ---- checks ----
+
+  std::string asked(const std::string& name, const char* access) const {
+    const std::string by = stage_.func.empty()
+                               ? std::string()
+                               : text(" by stage ", stage_.stage, " of ", quoted(stage_.func));
+    return text("checked_accesses: ", quoted(name), " is ", access, by, " at element ");
+  }
+
+  struct Check {
+    Expr holds, error;
+  };
+
+  // None for memory whose extent is not known here.
+  std::optional<Check> check_of(const std::string& name, const char* access, const Expr& index,
+                                const Expr& predicate) const {
+    const Room* room = find_or_null(rooms_, name);
+    if (!room) return {};
+    const Expr low = extreme(Kind::Min, index, predicate, room->first);
+    const Expr high = extreme(Kind::Max, index, predicate, room->last);
+    std::vector<Expr> message = {Expr(int32_t{retrograde_error_access_out_of_bounds}),
+                                 Expr(asked(name, access)), low};
+    if (!index.type().is_scalar()) {
+      message.emplace_back(" to ");
+      message.push_back(high);
+    }
+    message.emplace_back(". An access stays inside its storage, which has the elements ");
+    message.push_back(room->first);
+    message.emplace_back(" to ");
+    message.push_back(room->last);
+    message.emplace_back(
+        ". Correct what unsafe_promise_clamped() or allow_race_conditions() promises; a program without them "
+        "has met a fault of the compiler: report it.");
+    const Expr holds = binary(Kind::And, binary(Kind::LE, room->first, low),
+                              binary(Kind::LE, high, room->last));
+    return Check{holds, call_op(Op::error, Int(32), std::move(message))};
+  }
+
+  Expr checked_load(const Load& n) {
+    const Expr predicate = n.predicate.defined() ? (*this)(n.predicate) : Expr();
+    const Expr index = under(n.predicate, [&] { return (*this)(n.index); });
+    const Expr value = make_load(n.type, n.name, index, predicate, n.symbol);
+    const auto check = check_of(n.name, "read", index, predicate);
+    if (!check) return value;
+    return call_op(Op::require, value.type(), {check->holds, value, check->error});
+  }
+
+  Stmt store_check(const Store& n) {
+    const Expr predicate = n.predicate.defined() ? (*this)(n.predicate) : Expr();
+    const Expr index = under(n.predicate, [&] { return (*this)(n.index); });
+    const auto check = check_of(n.name, "written", index, predicate);
+    return check ? make_assert(check->holds, check->error) : Stmt();
+  }
+
+  // Its address is asked for, not its value.
+  Expr address(const Expr& e, const Call& call) {
+    const auto* load = call.args[0].as<Load>();
+    const Expr index = (*this)(load->index);
+    if (index.same_as(load->index)) return e;
+    return call_op(Op::address_of, e.type(),
+                   {make_load(load->type, load->name, index, load->predicate, load->symbol)});
+  }
+
+  Expr checked_promise(const Expr& promise) const {
+    const auto* call = promise.as<Call>();
+    const Expr &value = call->args[0], &low = call->args[1], &high = call->args[2];
+    const Expr error = call_op(
+        Op::error, Int(32),
+        {Expr(int32_t{retrograde_error_internal}),
+         Expr(text(asked_promise(), "a coordinate is taken to lie between ")), low, Expr(" and "),
+         high, Expr(", which its loops see to, but it is "), value,
+         Expr(". This is a fault of the compiler: report the program.")});
+    Expr holds = binary(Kind::And, binary(Kind::LE, low, value), binary(Kind::LE, value, high));
+    if (mask_.defined() && mask_.type().lanes() == holds.type().lanes())
+      holds = binary(Kind::Or, logical_not(mask_), holds);
+    else if (!holds.type().is_scalar())  // of a branch that some lanes take: it runs for one at least
+      holds = make_vector_reduce(Kind::Or, holds, 1);
+    return call_op(Op::require, value.type(), {holds, value, error});
+  }
+  std::string asked_promise() const {
+    return stage_.func.empty() ? std::string("checked_accesses: ")
+                               : text("checked_accesses: in stage ", stage_.stage, " of ",
+                                      quoted(stage_.func), " ");
+  }
+
+  // What an indivisible update would be checked for.
+  Stmt checks_of(const Stmt& s) {
+    return match(
+        s,
+        [&](const Store& n) {
+          return make_block({store_check(n), make_evaluate((*this)(n.value))});
+        },
+        [&](const Evaluate& n) { return make_evaluate((*this)(n.value)); },
+        [&](const LetStmt& n) { return make_let(n.name, (*this)(n.value), checks_of(n.body)); },
+        [&](const IfThenElse& n) {
+          return make_if((*this)(n.condition), checks_of(n.when_true),
+                         n.when_false.defined() ? checks_of(n.when_false) : Stmt());
+        },
+        [&](const Block& n) {
+          return make_block(mapped(n.stmts, [&](const Stmt& part) { return checks_of(part); }));
+        },
+        [&](const StmtNode&) { return make_evaluate(0); });
+  }
+};
+
+// What lies between the first and the last element of a buffer, whatever the signs of its strides.
+void add_room(const LoweredArgument& arg, Lets& lets, std::unordered_map<std::string, Room>& rooms) {
+  const Expr buffer = variable(arg.name + ".buffer", Handle()), zero = make_const(Int(64), 0);
+  Expr first = zero, last = zero, is_empty = const_false();
+  // What the function has not checked yet when this runs.
+  const Expr is_usable = binary(Kind::EQ, call_op(Op::buffer_dimensions, Int(32), {buffer}),
+                                Expr(arg.dimensions));
+  const auto if_usable = [&](const Expr& value, int otherwise) {
+    const Expr without = make_const(Int(64), otherwise);
+    return call_op(Op::if_then_else, Int(64),
+                   {call_op(Op::buffer_is_null, Bool(), {buffer}), without,
+                    call_op(Op::if_then_else, Int(64), {is_usable, value, without})});
+  };
+  for (int d = 0; d < arg.dimensions; ++d) {
+    const Expr extent = call_op(Op::buffer_extent, Int(32), {buffer, Expr(d)});
+    const Expr stride = call_op(Op::buffer_stride, Int(32), {buffer, Expr(d)});
+    const Expr reach = binary(
+        Kind::Mul, binary(Kind::Sub, as_int64(extent), make_const(Int(64), 1)), as_int64(stride));
+    first = binary(Kind::Add, first, binary(Kind::Min, reach, zero));
+    last = binary(Kind::Add, last, binary(Kind::Max, reach, zero));
+    is_empty = binary(Kind::Or, is_empty, binary(Kind::LE, extent, Expr(0)));
+  }
+  const std::string first_name = arg.name + ".first", last_name = arg.name + ".last";
+  lets.emplace_back(first_name, if_usable(make_select(is_empty, zero, first), 0));
+  lets.emplace_back(last_name, if_usable(make_select(is_empty, make_const(Int(64), -1), last), -1));
+  rooms[arg.name] = {variable(first_name, Int(64)), variable(last_name, Int(64))};
+}
+
+}  // namespace
+
+Stmt check_accesses(const Stmt& s, const std::vector<LoweredArgument>& args) {
+  Lets lets;
+  std::unordered_map<std::string, Room> rooms;
+  for (const LoweredArgument& arg : args) {
+    if (arg.is_buffer()) add_room(arg, lets, rooms);
+  }
+  return make_lets(lets, AccessChecker(std::move(rooms))(s));
+}
+
+}  // namespace retrograde::lower

@@ -1,0 +1,131 @@
+// Target::CheckedAccesses: an access that leaves its storage is an error that names Func, stage, element and extent,
+// before it happens; a program whose accesses all lie inside is what it was.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+
+#include "retrograde/retrograde.h"
+#include "support/errors.h"
+
+namespace retrograde {
+namespace {
+
+Target checked(Target::Feature feature = Target::CheckedAccesses) {
+  return get_jit_target_from_environment().with_feature(feature);
+}
+
+class CheckedAccesses : public testing::Test {
+ protected:
+  void SetUp() override {
+    for (int i = 0; i < 16; ++i) places(i) = i % 10;
+  }
+
+  std::string error_of(Func f, const std::vector<int>& sizes, const Target& target = checked()) {
+    try {
+      f.realize(sizes, target);
+    } catch (const RuntimeError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  static void expect_parts(const std::string& message, const std::vector<std::string>& parts) {
+    for (const std::string& part : parts)
+      EXPECT_NE(message.find(part), std::string::npos) << part << " is not in: " << message;
+  }
+
+  // table(0 .. 9), read where `places` says.
+  Func reader() {
+    table(x) = x * 7;
+    table.compute_root();
+    read(x) = table(unsafe_promise_clamped(places(x), 0, 9));
+    return read;
+  }
+
+  Var x{"x"}, y{"y"};
+  Func table{"table"}, read{"read"}, counts{"counts"}, out{"out"};
+  Buffer<int> places{16};
+};
+
+TEST_F(CheckedAccesses, LetLegalProgramsRun) {
+  Buffer<int> result = reader().realize({16}, checked());
+  for (int i = 0; i < 16; ++i) EXPECT_EQ(result(i), i % 10 * 7);
+}
+
+TEST_F(CheckedAccesses, NameFuncStageElementAndStorageOfALoad) {
+  places(11) = 123;
+  expect_parts(error_of(reader(), {16}), {"checked_accesses: \"table", "is read by stage 0 of \"read",
+                                          "at element 123", "elements 0 to 9", "report"});
+}
+
+TEST_F(CheckedAccesses, CheckEveryLane) {
+  places(13) = -5;
+  Func f = reader();
+  f.vectorize(x, 8);
+  expect_parts(error_of(f, {16}), {"\"table", "at element -5 to"});
+}
+
+TEST_F(CheckedAccesses, CheckStoresOfUpdates) {
+  places(3) = 77;
+  RDom r(0, 16);
+  counts(x) = 0;
+  counts(unsafe_promise_clamped(places(r), 0, 9)) += 1;
+  counts.compute_root();
+  out(x) = counts(x);
+  const std::string error = error_of(out, {10});
+  expect_parts(error, {"\"counts", "by stage 1 of \"counts", "at element 77"});
+}
+
+TEST_F(CheckedAccesses, CheckAtomicUpdatesBeforeTheyHappen) {
+  places(3) = 77;
+  RDom r(0, 16);
+  counts(x) = 0;
+  counts(unsafe_promise_clamped(places(r), 0, 9)) += 1;
+  counts.compute_root().update().atomic().parallel(r);
+  out(x) = counts(x);
+  expect_parts(error_of(out, {10}), {"\"counts", "at element 77"});
+}
+
+TEST_F(CheckedAccesses, CheckBuffersOfTheCaller) {
+  Buffer<int> image(10);
+  image.fill(1);
+  Func f("f");
+  f(x) = image(unsafe_promise_clamped(places(x), 0, 9));
+  places(7) = 10;
+  expect_parts(error_of(f, {16}), {"is read by stage 0 of \"f", "at element 10", "elements 0 to 9"});
+}
+
+TEST_F(CheckedAccesses, KnowBuffersThatRunBackwards) {
+  std::vector<int> memory(10, 3);
+  const halide_dimension_t backwards(0, 10, -1);
+  Buffer<int> image(Runtime::Buffer<int>(memory.data() + 9, 1, &backwards));
+  Func f("f");
+  f(x) = image(unsafe_promise_clamped(places(x), 0, 9));
+  EXPECT_EQ(error_of(f, {16}), "");
+  places(2) = -1;
+  expect_parts(error_of(f, {16}), {"at element 1", "elements -9 to 0"});
+}
+
+TEST_F(CheckedAccesses, AreWhatHalidesAsanAsksFor) {
+  places(11) = 123;
+  expect_parts(error_of(reader(), {16}, checked(Target::ASAN)), {"checked_accesses"});
+}
+
+TEST_F(CheckedAccesses, StayWithNoAsserts) {
+  places(11) = 123;
+  expect_parts(error_of(reader(), {16}, checked().with_feature(Target::NoAsserts)),
+               {"checked_accesses"});
+}
+
+TEST_F(CheckedAccesses, LetWhatIsNotComputedBe) {
+  places(11) = 123;
+  table(x) = x * 7;
+  table.compute_root();
+  read(x) = table(unsafe_promise_clamped(places(x), 0, 9));
+  read.compute_root();
+  out(x) = read(x);
+  EXPECT_EQ(error_of(out, {8}), "");
+}
+
+}  // namespace
+}  // namespace retrograde
