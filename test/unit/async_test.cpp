@@ -213,7 +213,7 @@ TEST_P(Async, AFuncStoredBesideTheAsyncOneHasStorageInBothBranches) {
 // In one loop nest: `first` is read by the async Func alone, `second` by what is computed after it,
 // or the other way round.
 TEST_P(Async, FuncsComputedTogetherOfWhichEachBranchReadsOne) {
-  for (bool turned : {false, true}) {
+  for (const auto& [turned, traced] : {std::pair(false, false), {true, false}, {false, true}, {true, true}}) {
     Var x("x"), y("y");
     Func first("first"), second("second"), ahead("ahead"), out("out"), copy("copy");
     first(x) = x * 2;
@@ -226,7 +226,12 @@ TEST_P(Async, FuncsComputedTogetherOfWhichEachBranchReadsOne) {
     first.compute_root();
     second.compute_root().compute_with(first, x);
     ahead.compute_at(out, y).store_root().async();
+    if (traced) {  // events stand between the two
+      first.trace_realizations();
+      second.trace_realizations();
+    }
     Pipeline both({out, copy});
+    both.set_custom_trace([](void*, const halide_trace_event_t*) { return 0; });
     both.jit_handlers().thread_limit = GetParam();
     Buffer<int> rows(16, 8), line(16);
     both.realize({rows, line});

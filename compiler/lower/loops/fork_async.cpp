@@ -93,19 +93,19 @@ bool produces_any(const Stmt& s, const Names& funcs) {
 bool produces(const Stmt& s, const std::string& func) { return produces_any(s, {func}); }
 
 // The Funcs that are computed together in the loops of a producer (compute_with): those of
-// producers directly inside each other.
+// producers inside each other with no loop in between. Tracing stands around the inner ones.
+void add_group(const Stmt& s, Names& names) {
+  if (const auto* let = s.as<LetStmt>()) return add_group(let->body, names);
+  if (const auto* block = s.as<Block>()) {
+    for (const Stmt& part : block->stmts) add_group(part, names);
+  } else if (const ProducerConsumer* n = as_producer(s)) {
+    names.insert(n->name);
+    add_group(n->body, names);
+  }
+}
 Names group_of(const ProducerConsumer& producer) {
   Names names = {producer.name};
-  for (Stmt s = producer.body; s.defined();) {
-    if (const auto* let = s.as<LetStmt>()) {
-      s = let->body;
-    } else if (const ProducerConsumer* n = as_producer(s)) {
-      names.insert(n->name);
-      s = n->body;
-    } else {
-      break;
-    }
-  }
+  add_group(producer.body, names);
   return names;
 }
 
