@@ -65,8 +65,13 @@ bool has_exact_predecessor(const Expr& p) {
 // dx: p x^(p-1), 0 where p is 0.  dp: x^p log x, 0 where x is 0.
 // Where p - 1 is rounded, x^(p-1) is wrong by that times log x, or is another power altogether:
 // p v / x is not, unless v overflowed or underflowed.
+// Derivatives of both, as those of a program: the 0 of dx is p / x, whose derivative by p is 1 / x,
+// and where x is 0 nothing depends on p, in dx as in dp.
 Partials power_partials(Args a, const Expr& v, Op power, Op logarithm) {
-  const Expr &x = a[0], &p = a[1];
+  const Expr& x = a[0];
+  const Expr at_origin = x == num(x, 0);
+  const Expr p =
+      is_const(a[1]) ? a[1] : make_select(at_origin, call_op(Op::stop_gradient, {a[1]}), a[1]);
   Expr dx = p * call_op(power, x.type(), {x, p - num(p, 1)});
   if (!has_exact_predecessor(p)) {
     Expr size = call_op(Op::abs, {v});
@@ -75,8 +80,9 @@ Partials power_partials(Args a, const Expr& v, Op power, Op logarithm) {
     dx = make_select(lost, dx, p * v / x);
   }
   if (is_zero(p)) dx = num(x, 0);
-  if (!is_const(p)) dx = zero_where(p == num(p, 0), dx);
-  Expr dp = zero_where(x == num(x, 0), v * call_op(logarithm, {x}));
+  if (!is_const(p))
+    dx = make_select(a[1] == num(p, 0), call_op(Op::strong_div, x.type(), {p, x}), dx);
+  Expr dp = zero_where(at_origin, v * call_op(logarithm, {x}));
   return {strong(dx), strong(dp)};
 }
 Partials pow_partials(Args a, const Expr& v) { return power_partials(a, v, Op::pow, Op::log); }
@@ -146,9 +152,11 @@ Partials saturating_cast_partials(Args a, const Expr& v) {
   if (v.type().is_float()) inside = call_op(Op::abs, {a[0]}) <= num(a[0], largest_of(v.type()));
   return {plain(make_select(inside, make_one(v.type()), make_zero(v.type())))};
 }
-Partials strong_mul_partials(Args a, const Expr&) { return {strong(a[1]), strong(a[0])}; }
+// Where x is 0 the value is 0 for every y: the partial by y is a 0 that no infinite or NaN adjoint
+// or tangent undoes. The one by x is y even there, as the product rule has it.
+Partials strong_mul_partials(Args a, const Expr&) { return {strong(a[1]), {a[0], Strength::Both}}; }
 Partials strong_div_partials(Args a, const Expr& v) {
-  return {quotient(num(a[0], 1), a[1]), quotient(-v, a[1])};
+  return {quotient(num(a[0], 1), a[1]), {-v, Strength::Strong, a[1], true}};
 }
 
 Partials add_partials(Args a, const Expr&) {
@@ -396,6 +404,9 @@ bool is_finite_constant(const Expr& e) {
 namespace {
 
 bool is_cut(Strength strength) { return strength == Strength::Cut || strength == Strength::Both; }
+bool is_strong(Strength strength) {
+  return strength == Strength::Strong || strength == Strength::Both;
+}
 
 // adjoint / divisor * factor, in that order. A constant factor, at most 1, goes first: it cannot
 // overflow, and one division is all.
@@ -413,6 +424,13 @@ Expr divided_first(const Expr& adjoint, const Partial& partial) {
 
 }  // namespace
 
+Strength made_strong(Strength strength) {
+  return is_cut(strength) ? Strength::Both : Strength::Strong;
+}
+Strength made_cut(Strength strength) {
+  return is_strong(strength) ? Strength::Both : Strength::Cut;
+}
+
 Expr times_partial(const Expr& adjoint, const Partial& partial) {
   if (is_zero(partial.factor)) return make_zero(adjoint.type());
   // A choice stays a choice: inf * 0 must not make a NaN of the operand that was not taken.
@@ -424,7 +442,10 @@ Expr times_partial(const Expr& adjoint, const Partial& partial) {
   }
   if (partial.divisor.defined()) {
     if (!is_cut(partial.strength)) return divided_first(adjoint, partial);
-    return times_partial(adjoint, {partial.factor / partial.divisor, partial.strength});
+    const Expr factor = partial.is_strong_quotient ? call_op(Op::strong_div, partial.factor.type(),
+                                                             {partial.factor, partial.divisor})
+                                                   : partial.factor / partial.divisor;
+    return times_partial(adjoint, {factor, partial.strength});
   }
   Expr factor = cast_to(adjoint.type(), partial.factor);
   if (is_one(factor)) return adjoint;

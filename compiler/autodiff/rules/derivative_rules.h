@@ -24,6 +24,8 @@ enum class Strength : uint8_t {
   Cut,     // the adjoint may be infinite (it passed a pole): a partial of 0 makes the product 0
   Both,    // Strong and Cut
 };
+Strength made_strong(Strength strength);
+Strength made_cut(Strength strength);
 
 struct Partial {
   Expr factor;  // undefined: this operand gets nothing
@@ -31,6 +33,8 @@ struct Partial {
   // The partial is factor / divisor; undefined: 1. The adjoint is divided before it is multiplied:
   // 1 / y may overflow where adjoint / y, an adjoint itself, does not.
   Expr divisor = {};
+  // A factor of 0 stays 0 whatever the divisor is: it is the value of a strong quotient.
+  bool is_strong_quotient = false;
 };
 
 // A partial that may be infinite where an adjoint is 0.

@@ -296,8 +296,10 @@ StableForm stable_form(const Expr& e) {
     if (form.is_found()) return form;
   }
   if (const Call* arctangent = as_op(e, Op::atan)) return angle(arctangent->args[0]);
-  const StableForm norm = norm_form(e);
-  return !norm.is_found() ? normalised_form(e) : norm;
+  for (const StableForm& form : {norm_form(e), squared_norm_form(e)}) {
+    if (form.is_found()) return form;
+  }
+  return normalised_form(e);
 }
 
 }  // namespace retrograde::autodiff

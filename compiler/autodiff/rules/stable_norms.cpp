@@ -142,6 +142,68 @@ StableForm norm_form(const Expr& e) {
   return result;
 }
 
+namespace {
+
+// Products of products: to this depth, so that long chains of them take linear time.
+constexpr int deepest_product = 2;
+
+void add_factors(const Expr& e, int depth, std::vector<Expr>& factors) {
+  const auto* product = e.as<Mul>();
+  if (!product || depth > deepest_product) return factors.push_back(e);
+  add_factors(product->a, depth + 1, factors);
+  add_factors(product->b, depth + 1, factors);
+}
+
+// The factors of a product in which a norm stands twice, the two of them last; else none.
+std::vector<Expr> with_square_last(const Expr& e) {
+  if (const Expr root = square_root_of(e); root.defined() && !e.as<Mul>()) return {root, root};
+  std::vector<Expr> factors;
+  if (e.as<Mul>()) add_factors(e, 0, factors);
+  for (size_t i = 0; i < factors.size(); ++i) {
+    if (components_of_norm(factors[i]).empty()) continue;
+    for (size_t j = i + 1; j < factors.size(); ++j) {
+      if (!equal(factors[i], factors[j])) continue;
+      std::swap(factors[j], factors.back());
+      std::swap(factors[i], factors[factors.size() - 2]);
+      return factors;
+    }
+  }
+  return {};
+}
+
+// The product of all but one; undefined where there is no other.
+Expr product_without(const std::vector<Expr>& factors, size_t own) {
+  Expr product;
+  for (size_t i = 0; i < factors.size(); ++i) {
+    if (i != own) product = product.defined() ? product * factors[i] : factors[i];
+  }
+  return product;
+}
+
+}  // namespace
+
+// v = r |a|^2:  d/da_i = r 2 a_i, d/dr = |a|^2. Through |a| it is 2 r |a| times the unit vector: the
+// same, but for the origin, where neither has a derivative and the whole has 2 r.
+StableForm squared_norm_form(const Expr& e) {
+  std::vector<Expr> factors = with_square_last(e);
+  if (factors.empty()) return {};
+  const Expr norm = factors.back();
+  factors.resize(factors.size() - 2);
+  StableForm result;
+  const Expr others = product_without(factors, factors.size());
+  for (const Expr& a : components_of_norm(norm)) {
+    if (is_const(a)) continue;
+    const Expr slope = make_const(a.type(), 2) * a;
+    result.add(a, {others.defined() ? others * slope : slope, Strength::Plain});
+  }
+  for (size_t i = 0; i < factors.size() && result.is_found(); ++i) {
+    if (is_const(factors[i])) continue;
+    const Expr rest = product_without(factors, i), square = norm * norm;
+    result.add(factors[i], {rest.defined() ? rest * square : square, Strength::Plain});
+  }
+  return result;
+}
+
 StableForm normalised_form(const Expr& e) {
   StableForm result;
   if (const auto* quotient = e.as<Div>()) result = of_quotient(*quotient);

@@ -108,10 +108,11 @@ class ForwardSweep {
     const AdjointTraits& passed = traits_[local.operands[i].get()];
     const Passed here = passed_[local.operands[i].get()];
     const bool is_quotient = partial.divisor.defined();
-    if (factor.infinite || (here.choice && factor.read)) partial.strength = Strength::Strong;
+    if (factor.infinite || (here.choice && factor.read))
+      partial.strength = made_strong(partial.strength);
     if (passed.singular || (passed.infinite && local.levels_off_by(i)) ||
         (here.quotient && !is_quotient))
-      partial.strength = partial.strength == Strength::Plain ? Strength::Cut : Strength::Both;
+      partial.strength = made_cut(partial.strength);
     passed_[e.get()].choice |= here.choice || partial.factor.as<Select>();
     passed_[e.get()].quotient |= here.quotient || is_quotient;
     AdjointTraits& traits = traits_[e.get()];

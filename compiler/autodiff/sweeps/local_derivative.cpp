@@ -52,8 +52,7 @@ LocalDerivative sum_of(const std::vector<Expr>& operands, std::vector<Partial> p
     for (const Expr& part : {p.factor, p.divisor}) {
       if (part.defined()) partial.add(facts.finiteness_of(part));
     }
-    const bool is_weak = p.strength == Strength::Plain && !partial.risky;
-    p.strength = is_weak ? Strength::Plain : Strength::Strong;
+    if (partial.risky) p.strength = made_strong(p.strength);
     partial.risky |= p.divisor.defined();
     result.factors.push_back(partial);
   }
