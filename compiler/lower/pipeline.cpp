@@ -19,6 +19,7 @@
 #include "lower/loops/insert_prefetches.h"
 #include "lower/loops/keep_accumulators.h"
 #include "lower/loops/memoize.h"
+#include "lower/loops/skip_stages.h"
 #include "lower/lower.h"
 #include "lower/nests/argument_checks.h"
 #include "lower/nests/build_loop_nests.h"
@@ -153,6 +154,13 @@ constexpr Pass passes[] = {
     {"check_promises", Phase::Loops, wanted<Target::CheckUnsafePromises, check_promises>},
     {"write_debug_files", Phase::Loops,
      [](Lowering& lowering, const Stmt& s) { return write_debug_files(s, lowering.program); }},
+    {"skip_stages", Phase::Loops,
+     [](Lowering& lowering, const Stmt& s) {
+       return skip_stages(s, [&](const std::string& name) {
+         const LoopedFunc* f = lowering.program.find(name);
+         return !f || !f->schedule.async;
+       });
+     }},
     {"insert_prefetches", Phase::Loops,
      [](Lowering& lowering, const Stmt& s) { return insert_prefetches(s, lowering.program); }},
     {"lower_prefetches", Phase::Loops,

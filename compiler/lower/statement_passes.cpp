@@ -3,6 +3,7 @@
 #include "lower/instrumentation/check_accesses.h"
 #include "lower/loops/flatten_storage.h"
 #include "lower/loops/keep_accumulators.h"
+#include "lower/loops/skip_stages.h"
 #include "lower/vectors/vectorize_inner_loops.h"
 #include "simplify/simplify.h"
 
@@ -31,6 +32,8 @@ const std::vector<StatementPass>& statement_passes() {
       {"partition_loops", partition_loops},
       {"simplify", [](const Stmt& s) { return simplify(s); }},
       {"mask_guarded_loads", mask_guarded_loads},
+      {"skip_stages",  // every Func that is stored
+       [](const Stmt& s) { return skip_stages(s, [](const std::string&) { return true; }); }},
       {"transpose_loads", transpose_loads},
       {"drop_guarded_clamps", drop_guarded_clamps},
       {"trim_loops", trim_loops},

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <string>
+
+#include "ir/visit.h"
+
+namespace retrograde::lower {
+
+// `may_skip`: whether the Func of that name may be left out where no one reads it.
+Stmt skip_stages(const Stmt& s, FunctionRef<bool(const std::string&)> may_skip);
+
+}  // namespace retrograde::lower
