@@ -64,6 +64,7 @@ StorageLayouts storage_layouts(const Lowering& lowering) {
     if (!is_hoisted(f)) continue;
     layout.lies_in = place_name(f.name());
     layouts[layout.lies_in].is_place = layout.lies_in;
+    layouts[layout.lies_in].folds = layout.folds;
   }
   for (const auto& [name, original] : lowering.program.renamed) layouts[name] = layouts[original];
   return layouts;

@@ -55,8 +55,17 @@ TEST_F(HoistStorage, ToALoopInside) {
   g(x, y) = f(x - 1, y) + f(x, y + 1);
   g.tile(x, y, xo, yo, xi, yi, 8, 4).parallel(yo);
   f.compute_at(g, yi).store_at(g, xo).hoist_storage(g, yo);
-  EXPECT_EQ(allocation(g).first, 1);
+  EXPECT_EQ(allocation(g), std::make_pair(1, int64_t{9 * 2})) << "two rows are alive";
   expect_values(g, [](int i, int j) { return (i - 1) * 3 + j + i * 3 + j + 1; });
+}
+
+TEST_F(HoistStorage, OfWindowsThatSlide) {
+  Func f("f"), g("g");
+  f(x, y) = x * 3 + y;
+  g(x, y) = f(x - 1, y) + f(x + 1, y);
+  f.compute_at(g, x).store_at(g, y).hoist_storage_root();
+  EXPECT_EQ(allocation(g), std::make_pair(0, int64_t{4}));
+  expect_values(g, [](int i, int j) { return 6 * i + 2 * j; });
 }
 
 TEST_F(HoistStorage, OfTuples) {

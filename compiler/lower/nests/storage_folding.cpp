@@ -69,7 +69,7 @@ class Folder {
     if (Expr asked = asked_factor(d); asked.defined()) {
       bool fits = can_prove(touched <= asked, facts_);
       folds_[d] = {asked, fits ? Expr() : touched};
-    } else if (!is_hoisted(f_) && !f_.schedule.async && !f_.schedule.memoized &&
+    } else if (!f_.schedule.async && !f_.schedule.memoized &&
                !(is_vectorized_ && is_innermost(d))) {
       folds_[d].factor = smallest_power_of_two(touched);
     }
