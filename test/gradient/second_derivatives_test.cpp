@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "autodiff/jacobian.h"
 #include "autodiff/rules/derivative_rules.h"
 #include "autodiff/second_order.h"
 #include "autodiff/tangents.h"
@@ -421,6 +422,19 @@ TEST_F(HessiansAtExceptionalPoints, OfALogarithmThatIsNotChosenBehindAFunc) {
   logarithm.compute_root();
   EXPECT_EQ(hessian_of(loss, -1, 0), only_first(2));
   EXPECT_EQ(hessian_of(loss, 0, 0), only_first(2));
+}
+
+TEST_F(HessiansAtExceptionalPoints, AsWholeMatrices) {
+  Func loss("loss");
+  RDom both(0, 2);
+  loss() += select(a(both) > 0, sqrt(a(both)), a(both) * a(both));
+  a(0) = -1;
+  a(1) = 4;
+  const Buffer<float> found = hessian(loss, a).dense().realize({2, 2});
+  EXPECT_EQ(found(0, 0), 2);
+  EXPECT_EQ(found(0, 1), 0);
+  EXPECT_EQ(found(1, 0), 0);
+  EXPECT_FLOAT_EQ(found(1, 1), -1.0f / 32);
 }
 
 TEST_F(HessiansAtExceptionalPoints, OfAPowerWhoseExponentIsZero) {

@@ -138,6 +138,29 @@ TEST_F(SkipStages, StepsOfAReductionThatIsNoBox) {
   EXPECT_EQ(found(0), 6);
 }
 
+TEST_F(SkipStages, PointsOfAReductionThatIsNoBox) {
+  RDom r(0, 10, 0, 10);
+  r.where(r.x * r.x + r.y * r.y < 25);
+  a(x, y) = counted(0, x + y);
+  out(x) = 0;
+  out(x) += a(r.x, r.y);
+  a.compute_at(out, r.x);
+  run({1});
+  expect_calls({22});
+}
+
+TEST_F(SkipStages, SumsThatAreWantedInPlaces) {
+  RDom r(0, 5);
+  a(x) = 0;
+  a(x) += counted(0, x + r);
+  out(x) = select(x > 3 && x < 7, a(x), 0);
+  EXPECT_EQ(run({20})(5), 35);
+  expect_calls({15});
+  a.compute_at(out, x);
+  EXPECT_EQ(run({20})(5), 35);
+  expect_calls({15});
+}
+
 TEST_F(SkipStages, WindowsThatSlideAreComputedInAllIterationsOrNone) {
   a(x, y) = counted(0, x + y);
   out(x, y) = select(p && y > 2, a(x, y) + a(x, y + 1), 0);
