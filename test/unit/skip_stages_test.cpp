@@ -161,6 +161,25 @@ TEST_F(SkipStages, SumsThatAreWantedInPlaces) {
   expect_calls({15});
 }
 
+// The condition is what the C function says, which the select asks anyway.
+TEST_F(SkipStages, ConvolutionsThatAreWantedWhereAFunctionSaysSo) {
+  RDom r(0, 5);
+  out(x) = select(counted(0, x % 3) > 0, sum(counted(1, x + r)), 0);
+  EXPECT_EQ(run({30})(4), 4 + 5 + 6 + 7 + 8);
+  EXPECT_EQ(calls[0], 30);
+  EXPECT_EQ(calls[1], 20 * 5);
+}
+
+TEST_F(SkipStages, WindowsInTheLoopsOfAFuncThatIsReadInPlaces) {
+  a(x) = counted(0, x);
+  b(x) = a(x) + a(x - 1);
+  out(x) = select(x == 5, 0, b(x));
+  a.store_root().compute_at(b, x);
+  b.compute_at(out, x);
+  const Buffer<int> found = run({10});
+  for (int i = 0; i < 10; i++) EXPECT_EQ(found(i), i == 5 ? 0 : 2 * i - 1);
+}
+
 TEST_F(SkipStages, WindowsThatSlideAreComputedInAllIterationsOrNone) {
   a(x, y) = counted(0, x + y);
   out(x, y) = select(p && y > 2, a(x, y) + a(x, y + 1), 0);

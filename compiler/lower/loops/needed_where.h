@@ -14,7 +14,7 @@
 namespace retrograde::lower {
 
 // What is known where `condition` is true (or false: `holds`), made of what can be evaluated
-// anywhere: no memory, no C functions, no effects, and little work.
+// anywhere: no memory, no effects, and little work but in C functions, which are pure.
 Expr usable_where(const Expr& condition, bool holds);
 
 // Of "only where a" and "only where b": what holds in both, or where one of the two runs.
@@ -35,6 +35,9 @@ enum class AtLoops : uint8_t {
 
 // The condition as it looks from outside of the binder.
 Expr from_outside(const Expr& condition, const Binder& binder, AtLoops at_loops);
+
+// Without the parts that call C functions.
+Expr without_calls(const Expr& condition);
 
 // Without the parts that use one of the names.
 Expr without_parts_of(const Expr& condition, const std::unordered_set<std::string>& names);

@@ -10,7 +10,8 @@
 //
 // The consumers' selects and ifs say where they read it. A condition stays as far as it can be
 // evaluated where the storage of f begins: it is made of parameters, of extents of buffers, and of
-// variables of loops around that storage, and reads no memory. What depends on loops inside counts
+// variables of loops around that storage, and reads no memory. (A C function that a select calls
+// there anyway is pure, and called once for both.) What depends on loops inside counts
 // as true; but in a choice between Funcs, select(x < n, a(x), b(x - n)), it is asked whether x
 // reaches the arm at all, so that concatenations compute one part where the other is not wanted.
 // What only a skipped Func reads is skipped with it.
@@ -34,6 +35,7 @@
 //         test/golden/lower/skip_stages/, test/unit/skip_stages_test.cpp, test/property.
 #include "lower/loops/skip_stages.h"
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <unordered_map>
@@ -42,6 +44,7 @@
 #include <vector>
 
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "lower/loops/needed_where.h"
 #include "lower/statement_rewriter.h"
 #include "simplify/simplify.h"
@@ -149,8 +152,9 @@ class NeedFinder {
 
   void visit_branch(const IfThenElse& n) {
     visit_values({n.condition});
-    under(usable_where(n.condition, true), AtLoops::Forget, [&] { visit(n.when_true); });
-    under(usable_where(n.condition, false), AtLoops::Forget, [&] { visit(n.when_false); });
+    const auto where = [&](bool holds) { return without_calls(usable_where(n.condition, holds)); };
+    under(where(true), AtLoops::Forget, [&] { visit(n.when_true); });
+    under(where(false), AtLoops::Forget, [&] { visit(n.when_false); });
   }
 
   void visit_store(const Provide& n) {
@@ -215,6 +219,8 @@ class NeedFinder {
     Expr where = const_true();
     for (size_t i = stage.held; i < held_.size(); i++)
       where = both(where, seen_from(held_[i], stage.binders));
+    // C functions are called where they were, with their arguments: a select always does.
+    if (outside_ > stage.held) where = without_calls(where);
     add_need(func, stage, where);
   }
 
@@ -352,6 +358,28 @@ class NeedFinder {
   size_t outside_ = 0;  // conditions in force around it
 };
 
+// Calls of C functions in the condition, and equal ones in `body`, are one, before it.
+Stmt with_calls_shared(const std::string& func, const Expr& condition, Stmt body) {
+  std::vector<Expr> calls;
+  walk(condition, [&](const Expr& e) {
+    const auto* call = e.as<Call>();
+    if (!call || call->call_type != CallType::Extern) return true;
+    const auto is_known = [&](const Expr& known) { return equal(known, e); };
+    if (std::ranges::none_of(calls, is_known)) calls.push_back(e);
+    return false;
+  });
+  for (size_t i = 0; i < calls.size(); i++) {
+    const std::string name = text(func, ".asked.", i);
+    const Expr value = variable(name, calls[i].type());
+    body = rewrite(body, [&](const Expr& e, const auto&) -> Expr {
+      const auto* call = e.as<Call>();
+      return call && call->call_type == CallType::Extern && equal(e, calls[i]) ? value : Expr();
+    });
+    body = make_let(name, calls[i], body);
+  }
+  return body;
+}
+
 }  // namespace
 
 Stmt skip_stages(const Stmt& s, FunctionRef<bool(const std::string&)> may_skip) {
@@ -360,8 +388,13 @@ Stmt skip_stages(const Stmt& s, FunctionRef<bool(const std::string&)> may_skip) 
   return rewrite_statements(s, [&](const Stmt& node, auto& all) {
     const Stmt result = all.children(node);
     const auto* producer = node.as<ProducerConsumer>();
-    const auto guard = producer && producer->produces ? guards.find(producer->name) : guards.end();
+    const auto* storage = node.as<Realize>();
+    const bool is_producer = producer && producer->produces;
+    const auto guard = is_producer ? guards.find(producer->name)
+                       : storage   ? guards.find(storage->name)
+                                   : guards.end();
     if (guard == guards.end()) return result;
+    if (storage) return with_calls_shared(storage->name, guard->second, result);
     return is_const_false(guard->second) ? make_evaluate(0) : make_if(guard->second, result);
   });
 }
