@@ -85,6 +85,17 @@ TEST(ResolveUndef, ElementsOfATupleWithOneCondition) {
   EXPECT_EQ(values_of(all[2]), (Ints{3, 1, 3}));
 }
 
+TEST(ResolveUndef, AnElementUpdatedAloneSpeaksForAll) {
+  Func f("f");
+  RDom r(0, 4);
+  f(x) = Tuple(1, 2, 3);
+  f(r)[1] += select(r > 1, 10, undef<int>());
+  Realization all = f.realize({4});
+  EXPECT_EQ(values_of(all[0]), (Ints{1, 1, 1, 1}));
+  EXPECT_EQ(values_of(all[1]), (Ints{2, 2, 12, 12}));
+  EXPECT_EQ(values_of(all[2]), (Ints{3, 3, 3, 3}));
+}
+
 // What was never stored may hold anything, so it bounds no coordinate.
 TEST(ResolveUndef, PartlyStoredValuesBoundNothing) {
   Func index("index"), table("table"), out("out");

@@ -110,10 +110,20 @@ class StageResolver {
  private:
   Expr undef_of(size_t i) const { return call_op(Op::undef, definition_.values[i].type(), {}); }
 
-  // Elements that are never stored have no say.
+  // f(x)[0] = f(x)[0]: what f(x)[1] = e says of the other elements. It may be stored or not.
+  bool keeps_old_value(size_t i) const {
+    const Call* old = definition_.values[i].as<Call>();
+    return old && old->call_type == CallType::Func && old->name == f_.name() &&
+           old->component == static_cast<int>(i) &&
+           std::ranges::equal(old->args, definition_.args,
+                              [](const Expr& a, const Expr& b) { return equal(a, b); });
+  }
+
+  // Elements that are never stored, or keep their value, have no say.
   void check_alike() {
-    for (const Expr& where : where_) {
-      if (is_const_false(where)) continue;
+    for (size_t i = 0; i < where_.size(); ++i) {
+      const Expr& where = where_[i];
+      if (is_const_false(where) || keeps_old_value(i)) continue;
       if (common_.defined() && !equal(common_, where)) refuse(common_, where);
       common_ = where;
     }
