@@ -300,6 +300,37 @@ TEST(Predicates, MayReadWhatTheyGuard) {
   for (int i = 0; i < 8; ++i) EXPECT_EQ(of_f(i), i > 2 ? 11 * i : i);
 }
 
+// ---- choices and targets as text ----
+
+template <typename T>
+std::string shown(const T& value) {
+  std::ostringstream out;
+  out << value;
+  return out.str();
+}
+
+TEST(Printing, ChoicesByTheirNames) {
+  EXPECT_EQ(shown(TailStrategy::GuardWithIf), "GuardWithIf");
+  EXPECT_EQ(shown(TailStrategy::Auto), "Auto");
+  EXPECT_EQ(shown(MemoryType::Stack), "Stack");
+  EXPECT_EQ(shown(MemoryType::GPUShared), "GPUShared");
+  EXPECT_EQ(shown(DeviceAPI::CUDA), "CUDA");
+  EXPECT_EQ(shown(DeviceAPI::Default_GPU), "Default_GPU");
+  EXPECT_EQ(shown(LoopAlignStrategy::AlignEnd), "AlignEnd");
+  EXPECT_EQ(shown(PrefetchBoundStrategy::NonFaulting), "NonFaulting");
+  EXPECT_EQ(shown(Partition::Never), "Never");
+}
+
+TEST(Printing, TargetsAndLoopLevels) {
+  EXPECT_EQ(shown(Target("x86-64-linux-avx2")), "target(x86-64-linux-avx2)");
+  Var x("x");
+  Func f("print_level");
+  f(x) = x;
+  EXPECT_EQ(shown(LoopLevel(f, x)), f.name() + ".x");
+  EXPECT_EQ(shown(LoopLevel::root()), "root");
+  EXPECT_EQ(shown(LoopLevel()), "undefined");
+}
+
 // ---- what is refused ----
 
 // rule: buffers of arguments are memory of the CPU

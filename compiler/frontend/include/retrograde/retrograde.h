@@ -33,6 +33,7 @@
 #include "frontend/run/param_map.h"
 #include "frontend/run/pipeline.h"
 #include "frontend/run/warnings.h"
+#include "frontend/schedule/print_choices.h"
 #include "generator/generator.h"
 #include "ir/print.h"
 #include "ir/target.h"
