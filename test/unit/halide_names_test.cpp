@@ -331,6 +331,14 @@ TEST(Printing, TargetsAndLoopLevels) {
   EXPECT_EQ(shown(LoopLevel()), "undefined");
 }
 
+TEST(Evaluating, TuplesWhereADeviceMayHelp) {
+  int whole = 0;
+  float half = 0;
+  evaluate_may_gpu(Tuple(Expr(3), Expr(2.5f)), &whole, &half);
+  EXPECT_EQ(whole, 3);
+  EXPECT_EQ(half, 2.5f);
+}
+
 // ---- what is refused ----
 
 // rule: buffers of arguments are memory of the CPU

@@ -60,9 +60,14 @@ requires(sizeof...(Results) >= 1) void evaluate(const Tuple& values, Results*...
   i = 0;
   ((*results = realization[i++].template as<Results>()()), ...);
 }
+// The same: an expression without loops has nothing that a device would do faster.
 template <typename T>
 T evaluate_may_gpu(const Expr& e) {
   return evaluate<T>(e);
+}
+template <typename... Results>
+requires(sizeof...(Results) >= 1) void evaluate_may_gpu(const Tuple& values, Results*... results) {
+  evaluate(values, results...);
 }
 
 }  // namespace retrograde
