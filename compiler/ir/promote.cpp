@@ -86,13 +86,26 @@ RETROGRADE_DEFINE_OPERATOR(operator<, Kind::LT)
 RETROGRADE_DEFINE_OPERATOR(operator<=, Kind::LE)
 RETROGRADE_DEFINE_OPERATOR(operator>, Kind::GT)
 RETROGRADE_DEFINE_OPERATOR(operator>=, Kind::GE)
-RETROGRADE_DEFINE_OPERATOR(operator==, Kind::EQ)
-RETROGRADE_DEFINE_OPERATOR(operator!=, Kind::NE)
 RETROGRADE_DEFINE_OPERATOR(min, Kind::Min)
 RETROGRADE_DEFINE_OPERATOR(max, Kind::Max)
 #undef RETROGRADE_DEFINE_OPERATOR
 
 namespace {
+
+bool are_handles(const Expr& a, const Expr& b) {
+  return a.defined() && b.defined() && a.type().is_handle() && a.type() == b.type();
+}
+
+// Addresses are compared as numbers.
+Expr compared(Kind kind, Expr a, Expr b, const char* what) {
+  if (are_handles(a, b)) {
+    const Type address = UInt(64, a.type().lanes());
+    return ir::binary(kind, ir::reinterpret_as(address, std::move(a)),
+                      ir::reinterpret_as(address, std::move(b)));
+  }
+  ir::match_types(a, b, what);
+  return ir::binary(kind, std::move(a), std::move(b));
+}
 
 void check_bool(const Expr& e, const char* what) {
   ir::check_operand(e, what);
@@ -109,6 +122,13 @@ Expr logical(Kind kind, Expr a, Expr b, const char* what) {
 }
 
 }  // namespace
+
+Expr operator==(Expr a, Expr b) {
+  return compared(Kind::EQ, std::move(a), std::move(b), "operator==");
+}
+Expr operator!=(Expr a, Expr b) {
+  return compared(Kind::NE, std::move(a), std::move(b), "operator!=");
+}
 
 Expr operator&&(Expr a, Expr b) {
   return logical(Kind::And, std::move(a), std::move(b), "operator&&");
@@ -143,6 +163,7 @@ RETROGRADE_DEFINE_ASSIGNMENT(/=, /)
 #undef RETROGRADE_DEFINE_ASSIGNMENT
 
 Expr cast(Type type, Expr value) {
+  if (value.defined() && value.type() == type && type.is_handle()) return value;
   ir::check_operand(value, "cast");
   if (type.is_handle() || type.bits() == 0) {
     user_error("cast", "the new type must be a number", text("it is ", type),
@@ -181,7 +202,7 @@ void match_literals(Expr& a, Expr& b, const char* what) {
 
 Expr select(Expr condition, Expr when_true, Expr when_false) {
   check_bool(condition, "select");
-  match_literals(when_true, when_false, "select");
+  if (!are_handles(when_true, when_false)) match_literals(when_true, when_false, "select");
   return ir::make_select(std::move(condition), std::move(when_true), std::move(when_false));
 }
 

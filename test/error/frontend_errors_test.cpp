@@ -149,9 +149,9 @@ TEST(DefinitionErrors, UndefinedLeftHandSide) {
   });
 }
 
-TEST(DefinitionErrors, HandleValues) {
+TEST(DefinitionErrors, TextsAsValues) {
   Var x("x");
-  expect_error({"values are numbers"}, [&] {
+  expect_error({"values are numbers or pointers"}, [&] {
     Func g;
     g(x) = Expr("text");
   });
@@ -554,7 +554,7 @@ TEST(ParameterErrors, BuffersThatDoNotFit) {
   expect_error({"it has 2 dimensions"}, [&] { in.dim(2).extent(); });
   expect_error({"not negative"}, [&] { in.dim(0).set_extent(-1); });
   expect_error({"needs a type and dimensions"}, [] { ImageParam().width(); });
-  expect_error({"elements are numbers"}, [] { ImageParam bad(Handle(), 1); });
+  expect_error({"elements are numbers or pointers"}, [] { ImageParam bad(Type(), 1); });
 }
 
 TEST(ParameterErrors, ValuesThatDoNotFit) {

@@ -339,6 +339,65 @@ TEST(Evaluating, TuplesWhereADeviceMayHelp) {
   EXPECT_EQ(half, 2.5f);
 }
 
+// ---- pointers as values ----
+
+class Pointers : public testing::Test {
+ protected:
+  Var x{"x"};
+  const char* texts[4] = {"abc", "bc", "c", ""};
+  Buffer<const char*> image{4};
+  ImageParam in{Handle(), 1, "texts"};
+  Pointers() {
+    for (int i = 0; i < 4; i++) image(i) = texts[i];
+    in.set(image);
+  }
+  void expect_reversed(Func f) {
+    Buffer<const char*> found = f.realize({4});
+    for (int i = 0; i < 4; i++) EXPECT_EQ(found(i), texts[3 - i]) << i;
+  }
+};
+
+TEST_F(Pointers, OfParamsAndImagesAreValues) {
+  Param<const char*> word("word");
+  word.set(texts[0]);
+  Func stored("stored"), shifted("shifted"), reversed("reversed");
+  stored(x) = word;
+  shifted(x) = stored(x + 1);
+  stored.compute_root();
+  Buffer<const char*> same = shifted.realize({3});
+  EXPECT_EQ(same(2), texts[0]);
+  reversed(x) = in(3 - x);
+  expect_reversed(reversed);
+}
+
+TEST_F(Pointers, RunInVectorsAndThreads) {
+  Func wide("wide"), apart("apart");
+  wide(x) = in(3 - x);
+  wide.vectorize(x, 4);
+  expect_reversed(wide);
+  apart(x) = in(3 - x);
+  apart.parallel(x);
+  expect_reversed(apart);
+}
+
+TEST_F(Pointers, AreChosenComparedAndReadAsNumbers) {
+  Func last("last"), same("same"), number("number"), pair("pair");
+  RDom r(0, 4);
+  last() = in(0);
+  last() = select(r > 1, in(r), last());
+  Buffer<const char*> of_last = last.realize();
+  EXPECT_EQ(of_last(), texts[3]);
+  same(x) = in(x) == in(2) || in(x) != in(x);
+  Buffer<bool> of_same = same.realize({4});
+  for (int i = 0; i < 4; i++) EXPECT_EQ(of_same(i), i == 2) << i;
+  number(x) = reinterpret<uint64_t>(in(x));
+  Buffer<uint64_t> of_number = number.realize({4});
+  EXPECT_EQ(of_number(1), reinterpret_cast<uint64_t>(texts[1]));
+  pair(x) = Tuple(x, in(x));
+  Realization both = pair.realize({4});
+  EXPECT_EQ(Buffer<const char*>(both[1])(2), texts[2]);
+}
+
 // ---- what is refused ----
 
 // rule: buffers of arguments are memory of the CPU

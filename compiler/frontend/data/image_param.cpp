@@ -17,9 +17,9 @@ namespace {
 std::shared_ptr<graph::ParameterContents> make_parameter(Type type, int dimensions,
                                                          const std::string& name) {
   const std::string asked = "make the ImageParam " + quoted(name);
-  if (type.is_handle() || !type.is_scalar() || type.bits() == 0) {
-    user_error(asked, "its elements are numbers", "the type is " + to_string(type),
-               "Give a type of numbers");
+  if (!type.is_scalar() || type.bits() == 0) {
+    user_error(asked, "its elements are numbers or pointers", "the type is " + to_string(type),
+               "Give a type of scalars");
   }
   if (dimensions < 0)
     user_error(asked, "dimensions are not negative", text("they are ", dimensions),

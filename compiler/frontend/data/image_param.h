@@ -93,7 +93,7 @@ void check_estimates(const std::string& name, int dimensions, const Region& esti
 class ImageParam : public OutputImageParam {
  public:
   ImageParam() = default;
-  // Requires: its elements are numbers; dimensions are not negative.
+  // Requires: its elements are numbers or pointers; dimensions are not negative.
   ImageParam(Type type, int dimensions);
   ImageParam(Type type, int dimensions, const std::string& name);
   ImageParam(Type type, int dimensions, std::nullptr_t) = delete;

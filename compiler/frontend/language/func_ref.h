@@ -20,7 +20,8 @@ class FuncRef {
       : func_(std::move(func)), args_(std::move(args)) {}
 
   // Requires: every argument on the left-hand side must be a defined expression; a definition has
-  // at least one value; the right-hand side must be a defined expression; values are numbers; a
+  // at least one value; the right-hand side must be a defined expression; values are numbers or
+  // pointers; a
   // Func is defined once; a first definition has no reduction variables; the arguments of a first
   // definition are Vars; the arguments of a first definition are different Vars; a definition has
   // the dimensions that the Func was declared with; a right-hand side that uses _ needs _ on the
