@@ -398,6 +398,32 @@ TEST_F(Pointers, AreChosenComparedAndReadAsNumbers) {
   EXPECT_EQ(Buffer<const char*>(both[1])(2), texts[2]);
 }
 
+// ---- copies ----
+
+TEST(Copies, ToTheHostAreFuncsThatCopy) {
+  Var x("x");
+  Func f("f"), out("out");
+  f(x) = 3 * x;
+  out(x) = f(x) + f(x + 1);
+  f.compute_root();
+  f.in(out).copy_to_host().compute_root();
+  Buffer<int> found = out.realize({8});
+  for (int i = 0; i < 8; i++) EXPECT_EQ(found(i), 6 * i + 3);
+}
+
+TEST(Copies, ChangeNothing) {
+  Var x("x");
+  Func f("f"), moved("moved"), undefined("undefined");
+  f(x) = 3 * x;
+  moved(x) = f(x + 1);
+  for (Func* other : {&moved, &f}) {
+    expect_mentions(error_of<CompileError>([&] { other->copy_to_host(); }),
+                    {"same values at the same coordinates"});
+  }
+  expect_mentions(error_of<CompileError>([&] { undefined.copy_to_host(); }),
+                  {"it has no definition"});
+}
+
 // ---- what is refused ----
 
 // rule: buffers of arguments are memory of the CPU

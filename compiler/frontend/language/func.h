@@ -173,6 +173,8 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   Func copy_input(const Buffer<>& image);
   // Requires: storage lies in the memory of the CPU (Unsupported).
   Func copy_to_device(DeviceAPI device = DeviceAPI::Default_GPU);
+  // This Func, which does nothing but read another one, is computed by the host: g.in().copy_to_host().
+  // Requires: a copy is the same values at the same coordinates.
   Func copy_to_host();
 
   // ---- where it is computed and stored ----

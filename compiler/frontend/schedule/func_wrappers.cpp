@@ -1,6 +1,9 @@
-// func_wrappers.cpp -- Func::in and clone_in, and copies to devices, which there are none of.
+// func_wrappers.cpp -- Func::in and clone_in, and copies between memories.
+#include <algorithm>
+
 #include "frontend/language/func.h"
 #include "graph/wrappers.h"
+#include "ir/equal.h"
 
 namespace retrograde {
 
@@ -42,9 +45,25 @@ Func Func::copy_to_device(DeviceAPI) {
               "no code is generated for devices", "Leave it out");
 }
 
+// f(x, y) = g(x, y), and nothing more.
+static bool is_plain_copy(const graph::FuncContents& f) {
+  if (!f.pure || f.is_extern() || !f.updates.empty() || f.pure->values.size() != 1) return false;
+  const ir::Call* read = f.pure->values[0].as<ir::Call>();
+  if (!read || (read->call_type != ir::CallType::Func && read->call_type != ir::CallType::Image)) {
+    return false;
+  }
+  return std::ranges::equal(read->args, f.pure->args,
+                            [](const Expr& a, const Expr& b) { return ir::equal(a, b); });
+}
+
 Func Func::copy_to_host() {
-  unsupported("copy " + quoted(name()) + " from a device", "storage lies in the memory of the CPU",
-              "no code is generated for devices", "Leave it out");
+  if (!is_plain_copy(*func_)) {
+    user_error("copy " + quoted(name()) + " to the host",
+               "a copy is the same values at the same coordinates",
+               defined() ? text("its definition is another one") : text("it has no definition"),
+               "Copy a wrapper: " + name() + ".in().copy_to_host()");
+  }
+  return *this;
 }
 
 }  // namespace retrograde
