@@ -81,6 +81,78 @@ TEST(JITHandlers, ErrorsGoToTheHandlerAndNothingIsThrown) {
   expect_mentions(context.error, {"x is 5"});
 }
 
+struct Complaints : JITUserContext {
+  std::vector<std::string> told;
+  Complaints() {
+    handlers.custom_error = [](JITUserContext* c, const char* message) {
+      static_cast<Complaints*>(c)->told.emplace_back(message);
+    };
+  }
+  void expect_one(std::initializer_list<std::string_view> parts) {
+    ASSERT_EQ(told.size(), 1u);
+    expect_mentions(told[0], parts);
+    told.clear();
+  }
+};
+
+TEST(JITHandlers, ErrorsOfArgumentsGoToTheHandler) {
+  Var x("x");
+  Param<int> offset("offset", 5, 0, 10);
+  Func f("f"), pair("pair");
+  f(x) = x + offset;
+  pair(x) = Tuple(x, x);
+  Complaints c;
+  Buffer<int> out(3), longer(4), flat(3, 3);
+  Buffer<float> floats(3);
+  offset.set(20);
+  f.realize(&c, out);
+  c.expect_one({"\"offset\"", "20"});
+  const Buffer<int> sized = f.realize(&c, {3});
+  c.expect_one({"\"offset\"", "20"});
+  EXPECT_EQ(sized.width(), 3);
+  offset.set(3);
+  f.realize(&c, floats);
+  c.expect_one({"right element type"});
+  f.realize(&c, flat);
+  c.expect_one({"number of dimensions"});
+  pair.realize(&c, {out, longer});
+  c.expect_one({"one region"});
+  EXPECT_THROW(f.realize(floats), RuntimeError);
+  f.realize(&c, out);
+  EXPECT_EQ(out(2), 5);
+  EXPECT_TRUE(c.told.empty());
+}
+
+TEST(JITHandlers, ErrorsOfImagesThatAreMissingGoToTheHandler) {
+  Var x("x");
+  ImageParam in(Int(32), 1, "in");
+  Func f("f");
+  f(x) = in(x);
+  Complaints c;
+  f.realize(&c, {4});
+  c.expect_one({"\"in\"", "needs a buffer"});
+  Buffer<float> wrong(4);
+  f.infer_input_bounds(&c, wrong);
+  c.expect_one({"right element type"});
+  EXPECT_FALSE(in.get().defined());
+}
+
+TEST(JITHandlers, ErrorsOfCallablesAreTheirCodes) {
+  Var x("x");
+  Param<int> offset("offset", 5, 0, 10);
+  Func f("f");
+  f(x) = x + offset;
+  const Callable callable = f.compile_to_callable({offset});
+  Complaints c;
+  Buffer<int> out(3);
+  EXPECT_NE(callable(&c, 20, out), 0);
+  c.expect_one({"\"offset\"", "20"});
+  EXPECT_NE(callable(&c, 1.0f, out), 0);
+  c.expect_one({"must be of type int32"});
+  EXPECT_EQ(callable(&c, 3, out), 0);
+  EXPECT_EQ(out(2), 5);
+}
+
 TEST(JITHandlers, ThoseOfTheContextGoBeforeThoseOfTheFunc) {
   Var x("x");
   Func f("f");

@@ -147,6 +147,19 @@ void check_handlers(const JITHandlers& handlers, const std::string& asked) {
 
 }  // namespace
 
+int prepared(const JITHandlers& own, JITUserContext* user, FunctionRef<void()> prepare) {
+  try {
+    prepare();
+    return 0;
+  } catch (const RuntimeError& error) {
+    const auto custom = merged(own, user).custom_error;
+    if (!custom) throw;
+    JITUserContext nobody;
+    custom(user ? user : &nobody, error.what());
+    return error.code() != 0 ? error.code() : halide_error_code_generic_error;
+  }
+}
+
 int call(const CompiledPipeline& code, const JITHandlers& own, void* const* argv,
          const std::string& asked, JITUserContext* user) {
   JITUserContext nobody;

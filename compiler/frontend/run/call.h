@@ -7,6 +7,7 @@
 
 #include "frontend/run/compiler_interface.h"
 #include "frontend/run/param_map.h"
+#include "ir/visit.h"
 
 namespace retrograde::frontend {
 
@@ -48,6 +49,10 @@ class Arguments {
   void* bind_scalar(const ParameterPtr& parameter);
   void* bind_buffer(const ParameterPtr& parameter, bool is_query);
 };
+
+// Runs what checks and binds the arguments of a call. A RuntimeError goes to the handler of errors
+// where there is one: then its code is returned, which is not 0.
+int prepared(const JITHandlers& own, JITUserContext* user, FunctionRef<void()> prepare);
 
 // Runs it. The handlers of `user` go before `own`. RuntimeError for an error; where a handler was
 // told of it, the error code is returned instead.

@@ -114,10 +114,22 @@ void Callable::check(const std::vector<Value>& values) const {
 }
 
 int Callable::call(JITUserContext* context, const std::vector<Value>& values) const {
-  check(values);
+  const JITHandlers& handlers = contents_ ? contents_->handlers : JITHandlers();
+  const int refused = frontend::prepared(handlers, context, [&] { check(values); });
+  if (refused != 0) return refused;
   const std::string& asked = contents_->asked;
   std::vector<void*> argv(contents_->code->arguments().size() + 1);  // one more: for those unused
   std::vector<uint64_t> scalars(values.size());
+  const int unfit = frontend::prepared(handlers, context, [&] { bind(values, argv, scalars); });
+  if (unfit != 0) return unfit;
+  for (const Place& literal : contents_->literals)
+    argv[literal.position] = literal.parameter->buffer;
+  return frontend::call(*contents_->code, handlers, argv.data(), asked, context);
+}
+
+void Callable::bind(const std::vector<Value>& values, std::vector<void*>& argv,
+                    std::vector<uint64_t>& scalars) const {
+  const std::string& asked = contents_->asked;
   for (size_t i = 0; i < values.size(); i++) {
     const Place& place = contents_->places[i];
     if (place.is_buffer) {
@@ -130,9 +142,6 @@ int Callable::call(JITUserContext* context, const std::vector<Value>& values) co
     scalars[i] = frontend::scalar_bits(values[i].scalar);
     argv[place.position] = &scalars[i];
   }
-  for (const Place& literal : contents_->literals)
-    argv[literal.position] = literal.parameter->buffer;
-  return frontend::call(*contents_->code, contents_->handlers, argv.data(), asked, context);
 }
 
 }  // namespace retrograde

@@ -21,7 +21,14 @@ namespace retrograde {
 
 namespace frontend {
 struct DynamicCall;  // of other languages, which know at run time how many arguments there are
-}
+
+// Whether the first of some arguments is a context, or what derives from one.
+template <typename... Args>
+inline constexpr bool starts_with_context = false;
+template <typename First, typename... Rest>
+inline constexpr bool starts_with_context<First, Rest...> =
+    std::is_convertible_v<First, JITUserContext*>;
+}  // namespace frontend
 
 class Callable {
  public:
@@ -40,7 +47,7 @@ class Callable {
     return call(context, {value_of(args)...});
   }
   template <typename... Args>
-  int operator()(const Args&... args) const {
+  requires(!frontend::starts_with_context<Args...>) int operator()(const Args&... args) const {
     return call(nullptr, {value_of(args)...});
   }
 
@@ -103,6 +110,8 @@ class Callable {
   // Whether arguments of these kinds fit.
   void check(const std::vector<Value>& values) const;
   int call(JITUserContext* context, const std::vector<Value>& values) const;
+  void bind(const std::vector<Value>& values, std::vector<void*>& argv,
+            std::vector<uint64_t>& scalars) const;
   std::shared_ptr<const Contents> contents_;
 };
 

@@ -33,7 +33,8 @@ struct JITHandlers {
   // Runs a loop: calls the task for every index of [min, min + extent).
   int (*custom_do_par_for)(JITUserContext*, JITTask task, int min, int extent,
                            uint8_t* closure){nullptr};
-  // Told of the error of a call; realize() then returns and throws nothing.
+  // Told of the error of a call, also of arguments that do not fit: Params beyond their limits, and
+  // buffers of another type or shape. realize() then returns and throws nothing.
   void (*custom_error)(JITUserContext*, const char*){nullptr};
   // Told of every event of a trace; gives its number, which other events name as their parent.
   int32_t (*custom_trace)(JITUserContext*, const halide_trace_event_t*){nullptr};

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <iostream>
 #include <mutex>
+#include <optional>
 #include <unordered_set>
 
 #include "frontend/language/func.h"
@@ -318,11 +319,16 @@ ScheduleReport Pipeline::explain_schedule(const RealizationArg& outputs, const T
 
 void Pipeline::run(JITUserContext* context, const RealizationArg& given, const Target& target,
                    const ParamMap& map) const {
-  const std::vector<halide_buffer_t*> outputs = checked_outputs(given, true);
+  const JITHandlers& handlers = checked().handlers;
+  std::vector<halide_buffer_t*> outputs;
+  const auto check = [&] { outputs = checked_outputs(given, true); };
+  if (frontend::prepared(handlers, context, check) != 0) return;
   const auto code = compiled(target);
   const std::string asked = "realize " + names_of(contents_->outputs);
-  frontend::Arguments arguments(*code, outputs, false, asked, map);
-  frontend::call(*code, contents_->handlers, arguments.argv(), asked, context);
+  std::optional<frontend::Arguments> arguments;
+  const auto bind = [&] { arguments.emplace(*code, outputs, false, asked, map); };
+  if (frontend::prepared(handlers, context, bind) != 0) return;
+  frontend::call(*code, handlers, arguments->argv(), asked, context);
 }
 
 Realization Pipeline::run(JITUserContext* context, const std::vector<int32_t>& sizes,
@@ -331,13 +337,17 @@ Realization Pipeline::run(JITUserContext* context, const std::vector<int32_t>& s
   RealizationArg outputs(buffers);
   const auto code = compiled(target);
   const std::string asked = "realize " + names_of(contents_->outputs);
-  frontend::Arguments arguments(*code, outputs.buffers(), false, asked, map);
+  const JITHandlers& handlers = contents_->handlers;
+  std::optional<frontend::Arguments> arguments;
+  const auto bind = [&] { arguments.emplace(*code, outputs.buffers(), false, asked, map); };
   const auto call = [&] {
-    return frontend::call(*code, contents_->handlers, arguments.argv(), asked, context) == 0;
+    return frontend::call(*code, handlers, arguments->argv(), asked, context) == 0;
   };
   // Without memory the call is a query of what the outputs must be; no elements need none.
-  const bool is_empty = std::find(sizes.begin(), sizes.end(), 0) != sizes.end();
-  const bool succeeds = is_empty || contents_->target.has_feature(Target::NoBoundsQuery) || call();
+  const bool needs_no_query = std::find(sizes.begin(), sizes.end(), 0) != sizes.end() ||
+                              contents_->target.has_feature(Target::NoBoundsQuery);
+  const bool succeeds =
+      frontend::prepared(handlers, context, bind) == 0 && (needs_no_query || call());
   for (Buffer<>& buffer : buffers) {
     enlarge_to(*buffer.get(), sizes);
     frontend::allocate_host(*buffer.get());
@@ -355,14 +365,17 @@ void Pipeline::infer(JITUserContext* context, const std::vector<halide_buffer_t*
   constexpr int max_rounds = 16;
   const auto code = compiled(target);
   const std::string asked = "infer the input bounds of " + names_of(contents_->outputs);
-  frontend::Arguments arguments(*code, outputs, true, asked, map);
+  std::optional<frontend::Arguments> bound;
+  const auto bind = [&] { bound.emplace(*code, outputs, true, asked, map); };
+  if (frontend::prepared(contents_->handlers, context, bind) != 0) return;
+  frontend::Arguments& arguments = *bound;
   if (arguments.queries().empty()) return;
   for (int round = 0;; round++) {
     std::vector<std::vector<halide_dimension_t>> before;
     for (auto& [parameter, buffer] : arguments.queries()) {
       before.emplace_back(buffer.raw_buffer()->dim, buffer.raw_buffer()->dim + buffer.dimensions());
     }
-    frontend::call(*code, contents_->handlers, arguments.argv(), asked, context);
+    if (frontend::call(*code, contents_->handlers, arguments.argv(), asked, context) != 0) return;
     bool settled = true;
     for (size_t i = 0; i < before.size(); i++) {
       settled = settled && same_shape(*arguments.queries()[i].buffer.raw_buffer(), before[i]);
@@ -396,7 +409,10 @@ void Pipeline::infer(JITUserContext* context, const std::vector<int32_t>& sizes,
 
 void Pipeline::infer(JITUserContext* context, const RealizationArg& outputs, const Target& target,
                      const ParamMap& map) const {
-  infer(context, checked_outputs(outputs, false), target, map);
+  std::vector<halide_buffer_t*> shapes;
+  const auto check = [&] { shapes = checked_outputs(outputs, false); };
+  if (frontend::prepared(checked().handlers, context, check) == 0)
+    infer(context, shapes, target, map);
 }
 
 }  // namespace retrograde
