@@ -5,6 +5,7 @@
 #include "autoschedule/choose_schedule.h"
 #include "frontend/run/compiler_interface.h"
 #include "frontend/run/warnings.h"
+#include "jit/extern_pipelines.h"
 #include "jit/jit.h"
 #include "lower/lower.h"
 #include "retrograde_runtime.h"
@@ -21,8 +22,9 @@ struct CallState {
 CallState& state_of(retrograde_context* context) { return *reinterpret_cast<CallState*>(context); }
 CallContext& caller_of(retrograde_context* context) { return *state_of(context).caller; }
 
+// The first one of a call: it is the cause of the others.
 void keep_error(retrograde_context* context, int, const char* message) {
-  caller_of(context).error = message;
+  if (std::string& error = caller_of(context).error; error.empty()) error = message;
 }
 
 void hand_on_print(retrograde_context* context, const char* message) {
@@ -113,8 +115,10 @@ retrograde_context context_for(const CallContext& caller) {
 class JitPipeline : public CompiledPipeline {
  public:
   JitPipeline(std::vector<ir::LoweredArgument> arguments,
-              std::shared_ptr<const jit::CompiledFunction> code, const Target& target)
+              std::shared_ptr<const jit::CompiledFunction> code, jit::ExternPipelines called,
+              const Target& target)
       : arguments_(std::move(arguments)),
+        called_(std::move(called)),
         code_(std::move(code)),
         is_profiled_(target.has_feature(Target::Profile)),
         writes_on_host_(!target.has_gpu_feature()) {}
@@ -145,6 +149,7 @@ class JitPipeline : public CompiledPipeline {
   }
 
   const std::vector<ir::LoweredArgument> arguments_;
+  const jit::ExternPipelines called_;  // by the code
   const std::shared_ptr<const jit::CompiledFunction> code_;
   const bool is_profiled_;  // then every call tells of its profile
   const bool writes_on_host_;
@@ -161,9 +166,13 @@ class JitCompiler : public Compiler {
                      lower::infer_arguments(pipeline.outputs), options);
     jit::Options code_options;
     code_options.externs = pipeline.externs;
+    jit::ExternPipelines called = jit::compile_extern_pipelines(pipeline, target);
+    function.body = jit::call_pipelines(function.body, called);
+    for (const auto& [name, one] : called) code_options.externs[name] = one.code->address();
     auto code = jit::compile(function, target, code_options);
     for (const std::string& note : code->notes()) frontend::tell_warning(note);
-    return std::make_shared<JitPipeline>(std::move(function.args), std::move(code), target);
+    return std::make_shared<JitPipeline>(std::move(function.args), std::move(code),
+                                         std::move(called), target);
   }
 
   std::string loop_nest(const PipelineSpec& pipeline, const Target& target) override {

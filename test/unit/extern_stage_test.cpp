@@ -205,6 +205,94 @@ TEST(ExternFunction, IsFoundInTheProcessOrAmongTheExterns) {
   EXPECT_EQ(again(4), 8);
 }
 
+// ---- pipelines by name ----
+
+// An extern stage "inner" that reads `source`, and its consumer.
+struct CallsInner {
+  Var x{"x"};
+  Func source{"source"}, stage{"stage"}, out{"out"};
+  CallsInner(const std::vector<ExternFuncArgument>& more, bool gives_context) {
+    source(x) = 10 * x;
+    std::vector<ExternFuncArgument> args;
+    if (gives_context) args.emplace_back(user_context_value());
+    args.emplace_back(source);
+    args.insert(args.end(), more.begin(), more.end());
+    stage.define_extern("extern_test_inner", args, Int(32), 1);
+    out(x) = stage(x) + 1;
+    source.compute_root();
+    stage.compute_root();
+  }
+};
+
+// inner(x) = in(x + 1) * factor + table(x % 2), with a Buffer of its own
+struct Inner {
+  Var x{"x"};
+  ImageParam in{Int(32), 1, "in"};
+  Param<int> factor{"factor"};
+  Buffer<int> table{2};
+  Func f{"inner"};
+  Inner() {
+    table(0) = 100, table(1) = 200;
+    f(x) = in(x + 1) * factor + table(x % 2);
+  }
+};
+
+TEST(ExternPipeline, IsCalledByName) {
+  for (const bool gives_context : {false, true}) {
+    Inner inner;
+    CallsInner outer({Expr(3)}, gives_context);
+    Pipeline p(outer.out);
+    p.set_jit_externs({{"extern_test_inner", JITExtern(inner.f)}});
+    const Buffer<int> found = p.realize({6});
+    for (int i = 0; i < 6; i++) EXPECT_EQ(found(i), 30 * (i + 1) + 100 + i % 2 * 100 + 1) << i;
+  }
+}
+
+TEST(ExternPipeline, MayCallOthersAndBeChanged) {
+  Inner inner;
+  Func middle("middle"), copy("copy");
+  Var x("x");
+  ImageParam of_middle(Int(32), 1, "of_middle");
+  copy(x) = of_middle(x);
+  middle.define_extern("extern_test_innermost", {copy, Expr(2)}, Int(32), 1);
+  copy.compute_root();
+  Pipeline called(middle);
+  called.set_jit_externs({{"extern_test_innermost", JITExtern(inner.f)}});
+  CallsInner outer({}, true);
+  outer.out.set_jit_externs({{"extern_test_inner", JITExtern(called)}});
+  Buffer<int> found = outer.out.realize({4});
+  EXPECT_EQ(found(3), 20 * 4 + 200 + 1);
+  RDom r(0, 2);
+  inner.f(r) = 7;
+  found = outer.out.realize({4});
+  EXPECT_EQ(found(1), 8);
+  EXPECT_EQ(found(3), 281);
+}
+
+TEST(ExternPipeline, ItsErrorsAreThoseOfTheCall) {
+  Var x("x");
+  ImageParam in(Int(32), 1, "in");
+  Func f("inner");
+  f(x) = require(in(x) < 30, in(x), "too large:", in(x));
+  CallsInner outer({}, true);
+  outer.out.set_jit_externs({{"extern_test_inner", JITExtern(f)}});
+  expect_error<RuntimeError>({"too large: 30"}, [&] { outer.out.realize({6}); });
+}
+
+// rule: a pipeline that is called by name gets its arguments
+TEST(ExternPipeline, ArgumentsThatDoNotFitAreErrors) {
+  Inner inner;
+  CallsInner too_few({}, true), wrong({Expr(3.0f)}, true), too_many({Expr(3), Expr(4)}, true);
+  for (const CallsInner* outer : {&too_few, &wrong, &too_many}) {
+    Func out = outer->out;
+    out.set_jit_externs({{"extern_test_inner", JITExtern(inner.f)}});
+    expect_error<CompileError>(
+        {"\"extern_test_inner\"", "\"factor\" (int32)", "order of their names"},
+        [&] { out.compile_jit(); });
+  }
+  expect_error<CompileError>({"needs outputs"}, [] { JITExtern{Pipeline()}; });
+}
+
 TEST(ExternFunction, ArgumentsHaveTheDeclaredTypes) {
   Var x("x");
   Func f("f");

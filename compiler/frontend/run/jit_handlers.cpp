@@ -15,14 +15,11 @@ void frontend::check_allocator(bool allocates, bool frees) {
              "Give both, or neither");
 }
 
-static Pipeline supported_extern(Pipeline pipeline) {
-  unsupported("call a Pipeline by name", "what a pipeline calls by name is a C function",
-              "the JITExtern is made from a Pipeline",
-              "Use the Func itself, or a C function that calls realize()");
-  return pipeline;
+JITExtern::JITExtern(Pipeline pipeline) : pipeline_(std::move(pipeline)) {
+  if (pipeline_.defined()) return;
+  user_error("call a Pipeline by name", "it needs outputs", "it was constructed without any",
+             "Construct it: Pipeline p(f)");
 }
-
-JITExtern::JITExtern(Pipeline pipeline) : pipeline_(supported_extern(std::move(pipeline))) {}
 JITExtern::JITExtern(const Func& func) : JITExtern(Pipeline(func)) {}
 
 Expr frontend::checked_extern_call(const std::string& function, Type result,

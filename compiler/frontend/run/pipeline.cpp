@@ -24,16 +24,20 @@ struct Stamp {
   std::vector<std::pair<graph::FuncPtr, uint64_t>> funcs;
   std::vector<std::pair<ParameterPtr, uint64_t>> parameters;
 
-  static Stamp of(const std::vector<graph::FuncPtr>& outputs) {
+  static Stamp of(const PipelineSpec& pipeline) {
     Stamp result;
-    for (const graph::FuncPtr& f : graph::functions_of(outputs))
-      result.funcs.emplace_back(f, f->version);
-    for (const ParameterPtr& p : graph::parameters_of(outputs))
-      result.parameters.emplace_back(p, p->version);
-    for (const graph::FuncPtr& f : outputs) {
-      for (const ParameterPtr& p : f->outputs) result.parameters.emplace_back(p, p->version);
-    }
+    result.add(pipeline);
     return result;
+  }
+  void add(const PipelineSpec& pipeline) {
+    for (const graph::FuncPtr& f : graph::functions_of(pipeline.outputs))
+      funcs.emplace_back(f, f->version);
+    for (const ParameterPtr& p : graph::parameters_of(pipeline.outputs))
+      parameters.emplace_back(p, p->version);
+    for (const graph::FuncPtr& f : pipeline.outputs) {
+      for (const ParameterPtr& p : f->outputs) parameters.emplace_back(p, p->version);
+    }
+    for (const auto& [name, called] : pipeline.pipelines) add(*called);
   }
   bool is_current() const {
     const auto is_same = [](const auto& seen) { return seen.first->version == seen.second; };
@@ -147,8 +151,12 @@ void Pipeline::apply_schedule(const ScheduleLog& log) { graph::apply_log(log, ch
 
 PipelineSpec Pipeline::spec() const {
   PipelineSpec result{checked().outputs[0]->name, contents_->outputs};
-  for (const auto& [name, function] : contents_->externs)
-    result.externs[name] = function.extern_c_function().address();
+  for (const auto& [name, called] : contents_->externs) {
+    if (called.pipeline().defined())
+      result.pipelines[name] = std::make_shared<PipelineSpec>(called.pipeline().spec());
+    else
+      result.externs[name] = called.extern_c_function().address();
+  }
   result.is_traced = contents_->is_traced;
   result.autoschedule = contents_->autoschedule;
   return result;
@@ -202,8 +210,9 @@ std::shared_ptr<CompiledPipeline> Pipeline::compiled(const Target& wanted) const
     target = contents.compiled ? contents.target : get_jit_target_from_environment();
   if (!contents.compiled || !(contents.target == target) || !contents.stamp.is_current()) {
     contents.compiled.reset();
-    contents.stamp = Stamp::of(contents.outputs);
-    contents.compiled = default_compiler().compile(spec(), target);
+    const PipelineSpec pipeline = spec();
+    contents.stamp = Stamp::of(pipeline);
+    contents.compiled = default_compiler().compile(pipeline, target);
     contents.target = target;
     frontend::tell_warnings(contents.outputs);
   }

@@ -133,8 +133,14 @@ class Pipeline : public Runnable<Pipeline> {
   std::shared_ptr<Contents> contents_;
 };
 
-// A C function behind a name that a pipeline calls.
+// A C function behind a name that a pipeline calls; or a Pipeline, compiled with it, that an extern
+// stage calls. It takes user_context_value(), which may be left out, then what it uses of images,
+// then of Params, each in the order of their names, then its outputs:
+//   blur: uses the ImageParam "in" and the Param "radius"
+//   f.define_extern("blur", {user_context_value(), g, radius}, Float(32), 2);
+//   f.set_jit_externs({{"blur", JITExtern(blur)}});
 struct JITExtern {
+  // Requires: it needs outputs; a pipeline that is called by name gets its arguments.
   explicit JITExtern(Pipeline pipeline);
   explicit JITExtern(const Func& func);
   explicit JITExtern(ExternCFunction function) : function_(std::move(function)) {}

@@ -169,7 +169,6 @@ class Runnable {
     frontend::set_handler(handlers().custom_print, handler);
   }
   // What the C functions that the pipeline calls by name are; others are looked up in the process.
-  // Requires: what a pipeline calls by name is a C function (Unsupported).
   void set_jit_externs(const std::map<std::string, JITExtern>& externs) {
     pipeline_to("call C functions from ").set_externs(externs);
   }
