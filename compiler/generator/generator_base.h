@@ -149,6 +149,11 @@ class GeneratorBase : public NamesInterface {
     members_.inputs.push_back(result);
     return result;
   }
+  template <typename T>
+  GeneratorOutput<T>* add_output(const std::string& name, const std::vector<Type>& types,
+                                 int dims) {
+    return add_output<T, std::vector<Type>, int>(name, types, dims);
+  }
   template <typename T, typename... Args>
   GeneratorOutput<T>* add_output(const std::string& name, const Args&... args) {
     check_configuring("output", name);

@@ -44,17 +44,20 @@ class GeneratorContext {
   MachineParams machine_;
 };
 
-namespace internal {
-
+// What generators call by its plain name, without a using directive.
 class NamesInterface {
  protected:
+  using EvictionKey = retrograde::EvictionKey;
   using Expr = retrograde::Expr;
+  using ExternFuncArgument = retrograde::ExternFuncArgument;
   using Func = retrograde::Func;
   using GeneratorContext = retrograde::GeneratorContext;
   using ImageParam = retrograde::ImageParam;
   using LoopLevel = retrograde::LoopLevel;
   using MemoryType = retrograde::MemoryType;
+  using NameMangling = retrograde::NameMangling;
   using Pipeline = retrograde::Pipeline;
+  using PrefetchBoundStrategy = retrograde::PrefetchBoundStrategy;
   using RDom = retrograde::RDom;
   using RVar = retrograde::RVar;
   using TailStrategy = retrograde::TailStrategy;
@@ -79,5 +82,4 @@ class NamesInterface {
   static Type UInt(int bits, int lanes = 1) { return retrograde::UInt(bits, lanes); }
 };
 
-}  // namespace internal
 }  // namespace retrograde

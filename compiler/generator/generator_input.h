@@ -182,6 +182,7 @@ requires(internal::IsScalarIO<T> && !internal::IsArrayIO<T>) class GeneratorInpu
   GeneratorInput(const std::string& name, const Value& value, const Value& min, const Value& max)
       : Base(Declared(name), value, min, max) {}
   operator Expr() const { return Base::handles()[0]; }
+  operator ExternFuncArgument() const { return ExternFuncArgument(Base::handles()[0]); }
   void set_estimate(const Expr& value) { Base::set_estimate_of(0, value); }
 };
 

@@ -49,6 +49,8 @@ class OutputElements : public GeneratorOutputBase {
       : OutputElements(Declared(name, types)) {}
   OutputElements(const std::string& name, const std::vector<Type>& types, int dims)
       : OutputElements(Declared(name, types, dims)) {}
+  OutputElements(size_t size, const std::string& name, const std::vector<Type>& types, int dims)
+      : OutputElements(Declared(size, name, types, dims)) {}
 };
 
 }  // namespace internal

@@ -212,6 +212,96 @@ TEST(Generator, ConfigureAddsInputsAndOutputs) {
   EXPECT_EQ(both[1].as<float>()(5), ramp(6)(5));
 }
 
+std::vector<std::string> argument_names(const Module& module) {
+  std::vector<std::string> names;
+  const auto declared = module.get_metadata_name_map();
+  for (const Argument& argument : module.functions().back().args) {
+    const auto found = declared.find(argument.name);
+    names.push_back(found == declared.end() ? argument.name : found->second);
+  }
+  return names;
+}
+
+// What generators name without a using directive, inputs as arguments of a C function, and outputs
+// of several types.
+class Outside : public retrograde::Generator<Outside> {
+ public:
+  Input<Buffer<int32_t, 1>> image{"image"};
+  Input<Func> func{"func", Int(32), 1};
+  Input<int> factor{"factor", 3};
+  Input<float[2]> more{"more"};
+  Output<Func> both{"both", {Int(32), Float(32)}, 1};
+  Output<Buffer<>> open{"open", {Int(32), UInt(8)}, 1};
+  Output<Func[]> many{2, "many", {UInt(8), Int(16)}, 1};
+  Output<Func> any{"any", 1};
+  void configure() { extra_ = add_output<Func>("extra", {Int(32), Float(32)}, 1); }
+  void generate() {
+    stage_.define_extern("generator_test_sum", {image, func, factor, more[0]}, Int(32), 1,
+                         NameMangling::C);
+    const std::vector<ExternFuncArgument> arguments = {factor, image};
+    EXPECT_TRUE(arguments[0].is_expr());
+    both(x) = Tuple(stage_(x), more[1] * 2);
+    open(x) = Tuple(x, cast<uint8_t>(x));
+    many[0](x) = Tuple(cast<uint8_t>(x), cast<int16_t>(x));
+    many[1](x) = many[0](x);
+    any(x) = Tuple(x, x > 2);
+    (*extra_)(x) = Tuple(x, 0.5f);
+    EvictionKey key;
+    PrefetchBoundStrategy bound = PrefetchBoundStrategy::Clamp;
+    (void)key, (void)bound;
+  }
+  void schedule() { stage_.compute_root(); }
+
+ private:
+  Var x{"x"};
+  Func stage_{"stage"};
+  GeneratorOutput<Func>* extra_ = nullptr;
+};
+
+extern "C" int generator_test_sum(halide_buffer_t* image, halide_buffer_t* func, int factor,
+                                  float more, halide_buffer_t* out) {
+  const auto at = [](const halide_buffer_t* b, int i) {
+    return reinterpret_cast<int32_t*>(b->host)[i - b->dim[0].min];
+  };
+  for (halide_buffer_t* input : {image, func}) {
+    if (input->is_bounds_query()) input->dim[0] = out->dim[0];
+  }
+  if (image->is_bounds_query() || func->is_bounds_query() || out->is_bounds_query()) return 0;
+  for (int i = out->dim[0].min; i < out->dim[0].min + out->dim[0].extent; i++) {
+    reinterpret_cast<int32_t*>(out->host)[i - out->dim[0].min] =
+        at(image, i) + at(func, i) * factor + static_cast<int>(more);
+  }
+  return 0;
+}
+
+TEST(Generator, InputsAreArgumentsOfCFunctions) {
+  auto outside = GeneratorContext(get_jit_target_from_environment()).create<Outside>();
+  outside->any.set_types({Int(32), Bool()});
+  Buffer<int32_t> image(5);
+  for (int i = 0; i < 5; i++) image(i) = 100 * i;
+  Func func("func");
+  Var x;
+  func(x) = x;
+  func.compute_root();
+  outside->apply(image, func, 2, std::vector<float>{7.0f, 1.5f});
+  const Realization all = outside->realize({5});
+  ASSERT_EQ(all.size(), 12u);
+  EXPECT_EQ(all[0].as<int32_t>()(4), 400 + 8 + 7);
+  EXPECT_EQ(all[1].as<float>()(4), 3.0f);
+  EXPECT_EQ(all[3].as<uint8_t>()(3), 3);
+  EXPECT_EQ(all[7].as<int16_t>()(3), 3);
+  EXPECT_EQ(all[9].as<bool>()(3), true);
+  EXPECT_EQ(all[11].as<float>()(3), 0.5f);
+}
+
+TEST(Generator, OutputsOfSeveralTypesAreDeclaredAsText) {
+  auto outside = GeneratorContext(Target("x86-64-linux")).create<Outside>();
+  outside->set_generator_param_values({{"any.type", "int32,bool"}});
+  const Module module = outside->build_module("outside");
+  EXPECT_EQ(argument_names(module)[5], "both.0");
+  EXPECT_EQ(argument_names(module).size(), 5 + 12u);
+}
+
 // A generator that uses another one.
 class Twice : public Generator<Twice> {
  public:
@@ -234,16 +324,6 @@ TEST(Generator, UsesAnother) {
   twice->apply(in);
   const Buffer<float> out = twice->realize({20});
   EXPECT_EQ(out(5), 2.0f * (in(4) + in(5) + in(6)));
-}
-
-std::vector<std::string> argument_names(const Module& module) {
-  std::vector<std::string> names;
-  const auto declared = module.get_metadata_name_map();
-  for (const Argument& argument : module.functions().back().args) {
-    const auto found = declared.find(argument.name);
-    names.push_back(found == declared.end() ? argument.name : found->second);
-  }
-  return names;
 }
 
 using Names = std::vector<std::string>;
