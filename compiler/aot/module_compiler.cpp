@@ -276,6 +276,11 @@ class AheadOfTime : public ModuleCompiler {
     return function;
   }
 
+  ScheduleLog schedule(const PipelineSpec& pipeline, const Target& target) override {
+    return graph::schedule_log(
+        autoschedule::choose_schedule(pipeline, pipeline.traced(target)).graph.outputs);
+  }
+
   std::vector<uint8_t> object(const Module& module) override {
     const std::string bytes = Outputs(module, {{OutputFileType::object, ""}}).object();
     return {bytes.begin(), bytes.end()};

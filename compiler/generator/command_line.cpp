@@ -116,7 +116,11 @@ void check_complete(const CommandLine& command) {
   if (command.folder.empty()) {
     user_error(asked, "-o names the folder of its files", "it is missing", "Add -o .");
   }
-  if (command.targets.empty()) {
+  const bool needs_target = command.emit.empty() || !command.runtime.empty() ||
+                            std::ranges::any_of(command.emit, [](OutputFileType type) {
+                              return type != OutputFileType::cpp_stub;
+                            });
+  if (command.targets.empty() && needs_target) {
     user_error(asked, "target= names what to compile for", "it is missing",
                "Add target=host, or for example target=x86-64-linux-avx2");
   }
@@ -164,6 +168,18 @@ void run_runtime(const CommandLine& command) {
   compile_standalone_runtime(files_of(command, command.runtime), common);
 }
 
+// One for each target, as a schedule may ask for it.
+void emit_schedules(const CommandLine& command, const std::string& function,
+                    const std::string& base) {
+  const std::string extension =
+      get_output_info(command.targets[0]).at(OutputFileType::schedule).extension;
+  for (size_t i = 0; i < command.targets.size(); i++) {
+    const std::string suffix = command.targets.size() > 1 ? "-" + command.suffixes[i] : "";
+    make_generator(command, command.targets[i])
+        ->emit_schedule(command.folder + "/" + base + suffix + extension, function);
+  }
+}
+
 void run_generator(const CommandLine& command) {
   const std::string function = command.function.empty() ? command.generator : command.function;
   const std::string base = command.file_base.empty() ? base_name(function) : command.file_base;
@@ -187,8 +203,9 @@ void run_generator(const CommandLine& command) {
   if (const auto stub = files.find(OutputFileType::cpp_stub); stub != files.end()) {
     make_generator(command, command.targets[0])->emit_cpp_stub(stub->second);
     files.erase(stub);
-    if (files.empty()) return;
   }
+  if (files.erase(OutputFileType::schedule)) emit_schedules(command, function, base);
+  if (files.empty()) return;
   if (command.targets.size() == 1)
     build(function, command.targets[0]).compile(files);
   else
@@ -229,6 +246,7 @@ CommandLine read_command_line(int argc, const char* const* argv) {
     set_flag(word[1], argv[++i], command);
   }
   check_complete(command);
+  if (command.targets.empty()) read_targets("host", command);  // for a stub, which has none
   return command;
 }
 

@@ -1,6 +1,7 @@
 // cpp_stub.cpp -- the header that stands for a generator: its declarations as C++ text.
 #include "generator/cpp_stub.h"
 
+#include <set>
 #include <sstream>
 
 #include "frontend/run/compiler_interface.h"
@@ -12,7 +13,20 @@ namespace {
 // A member of one of the structs, and how a value of it becomes a param's.
 struct Member {
   std::string type, name, value;  // value: its default, empty for none
-  std::string key, text;          // of a param: its name and the expression of its value
+  std::string key, text;          // its name in the generator; of a param: the text of its value
+};
+
+// The names of a struct's members: what is taken already gets an underscore.
+class MemberNames {
+ public:
+  explicit MemberNames(std::set<std::string> taken) : taken_(std::move(taken)) {}
+  std::string operator()(std::string name) {
+    while (!taken_.insert(name).second) name += "_";
+    return name;
+  }
+
+ private:
+  std::set<std::string> taken_;
 };
 
 // "a::b::C" => {"a", "b", "C"}
@@ -46,16 +60,17 @@ std::string element_type(const GeneratorPort& io, const char* buffer_class) {
               is_known ? cpp_element_name(io.types()[0]) : "", ">");
 }
 
-Member member_of(const GeneratorPort& io, const char* buffer_class) {
+Member member_of(const GeneratorPort& io, const char* buffer_class, MemberNames& names) {
   const std::string element = element_type(io, buffer_class);
-  return {io.is_array() ? "std::vector<" + element + ">" : element, io.name(), "", "", ""};
+  return {io.is_array() ? "std::vector<" + element + ">" : element, names(io.name()), "", io.name(),
+          ""};
 }
 
 // What an output's declaration leaves open: a param "out.type", a member out_type.
-void add_open_parts(const GeneratorPort& output, std::vector<Member>& params) {
+void add_open_parts(const GeneratorPort& output, std::vector<Member>& params, MemberNames& names) {
   const auto add = [&](const char* type, const std::string& part, const char* value,
                        const char* function) {
-    const std::string name = output.name() + "_" + part;
+    const std::string name = names(output.name() + "_" + part);
     params.push_back(
         {type, name, value, output.name() + "." + part, std::string(function) + "(" + name + ")"});
   };
@@ -74,16 +89,16 @@ class StubWriter {
     const GeneratorParamBase::InCpp cpp = param.in_cpp();
     if (!cpp.choices.empty()) return add_enumeration(param.name(), cpp);
     if (cpp.type.empty()) return;
-    const std::string text =
-        *cpp.to_text ? std::string(cpp.to_text) + "(" + param.name() + ")" : param.name();
-    params_.push_back({cpp.type, param.name(), cpp.value, param.name(), text});
+    const std::string name = param_names_(param.name());
+    const std::string text = *cpp.to_text ? std::string(cpp.to_text) + "(" + name + ")" : name;
+    params_.push_back({cpp.type, name, cpp.value, param.name(), text});
   }
   void add(const GeneratorInputBase& input) {
-    inputs_.push_back(member_of(input, "StubInputBuffer"));
+    inputs_.push_back(member_of(input, "StubInputBuffer", input_names_));
   }
   void add(const GeneratorOutputBase& output) {
-    add_open_parts(output, params_);
-    outputs_.push_back(member_of(output, "StubOutputBuffer"));
+    add_open_parts(output, params_, param_names_);
+    outputs_.push_back(member_of(output, "StubOutputBuffer", output_names_));
     is_array_output_.push_back(output.is_array());
   }
 
@@ -110,6 +125,9 @@ class StubWriter {
   const std::string generator_;
   const std::vector<std::string> path_;
   std::vector<Member> inputs_, params_, outputs_;
+  MemberNames input_names_{{"Inputs"}};
+  MemberNames param_names_{{"GeneratorParams", "to_generator_params_map"}};
+  MemberNames output_names_{{"Outputs", "target", "get_pipeline", "realize"}};
   std::vector<bool> is_array_output_;
   std::ostringstream enumerations_, out_;
 
@@ -119,7 +137,8 @@ class StubWriter {
                   << "inline const char* param_text(" << type << " value) {\n"
                   << "  const char* const names[] = {\"" << joined(cpp.choices, "\", \"")
                   << "\"};\n  return names[static_cast<int>(value)];\n}\n\n";
-    params_.push_back({type, name, type + "::" + cpp.value, name, "param_text(" + name + ")"});
+    const std::string member = param_names_(name);
+    params_.push_back({type, member, type + "::" + cpp.value, name, "param_text(" + member + ")"});
   }
 
   // Of all members at once, and of none, to be set one by one.
@@ -189,7 +208,7 @@ class StubWriter {
     std::vector<std::string> inputs, outputs;
     for (const Member& input : inputs_) inputs.push_back("inputs." + input.name);
     for (size_t i = 0; i < outputs_.size(); i++) {
-      const std::string funcs = "generator->output_funcs(\"" + outputs_[i].name + "\")";
+      const std::string funcs = "generator->output_funcs(\"" + outputs_[i].key + "\")";
       if (!is_array_output_[i])
         outputs.push_back(funcs + ".at(0)");
       else

@@ -5,6 +5,7 @@
 #include <cctype>
 #include <set>
 
+#include "frontend/run/compiler_interface.h"
 #include "generator/registry.h"
 #include "ir/equal.h"
 #include "ir/scalar.h"
@@ -321,6 +322,45 @@ Module GeneratorBase::build_module(const std::string& function_name, LinkageType
     }
   }
   return to_module(pipeline, input_arguments(), names, function_name, linkage);
+}
+
+namespace {
+
+// A C++ literal of several lines.
+std::string quoted_lines(const std::string& text) {
+  std::string out;
+  for (size_t begin = 0; begin < text.size();) {
+    const size_t end = std::min(text.find('\n', begin), text.size());
+    out += "\n      " + cpp_literal(text.substr(begin, end - begin) + "\n");
+    begin = end + 1;
+  }
+  return out.empty() ? "\"\"" : out;
+}
+
+// "ns::blur" => "ns_blur"
+std::string as_identifier(std::string name) {
+  for (size_t colons; (colons = name.find("::")) != std::string::npos;)
+    name.replace(colons, 2, "_");
+  return name;
+}
+
+}  // namespace
+
+void GeneratorBase::emit_schedule(const std::string& path, const std::string& function_name) {
+  schedule_all();
+  Pipeline pipeline = get_pipeline();
+  auto_schedule_pipeline(pipeline);
+  const std::string function = as_identifier(function_name.empty() ? name_ : function_name);
+  const ScheduleLog log = module_compiler().schedule(pipeline.spec(), get_target());
+  const std::string guard = "RETROGRADE_SCHEDULE_" + function;
+  const std::string header =
+      text("// The schedule of the generator ", quoted(name_), " for ", get_target().to_string(),
+           ". Made by it; not to be edited.\n#ifndef ", guard, "\n#define ", guard,
+           "\n\n#include <retrograde/retrograde.h>\n\n", "inline void apply_schedule_", function,
+           "(::retrograde::Pipeline pipeline, ::retrograde::Target) {\n",
+           "  pipeline.apply_schedule(::retrograde::ScheduleLog::parse(",
+           quoted_lines(log.to_text()), "));\n}\n\n#endif\n");
+  module_compiler().write_text(path, header);
 }
 
 }  // namespace retrograde::internal

@@ -79,6 +79,10 @@ class GeneratorBase : public NamesInterface {
   void set_generator_param_values(const GeneratorParamsMap& values);
   // Writes a header with a class that runs this generator inside another one: see cpp_stub.h.
   void emit_cpp_stub(const std::string& path) const;
+  // Writes a header whose function
+  //   void apply_schedule_<function>(retrograde::Pipeline pipeline, retrograde::Target target)
+  // gives the schedule that build_module() compiles with to a pipeline of the same Funcs.
+  void emit_schedule(const std::string& path, const std::string& function_name = "");
   // Name of that class, with its namespaces; by default that of the generator.
   void set_stub_name(const std::string& name) { stub_name_ = name; }
 

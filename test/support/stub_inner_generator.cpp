@@ -15,6 +15,8 @@ class Inner : public Halide::Generator<Inner> {
       "shape", Shape::Ramp, {{"square", Shape::Square}, {"ramp", Shape::Ramp}}};
   GeneratorParam<Halide::Type> type{"type", Halide::Int(32)};
   GeneratorParam<LoopLevel> level{"level", LoopLevel::root()};
+  // The stub's name for the open type of "scaled", too.
+  GeneratorParam<Halide::Type> scaled_type{"scaled_type", Halide::Int(32)};
 
   Input<Func> source{"source", Int(32), 1};
   Input<Buffer<int, 1>> image{"image"};

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "Halide.h"
+#include "stub_inner.schedule.h"
 #include "stub_inner.stub.h"
 
 using namespace Halide;
@@ -56,6 +57,16 @@ TEST(GeneratorStub, HasParamsWithTheirDefaults) {
   EXPECT_TRUE(params.level.is_root());
 }
 
+TEST(GeneratorStub, HasEachNameOnce) {
+  InnerStub::GeneratorParams params;
+  EXPECT_EQ(params.scaled_type, Int(32));  // the param
+  EXPECT_EQ(params.scaled_type_, Type());  // what the output "scaled" leaves open
+  params.scaled_type_ = Int(16);
+  const auto map = params.to_generator_params_map();
+  EXPECT_EQ(map.at("scaled.type").text, "int16");
+  EXPECT_EQ(map.at("scaled_type").text, "int32");
+}
+
 TEST(GeneratorStub, GivesImagesThatCanBeRealized) {
   Func source("source");
   Var x("x");
@@ -79,6 +90,23 @@ TEST(GeneratorStub, GivesImagesThatCanBeRealized) {
   Buffer<int16_t> open = all[4];
   EXPECT_EQ(open(3), 3);
   EXPECT_TRUE(inner.target.has_feature(Target::JIT) || !inner.target.has_unknowns());
+}
+
+// api: GeneratorBase::emit_schedule
+// stub_inner.schedule.h (-e schedule): given to the same Funcs without a schedule.
+TEST(GeneratorSchedule, AppliesToFreshFuncs) {
+  const GeneratorContext context(get_jit_target_from_environment());
+  const auto make = [&] {
+    auto inner = Internal::GeneratorRegistry::create("stub_inner", context);
+    inner->set_generator_param_values({{"many.size", "2"}, {"open.type", "uint8"}});
+    inner->generate_all();
+    return inner->get_pipeline();
+  };
+  Pipeline plain = make(), scheduled = make();
+  apply_schedule_stub_inner(scheduled, context.get_target());
+  EXPECT_GT(scheduled.schedule_log().size(), 0u);
+  EXPECT_EQ(plain.loop_nest().find("produce partial"), std::string::npos);
+  EXPECT_NE(scheduled.loop_nest().find("produce partial"), std::string::npos);
 }
 
 TEST(GeneratorStub, RefusesWhatDoesNotFit) {

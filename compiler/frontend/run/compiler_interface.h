@@ -14,6 +14,7 @@
 #include "frontend/run/schedule_report.h"
 #include "frontend/schedule/autoschedule_options.h"
 #include "graph/function.h"
+#include "graph/schedule_log.h"
 #include "ir/lowered_function.h"
 #include "ir/target.h"
 
@@ -89,6 +90,8 @@ class ModuleCompiler {
   virtual ir::LoweredFunction lower(const PipelineSpec& pipeline,
                                     const std::vector<ir::LoweredArgument>& inputs,
                                     const Target& target) = 0;
+  // What `lower` schedules it by: the directives given, and those chosen for what nobody scheduled.
+  virtual ScheduleLog schedule(const PipelineSpec& pipeline, const Target& target) = 0;
   virtual std::vector<uint8_t> object(const Module& module) = 0;
   virtual void write(const Module& module,
                      const std::map<OutputFileType, std::string>& output_files) = 0;
