@@ -166,7 +166,8 @@ void check_reduction_order(const FuncContents& f, const Definition& definition,
     return order;
   };
   const std::vector<std::string> before = dependent_loops(now.dims), after = dependent_loops(dims);
-  if (before == after || can_prove_commutative(f, definition)) return;
+  if (before == after || stores_one_value(f, definition) || can_prove_commutative(f, definition))
+    return;
   size_t i = 0;
   while (before[i] == after[i]) i++;
   user_error(asked, "the order of reduction loops may change only where it changes no result",

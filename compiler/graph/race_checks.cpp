@@ -63,4 +63,12 @@ bool can_prove_commutative(const FuncContents& f, const Definition& update) {
   return proof.op && proof.op->commutative && !proof.op->breaks_ties;
 }
 
+bool stores_one_value(const FuncContents& f, const Definition& update) {
+  if (!own_reads(f, update).empty()) return false;
+  return std::ranges::none_of(update.values, [&](const Expr& value) {
+    return std::ranges::any_of(
+        update.rvars, [&](const ReductionVariable& r) { return uses_variable(value, r.var); });
+  });
+}
+
 }  // namespace retrograde::graph

@@ -17,6 +17,10 @@ bool can_prove_race_free(const FuncContents& f, const Definition& update, const 
 // only. False means unknown.
 bool can_prove_commutative(const FuncContents& f, const Definition& update);
 
+// Whether the update stores one value wherever it goes and reads nothing of its Func: two points
+// that meet store the same. False means unknown.
+bool stores_one_value(const FuncContents& f, const Definition& update);
+
 // A read of the Func by its update at a point that is not proven to be the one written, or one that
 // the update never writes; undefined when there is none.
 Expr read_of_other_element(const FuncContents& f, const Definition& update);

@@ -199,6 +199,25 @@ TEST(DistinctWrites, OfPlacesThatDataMove) {
   EXPECT_NO_THROW(f.update().parallel(r.y));
 }
 
+// ---- updates whose order does not matter, or is said not to ----
+
+TEST(Orders, OfAScatteredConstant) {
+  RDom r(0, 8, 0, 8);
+  Func place("place");
+  place(x) = x * x % 7;
+  const auto define = [&] {
+    Func f("f");
+    f(x) = x;
+    f(place(r.x) + place(r.y)) = 7;
+    return f;
+  };
+  expect_same({14}, define, [&](Func& f) { f.update().reorder(r.y, r.x); });
+  Func other("other");
+  other(x) = x;
+  other(place(r.x) + place(r.y)) = r.x;
+  expect_error<CompileError>({"changes no result"}, [&] { other.update().reorder(r.y, r.x); });
+}
+
 // ---- loops that are unrolled up to a bound ----
 
 TEST(BoundedLoops, AreUnrolledUnderTheirBound) {
