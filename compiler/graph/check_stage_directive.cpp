@@ -215,14 +215,17 @@ std::string list_of(const std::vector<NamedLoop>& names) {
 }
 
 // Iterations that may touch the same element need atomic() of an update that is proven associative
-// and commutative, atomic(true), or allow_race_conditions().
-void check_race_free(const SchedulePlace& at, const std::string& loop, const std::string& asked) {
+// and commutative, atomic(true), or allow_race_conditions(). Lanes of what atomic(true) vouches for
+// take turns, so that they may read each other's elements.
+void check_race_free(const SchedulePlace& at, const std::string& loop, bool is_vectorized,
+                     const std::string& asked) {
   const Definition& stage = at.definition();
   const StageLoops& now = at.schedule();
   if (now.allow_races) return;
   for (const std::string& root : reduction_roots(stage, now, loop)) {
     if (can_prove_race_free(*at.f, stage, root)) continue;
     if (now.atomic) {
+      if (now.override_associativity && is_vectorized) continue;
       check_atomic_reads(*at.f, stage, asked);
       if (now.override_associativity) continue;
       const AssociativityProof update = prove_associative(*at.f, stage);
@@ -325,7 +328,7 @@ void check(RunLoop& run, const SchedulePlace& at) {
       text(verbs[static_cast<int>(run.kind)], at.name(), " over ", quoted(run.loop));
   if (run.loop != outermost_loop || run.kind != ForType::GpuBlock) loop_index(at, run.loop, asked);
   if (runs_at_once(run.kind) || run.kind == ForType::Vectorized)
-    check_race_free(at, run.loop, asked);
+    check_race_free(at, run.loop, run.kind == ForType::Vectorized, asked);
 }
 
 void check(PartitionLoop& partition, const SchedulePlace& at) {

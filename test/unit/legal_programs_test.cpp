@@ -218,6 +218,19 @@ TEST(Orders, OfAScatteredConstant) {
   expect_error<CompileError>({"changes no result"}, [&] { other.update().reorder(r.y, r.x); });
 }
 
+TEST(Orders, OfLanesThatReadWhatOthersStore) {
+  RDom r(2, 30);
+  for (const int lanes : {2, 4, 8}) {
+    const auto define = [&] {
+      Func f("f");
+      f(x) = x;
+      f(r) = f(r - 2) + r;
+      return f;
+    };
+    expect_same({32}, define, [&](Func& f) { f.update().atomic(true).vectorize(r, lanes); });
+  }
+}
+
 // ---- loops that are unrolled up to a bound ----
 
 TEST(BoundedLoops, AreUnrolledUnderTheirBound) {

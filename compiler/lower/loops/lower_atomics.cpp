@@ -10,6 +10,8 @@
 //     }
 //   }
 //
+// A vectorized loop whose iterations read what others store, as atomic(true) allows, becomes serial.
+//
 // Method: one walk that counts the parallel loops around; an allocation remembers the count.
 // Errors: a require() that reads the element of a Tuple: it would leave with the lock held.
 // Source: folklore. Tests: test/golden/lower/lower_atomics/, test/unit/atomic_test.cpp.
@@ -21,6 +23,7 @@
 #include "diagnostics/error.h"
 #include "ir/atomic_update.h"
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "ir/visit.h"
 #include "lower/statement_rewriter.h"
 
@@ -78,6 +81,18 @@ Stmt narrowed(const Atomic& n) {
   return make_lets(outside, make_atomic(n.name, body));
 }
 
+// atomic(true) of f[r] = f[r - 2] + g: an iteration reads what another one stores.
+bool reads_other_elements(const Stmt& s) {
+  return any_node(s, [&](const Atomic& n) {
+    std::unordered_map<std::string, Expr> stored;  // the element of each buffer
+    walk(n.body, [&](const Store& store) { stored[store.name] = store.index; });
+    return any_node(n.body, [&](const Load& load) {
+      const auto element = stored.find(load.name);
+      return element != stored.end() && !equal(load.index, element->second);
+    });
+  });
+}
+
 }  // namespace
 
 Stmt lower_atomics(const Stmt& s) {
@@ -94,6 +109,11 @@ Stmt lower_atomics(const Stmt& s) {
     if (const Allocate* n = node.as<Allocate>()) depth_of[n->name] = depth;
     const For* loop = node.as<For>();
     const bool is_parallel = node.kind() == Kind::Fork || (loop && runs_at_once(loop->runs));
+    // Lanes take turns: in the order of the loop, whatever they read.
+    if (loop && loop->runs == ForType::Vectorized && reads_other_elements(loop->body)) {
+      return all(make_for(loop->name, loop->min, loop->extent, ForType::Serial, loop->body,
+                          loop->partition));
+    }
     depth += is_parallel;
     Stmt result = all.children(node);
     depth -= is_parallel;
