@@ -231,8 +231,62 @@ TEST(Orders, OfLanesThatReadWhatOthersStore) {
   }
 }
 
+// ---- loops whose extent has a bound that the loops around them tell ----
+
+// Halves of a vector at the end of a guarded loop, and the first part of a window.
+TEST(BoundedLoops, AreVectorizedUnderTheirBound) {
+  for (const int reach : {0, 1}) {
+    const auto define = [&](Func& f) {
+      Func out("out");
+      f(x) = 3 * x;
+      out(x) = f(x) + f(x + reach);
+      out.vectorize(x, 8, TailStrategy::GuardWithIf);
+      f.compute_at(out, x).vectorize(x);
+      return out;
+    };
+    for (const int size : {1, 7, 8, 13, 27}) {
+      Func f("f");
+      const Buffer<int> out = define(f).realize({size});
+      for (int i = 0; i < size; i++) EXPECT_EQ(out(i), 6 * i + 3 * reach) << i << " of " << size;
+    }
+  }
+}
+
+TEST(BoundedLoops, OfWindowsAreUnrolled) {
+  for (const bool at_root : {false, true}) {
+    Func f("f"), out("out");
+    f(x, y) = x + 10 * y;
+    out(x, y) = f(x, y) + f(x + 1, y) + f(x + 2, y);
+    out.unroll(x, 3);
+    f.compute_at(out, x).unroll(x);
+    if (at_root)
+      f.store_root();
+    else
+      f.store_at(out, y);
+    const Buffer<int> found = out.realize({12, 6});
+    for (int j = 0; j < 6; j++) {
+      for (int i = 0; i < 12; i++) EXPECT_EQ(found(i, j), 3 * i + 3 + 30 * j) << i << ", " << j;
+    }
+  }
+}
+
+// f is needed over [min(min, 0), max(max, 0)], which the condition makes three coordinates.
+TEST(BoundedLoops, OfHullsAreUnrolledWhereTheConditionSaysSo) {
+  Func f("f"), out("out");
+  f(x, c) = x + 10 * c;
+  out(x, c) = f(x, c) + f(x + 1, 0);
+  const Dimension channels = out.output_buffer().dim(1);
+  f.compute_root().reorder(c, x);
+  f.specialize(channels.extent() == 3 && channels.min() == 0).unroll(c);
+  for (const int depth : {3, 4}) {
+    const Buffer<int> found = out.realize({5, depth});
+    for (int k = 0; k < depth; k++) EXPECT_EQ(found(4, k), 4 + 10 * k + 5) << depth;
+  }
+}
+
 // ---- loops that are unrolled up to a bound ----
 
+// rule: the extent of an unrolled loop must be a constant, or have a constant above it
 TEST(BoundedLoops, AreUnrolledUnderTheirBound) {
   Param<int> n("n");
   RDom r(0, n);

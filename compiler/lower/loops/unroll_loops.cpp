@@ -13,23 +13,20 @@
 //
 // Method: inner loops first; copies after the first get fresh names for everything that they bind.
 //         Of select(x == 0, .., select(x == 1, ..)) a copy has its own arm, which is looked up: n
-//         copies of a choice from n arms take n steps.
+//         copies of a choice from n arms take n steps. Constants above extents: bounded_extents.h.
 // Not done: a limit on the size of the result: the user asked for the copies.
 // Source: folklore. Tests: test/golden/lower/unroll_loops/.
 #include "lower/statement_passes.h"
 
-#include <algorithm>
 #include <optional>
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
-#include "lower/in_full.h"
+#include "lower/loops/bounded_extents.h"
 #include "lower/loops/choice_arms.h"
 #include "lower/nests/copy_statement.h"
-#include "lower/statement_rewriter.h"
-#include "simplify/facts.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::lower {
@@ -38,19 +35,17 @@ namespace {
 
 constexpr int64_t most_guarded = 256;  // copies of a loop whose extent is not known
 
-class Unroller : public StatementRewriter {
+class Unroller : public BoundedExtents {
  public:
   explicit Unroller(const Stmt& s) : fresh_(s) {}
 
  protected:
   Stmt rewrite(const Stmt& s) override {
-    if (const IfThenElse* choice = s.as<IfThenElse>()) return chosen(*choice);
-    if (const LetStmt* let = s.as<LetStmt>()) values_[let->name] = let->value;
-    Stmt inner = children(s);
+    Stmt inner = parts(s);
     const For* loop = inner.as<For>();
     if (!loop || loop->runs != ForType::Unrolled) return inner;
     if (auto extent = as_const_int(simplify(loop->extent))) return unrolled(*loop, *extent, false);
-    if (auto most = largest(loop->extent)) return unrolled(*loop, *most, true);
+    if (auto most = largest(loop->extent, most_guarded)) return unrolled(*loop, *most, true);
     user_error(
         "unroll " + describe_loop(loop->name),
         "the extent of an unrolled loop must be a constant, or have a constant above it",
@@ -61,30 +56,6 @@ class Unroller : public StatementRewriter {
 
  private:
   FreshNames fresh_;
-  Substitution values_;           // of names around the statement at hand, as they are written
-  std::vector<Expr> conditions_;  // that hold there
-
-  Stmt chosen(const IfThenElse& choice) {
-    const auto under = [&](const Expr& condition, const Stmt& branch) {
-      if (!branch.defined()) return branch;
-      conditions_.push_back(condition);
-      Stmt result = (*this)(branch);
-      conditions_.pop_back();
-      return result;
-    };
-    const Stmt when_true = under(choice.condition, choice.when_true);
-    return with_parts(choice, choice.condition, when_true,
-                      under(!choice.condition, choice.when_false));
-  }
-
-  // A constant that the extent does not exceed where the loop runs.
-  std::optional<int64_t> largest(const Expr& extent) const {
-    Facts facts;
-    for (const Expr& condition : conditions_) facts.assume(simplify(in_full(condition, values_)));
-    const Expr value = simplify(in_full(extent, values_));
-    const int64_t most = std::min(facts.range(value).max, facts.upper_bound(sum_of(value)));
-    return most <= most_guarded ? std::optional(std::max<int64_t>(most, 0)) : std::nullopt;
-  }
 
   Stmt unrolled(const For& loop, int64_t extent, bool is_guarded) {
     std::vector<Stmt> copies;

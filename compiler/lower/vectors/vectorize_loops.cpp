@@ -1,7 +1,7 @@
 // vectorize_loops -- turn the iterations of Vectorized loops into lanes of vectors.
-// In:  FlatStorage; names unique; extents of Vectorized loops are constants; iterations are
-//      independent, except for stores of the form f[i] = f[i] op g with an associative op and an i
-//      that does not vary.
+// In:  FlatStorage; names unique; extents of Vectorized loops are constants, or have constants above
+//      them, which guarded lanes fill; iterations are independent, except for stores of the form
+//      f[i] = f[i] op g with an associative op and an i that does not vary.
 // Out: FlatStorage without Vectorized loops; names unique. All lanes of a statement run before the
 //      next statement.
 //
@@ -34,6 +34,7 @@
 #include "ir/memory_reads.h"
 #include "ir/print.h"
 #include "ir/visit.h"
+#include "lower/loops/bounded_extents.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
 #include "lower/vectors/vector_stores.h"
@@ -44,6 +45,7 @@ namespace retrograde::lower {
 namespace {
 
 constexpr int max_lanes = 4096;
+constexpr int64_t max_guarded_lanes = 256;  // of a loop whose extent is not known
 
 // ---- lane by lane ----
 
@@ -284,35 +286,59 @@ int widest_vector(const Stmt& s) {
   return lanes;
 }
 
-Stmt vectorized(const For& loop, FreshNames& fresh) {
-  auto extent = as_const_int(simplify(loop.extent));
-  std::string what = "vectorize " + describe_loop(loop.name);
-  if (!extent) {
-    user_error(what, "the extent of a vectorized loop must be a constant",
+Stmt vectorized(const For& loop, int64_t extent, FreshNames& fresh) {
+  if (extent <= 0) return {};
+  if (extent == 1) return substitute(loop.body, loop.name, loop.min);
+  int64_t lanes = extent * widest_vector(loop.body);
+  if (lanes > max_lanes) {
+    user_error("vectorize " + describe_loop(loop.name),
+               text("vectors have at most ", max_lanes, " lanes"), text("this loop needs ", lanes),
+               "Split the variable, and vectorize the inner part");
+  }
+  return LoopVectorizer(loop, static_cast<int>(extent), fresh).run();
+}
+
+class Vectorizer : public BoundedExtents {
+ public:
+  explicit Vectorizer(const Stmt& s) : fresh_(s) {}
+
+ protected:
+  Stmt rewrite(const Stmt& s) override {
+    const Stmt inner = parts(s);
+    const For* loop = inner.as<For>();
+    if (!loop || loop->runs != ForType::Vectorized) return inner;
+    if (const auto extent = as_const_int(simplify(loop->extent)))
+      return vectorized(*loop, *extent, fresh_);
+    const auto most = largest(loop->extent, max_guarded_lanes);
+    if (!most) refuse(*loop);
+    const Stmt guarded = with_all_lanes(*loop, *most);
+    return vectorized(*guarded.as<For>(), *most, fresh_);
+  }
+
+ private:
+  FreshNames fresh_;
+
+  // Lanes beyond the extent do nothing.
+  static Stmt with_all_lanes(const For& loop, int64_t lanes) {
+    const Expr runs = variable(loop.name, loop.min.type()) < loop.min + loop.extent;
+    return make_for(loop.name, loop.min, make_const(loop.extent.type(), lanes), loop.runs,
+                    make_if(runs, loop.body));
+  }
+
+  [[noreturn]] static void refuse(const For& loop) {
+    user_error("vectorize " + describe_loop(loop.name),
+               "the extent of a vectorized loop must be a constant, or have a constant above it",
                text("its extent is ", loop.extent),
                "Vectorize the inner variable of a split by a constant, or promise the extent "
                "with bound()");
   }
-  if (*extent <= 0) return {};
-  if (*extent == 1) return substitute(loop.body, loop.name, loop.min);
-  int64_t lanes = *extent * widest_vector(loop.body);
-  if (lanes > max_lanes) {
-    user_error(what, text("vectors have at most ", max_lanes, " lanes"),
-               text("this loop needs ", lanes), "Split the variable, and vectorize the inner part");
-  }
-  return LoopVectorizer(loop, static_cast<int>(*extent), fresh).run();
-}
+};
 
 }  // namespace
 
 Stmt vectorize_loops(const Stmt& s) {
   if (!has_loops(s, ForType::Vectorized)) return s;
-  FreshNames fresh(s);
-  const Stmt result = rewrite_statements(s, [&](const Stmt& node, auto& all) {
-    const Stmt inner = all.children(node);
-    const For* loop = inner.as<For>();
-    return loop && loop->runs == ForType::Vectorized ? vectorized(*loop, fresh) : inner;
-  });
+  const Stmt result = Vectorizer(s)(s);
   return result.defined() ? result : make_evaluate(Expr(0));
 }
 

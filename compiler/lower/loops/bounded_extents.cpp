@@ -1,0 +1,118 @@
+#include "lower/loops/bounded_extents.h"
+
+#include <algorithm>
+
+#include "ir/build.h"
+#include "ir/equal.h"
+#include "ir/markers.h"
+#include "lower/in_full.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::lower {
+
+namespace {
+
+constexpr int most_choices = 6;  // that are taken apart
+
+Expr a_choice_in(const Expr& e) {
+  Expr found;
+  walk(e, [&](const Expr& part) {
+    if (!found.defined() && part.as<Select>()) found = part;
+    return !found.defined();
+  });
+  return found;
+}
+
+// With every choice by this condition decided.
+Expr decided(const Expr& e, const Expr& condition, bool value) {
+  return simplify(rewrite(e, [&](const Expr& part, const auto& recurse) -> Expr {
+    const Select* choice = part.as<Select>();
+    if (!choice || !equal(choice->condition, condition)) return {};
+    return recurse(value ? choice->when_true : choice->when_false);
+  }));
+}
+
+int64_t bound_of(const Expr& e, Facts& facts, int choices) {
+  const Expr choice = choices > 0 ? a_choice_in(e) : Expr();
+  if (!choice.defined()) return std::min(facts.range(e).max, facts.upper_bound(sum_of(e)));
+  const Expr condition = choice.as<Select>()->condition;
+  const auto arm = [&](bool value) {
+    const Facts::Assumption holds(facts, simplify(value ? condition : logical_not(condition)));
+    facts.forget();
+    return bound_of(decided(e, condition, value), facts, choices - 1);
+  };
+  const int64_t most = std::max(arm(true), arm(false));
+  facts.forget();
+  return most;
+}
+
+// n == 3: what conditions say to be constants.
+using Constants = std::vector<std::pair<Expr, Expr>>;
+void add_constants(const Expr& condition, Constants& constants) {
+  std::vector<Expr> conjuncts;
+  add_conjuncts(condition, conjuncts);
+  for (const Expr& e : conjuncts) {
+    const EQ* same = e.as<EQ>();
+    if (!same || is_const(same->a) == is_const(same->b)) continue;
+    if (is_const(same->b))
+      constants.emplace_back(same->a, same->b);
+    else
+      constants.emplace_back(same->b, same->a);
+  }
+}
+
+Expr with_constants(const Expr& e, const Constants& constants) {
+  if (constants.empty()) return e;
+  return rewrite(e, [&](const Expr& part, const auto&) -> Expr {
+    for (const auto& [name, value] : constants) {
+      if (equal(part, name)) return value;
+    }
+    return {};
+  });
+}
+
+}  // namespace
+
+Stmt BoundedExtents::parts(const Stmt& s) {
+  if (const IfThenElse* choice = s.as<IfThenElse>()) return chosen(*choice);
+  if (const LetStmt* let = s.as<LetStmt>()) values_[let->name] = let->value;
+  const For* loop = s.as<For>();
+  if (!loop) return children(s);
+  loops_.push_back(loop);
+  Stmt result = children(s);
+  loops_.pop_back();
+  return result;
+}
+
+Stmt BoundedExtents::chosen(const IfThenElse& choice) {
+  const auto under = [&](const Expr& condition, const Stmt& branch) {
+    if (!branch.defined()) return branch;
+    conditions_.push_back(condition);
+    Stmt result = (*this)(branch);
+    conditions_.pop_back();
+    return result;
+  };
+  const Stmt when_true = under(choice.condition, choice.when_true);
+  return with_parts(choice, choice.condition, when_true,
+                    under(logical_not(choice.condition), choice.when_false));
+}
+
+std::optional<int64_t> BoundedExtents::largest(const Expr& extent, int64_t most) const {
+  const auto full = [&](const Expr& e) { return simplify(without_likely(in_full(e, values_))); };
+  Facts facts;
+  for (const For* loop : loops_) {
+    const Expr min = full(loop->min);
+    facts.bind(loop->name, min, simplify(min + full(loop->extent) - 1));
+  }
+  Constants constants;
+  for (const Expr& condition : conditions_) {
+    const Expr holds = full(condition);
+    facts.assume(holds);
+    add_constants(holds, constants);
+  }
+  const Expr value = simplify(with_constants(full(extent), constants));
+  const int64_t bound = bound_of(value, facts, most_choices);
+  return bound <= most ? std::optional(std::max<int64_t>(bound, 0)) : std::nullopt;
+}
+
+}  // namespace retrograde::lower
