@@ -110,7 +110,8 @@ class NestEmitter {
   // come back in `storage`.
   Emitted emit_members(const FusedGroup& group, std::vector<Member>& members, ComputePlace& site,
                        std::vector<Stmt> stmts);
-  void leave_rounded(const NestStage& stage, Emitted& code) const;
+  void leave_overrun(const std::vector<NestStage>& stages, Emitted& code) const;
+  static bool is_one_of(const std::vector<NestStage>& stages, const std::string& func);
   void widen_by_own_reads(Member& member, Emitted& code) const;
   Emitted emit_extern(const LoopedFunc& f, const Domain& domain, ComputePlace& site) const;
   Emitted emit_variants(const FusedNest& nest, std::vector<NestStage> stages, ComputePlace& home);
