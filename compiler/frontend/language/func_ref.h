@@ -19,14 +19,14 @@ class FuncRef {
   FuncRef(graph::FuncPtr func, std::vector<Expr> args)
       : func_(std::move(func)), args_(std::move(args)) {}
 
-  // Requires: every argument on the left-hand side must be a defined expression; a definition has
-  // at least one value; the right-hand side must be a defined expression; values are numbers or
-  // pointers; a
-  // Func is defined once; a first definition has no reduction variables; the arguments of a first
-  // definition are Vars; the arguments of a first definition are different Vars; a definition has
-  // the dimensions that the Func was declared with; a right-hand side that uses _ needs _ on the
-  // left-hand side; every variable on the right-hand side stands on the left-hand side, or is of an
-  // RDom; a parameter and a pure variable of one definition have different names.
+  // Requires: every argument on the left-hand side must be a defined expression; a definition
+  // has at least one value; the right-hand side must be a defined expression; values are
+  // numbers or pointers; a Func is defined once; a first definition has no reduction
+  // variables; the arguments of a first definition are Vars; the arguments of a first
+  // definition are different Vars; a definition has the dimensions that the Func was declared
+  // with; a right-hand side that uses _ needs _ on the left-hand side; every variable on the
+  // right-hand side stands on the left-hand side, or is of an RDom; a parameter and a pure
+  // variable of one definition have different names.
   Stage operator=(const Expr& value);
   Stage operator=(const Tuple& values);
   Stage operator=(const FuncRef& value);
