@@ -21,6 +21,8 @@ namespace retrograde {
 
 namespace ir {
 
+class IRVisitor;  // ir/visitor.h
+
 enum class Kind : uint8_t {
 #define RETROGRADE_EXPR(Kind) Kind,
 #define RETROGRADE_BINARY(Kind) Kind,
@@ -109,6 +111,8 @@ class Expr : public ir::Ref<ir::ExprNode> {
   // Requires: a text is not null.
   Expr(const char* text);
   Type type() const { return get()->type; }
+  // Calls the visitor's function for the node's type: see ir/visitor.h.
+  void accept(ir::IRVisitor* visitor) const;
 };
 
 class Stmt : public ir::Ref<ir::StmtNode> {
@@ -190,6 +194,11 @@ class SymbolRef {
 // What a node says besides its kind and type is listed once, as its fields: names and numbers, then
 // children in evaluation order. Comparison and walks stand on the list. Symbols only go along.
 // Nodes have no constructors: make_node gives the members in the order of the struct.
+//
+// make() builds a node, as the functions of build.h do: it folds constants, so that what it gives may
+// be of another kind.
+// Requires: operands of a node are defined; operands of a node have one type; the condition of a node
+// is of type bool.
 #define RETROGRADE_FIELDS(...) \
   auto fields() const { return std::tie(__VA_ARGS__); }
 #define RETROGRADE_NODE(Name, ...)                                      \
@@ -199,34 +208,41 @@ class SymbolRef {
 
 struct IntImm : ExprNode {
   RETROGRADE_NODE(IntImm, value)
+  static Expr make(Type type, int64_t value);
   const int64_t value;
 };
 struct UIntImm : ExprNode {
   RETROGRADE_NODE(UIntImm, value)
+  static Expr make(Type type, uint64_t value);
   const uint64_t value;
 };
 struct FloatImm : ExprNode {  // value already rounded to the type
   RETROGRADE_NODE(FloatImm, value)
+  static Expr make(Type type, double value);
   const double value;
 };
 struct StringImm : ExprNode {
   RETROGRADE_NODE(StringImm, value)
+  static Expr make(const std::string& text) { return Expr(text); }
   const std::string value;
 };
 // A pure variable, loop variable, let-bound name, scalar parameter, reduction variable, or a fact
 // of a buffer ("input.min.0", "input.extent.1", "input.stride.0").
 struct Variable : ExprNode {
   RETROGRADE_NODE(Variable, name)
+  static Expr make(Type type, const std::string& name);
   const std::string name;
   const SymbolRef symbol;
 };
 struct Cast
     : ExprNode {  // integers wrap; float to integer truncates toward zero; to bool means != 0
   RETROGRADE_NODE(Cast, value)
+  static Expr make(Type type, Expr value);
   const Expr value;
 };
 struct Reinterpret : ExprNode {  // same bits, other type
   RETROGRADE_NODE(Reinterpret, value)
+  static Expr make(Type type, Expr value);
   const Expr value;
 };
 struct Binary : ExprNode {
@@ -243,16 +259,19 @@ template <Kind K>
 struct BinaryOf : Binary {
   static constexpr bool is_kind(Kind kind) { return kind == K; }
   BinaryOf(Type type, Expr a, Expr b) : Binary(K, type, std::move(a), std::move(b)) {}
+  static Expr make(Expr a, Expr b);
 };
 #define RETROGRADE_BINARY(Name) using Name = BinaryOf<Kind::Name>;
 #include "ir/kinds.def"
 
 struct Not : ExprNode {
   RETROGRADE_NODE(Not, a)
+  static Expr make(Expr a);
   const Expr a;
 };
 struct Select : ExprNode {
   RETROGRADE_NODE(Select, condition, when_true, when_false)
+  static Expr make(Expr condition, Expr when_true, Expr when_false);
   const Expr condition, when_true, when_false;
 };
 // FlatStorage phase. Element number `index` of the allocation or buffer `name`.
@@ -266,11 +285,13 @@ struct Load : ExprNode {
 struct Ramp
     : ExprNode {  // base, base + stride, ...; base may be a vector: then lanes are base-major
   RETROGRADE_NODE(Ramp, lanes, base, stride)
+  static Expr make(Expr base, Expr stride, int lanes);
   const Expr base, stride;
   const int lanes;
 };
 struct Broadcast : ExprNode {  // value repeated `lanes` times; value may be a vector (concatenated)
   RETROGRADE_NODE(Broadcast, lanes, value)
+  static Expr make(Expr value, int lanes);
   const Expr value;
   const int lanes;
 };
@@ -287,6 +308,23 @@ struct Call : ExprNode {
     return call_type == CallType::Operator && ((op == which) || ...);
   }
   bool is_marker() const { return op_info(op).cls == OpClass::Marker; }
+  // What visitors call these: an operator is an intrinsic, named by its enumerator (Call::likely).
+  using enum Op;
+  static constexpr CallType Halide = CallType::Func, Image = CallType::Image,
+                            Extern = CallType::Extern, PureExtern = CallType::Extern,
+                            Intrinsic = CallType::Operator, PureIntrinsic = CallType::Operator;
+  bool is_intrinsic() const { return call_type == CallType::Operator; }
+  template <class... Ops>
+  requires(sizeof...(Ops) >= 1) bool is_intrinsic(Ops... which) const { return is_op(which...); }
+  bool is_extern() const { return call_type == CallType::Extern; }
+  bool is_pure() const {
+    return call_type != CallType::Operator || op_info(op).cls != OpClass::Effect;
+  }
+  // The call of a C function. Requires: what is called by a name alone is a C function.
+  static Expr make(Type type, const std::string& name, const std::vector<Expr>& args,
+                   CallType call_type = CallType::Extern);
+  static Expr make(Type type, Op op, const std::vector<Expr>& args,
+                   CallType call_type = CallType::Operator);
   bool is_likely() const { return is_op(Op::likely, Op::likely_if_innermost); }
   const CallType call_type;
   const Op op;             // Op::none unless Operator
@@ -304,11 +342,16 @@ const Call* as_op(const Expr& e, Ops... which) {
 inline bool is_undef(const Expr& e) { return as_op(e, Op::undef) != nullptr; }
 struct Let : ExprNode {
   RETROGRADE_NODE(Let, name, value, body)
+  static Expr make(const std::string& name, Expr value, Expr body);
   const std::string name;
   const Expr value, body;
 };
 struct Shuffle : ExprNode {  // lane i = lane indices[i] of the concatenated vectors
   RETROGRADE_NODE(Shuffle, indices, vectors)
+  static Expr make(const std::vector<Expr>& vectors, const std::vector<int>& indices);
+  static Expr make_interleave(const std::vector<Expr>& vectors);
+  static Expr make_concat(const std::vector<Expr>& vectors);
+  static Expr make_slice(Expr vector, int begin, int stride, int size);
   const std::vector<Expr> vectors;
   const std::vector<int> indices;
 };
