@@ -1,6 +1,7 @@
 // error.cpp -- rendering of the four parts, and the functions that throw.
 #include "diagnostics/error.h"
 
+#include <atomic>
 #include <cctype>
 
 namespace retrograde {
@@ -63,9 +64,25 @@ InternalError::InternalError(const std::string& what, const std::string& pass,
     : Error(internal_text(what, pass, ir_before)),
       details_(std::make_shared<const Details>(Details{pass, ir_before})) {}
 
+namespace {
+std::atomic<detail::ErrorObserver> error_observer = nullptr;
+
+template <typename E>
+[[noreturn]] void tell_and_throw(const E& error) {
+  if (const detail::ErrorObserver tell = error_observer.load()) tell(error);
+  throw error;
+}
+}  // namespace
+
+detail::ErrorObserver detail::observe_errors(ErrorObserver observer) {
+  return error_observer.exchange(observer);
+}
+
+void detail::throw_error(const CompileError& error) { tell_and_throw(error); }
+
 void user_error(std::string asked, std::string rule, std::string evidence, std::string instead) {
-  throw CompileError(
-      Message{std::move(asked), std::move(rule), std::move(evidence), std::move(instead)});
+  tell_and_throw(CompileError(
+      Message{std::move(asked), std::move(rule), std::move(evidence), std::move(instead)}));
 }
 
 void call_error(std::string asked, std::string rule, std::string evidence, std::string instead,
@@ -75,8 +92,8 @@ void call_error(std::string asked, std::string rule, std::string evidence, std::
 }
 
 void unsupported(std::string asked, std::string rule, std::string evidence, std::string instead) {
-  throw Unsupported(
-      Message{std::move(asked), std::move(rule), std::move(evidence), std::move(instead)});
+  tell_and_throw(Unsupported(
+      Message{std::move(asked), std::move(rule), std::move(evidence), std::move(instead)}));
 }
 
 void internal_error(const std::string& what, std::source_location where) {

@@ -99,6 +99,15 @@ class InternalError : public Error {
   std::shared_ptr<const Details> details_;
 };
 
+namespace detail {
+// Told of every CompileError and Unsupported before it is thrown by the functions below; null: nobody.
+// By any thread. The one before comes back.
+using ErrorObserver = void (*)(const Error& error);
+ErrorObserver observe_errors(ErrorObserver observer);
+// Throws it, after the observer was told.
+[[noreturn]] void throw_error(const CompileError& error);
+}  // namespace detail
+
 // Throws CompileError: a definition, schedule or compilation that cannot be.
 [[noreturn]] void user_error(std::string asked, std::string rule, std::string evidence = {},
                              std::string instead = {});

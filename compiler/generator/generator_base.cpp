@@ -50,9 +50,11 @@ void GeneratorBase::init_from_context(const GeneratorContext& context) {
   target.set(context.get_target());
   if (context.get_auto_schedule()) auto_schedule.set(true);
   machine_params.set(context.get_machine_params());
+  autoscheduler_ = context.autoscheduler_params();
 }
 
 GeneratorContext GeneratorBase::context() const {
+  if (!autoscheduler_.name.empty()) return GeneratorContext(get_target(), autoscheduler_);
   return GeneratorContext(get_target(), get_auto_schedule(), get_machine_params());
 }
 
@@ -62,7 +64,12 @@ void GeneratorBase::set_generator_param_values(const GeneratorParamsMap& values)
     const auto param = std::find_if(members_.params.begin(), members_.params.end(),
                                     [&](const GeneratorParamBase* p) { return p->name() == key; });
     if (param == members_.params.end()) {
-      if (!set_open_part(key, value.text)) unknown_param(key);
+      if (key == "autoscheduler")
+        autoscheduler_.name = value.text;
+      else if (key.starts_with("autoscheduler."))
+        autoscheduler_.extra[key.substr(key.find('.') + 1)] = value.text;
+      else if (!set_open_part(key, value.text))
+        unknown_param(key);
     } else if (value.level.defined()) {
       (*param)->set_from_loop_level(value.level);
     } else {
@@ -273,7 +280,9 @@ std::vector<Argument> GeneratorBase::input_arguments() const {
 
 void GeneratorBase::auto_schedule_pipeline(Pipeline& pipeline) const {
   pipeline.set_autoschedule(autoschedule_options);
-  if (auto_schedule)
+  if (!autoscheduler_.name.empty())
+    pipeline.apply_autoscheduler(get_target(), autoscheduler_);
+  else if (auto_schedule)
     pipeline.auto_schedule(auto_schedule.scheduler(), get_target(), get_machine_params());
 }
 
@@ -300,10 +309,13 @@ std::vector<std::string> GeneratorBase::input_names() const {
   return names;
 }
 
-Callable GeneratorBase::compile_to_callable() {
+Callable GeneratorBase::compile_to_callable(const JITHandlers* handlers,
+                                            const std::map<std::string, JITExtern>* externs) {
   schedule_all();
   Pipeline pipeline = get_pipeline();
   auto_schedule_pipeline(pipeline);
+  if (handlers) pipeline.jit_handlers() = *handlers;
+  if (externs) pipeline.set_jit_externs(*externs);
   return pipeline.compile_to_callable(input_arguments(), get_target().with_feature(Target::JIT));
 }
 

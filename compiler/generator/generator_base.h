@@ -63,7 +63,8 @@ class GeneratorBase : public NamesInterface {
   GeneratorContext context() const;
   Target get_target() const { return target; }
   bool get_auto_schedule() const { return auto_schedule; }
-  bool using_autoscheduler() const { return auto_schedule; }
+  bool using_autoscheduler() const { return auto_schedule || !autoscheduler_.name.empty(); }
+  const AutoschedulerParams& get_autoscheduler_params() const { return autoscheduler_; }
   MachineParams get_machine_params() const { return machine_params; }
   int natural_vector_size(const Type& type) const { return get_target().natural_vector_size(type); }
   template <typename T>
@@ -72,7 +73,8 @@ class GeneratorBase : public NamesInterface {
   }
 
   // By name: GeneratorParams, and what declarations leave open: in.type=float32, in.dim=2,
-  // in.size=3.
+  // in.size=3. autoscheduler=NAME names a scheduler for the pipeline, and autoscheduler.KEY=VALUE tells
+  // it something: see AutoschedulerParams.
   // Requires: only what the generator declares can be set; types are names such as float32; numbers
   // of dimensions and of elements are whole and at least 0; a value is set before generate() reads
   // it.
@@ -124,7 +126,10 @@ class GeneratorBase : public NamesInterface {
   Module build_module(const std::string& function_name = "",
                       LinkageType linkage = LinkageType::ExternalPlusMetadata);
   // The same in this process: see Pipeline::compile_to_callable.
-  Callable compile_to_callable();
+  // The handlers are those of its calls; the C functions that it calls by name are among `externs`,
+  // or in this process.
+  Callable compile_to_callable(const JITHandlers* handlers = nullptr,
+                               const std::map<std::string, JITExtern>* externs = nullptr);
   // The gradient of every output with respect to every image: the function takes the same inputs,
   // then for each output _grad_loss_for_<output>, then for each output and each image input
   // _grad_loss_<output>_wrt_<input>, all of the shape of what they belong to. schedule() is not
@@ -153,10 +158,15 @@ class GeneratorBase : public NamesInterface {
     members_.inputs.push_back(result);
     return result;
   }
+  // Of several types: add_output<Func>("pair", {Float(32), UInt(8)}, 2).
   template <typename T>
   GeneratorOutput<T>* add_output(const std::string& name, const std::vector<Type>& types,
                                  int dims) {
     return add_output<T, std::vector<Type>, int>(name, types, dims);
+  }
+  template <typename T>
+  GeneratorOutput<T>* add_output(const std::string& name, const std::vector<Type>& types) {
+    return add_output<T, std::vector<Type>>(name, types);
   }
   template <typename T, typename... Args>
   GeneratorOutput<T>* add_output(const std::string& name, const Args&... args) {
@@ -236,6 +246,7 @@ class GeneratorBase : public NamesInterface {
   std::vector<std::unique_ptr<GeneratorPort>> extras_;
   std::vector<Requirement> requirements_;
   bool is_traced_ = false;
+  AutoschedulerParams autoscheduler_;
   Pipeline pipeline_;
 };
 

@@ -22,9 +22,13 @@ class GeneratorContext {
   explicit GeneratorContext(const Target& target, bool auto_schedule = false,
                             const MachineParams& machine = MachineParams::generic())
       : target_(target), auto_schedule_(auto_schedule), machine_(machine) {}
+  // With a scheduler, which is told this; none where its name is empty.
+  GeneratorContext(const Target& target, const AutoschedulerParams& params)
+      : target_(target), autoscheduler_(params) {}
   const Target& get_target() const { return target_; }
   bool get_auto_schedule() const { return auto_schedule_; }
   const MachineParams& get_machine_params() const { return machine_; }
+  const AutoschedulerParams& autoscheduler_params() const { return autoscheduler_; }
 
   // auto blur = context.create<Blur>(); blur->radius.set(3); blur->apply(image); use blur->out
   template <typename T>
@@ -42,6 +46,7 @@ class GeneratorContext {
   Target target_;
   bool auto_schedule_ = false;
   MachineParams machine_;
+  AutoschedulerParams autoscheduler_;
 };
 
 // What generators call by its plain name, without a using directive.

@@ -179,6 +179,9 @@ requires(internal::IsScalarIO<T> && !internal::IsArrayIO<T>) class GeneratorInpu
  public:
   explicit GeneratorInput(const std::string& name) : Base(Declared(name)) {}
   GeneratorInput(const std::string& name, const Value& value) : Base(Declared(name), value) {}
+  // An Expr of this type.
+  GeneratorInput(const std::string& name, const Type& type) requires std::is_same_v<T, Expr>
+      : Base(Declared(name, type)) {}
   GeneratorInput(const std::string& name, const Value& value, const Value& min, const Value& max)
       : Base(Declared(name), value, min, max) {}
   operator Expr() const { return Base::handles()[0]; }

@@ -195,6 +195,13 @@ Target::Target(OS os, Arch arch, int bits, const std::vector<Feature>& features)
   for (Feature feature : features) set_feature(feature);
 }
 
+Target::Target(OS os, Arch arch, int bits, Processor processor,
+               const std::vector<Feature>& features, int vector_bits)
+    : Target(os, arch, bits, features) {
+  processor_tune = processor;
+  this->vector_bits = vector_bits;
+}
+
 Target::Target(const std::string& text) {
   if (text.empty()) {
     *this = get_host_target();

@@ -83,6 +83,8 @@ struct Target {
 
   Target() = default;
   Target(OS os, Arch arch, int bits, const std::vector<Feature>& features = {});
+  Target(OS os, Arch arch, int bits, Processor processor, const std::vector<Feature>& features = {},
+         int vector_bits = 0);
   // "host", "x86-64-linux-avx2-fma", "arm-64-linux", "host-no_asserts"; "" is the host.
   // Requires: a target is arch-bits-os or host, then features, joined by dashes; a target is a text
   // such as "host".

@@ -103,6 +103,11 @@ requires(sizeof...(Rest) >= 1) Tuple
     select(const Expr& c0, const Tuple& v0, const Expr& c1, const Tuple& v1, Rest&&... rest) {
   return select(c0, v0, select(c1, v1, std::forward<Rest>(rest)...));
 }
+template <typename... Rest>
+requires(sizeof...(Rest) >= 1) Tuple
+    select(const Tuple& c0, const Tuple& v0, const Tuple& c1, const Tuple& v1, Rest&&... rest) {
+  return select(c0, v0, select(c1, v1, std::forward<Rest>(rest)...));
+}
 // Halide's name for these.
 inline Tuple tuple_select(const Tuple& condition, const Tuple& t, const Tuple& f) {
   return select(condition, t, f);

@@ -174,6 +174,12 @@ Func& Func::set_estimates(const Region& estimates) {
   return *this;
 }
 
+Func& Func::ring_buffer(const Expr&) {
+  unsupported("keep a ring buffer of " + quoted(name()), "a Func has one copy of its storage",
+              "several are asked for",
+              "Fold its storage with fold_storage(), which an async Func runs ahead in");
+}
+
 Stage Func::update(int index) {
   checked_update(index, "schedule update");
   return Stage(func_, index + 1);

@@ -15,6 +15,7 @@
 #include "frontend/data/image_param.h"
 #include "frontend/language/extern_argument.h"
 #include "frontend/language/func_ref.h"
+#include "frontend/language/function_handle.h"
 #include "frontend/run/callable.h"
 #include "frontend/run/pipeline.h"
 #include "frontend/schedule/stage.h"
@@ -92,7 +93,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Requires: a Func that define_extern defines has one.
   const std::string& extern_function_name() const;
   std::string source_location() const;  // of its declaration: "blur.cpp:12"
-  const graph::FuncPtr& function() const { return func_; }
+  internal::Function function() const { return internal::Function(func_); }
   // One function, two handles.
   bool same_as(const Func& other) const { return func_ == other.func_; }
 
@@ -226,6 +227,9 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
     return give(graph::HoistStorage{{{}, level.contents()}});
   }
   Func& hoist_storage_root() { return hoist_storage(LoopLevel::root()); }
+  // Refused: a Func has one copy of its storage.
+  // Requires: a Func has one copy of its storage (Unsupported).
+  Func& ring_buffer(const Expr& copies);
   // In which memory.
   // Requires: storage lies in memory that a CPU or a CUDA device has (Unsupported); shared memory is that
   // of the threads of a block; a block has at most as many bytes of it as the target says; a thread
@@ -346,5 +350,13 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   Func copied(const std::shared_ptr<graph::ParameterContents>& image) const;
   Pipeline& pipeline_to(const char* asked);
 };
+
+template <class Self>
+Self& LoopDirectives<Self>::eager_inline(const std::vector<Func>& funcs) {
+  std::vector<graph::FuncPtr> inlined;
+  for (const Func& f : funcs) inlined.push_back(f.function());
+  graph::inline_into(place(), inlined);
+  return self();
+}
 
 }  // namespace retrograde

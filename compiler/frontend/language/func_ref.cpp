@@ -5,6 +5,7 @@
 
 #include "frontend/language/several_points.h"
 #include "frontend/language/var.h"
+#include "frontend/run/warnings.h"
 #include "graph/define.h"
 
 namespace retrograde {
@@ -75,6 +76,7 @@ Stage FuncRef::define(const std::vector<Expr>& values) {
     frontend::define_several_points(func_, args, values);
   } else if (func_->is_defined()) {
     graph::define_update(func_, args, values);
+    frontend::warn_of_hidden_definitions(*func_);
   } else {
     graph::define_pure(func_, args, values);
   }

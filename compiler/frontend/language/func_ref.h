@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "frontend/language/expr_ops.h"
+#include "frontend/language/function_handle.h"
 #include "frontend/language/tuple.h"
 #include "frontend/schedule/stage.h"
 #include "graph/function.h"
@@ -53,7 +54,7 @@ class FuncRef {
   operator Expr() const;                        // of a Func with one value
   FuncTupleElementRef operator[](int i) const;  // one value of a Tuple-valued Func
   size_t size() const;                          // number of values
-  const graph::FuncPtr& function() const { return func_; }
+  internal::Function function() const { return internal::Function(func_); }
 
   // One value of the Func here, whatever their number.
   // Requires: the values of a point are numbered from 0.
@@ -99,7 +100,7 @@ class FuncTupleElementRef {
   Stage operator/=(const Expr& value) { return *this = Expr(*this) / value; }
   operator Expr() const { return ref_.element(index_); }
   int index() const { return index_; }
-  const graph::FuncPtr& function() const { return ref_.function(); }
+  internal::Function function() const { return ref_.function(); }
 
  private:
   FuncRef ref_;

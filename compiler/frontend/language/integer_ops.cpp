@@ -135,6 +135,89 @@ Expr saturating_sub(const Expr& a, const Expr& b) {
   return saturating_cast(a.type(), widening_sub(a, b));
 }
 
+// ---- shifts ----
+
+namespace {
+
+Type wide_like(const Expr& a, const Expr& b, const char* what) {
+  check_integers(a, b, what);
+  return wide_type(a, a, what).with_code(a.type().code());
+}
+
+// The highest bit that is shifted out is added: nothing overflows, as (e + half) >> amount might.
+Expr rounded_shift(const Expr& e, const Expr& amount) {
+  const Expr one = ir::make_one(amount.type()), zero = ir::make_zero(amount.type());
+  const Expr lost = (e >> (amount - one)) & ir::make_one(e.type());
+  return (e >> amount) + select(amount > zero, lost, ir::make_zero(e.type()));
+}
+
+Expr negated(const Expr& e) {
+  const Type type = Int(std::min(64, e.type().bits() * (e.type().is_int() ? 1 : 2)));
+  return -cast(type, e);
+}
+
+}  // namespace
+
+Expr widening_shift_left(const Expr& a, const Expr& b) {
+  return cast(wide_like(a, b, "widening_shift_left"), a) << b;
+}
+
+Expr widening_shift_right(const Expr& a, const Expr& b) {
+  return cast(wide_like(a, b, "widening_shift_right"), a) >> b;
+}
+
+Expr rounding_shift_right(const Expr& a, const Expr& b) {
+  const Type wide = wide_like(a, b, "rounding_shift_right");
+  return saturating_cast(a.type(), rounded_shift(cast(wide, a), b));
+}
+
+Expr rounding_shift_left(const Expr& a, const Expr& b) {
+  const Type wide = wide_like(a, b, "rounding_shift_left");
+  return saturating_cast(a.type(), rounded_shift(cast(wide, a), negated(b)));
+}
+
+Expr mul_shift_right(const Expr& a, const Expr& b, const Expr& q) {
+  check_integers(a, b, "mul_shift_right");
+  check_integers(q, q, "mul_shift_right");
+  const Expr product = widening_mul(a, b);
+  return saturating_cast(product.type().with_bits(product.type().bits() / 2), product >> q);
+}
+
+Expr rounding_mul_shift_right(const Expr& a, const Expr& b, const Expr& q) {
+  check_integers(a, b, "rounding_mul_shift_right");
+  check_integers(q, q, "rounding_mul_shift_right");
+  const Expr product = widening_mul(a, b);
+  const Type narrow = product.type().with_bits(product.type().bits() / 2);
+  return saturating_cast(narrow, rounded_shift(product, q));
+}
+
+// ---- a narrow operand beside a wide one ----
+
+namespace {
+
+Expr widened_like(const Expr& a, const Expr& b, const char* what) {
+  check_integers(a, b, what);
+  if (2 * b.type().bits() != a.type().bits()) {
+    user_error(text("apply ", what, " to ", a, " and ", b),
+               "the second operand has half the bits of the first",
+               text("their types are ", to_string(a.type()), " and ", to_string(b.type())),
+               "Cast one of them, or use the operator");
+  }
+  return cast(a.type(), b);
+}
+
+}  // namespace
+
+Expr widen_right_add(const Expr& a, const Expr& b) {
+  return a + widened_like(a, b, "widen_right_add");
+}
+Expr widen_right_mul(const Expr& a, const Expr& b) {
+  return a * widened_like(a, b, "widen_right_mul");
+}
+Expr widen_right_sub(const Expr& a, const Expr& b) {
+  return a - widened_like(a, b, "widen_right_sub");
+}
+
 // ---- means. Of 64 bits bit by bit: a = 2 (a >> 1) + (a & 1), so that no sum overflows ----
 
 Expr halving_add(Expr a, Expr b) {

@@ -27,6 +27,24 @@ Expr widening_sub(const Expr& a, const Expr& b);
 // 64 bits.
 Expr saturating_add(const Expr& a, const Expr& b);
 Expr saturating_sub(const Expr& a, const Expr& b);
+// `a` shifted in twice its bits; a negative amount shifts the other way.
+// Requires: every operand must be a defined expression; it takes integers; its result has at most
+// 64 bits.
+Expr widening_shift_left(const Expr& a, const Expr& b);
+Expr widening_shift_right(const Expr& a, const Expr& b);
+// As << and >>, computed in twice the bits; what is shifted out to the right rounds to the nearest,
+// halves up, and the result is clamped to the range of the type of `a`.
+Expr rounding_shift_left(const Expr& a, const Expr& b);
+Expr rounding_shift_right(const Expr& a, const Expr& b);
+// The product in twice the bits, shifted right by `q` and clamped to the range of the type that
+// a * b has; the second rounds to the nearest, halves up.
+Expr mul_shift_right(const Expr& a, const Expr& b, const Expr& q);
+Expr rounding_mul_shift_right(const Expr& a, const Expr& b, const Expr& q);
+// Of `a` and a `b` of half its bits: in the type of `a`, where the result wraps.
+// Requires: the second operand has half the bits of the first.
+Expr widen_right_add(const Expr& a, const Expr& b);
+Expr widen_right_mul(const Expr& a, const Expr& b);
+Expr widen_right_sub(const Expr& a, const Expr& b);
 // The mean, rounded down or up: no bit is lost on the way. Of the type that a + b has; a C++
 // integer takes the other operand's type.
 // Requires: it takes integers; a constant takes the type of the other operand and must fit it.

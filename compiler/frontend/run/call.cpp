@@ -2,7 +2,10 @@
 // exception.
 #include "frontend/run/call.h"
 
+#include <atomic>
 #include <cstdio>
+#include <mutex>
+#include <utility>
 
 namespace retrograde::frontend {
 
@@ -115,10 +118,18 @@ void default_print(const char* message) {
   std::fflush(stdout);
 }
 
-// The Pipeline's handlers with those of the call's context in front.
-JITHandlers merged(JITHandlers handlers, const JITUserContext* context) {
-  if (!context) return handlers;
-  const JITHandlers& first = context->handlers;
+struct DefaultHandlers {
+  std::mutex mutex;
+  JITHandlers handlers;
+  std::atomic<bool> are_set = false;
+};
+DefaultHandlers& defaults() {
+  static DefaultHandlers result;
+  return result;
+}
+
+// Handlers with others in front of them.
+JITHandlers merged(JITHandlers handlers, const JITHandlers& first) {
   const auto take = [](auto& to, const auto& from) {
     if (from) to = from;
   };
@@ -160,11 +171,22 @@ int prepared(const JITHandlers& own, JITUserContext* user, FunctionRef<void()> p
   }
 }
 
+JITHandlers default_handlers() {
+  const std::lock_guard lock(defaults().mutex);
+  return defaults().handlers;
+}
+JITHandlers set_default_handlers(const JITHandlers& handlers) {
+  const std::lock_guard lock(defaults().mutex);
+  defaults().are_set = true;
+  return std::exchange(defaults().handlers, handlers);
+}
+
 int call(const CompiledPipeline& code, const JITHandlers& own, void* const* argv,
          const std::string& asked, JITUserContext* user) {
   JITUserContext nobody;
   CallContext context;
-  context.handlers = merged(own, user);
+  context.handlers = defaults().are_set ? merged(default_handlers(), own) : own;
+  if (user) context.handlers = merged(std::move(context.handlers), user->handlers);
   context.user_context = user ? user : &nobody;
   check_handlers(context.handlers, asked);
   context.print = context.handlers.print ? context.handlers.print : default_print;

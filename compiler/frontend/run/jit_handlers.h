@@ -53,6 +53,12 @@ struct JITHandlers {
   int thread_limit = 0;  // threads of parallel loops; 0: as many as there are
 };
 
+namespace frontend {
+// Of all calls of this process: those of a Pipeline and of a call go before them.
+JITHandlers default_handlers();
+JITHandlers set_default_handlers(const JITHandlers& handlers);  // the ones before come back
+}  // namespace frontend
+
 // What a call hands to the handlers: derive from it to carry more. Its handlers go before those of
 // the Pipeline.
 struct JITUserContext {

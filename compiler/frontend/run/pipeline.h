@@ -70,9 +70,20 @@ class Pipeline : public Runnable<Pipeline> {
   // compile; what is stored has bounds that are known.
   AutoSchedulerResults auto_schedule(const Target& target, const AutoscheduleOptions& options,
                                      const MachineParams& machine = {}) const;
+  // By name, with what the scheduler is told: see AutoschedulerParams.
+  // Requires: the built-in autoscheduler is told of the machine.
+  AutoSchedulerResults apply_autoscheduler(const Target& target,
+                                           const AutoschedulerParams& params) const;
   // Its Funcs that got no directive stay without: gradients are computed where they are read, too.
   void unscheduled();
   static void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler) {
+    retrograde::add_autoscheduler(name, scheduler);
+  }
+  template <typename F>
+  requires(std::is_invocable_v<
+           F, const Pipeline&, const Target&, const AutoschedulerParams&,
+           AutoSchedulerResults*>) static void add_autoscheduler(const std::string& name,
+                                                                 const F& scheduler) {
     retrograde::add_autoscheduler(name, scheduler);
   }
   static void set_default_autoscheduler_name(const std::string& name) {

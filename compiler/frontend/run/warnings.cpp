@@ -11,6 +11,7 @@
 #include "frontend/run/warnings.h"
 
 #include <algorithm>
+#include <mutex>
 #include <utility>
 
 #include "diagnostics/error.h"
@@ -55,9 +56,9 @@ class Findings {
  public:
   explicit Findings(std::vector<std::string>& messages) : messages_(messages) {}
 
-  void look_at(const FuncContents& f) {
+  void look_at(const FuncContents& f, bool with_hidden) {
     if (f.is_extern()) return;
-    find_hidden(f);
+    if (with_hidden) find_hidden(f);
     find_forgotten(f);
     for (int s = 0; s < f.stage_count(); s++) {
       find_empty_domain(f, s);
@@ -74,13 +75,6 @@ class Findings {
         "set_autoschedule() how it is to choose, or Pipeline::unscheduled() for no schedule");
   }
 
- private:
-  std::vector<std::string>& messages_;
-
-  void add(const std::string& what, const std::string& evidence, const std::string& instead) {
-    messages_.push_back(what + ": " + evidence + ". " + instead + ".");
-  }
-
   void find_hidden(const FuncContents& f) {
     for (int s = f.stage_count() - 1; s > 0; s--) {
       if (!overwrites_all(f, f.stage(s))) continue;
@@ -93,6 +87,13 @@ class Findings {
           "Leave them out, or give the new values a Func of their own");
       return;
     }
+  }
+
+ private:
+  std::vector<std::string>& messages_;
+
+  void add(const std::string& what, const std::string& evidence, const std::string& instead) {
+    messages_.push_back(what + ": " + evidence + ". " + instead + ".");
   }
 
   void find_forgotten(const FuncContents& f) {
@@ -157,11 +158,11 @@ class Findings {
 
 }  // namespace
 
-std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs) {
+std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs, bool with_hidden) {
   std::vector<std::string> messages;
   Findings findings(messages);
   const std::vector<FuncPtr> funcs = functions_of(outputs);
-  for (const FuncPtr& f : funcs) findings.look_at(*f);
+  for (const FuncPtr& f : funcs) findings.look_at(*f, with_hidden);
   findings.note_default_schedule(funcs, *outputs[0]);
   return messages;
 }
@@ -169,17 +170,41 @@ std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs) {
 namespace {
 // Not shared: a scope is of the thread that opened it.
 thread_local std::function<void(const std::string&)> listener;
+
+struct ProcessHandler {
+  std::mutex mutex;
+  WarningHandler tell;
+};
+ProcessHandler& process_handler() {
+  static ProcessHandler handler;
+  return handler;
+}
+WarningHandler handler_of_process() {
+  std::lock_guard lock(process_handler().mutex);
+  return process_handler().tell;
+}
 }  // namespace
 
-void tell_warnings(const std::vector<FuncPtr>& outputs) {
-  if (!listener) return;
-  for (const std::string& warning : warnings_of(outputs)) listener(warning);
-}
+bool has_warning_scope() { return static_cast<bool>(listener); }
 
 void tell_warning(const std::string& warning) {
-  if (listener) listener(warning);
+  if (listener) return listener(warning);
+  if (const WarningHandler tell = handler_of_process()) tell(warning);
 }
-bool has_warning_scope() { return static_cast<bool>(listener); }
+
+void tell_warnings(const std::vector<FuncPtr>& outputs) {
+  if (!listener && !handler_of_process()) return;
+  const bool with_hidden = has_warning_scope();
+  for (const std::string& warning : warnings_of(outputs, with_hidden)) tell_warning(warning);
+}
+
+void warn_of_hidden_definitions(const FuncContents& f) {
+  const WarningHandler tell = listener ? WarningHandler() : handler_of_process();
+  if (!tell || !overwrites_all(f, f.updates.back())) return;
+  std::vector<std::string> messages;
+  Findings(messages).find_hidden(f);
+  for (const std::string& message : messages) tell(message);
+}
 
 }  // namespace retrograde::frontend
 
@@ -187,6 +212,11 @@ namespace retrograde {
 
 std::vector<std::string> warnings_of(const Pipeline& pipeline) {
   return frontend::warnings_of(pipeline.spec().outputs);
+}
+
+WarningHandler set_warning_handler(WarningHandler handler) {
+  std::lock_guard lock(frontend::process_handler().mutex);
+  return std::exchange(frontend::process_handler().tell, std::move(handler));
 }
 
 WarningScope::WarningScope(std::function<void(const std::string&)> tell)

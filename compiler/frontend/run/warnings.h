@@ -7,7 +7,8 @@
 //     WarningScope scope([](const std::string& warning) { log(warning); });
 //     f.realize({64});  // compiles f: its warnings are told
 //   }
-// Nobody is told of them otherwise.
+// Without a scope, the handler of the process is told; there is none unless a program sets one.
+// Halide.h sets one that prints; set_warning_handler({}) silences it.
 #pragma once
 
 #include <functional>
@@ -34,12 +35,20 @@ class WarningScope {
   std::function<void(const std::string&)> tell_, outer_;
 };
 
+// What is told to nobody's scope, by any thread: the handler must bear that. A null one: nobody.
+// The one before comes back.
+using WarningHandler = std::function<void(const std::string&)>;
+WarningHandler set_warning_handler(WarningHandler handler);
+
 namespace frontend {
-std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs);
+std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs, bool with_hidden = true);
 // To the scope around, if there is one.
 void tell_warnings(const std::vector<FuncPtr>& outputs);
 void tell_warning(const std::string& warning);
 bool has_warning_scope();
+// Tells the handler of the process, unless a scope is told when the Func is compiled, that the last
+// definition of the Func hides those before.
+void warn_of_hidden_definitions(const FuncContents& f);
 }  // namespace frontend
 
 }  // namespace retrograde

@@ -3,6 +3,7 @@
 
 #include <dlfcn.h>
 
+#include <algorithm>
 #include <charconv>
 #include <map>
 #include <mutex>
@@ -11,14 +12,17 @@
 #include "diagnostics/error.h"
 #include "frontend/language/func.h"
 #include "frontend/run/pipeline.h"
+#include "frontend/run/warnings.h"
 
 namespace retrograde {
 
 namespace {
 
+AutoschedulerParamsFn find_with_params(const std::string& name);
+
 struct Loaded {
   std::mutex mutex;
-  std::map<std::string, AutoSchedulerFn> by_name;
+  std::map<std::string, AutoschedulerParamsFn> by_name;
   std::set<std::string> claimed_twice;
   std::string default_name;
 };
@@ -60,8 +64,55 @@ std::string MachineParams::to_string() const {
   return text(parallelism, ",", last_level_cache_size, ",", balance);
 }
 
+std::string AutoschedulerParams::to_string() const {
+  std::string result = name.empty() ? "" : "autoscheduler=" + name;
+  for (const auto& [key, value] : extra)
+    result += text(result.empty() ? "" : " ", "autoscheduler.", key, "=", value);
+  return result;
+}
+
+namespace {
+
+const char* const machine_keys[] = {"parallelism", "last_level_cache_size", "balance"};
+
+// Of those that are not told, the generic machine.
+MachineParams machine_of(const AutoschedulerParams& params) {
+  std::string values;
+  for (size_t i = 0; i < std::size(machine_keys); i++) {
+    const MachineParams generic = MachineParams::generic();
+    const std::string defaults[] = {text(generic.parallelism), text(generic.last_level_cache_size),
+                                    text(generic.balance)};
+    const auto given = params.extra.find(machine_keys[i]);
+    values += (i ? "," : "") + (given == params.extra.end() ? defaults[i] : given->second);
+  }
+  return MachineParams(values);
+}
+
+AutoschedulerParams params_of(const std::string& name, const MachineParams& machine) {
+  return {name,
+          {{machine_keys[0], text(machine.parallelism)},
+           {machine_keys[1], text(machine.last_level_cache_size)},
+           {machine_keys[2], text(machine.balance)}}};
+}
+
+// What the built-in scheduler has no use for.
+std::string unknown_keys(const AutoschedulerParams& params) {
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : params.extra) {
+    if (std::ranges::find(machine_keys, key) == std::end(machine_keys)) keys.push_back(key);
+  }
+  return listed(keys, quoted);
+}
+
+bool is_of_halide(const std::string& name) {
+  return name == "Adams2019" || name == "Anderson2021" || name == "Li2018" ||
+         name == "Mullapudi2016";
+}
+
+}  // namespace
+
 // Plugins call it as they are loaded, where nothing may be thrown: find_autoscheduler tells of it.
-void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler) {
+void frontend::add_autoscheduler(const std::string& name, const AutoschedulerParamsFn& scheduler) {
   std::lock_guard lock(loaded().mutex);
   if (!scheduler) {
     loaded().by_name.erase(name);
@@ -69,6 +120,16 @@ void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler
   } else if (!loaded().by_name.emplace(name, scheduler).second) {
     loaded().claimed_twice.insert(name);
   }
+}
+
+void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler) {
+  if (!scheduler) return frontend::add_autoscheduler(name, AutoschedulerParamsFn());
+  frontend::add_autoscheduler(
+      name, AutoschedulerParamsFn([scheduler](const Pipeline& pipeline, const Target& target,
+                                              const AutoschedulerParams& params,
+                                              AutoSchedulerResults* results) {
+        scheduler(pipeline, target, machine_of(params), results);
+      }));
 }
 
 std::vector<std::string> autoscheduler_names() {
@@ -88,6 +149,15 @@ std::string default_autoscheduler_name() {
 }
 
 AutoSchedulerFn find_autoscheduler(const std::string& name) {
+  return [scheduler = find_with_params(name), name](const Pipeline& pipeline, const Target& target,
+                                                    const MachineParams& machine,
+                                                    AutoSchedulerResults* results) {
+    scheduler(pipeline, target, params_of(name, machine), results);
+  };
+}
+
+namespace {
+AutoschedulerParamsFn find_with_params(const std::string& name) {
   const std::string present = listed(autoscheduler_names(), quoted);
   std::lock_guard lock(loaded().mutex);
   if (loaded().claimed_twice.count(name)) {
@@ -102,6 +172,7 @@ AutoSchedulerFn find_autoscheduler(const std::string& name) {
              present.empty() ? "none is loaded" : "loaded are " + present,
              "Load its plugin, or schedule by hand");
 }
+}  // namespace
 
 void load_plugin(const std::string& library) {
   const std::string file = library_file(library);
@@ -130,6 +201,38 @@ AutoSchedulerResults Pipeline::auto_schedule(const std::string& name, const Targ
   results.target = target;
   results.machine_params_string = machine.to_string();
   scheduler(*this, target, machine, &results);
+  return results;
+}
+
+std::string frontend::scheduler_for(const AutoschedulerParams& params) {
+  const std::string& asked = params.name;
+  if (asked.empty()) return default_autoscheduler_name();
+  const auto present = autoscheduler_names();
+  if (!is_of_halide(asked) || std::ranges::find(present, asked) != present.end()) {
+    if (asked != built_in_autoscheduler || unknown_keys(params).empty()) return asked;
+    user_error(
+        "schedule automatically with " + params.to_string(),
+        "the built-in autoscheduler is told of the machine",
+        "it knows parallelism, last_level_cache_size and balance, not " + unknown_keys(params),
+        "Leave them out, or give AutoscheduleOptions");
+  }
+  std::string ignored = unknown_keys(params);
+  if (!ignored.empty()) ignored = "; it has no use for " + ignored;
+  tell_warning("the autoscheduler " + quoted(asked) +
+               " is not here: " + quoted(built_in_autoscheduler) + " schedules instead" + ignored +
+               ". Name that one.");
+  return built_in_autoscheduler;
+}
+
+AutoSchedulerResults Pipeline::apply_autoscheduler(const Target& target,
+                                                   const AutoschedulerParams& params) const {
+  const std::string name = frontend::scheduler_for(params);
+  AutoSchedulerResults results;
+  results.scheduler_name = name;
+  results.target = target;
+  results.autoscheduler_params = params;
+  results.machine_params_string = machine_of(params).to_string();
+  find_with_params(name)(*this, target, params, &results);
   return results;
 }
 

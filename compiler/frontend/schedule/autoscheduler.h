@@ -9,7 +9,9 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "frontend/run/schedule_report.h"
@@ -18,6 +20,17 @@
 namespace retrograde {
 
 class Pipeline;
+struct AutoschedulerParams;
+struct AutoSchedulerResults;
+
+namespace frontend {
+void add_autoscheduler(
+    const std::string& name,
+    const std::function<void(const Pipeline&, const Target&, const AutoschedulerParams&,
+                             AutoSchedulerResults*)>& scheduler);
+// The name of the one that is there for what is asked; a warning where it is another.
+std::string scheduler_for(const AutoschedulerParams& params);
+}  // namespace frontend
 
 // The machine that a schedule is made for. As text: "parallelism,last_level_cache_size,balance".
 struct MachineParams {
@@ -35,6 +48,19 @@ struct MachineParams {
   friend bool operator==(const MachineParams&, const MachineParams&) = default;
 };
 
+// A scheduler by name, with what it is told as text: parallelism, last_level_cache_size and balance
+// are those of MachineParams. The names of Halide's schedulers mean the built-in one, which says so in
+// a warning and does not know the rest of what they are told.
+struct AutoschedulerParams {
+  std::string name;
+  std::map<std::string, std::string> extra;
+
+  AutoschedulerParams() = default;
+  AutoschedulerParams(const std::string& name, const std::map<std::string, std::string>& extra = {})
+      : name(name), extra(extra) {}
+  std::string to_string() const;  // autoscheduler=NAME autoscheduler.KEY=VALUE ...
+};
+
 struct AutoSchedulerResults {
   std::string scheduler_name;
   Target target;
@@ -45,7 +71,8 @@ struct AutoSchedulerResults {
   // was allowed. They may be more: then no schedule that it knows takes less. Sizes that are not known
   // count as nothing.
   int64_t memory_bytes = 0, memory_budget_bytes = 0;
-  SearchedSchedules search;  // with AutoscheduleOptions::search
+  SearchedSchedules search;                  // with AutoscheduleOptions::search
+  AutoschedulerParams autoscheduler_params;  // of apply_autoscheduler
 };
 
 using AutoSchedulerFn =
@@ -54,6 +81,16 @@ using AutoSchedulerFn =
 
 // A null function takes the name away.
 void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler);
+// One that is given all that it is told.
+using AutoschedulerParamsFn =
+    std::function<void(const Pipeline& pipeline, const Target& target,
+                       const AutoschedulerParams& params, AutoSchedulerResults* results)>;
+template <typename F>
+requires(std::is_invocable_v<F, const Pipeline&, const Target&, const AutoschedulerParams&,
+                             AutoSchedulerResults*>) void add_autoscheduler(const std::string& name,
+                                                                            const F& scheduler) {
+  frontend::add_autoscheduler(name, AutoschedulerParamsFn(scheduler));
+}
 // Names of all that are there.
 std::vector<std::string> autoscheduler_names();
 inline constexpr const char* built_in_autoscheduler = "Retrograde";

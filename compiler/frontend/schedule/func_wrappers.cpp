@@ -9,7 +9,8 @@ namespace retrograde {
 
 Func Func::wrap(const std::vector<Func>& users, const std::string& name, bool clone) const {
   return Func(graph::wrapper_of(
-      func_, ir::mapped(users, [&](const Func& user) { return user.function(); }), name, clone));
+      func_, ir::mapped(users, [](const Func& user) -> graph::FuncPtr { return user.function(); }),
+      name, clone));
 }
 
 Func Func::in(const Func& f) { return wrap({f}, name() + "_in_" + f.name(), false); }

@@ -15,6 +15,7 @@
 #include "frontend/language/var_or_rvar.h"
 #include "frontend/schedule/loop_level.h"
 #include "graph/give_directive.h"
+#include "graph/inline_calls.h"
 #include "ir/target.h"
 
 namespace retrograde {
@@ -36,6 +37,7 @@ PrefetchData prefetch_of(const SchedulePlace& place,
                          const std::shared_ptr<ParameterContents>& image, PrefetchData prefetch);
 void check_device(const SchedulePlace& place, const std::vector<VarOrRVar>& loops,
                   DeviceAPI device);
+[[noreturn]] void refuse_streaming(const SchedulePlace& place, const char* what);
 
 }  // namespace frontend
 
@@ -426,6 +428,28 @@ class LoopDirectives {
     frontend::check_device(place(), {x}, DeviceAPI::Hexagon);
     return self();
   }
+
+  // Substitutes these Funcs into this definition, now: what later directives look at, such as
+  // rfactor, is what came of it. Other users of the Funcs still call them.
+  //   g(x) = x * x                    g(x) = x * x
+  //   f(x) = g(x) + g(x + 1)     =>   f(x) = x * x + (x + 1) * (x + 1)
+  // Requires: what is inlined has one pure definition; what is inlined has no schedule of its own.
+  Self& eager_inline(const std::vector<Func>& funcs);
+  template <std::same_as<Func>... Rest>
+  Self& eager_inline(const Func& first, const Rest&... rest) {
+    return eager_inline(std::vector<Func>{first, rest...});
+  }
+  // Stores and loads that bypass the caches: not generated (Unsupported).
+  // Requires: stores and loads go through the caches (Unsupported).
+  Self& stream_stores() {
+    frontend::refuse_streaming(place(), "stores");
+    return self();
+  }
+  Self& stream_loads() {
+    frontend::refuse_streaming(place(), "loads");
+    return self();
+  }
+  Self& stream_loads(const std::vector<Func>&) { return stream_loads(); }
 
   void unscheduled() { give(graph::Unscheduled{}); }  // says that no directive was forgotten
   const graph::StageLoops& get_schedule() const { return place().schedule(); }

@@ -181,7 +181,7 @@ RandomProgram make_program(Choices& choices, const Style& style) {
 }
 
 std::vector<graph::FuncPtr> outputs_of(const RandomProgram& program) {
-  return ir::mapped(program.outputs, [&](const Func& f) { return f.function(); });
+  return ir::mapped(program.outputs, [](const Func& f) -> graph::FuncPtr { return f.function(); });
 }
 
 std::string to_text(const RandomProgram& program, const ScheduleLog& schedule) {
