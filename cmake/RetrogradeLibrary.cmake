@@ -57,12 +57,12 @@ install(FILES ${CMAKE_BINARY_DIR}/retrogradeConfigVersion.cmake DESTINATION ${pa
 install(FILES ${PROJECT_SOURCE_DIR}/cmake/RetrogradeGenerators.cmake
   ${PROJECT_SOURCE_DIR}/cmake/RetrogradeTorch.cmake DESTINATION ${package_dir})
 
-# find_package(Halide) for projects written for Halide 14.
+# find_package(Halide) for projects written for Halide 14 to 21.
 set(halide_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/Halide)
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/halide/HalideConfig.cmake.in
   ${CMAKE_BINARY_DIR}/HalideConfig.cmake INSTALL_DESTINATION ${halide_package_dir})
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/HalideConfigVersion.cmake
-  VERSION 14.0.0 COMPATIBILITY SameMajorVersion)
+  VERSION 21.0.0 COMPATIBILITY AnyNewerVersion)
 install(FILES ${CMAKE_BINARY_DIR}/HalideConfig.cmake ${CMAKE_BINARY_DIR}/HalideConfigVersion.cmake
   DESTINATION ${halide_package_dir})
 

@@ -9,7 +9,12 @@
 
 using namespace Halide;
 using retrograde::error_of;
+using retrograde::expect_error;
 using retrograde::expect_mentions;
+using retrograde::reinterpret_bits;
+using retrograde::Unsupported;
+using retrograde::warnings_of;
+using retrograde::WarningScope;
 
 // A program may add to Halide's namespaces, as Halide's own extensions do.
 namespace Halide {

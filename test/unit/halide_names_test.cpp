@@ -12,7 +12,9 @@
 
 using namespace Halide;
 using retrograde::error_of;
+using retrograde::expect_error;
 using retrograde::expect_mentions;
+using retrograde::Unsupported;
 
 namespace {
 

@@ -1,8 +1,10 @@
 // Halide.h -- Retrograde under Halide's names: put this folder first on the include path, and a
-// pipeline written for Halide 14 compiles as it stands.
+// pipeline written for Halide 14 to 21 compiles as it stands.
 #pragma once
 
 #include <retrograde/retrograde.h>
+
+#include "porting/internal.h"
 
 // Programs rely on these.
 #include <algorithm>
@@ -48,9 +50,105 @@
 #include <string.h>
 #include <unistd.h>
 
-// Not an alias: HalideBuffer.h opens namespace Halide for Halide::Runtime.
+// Not an alias: HalideBuffer.h opens namespace Halide for Halide::Runtime. Name by name: what Halide
+// does not have stays in namespace retrograde, so that programs can have such names themselves.
+// clang-format off
 namespace Halide {
-using namespace ::retrograde;
+using ::retrograde::_; using ::retrograde::_0; using ::retrograde::_1; using ::retrograde::_2;
+using ::retrograde::_3; using ::retrograde::_4; using ::retrograde::_5; using ::retrograde::_6;
+using ::retrograde::_7; using ::retrograde::_8; using ::retrograde::_9; using ::retrograde::abs;
+using ::retrograde::absd; using ::retrograde::acos; using ::retrograde::acosh;
+using ::retrograde::argmax; using ::retrograde::argmin; using ::retrograde::Argument;
+using ::retrograde::ArgumentEstimates; using ::retrograde::asin; using ::retrograde::asinh;
+using ::retrograde::atan; using ::retrograde::atan2; using ::retrograde::atanh;
+using ::retrograde::AutoSchedulerFn; using ::retrograde::AutoschedulerParams;
+using ::retrograde::AutoSchedulerResults; using ::retrograde::BFloat;
+using ::retrograde::bfloat16_t; using ::retrograde::Bool; using ::retrograde::Buffer;
+using ::retrograde::Callable; using ::retrograde::cast; using ::retrograde::ceil;
+using ::retrograde::clamp; using ::retrograde::compile_multitarget;
+using ::retrograde::compile_standalone_runtime; using ::retrograde::CompileError;
+using ::retrograde::concat_bits; using ::retrograde::cos; using ::retrograde::cosh;
+using ::retrograde::count_leading_zeros; using ::retrograde::count_trailing_zeros;
+using ::retrograde::create_callable_from_generator; using ::retrograde::Derivative;
+using ::retrograde::deserialize_parameters; using ::retrograde::deserialize_pipeline;
+using ::retrograde::DeviceAPI; using ::retrograde::div_round_to_zero; using ::retrograde::erf;
+using ::retrograde::Error; using ::retrograde::evaluate; using ::retrograde::evaluate_may_gpu;
+using ::retrograde::EvictionKey; using ::retrograde::exp; using ::retrograde::Expr;
+using ::retrograde::ExprCompare; using ::retrograde::ExternCFunction;
+using ::retrograde::ExternFuncArgument; using ::retrograde::ExternSignature;
+using ::retrograde::extract_bits; using ::retrograde::fast_cos; using ::retrograde::fast_exp;
+using ::retrograde::fast_integer_divide; using ::retrograde::fast_integer_divide_round_to_zero;
+using ::retrograde::fast_integer_modulo; using ::retrograde::fast_inverse;
+using ::retrograde::fast_inverse_sqrt; using ::retrograde::fast_log; using ::retrograde::fast_pow;
+using ::retrograde::fast_sin; using ::retrograde::Float; using ::retrograde::float16_t;
+using ::retrograde::floor; using ::retrograde::fract; using ::retrograde::Func;
+using ::retrograde::FuncRef; using ::retrograde::FuncTupleElementRef; using ::retrograde::gather;
+using ::retrograde::Generator; using ::retrograde::GeneratorContext;
+using ::retrograde::GeneratorInput; using ::retrograde::GeneratorOutput;
+using ::retrograde::GeneratorParam; using ::retrograde::get_default_device_api_for_target;
+using ::retrograde::get_device_interface_for_device_api; using ::retrograde::get_host_target;
+using ::retrograde::get_jit_target_from_environment;
+using ::retrograde::get_target_from_environment; using ::retrograde::halving_add;
+using ::retrograde::halving_sub; using ::retrograde::Handle;
+using ::retrograde::host_supports_target_device; using ::retrograde::HTML; using ::retrograde::hypot;
+using ::retrograde::ImageParam; using ::retrograde::ImplicitVar; using ::retrograde::Int;
+using ::retrograde::InternalError; using ::retrograde::is_finite; using ::retrograde::is_inf;
+using ::retrograde::is_nan; using ::retrograde::JITExtern; using ::retrograde::JITHandlers;
+using ::retrograde::JITUserContext; using ::retrograde::lambda; using ::retrograde::lerp;
+using ::retrograde::likely; using ::retrograde::likely_if_innermost;
+using ::retrograde::link_modules; using ::retrograde::LinkageType; using ::retrograde::load_plugin;
+using ::retrograde::log; using ::retrograde::LoopAlignStrategy; using ::retrograde::LoopLevel;
+using ::retrograde::MachineParams; using ::retrograde::max; using ::retrograde::maximum;
+using ::retrograde::memoize_tag; using ::retrograde::MemoryType; using ::retrograde::min;
+using ::retrograde::minimum; using ::retrograde::mod_round_to_zero; using ::retrograde::Module;
+using ::retrograde::ModuleFactory; using ::retrograde::mul_shift_right; using ::retrograde::mux;
+using ::retrograde::NameMangling; using ::retrograde::OutputFileType;
+using ::retrograde::OutputImageParam; using ::retrograde::Param; using ::retrograde::Parameter;
+using ::retrograde::ParamMap; using ::retrograde::Partition; using ::retrograde::Pipeline;
+using ::retrograde::popcount; using ::retrograde::pow; using ::retrograde::PrefetchBoundStrategy;
+using ::retrograde::print; using ::retrograde::print_when; using ::retrograde::product;
+using ::retrograde::propagate_adjoints; using ::retrograde::random_float;
+using ::retrograde::random_int; using ::retrograde::random_uint; using ::retrograde::Range;
+using ::retrograde::RDom; using ::retrograde::Realization; using ::retrograde::Region;
+using ::retrograde::reinterpret; using ::retrograde::require; using ::retrograde::round;
+using ::retrograde::rounding_halving_add; using ::retrograde::rounding_mul_shift_right;
+using ::retrograde::rounding_shift_left; using ::retrograde::rounding_shift_right;
+using ::retrograde::RuntimeError; using ::retrograde::RVar; using ::retrograde::saturating_add;
+using ::retrograde::saturating_cast; using ::retrograde::saturating_sub;
+using ::retrograde::saturating_sum; using ::retrograde::scatter;
+using ::retrograde::ScheduleHandle; using ::retrograde::select;
+using ::retrograde::serialize_pipeline; using ::retrograde::sin; using ::retrograde::sinh;
+using ::retrograde::sqrt; using ::retrograde::Stage; using ::retrograde::StmtOutputFormat;
+using ::retrograde::strict_float; using ::retrograde::sum; using ::retrograde::TailStrategy;
+using ::retrograde::tan; using ::retrograde::Text; using ::retrograde::tanh; using ::retrograde::Target;
+using ::retrograde::target_feature_for_device_api; using ::retrograde::trunc;
+using ::retrograde::Tuple; using ::retrograde::tuple_select; using ::retrograde::Type;
+using ::retrograde::type_of; using ::retrograde::UInt; using ::retrograde::undef;
+using ::retrograde::unsafe_promise_clamped; using ::retrograde::user_context_value;
+using ::retrograde::Var; using ::retrograde::VarOrRVar; using ::retrograde::widen_right_add;
+using ::retrograde::widen_right_mul; using ::retrograde::widen_right_sub;
+using ::retrograde::widening_add; using ::retrograde::widening_mul;
+using ::retrograde::widening_shift_left; using ::retrograde::widening_shift_right;
+using ::retrograde::widening_sub;
+
+using ::retrograde::operator!; using ::retrograde::operator!=; using ::retrograde::operator%;
+using ::retrograde::operator&; using ::retrograde::operator&&; using ::retrograde::operator*;
+using ::retrograde::operator*=; using ::retrograde::operator+; using ::retrograde::operator+=;
+using ::retrograde::operator-; using ::retrograde::operator-=; using ::retrograde::operator/;
+using ::retrograde::operator/=; using ::retrograde::operator<; using ::retrograde::operator<<;
+using ::retrograde::operator<=; using ::retrograde::operator==; using ::retrograde::operator>;
+using ::retrograde::operator>=; using ::retrograde::operator>>; using ::retrograde::operator^;
+using ::retrograde::operator|; using ::retrograde::operator||; using ::retrograde::operator~;
+
+using ::retrograde::porting::CompileTimeErrorReporter;
+using ::retrograde::porting::set_custom_compile_time_error_reporter;
+using ::retrograde::internal::NamesInterface;
+// clang-format on
+namespace BoundaryConditions = ::retrograde::BoundaryConditions;
+namespace ConciseCasts = ::retrograde::ConciseCasts;
+
+constexpr int AnyDims = Runtime::AnyDims;
+using GeneratorParamsMap = std::map<std::string, std::string>;
 
 // Errors are always exceptions here.
 inline bool exceptions_enabled() { return true; }
@@ -58,19 +156,50 @@ inline bool exceptions_enabled() { return true; }
 // Deep programs are compiled on a stack of its own, as large as they need.
 inline void set_compiler_stack_size(size_t) {}
 inline size_t get_compiler_stack_size() { return size_t{1} << 30; }
+
 // A namespace of its own: ours has another name, so that programs which add to this one can still
 // say Internal:: behind `using namespace Halide`.
 namespace Internal {
 using namespace ::retrograde::internal;
-}
+using namespace ::retrograde::porting;
+using ::retrograde::Dimension;
+using ::retrograde::ForType;
+// As Halide: warnings are printed unless a program says otherwise. Silenced by
+// retrograde::set_warning_handler({}), or by a reporter or WarningScope that takes them.
+inline const bool prints_warnings = ::retrograde::porting::print_warnings_by_default();
+}  // namespace Internal
 }  // namespace Halide
 
 // ---- macros that programs use ----
 
-#define HALIDE_VERSION_MAJOR 14
+#define HALIDE_VERSION_MAJOR 21
 #define HALIDE_VERSION_MINOR 0
 #define HALIDE_VERSION_PATCH 0
-#define HALIDE_VERSION "14.0.0"
+#define HALIDE_VERSION "21.0.0"
+#ifndef HALIDE_WITH_EXCEPTIONS
+#define HALIDE_WITH_EXCEPTIONS
+#endif
+
+// Throws CompileError unless the condition holds: _halide_user_assert(x.defined()) << "no x\n";
+#define RETROGRADE_REPORT(condition, kind)                                                   \
+  (condition)                                                                                \
+      ? (void)0                                                                              \
+      : ::retrograde::porting::Voidifier() &                                                  \
+            ::retrograde::porting::ErrorReport(__FILE__, __LINE__, #condition,                \
+                                              ::retrograde::porting::ErrorReport::Kind::kind) \
+                .ref()
+#define _halide_user_assert(condition) RETROGRADE_REPORT(condition, User)
+#ifdef HALIDE_KEEP_MACROS
+#define user_assert(condition) RETROGRADE_REPORT(condition, User)
+#define internal_assert(condition) RETROGRADE_REPORT(condition, Internal)
+#define RETROGRADE_REPORT_ALWAYS(kind)                                             \
+  ::retrograde::porting::ErrorReport(__FILE__, __LINE__, nullptr,                   \
+                                    ::retrograde::porting::ErrorReport::Kind::kind) \
+      .ref()
+#define user_error RETROGRADE_REPORT_ALWAYS(User)
+#define user_warning RETROGRADE_REPORT_ALWAYS(Warning)
+#define internal_error RETROGRADE_REPORT_ALWAYS(Internal)
+#endif
 
 #ifndef HALIDE_EXPORT
 #define HALIDE_EXPORT __attribute__((visibility("default")))
@@ -88,44 +217,47 @@ struct halide_global_ns;
 #define HALIDE_REGISTER_GENERATOR_ALIAS(...) RETROGRADE_REGISTER_GENERATOR_ALIAS(__VA_ARGS__)
 
 // name(a1, ...): calls the C function of that name.
-#define HalideExtern_1(rt, name, t1) \
-  Halide::Expr name(const Halide::Expr& a1) { return Halide::call_c_function<rt, t1>(#name, a1); }
+#define HalideExtern_1(rt, name, t1)                         \
+  Halide::Expr name(const Halide::Expr& a1) {                \
+    return ::retrograde::call_c_function<rt, t1>(#name, a1); \
+  }
 #define HalideExtern_2(rt, name, t1, t2)                              \
   Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2) { \
-    return Halide::call_c_function<rt, t1, t2>(#name, a1, a2);        \
+    return ::retrograde::call_c_function<rt, t1, t2>(#name, a1, a2);  \
   }
 #define HalideExtern_3(rt, name, t1, t2, t3)                                                  \
   Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3) { \
-    return Halide::call_c_function<rt, t1, t2, t3>(#name, a1, a2, a3);                        \
+    return ::retrograde::call_c_function<rt, t1, t2, t3>(#name, a1, a2, a3);                  \
   }
 #define HalideExtern_4(rt, name, t1, t2, t3, t4)                                            \
   Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3, \
                     const Halide::Expr& a4) {                                               \
-    return Halide::call_c_function<rt, t1, t2, t3, t4>(#name, a1, a2, a3, a4);              \
+    return ::retrograde::call_c_function<rt, t1, t2, t3, t4>(#name, a1, a2, a3, a4);        \
   }
-#define HalideExtern_5(rt, name, t1, t2, t3, t4, t5)                                        \
-  Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3, \
-                    const Halide::Expr& a4, const Halide::Expr& a5) {                       \
-    return Halide::call_c_function<rt, t1, t2, t3, t4, t5>(#name, a1, a2, a3, a4, a5);      \
+#define HalideExtern_5(rt, name, t1, t2, t3, t4, t5)                                         \
+  Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3,  \
+                    const Halide::Expr& a4, const Halide::Expr& a5) {                        \
+    return ::retrograde::call_c_function<rt, t1, t2, t3, t4, t5>(#name, a1, a2, a3, a4, a5); \
   }
-#define HalideExtern_6(rt, name, t1, t2, t3, t4, t5, t6)                                       \
-  Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3,    \
-                    const Halide::Expr& a4, const Halide::Expr& a5, const Halide::Expr& a6) {  \
-    return Halide::call_c_function<rt, t1, t2, t3, t4, t5, t6>(#name, a1, a2, a3, a4, a5, a6); \
+#define HalideExtern_6(rt, name, t1, t2, t3, t4, t5, t6)                                        \
+  Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3,     \
+                    const Halide::Expr& a4, const Halide::Expr& a5, const Halide::Expr& a6) {   \
+    return ::retrograde::call_c_function<rt, t1, t2, t3, t4, t5, t6>(#name, a1, a2, a3, a4, a5, \
+                                                                     a6);                       \
   }
-#define HalideExtern_7(rt, name, t1, t2, t3, t4, t5, t6, t7)                                      \
-  Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3,       \
-                    const Halide::Expr& a4, const Halide::Expr& a5, const Halide::Expr& a6,       \
-                    const Halide::Expr& a7) {                                                     \
-    return Halide::call_c_function<rt, t1, t2, t3, t4, t5, t6, t7>(#name, a1, a2, a3, a4, a5, a6, \
-                                                                   a7);                           \
+#define HalideExtern_7(rt, name, t1, t2, t3, t4, t5, t6, t7)                                    \
+  Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3,     \
+                    const Halide::Expr& a4, const Halide::Expr& a5, const Halide::Expr& a6,     \
+                    const Halide::Expr& a7) {                                                   \
+    return ::retrograde::call_c_function<rt, t1, t2, t3, t4, t5, t6, t7>(#name, a1, a2, a3, a4, \
+                                                                         a5, a6, a7);           \
   }
 #define HalideExtern_8(rt, name, t1, t2, t3, t4, t5, t6, t7, t8)                                  \
   Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3,       \
                     const Halide::Expr& a4, const Halide::Expr& a5, const Halide::Expr& a6,       \
                     const Halide::Expr& a7, const Halide::Expr& a8) {                             \
-    return Halide::call_c_function<rt, t1, t2, t3, t4, t5, t6, t7, t8>(#name, a1, a2, a3, a4, a5, \
-                                                                       a6, a7, a8);               \
+    return ::retrograde::call_c_function<rt, t1, t2, t3, t4, t5, t6, t7, t8>(#name, a1, a2, a3,   \
+                                                                             a4, a5, a6, a7, a8); \
   }
 #define HalidePureExtern_1(rt, name, t1) HalideExtern_1(rt, name, t1)
 #define HalidePureExtern_2(rt, name, t1, t2) HalideExtern_2(rt, name, t1, t2)

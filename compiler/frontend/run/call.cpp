@@ -148,6 +148,12 @@ JITHandlers merged(JITHandlers handlers, const JITHandlers& first) {
   return handlers;
 }
 
+// Of a call: those of the process, then of the pipeline, then of the caller.
+JITHandlers handlers_of(const JITHandlers& own, const JITUserContext* user) {
+  JITHandlers handlers = defaults().are_set ? merged(default_handlers(), own) : own;
+  return user ? merged(std::move(handlers), user->handlers) : handlers;
+}
+
 void check_handlers(const JITHandlers& handlers, const std::string& asked) {
   if (!handlers.custom_malloc != !handlers.custom_free) {
     user_error(asked, "custom_malloc and custom_free come together",
@@ -163,7 +169,7 @@ int prepared(const JITHandlers& own, JITUserContext* user, FunctionRef<void()> p
     prepare();
     return 0;
   } catch (const RuntimeError& error) {
-    const auto custom = merged(own, user).custom_error;
+    const auto custom = handlers_of(own, user).custom_error;
     if (!custom) throw;
     JITUserContext nobody;
     custom(user ? user : &nobody, error.what());
@@ -185,8 +191,7 @@ int call(const CompiledPipeline& code, const JITHandlers& own, void* const* argv
          const std::string& asked, JITUserContext* user) {
   JITUserContext nobody;
   CallContext context;
-  context.handlers = defaults().are_set ? merged(default_handlers(), own) : own;
-  if (user) context.handlers = merged(std::move(context.handlers), user->handlers);
+  context.handlers = handlers_of(own, user);
   context.user_context = user ? user : &nobody;
   check_handlers(context.handlers, asked);
   context.print = context.handlers.print ? context.handlers.print : default_print;

@@ -1,0 +1,8 @@
+// internal.h -- all that Halide.h brings into Halide::Internal.
+#pragma once
+
+#include "porting/expressions.h"
+#include "porting/host.h"
+#include "porting/interval.h"
+#include "porting/reports.h"
+#include "porting/shared_runtime.h"

@@ -1,0 +1,51 @@
+#include "porting/shared_runtime.h"
+
+#include <thread>
+
+#include "diagnostics/error.h"
+#include "frontend/run/call.h"
+#include "gpu/gpu_calls.h"
+#include "gpu/host.h"
+#include "retrograde_runtime.h"
+
+namespace retrograde::porting {
+
+JITHandlers JITSharedRuntime::set_default_handlers(const JITHandlers& handlers) {
+  return frontend::set_default_handlers(handlers);
+}
+
+void JITSharedRuntime::memoization_cache_set_size(int64_t bytes) {
+  retrograde_memoization_set_size(bytes);
+}
+void JITSharedRuntime::memoization_cache_evict(uint64_t eviction_key) {
+  retrograde_memoization_evict(eviction_key);
+}
+
+void JITSharedRuntime::reuse_device_allocations(bool reuse) {
+  runtime::set_reuses_device_memory(reuse);
+  if (!reuse) retrograde_gpu_release_unused(nullptr);
+}
+
+int JITSharedRuntime::set_num_threads(int threads) {
+  if (threads < 0) {
+    user_error("set the number of threads", "it is not negative", text("it is ", threads),
+               "Give 0 for as many as the machine has");
+  }
+  const int before = get_num_threads();
+  JITHandlers handlers = frontend::default_handlers();
+  handlers.thread_limit = threads;
+  frontend::set_default_handlers(handlers);
+  return before;
+}
+int JITSharedRuntime::get_num_threads() {
+  const int limit = frontend::default_handlers().thread_limit;
+  return limit > 0 ? limit : static_cast<int>(std::thread::hardware_concurrency());
+}
+
+void JITSharedRuntime::release_all() {
+  retrograde_gpu_release(nullptr);
+  retrograde_memoization_cleanup();
+  retrograde_pool_release();
+}
+
+}  // namespace retrograde::porting
