@@ -1,6 +1,8 @@
 // buffer.cpp -- Buffer: elements, shapes, and the arrays of Python that share its memory.
 #include <pybind11/functional.h>
 
+#include <algorithm>
+
 #include "bind_all.h"
 #include "binding.h"
 #include "buffer_memory.h"
@@ -192,6 +194,15 @@ void bind_shapes(Class<Buffer<>>& c) {
             return changed(b, [&](Buffer<>& to) { to.transpose(d1, d2); });
           },
           py::arg("d1"), py::arg("d2"))
+      // The same memory with the dimensions in the opposite order.
+      .def("reverse_axes",
+           [](const Buffer<>& b) {
+             return changed(b, [](Buffer<>& to) {
+               std::vector<int> order;
+               for (int d = to.dimensions(); d-- > 0;) order.push_back(d);
+               to.transpose(order);
+             });
+           })
       .def("alias", [](const Buffer<>& b) { return changed(b, [](Buffer<>&) {}); });
 }
 
@@ -345,6 +356,22 @@ void bind_arrays(Class<Buffer<>>& c) {
       });
 }
 
+// Dimension 0 is the array's last axis, or with `reverse_axes` false its first.
+Buffer<> buffer_over(const py::object& array, const std::string& name,
+                     const std::optional<Type>& type, bool reverse_axes) {
+  std::optional<ArrayMemory> memory = array_memory(array);
+  if (!memory) throw py::type_error("a Buffer is made of an array, or of a type and sizes");
+  if (type && type->bytes() == memory->type.bytes())
+    memory->type = *type;
+  else if (type)
+    throw py::type_error("the elements of the array have another size than " + to_string(*type));
+  if (!reverse_axes) {  // buffer_of reverses them
+    std::ranges::reverse(memory->shape);
+    std::ranges::reverse(memory->strides_bytes);
+  }
+  return buffer_of(*memory, name);
+}
+
 void bind_dimension(py::module_& m) {
   using Dimension = Runtime::Buffer<>::Dimension;
   py::class_<Dimension>(m, "BufferDimension")
@@ -361,19 +388,12 @@ void bind_buffer(py::module_& m) {
   Class<Buffer<>> c(m, "Buffer", {}, py::buffer_protocol());
   c.def(py::init<>())
       .def(py::init([](const Buffer<>& other) { return other; }), py::arg("buffer"))
-      .def(py::init([](const py::object& array, const std::string& name,
-                       const std::optional<Type>& type) {
-             std::optional<ArrayMemory> memory = array_memory(array);
-             if (!memory)
-               throw py::type_error("a Buffer is made of an array, or of a type and sizes");
-             if (type && type->bytes() == memory->type.bytes())
-               memory->type = *type;
-             else if (type)
-               throw py::type_error("the elements of the array have another size than " +
-                                    to_string(*type));
-             return buffer_of(*memory, name);
+      .def(py::init(&buffer_over), py::arg("array"), py::arg("name") = "",
+           py::arg("type") = py::none(), py::arg("reverse_axes") = true)
+      .def(py::init([](const py::object& array, const std::string& name, bool reverse_axes) {
+             return buffer_over(array, name, std::nullopt, reverse_axes);
            }),
-           py::arg("array"), py::arg("name") = "", py::arg("type") = py::none())
+           py::arg("array"), py::arg("name"), py::arg("reverse_axes"))
       .def(py::init<Type, const std::vector<int>&, const std::string&>(), py::arg("type"),
            py::arg("sizes"), py::arg("name") = "")
       .def(py::init<Type, const std::vector<int>&, const std::vector<int>&, const std::string&>(),
@@ -389,6 +409,13 @@ void bind_buffer(py::module_& m) {
           },
           py::arg("type"), py::arg("width"), py::arg("height"), py::arg("channels"),
           py::arg("name") = "")
+      // A shape without memory: a call with it says there which region it needs.
+      .def_static(
+          "make_bounds_query",
+          [](Type type, const std::vector<int>& sizes, const std::string& name) {
+            return Buffer<>(Runtime::Buffer<>(to_halide_type(type), nullptr, sizes), name);
+          },
+          py::arg("type"), py::arg("sizes"), py::arg("name") = "")
       .def_static(
           "make_with_shape_of",
           [](const Buffer<>& source, const std::string& name) {

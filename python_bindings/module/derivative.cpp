@@ -69,7 +69,11 @@ void bind_class(py::module_& m) {
   c.def("__call__", of, arg("input"), arg("update_id") = -1)
       .def(
           "__getitem__",
-          [of](const Derivative& d, const py::object& input) { return of(d, input, -1); },
+          [of](const Derivative& d, const py::object& input) {
+            if (!py::isinstance<py::tuple>(input)) return of(d, input, -1);
+            const auto [func, update_id] = input.cast<std::pair<Func, int>>();  // d[f, 0]
+            return d(func, update_id);
+          },
           arg("input"))
       .def("adjoint", &Derivative::adjoint, arg("func"))
       .def("of", &Derivative::of, arg("input"))

@@ -47,6 +47,7 @@ void bind_element_update(Class<FuncTupleElementRef>& c, const char* name, Op op)
 
 void set_element(const FuncRef& ref, int index, const py::object& value) {
   if (py::isinstance<Updated>(value)) return;
+  if (index < 0) index += static_cast<int>(ref.size());
   ref[index] = operand_of(ref, index, value);
 }
 
@@ -73,9 +74,10 @@ void bind_func_ref(py::module_& m) {
       .def(
           "__getitem__",
           [](const FuncRef& r, int i) {
-            if (i < 0 || i >= static_cast<int>(r.size()))
-              throw py::index_error("values are numbered from 0");
-            return r[i];
+            const int size = static_cast<int>(r.size());
+            if (i < -size || i >= size)
+              throw py::index_error(text("there are ", size, " values, numbered from 0"));
+            return r[i < 0 ? size + i : i];
           },
           py::arg("index"))
       .def("__setitem__", &set_element, py::arg("index"), py::arg("value"))

@@ -57,6 +57,7 @@ void bind_places(FuncClass& c) {
       .def(
           "memoize", [](Func& f, const EvictionKey& key) -> Func& { return f.memoize(key); },
           arg("eviction_key") = EvictionKey())
+      .def("ring_buffer", &Func::ring_buffer, arg("copies"))
       .def("async_", &Func::async)
       .def("copy_to_device", [](Func& f) { return f.copy_to_device(); })
       .def("copy_to_host", &Func::copy_to_host);

@@ -20,6 +20,15 @@ void bind_integer_functions(py::module_& m) {
   binary("widening_mul", &widening_mul);
   binary("widening_add", &widening_add);
   binary("widening_sub", &widening_sub);
+  binary("widening_shift_left", &widening_shift_left);
+  binary("widening_shift_right", &widening_shift_right);
+  binary("rounding_shift_left", &rounding_shift_left);
+  binary("rounding_shift_right", &rounding_shift_right);
+  binary("widen_right_add", &widen_right_add);
+  binary("widen_right_mul", &widen_right_mul);
+  binary("widen_right_sub", &widen_right_sub);
+  def(m, "mul_shift_right", &mul_shift_right, arg("a"), arg("b"), arg("q"));
+  def(m, "rounding_mul_shift_right", &rounding_mul_shift_right, arg("a"), arg("b"), arg("q"));
   binary("saturating_add", &saturating_add);
   binary("saturating_sub", &saturating_sub);
   binary("halving_add", [](const Expr& a, const Expr& b) { return halving_add(a, b); });

@@ -92,6 +92,15 @@ void bind_loop_kinds(Class<Self>& c) {
       .def("always_partition_all", &Self::always_partition_all)
       .def("atomic", &Self::atomic, arg("override_associativity_test") = false)
       .def("allow_race_conditions", &Self::allow_race_conditions)
+      .def("eager_inline",
+           [](Self& s, const py::args& funcs) -> Self& {
+             return s.eager_inline(funcs.cast<std::vector<Func>>());
+           })
+      .def("stream_stores", [](Self& s) -> Self& { return s.stream_stores(); })
+      .def("stream_loads",
+           [](Self& s, const py::args& funcs) -> Self& {
+             return s.stream_loads(funcs.cast<std::vector<Func>>());
+           })
       .def("unscheduled", &Self::unscheduled);
 }
 

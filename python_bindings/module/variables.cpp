@@ -54,9 +54,10 @@ void bind_rdom(py::module_& m) {
       .def(
           "__getitem__",
           [](const RDom& r, int i) {
-            if (i < 0 || i >= r.dimensions())
-              throw py::index_error("variables are numbered from 0");
-            return r[i];
+            const int size = r.defined() ? r.dimensions() : 0;
+            if (i < -size || i >= size)
+              throw py::index_error(text("there are ", size, " variables, numbered from 0"));
+            return r[i < 0 ? size + i : i];
           },
           py::arg("index"))
       .def_readonly("x", &RDom::x)

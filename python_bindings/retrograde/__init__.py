@@ -16,7 +16,7 @@ from ._errors import CompileError, Error, InternalError, RuntimeError, Unsupport
 HalideError = Error  # as Halide's package calls it
 __all__ = ["CompileError", "Error", "HalideError", "InternalError", "Unsupported", "UserError"]
 # Names that Python itself has: reached as retrograde.sum, never brought in by `import *`.
-_BUILTIN = {"RuntimeError", "abs", "max", "min", "pow", "print", "round", "sum"}
+_BUILTIN = {"RuntimeError", "abs", "max", "min", "pow", "print", "round", "sum"}  # and vars
 
 if _util.find_spec("retrograde._retrograde") is None:
     def __getattr__(name):
@@ -28,11 +28,12 @@ else:
     from ._command_line import main
     from ._generator import *
     from ._linking import *
+    from ._names import funcs, vars
 
     for _name in ("abs", "max", "min", "pow", "print", "round", "sum", "_"):
         globals()[_name] = getattr(_retrograde, _name)
     for _n in range(10):
         globals()[f"_{_n}"] = getattr(_retrograde, f"_{_n}")
-    __all__ += ["_", "main"] + _generator.__all__ + _linking.__all__ + [
+    __all__ += ["_", "funcs", "main"] + _generator.__all__ + _linking.__all__ + [
         _name for _name in dir(_retrograde) if not _name.startswith("_") and _name not in _BUILTIN]
     __version__ = _retrograde.__version__

@@ -23,6 +23,25 @@ class Making(unittest.TestCase):
         self.assertEqual(rg.Buffer.make_with_shape_of(rg.Buffer("int8", [2, 3])).shape, (3, 2))
         self.assertFalse(rg.Buffer().defined())
 
+    def test_axes_in_their_own_order(self):
+        a = np.arange(6, dtype="int32").reshape(2, 3)
+        kept = rg.Buffer(a, "kept", False)
+        self.assertEqual((kept.name(), [kept.extent(d) for d in range(2)]), ("kept", [2, 3]))
+        self.assertEqual(kept[1, 2], a[1, 2])
+        a[1, 2] = 77
+        self.assertEqual((kept[1, 2], rg.Buffer(a, reverse_axes=False)[1, 2]), (77, 77))
+        turned = kept.reverse_axes()
+        self.assertEqual(turned[2, 1], 77)
+        self.assertEqual((np.asarray(turned).shape, np.asarray(kept).shape), ((2, 3), (3, 2)))
+
+    def test_a_shape_that_asks_for_bounds(self):
+        x, image, f = rg.Var("x"), rg.ImageParam("uint8", 1, "image"), rg.Func("f")
+        f[x] = image[x] + image[x + 2]
+        call = f.compile_to_callable([image])
+        wanted, made = rg.Buffer.make_bounds_query("uint8", [1]), rg.Buffer.make_bounds_query("uint8", [20])
+        call(wanted, made)
+        self.assertEqual((wanted.min(0), wanted.extent(0)), (0, 22))
+
     def test_impossible_sizes_are_errors(self):
         for sizes in ([-1], [2**31 - 1, 2**31 - 1]):
             with self.assertRaises(rg.CompileError):

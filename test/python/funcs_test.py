@@ -11,6 +11,38 @@ def array(f, *sizes, **more):
     return np.asarray(f.realize(list(sizes), **more))
 
 
+class Names(unittest.TestCase):
+    def test_several_at_once(self):
+        a, b = rg.vars("a b")
+        self.assertEqual((a.name(), b.name()), ("a", "b"))
+        first, second = rg.funcs("first, second")
+        first[a] = a
+        second[a] = first[a] * 2
+        np.testing.assert_array_equal(array(second, 3), [0, 2, 4])
+
+    def test_indices_from_the_end(self):
+        f, r = rg.Func("f"), rg.RDom([(0, 2), (0, 3)])
+        f[x] = (x, x * 2)
+        f[x][-1] = x * 3
+        g = rg.Func("g")
+        g[x] = f[x][-1] - f[x][-2]
+        np.testing.assert_array_equal(array(g, 3), [0, 2, 4])
+        self.assertEqual(r[-1].name(), r.y.name())
+        for index in (2, -3):
+            with self.assertRaises(IndexError):
+                r[index]
+            with self.assertRaises(IndexError):
+                f[x][index]
+
+    def test_inlining_at_once(self):
+        f, g = rg.Func("f"), rg.Func("g")
+        f[x] = x * x
+        g[x] = f[x] + f[x + 1]
+        g.eager_inline(f)
+        self.assertNotIn(f.name(), str(g.value()))
+        np.testing.assert_array_equal(array(g, 3), [1, 5, 13])
+
+
 class Definitions(unittest.TestCase):
     def test_the_axes_of_an_array_are_the_dimensions_in_reverse(self):
         f = rg.Func("f")

@@ -88,6 +88,19 @@ class Adjoints(unittest.TestCase):
             self.assertAlmostEqual(f.realize()[()], want, delta=1e-12)
 
 
+class HalidesSpelling(unittest.TestCase):
+    def test_a_func_at_a_definition_in_brackets(self):
+        x, f, total, r = rg.Var("x"), rg.Func("f"), rg.Func("total"), rg.RDom([(0, 4)])
+        values = rg.Buffer(np.arange(4, dtype="float32"))
+        f[x] = values[x]
+        f[1] *= 3.0
+        total[()] += 5.0 * f[r.x]
+        d = rg.propagate_adjoints(total)
+        np.testing.assert_array_equal(np.asarray(d[f, -1].realize([4])), np.asarray(d[f].realize([4])))
+        np.testing.assert_array_equal(np.asarray(d[f, 0].realize([4])), [5, 5, 5, 5])
+        np.testing.assert_array_equal(np.asarray(d[f].realize([4])), [5, 15, 5, 5])
+
+
 class Tangents(unittest.TestCase):
     def test_agree_with_adjoints(self):
         b = Blur()
