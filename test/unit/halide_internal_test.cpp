@@ -149,6 +149,20 @@ TEST(Nodes, AreMadeAndLookedAt) {
   EXPECT_EQ(Shuffle::make_interleave({both, both}).type().lanes(), 4);
 }
 
+TEST(Nodes, LetsBindTheirNamesInReductionDomains) {
+  Param<int> p;
+  Var x("x");
+  RDom r(0, Let::make("x", (p + 8) / p, x * x));
+  Func f("f");
+  f(x) = 0;
+  f(x) += r;
+  p.set(3);
+  Buffer<int> result = f.realize({2});
+  EXPECT_EQ(result(1), 9 * 8 / 2);
+  expect_error({"its bounds must be known before any loop starts", "\"x\""},
+               [&] { RDom(0, Let::make("t", p, x)); });
+}
+
 TEST(Nodes, HaveOperandsThatFit) {
   Var x("x");
   expect_error({"operands of a node are defined"}, [&] { Add::make(x, Expr()); });

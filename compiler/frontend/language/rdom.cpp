@@ -7,6 +7,7 @@
 #include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"
+#include "simplify/cse.h"
 
 namespace retrograde {
 
@@ -28,7 +29,8 @@ Expr checked_bound(const Expr& e, const std::string& domain, const char* which) 
     user_error(asked, text("its ", which, " must be an integer"),
                text(e, " has type ", to_string(e.type())), "Convert it with cast<int>");
   }
-  walk(e, [&](const ir::Variable& v) {
+  // Names that a Let inside binds are no variables of the program's.
+  walk(simplification::expand_lets(e), [&](const ir::Variable& v) {
     if (!v.symbol.defined() || graph::domain_of(v)) {
       user_error(asked, "its bounds must be known before any loop starts",
                  text("its ", which, " uses ", quoted(v.name)),
