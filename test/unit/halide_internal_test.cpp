@@ -305,6 +305,18 @@ TEST(EagerInline, ChangesTheDefinition) {
   EXPECT_EQ(Buffer<int>(sums.realize())(), 0 + 1 + 4 + 9);
 }
 
+TEST(DeclaredFuncs, HaveTypesAndDimensionsBeforeTheirDefinition) {
+  Func one(Int(16), 2, "one"), two({Float(32), UInt(8)}, 3, "two"), none("none");
+  EXPECT_EQ(one.type(), Int(16));
+  EXPECT_EQ(one.dimensions(), 2);
+  EXPECT_EQ(two.types(), (std::vector<Type>{Float(32), UInt(8)}));
+  EXPECT_EQ(two.outputs(), 2);
+  EXPECT_EQ(two.dimensions(), 3);
+  EXPECT_FALSE(one.defined());
+  EXPECT_EQ(none.outputs() + none.dimensions(), 0);
+  expect_error({"\"none\"", "needs a definition first"}, [&] { none.type(); });
+}
+
 TEST(EagerInline, TakesWhatHasNoScheduleOfItsOwn) {
   Var x("x");
   Func f("f"), g("g"), h("h");

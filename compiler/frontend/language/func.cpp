@@ -74,8 +74,8 @@ Tuple Func::values() const {
 }
 
 const Type& Func::type() const {
-  check_defined("take the type of " + quoted(name()));
-  return func_->types[0];
+  if (types().empty()) check_defined("take the type of " + quoted(name()));
+  return types()[0];
 }
 
 std::string Func::source_location() const { return graph::source_location_of(*func_); }

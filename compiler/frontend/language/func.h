@@ -6,6 +6,7 @@
 // they chain.
 #pragma once
 
+#include <algorithm>
 #include <concepts>
 #include <source_location>
 #include <string>
@@ -71,17 +72,23 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // ---- what it is ----
   // The name given, made unique, or a fresh one.
   const std::string& name() const { return func_->name; }
-  bool defined() const { return func_->is_defined(); }    // whether it has a first definition
-  int dimensions() const { return func_->dimensions(); }  // how many coordinates it takes
-  std::vector<Var> args() const;                          // the Vars of its first definition
+  bool defined() const { return func_->is_defined(); }  // whether it has a first definition
+  // How many coordinates it takes; before its definition as declared, or 0.
+  int dimensions() const {
+    return defined() ? func_->dimensions() : std::max(func_->required_dimensions, 0);
+  }
+  std::vector<Var> args() const;  // the Vars of its first definition
   // Requires: the Func needs a definition first; its values are expressions; it has one value only
   // if it is no Tuple.
   Expr value() const;    // what its first definition stores
   Tuple values() const;  // the same of a Func of any number of values
-  const std::vector<Type>& output_types() const { return func_->types; }  // of its values
-  const std::vector<Type>& types() const { return func_->types; }         // of its values
-  const Type& type() const;                                               // of its one value
-  int outputs() const { return static_cast<int>(func_->types.size()); }   // how many values it has
+  const std::vector<Type>& output_types() const { return types(); }  // of its values
+  // Of its values; before its definition as declared, or none.
+  const std::vector<Type>& types() const {
+    return defined() ? func_->types : func_->required_types;
+  }
+  const Type& type() const;                                         // of its one value
+  int outputs() const { return static_cast<int>(types().size()); }  // how many values it has
   bool has_update_definition() const { return !func_->updates.empty(); }
   int num_update_definitions() const { return static_cast<int>(func_->updates.size()); }
   // Requires: updates are numbered from 0.
