@@ -35,7 +35,7 @@ class Making(unittest.TestCase):
         self.assertEqual((np.asarray(turned).shape, np.asarray(kept).shape), ((2, 3), (3, 2)))
 
     def test_a_shape_that_asks_for_bounds(self):
-        x, image, f = rg.Var("x"), rg.ImageParam("uint8", 1, "image"), rg.Func("f")
+        x, image, f = rg.Var("x"), rg.ImageParam("uint8", 1, "asked_for"), rg.Func("f")
         f[x] = image[x] + image[x + 2]
         call = f.compile_to_callable([image])
         wanted, made = rg.Buffer.make_bounds_query("uint8", [1]), rg.Buffer.make_bounds_query("uint8", [20])
