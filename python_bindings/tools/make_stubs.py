@@ -212,7 +212,8 @@ def package_stub(module):
             + "".join(f"from ._retrograde import {name} as {name}\n" for name in hidden)
             + "from ._errors import Error as HalideError\nfrom ._errors import CompileError as CompileError, Error as Error, InternalError as InternalError\n"
               "from ._errors import RuntimeError as RuntimeError, Unsupported as Unsupported, UserError as UserError\n"
-              "from ._command_line import main as main\nfrom ._generator import *\nfrom ._linking import *\n\n"
+              "from ._command_line import main as main\nfrom ._generator import *\nfrom ._linking import *\n"
+              "from ._names import funcs as funcs, vars as vars\n\n"
               "__version__: str\n")
 
 

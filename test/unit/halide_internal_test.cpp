@@ -286,6 +286,16 @@ TEST(Functions, AnswerWhatFuncsDo) {
   EXPECT_EQ(Func(Int(32), 1, "declared").function().required_types()[0], Int(32));
 }
 
+TEST(Functions, OfNothingAreErrors) {
+  const Function nothing;
+  expect_error({"a Function is that of a Func"}, [&] { nothing.name(); });
+  expect_error({"a Function is that of a Func"}, [&] { Func of(nothing); });
+  Var x("x");
+  Func f("f");
+  f(x) = x;
+  EXPECT_TRUE(Func(f.function()).same_as(f));
+}
+
 // api: eager_inline
 TEST(EagerInline, ChangesTheDefinition) {
   Var x("x"), y("y");

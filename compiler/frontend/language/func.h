@@ -51,6 +51,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
        const std::string& name = "");
   explicit Func(const Expr& e);  // f(_) = e
   explicit Func(graph::FuncPtr contents) : func_(std::move(contents)) {}
+  explicit Func(const internal::Function& function) : func_(function) { function.name(); }
   template <typename T, int Dims>
   explicit Func(const Buffer<T, Dims>& image) : Func() {
     (*this)(_) = image(_);
