@@ -28,7 +28,7 @@ def flow_warp(image, flow):
     _, height, width = image.shape
     x = torch.arange(width, dtype=image.dtype, device=image.device) + flow[0]
     y = torch.arange(height, dtype=image.dtype, device=image.device)[:, None] + flow[1]
-    places = torch.stack([x * (2 / (width - 1)) - 1, y * (2 / (height - 1)) - 1], -1)
+    places = torch.stack([x * (2 / max(width - 1, 1)) - 1, y * (2 / max(height - 1, 1)) - 1], -1)
     return F.grid_sample(image[None], places[None], padding_mode="border", align_corners=True)[0]
 
 

@@ -220,7 +220,8 @@ struct View {
       kept = tensor.contiguous();
     }
     for (int axis = 0; axis < Rank; axis++) {
-      const int64_t size = kept.size(axis), stride = kept.stride(axis);
+      // An axis of one element or none has any stride, as it leads nowhere.
+      const int64_t size = kept.size(axis), stride = size > 1 ? kept.stride(axis) : 1;
       TORCH_CHECK(size <= INT32_MAX && stride <= INT32_MAX, "cannot call \"", function,
                   "\": extents and strides fit int32; \"", argument, "\" has sizes ", kept.sizes(),
                   ". Split the tensor.");

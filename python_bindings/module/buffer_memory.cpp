@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <climits>
+#include <cstdlib>
 
 #include "casters.h"
 #include "diagnostics/error.h"
@@ -152,8 +153,11 @@ Buffer<> buffer_of(const ArrayMemory& memory, const std::string& name) {
                   " bytes, and an element has ", bytes),
              "Copy it first, as with array.copy()");
     }
+    // An axis of one element or none has any stride, as it leads nowhere: one that fits.
+    const int64_t stride = memory.strides_bytes[axis] / bytes;
+    const bool leads_nowhere = memory.shape[axis] <= 1 && std::abs(stride) > INT32_MAX;
     shape.emplace_back(0, dimension_part(memory.shape[axis], "extents"),
-                       dimension_part(memory.strides_bytes[axis] / bytes, "strides"));
+                       leads_nowhere ? 0 : dimension_part(stride, "strides"));
   }
   Runtime::Buffer<> buffer(to_halide_type(memory.type), memory.data, static_cast<int>(shape.size()),
                            shape.data());

@@ -71,9 +71,10 @@ Runtime::Buffer<> buffer_of_tensor(py::handle tensor, Type type) {
   }
   halide_dimension_t dimensions[most];
   for (int axis = 0; axis < rank; axis++) {
-    dimensions[rank - 1 - axis] =
-        halide_dimension_t(0, part(PyTuple_GET_ITEM(sizes.ptr(), axis), "extents"),
-                           part(PyTuple_GET_ITEM(strides.ptr(), axis), "strides"));
+    const int extent = part(PyTuple_GET_ITEM(sizes.ptr(), axis), "extents");
+    // An axis of one element or none has any stride, as it leads nowhere.
+    const int stride = extent > 1 ? part(PyTuple_GET_ITEM(strides.ptr(), axis), "strides") : 1;
+    dimensions[rank - 1 - axis] = halide_dimension_t(0, extent, stride);
   }
   return Runtime::Buffer<>(to_halide_type(type), data ? data : nothing, rank, dimensions);
 }

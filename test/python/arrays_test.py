@@ -120,6 +120,32 @@ class AnyStrides(unittest.TestCase):
         self.assertEqual(f.realize([5, 4])[4, 3], 1)
 
 
+class StridesOfOneElement(unittest.TestCase):
+    """An axis of one element or none leads nowhere: its stride may be anything, as libraries leave it."""
+
+    def test_in_inputs_outputs_and_programs(self):
+        as_strided = np.lib.stride_tricks.as_strided
+        for stride in (0, 12, -20, 2**34):  # bytes
+            # NumPy puts strides right where an array is dense without these axes, so some are not.
+            for shape, strides in (((1,), (stride,)), ((0,), (stride,)), ((1, 1), (stride, stride)), ((0, 1), (4, stride)),
+                                   ((3, 1), (8, stride)), ((1, 3), (stride, 8)), ((2, 1, 2), (16, stride, 4))):
+                with self.subTest(shape=shape, strides=strides):
+                    base = np.arange(8, dtype=np.int32)
+                    given, out = as_strided(base, shape, strides), as_strided(np.zeros(8, np.int32), shape, strides)
+                    at = tuple(rg.Var(f"d{d}") for d in range(len(shape)))
+                    image, f, g = rg.ImageParam("int32", len(shape)), rg.Func(), rg.Func()
+                    f[at] = image[at] * 2
+                    g[at] = rg.Buffer(given)[at] * 2
+                    image.set(given)
+                    want = 2 * given.copy()
+                    for func in (f, g):
+                        np.testing.assert_array_equal(func.realize(list(reversed(shape))), want)
+                    func.realize(out)
+                    np.testing.assert_array_equal(out, want)
+                    f.compile_to_callable([image])(given, out)
+                    np.testing.assert_array_equal(out, want)
+
+
 class ReadOnly(unittest.TestCase):
     def setUp(self):
         self.a = np.arange(6, dtype=np.float32)

@@ -13,6 +13,43 @@ def off_grid(t, cells):
     return (at.floor() + (at - at.floor()) * 0.8 + 0.1) / cells
 
 
+# The sizes of the operators' tensors, names where they are free; and those of which an element is read in any case: by
+# what looks up a place, and at the edge of an image, so that they are not 0.
+SHAPES = {
+    "bilateral_slice": [(3, "H", "W"), ("H", "W"), (3, 4, "levels", "cells", "columns")],
+    "flow_warp": [("C", "H", "W"), (2, "H", "W")],
+    "spatial_transformer": [("N", "C", "H", "W"), ("N", 2, 3)],
+    "convolution": [("N", "in", "H", "W"), ("out", "in", 3, 3), ("out",)],
+    "tone_curve": [("H", "W"), ("knots",)],
+    "recursive_filter": [("H", "W"), ()],
+    "non_local_means": [("H", "W"), ()],
+    "soft_histogram": [("H", "W")],
+}
+READ = ("levels", "cells", "columns", "knots", "in")
+
+
+def sizes_of(name):
+    """Sizes for each free axis: all 1, and each axis 0, 1 and 2 where the others are 3."""
+    axes = sorted({axis for shape in SHAPES[name] for axis in shape if isinstance(axis, str)})
+    yield dict.fromkeys(axes, 1)
+    for axis in axes:
+        for size in (1, 2) if axis in READ else (0, 1, 2):
+            yield {**dict.fromkeys(axes, 3), axis: size}
+
+
+def inputs_of_sizes(name, sizes, kind=torch.float64):
+    """Of the operator of that name; values at which it is smooth."""
+    shapes = [tuple(sizes.get(axis, axis) for axis in shape) for shape in SHAPES[name]]
+    made = [0.11 + 0.77 * values(*shape, seed=i + 1, kind=kind) for i, shape in enumerate(shapes)]
+    if name == "bilateral_slice":
+        made[1] = off_grid(made[1] * 0.9 + 0.05, sizes["levels"])
+    if name == "tone_curve":
+        made[0] = off_grid(made[0], max(sizes["knots"] - 1, 1))
+    if name == "soft_histogram":
+        made[0] = off_grid(made[0], 7)
+    return made
+
+
 def inputs_of(name, kind=torch.float64):
     """Of the operator of that name, of the smallest size at which everything happens that can happen."""
     transforms = torch.tensor([[[0.83, -0.21, 0.11], [0.17, 0.93, -0.07]], [[1.07, 0.05, -0.03], [-0.12, 0.71, 0.2]]])

@@ -22,11 +22,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "bench" / "torch"))
 from definitions import OPERATORS
 from formulations import FORMULATIONS
 from retrograde.torch import operator
-from torch_inputs import inputs_of, values
+from torch_inputs import inputs_of, inputs_of_sizes, sizes_of, values
 
 NAME = sys.argv.pop(1)
 STEPS = int(os.environ.get("RETROGRADE_TORCH_STEPS", 1000))
-OP = operator(f"tests::{NAME}", OPERATORS[NAME])
+OP = operator(f"tests::{NAME}", OPERATORS[NAME])  # compiled for each set of sizes
+OF_ANY_SIZES = operator(f"tests::{NAME}_of_any_sizes", lambda kind: OPERATORS[NAME](kind))
 IS_NEW = hasattr(torch.library, "opcheck")
 
 
@@ -46,6 +47,70 @@ def strided(t):
     view = wide[tuple(slice(1, None, 2) for _ in t.shape)].permute(*reversed(range(t.dim())))
     view.copy_(t)
     return view
+
+
+def layouts_of(tensors):
+    """The same sizes in memory of all kinds: dense, axes in reverse, and, for each axis, one element for all of it, as
+    expand() makes it; and what extents of 1 have for strides then."""
+    yield "dense", tensors
+    yield "transposed", [t.permute(list(reversed(range(t.dim())))).contiguous().permute(list(reversed(range(t.dim()))))
+                         for t in tensors]
+    for axis in range(1, max(t.dim() for t in tensors) + 1):
+        yield f"axis -{axis} expanded", [t.narrow(-axis, 0, min(1, t.shape[-axis])).expand(t.shape)
+                                         if t.dim() >= axis and t.shape[-axis] else t for t in tensors]
+    yield "any strides", [torch.as_strided(t.contiguous(), t.shape, [
+        stride if size > 1 else 7 * i for i, (size, stride) in enumerate(zip(t.shape, t.contiguous().stride()))])
+        if t.numel() else t for t in tensors]
+
+
+def reference(tensors):
+    """The formulation, or what it would give of no elements, of which PyTorch's own operators know little."""
+    if all(t.numel() for t in tensors):
+        return FORMULATIONS[NAME](*tensors)
+    result = OP(*[t.detach() for t in tensors])
+    return torch.zeros_like(result) + sum(0 * t.sum() for t in tensors)
+
+
+class Sizes(unittest.TestCase):
+    """0, 1 and 2 in each dimension, in memory of all kinds; the seeds of sums are expanded as well."""
+
+    def cases(self):
+        for sizes in sizes_of(NAME):
+            # Code for all sizes has reduction domains of one element at least, which begin at 1.
+            has_domains = NAME != "recursive_filter" or 1 not in sizes.values()
+            if has_domains:
+                yield OF_ANY_SIZES, sizes
+            if set(sizes.values()) == {1} or not has_domains:
+                yield OP, sizes
+
+    def test_values_and_gradients(self):
+        for op, sizes in self.cases():
+            for layout, tensors in layouts_of(inputs_of_sizes(NAME, sizes)):
+                with self.subTest(op=op.name, sizes=sizes, layout=layout):
+                    ours, theirs = wanting(tensors), wanting(tensors)
+                    for mine, tensor in zip(ours, tensors):
+                        self.assertEqual(mine.stride(), tensor.stride())
+                    result, want = op(*ours), reference(theirs)
+                    torch.testing.assert_close(result, want, rtol=1e-11, atol=1e-13)
+                    result.sum().backward()
+                    want.sum().backward()
+                    for a, b in zip(ours, theirs):
+                        torch.testing.assert_close(a.grad, b.grad, rtol=1e-10, atol=1e-12)
+
+    def test_seeds_of_any_strides(self):
+        for op, sizes in self.cases():
+            ours = wanting(inputs_of_sizes(NAME, sizes))
+            result = op(*ours)
+            if not result.numel():
+                continue
+            want = torch.autograd.grad(result, ours, torch.ones_like(result), retain_graph=True)
+            for seed in (torch.ones((), dtype=result.dtype).expand(result.shape),
+                         torch.ones([1] * result.dim(), dtype=result.dtype).expand(result.shape),
+                         strided(torch.ones_like(result))):
+                with self.subTest(op=op.name, sizes=sizes, strides=seed.stride()):
+                    got = torch.autograd.grad(result, ours, seed, retain_graph=True)
+                    for a, b in zip(got, want):
+                        self.assertTrue(torch.equal(a, b))
 
 
 class Values(unittest.TestCase):

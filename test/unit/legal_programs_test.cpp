@@ -3,6 +3,8 @@
 // that speak of themselves. Each is compared with itself unscheduled, or with what it must give.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <climits>
 #include <cmath>
 #include <functional>
 
@@ -91,6 +93,65 @@ TEST(RealizedSizes, SmallerPromisesAreRefused) {
   Func f = twice();
   f.output_buffer().dim(0).set_bounds(0, 8);
   expect_error<RuntimeError>({"promised to be 8", "it is 10"}, [&] { f.realize({10}); });
+}
+
+// ---- the stride of a dimension with one element or none may be anything: libraries of arrays leave it ----
+
+// What in(x, y) + out's own coordinates is, of buffers with these extents and strides.
+void expect_any_strides(const std::function<void(Func&, ImageParam&)>& promise, int width,
+                        int height, int stride_x, int stride_y) {
+  ImageParam in(Int(32), 2, "in");
+  Func f("f");
+  f(x, y) = in(x, y) + x + 10 * y;
+  promise(f, in);
+  std::vector<int> read(64, 5), written(64, -1);
+  const halide_dimension_t shape[] = {{0, width, stride_x}, {0, height, stride_y}};
+  in.set(Buffer<int>(read.data(), 2, shape));
+  Buffer<int> out(written.data(), 2, shape);
+  ASSERT_NO_THROW(f.realize(out)) << width << " x " << height << ", strides " << stride_x << " "
+                                  << stride_y;
+  for (int j = 0; j < height; j++) {
+    for (int i = 0; i < width; i++)
+      EXPECT_EQ(written[static_cast<size_t>(i * stride_x + j * stride_y)], 5 + i + 10 * j);
+  }
+  EXPECT_EQ(std::count_if(written.begin(), written.end(), [](int v) { return v != -1; }),
+            width * height);
+}
+
+TEST(StridesOfOneElement, MayBeAnything) {
+  const auto nothing = [](Func&, ImageParam&) {};
+  const auto vectors = [](Func& f, ImageParam&) { f.vectorize(x, 4, TailStrategy::GuardWithIf); };
+  const auto rows = [](Func& f, ImageParam& in) {  // of 8 elements, said twice
+    in.dim(1).set_stride(8 * in.dim(0).stride());
+    f.output_buffer().dim(1).set_stride(8);
+  };
+  for (const auto& promise :
+       std::vector<std::function<void(Func&, ImageParam&)>>{nothing, vectors, rows}) {
+    for (int stride : {0, -3, INT32_MAX}) {
+      for (int height : {0, 2}) {
+        expect_any_strides(promise, 1, height, stride, 8);
+        expect_any_strides(promise, 0, height, stride, 8);
+      }
+      for (int width : {0, 7}) {
+        expect_any_strides(promise, width, 1, 1, stride);
+        expect_any_strides(promise, width, 0, 1, stride);
+      }
+      expect_any_strides(promise, 1, 1, stride, stride);
+    }
+  }
+}
+
+TEST(StridesOfOneElement, OfMoreAreStillChecked) {
+  Func f("f");
+  f(x, y) = x + y;
+  f.output_buffer().dim(1).set_stride(8);
+  std::vector<int> memory(64);
+  const halide_dimension_t wide[] = {{0, 2, 2}, {0, 2, 8}}, low[] = {{0, 2, 1}, {0, 2, 4}};
+  Buffer<int> of_wide(memory.data(), 2, wide), of_low(memory.data(), 2, low);
+  expect_error<RuntimeError>({"stride of dimension 0", "promised to be 1, but it is 2"},
+                             [&] { f.realize(of_wide); });
+  expect_error<RuntimeError>({"stride of dimension 1", "promised to be 8, but it is 4"},
+                             [&] { f.realize(of_low); });
 }
 
 // ---- updates whose iterations never touch the same element ----

@@ -283,6 +283,15 @@ TEST(BufferChecks, MemoryAndStridesAreChecked) {
   image.dims[0].stride = 2;
   EXPECT_EQ(check(image, 0, 1), 0);
   EXPECT_EQ(check(image, retrograde_region_is_dense, 1), retrograde_error_constraint_violated);
+  for (int extent : {0, 1}) {  // no other element is there for the stride to lead to
+    for (int stride : {0, 2, -7, INT32_MIN}) {
+      Image narrow = image;
+      narrow.buffer.dim = narrow.dims;
+      narrow.dims[0].extent = extent;
+      narrow.dims[0].stride = stride;
+      EXPECT_EQ(check(narrow, retrograde_region_is_dense, 1), 0) << extent << " " << stride;
+    }
+  }
   image.dims[1].stride = INT32_MIN;
   EXPECT_EQ(check(image, 0, 1), retrograde_error_allocation_too_large);
   image.dims[1].stride = 8;

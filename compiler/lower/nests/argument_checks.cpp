@@ -117,9 +117,12 @@ class Checks {
     for (const LoweredArgument& arg : args_) {
       for (int d = 0; arg.is_buffer() && d < arg.dimensions; d++) {
         const BufferConstraint promised = constraint_of(arg, d);
+        // A promise of a constant is that constant, also of a stride that is another (see
+        // add_constraint_check).
         const auto add = [&](const char* what, const Expr& promise) {
-          if (promise.defined())
-            names[fact(arg.name, what, d)] = variable(fact(arg.name, what, d) + ".actual");
+          if (!promise.defined()) return;
+          names[fact(arg.name, what, d)] =
+              is_const(promise) ? promise : variable(fact(arg.name, what, d) + ".actual");
         };
         add("min", promised.min);
         add("extent", promised.extent);
@@ -311,7 +314,6 @@ class Checks {
                          std::vector<Stmt>& checks) const {
     std::vector<Expr> sides;
     std::vector<Stmt> facts, of_promises;
-    if (is_dense(arg)) facts.push_back(holds_already(actual_fact(arg, "stride", 0) == 1));
     int32_t dimensions = 0;  // a bit each
     for (size_t d = 0; d < box.size(); d++) {
       const int dimension = static_cast<int>(d);
@@ -379,11 +381,19 @@ class Checks {
     return variable(fact(arg.name, what, d) + ".actual");
   }
 
-  static void add_constraint_check(const LoweredArgument& arg, const char* what, int d,
-                                   const Expr& promised, std::vector<Stmt>& checks) {
+  // Then its stride leads to no other element, and may be anything: libraries of arrays leave it as it
+  // comes.
+  Expr has_one_element_at_most(const LoweredArgument& arg, int d) const {
+    return variable(fact(arg.name, "extent", d)) <= 1;
+  }
+
+  void add_constraint_check(const LoweredArgument& arg, const char* what, int d,
+                            const Expr& promised, std::vector<Stmt>& checks) const {
     if (!promised.defined()) return;
     const Expr actual = actual_fact(arg, what, d);
-    checks.push_back(run_time_check(actual == promised, retrograde_error_constraint_violated,
+    Expr holds = actual == promised;
+    if (what == std::string("stride")) holds = holds || has_one_element_at_most(arg, d);
+    checks.push_back(run_time_check(holds, retrograde_error_constraint_violated,
                                     text("cannot run: the ", what, " of dimension ", d, " of ",
                                          quoted(arg.name), " was promised to be "),
                                     promised, Expr(", but it is "), actual,
