@@ -139,6 +139,16 @@ void refuse_sanitizers(const Target& target) {
   }
 }
 
+// Places in buffers are numbered by int32 throughout, from the linear forms of indices to lanes of gathers.
+void refuse_large_buffers(const Target& target) {
+  if (!target.has_feature(F::LargeBuffers)) return;
+  unsupported("generate code for target \"" + target.to_string() + "\"",
+              "the elements of a buffer are numbered in 31 bits",
+              "the target asks for \"large_buffers\", whose buffers have more",
+              "Leave out \"large_buffers\", and process an image of 2147483648 elements or more in "
+              "tiles, each a cropped() part of it");
+}
+
 }  // namespace
 
 // LLVM's order of instructions follows a model of latencies and ports. That of the oldest
@@ -167,6 +177,7 @@ static bool gathers_fast(const Machine& machine) {
 
 Machine machine_for(const Target& target, bool tune_for_host) {
   refuse_sanitizers(target);
+  refuse_large_buffers(target);
   if (const std::string part = target.unsupported_part(); !part.empty()) {
     unsupported("generate code for target \"" + target.to_string() + "\"",
                 "code is generated for 64-bit x86 and ARM under Linux",

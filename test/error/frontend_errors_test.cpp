@@ -523,6 +523,71 @@ TEST(BufferErrors, Sizes) {
                [] { Buffer<double> b(1 << 30, 1 << 30); });
 }
 
+// Dimension 2 would begin 2^31 elements on, which int32 takes for a negative number.
+TEST(BufferErrors, StridesThatOverflow) {
+  const int n = 1 << 16, half = 1 << 15;
+  static uint8_t memory[4];  // never touched
+  const std::initializer_list<std::string_view> words{"strides must fit 31 bits",
+                                                      "65536 x 32768 x 2", "2147483648"};
+  expect_error(words, [&] { Buffer<uint8_t> b(memory, n, half, 2); });
+  expect_error(words, [&] { Buffer<uint8_t> b(memory, std::vector<int>{n, half, 2}); });
+  expect_error(words, [&] { Buffer<> b(UInt(8), static_cast<void*>(memory), n, half, 2); });
+  expect_error(words, [&] { Buffer<uint8_t> b(n, half, 2); });
+  expect_error(words, [&] {
+    Buffer<uint8_t> b(std::vector<int>{n, half, 2}, std::vector<int>{0, 1, 2});
+  });
+  expect_error({"strides must fit 31 bits"},
+               [&] { Buffer<uint8_t>::make_interleaved(n, 3, half + 1); });
+  expect_error({"strides must fit 31 bits"},
+               [&] { Buffer<uint8_t>::make_interleaved(memory, n, 3, half); });
+  expect_error({"strides must fit 31 bits"},
+               [&] { Buffer<>::make_interleaved(UInt(8), n, 3, half); });
+  // All elements are one: its shape is, and a dense Buffer of it would not be.
+  const halide_dimension_t shape[] = {{0, n, 0}, {0, half, 0}, {0, 2, 0}};
+  Buffer<uint8_t> same(memory, 3, shape);
+  expect_error(words, [&] { Buffer<float>::make_with_shape_of(same); });
+  expect_error(words, [&] { same.copy(); });
+  expect_error(words, [&] { same.copy_to_planar(); });
+  const halide_dimension_t wide[] = {{0, n, 0}, {0, 2, 0}, {0, half, 0}};
+  expect_error({"strides must fit 31 bits"},
+               [&] { Buffer<uint8_t>(memory, 3, wide).copy_to_interleaved(); });
+  const halide_dimension_t plane[] = {{0, n, 1}, {0, half, n}};
+  Buffer<uint8_t> flat(memory, 2, plane);
+  expect_error({"strides must fit 31 bits", "2147483648"}, [&] { flat.embed(2); });
+  expect_error({"strides must fit 31 bits"}, [&] { flat.add_dimension(); });
+  EXPECT_EQ(flat.dimensions(), 2);
+  EXPECT_EQ(flat.cropped(1, 0, 2).embedded(2).stride(2), 2 * n);
+}
+
+TEST(BufferErrors, StridesThatJustFit) {
+  static uint8_t memory[4];  // never touched
+  const Buffer<uint8_t> b(memory, 65535, 32768, 2);
+  EXPECT_EQ(b.stride(2), 2147450880);
+  const Buffer<uint8_t> two(memory, 50000, 50000);
+  EXPECT_EQ(two.number_of_elements(), 2500000000u);
+  EXPECT_EQ(&two(49999, 49999) - two.data(), 2499999999);
+}
+
+TEST(BufferErrors, CoordinatesThatOverflow) {
+  Buffer<uint8_t> b(4, 4);
+  const std::initializer_list<std::string_view> words{"coordinates must fit int32"};
+  expect_error(words, [&] { b.set_min(0, INT32_MAX); });
+  expect_error(words, [&] { b.set_min(INT32_MAX - 3); });
+  b.set_min(INT32_MAX - 4, INT32_MIN);
+  EXPECT_EQ(b.right(), INT32_MAX - 1);
+  expect_error(words, [&] { b.translate(0, 1); });
+  expect_error(words, [&] { b.translate(1, -1); });
+  expect_error(words, [&] { b.translated({0, -1}); });
+}
+
+TEST(BufferErrors, CopiesOfWhatIsNotThere) {
+  Buffer<uint8_t> b(4, 4);
+  expect_error({"an interleaved Buffer has three dimensions", "it has 2"},
+               [&] { b.copy_to_interleaved(); });
+  b.deallocate();
+  expect_error({"the buffer must have memory"}, [&] { b.copy(); });
+}
+
 TEST(BufferErrors, UndefinedHandle) {
   Buffer<float> b;
   Var x("x");
@@ -588,6 +653,16 @@ TEST(CallArguments, Sizes) {
   });
   expect_error<RuntimeError>({"sizes are not negative"}, [&] { s.f.realize({-3, 4}); });
   expect_error<UserError>({"address space"}, [&] { s.f.realize({INT32_MAX, INT32_MAX}); });
+  Func three("three");
+  three(s.x, s.y, s.z) = cast<uint8_t>(s.x + s.y + s.z);
+  expect_error<UserError>({"strides must fit 31 bits"}, [&] {
+    three.realize({1 << 16, 1 << 15, 2});
+  });
+  ImageParam in(UInt(8), 3, "in");
+  Func reads("reads");
+  RDom r(0, 1 << 16, 0, 1 << 15);
+  reads(s.x) = sum(cast<int>(in(r.x, r.y, s.x)));
+  expect_error<UserError>({"at most 2147483647 elements"}, [&] { reads.infer_input_bounds({2}); });
 }
 
 // rule: must have the right element type

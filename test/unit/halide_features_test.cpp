@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "support/errors.h"
+#include "support/temporary_folder.h"
 
 using namespace Halide;
 using retrograde::error_of;
@@ -117,6 +118,22 @@ TEST(Targets, RefuseSanitizersByName) {
         {name, "no checks of a sanitizer", "Leave out"},
         [&, feature = feature] { f.realize({3}, jit.with_feature(feature)); });
   }
+}
+
+TEST(Targets, RefuseLargeBuffersByName) {
+  Func f("f");
+  Var x("x");
+  f(x) = x;
+  const Target large = get_jit_target_from_environment().with_feature(Target::LargeBuffers);
+  EXPECT_EQ(large.unsupported_part(), "large_buffers");
+  const std::initializer_list<std::string_view> words{"\"large_buffers\"", "numbered in 31 bits",
+                                                      "in tiles"};
+  expect_error<Unsupported>(words, [&] { f.realize({3}, large); });
+  const TemporaryFolder folder;
+  expect_error<Unsupported>(words, [&] {
+    f.compile_to_file((folder.path() / "f").string(), {}, "f",
+                      Target("x86-64-linux-large_buffers"));
+  });
 }
 
 // ---- Target::FuzzFloatStores ----

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <numeric>
 
 #include "ir/visit.h"
 
@@ -71,7 +72,31 @@ void* allocate_or_throw(size_t bytes) {
 
 }  // namespace
 
-void check_sizes(halide_type_t type, const std::vector<int>& sizes, const std::string& asked) {
+namespace {
+
+// Of dense elements: that of each dimension is the number of elements of those inside of it. HalideBuffer.h
+// multiplies them in 32 bits.
+void check_strides(const std::vector<int>& sizes, const std::vector<int>& storage_order,
+                   const std::string& asked) {
+  int64_t stride = 1;
+  for (size_t n = 0; n < sizes.size(); n++) {
+    const size_t d = storage_order.empty() ? n : static_cast<size_t>(storage_order[n]);
+    if (stride > INT32_MAX) {
+      user_error(asked, "its strides must fit 31 bits",
+                 text("the extents are ", sizes_text(sizes),
+                      ", so that elements which are next to each other in "
+                      "dimension ",
+                      d, " lie ", stride, " elements apart"),
+                 "Use several smaller Buffers, as tiles of the image");
+    }
+    stride *= sizes[d];
+  }
+}
+
+}  // namespace
+
+void check_sizes(halide_type_t type, const std::vector<int>& sizes, const std::string& asked,
+                 const std::vector<int>& storage_order) {
   uint64_t bytes = type.bytes();
   for (int size : sizes) {
     if (size < 0) {
@@ -84,6 +109,16 @@ void check_sizes(halide_type_t type, const std::vector<int>& sizes, const std::s
                  text("the extents are ", sizes_text(sizes)), "Use a smaller Buffer");
     }
   }
+  check_strides(sizes, storage_order, asked);
+}
+
+void check_coordinates(const Runtime::Buffer<>& buffer, const std::string& name, int d,
+                       int64_t min) {
+  const int64_t end = min + buffer.dim(d).extent();
+  if (min >= INT32_MIN && end <= INT32_MAX) return;
+  user_error(text("let dimension ", d, " of the Buffer ", quoted(name), " begin at ", min),
+             "coordinates must fit int32", text("they would be [", min, ", ", end, ")"),
+             "Give smaller coordinates");
 }
 
 Runtime::Buffer<> wrap_memory(halide_type_t type, const void* data, const std::vector<int>& sizes) {
@@ -105,18 +140,71 @@ void check_storage_order(const std::vector<int>& order, int dimensions, const st
 
 Runtime::Buffer<> allocate_buffer(halide_type_t type, const std::vector<int>& sizes,
                                   const std::vector<int>& storage_order) {
-  check_sizes(type, sizes, "make a Buffer");
+  const std::string asked = "make a Buffer";
   if (storage_order.empty()) {
+    check_sizes(type, sizes, asked);
     Runtime::Buffer<> buffer(type, nullptr, sizes);
     allocate_host(buffer);
     return buffer;
   }
-  check_storage_order(storage_order, static_cast<int>(sizes.size()), "make a Buffer");
+  check_storage_order(storage_order, static_cast<int>(sizes.size()), asked);
+  check_sizes(type, sizes, asked, storage_order);
   const std::vector<int> in_memory = mapped(storage_order, [&](int d) { return sizes[d]; });
   Runtime::Buffer<> buffer(type, nullptr, in_memory);
   buffer.transpose(storage_order);
   allocate_host(buffer);
   return buffer;
+}
+
+namespace {
+
+// Dimensions by the distance of their elements, nearest first.
+std::vector<int> order_in_memory(const Runtime::Buffer<>& buffer) {
+  std::vector<int> order(static_cast<size_t>(buffer.dimensions()));
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return buffer.dim(a).stride() < buffer.dim(b).stride(); });
+  return order;
+}
+
+}  // namespace
+
+Runtime::Buffer<> allocate_like(const Runtime::Buffer<>& source, halide_type_t type, Layout layout,
+                                const std::string& asked) {
+  if (layout == Layout::Interleaved && source.dimensions() != 3) {
+    user_error(asked, "an interleaved Buffer has three dimensions",
+               text("it has ", source.dimensions()), "Slice or embed it first");
+  }
+  std::vector<int> sizes, mins, order;
+  for (int d = 0; d < source.dimensions(); d++) {
+    sizes.push_back(source.dim(d).extent());
+    mins.push_back(source.dim(d).min());
+  }
+  if (layout == Layout::OfSource) order = order_in_memory(source);
+  if (layout == Layout::Interleaved) order = {2, 0, 1};
+  check_sizes(type, sizes, asked, order);
+  Runtime::Buffer<> buffer = allocate_buffer(type, sizes, order);
+  buffer.set_min(mins);
+  return buffer;
+}
+
+Runtime::Buffer<> copy_of(const Runtime::Buffer<>& source, Layout layout,
+                          const std::string& asked) {
+  if (!source.data() && source.number_of_elements() > 0)
+    user_error(asked, "the buffer must have memory", "it has only a shape", "Call allocate()");
+  Runtime::Buffer<> copy = allocate_like(source, source.type(), layout, asked);
+  copy.copy_from(source);
+  return copy;
+}
+
+void check_new_dimension(const Runtime::Buffer<>& buffer, const std::string& asked) {
+  const int last = buffer.dimensions() - 1;
+  if (last < 0) return;
+  const int64_t stride = int64_t{buffer.dim(last).extent()} * buffer.dim(last).stride();
+  if (stride <= INT32_MAX && stride >= INT32_MIN) return;
+  user_error(asked, "its strides must fit 31 bits",
+             text("the stride of dimension ", last + 1, " would be ", stride),
+             "Crop the Buffer first");
 }
 
 BufferContents::BufferContents(Runtime::Buffer<> buffer, const std::string& name)
@@ -169,9 +257,10 @@ void check_dimension(const Runtime::Buffer<>& buffer, const std::string& name, i
 }
 
 void check_embed(const Runtime::Buffer<>& buffer, const std::string& name, int d) {
-  if (d >= 0 && d <= buffer.dimensions()) return;
-  user_error(text("embed the Buffer ", quoted(name), " as dimension ", d, " of another"),
-             "a new dimension stands before, between or behind those that are there",
+  const std::string asked =
+      text("embed the Buffer ", quoted(name), " as dimension ", d, " of another");
+  if (d >= 0 && d <= buffer.dimensions()) return check_new_dimension(buffer, asked);
+  user_error(asked, "a new dimension stands before, between or behind those that are there",
              text("it has ", buffer.dimensions(), " dimensions"),
              text("Give a number from 0 to ", buffer.dimensions()));
 }

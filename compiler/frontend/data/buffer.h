@@ -72,7 +72,14 @@ Runtime::Buffer<> allocate_buffer(halide_type_t type, const std::vector<int>& si
 Runtime::Buffer<> wrap_memory(halide_type_t type, const void* data, const std::vector<int>& sizes);
 // Memory for a buffer that has a shape and none.
 void allocate_host(Runtime::Buffer<>& buffer);
-void check_sizes(halide_type_t type, const std::vector<int>& sizes, const std::string& asked);
+// storage_order: dimensions, innermost in memory first; empty: as they are numbered.
+void check_sizes(halide_type_t type, const std::vector<int>& sizes, const std::string& asked,
+                 const std::vector<int>& storage_order = {});
+// Dense memory for as many elements, which begin at the same coordinates.
+enum class Layout { OfSource, Planar, Interleaved };
+Runtime::Buffer<> allocate_like(const Runtime::Buffer<>& source, halide_type_t type, Layout layout,
+                                const std::string& asked);
+Runtime::Buffer<> copy_of(const Runtime::Buffer<>& source, Layout layout, const std::string& asked);
 // A type or number of dimensions that does not fit; -1 and halide_type_t() stand for any.
 void check_convertible(const Runtime::Buffer<>& buffer, const std::string& name, halide_type_t type,
                        bool any_type, int dimensions);
@@ -81,6 +88,10 @@ void check_dimension(const Runtime::Buffer<>& buffer, const std::string& name, i
                      const char* method);
 void check_storage_order(const std::vector<int>& order, int dimensions, const std::string& asked);
 void check_embed(const Runtime::Buffer<>& buffer, const std::string& name, int d);
+void check_new_dimension(const Runtime::Buffer<>& buffer, const std::string& asked);
+// A dimension that is to begin at `min`.
+void check_coordinates(const Runtime::Buffer<>& buffer, const std::string& name, int d,
+                       int64_t min);
 void check_same_shape(const Runtime::Buffer<>& buffer, const std::string& name,
                       const Runtime::Buffer<>& other);
 void check_crop(const Runtime::Buffer<>& buffer, const std::string& name, int d, int min,
@@ -112,8 +123,8 @@ struct AreSizes<First, Second, Rest...>
 }  // namespace frontend
 
 // Requires: the handle must have a buffer; an extent is not negative; its elements must fit the
-// address space; its elements must fit the memory of this machine; a storage order names each
-// dimension once; the element types must agree; the dimensions must agree.
+// address space; its strides must fit 31 bits; its elements must fit the memory of this machine; a
+// storage order names each dimension once; the element types must agree; the dimensions must agree.
 template <typename T, int Dims>
 class Buffer {
   static constexpr bool is_typed = !std::is_void_v<T>;
@@ -163,8 +174,8 @@ class Buffer {
     const frontend::NamedSizes given(first, std::forward<Args>(rest)...);
     *this = adopt(frontend::allocate_buffer(to_halide_type(type), given.sizes), given.name);
   }
-  // Requires: an extent is not negative; its elements must fit the address space; its elements must
-  // fit the memory of this machine.
+  // Requires: an extent is not negative; its elements must fit the address space; its strides must fit
+  // 31 bits; its elements must fit the memory of this machine.
   explicit Buffer(const std::vector<int>& sizes, const std::string& name = "")
       : Buffer(adopt(frontend::allocate_buffer(static_halide_type(), sizes), name)) {}
   explicit Buffer(Type type, const std::vector<int>& sizes, const std::string& name = "")
@@ -246,13 +257,17 @@ class Buffer {
   static Buffer make_interleaved(T* data, int width, int height, int channels,
                                  const std::string& name = "") requires(!std::is_void_v<T>) {
     frontend::check_sizes(static_halide_type(), {width, height, channels},
-                          "make an interleaved Buffer");
+                          "make an interleaved Buffer", {2, 0, 1});
     return adopt(untyped(Runtime::Buffer<T>::make_interleaved(data, width, height, channels)),
                  name);
   }
   template <typename T2, int D2>
   static Buffer make_with_shape_of(const Buffer<T2, D2>& source, const std::string& name = "") {
-    return adopt(untyped(Runtime::Buffer<Bare>::make_with_shape_of(*source.get())), name);
+    halide_type_t type = source.runtime().type();
+    if constexpr (!std::is_void_v<Bare>) type = static_halide_type();
+    return adopt(frontend::allocate_like(source.runtime(), type, frontend::Layout::OfSource,
+                                         "make a Buffer with the shape of another"),
+                 name);
   }
 
   // ---- the handle ----
@@ -335,27 +350,31 @@ class Buffer {
     contents_->buffer.slice(d, position);
   }
   void slice(int d) { slice(d, min(d)); }
-  // Requires: a new dimension stands before, between or behind those that are there.
+  // Requires: a new dimension stands before, between or behind those that are there; its strides must
+  // fit 31 bits.
   void embed(int d, int position = 0) {
     frontend::check_embed(runtime(), name(), d);
     contents_->buffer.embed(d, position);
   }
-  // Requires: a dimension is numbered from 0.
+  // Requires: a dimension is numbered from 0; coordinates must fit int32.
   void translate(int d, int delta) {
     check_dimension(d, "translate");
+    frontend::check_coordinates(runtime(), name(), d, int64_t{min(d)} + delta);
     check_on_host("translate");
     contents_->buffer.translate(d, delta);
   }
   void translate(const std::vector<int>& delta) {
     for (size_t d = 0; d < delta.size(); d++) translate(static_cast<int>(d), delta[d]);
   }
-  // Requires: a dimension is numbered from 0.
+  // Requires: a dimension is numbered from 0; coordinates must fit int32.
   template <typename... Ints>
   void set_min(Ints... mins) {
     set_min(std::vector<int>{mins...});
   }
   void set_min(const std::vector<int>& mins) {
     if (!mins.empty()) check_dimension(static_cast<int>(mins.size()) - 1, "set_min");
+    for (size_t d = 0; d < mins.size(); d++)
+      frontend::check_coordinates(runtime(), name(), static_cast<int>(d), mins[d]);
     check_on_host("set_min");
     contents_->buffer.set_min(mins);
   }
@@ -371,7 +390,12 @@ class Buffer {
                                   "transpose the Buffer " + retrograde::quoted(name()));
     contents_->buffer.transpose(order);
   }
-  void add_dimension() { checked("add_dimension")->buffer.add_dimension(); }
+  // Requires: its strides must fit 31 bits.
+  void add_dimension() {
+    frontend::check_new_dimension(runtime(),
+                                  "add a dimension to the Buffer " + retrograde::quoted(name()));
+    contents_->buffer.add_dimension();
+  }
   void allocate() { frontend::allocate_host(checked("allocate")->buffer); }
   void deallocate() { checked("deallocate")->buffer.deallocate(); }
   void reset() { contents_.reset(); }
@@ -417,18 +441,15 @@ class Buffer {
 
   // ---- elements ----
   // New memory, same elements.
-  // Requires: its newest elements must be on the host (RuntimeError).
-  Buffer<Bare, Dims> copy() const {
-    check_on_host("copy");
-    return Buffer<Bare, Dims>(untyped(get()->copy()));
-  }
+  // Requires: its newest elements must be on the host (RuntimeError); the buffer must have memory; its
+  // strides must fit 31 bits.
+  Buffer<Bare, Dims> copy() const { return copied(frontend::Layout::OfSource, "copy"); }
   Buffer<Bare, Dims> copy_to_planar() const {
-    check_on_host("copy_to_planar");
-    return Buffer<Bare, Dims>(untyped(get()->copy_to_planar()));
+    return copied(frontend::Layout::Planar, "copy_to_planar");
   }
+  // Requires: an interleaved Buffer has three dimensions.
   Buffer<Bare, Dims> copy_to_interleaved() const {
-    check_on_host("copy_to_interleaved");
-    return Buffer<Bare, Dims>(untyped(get()->copy_to_interleaved()));
+    return copied(frontend::Layout::Interleaved, "copy_to_interleaved");
   }
   // Into this buffer, where the two overlap.
   // Requires: both Buffers have one type and as many dimensions.
@@ -599,6 +620,11 @@ class Buffer {
   frontend::DeviceCall on_device(const char* method) const {
     checked(method);
     return {contents_->buffer, contents_->name, method};
+  }
+  Buffer<Bare, Dims> copied(frontend::Layout layout, const char* method) const {
+    check_on_host(method);
+    return Buffer<Bare, Dims>(frontend::copy_of(
+        runtime(), layout, text("call ", method, "() of the Buffer ", retrograde::quoted(name()))));
   }
   // Of what reads or writes elements on the host, or moves coordinates, which drops device memory.
   void check_on_host(const char* method) const { on_device(method).check_not_newer_on_device(); }

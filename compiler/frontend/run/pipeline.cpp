@@ -62,7 +62,9 @@ bool same_shape(const halide_buffer_t& a, const std::vector<halide_dimension_t>&
 // The answer to a query, and at least [0, size) in each dimension: then the call itself says what
 // is wrong with that. Its strides are the answer's, unless it is larger, or they put elements onto
 // each other.
-void enlarge_to(Runtime::Buffer<>& buffer, const std::vector<int32_t>& sizes) {
+void enlarge_to(Runtime::Buffer<>& buffer, const std::vector<int32_t>& sizes,
+                const std::string& asked) {
+  std::vector<int> extents;
   bool is_answer = true;
   for (size_t d = 0; d < sizes.size(); d++) {
     halide_dimension_t& dim = buffer.raw_buffer()->dim[d];
@@ -71,7 +73,9 @@ void enlarge_to(Runtime::Buffer<>& buffer, const std::vector<int32_t>& sizes) {
                 (dim.stride != 0 || dim.extent <= 1);
     dim.min = min;
     dim.extent = end - min;
+    extents.push_back(dim.extent);
   }
+  frontend::check_sizes(buffer.type(), extents, asked);
   int32_t stride = 1;
   for (size_t d = 0; d < sizes.size() && !is_answer; d++) {
     buffer.raw_buffer()->dim[d].stride = stride;
@@ -358,7 +362,7 @@ Realization Pipeline::run(JITUserContext* context, const std::vector<int32_t>& s
   const bool succeeds =
       frontend::prepared(handlers, context, bind) == 0 && (needs_no_query || call());
   for (Buffer<>& buffer : buffers) {
-    enlarge_to(*buffer.get(), sizes);
+    enlarge_to(*buffer.get(), sizes, asked);
     frontend::allocate_host(*buffer.get());
   }
   if (succeeds) call();
