@@ -31,6 +31,7 @@ void bind_schedule_log(pybind11::module_& module);
 void bind_module_files(pybind11::module_& module);
 void bind_callable(pybind11::module_& module);
 void bind_externs(pybind11::module_& module);
+void bind_graph_text(pybind11::module_& module);
 void bind_handlers(pybind11::module_& module);
 void bind_watching(pybind11::module_& module);
 void bind_boundary_conditions(pybind11::module_& module);

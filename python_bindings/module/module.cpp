@@ -31,6 +31,7 @@ PYBIND11_MODULE(_retrograde, module) {
   bind_module_files(module);
   bind_callable(module);
   bind_externs(module);
+  bind_graph_text(module);
   bind_handlers(module);
   bind_watching(module);
   bind_expr_functions(module);

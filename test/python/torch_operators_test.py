@@ -113,6 +113,52 @@ class Sizes(unittest.TestCase):
                         self.assertTrue(torch.equal(a, b))
 
 
+class Mapped(unittest.TestCase):
+    """Autograd's own vmap: over gradients, and over vectors in jacobian and hessian."""
+
+    def test_batched_gradients(self):
+        tensors = wanting(inputs())
+        shared = wanting([torch.stack([tensors[0]] * 2).detach(), *tensors[1:]])  # the others are each item's
+        for given in (tensors, shared):
+            result = OP(*given)
+            seeds = values(3, *result.shape, low=-1)
+            got = torch.autograd.grad(result, given, seeds, is_grads_batched=True, retain_graph=True)
+            each = [torch.autograd.grad(result, given, seed, retain_graph=True) for seed in seeds]
+            for all_items, *items in zip(got, *each):
+                torch.testing.assert_close(all_items, torch.stack(items), rtol=1e-13, atol=1e-15)
+
+    def test_batched_gradients_are_differentiated_again(self):
+        tensors = wanting(inputs())
+        result = OP(*tensors)
+        seeds = values(2, *result.shape, low=-1)
+        got = torch.autograd.grad(result, tensors, seeds, is_grads_batched=True, create_graph=True)
+        each = [torch.autograd.grad(result, tensors, seed, create_graph=True) for seed in seeds]
+        second = [torch.autograd.grad(sum(t.square().sum() for t in gradients), tensors, retain_graph=True)
+                  for gradients in (got, [t for one in each for t in one])]
+        for a, b in zip(*second):
+            torch.testing.assert_close(a, b, rtol=1e-11, atol=1e-13)
+
+    def test_jacobians(self):
+        functional, tensors = torch.autograd.functional, tuple(inputs())
+        want = functional.jacobian(OP, tensors)
+        for strategy in ("reverse-mode", "forward-mode"):
+            got = functional.jacobian(OP, tensors, vectorize=True, strategy=strategy)
+            for a, b in zip(got, want):
+                torch.testing.assert_close(a, b, rtol=1e-11, atol=1e-13)
+
+    def test_hessians(self):
+        functional, first, rest = torch.autograd.functional, inputs()[0], inputs()[1:]
+        if first.numel() > 16:
+            self.skipTest("a Hessian of more than 16 elements takes long")
+
+        def loss(t):
+            return OP(t, *rest).square().sum()
+        want = functional.hessian(loss, first)
+        for strategy in ("reverse-mode", "forward-mode"):
+            got = functional.hessian(loss, first, vectorize=True, outer_jacobian_strategy=strategy)
+            torch.testing.assert_close(got, want, rtol=1e-10, atol=1e-12)
+
+
 class Values(unittest.TestCase):
     def check(self, tensors, close=1e-12):
         result, want = OP(*tensors), FORMULATIONS[NAME](*tensors)

@@ -78,6 +78,9 @@ class Param {
   explicit Param(Type type, const std::string& name = "") requires(!has_static_type)
       : parameter_(frontend::make_scalar_parameter(type, name)) {}
   Param(Type type, std::nullptr_t) = delete;
+  // The Param whose record this is.
+  explicit Param(std::shared_ptr<graph::ParameterContents> parameter) requires(!has_static_type)
+      : parameter_(std::move(parameter)) {}
   explicit Param(Value value) requires(has_static_type && !std::is_pointer_v<T>) : Param() {
     set(value);
   }

@@ -15,6 +15,15 @@ from torch.autograd import forward_ad
 is_compiling = getattr(getattr(torch, "compiler", None), "is_compiling", lambda: False)
 _count_modes = _C._len_torch_function_stack
 _is_profiled = torch.autograd._profiler_enabled
+
+
+def count_maps():
+    """The levels of autograd's older vmap that are open."""
+    before = _C._vmapmode_increment_nesting() - 1
+    _C._vmapmode_decrement_nesting()
+    return before
+
+
 _TYPES = {torch.Tensor, torch.nn.Parameter}
 
 
@@ -54,7 +63,7 @@ else:  # PyTorch 1.13 does not show its sets of keys; a question for each of tho
 
     def _is_ordinary_thread():
         return not (_count_dispatch_modes() or _has_transforms() or _is_traced() or _has_autocast()
-                    or _is_excluded(_AUTOGRAD))
+                    or _is_excluded(_AUTOGRAD) or count_maps())
 
     def _is_ordinary(t):  # a tensor of the CPU without memory has no address either, which is an error
         return t.is_cpu and not t.is_neg() and not t._is_zerotensor() and not _is_functional(t)

@@ -9,7 +9,7 @@ made, so that a compiled graph that PyTorch kept on disk finds them. Each has a 
     Meta (fake)    the shapes and types of the results
     Autograd       autograd.Function with backward and jvp, which call the derivative operator
     Autocast       the types of the pipeline, whatever the mode says
-    vmap           a batched call: the kernels take batches as they are
+    vmap, Batched  a batched call: the kernels take batches as they are
 
 PyTorch 1.13 has no vmap and no functorch transforms of such operators; all else is the same there.
 
@@ -21,7 +21,7 @@ import torch
 from torch.autograd import forward_ad
 
 from .._errors import Unsupported, error
-from ._direct import is_compiling, is_direct
+from ._direct import count_maps, is_compiling, is_direct
 from ._plan import GRADIENT, TANGENT
 
 if tuple(int(n) for n in torch.__version__.split(".")[:2]) < (1, 13):
@@ -65,7 +65,7 @@ class Calls:
     def __init__(self, operator, library, namespace, name):
         self.operator, self._last, self._functions = operator, {}, {}
         kernels = {"CPU": self.run, "CUDA": self.run_on_device, "Autograd": self.differentiate,
-                   "AutocastCPU": self.cast, "AutocastCUDA": self.cast}
+                   "AutocastCPU": self.cast, "AutocastCUDA": self.cast, "Batched": self.take_batch}
         for key, kernel in kernels.items():
             library.impl(name, self.of_operator(kernel), key)
             library.impl(name + "_derivative", of_derivative(kernel), key)
@@ -175,6 +175,14 @@ class Calls:
         results = self.dispatch(path, self._batched(path, tensors, dims[0]))
         return results, [0] * len(results)
 
+    def take_batch(self, path, tensors):
+        """What autograd maps over gradients by, and jacobian and hessian over vectors: an older vmap, whose tensors hide
+        a dimension for each of its levels. The innermost one that a tensor has comes to the front, and goes back."""
+        level, has_level = _innermost_level(tensors)
+        shown = [torch._remove_batch_dim(t, level, 1, 0) if has else t for t, has in zip(tensors, has_level)]
+        results = self.dispatch(path, self._batched(path, shown, [0 if has else None for has in has_level]))
+        return [torch._add_batch_dim(result, 0, level) for result in results]
+
     def _batched(self, path, tensors, dims):
         ranks = self.operator.plan(path, tensors).ranks
         before = [t.dim() - rank - (dim is not None) for t, rank, dim in zip(tensors, ranks, dims)]
@@ -185,6 +193,18 @@ class Calls:
                 t = t.reshape(t.shape[:1] + (1,) * (max(before) - has) + t.shape[1:])
             moved.append(t)
         return moved
+
+
+def _innermost_level(tensors):
+    """Of the older vmap: its number, and which of the tensors have it."""
+    for level in range(count_maps(), 0, -1):
+        # One that has it not is expanded to the size that is asked for.
+        has_level = [torch._remove_batch_dim(t, level, 1, 0).shape[0] == torch._remove_batch_dim(t, level, 2, 0).shape[0]
+                     for t in tensors]
+        if any(has_level):
+            return level, has_level
+    raise error(RuntimeError, "map an operator over a batch", "a tensor of the batch is of a level of vmap",
+                "none is", "Use torch.func.vmap")
 
 
 def of_derivative(kernel):

@@ -3,6 +3,7 @@ import inspect
 import itertools
 import re
 import threading
+import uuid
 
 import torch
 
@@ -10,6 +11,7 @@ from .. import _retrograde as rg
 from .._errors import CompileError, error
 from . import _library
 from ._direct import is_compiling, is_direct
+from ._pickling import Function, describe, described
 from ._plan import Plan, is_image
 
 _numbers = itertools.count()
@@ -33,7 +35,45 @@ def operator(name, pipeline=None, inputs=None, outputs=None, *, sizes=None):
     than code for all. It is called with None for others, after MOST_SIZES of them."""
     if not isinstance(name, str):
         name, pipeline, inputs, outputs = None, name, pipeline, outputs if inputs is None else inputs
-    return Operator(name, pipeline, inputs, sizes if outputs is None else outputs)
+    return _registered(Operator(name, pipeline, inputs, sizes if outputs is None else outputs))
+
+
+# Of this process: by their names, and by the marks that their pickles have. A name that the user did not choose is
+# another operator's in another process.
+_by_name, _by_mark, _registering = {}, {}, threading.RLock()
+
+
+def _registered(operator):
+    """The operator, or one that a pickle has made of the same definition before."""
+    with _registering:
+        known = _by_name.get(operator.name)
+        if known is not None and known._is_restored and known._signature() == operator._signature():
+            return known
+        operator._register()
+        _by_name[operator.name] = _by_mark[operator._mark] = operator
+    return operator
+
+
+def _restored(name, mark, signature, definition, description):
+    """What a pickle stands for."""
+    with _registering:
+        known = _by_mark.get(mark) or (name and _by_name.get(name))
+        if known is None:
+            parts = (definition.function, None, None) if definition else described(*description)
+            known = Operator(name, *parts)
+            known._mark, known._is_restored = mark, True
+            _registered(known)
+        if known._signature() != signature:
+            raise error(ValueError, f'restore the operator "{name}"', "a name is given once",
+                        f"there is an operator of that name that {_shown(known._signature())}, and the stored one "
+                        f"{_shown(signature)}", "Choose another name for one of them")
+        _by_mark[mark] = known
+    return known
+
+
+def _shown(signature):
+    inputs, results = signature
+    return f"takes {', '.join(f'{name}: {kind}' for name, kind, _ in inputs)} and gives {', '.join(results)}"
 
 
 def _funcs(pipeline):
@@ -83,6 +123,8 @@ class Operator:
             definition = (pipeline, inputs, outputs)
         self._plans, self._sized, self._lock = {}, {}, threading.Lock()
         funcs, self.single = _funcs(definition[0])
+        self._definition = None if self._define else (funcs, self.single, list(definition[1]), definition[2])
+        self._has_name, self._mark, self._is_restored = bool(name), uuid.uuid4().hex, False
         self.name = name or f"retrograde::{re.sub(r'[^A-Za-z0-9]', '_', funcs[0].name())}_{next(_numbers)}"
         if not re.fullmatch(r"[A-Za-z]\w*::[A-Za-z]\w*", self.name):
             raise error(ValueError, f'make an operator "{self.name}"', 'a name is "namespace::name", of words',
@@ -93,7 +135,28 @@ class Operator:
         self._by = next((i for i, d in enumerate(plan.dtypes) if d == torch.float32), None) if self._define else None
         self._plans[torch.float32 if self._by is not None else None] = plan
         self._parameters = plan
+
+    def _register(self):
         self._calls = _library.register(self)
+
+    def _signature(self):
+        """What tells it from another operator of its name: names, types and ranks of inputs, types of results."""
+        plan = self._parameters
+        return ([(name, str(dtype), rank) for name, dtype, rank in zip(plan.names, plan.dtypes, plan.ranks)],
+                [str(dtype) for dtype in plan.result_dtypes])
+
+    # ---- copies and pickles (_pickling.py) ----
+
+    def __copy__(self):
+        return self
+
+    def __deepcopy__(self, _):
+        return self
+
+    def __reduce__(self):
+        return _restored, (self.name if self._has_name else None, self._mark, self._signature(),
+                           Function(self._define) if self._define else None,
+                           None if self._define else describe(*self._definition))
 
     def _defined(self, dtype):
         kind = str(dtype)[6:]
