@@ -71,6 +71,7 @@ target_include_directories(retrograde_dep_halide SYSTEM INTERFACE
   ${RETROGRADE_HALIDE_RUNTIME_INCLUDE})
 target_link_libraries(retrograde_dep_halide INTERFACE ${RETROGRADE_HALIDE_LIBRARY} ${CMAKE_DL_LIBS})
 
+find_package(JPEG REQUIRED)  # JPEG::JPEG: whether pictures are whole
 pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO)
 add_library(retrograde_dep_image INTERFACE)
 target_link_libraries(retrograde_dep_image INTERFACE PkgConfig::OIIO)

@@ -72,11 +72,13 @@ void Burst::leave_out(const std::vector<int>& which) {
 Burst read_burst(const std::filesystem::path& folder, const std::string& pattern) {
   Burst burst;
   for (const std::filesystem::path& path : apps::images_in(folder)) {
-    const Frame frame = measured(demosaic::read_sensor(path, pattern));
+    const demosaic::Sensor sensor = demosaic::read_sensor(path, pattern);
+    const Frame frame = measured(sensor);
     require_large(path, frame.size);
     if (burst.names.empty()) {
       burst.size = frame.size;
       burst.bits = frame.bits;
+      burst.orientation = sensor.orientation;
     }
     require_same_size(path, frame.size, burst.size);
     burst.samples.insert(burst.samples.end(), frame.samples.begin(), frame.samples.end());

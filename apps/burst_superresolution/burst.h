@@ -28,6 +28,7 @@ struct Truth {
 struct Burst {
   FrameSize size;
   int bits = 16;                   // of the files; 32: results are written as linear light, too
+  int orientation = 1;             // how pictures are to be turned, as the first frame says
   std::vector<float> samples;      // [frames, height, width]
   std::vector<std::string> names;  // of the frames
   std::vector<std::string> notes;  // what a person should know: frames left out ...

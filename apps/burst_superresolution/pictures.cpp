@@ -16,6 +16,19 @@ size_t at(const FrameSize& size, int x, int y, size_t c) {
          static_cast<size_t>(x);
 }
 
+// A square of planes, turned.
+apps::Image square_of(std::span<const float> planes, const FrameSize& size, const Corner& corner,
+                      int side, int orientation) {
+  apps::Image square{side, side, 8, {}};
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      for (size_t c = 0; c < 3; ++c)
+        square.pixels.push_back(planes[at(size, corner.x + x, corner.y + y, c)]);
+    }
+  }
+  return apps::upright(std::move(square), orientation);
+}
+
 double activity(std::span<const float> planes, const FrameSize& size, const Corner& from,
                 int side) {
   double sum = 0;
@@ -32,8 +45,9 @@ double activity(std::span<const float> planes, const FrameSize& size, const Corn
 }  // namespace
 
 void write_planes(const std::filesystem::path& path, std::span<const float> planes,
-                  const FrameSize& size, int bits) {
-  apps::write_image(path, demosaic::image_of(size.width, size.height, bits, planes));
+                  const FrameSize& size, int bits, int orientation) {
+  apps::write_image(
+      path, apps::upright(demosaic::image_of(size.width, size.height, bits, planes), orientation));
 }
 
 std::vector<float> coloured(std::span<const float> mosaic, const FrameSize& size) {
@@ -64,20 +78,19 @@ Corner busiest_square(std::span<const float> planes, const FrameSize& size, int 
 
 void write_enlarged(const std::filesystem::path& path,
                     std::span<const std::span<const float>> pictures, const FrameSize& size,
-                    const Corner& corner, int side, int times) {
+                    const Corner& corner, int side, int times, int orientation) {
   const int panel = side * times, gap = times;
   apps::Image image{static_cast<int>(pictures.size()) * (panel + gap) - gap, panel, 8, {}};
   image.pixels.assign(static_cast<size_t>(image.elems()), 1.0f);
   for (size_t n = 0; n < pictures.size(); ++n) {
+    const apps::Image square = square_of(pictures[n], size, corner, side, orientation);
     for (int y = 0; y < panel; ++y) {
       for (int x = 0; x < panel; ++x) {
         const size_t to = (static_cast<size_t>(y) * static_cast<size_t>(image.width) +
                            n * static_cast<size_t>(panel + gap) + static_cast<size_t>(x)) *
                           3;
-        for (size_t c = 0; c < 3; ++c) {
-          image.pixels[to + c] =
-              pictures[n][at(size, corner.x + x / times, corner.y + y / times, c)];
-        }
+        const auto from = static_cast<size_t>(y / times * side + x / times) * 3;
+        for (size_t c = 0; c < 3; ++c) image.pixels[to + c] = square.pixels[from + c];
       }
     }
   }

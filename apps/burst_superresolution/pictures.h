@@ -10,9 +10,10 @@
 
 namespace burst {
 
-// planes: [3, height, width]. Throws retrograde::UserError.
+// planes: [3, height, width]. The picture is turned as the orientation says (apps::upright). Throws
+// retrograde::UserError.
 void write_planes(const std::filesystem::path& path, std::span<const float> planes,
-                  const FrameSize& size, int bits);
+                  const FrameSize& size, int bits, int orientation);
 
 // A mosaic, each sample in its colour: [3, height, width].
 std::vector<float> coloured(std::span<const float> mosaic, const FrameSize& size);
@@ -24,10 +25,10 @@ struct Corner {
 };
 Corner busiest_square(std::span<const float> planes, const FrameSize& size, int side);
 
-// The same square of each, enlarged so many times without interpolation, side by side. Throws
+// The same square of each, turned, enlarged so many times without interpolation, side by side. Throws
 // retrograde::UserError.
 void write_enlarged(const std::filesystem::path& path,
                     std::span<const std::span<const float>> pictures, const FrameSize& size,
-                    const Corner& corner, int side, int times);
+                    const Corner& corner, int side, int times, int orientation);
 
 }  // namespace burst

@@ -42,7 +42,8 @@ void write_light(const Run& run, std::span<const float> planes) {
   if (run.burst.bits < 32) return;
   std::vector<float> light(planes.begin(), planes.end());
   for (float& value : light) value = demosaic::decoded(value);
-  write_planes(run.options.common.output / "result.exr", light, run.burst.size, 32);
+  write_planes(run.options.common.output / "result.exr", light, run.burst.size, 32,
+               run.burst.orientation);
 }
 
 void write_pictures(const Run& run, apps::Report& report) {
@@ -51,23 +52,26 @@ void write_pictures(const Run& run, apps::Report& report) {
   std::vector<std::span<const float>> beside;
   std::string names;
   for (const Method& m : methods_of(run)) {
-    write_planes(out / m.file, m.planes, size, run.burst.bits);
+    write_planes(out / m.file, m.planes, size, run.burst.bits, run.burst.orientation);
     report.add_picture(m.file, m.name);
     beside.push_back(m.planes);
     names += (names.empty() ? "" : ", ") + std::string(m.name);
   }
   write_light(run, methods_of(run).back().planes);
-  write_planes(out / "frame.png", coloured(run.burst.frame(0), size), size, run.burst.bits);
+  write_planes(out / "frame.png", coloured(run.burst.frame(0), size), size, run.burst.bits,
+               run.burst.orientation);
   report.add_picture("frame.png", "the first frame");
   if (run.burst.truth) {
-    write_planes(out / "truth.png", run.burst.truth->planes, size, run.burst.bits);
+    write_planes(out / "truth.png", run.burst.truth->planes, size, run.burst.bits,
+                 run.burst.orientation);
     report.add_picture("truth.png", "the truth");
     beside.push_back(run.burst.truth->planes);
     names += ", the truth";
   }
   const int side = std::min({enlarged_side, size.width, size.height});
   write_enlarged(out / "enlarged.png", beside, size,
-                 busiest_square(run.prepared.average, size, side), side, enlarged_times);
+                 busiest_square(run.prepared.average, size, side), side, enlarged_times,
+                 run.burst.orientation);
   report.add_picture("enlarged.png", names);
 }
 

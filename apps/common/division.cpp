@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "common/images.h"
+#include "common/json_files.h"
 #include "diagnostics/error.h"
 
 namespace apps {
@@ -33,7 +34,8 @@ Division division_by_list(const std::filesystem::path& folder) {
     std::string kind, name;
     if (!(words >> kind)) continue;
     if (!(words >> name) || (kind != "train" && kind != "held_out")) {
-      refuse_list(list, text("it has the line ", quoted(line)));
+      refuse_list(list, is_text(line) ? text("it has the line ", quoted(line))
+                                      : std::string("it is a binary file"));
     }
     (kind == "train" ? division.train : division.held_out).push_back(folder / name);
   }

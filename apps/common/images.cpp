@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "common/files.h"
+#include "common/jpeg_check.h"
 #include "diagnostics/error.h"
 
 namespace apps {
@@ -54,7 +55,11 @@ class QuietErrors {
   int kept_;
 };
 
-// `raw_mosaic`: of a RAW file what the sensor saw, without demosaicing.
+constexpr const char *whole_rule = "an input must be a whole image",
+                     *fetch_again = "The file is damaged or truncated: fetch it again";
+
+// `raw_mosaic`: of a RAW file what the sensor saw, without demosaicing and not turned: OpenImageIO 2.4 would give it
+// another width and leave the samples where they are.
 std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path,
                                              bool raw_mosaic = false) {
   std::error_code failed;
@@ -65,11 +70,18 @@ std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path,
   }
   OIIO::ImageSpec config;
   config["oiio:UnassociatedAlpha"] = 1;  // colours as stored, not multiplied by alpha
-  if (raw_mosaic) config["raw:Demosaic"] = "none";
+  if (raw_mosaic) {
+    config["raw:Demosaic"] = "none";
+    config["raw:user_flip"] = 0;
+  }
   auto input = OIIO::ImageInput::open(path.string(), &config);
   if (!input) {
     refuse_read(path, "an input must be an image that OpenImageIO decodes", OIIO::geterror(),
                 "Give a PNG, JPEG, TIFF, OpenEXR or similar file");
+  }
+  if (std::string(input->format_name()) == "jpeg") {
+    if (const std::string damage = jpeg_damage(path); !damage.empty())
+      refuse_read(path, whole_rule, damage, fetch_again);
   }
   return input;
 }
@@ -98,8 +110,7 @@ Image read_open(const std::filesystem::path& path, OIIO::ImageInput& input, int 
   Image image{spec.width, spec.height, sample_bits(spec), {}, channels};
   image.pixels.resize(image.elems());
   if (!input.read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, image.pixels.data())) {
-    refuse_read(path, "an input must be a whole image", input.geterror(),
-                "The file is damaged or truncated: fetch it again");
+    refuse_read(path, whole_rule, input.geterror(), fetch_again);
   }
   const auto bad = std::find_if(image.pixels.begin(), image.pixels.end(),
                                 [](float v) { return !std::isfinite(v); });
@@ -110,6 +121,20 @@ Image read_open(const std::filesystem::path& path, OIIO::ImageInput& input, int 
                 "Mend the image first");
   }
   return image;
+}
+
+// As EXIF numbers it (JEITA CP-3451, tag 274): 1 is upright. Of a RAW file it is 1, too, for what its decoder has
+// demosaiced it has turned.
+int orientation_of(const OIIO::ImageInput& input) {
+  return input.spec().get_int_attribute("Orientation", 1);
+}
+
+// What a RAW file's decoder would do, in LibRaw's numbers, which it says where nothing tells it to leave that.
+int orientation_of_mosaic(const std::filesystem::path& path, const OIIO::ImageInput& input) {
+  if (std::string(input.format_name()) != "raw") return orientation_of(input);
+  const auto turned = OIIO::ImageInput::open(path.string());
+  const int flip = turned ? turned->spec().get_int_attribute("raw:flip", 0) : 0;
+  return flip == 3 ? 3 : flip == 5 ? 8 : flip == 6 ? 6 : 1;
 }
 
 // Row by row what OpenImageIO 2.4 names clockwise, and later ones row by row. Where LibRaw counts the two greens
@@ -199,7 +224,7 @@ Image read_image(const std::filesystem::path& path) {
   check_size(path, input->spec());
   // One or two channels are gray and alpha; of more, the first three are the colours.
   const bool gray = input->spec().nchannels < 3;
-  const Image image = read_open(path, *input, gray ? 1 : 3);
+  const Image image = upright(read_open(path, *input, gray ? 1 : 3), orientation_of(*input));
   return gray ? spread_gray(image) : image;
 }
 
@@ -207,7 +232,7 @@ Image read_channels(const std::filesystem::path& path) {
   const QuietErrors quiet;
   const auto input = open_image(path);
   check_size(path, input->spec());
-  return read_open(path, *input, input->spec().nchannels);
+  return upright(read_open(path, *input, input->spec().nchannels), orientation_of(*input));
 }
 
 Mosaic read_mosaic(const std::filesystem::path& path) {
@@ -219,8 +244,8 @@ Mosaic read_mosaic(const std::filesystem::path& path) {
     refuse_read(path, "a mosaic has one channel, as a sensor or a gray image has",
                 text("it has ", spec.nchannels), "Give a RAW photograph or a gray image");
   }
-  return {read_open(path, *input, 1),
-          bayer_pattern(spec.get_string_attribute("raw:FilterPattern"))};
+  return {read_open(path, *input, 1), bayer_pattern(spec.get_string_attribute("raw:FilterPattern")),
+          orientation_of_mosaic(path, *input)};
 }
 
 std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
@@ -287,6 +312,32 @@ Image resized_and_transposed(const Image& image, int width) {
 }
 
 }  // namespace
+
+// From 5 on rows are stored as columns; x, y or both run backwards.
+Image upright(Image image, int orientation) {
+  if (orientation < 2 || orientation > 8) return image;
+  const bool swaps = orientation >= 5;
+  const bool back_x = orientation == 2 || orientation == 3 || orientation >= 7,
+             back_y = orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
+  Image out{swaps ? image.height : image.width,
+            swaps ? image.width : image.height,
+            image.bits,
+            {},
+            image.channels};
+  out.pixels.reserve(image.pixels.size());
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      const int u = swaps ? y : x, v = swaps ? x : y;
+      const size_t column = static_cast<size_t>(back_x ? image.width - 1 - u : u),
+                   row = static_cast<size_t>(back_y ? image.height - 1 - v : v);
+      const auto from = image.pixels.begin() +
+                        static_cast<long>((row * static_cast<size_t>(image.width) + column) *
+                                          static_cast<size_t>(image.channels));
+      out.pixels.insert(out.pixels.end(), from, from + image.channels);
+    }
+  }
+  return out;
+}
 
 Image resized(const Image& image, int width, int height) {
   return resized_and_transposed(resized_and_transposed(image, width), height);

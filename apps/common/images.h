@@ -21,7 +21,8 @@ struct Image {
 inline constexpr long max_pixels = 50'000'000;
 
 // Any format, sample type and channel count that OpenImageIO decodes, RAW photographs included, as
-// three channels. Gray is spread over them; alpha is left out. Throws retrograde::UserError when
+// three channels. Gray is spread over them; alpha is left out. A photograph is turned upright, as its
+// EXIF orientation asks; what write_image writes has no orientation, and needs none. Throws retrograde::UserError when
 // the file is missing, unreadable, truncated, empty or too large, or when a sample is not finite.
 Image read_image(const std::filesystem::path& path);
 
@@ -29,13 +30,17 @@ Image read_image(const std::filesystem::path& path);
 Image read_channels(const std::filesystem::path& path);
 
 // What a camera's sensor saw, one channel: a RAW file without demosaicing, or an image of one
-// channel as it is. `pattern` names the colours of the first two rows, as "RGGB"; empty: the file
-// does not say.
+// channel as it is, not turned. `pattern` names the colours of the first two rows, as "RGGB"; empty: the
+// file does not say. `orientation`: how a picture made of it is to be turned, by upright().
 struct Mosaic {
   Image image;
   std::string pattern;
+  int orientation = 1;
 };
 Mosaic read_mosaic(const std::filesystem::path& path);
+
+// An image as it is stored, turned and mirrored as an EXIF orientation of 1 to 8 says; others are none.
+Image upright(Image image, int orientation);
 
 // The images of a folder by their names' order; other files are left out. Throws
 // retrograde::UserError when it is no folder or holds none.

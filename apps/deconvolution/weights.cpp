@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "cleaning.h"
 #include "common/files.h"
+#include "common/json_files.h"
 #include "common/process.h"
 
 namespace deconvolution {
@@ -226,10 +226,10 @@ void write_weights(const std::filesystem::path& path, const Weights& weights,
 }
 
 Weights read_weights(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) refuse_file(path, "it cannot be opened");
+  nlohmann::json json;
+  if (const std::string wrong = apps::read_json(path, json); !wrong.empty())
+    refuse_file(path, wrong);
   try {
-    const auto json = nlohmann::json::parse(file);
     const Shape shape{json.at("filters").get<int>(), json.at("size").get<int>(),
                       json.at("bumps").get<int>()};
     const auto stages = static_cast<int>(json.at("stages").size());

@@ -14,10 +14,12 @@ using retrograde::text;
 
 namespace {
 
-void write_planes(const Options& options, const std::string& name, const Sensor& size,
-                  std::span<const float> planes) {
-  apps::write_image(options.common.output / name,
-                    image_of(size.width, size.height, size.bits, planes));
+apps::Image write_planes(const Options& options, const std::string& name, const Sensor& size,
+                         std::span<const float> planes) {
+  const apps::Image image =
+      apps::upright(image_of(size.width, size.height, size.bits, planes), size.orientation);
+  apps::write_image(options.common.output / name, image);
+  return image;
 }
 
 // A picture of floats holds linear light, as it came.
@@ -28,7 +30,8 @@ void write_light(const Options& options, const Sensor& size, std::vector<float> 
 }
 
 // Without what begin_with_red put before.
-void write_result(const Options& options, const Sensor& sensor, const std::vector<float>& planes) {
+apps::Image write_result(const Options& options, const Sensor& sensor,
+                         const std::vector<float>& planes) {
   Sensor size = sensor;
   size.width -= sensor.left;
   size.height -= sensor.top;
@@ -39,18 +42,18 @@ void write_result(const Options& options, const Sensor& sensor, const std::vecto
       cut.insert(cut.end(), row + sensor.left, row + sensor.width);
     }
   }
-  write_planes(options, "result.png", size, cut);
   write_light(options, size, cut);
+  return write_planes(options, "result.png", size, cut);
 }
 
 void demosaic_mosaic(const Options& options, const Weights& weights, apps::Report& report) {
   Sensor sensor = read_sensor(options.common.input, options.pattern);
   Demosaicker method = Demosaicker::relaxed(weights, options.common.threads);
   const auto planes = method.run(sensor.samples, sensor.width, sensor.height);
-  write_result(options, sensor, planes);
+  const apps::Image result = write_result(options, sensor, planes);
   report.add_picture("result.png", method.name());
-  report.own["width"] = sensor.width - sensor.left;
-  report.own["height"] = sensor.height - sensor.top;
+  report.own["width"] = result.width;
+  report.own["height"] = result.height;
 }
 
 // The mosaic in its colours, as a picture.
@@ -70,7 +73,7 @@ std::vector<float> coloured(const Photograph& photograph) {
 
 void demosaic_picture(const Options& options, const Weights& weights, apps::Report& report) {
   const Photograph photograph = read_photograph(options.common.input);
-  const Sensor size{photograph.width, photograph.height, photograph.bits, 0, 0, {}};
+  const Sensor size{photograph.width, photograph.height, photograph.bits, 0, 0, {}, 1};
   auto mosaic = mosaic_of(photograph);
   write_planes(options, "truth.png", size, photograph.planes);
   write_planes(options, "mosaic.png", size, coloured(photograph));

@@ -17,7 +17,7 @@ namespace {
 Sensor begin_with_red(const apps::Image& mosaic, const std::string& pattern, bool is_light) {
   const int left = pattern[0] == 'G' ? (pattern[1] == 'R' ? 1 : 0) : (pattern[0] == 'B' ? 1 : 0);
   const int top = pattern[0] == 'G' ? (pattern[1] == 'R' ? 0 : 1) : (pattern[0] == 'B' ? 1 : 0);
-  Sensor sensor{mosaic.width + left, mosaic.height + top, mosaic.bits, left, top, {}};
+  Sensor sensor{mosaic.width + left, mosaic.height + top, mosaic.bits, left, top, {}, 1};
   for (int y = 0; y < sensor.height; ++y) {
     for (int x = 0; x < sensor.width; ++x) {
       const auto from = static_cast<size_t>(mirrored(y - top, mosaic.height)) *
@@ -58,7 +58,9 @@ Sensor read_sensor(const std::filesystem::path& path, const std::string& pattern
                            "Give a larger one");
   }
   // What a sensor measures is linear in light.
-  return begin_with_red(mosaic.image, named, is_raw(path) || mosaic.image.bits == 32);
+  Sensor sensor = begin_with_red(mosaic.image, named, is_raw(path) || mosaic.image.bits == 32);
+  sensor.orientation = mosaic.orientation;
+  return sensor;
 }
 
 }  // namespace demosaic

@@ -15,6 +15,7 @@ struct Sensor {
   int width = 0, height = 0, bits = 16;
   int left = 0, top = 0;       // what was put before
   std::vector<float> samples;  // [height, width], in sRGB's encoding
+  int orientation = 1;         // how a picture made of it is to be turned: apps::upright
 };
 
 // `pattern`: the colours of its first two rows, as "RGGB"; empty: as the file says. RAW files and images of

@@ -2,11 +2,11 @@
 
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/json_files.h"
 
 namespace demosaic {
 
@@ -160,10 +160,10 @@ void write_weights(const std::filesystem::path& path, Weights& weights, const st
 }
 
 Weights read_weights(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) refuse_file(path, "it cannot be opened");
+  nlohmann::json json;
+  if (const std::string wrong = apps::read_json(path, json); !wrong.empty())
+    refuse_file(path, wrong);
   try {
-    const auto json = nlohmann::json::parse(file);
     const Shape shape{json.at("filters").get<int>(), json.at("size").get<int>()};
     if (shape.filters < 1 || shape.filters > 64 || (shape.size != 5 && shape.size != 7)) {
       refuse_file(path, text("it has ", shape.filters, " filters of size ", shape.size));

@@ -51,14 +51,23 @@ def retouched(images):
     return (images.clamp(min=1e-3) ** 0.7 + 0.4 * (images - around)).clamp(0, 1)
 
 
-def photographs(folder):
-    from matplotlib import image
+def pixels_of(path):
+    """[height, width, channels], upright."""
+    from PIL import Image, ImageOps
 
+    try:
+        with Image.open(path) as picture:
+            return numpy.asarray(ImageOps.exif_transpose(picture))
+    except OSError as error:
+        raise SystemExit(f"cannot train: every photograph is a whole picture; {path}: {error}. Fetch it again.") from None
+
+
+def photographs(folder):
     paths = sorted(Path(folder).glob("*.jpg"))
     if not paths:
         raise SystemExit(f"cannot train: {folder} holds no photographs (*.jpg). Name another folder with --images.")
     for path in paths:
-        pixels = image.imread(path)
+        pixels = pixels_of(path)
         if pixels.ndim == 3:
             yield torch.from_numpy(numpy.ascontiguousarray(pixels[..., :3].transpose(2, 0, 1))).float() / 255
 

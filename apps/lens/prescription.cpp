@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "common/json_files.h"
 #include "diagnostics/error.h"
 #include "paraxial.h"
 
@@ -61,14 +61,12 @@ Surface read_surface(const std::string& asked, const json& from, double scale) {
 }
 
 json parse_file(const std::string& asked, const std::filesystem::path& path) {
-  std::ifstream file(path);
-  if (!file)
-    refuse_lens(asked, "it must be a file", "no such file can be read", "Give a prescription");
-  try {
-    return json::parse(file);
-  } catch (const json::exception& error) {
-    refuse_lens(asked, "a prescription is JSON, as in apps/lens/prescriptions", error.what());
-  }
+  json found;
+  const std::string wrong = apps::read_json(path, found);
+  if (!wrong.empty())
+    refuse_lens(asked, "a prescription is JSON, as in apps/lens/prescriptions", wrong,
+                "Give a prescription");
+  return found;
 }
 
 Lens lens_of(const std::string& asked, const json& from) {

@@ -9,6 +9,8 @@
 
 #include <jpeglib.h>
 
+#include <jerror.h>
+
 namespace retrograde::run_gen {
 
 namespace {
@@ -18,20 +20,32 @@ constexpr int quality = 98;  // as good as those who compare pictures want them
 struct Errors {
   jpeg_error_mgr manager;
   std::jmp_buf back;
-  char message[JMSG_LENGTH_MAX] = "";
+  char message[JMSG_LENGTH_MAX] = "";  // the first one
 };
 
-[[noreturn]] void give_up(j_common_ptr codec) {
+// Warnings after which the decoder makes samples up, as of a file that is cut off.
+bool is_damage(int warning) {
+  return warning == JWRN_JPEG_EOF || warning == JWRN_HIT_MARKER || warning == JWRN_HUFF_BAD_CODE ||
+         warning == JWRN_ARITH_BAD_CODE || warning == JWRN_MUST_RESYNC;
+}
+
+void note(j_common_ptr codec) {
   auto* errors = static_cast<Errors*>(codec->client_data);
-  codec->err->format_message(codec, errors->message);
-  std::longjmp(errors->back, 1);
+  if (!*errors->message) codec->err->format_message(codec, errors->message);
+}
+
+[[noreturn]] void give_up(j_common_ptr codec) {
+  note(codec);
+  std::longjmp(static_cast<Errors*>(codec->client_data)->back, 1);
 }
 
 template <typename Codec>
 void report_to(Errors& errors, Codec& codec) {
   codec.err = jpeg_std_error(&errors.manager);
   errors.manager.error_exit = give_up;
-  errors.manager.emit_message = [](j_common_ptr, int) {};
+  errors.manager.emit_message = [](j_common_ptr from, int level) {
+    if (level < 0 && is_damage(from->err->msg_code)) note(from);
+  };
   codec.client_data = &errors;
 }
 
@@ -68,6 +82,7 @@ bool start(Decoder& decoder, std::FILE* file) {
   return true;
 }
 
+// False also where samples are made up.
 bool read_lines(Decoder& decoder, uint8_t* samples, size_t bytes_of_line) {
   if (setjmp(decoder.errors.back)) return false;
   while (decoder.codec.output_scanline < decoder.codec.output_height) {
@@ -75,7 +90,7 @@ bool read_lines(Decoder& decoder, uint8_t* samples, size_t bytes_of_line) {
     jpeg_read_scanlines(&decoder.codec, &line, 1);
   }
   jpeg_finish_decompress(&decoder.codec);
-  return true;
+  return !*decoder.errors.message;
 }
 
 bool write_lines(Encoder& encoder, std::FILE* file, int width, int height, int channels,

@@ -29,6 +29,24 @@ class LearnedRetouching(unittest.TestCase):
         gradients = [torch.autograd.grad(result.square().sum(), tensors) for result in results]
         torch.testing.assert_close(*gradients, rtol=1e-11, atol=1e-11)
 
+    def test_photographs_are_upright_and_whole(self):
+        from PIL import Image
+        from train import photographs
+        with tempfile.TemporaryDirectory() as folder:
+            exif = Image.Exif()
+            exif[274] = 6  # the first row is the right side
+            picture = Image.new("RGB", (40, 24), (255, 0, 0))
+            picture.paste((0, 0, 255), (20, 0, 40, 24))
+            picture.save(Path(folder, "a.jpg"), exif=exif, quality=95)
+            pixels, = photographs(folder)
+            self.assertEqual(pixels.shape, (3, 40, 24))
+            self.assertGreater(pixels[0, :16].min().item(), 0.9)  # what was left is on top
+            self.assertLess(pixels[0, 24:].max().item(), 0.1)
+            whole = Path(folder, "a.jpg").read_bytes()
+            Path(folder, "a.jpg").write_bytes(whole[:len(whole) * 2 // 3])
+            with self.assertRaisesRegex(SystemExit, "whole picture"):
+                list(photographs(folder))
+
     def test_they_train_alike(self):
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run([sys.executable, "-B", APP / "train.py", "--steps", "12", "--size", "64", "--batch", "2",

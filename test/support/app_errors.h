@@ -101,6 +101,10 @@ class AppErrors : public testing::Test {
     std::filesystem::resize_file(folder_ / "half.png",
                                  std::filesystem::file_size(folder_ / "half.png") / 2);
     refused_input(folder_ / "half.png", {"half.png", "damaged or truncated"});
+    std::filesystem::copy_file(write_noise("whole.jpg", 300, 200), folder_ / "half.jpg");
+    std::filesystem::resize_file(folder_ / "half.jpg",
+                                 std::filesystem::file_size(folder_ / "half.jpg") / 2);
+    refused_input(folder_ / "half.jpg", {"half.jpg", "must be a whole image", "end of"});
   }
 
   std::filesystem::path out() const { return folder_ / "out"; }

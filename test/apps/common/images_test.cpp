@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <limits>
 
 #include "common/files.h"
@@ -19,7 +21,7 @@ namespace fs = std::filesystem;
 // TIFF with the tags of a colour filter array. The samples are those of a sensor "RGGB".
 class SmallDng {
  public:
-  SmallDng(int width, int height, const std::vector<uint16_t>& samples) {
+  SmallDng(int width, int height, const std::vector<uint16_t>& samples, uint32_t orientation = 1) {
     number(254, 4, {0});  // the full image
     number(256, 4, {static_cast<uint32_t>(width)});
     number(257, 4, {static_cast<uint32_t>(height)});
@@ -29,7 +31,7 @@ class SmallDng {
     words(271, "Retrograde");
     words(272, "Test");
     const size_t place = number(273, 4, {0});
-    number(274, 3, {1});
+    number(274, 3, {orientation});
     number(277, 3, {1});
     number(278, 4, {static_cast<uint32_t>(height)});
     number(279, 4, {static_cast<uint32_t>(2 * samples.size())});
@@ -252,6 +254,122 @@ TEST_F(AppImages, ResizingKeepsMeansAndRamps) {
   EXPECT_NEAR(half.pixels[2 * (6 + 2) + 1], 2.5f / 6, 1e-6);
   const apps::Image twice = apps::resized(ramp, 24, 12);
   for (int x = 2; x < 22; ++x) EXPECT_NEAR(twice.pixels[2 * (24 * 5 + x)], (x - 0.5f) / 24, 1e-6);
+}
+
+// A JPEG whose rows are ramps along x, with colours that no mirror image has.
+class AppPhotographs : public AppImages {
+ protected:
+  fs::path store_ramp(const std::string& name, int width, int height, int orientation) {
+    std::vector<float> pixels;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) pixels.insert(pixels.end(), {x / 64.0f, y / 64.0f, 0.25f});
+    }
+    const fs::path path = folder_ / name;
+    auto output = OIIO::ImageOutput::create(path.string());
+    OIIO::ImageSpec spec(width, height, 3, OIIO::TypeDesc::UINT8);
+    spec["Orientation"] = orientation;
+    spec["CompressionQuality"] = 100;
+    EXPECT_TRUE(output && output->open(path.string(), spec) &&
+                output->write_image(OIIO::TypeDesc::FLOAT, pixels.data()) && output->close());
+    return path;
+  }
+  std::string contents(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+};
+
+// Where the stored pixel (x, y) of w x h is shown, by the definition of the tag: which side of the picture the
+// first row is, and which the first column.
+std::pair<int, int> place_shown(int orientation, int x, int y, int w, int h) {
+  switch (orientation) {
+    case 2:  // top, right
+      return {w - 1 - x, y};
+    case 3:  // bottom, right
+      return {w - 1 - x, h - 1 - y};
+    case 4:  // bottom, left
+      return {x, h - 1 - y};
+    case 5:  // left, top
+      return {y, x};
+    case 6:  // right, top
+      return {h - 1 - y, x};
+    case 7:  // right, bottom
+      return {h - 1 - y, w - 1 - x};
+    case 8:  // left, bottom
+      return {y, w - 1 - x};
+    default:
+      return {x, y};
+  }
+}
+
+TEST_F(AppPhotographs, ComeUprightAndGoOutUpright) {
+  const int w = 40, h = 24;
+  for (const std::string suffix : {".jpg", ".tif"}) {
+    for (int orientation = 1; orientation <= 8; ++orientation) {
+      const auto path = store_ramp("a" + suffix, w, h, orientation);
+      const apps::Image image = apps::read_image(path);
+      ASSERT_EQ(image.width, orientation < 5 ? w : h) << orientation;
+      ASSERT_EQ(image.height, orientation < 5 ? h : w) << orientation;
+      EXPECT_EQ(apps::read_channels(path).pixels, image.pixels);
+      for (const auto& [x, y] : {std::pair{0, 0}, {w - 1, 0}, {0, h - 1}, {17, 5}}) {
+        const auto [u, v] = place_shown(orientation, x, y, w, h);
+        const size_t at = static_cast<size_t>(v * image.width + u) * 3;
+        EXPECT_NEAR(image.pixels[at], x / 64.0f, 0.04) << orientation;
+        EXPECT_NEAR(image.pixels[at + 1], y / 64.0f, 0.04) << orientation;
+      }
+      // What is written looks the same to who turns pictures and to who does not.
+      apps::write_image(folder_ / ("b" + suffix), image);
+      EXPECT_EQ(OIIO::ImageInput::open((folder_ / ("b" + suffix)).string())
+                    ->spec()
+                    .get_int_attribute("Orientation", 1),
+                1);
+      EXPECT_EQ(apps::read_image(folder_ / ("b" + suffix)).width, image.width);
+    }
+  }
+}
+
+// The sensor's samples stay as they are, for its pattern's sake; who makes a picture of them turns it.
+TEST_F(AppPhotographs, AMosaicIsNotTurnedButSaysHow) {
+  std::vector<uint16_t> samples;
+  for (int n = 0; n < 64 * 48; ++n) samples.push_back(static_cast<uint16_t>(10000 + 10 * n));
+  for (const int orientation : {1, 3, 6, 8}) {
+    apps::write_file(folder_ / "a.dng",
+                     SmallDng(64, 48, samples, static_cast<uint32_t>(orientation)).bytes());
+    const apps::Mosaic mosaic = apps::read_mosaic(folder_ / "a.dng");
+    EXPECT_EQ(mosaic.image.width, 64);
+    EXPECT_EQ(mosaic.orientation, orientation);
+    ASSERT_EQ(mosaic.image.pixels.size(), samples.size());
+    for (size_t n = 0; n < samples.size(); ++n)
+      ASSERT_NEAR(mosaic.image.pixels[n], static_cast<float>(samples[n]) / 65535.0f, 1e-6) << n;
+    const apps::Image photograph = apps::read_image(folder_ / "a.dng");
+    EXPECT_EQ(photograph.width, orientation < 5 ? 64 : 48);
+    EXPECT_EQ(photograph.height, orientation < 5 ? 48 : 64);
+  }
+  // A gray image says it by itself.
+  apps::write_image(folder_ / "a.tif", {1, 1, 8, {0.5f}, 1});
+  EXPECT_EQ(apps::read_mosaic(folder_ / "a.tif").orientation, 1);
+}
+
+TEST_F(AppPhotographs, ThatAreNotWholeAreRefused) {
+  const std::string whole = contents(store_ramp("a.jpg", 64, 64, 1));
+  const auto error_of = [&](const std::string& bytes) -> std::string {
+    apps::write_file(folder_ / "b.jpg", bytes);
+    try {
+      apps::read_image(folder_ / "b.jpg");
+    } catch (const retrograde::UserError& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(error_of(whole), "no error");
+  EXPECT_EQ(error_of(whole + "and a tail"), "no error");
+  for (const size_t kept : {whole.size() / 2, whole.size() - 100, whole.size() - 2})
+    EXPECT_NE(error_of(whole.substr(0, kept)).find("must be a whole image"), std::string::npos)
+        << error_of(whole.substr(0, kept));
+  // A piece out of the middle.
+  EXPECT_NE(error_of(whole.substr(0, whole.size() - 300) + whole.substr(whole.size() - 2))
+                .find("must be a whole image"),
+            std::string::npos);
 }
 
 TEST_F(AppImages, AFolderGivesItsImagesInOrder) {

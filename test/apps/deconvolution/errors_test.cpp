@@ -67,7 +67,8 @@ TEST_F(DeconvolutionErrors, OptionsThatCannotBe) {
 
 TEST_F(DeconvolutionErrors, WeightsThatAreNone) {
   const fs::path in = write_noise("in.png", 60, 60);
-  refused_input(in, {"nothing.json", "cannot be opened"}, {"--weights", folder_ / "nothing.json"});
+  refused_input(in, {"nothing.json", "no such file can be read"},
+                {"--weights", folder_ / "nothing.json"});
   std::ofstream(folder_ / "half.json") << R"({"filters": 2, "size": 3, "bumps": 1, "stages": [)";
   refused_input(in, {"half.json", "every array whole"}, {"--weights", folder_ / "half.json"});
   std::ofstream(folder_ / "few.json")

@@ -46,7 +46,8 @@ TEST_F(DemosaicErrors, ShapesThatDoNotExist) {
 
 TEST_F(DemosaicErrors, WeightsThatAreNone) {
   const fs::path in = write_noise("in.png", 8, 8);
-  refused_input(in, {"nothing.json", "cannot be opened"}, {"--weights", folder_ / "nothing.json"});
+  refused_input(in, {"nothing.json", "no such file can be read"},
+                {"--weights", folder_ / "nothing.json"});
   std::ofstream(folder_ / "half.json") << R"({"filters": 2, "size": 5, "green": [1, 2)";
   refused_input(in, {"half.json", "every array whole"}, {"--weights", folder_ / "half.json"});
   std::ofstream(folder_ / "few.json") << R"({"filters": 2, "size": 5, "green": [1, 2]})";

@@ -40,7 +40,21 @@ class AppLensErrors : public AppErrors {
 TEST_F(AppLensErrors, OtherFilesAreNoPrescriptions) {
   refuse_text("", {"a prescription is JSON"});
   refuse_text("{\"surfaces\": [", {"a prescription is JSON"});
-  refuse_text("\x89PNG", {"a prescription is JSON"});
+  // What they are is said, and nothing of them that no terminal shows.
+  for (const std::string binary :
+       {"\x89PNG\r\n\x1a\n", "{\"name\": \"\xc3\x28\"}", "{\"\x1b[31m\": 1}",
+        "{\"\xc2\x9b"
+        "31m\": 1}",
+        "\xff\xfe{"}) {
+    refuse_text(binary, {"it is a binary file"});
+    EXPECT_TRUE(std::all_of(message_.begin(), message_.end(), [](char c) {
+      return c == '\n' || (c >= ' ' && c <= '~');
+    })) << message_;
+  }
+  run("--input " + folder_.string() + " --output " + out().string());
+  expect_refused({"it is a folder"});
+  refuse_text(std::string(5000, '['), {"a prescription is JSON"});
+  EXPECT_LT(message_.size(), 1000u);
   refuse_text("[1, 2]", {"a list of \"surfaces\""});
   refuse_text("{\"surfaces\": 3}", {"a list of \"surfaces\""});
   refuse_text("{\"surfaces\": []}", {"2 to 60 surfaces", "it has 0"});
