@@ -62,15 +62,6 @@ find_package(Boost REQUIRED COMPONENTS context)  # Boost::context, fibers of the
 if(NOT RETROGRADE_PROGRAMS)
   return()
 endif()
-find_library(RETROGRADE_HALIDE_LIBRARY NAMES Halide14 REQUIRED)
-get_filename_component(retrograde_halide_folder ${RETROGRADE_HALIDE_LIBRARY} DIRECTORY)
-find_library(RETROGRADE_HALIDE_LI2018 NAMES autoschedule_li2018
-  PATHS ${retrograde_halide_folder}/halide14 ${retrograde_halide_folder} NO_DEFAULT_PATH REQUIRED)
-add_library(retrograde_dep_halide INTERFACE)
-target_include_directories(retrograde_dep_halide SYSTEM INTERFACE
-  ${RETROGRADE_HALIDE_RUNTIME_INCLUDE})
-target_link_libraries(retrograde_dep_halide INTERFACE ${RETROGRADE_HALIDE_LIBRARY} ${CMAKE_DL_LIBS})
-
 find_package(JPEG REQUIRED)  # JPEG::JPEG: whether pictures are whole
 pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO)
 add_library(retrograde_dep_image INTERFACE)
@@ -88,18 +79,33 @@ target_include_directories(retrograde_dep_ceres SYSTEM INTERFACE ${RETROGRADE_CE
 target_link_libraries(retrograde_dep_ceres INTERFACE ${RETROGRADE_CERES_LIBRARY}
   ${RETROGRADE_GLOG_LIBRARY})
 
-# By hand: its CMake package comes only with the development packages of all of OpenCV.
-find_path(RETROGRADE_OPENCV_INCLUDE opencv2/calib3d.hpp PATH_SUFFIXES opencv4 REQUIRED)
-add_library(retrograde_dep_opencv INTERFACE)
-target_include_directories(retrograde_dep_opencv SYSTEM INTERFACE ${RETROGRADE_OPENCV_INCLUDE})
-foreach(module calib3d features2d core)
-  find_library(RETROGRADE_OPENCV_${module} opencv_${module} REQUIRED)
-  target_link_libraries(retrograde_dep_opencv INTERFACE ${RETROGRADE_OPENCV_${module}})
-endforeach()
-
 find_path(RETROGRADE_CLI_INCLUDE CLI/CLI.hpp REQUIRED)
 add_library(retrograde_dep_cli INTERFACE)
 target_include_directories(retrograde_dep_cli SYSTEM INTERFACE ${RETROGRADE_CLI_INCLUDE})
+
+# By hand: its CMake package comes only with the development packages of all of OpenCV.
+if(RETROGRADE_BUILD_APPS STREQUAL "all" OR "burst_superresolution" IN_LIST RETROGRADE_BUILD_APPS)
+  find_path(RETROGRADE_OPENCV_INCLUDE opencv2/calib3d.hpp PATH_SUFFIXES opencv4 REQUIRED)
+  add_library(retrograde_dep_opencv INTERFACE)
+  target_include_directories(retrograde_dep_opencv SYSTEM INTERFACE ${RETROGRADE_OPENCV_INCLUDE})
+  foreach(module calib3d features2d core)
+    find_library(RETROGRADE_OPENCV_${module} opencv_${module} REQUIRED)
+    target_link_libraries(retrograde_dep_opencv INTERFACE ${RETROGRADE_OPENCV_${module}})
+  endforeach()
+endif()
+
+# What follows is for tools, tests and benchmarks, which come with all apps.
+if(NOT RETROGRADE_BUILD_APPS STREQUAL "all")
+  return()
+endif()
+find_library(RETROGRADE_HALIDE_LIBRARY NAMES Halide14 REQUIRED)
+get_filename_component(retrograde_halide_folder ${RETROGRADE_HALIDE_LIBRARY} DIRECTORY)
+find_library(RETROGRADE_HALIDE_LI2018 NAMES autoschedule_li2018
+  PATHS ${retrograde_halide_folder}/halide14 ${retrograde_halide_folder} NO_DEFAULT_PATH REQUIRED)
+add_library(retrograde_dep_halide INTERFACE)
+target_include_directories(retrograde_dep_halide SYSTEM INTERFACE
+  ${RETROGRADE_HALIDE_RUNTIME_INCLUDE})
+target_link_libraries(retrograde_dep_halide INTERFACE ${RETROGRADE_HALIDE_LIBRARY} ${CMAKE_DL_LIBS})
 
 find_path(RETROGRADE_SQLITE_INCLUDE sqlite3.h REQUIRED)
 find_library(RETROGRADE_SQLITE_LIBRARY sqlite3 REQUIRED)

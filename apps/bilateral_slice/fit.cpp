@@ -57,7 +57,7 @@ class PeerRun {
       if (program.empty()) {
         fit_.why_no_peer =
             "cannot measure Halide 14: its peer program is installed with this one; "
-            "no bilateral_slice_halide_peer was found. Build with libhalide14-0-dev.";
+            "no bilateral_slice_halide_peer was found. tools/build makes both.";
         return;
       }
       peer_.emplace(program, shape, photo, target, options.threads);

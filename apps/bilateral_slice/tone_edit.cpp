@@ -38,9 +38,9 @@ Func luminance(const lang::ImageParam& photo, const Shape& shape) {
   return f;
 }
 
-constexpr auto guarded = lang::TailStrategy::GuardWithIf;  // never reads beside the photo
+constexpr auto guarded_tail = lang::TailStrategy::GuardWithIf;  // never reads beside the photo
 
-void store(Func f) { f.compute_root().vectorize(x, 8, guarded).parallel(y); }
+void store(Func f) { f.compute_root().vectorize(x, 8, guarded_tail).parallel(y); }
 
 // Mean over a square, one axis at a time.
 Func box_mean(const Func& f, int radius, const std::string& name) {
@@ -89,7 +89,7 @@ void tone_edit(const Shape& shape, float* photo, float* edited) {
   const Expr edited_sample =
       shape.channels == 1 ? colour : gray + saturation * (colour - gray);  // gray has no saturation
   out(x, y, c) = lang::clamp(edited_sample, 0.0f, 1.0f);
-  out.vectorize(x, 8, guarded).parallel(y);
+  out.vectorize(x, 8, guarded_tail).parallel(y);
 
   input.set(lang::Buffer<float>(photo, shape.width, shape.height, shape.coefficients()));
   lang::Buffer<float> result(edited, shape.width, shape.height, shape.channels);
