@@ -115,9 +115,8 @@ const Variable* as_plain_var(const Expr& e) {
   return v && !v->symbol.defined() && v->type == Int(32) ? v : nullptr;
 }
 
-// The reduction domain of a definition, null when it has none.
-DomainPtr domain_in(const Site& site, const Names& names) {
-  DomainPtr result;
+// The reduction domain of a definition, null when it has none. `result`: known already.
+DomainPtr domain_in(const Site& site, const Names& names, DomainPtr result = nullptr) {
   for (const Variable* v : names.free) {
     auto domain = domain_of(*v);
     if (!domain) continue;
@@ -384,19 +383,20 @@ Expr redirect_calls(const Expr& e, const FuncPtr& from, const FuncPtr& to, bool 
   });
 }
 
-void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vector<Expr>& values) {
+void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vector<Expr>& raw) {
   const Site site = site_of(*f, args, false);
   if (f->is_defined())
     user_error(site.asked, "a Func is defined once", "it has a definition already", "Update it");
-  check_values(site, values);
+  check_values(site, raw);
   const std::vector<std::string> variables = pure_names(site, args);
-  check_declared(site, args.size(), values);
-  const Names names = names_in(*f, values);
-  if (auto domain = domain_in(site, names)) {
+  check_declared(site, args.size(), raw);
+  if (auto domain = domain_in(site, names_in(*f, raw))) {
     user_error(site.asked, "a first definition has no reduction variables",
                text("it uses ", quoted(domain->vars[0].var)),
                "Reduce in an update, f(x) += ..., or inside the expression with sum(...)");
   }
+  const std::vector<Expr> values = settled(raw);
+  const Names names = names_in(*f, values);
   check_free_variables(site, names, variables);
 
   freeze(names);
@@ -412,8 +412,10 @@ void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vec
   f->version++;
 }
 
+// The domain is that of the expressions as they were written; all else is asked of what is left of
+// them after folding.
 void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
-                   const std::vector<Expr>& values) {
+                   const std::vector<Expr>& raw_values, const DomainPtr& given) {
   const Site site = site_of(*f, raw_args, true);
   if (!f->is_defined())
     user_error(site.asked, "a Func is updated after its first definition", "it has none",
@@ -429,14 +431,15 @@ void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
                "Move the update before that use, or put it into a new Func");
   }
   check_update_arity(site, raw_args);
-  check_values(site, values);
-  check_types(site, values, f->types, "the first definition");
-  const std::vector<Expr> args = update_coordinates(site, raw_args);
-  std::vector<Expr> exprs = with(args, values);
-  const auto domain = domain_in(site, names_in(*f, exprs));
+  check_values(site, raw_values);
+  check_types(site, raw_values, f->types, "the first definition");
+  const auto domain = domain_in(site, names_in(*f, with(raw_args, raw_values)), given);
+  std::vector<Expr> exprs = settled(with(update_coordinates(site, raw_args), raw_values));
+  const auto first_value = exprs.begin() + static_cast<std::ptrdiff_t>(raw_args.size());
+  const std::vector<Expr> args(exprs.begin(), first_value), values(first_value, exprs.end());
   if (domain && domain->predicate.defined()) exprs.push_back(domain->predicate);
   const Names names = names_in(*f, exprs);
-  domain_in(site, names);  // the predicate may bring in another one
+  domain_in(site, names, domain);  // the predicate may bring in another one
   if (domain) check_bounds(site, f, *domain);
   const std::vector<std::string> pure = pure_positions(*f, args);
   check_free_variables(site, names, pure);

@@ -10,9 +10,10 @@ namespace retrograde::graph {
 
 // f(args) = values as the first definition. `args` must be distinct plain Vars.
 void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vector<Expr>& values);
-// f(args) = values as one more update definition.
-void define_update(const FuncPtr& f, const std::vector<Expr>& args,
-                   const std::vector<Expr>& values);
+// f(args) = values as one more update definition, over `domain` or, where it is null, over that of
+// the reduction variables that the two sides mention.
+void define_update(const FuncPtr& f, const std::vector<Expr>& args, const std::vector<Expr>& values,
+                   const DomainPtr& domain = nullptr);
 
 // f's values come from a C function; `asked` for messages.
 void define_extern(const FuncPtr& f, ExternDefinition definition, const std::vector<Type>& types,

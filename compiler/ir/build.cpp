@@ -115,6 +115,23 @@ Expr variable(const std::string& name, Type type, SymbolRef symbol) {
   return make_node<Variable>(type, name, std::move(symbol));
 }
 
+Expr loose_variable(const std::string& name, Type type, SymbolRef symbol) {
+  Expr result = variable(name, type, std::move(symbol));
+  result->has_loose_names = true;
+  return result;
+}
+
+std::vector<Expr> settled(std::vector<Expr> exprs) {
+  StepRewriter settle([](const Expr& part, const auto&) -> Expr {
+    if (!part->has_loose_names) return part;
+    const auto* v = part.as<Variable>();
+    return v ? variable(v->name, v->type, v->symbol) : Expr();
+  });
+  for (Expr& e : exprs)
+    if (has_loose_names(e)) e = settle(e);
+  return exprs;
+}
+
 std::vector<Expr> variables_of(const std::vector<std::string>& names) {
   return mapped(names, [](const std::string& name) { return variable(name); });
 }
@@ -232,6 +249,11 @@ std::optional<Scalar> value_over_constants(const Expr& e) {
   return value_over_constants(e, budget);
 }
 
+// Whether folding to `result` would lose a name of the operand.
+bool loses_names(const Expr& result, const Expr& operand) {
+  return operand->has_loose_names && !operand.same_as(result);
+}
+
 Expr fold_binary(Kind kind, Type result, const Expr& a, const Expr& b) {
   const std::optional<Scalar> x = as_scalar(a);
   const std::optional<Scalar> y = x ? as_scalar(b) : std::nullopt;
@@ -254,7 +276,8 @@ Expr binary(Kind kind, Expr a, Expr b) {
   const bool logical = kind == Kind::And || kind == Kind::Or;
   RETROGRADE_ASSERT(!logical || a.type().is_bool(), kind_name(kind), " of ", a.type());
   const Type type = is_comparison(kind) ? Bool(a.type().lanes()) : a.type();
-  if (Expr folded = fold_binary(kind, type, a, b); folded.defined()) return folded;
+  Expr folded = fold_binary(kind, type, a, b);
+  if (folded.defined() && !loses_names(folded, a) && !loses_names(folded, b)) return folded;
   return new_binary(kind, type, std::move(a), std::move(b));
 }
 
@@ -320,9 +343,13 @@ Expr make_select(Expr condition, Expr when_true, Expr when_false) {
                     " and ", when_false.type());
   RETROGRADE_ASSERT(lanes == 1 || lanes == when_true.type().lanes(), "select of ", when_true.type(),
                     " on ", condition.type());
-  if (is_const_true(condition)) return when_true;
-  if (is_const_false(condition)) return when_false;
-  if (when_true.same_as(when_false)) return when_true;
+  const Expr folded = is_const_true(condition)        ? when_true
+                      : is_const_false(condition)     ? when_false
+                      : when_true.same_as(when_false) ? when_true
+                                                      : Expr();
+  const auto is_lost = [&](const Expr& e) { return loses_names(folded, e); };
+  if (folded.defined() && !is_lost(condition) && !is_lost(when_true) && !is_lost(when_false))
+    return folded;
   return make_node<Select>(when_true.type(), std::move(condition), std::move(when_true),
                            std::move(when_false));
 }

@@ -37,6 +37,12 @@ bool is_const_false(const Expr& e);
 bool is_const_int(const Expr& e, int64_t value);
 
 Expr variable(const std::string& name, Type type = Int(32), SymbolRef symbol = {});
+// A variable that no definition has claimed yet, as users write reduction variables. Folding keeps
+// every operand that mentions one: r * 0 is no constant, because the definition that it ends up in
+// runs over the domain of r. `settled` is for the definition: the same expression over plain
+// variables, folded.
+Expr loose_variable(const std::string& name, Type type = Int(32), SymbolRef symbol = {});
+std::vector<Expr> settled(std::vector<Expr> exprs);  // what they share stays shared
 // An int32 variable for each name: the arguments of a Func as its definition names them.
 std::vector<Expr> variables_of(const std::vector<std::string>& names);
 // `a` and `b` already of one type (lanes too, but a scalar is broadcast).

@@ -40,6 +40,8 @@ struct Node {
 };
 struct ExprNode : Node {
   ExprNode(Kind kind, Type type) : Node(kind), type(type) {}
+  // Whether it mentions a name that no definition has claimed yet (build.h, loose_variable).
+  mutable bool has_loose_names = false;
   const Type type;
   mutable std::atomic<uint64_t> hash{0};  // structural (equal.h); 0 until asked for
 };
@@ -252,7 +254,9 @@ struct Binary : ExprNode {
 
  protected:
   Binary(Kind kind, Type type, Expr a, Expr b)
-      : ExprNode(kind, type), a(std::move(a)), b(std::move(b)) {}
+      : ExprNode(kind, type), a(std::move(a)), b(std::move(b)) {
+    has_loose_names = this->a->has_loose_names || this->b->has_loose_names;
+  }
 };
 // Binary nodes of one kind, for as<>(): e.as<Add>()->a
 template <Kind K>
@@ -477,9 +481,23 @@ std::string block_index(const std::string& kernel, int dimension);
 #undef RETROGRADE_NODE
 #undef RETROGRADE_FIELDS
 
+inline bool has_loose_names(const Expr& e) { return e.defined() && e->has_loose_names; }
+inline bool has_loose_names(const std::vector<Expr>& all) {
+  for (const Expr& e : all)
+    if (has_loose_names(e)) return true;
+  return false;
+}
+template <class Field>
+constexpr bool has_loose_names(const Field&) {  // of a name or a number
+  return false;
+}
+
 template <std::derived_from<ExprNode> N, class... Members>
 const N* make_node(Type type, Members&&... members) {
-  return new N{{N::own_kind, type}, std::forward<Members>(members)...};
+  const N* node = new N{{N::own_kind, type}, std::forward<Members>(members)...};
+  node->has_loose_names = std::apply(
+      [](const auto&... fields) { return (has_loose_names(fields) || ...); }, node->fields());
+  return node;
 }
 template <std::derived_from<StmtNode> N, class... Members>
 const N* make_node(Members&&... members) {

@@ -99,7 +99,8 @@ Expr marked(Op op, const Expr& e) {
 Type unsigned_form(Type type) { return type.is_int() ? type.with_code(TypeCode::UInt) : type; }
 
 Expr power_by_squaring(const Expr& x, int64_t exponent) {
-  if (exponent == 0) return ir::make_one(x.type());
+  if (exponent == 0)  // x keeps its reduction variables until the definition
+    return ir::make_select(ir::const_true(), ir::make_one(x.type()), x);
   if (exponent == 1) return x;
   Expr half = power_by_squaring(x, exponent / 2);
   return exponent % 2 ? half * half * x : half * half;

@@ -4,6 +4,7 @@
 #include <unordered_set>
 
 #include "frontend/language/integer_ops.h"
+#include "graph/define.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -79,13 +80,13 @@ class Finder {
     if (domain == domain_ && domain) return;
     if (!v.symbol.defined()) {
       result.args.push_back(ir::variable(v.name));
-      result.at.push_back(ir::variable(v.name));
+      result.at.push_back(Expr(&v));
     } else if (domain) {
       // A variable of an enclosing reduction is one value for us.
       const Var fresh;
       renamed_[v.name] = fresh;
       result.args.push_back(fresh);
-      result.at.push_back(ir::variable(v.name, v.type, v.symbol));
+      result.at.push_back(ir::loose_variable(v.name, v.type, v.symbol));
     }
   }
 };
@@ -100,14 +101,9 @@ void check_undefined(const Func& f, const char* name) {
              "the Func that is given must have no definition", "it has one", "Give a new Func");
 }
 
-// The update must run over the whole domain even when the body uses only part of its variables, or
-// none.
-Expr mention_domain(const Expr& e, const Reduction& reduction) {
-  const bool mentioned = ir::any_node(
-      e, [&](const ir::Variable& v) { return v.symbol.raw() == reduction.domain.get(); });
-  if (mentioned) return e;
-  const RVar r(reduction.domain, 0);
-  return select(Expr(r) >= r.min(), e, ir::make_zero(e.type()));
+// Over the whole domain, even when the body uses only part of its variables, or none.
+void update(const Func& f, const Reduction& reduction, const std::vector<Expr>& values) {
+  graph::define_update(f.function(), reduction.args, values, reduction.domain);
 }
 
 // What a reduction begins with, and how it takes one more value.
@@ -128,7 +124,7 @@ Expr reduce(const Fold& fold, const DomainPtr& domain, const Expr& e, const Func
   check_undefined(f, name);
   const Reduction reduction = find_reduction(domain, e, name);
   f(reduction.args) = fold.initial(e.type());
-  f(reduction.args) = fold.combine(f(reduction.args), mention_domain(reduction.body, reduction));
+  update(f, reduction, {fold.combine(f(reduction.args), reduction.body)});
   return f(reduction.at);
 }
 
@@ -148,7 +144,7 @@ Tuple reduce_place(bool is_max, const DomainPtr& domain, const Expr& e, const Fu
   const Tuple best = f(reduction.args);
   const Expr best_value = best[best.size() - 1];
   const Expr better = is_max ? reduction.body > best_value : reduction.body < best_value;
-  f(reduction.args) = select(better, Tuple(found), best);
+  update(f, reduction, select(better, Tuple(found), best).as_vector());
   return f(reduction.at);
 }
 

@@ -74,7 +74,7 @@ Expr RVar::extent() const { return variable("take the extent").extent; }
 
 RVar::operator Expr() const {
   variable("use the value");
-  return ir::variable(name_, Int(32), ir::SymbolRef(domain_));
+  return ir::loose_variable(name_, Int(32), ir::SymbolRef(domain_));
 }
 
 RDom::RDom(const Region& region, const std::string& name) { initialize(region, name); }

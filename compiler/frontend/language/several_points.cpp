@@ -86,7 +86,7 @@ class SeveralPoints {
     choose_domain();
     read_what_was_before();
     const std::vector<Expr> args = at_point(args_), values = at_point(values_);
-    define_update(f_, args, values);
+    define_update(f_, args, values, domain_);
     Stage(f_, f_->stage_count() - 1).unroll(VarOrRVar(domain_->vars[0].var, true));
   }
 

@@ -46,7 +46,10 @@ Var::Var() : expr_() {
   expr_ = ir::variable(name_);
 }
 
-Var::Var(const std::string& name) : name_(checked_name(name)), expr_(ir::variable(name_)) {}
+// An implicit variable says how many dimensions its definition has, even in f(_) * 0.
+Var::Var(const std::string& name)
+    : name_(checked_name(name)),
+      expr_(is_implicit() ? ir::loose_variable(name_) : ir::variable(name_)) {}
 
 Var Var::implicit(int n) { return Var(graph::implicit_name(n)); }
 
