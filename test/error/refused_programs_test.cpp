@@ -38,7 +38,29 @@ TEST_F(Refused, LerpOfEndsThatDoNotFit) {
                [&] { lerp(cast<int64_t>(x), cast<int64_t>(y), 0.5f); });
 }
 
+TEST_F(Refused, LerpOfConstantsOfDifferentTypes) {
+  const Expr byte = cast<uint8_t>(42), word = cast<uint16_t>(0), wide = cast<uint32_t>(1023);
+  expect_error({"both values have one type", "uint16 and uint8"}, [&] { lerp(word, byte, 0.5f); });
+  expect_error({"both values have one type"}, [&] { lerp(u8, word, 0.5f); });
+  expect_error({"both values have one type"}, [&] { lerp(u8, 2.0f, 0.5f); });
+  // Literals take the type of the other end, constant or not.
+  EXPECT_EQ(lerp(0, wide, 0.5f).type(), UInt(32));
+  EXPECT_EQ(lerp(wide, 0, 0.5f).type(), UInt(32));
+  EXPECT_EQ(lerp(0, cast(Float(16), x), 0.5f).type(), Float(16));
+  EXPECT_EQ(lerp(1.0, f32, 0.5f).type(), Float(32));
+}
+
+// A call that C++20's lerp of doubles would take, too.
+TEST_F(Refused, LerpOfNumbersIsTheLanguagesOwn) {
+  const Expr whole = lerp(42, 69, 0.25f);
+  EXPECT_EQ(whole.type(), Int(32));
+  EXPECT_EQ(*ir::as_const_int(whole), 49);
+  const Expr mixed = lerp(1, 2.0f, 0.5f);
+  EXPECT_EQ(mixed.type(), Float(32));
+}
+
 TEST_F(Refused, LerpByWeightsOfSignedTypes) {
+  expect_error({"a float or an unsigned integer", "int8"}, [&] { lerp(u8, u8, cast<int8_t>(1)); });
   expect_error({"a float or an unsigned integer", "int8"}, [&] { lerp(u8, u8, i8); });
   expect_error({"a float or an unsigned integer", "int32"}, [&] { lerp(u8, u8, -1); });
   expect_error({"a float or an unsigned integer", "int32"}, [&] { lerp(f32, f32, 3); });

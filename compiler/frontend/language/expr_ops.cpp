@@ -113,7 +113,6 @@ Expr integer_power(const Expr& x, int64_t exponent) {
 
 // Every call without a seed is another stream.
 Expr random(Type type, Expr seed) {
-  static std::atomic<int32_t> streams{0};
   if (!seed.defined()) {
     seed = Expr(int32_t{-1} - streams.fetch_add(1));
   } else if (!seed.type().is_int_or_uint() || !seed.type().is_scalar()) {
@@ -207,14 +206,26 @@ Expr absd(Expr a, Expr b) {
 
 namespace {
 
-// A constant takes the type of the other end.
+// A constant of a type that C++ gives to literals, which says nothing of the type that is wanted.
+bool is_literal(const Expr& e) {
+  const Type type = e.type();
+  return ir::is_const(e) && type.is_scalar() &&
+         (type == Int(32) || type == Float(32) || type == Float(64));
+}
+
+// A literal takes the type of the other end; a float one only another floating type.
 void match_ends(Expr& zero, Expr& one) {
   const std::string asked = text("apply lerp to ", zero, " and ", one);
-  const std::string rule = "a constant end takes the type of the other and must fit it";
-  if (ir::is_const(zero) && !ir::is_const(one)) {
-    zero = ir::literal_in(one.type(), zero, asked, rule);
-  } else if (ir::is_const(one)) {
-    one = ir::literal_in(zero.type(), one, asked, rule);
+  const auto match = [&](Expr& end, const Expr& other) {
+    if (is_literal(end) && (end.type().is_int() || other.type().is_float()))
+      end = ir::literal_in(other.type(), end, asked,
+                           "a constant end takes the type of the other and must fit it");
+  };
+  if (is_literal(zero) && is_literal(one)) {
+    ir::match_types(zero, one, "lerp");
+  } else {
+    match(zero, one);
+    match(one, zero);
   }
   if (zero.type() != one.type()) {
     user_error(asked, "both values have one type",
@@ -226,10 +237,10 @@ void match_ends(Expr& zero, Expr& one) {
              "Cast them to double, or write zero + (one - zero) * weight");
 }
 
-// The literals 0 and 1 are weights too, whatever their type.
+// The literals 0 and 1 are weights too.
 Expr checked_weight(const Expr& zero, Expr weight) {
   const auto constant = ir::as_const_int(weight);
-  const bool is_end = constant && weight.type().is_int() && (*constant == 0 || *constant == 1);
+  const bool is_end = constant && weight.type() == Int(32) && (*constant == 0 || *constant == 1);
   if (is_end) weight = ir::cast_to(Float(32), weight);
   if (!weight.type().is_uint() && !weight.type().is_float()) {
     type_error("lerp", "its weight is a float or an unsigned integer", weight);

@@ -136,6 +136,12 @@ Expr absd(Expr a, Expr b);  // |a - b| without overflow; of integers: unsigned
 // integers are of at most 32 bits; its weight is a float or an unsigned integer; integers are
 // interpolated with weights in [0, 1].
 Expr lerp(Expr zero, Expr one, Expr weight);
+// The same of C++ numbers alone, which C++20's own lerp would take to be doubles.
+template <typename Zero, typename One, typename Weight>
+requires(std::is_arithmetic_v<Zero>&& std::is_arithmetic_v<One>&& std::is_arithmetic_v<Weight>) Expr
+    lerp(Zero zero, One one, Weight weight) {
+  return lerp(Expr(zero), Expr(one), Expr(weight));
+}
 // Requires: it takes integers.
 Expr div_round_to_zero(Expr a, Expr b);  // as C++ does; x / 0 == 0
 Expr mod_round_to_zero(Expr a, Expr b);
