@@ -60,6 +60,30 @@ void check_values(const Site& site, const std::vector<Expr>& values) {
   }
 }
 
+bool mentions_undef(const Expr& root) {
+  return any_node(root, [](const Expr& e) { return is_undef(e); });
+}
+
+// Undef means that nothing is stored, which says nothing of where. `exprs`: of either side.
+void check_coordinates(const Site& site, const std::vector<Expr>& args,
+                       const std::vector<Expr>& exprs) {
+  const auto refuse = [&](const Expr& coordinate, const std::string& where) {
+    user_error(site.asked, "a coordinate has a value, and undef has none",
+               text("the coordinate ", coordinate, " ", where, " comes from undef"),
+               "Give the place a value, and store undef there to leave it as it is");
+  };
+  for (const Expr& arg : args)
+    if (mentions_undef(arg)) refuse(arg, "on the left-hand side");
+  for (const Expr& root : exprs) {
+    if (!mentions_undef(root)) continue;
+    walk(root, [&](const Call& call) {
+      if (call.call_type != CallType::Func && call.call_type != CallType::Image) return;
+      for (const Expr& arg : call.args)
+        if (mentions_undef(arg)) refuse(arg, "of " + quoted(call.name));
+    });
+  }
+}
+
 void check_types(const Site& site, const std::vector<Expr>& values, const std::vector<Type>& types,
                  const char* whose) {
   if (values.size() != types.size()) {
@@ -396,6 +420,7 @@ void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vec
                "Reduce in an update, f(x) += ..., or inside the expression with sum(...)");
   }
   const std::vector<Expr> values = settled(raw);
+  check_coordinates(site, {}, values);
   const Names names = names_in(*f, values);
   check_free_variables(site, names, variables);
 
@@ -438,6 +463,7 @@ void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
   const auto first_value = exprs.begin() + static_cast<std::ptrdiff_t>(raw_args.size());
   const std::vector<Expr> args(exprs.begin(), first_value), values(first_value, exprs.end());
   if (domain && domain->predicate.defined()) exprs.push_back(domain->predicate);
+  check_coordinates(site, args, exprs);
   const Names names = names_in(*f, exprs);
   domain_in(site, names, domain);  // the predicate may bring in another one
   if (domain) check_bounds(site, f, *domain);

@@ -59,6 +59,18 @@ TEST_F(Refused, LerpOfNumbersIsTheLanguagesOwn) {
   EXPECT_EQ(mixed.type(), Float(32));
 }
 
+TEST_F(Refused, CoordinatesThatComeFromUndef) {
+  Func g("g"), h("h");
+  g(x) = 0;
+  const std::initializer_list<std::string_view> phrases{"a coordinate has a value", "undef"};
+  expect_error(phrases, [&] { g(undef<int>()) = 3; });
+  expect_error(phrases, [&] { g(clamp(undef<int>(), 0, 9)) = 3; });
+  expect_error(phrases, [&] { h(x) = g(undef<int>()); });
+  expect_error(phrases, [&] { h(x) = g(select(x > 2, x, undef<int>())) + 1; });
+  const Buffer<int> image(10);
+  expect_error(phrases, [&] { h(x) = image(undef<int>()); });
+}
+
 TEST_F(Refused, LerpByWeightsOfSignedTypes) {
   expect_error({"a float or an unsigned integer", "int8"}, [&] { lerp(u8, u8, cast<int8_t>(1)); });
   expect_error({"a float or an unsigned integer", "int8"}, [&] { lerp(u8, u8, i8); });

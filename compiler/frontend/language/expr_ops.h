@@ -212,7 +212,8 @@ Expr memoize_tag(Expr value, Keys&&... key) {
 Expr stop_gradient(Expr e);  // a constant as far as derivatives go
 
 // Any value: a definition whose value is undef stores nothing there.
-// Requires: the elements of a Tuple are undefined in the same places, or everywhere.
+// Requires: the elements of a Tuple are undefined in the same places, or everywhere; a coordinate has
+// a value, and undef has none.
 Expr undef(Type type);
 template <typename T>
 Expr undef() {
