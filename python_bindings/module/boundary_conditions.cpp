@@ -52,7 +52,7 @@ void bind_boundary_conditions(py::module_& m) {
             f = BoundaryConditions::detail::func_of(image);
           const bool is_number = is_plain_number(value) && f.types().size() == 1;
           const Tuple outside =
-              is_number ? Tuple(operand_for(f.types()[0], value)) : value.cast<Tuple>();
+              is_number ? Tuple(operand_for(f.types()[0], value)) : tuple_for(f.types(), value);
           if constexpr (sizeof...(region) == 0 &&
                         !std::is_same_v<std::decay_t<decltype(image)>, Func>) {
             return BoundaryConditions::constant_exterior(image, outside);

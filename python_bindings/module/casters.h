@@ -40,6 +40,17 @@ py::object object_of(const VarOrRVar& loop);
 std::vector<Expr> operands(const std::vector<py::object>& objects);
 // The same of what an element of type `type` is given.
 Expr operand_for(Type type, py::handle object);
+// Of what is cast: a Python float is a float64, so that the cast is the only step that rounds it.
+std::optional<Expr> unrounded_from(py::handle object);
+struct Unrounded {
+  Expr expr;
+};
+// A number in the type's width, for the bits of it.
+Expr bits_operand(Type type, py::handle object);
+// The types of a Func's values, which its declaration may say before its definition does.
+const std::vector<Type>& value_types(const graph::FuncContents& f);
+// Numbers among the values of a Tuple take the types of the Func that they are for.
+Tuple tuple_for(const std::vector<Type>& types, py::handle object);
 // A Python int or float, which has no type of its own here.
 bool is_plain_number(py::handle object);
 
@@ -80,6 +91,18 @@ RETROGRADE_CONVERTING_CASTER(retrograde::AdjointInput, adjoint_input_from);
 RETROGRADE_CONVERTING_CASTER(retrograde::Direction, direction_from);
 RETROGRADE_CONVERTING_CASTER(retrograde::Argument, argument_from);
 #undef RETROGRADE_CONVERTING_CASTER
+
+template <>
+class type_caster<retrograde::python::Unrounded> {
+ public:
+  PYBIND11_TYPE_CASTER(retrograde::python::Unrounded, const_name("Expr"));
+  bool load(handle source, bool) {
+    std::optional<retrograde::Expr> expr = retrograde::python::unrounded_from(source);
+    if (!expr) return false;
+    value.expr = std::move(*expr);
+    return true;
+  }
+};
 
 // Not a class in Python: a Var, an RVar, or an RDom of one variable.
 template <>

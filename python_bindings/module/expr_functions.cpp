@@ -1,4 +1,6 @@
 // expr_functions.cpp -- functions of Exprs: choice, arithmetic, functions of real numbers, types, hints.
+#include <algorithm>
+
 #include "autodiff/straight_through.h"
 #include "bind_all.h"
 #include "binding.h"
@@ -52,6 +54,42 @@ bool is_tuple(const py::object& object) {
          (py::isinstance<FuncRef>(object) && object.cast<const FuncRef&>().size() > 1);
 }
 
+// Tuples of one size, whose numbers take the types of what stands in their places in the others.
+std::vector<Tuple> matched_tuples(const std::vector<py::object>& values) {
+  const auto is_list = [](const py::object& value) {
+    return py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value);
+  };
+  std::vector<std::vector<Expr>> rows;
+  std::vector<std::vector<py::object>> elements;
+  for (const py::object& value : values) {
+    std::vector<py::object> row;
+    if (is_list(value)) {
+      for (py::handle one : value) row.push_back(py::reinterpret_borrow<py::object>(one));
+    } else {
+      const Tuple tuple = value.cast<Tuple>();
+      for (const Expr& one : tuple.as_vector()) row.push_back(py::cast(one));
+    }
+    elements.push_back(std::move(row));
+  }
+  std::vector<Tuple> result;
+  const size_t size = elements[0].size();
+  const bool is_one_size =
+      std::ranges::all_of(elements, [&](const auto& row) { return row.size() == size; });
+  if (!is_one_size) {
+    for (const py::object& value : values) result.push_back(value.cast<Tuple>());
+    return result;
+  }
+  rows.resize(values.size());
+  for (size_t i = 0; i < size; i++) {
+    std::vector<py::object> column;
+    for (const auto& row : elements) column.push_back(row[i]);
+    const std::vector<Expr> matched = operands(column);
+    for (size_t k = 0; k < rows.size(); k++) rows[k].push_back(matched[k]);
+  }
+  for (const auto& row : rows) result.emplace_back(row);
+  return result;
+}
+
 // select(c0, v0, c1, v1, ..., otherwise): of Exprs, or of Tuples.
 py::object select_of(const py::args& args) {
   const size_t n = args.size();
@@ -61,10 +99,11 @@ py::object select_of(const py::args& args) {
   for (size_t i = 1; i < n; i += 2) values.push_back(args[i]);
   values.push_back(args[n - 1]);
   if (is_tuple(values[0])) {
-    auto result = values.back().cast<Tuple>();
+    const std::vector<Tuple> tuples = matched_tuples(values);
+    Tuple result = tuples.back();
     for (size_t i = values.size() - 1; i-- > 0;) {
       const py::object condition = args[2 * i];
-      const auto value = values[i].cast<Tuple>();
+      const Tuple& value = tuples[i];
       result = is_tuple(condition) ? select(condition.cast<Tuple>(), value, result)
                                    : select(condition.cast<Expr>(), value, result);
     }
@@ -110,7 +149,12 @@ void bind_arithmetic(py::module_& m) {
   def(
       m, "lerp",
       [](const py::object& zero, const py::object& one, const py::object& weight) {
-        const std::vector<Expr> ends = operands({zero, one});
+        // Ends that are numbers are of the floating type that the weight has.
+        const bool are_numbers = is_plain_number(zero) && is_plain_number(one);
+        std::vector<Expr> ends =
+            operands(are_numbers && (PyFloat_Check(zero.ptr()) || PyFloat_Check(one.ptr()))
+                         ? std::vector{zero, one, weight}
+                         : std::vector{zero, one});
         const Expr w = is_plain_number(weight) && ends[0].type().is_float()
                            ? operand_for(ends[0].type(), weight)
                            : weight.cast<Expr>();
@@ -166,22 +210,25 @@ void bind_reals(py::module_& m) {
 
 void bind_types_of_values(py::module_& m) {
   def(
-      m, "cast", [](Type type, const Expr& value) { return cast(type, value); }, arg("type"),
-      arg("value"));
+      m, "cast", [](Type type, const Unrounded& value) { return cast(type, value.expr); },
+      arg("type"), arg("value"));
   def(
       m, "saturating_cast",
-      [](Type type, const Expr& value) { return saturating_cast(type, value); }, arg("type"),
-      arg("value"));
+      [](Type type, const Unrounded& value) { return saturating_cast(type, value.expr); },
+      arg("type"), arg("value"));
   def(
-      m, "reinterpret", [](Type type, const Expr& value) { return reinterpret(type, value); },
+      m, "reinterpret",
+      [](Type type, const py::object& value) {
+        return reinterpret(type, bits_operand(type, value));
+      },
       arg("type"), arg("value"));
   const auto concise = [&](const std::string& name, Type type, bool saturates) {
     def(
-        m, name.c_str(), [type](const Expr& e) { return cast(type, e); }, arg("e"));
+        m, name.c_str(), [type](const Unrounded& e) { return cast(type, e.expr); }, arg("e"));
     if (saturates)
       def(
-          m, (name + "_sat").c_str(), [type](const Expr& e) { return saturating_cast(type, e); },
-          arg("e"));
+          m, (name + "_sat").c_str(),
+          [type](const Unrounded& e) { return saturating_cast(type, e.expr); }, arg("e"));
   };
   for (int bits : {8, 16, 32, 64}) {
     concise(text("i", bits), Int(bits), true);
@@ -200,11 +247,19 @@ void bind_hints(py::module_& m) {
   unary(m, "likely_if_innermost", &likely_if_innermost);
   unary(m, "strict_float", &strict_float);
   unary(m, "stop_gradient", &stop_gradient);
-  def(m, "straight_through", &straight_through, arg("value"), arg("surrogate"));
+  binary(
+      m, "straight_through",
+      [](Expr value, Expr surrogate) { return straight_through(value, surrogate); }, "value",
+      "surrogate");
   def(
       m, "unsafe_promise_clamped",
-      [](const Expr& value, const std::optional<Expr>& low, const std::optional<Expr>& high) {
-        return unsafe_promise_clamped(value, low.value_or(Expr()), high.value_or(Expr()));
+      [](const Expr& value, const py::object& low, const py::object& high) {
+        const auto bound = [&](const py::object& end) {
+          return end.is_none()     ? Expr()
+                 : value.defined() ? operand_for(value.type(), end)
+                                   : end.cast<Expr>();
+        };
+        return unsafe_promise_clamped(value, bound(low), bound(high));
       },
       arg("value"), arg("min") = py::none(), arg("max") = py::none());
   def(

@@ -14,10 +14,11 @@ namespace {
 // Values in the types that earlier definitions have: `f[x] = 0` of a float Func stores 0.0.
 std::vector<Expr> values_for(const Func& f, const py::sequence& given) {
   std::vector<Expr> values;
+  const std::vector<Type>& types = value_types(*f.function());
   for (size_t i = 0; i < given.size(); i++) {
     const py::object value = given[i];
-    const bool known = i < f.types().size();
-    values.push_back(known ? operand_for(f.types()[i], value) : py::cast<Expr>(value));
+    const bool known = i < types.size();
+    values.push_back(known ? operand_for(types[i], value) : py::cast<Expr>(value));
   }
   return values;
 }

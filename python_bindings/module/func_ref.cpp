@@ -10,7 +10,7 @@ Updated done(const graph::FuncPtr& func) { return {func}; }
 
 // A number in the type of the Func, once it has one.
 Expr operand_of(const FuncRef& ref, int value, py::handle object) {
-  const std::vector<Type>& types = ref.function()->types;
+  const std::vector<Type>& types = value_types(*ref.function());
   if (value < static_cast<int>(types.size())) return operand_for(types[value], object);
   return py::reinterpret_borrow<py::object>(object).cast<Expr>();
 }
@@ -25,7 +25,7 @@ void bind_update(Class<FuncRef>& c, const char* name, Op op) {
           op(ref, value.cast<const FuncRef&>());
         } else if (py::isinstance<Tuple>(value) || py::isinstance<py::tuple>(value) ||
                    py::isinstance<py::list>(value)) {
-          op(ref, value.cast<Tuple>());
+          op(ref, tuple_for(value_types(*ref.function()), value));
         } else {
           op(ref, operand_of(ref, 0, value));
         }

@@ -45,9 +45,12 @@ void bind_integer_functions(py::module_& m) {
       arg("type"), arg("e"), arg("lowest"));
   def(m, "concat_bits", &concat_bits, arg("parts"));
   def(m, "user_context_value", &user_context_value);
-  def(m, "scatter",
-      [](const py::args& points) { return scatter(points.cast<std::vector<Expr>>()); });
-  def(m, "gather", [](const py::args& points) { return gather(points.cast<std::vector<Expr>>()); });
+  // Numbers take the type of the other points.
+  const auto points_of = [](const py::args& points) {
+    return operands(points.cast<std::vector<py::object>>());
+  };
+  def(m, "scatter", [=](const py::args& points) { return scatter(points_of(points)); });
+  def(m, "gather", [=](const py::args& points) { return gather(points_of(points)); });
 }
 
 }  // namespace retrograde::python

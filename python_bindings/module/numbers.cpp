@@ -151,6 +151,32 @@ Expr operand_for(Type type, py::handle object) {
                        std::string(py::str(py::type::of(object))));
 }
 
+std::optional<Expr> unrounded_from(py::handle object) {
+  if (is_plain_number(object) && PyFloat_Check(object.ptr()))
+    return ir::make_const(Float(64), PyFloat_AS_DOUBLE(object.ptr()));
+  return expr_from(object);
+}
+
+Expr bits_operand(Type type, py::handle object) {
+  if (!is_plain_number(object) || type.bits() < 16) return operand_for(type, object);
+  const Type width = PyFloat_Check(object.ptr()) ? Float(type.bits())
+                     : type.is_int()             ? type
+                                                 : UInt(type.bits());
+  return operand_for(width, object);
+}
+
+const std::vector<Type>& value_types(const graph::FuncContents& f) {
+  return f.types.empty() ? f.required_types : f.types;
+}
+
+Tuple tuple_for(const std::vector<Type>& types, py::handle object) {
+  const bool is_sequence = PyList_Check(object.ptr()) || PyTuple_Check(object.ptr());
+  if (!is_sequence || py::len(object) != types.size()) return object.cast<Tuple>();
+  std::vector<Expr> exprs;
+  for (py::handle element : object) exprs.push_back(operand_for(types[exprs.size()], element));
+  return Tuple(exprs);
+}
+
 ir::Scalar scalar_of(Type type, py::handle number) {
   const py::object plain = is_numpy_scalar(number) ? py::object(number.attr("item")())
                                                    : py::reinterpret_borrow<py::object>(number);

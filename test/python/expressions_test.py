@@ -46,6 +46,58 @@ class Numbers(unittest.TestCase):
         self.assertEqual(value(rg.cast("float64", 1) * 0.1), 0.1)
         self.assertEqual(value(rg.max(rg.Expr(np.float64(0)), 0.1)), 0.1)
 
+    def test_a_cast_float_is_rounded_once(self):
+        self.assertEqual(value(rg.f64(0.1)), 0.1)
+        self.assertEqual(value(rg.cast(rg.Float(64), 0.1)), 0.1)
+        self.assertEqual(value(rg.cast("float16", 0.1)), float(np.float16(0.1)))
+        self.assertEqual(value(rg.i64(2.0**53 - 1)), 2**53 - 1)
+        self.assertEqual(value(rg.cast("int64", 16777217.0)), 16777217)
+        self.assertEqual(value(rg.i64(2**62 + 1)), 2**62 + 1)
+        self.assertEqual(value(rg.u64(2**63 + 1)), 2**63 + 1)
+        self.assertEqual(value(rg.saturating_cast("uint32", 4294967295.0)), 2**32 - 1)
+        self.assertEqual(value(rg.u32_sat(16777217.0)), 16777217)
+        bits = int(np.float64(0.1).view("uint64"))
+        self.assertEqual(value(rg.reinterpret("uint64", 0.1)), bits)
+        self.assertEqual(value(rg.reinterpret("uint32", 0.1)), int(np.float32(0.1).view("uint32")))
+        self.assertEqual(value(rg.reinterpret("float64", bits)), 0.1)
+
+    def test_a_float_for_a_func_of_doubles_keeps_its_digits(self):
+        declared = rg.Func(rg.Float(64), 1, "declared")
+        declared[x] = 0.1
+        self.assertEqual(declared.realize([1])[0], 0.1)
+        started = rg.Func(rg.Float(64), 1, "started")
+        started[x] += 0.1
+        self.assertEqual(started.realize([1])[0], 0.1)
+        both = rg.Func("both")
+        both[x] = (rg.f64(x), rg.f64(x))
+        both[x] += (0.1, 0.2)
+        self.assertEqual([b[0] for b in both.realize([1])], [0.1, 0.2])
+
+    def test_a_float_among_doubles_keeps_its_digits(self):
+        e = rg.f64(0)
+        self.assertEqual(value(rg.lerp(0.1, 0.2, e)), 0.1)
+        self.assertEqual(value(rg.mux(0, [0.1, e])), 0.1)
+        self.assertEqual(value(rg.unsafe_promise_clamped(rg.f64(0.1), 0.1, 0.2)), 0.1)
+        chosen = rg.Func("chosen")
+        chosen[()] = rg.select(rg.Expr(True), (0.1, 1), (e, rg.i64(2)))
+        self.assertEqual([b[()] for b in chosen.realize()], [0.1, 1])
+        points = rg.Func("points")
+        points[x] = rg.f64(0)
+        points[rg.scatter(0, 1)] = rg.gather(0.1, e)
+        self.assertEqual(points.realize([2])[0], 0.1)
+        pair = rg.Func("pair")
+        pair[x] = (rg.f64(x), rg.f64(x))
+        outside = rg.BoundaryConditions.constant_exterior(pair, (0.1, 0.2), [(0, 1)])
+        self.assertEqual([b[3] for b in outside.realize([4])], [0.1, 0.2])
+
+    def test_a_reduction_runs_over_a_domain_that_folds_away(self):
+        r = rg.RDom([(0, 10)])
+        f = rg.Func("f")
+        f[()] = 1
+        f[()] += 1 + r * 0
+        self.assertEqual(f.realize()[()], 11)
+        self.assertEqual(value(rg.sum(r * 0 + 1)), 10)
+
     def test_one_that_does_not_fit_is_of_a_type_that_holds_it(self):
         with self.assertRaisesRegex(rg.Error, "operands must be numbers"):
             x + rg.Expr("text")
