@@ -334,7 +334,12 @@ TEST_F(Rules, RegionsThatDoNotSettle) {
   Func g("g");
   RDom r(0, in.dim(0).extent() + 1);
   g(x) = sum(in(r)) + x;
-  expect<RuntimeError>("the regions of the inputs must settle", [&] { g.infer_input_bounds({4}); });
+  const char* const rule = "the regions of buffers settle within 64 bounds queries";
+  expect<RuntimeError>(rule, [&] { g.infer_input_bounds({4}); });
+  Func h("h");
+  h(x) = x;
+  h.output_buffer().dim(0).set_bounds(0, h.output_buffer().dim(0).extent() + 1);
+  expect<RuntimeError>(rule, [&] { h.realize({4}); });
 }
 
 TEST_F(Rules, AnErrorCodeWithoutWords) {

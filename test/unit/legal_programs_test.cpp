@@ -89,6 +89,35 @@ TEST(RealizedSizes, KeepTheStridesThatWerePromised) {
   EXPECT_EQ(out(3, 1, 2), 213);
 }
 
+TEST(RealizedSizes, GrowUntilTheirBoundsAreMet) {
+  Func f = twice();
+  const Expr extent = f.output_buffer().dim(0).extent();
+  f.output_buffer().dim(0).set_bounds(0, select(extent < 52, extent + 1, extent));
+  expect_ten(f);
+}
+
+// Two buffers whose bounds depend on each other and on themselves.
+TEST(InferredBounds, OfOutputsGrowUntilTheirBoundsAreMet) {
+  ImageParam in(Int(32), 2, "in");
+  Func f("f");
+  f(x, y) = in(x + 2, y);
+  const OutputImageParam out = f.output_buffer();
+  const Expr extent = out.dim(0).extent();
+  out.dim(0).set_bounds(0, select(extent < 22, extent + 1, extent));
+  in.dim(0).set_bounds(in.dim(1).min() - 3, out.dim(0).extent() + in.dim(1).extent() + 5);
+  Buffer<int> wanted(nullptr, {7, 8});
+  wanted.set_min(2, 4);
+  f.infer_input_bounds(wanted);
+  EXPECT_EQ(wanted.min(0), 0);
+  EXPECT_EQ(wanted.width(), 22);
+  EXPECT_EQ(wanted.min(1), 4);
+  EXPECT_EQ(wanted.height(), 8);
+  const Buffer<int> image = in.get();
+  EXPECT_EQ(image.min(0), 1);
+  EXPECT_EQ(image.width(), 35);
+  EXPECT_EQ(image.height(), 8);
+}
+
 TEST(RealizedSizes, SmallerPromisesAreRefused) {
   Func f = twice();
   f.output_buffer().dim(0).set_bounds(0, 8);

@@ -49,14 +49,32 @@ std::string names_of(const std::vector<graph::FuncPtr>& outputs) {
   return listed(outputs, [](const graph::FuncPtr& f) { return quoted(f->name); });
 }
 
-bool same_shape(const halide_buffer_t& a, const std::vector<halide_dimension_t>& shape) {
-  for (int d = 0; d < a.dimensions; d++) {
-    if (a.dim[d].min != shape[d].min || a.dim[d].extent != shape[d].extent ||
-        a.dim[d].stride != shape[d].stride) {
-      return false;
+// Minima, extents and strides of buffers, one after the other.
+std::vector<int32_t> shapes_of(const std::vector<halide_buffer_t*>& buffers) {
+  std::vector<int32_t> result;
+  for (const halide_buffer_t* buffer : buffers) {
+    for (int d = 0; d < buffer->dimensions; d++) {
+      const halide_dimension_t& dim = buffer->dim[d];
+      result.insert(result.end(), {dim.min, dim.extent, dim.stride});
     }
   }
-  return true;
+  return result;
+}
+
+// A region may depend on the shape of another buffer, or on its own: a call that is a query is
+// repeated until its buffers keep their shapes. False when a call fails.
+template <class Call>
+bool ask_until_settled(const std::vector<halide_buffer_t*>& buffers, const std::string& asked,
+                       const Call& call) {
+  constexpr int max_rounds = 64;  // as the message says
+  for (int round = 0; round < max_rounds; round++) {
+    const std::vector<int32_t> before = shapes_of(buffers);
+    if (!call()) return false;
+    if (shapes_of(buffers) == before) return true;
+  }
+  call_error(asked, "the regions of buffers settle within 64 bounds queries",
+             "they still changed in the last one",
+             "Set buffers by hand, or give bounds that stay the same once they are met");
 }
 
 // The answer to a query, and at least [0, size) in each dimension: then the call itself says what
@@ -359,8 +377,8 @@ Realization Pipeline::run(JITUserContext* context, const std::vector<int32_t>& s
   // Without memory the call is a query of what the outputs must be; no elements need none.
   const bool needs_no_query = std::find(sizes.begin(), sizes.end(), 0) != sizes.end() ||
                               contents_->target.has_feature(Target::NoBoundsQuery);
-  const bool succeeds =
-      frontend::prepared(handlers, context, bind) == 0 && (needs_no_query || call());
+  const bool succeeds = frontend::prepared(handlers, context, bind) == 0 &&
+                        (needs_no_query || ask_until_settled(outputs.buffers(), asked, call));
   for (Buffer<>& buffer : buffers) {
     enlarge_to(*buffer.get(), sizes, asked);
     frontend::allocate_host(*buffer.get());
@@ -371,11 +389,9 @@ Realization Pipeline::run(JITUserContext* context, const std::vector<int32_t>& s
   return Realization(std::move(buffers));
 }
 
-// Asks the code for the regions again until they agree: a region may depend on the shape of another
-// buffer.
+// Outputs without memory are asked for, too.
 void Pipeline::infer(JITUserContext* context, const std::vector<halide_buffer_t*>& outputs,
                      const Target& target, const ParamMap& map) const {
-  constexpr int max_rounds = 16;
   const auto code = compiled(target);
   const std::string asked = "infer the input bounds of " + names_of(contents_->outputs);
   std::optional<frontend::Arguments> bound;
@@ -383,23 +399,12 @@ void Pipeline::infer(JITUserContext* context, const std::vector<halide_buffer_t*
   if (frontend::prepared(contents_->handlers, context, bind) != 0) return;
   frontend::Arguments& arguments = *bound;
   if (arguments.queries().empty()) return;
-  for (int round = 0;; round++) {
-    std::vector<std::vector<halide_dimension_t>> before;
-    for (auto& [parameter, buffer] : arguments.queries()) {
-      before.emplace_back(buffer.raw_buffer()->dim, buffer.raw_buffer()->dim + buffer.dimensions());
-    }
-    if (frontend::call(*code, contents_->handlers, arguments.argv(), asked, context) != 0) return;
-    bool settled = true;
-    for (size_t i = 0; i < before.size(); i++) {
-      settled = settled && same_shape(*arguments.queries()[i].buffer.raw_buffer(), before[i]);
-    }
-    if (settled) break;
-    if (round == max_rounds) {
-      call_error(asked, "the regions of the inputs must settle",
-                 text("they still changed after ", max_rounds, " rounds"),
-                 "Set the inputs by hand");
-    }
-  }
+  std::vector<halide_buffer_t*> buffers = outputs;
+  for (auto& query : arguments.queries()) buffers.push_back(query.buffer.raw_buffer());
+  const bool succeeds = ask_until_settled(buffers, asked, [&] {
+    return frontend::call(*code, contents_->handlers, arguments.argv(), asked, context) == 0;
+  });
+  if (!succeeds) return;
   for (auto& [parameter, buffer] : arguments.queries()) {
     frontend::check_buffer(buffer.raw_buffer(), parameter->name, parameter->type,
                            parameter->dimensions, false, asked);

@@ -107,9 +107,11 @@ class Runnable {
     pipeline_to("realize ").run(context, outputs, target, map);
   }
   // Gives every ImageParam without a buffer one of exactly the region that the outputs need; those
-  // of the map, whose Buffers it makes, keep their own.
-  // Requires: the regions of the inputs must settle (RuntimeError); the region that a pipeline
-  // reads of its input must be bounded.
+  // of the map, whose Buffers it makes, keep their own. Outputs without memory are enlarged to what
+  // the pipeline writes. Regions may depend on each other and on themselves: bounds are asked for
+  // until nothing changes.
+  // Requires: the regions of buffers settle within 64 bounds queries (RuntimeError); the region that
+  // a pipeline reads of its input must be bounded.
   void infer_input_bounds(const std::vector<int32_t>& sizes, const Target& target = Target(),
                           const ParamMap& map = ParamMap::empty_map()) {
     infer_input_bounds(nullptr, sizes, target, map);
