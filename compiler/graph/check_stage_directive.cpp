@@ -327,6 +327,11 @@ void check(RunLoop& run, const SchedulePlace& at) {
   const std::string asked =
       text(verbs[static_cast<int>(run.kind)], at.name(), " over ", quoted(run.loop));
   if (run.loop != outermost_loop || run.kind != ForType::GpuBlock) loop_index(at, run.loop, asked);
+  if (at.f->is_extern() && (is_gpu(run.kind) || run.kind == ForType::Vectorized)) {
+    user_error(asked, "loops around the calls of a C function are serial, parallel or unrolled",
+               quoted(at.f->name) + " is computed by a C function",
+               "Let another Func read it, and schedule that one");
+  }
   if (runs_at_once(run.kind) || run.kind == ForType::Vectorized)
     check_race_free(at, run.loop, run.kind == ForType::Vectorized, asked);
 }

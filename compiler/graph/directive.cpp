@@ -44,8 +44,8 @@ void give(const FuseLoops& fuse, StageLoops& schedule) {
   const Dim outer = schedule.dims[outer_at];
   schedule.dims.erase(schedule.dims.begin() + static_cast<std::ptrdiff_t>(outer_at));
   const bool reduces = inner.is_reduction || outer.is_reduction;
-  schedule.dims[place_of(schedule, fuse.inner)] = {fuse.fused, outer.runs, reduces,
-                                                   outer.partition};
+  schedule.dims[place_of(schedule, fuse.inner)] = {fuse.fused, outer.runs, reduces, outer.partition,
+                                                   inner.is_in_call && outer.is_in_call};
   schedule.splits.push_back(
       {Split::Kind::Fuse, fuse.fused, fuse.outer, fuse.inner, {}, TailStrategy::Auto, reduces});
 }
@@ -76,7 +76,9 @@ void give(const ReorderLoops& reorder, StageLoops& schedule) {
 void give(const RunLoop& run, StageLoops& schedule) {
   if (run.loop == outermost_loop && !has_outermost(schedule.dims))
     schedule.dims.push_back({outermost_loop});
-  schedule.dims[place_of(schedule, run.loop)].runs = run.kind;
+  Dim& loop = schedule.dims[place_of(schedule, run.loop)];
+  loop.runs = run.kind;
+  loop.is_in_call = false;
 }
 void give(const PartitionLoop& partition, StageLoops& schedule) {
   schedule.dims[place_of(schedule, partition.loop)].partition = partition.how;
@@ -228,7 +230,8 @@ void add_loops(const StageLoops& schedule, const std::vector<Dim>& first,
   }
   for (size_t i = 0; i < schedule.dims.size(); ++i) {
     const Dim &wanted = schedule.dims[i], &now = built.dims[i];
-    if (wanted.runs != now.runs) log.push_back(RunLoop{wanted.var, wanted.runs});
+    if (wanted.runs != now.runs || wanted.is_in_call != now.is_in_call)
+      log.push_back(RunLoop{wanted.var, wanted.runs});
     if (wanted.partition != now.partition)
       log.push_back(PartitionLoop{wanted.var, wanted.partition});
   }
@@ -238,13 +241,12 @@ void add_loops(const StageLoops& schedule, const std::vector<Dim>& first,
 
 std::vector<Dim> first_loops(const FuncContents& f, const Definition& definition) {
   std::vector<Dim> loops;
-  if (f.is_extern()) return loops;
   for (const ReductionVariable& rvar : definition.rvars)
     loops.push_back({rvar.var, ForType::Serial, true});
   for (size_t d = 0; d < definition.args.size(); ++d) {
     const Variable* v = definition.args[d].as<Variable>();
     if (v && !v->symbol.defined() && v->name == f.args[d])
-      loops.push_back({v->name, ForType::Serial, false});
+      loops.push_back({v->name, ForType::Serial, false, Partition::Auto, f.is_extern()});
   }
   return loops;
 }

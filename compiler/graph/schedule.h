@@ -54,6 +54,9 @@ struct Dim {
   bool is_reduction =
       false;  // derives from a reduction variable: order matters unless proven otherwise
   Partition partition = Partition::Auto;
+  // Of an extern stage: no loop, but what the C function computes in one call; until a directive
+  // says how the loop runs.
+  bool is_in_call = false;
 };
 
 // Where a Func is computed or stored.

@@ -88,13 +88,6 @@ TEST_F(ExternErrors, FoldedStorage) {
   expect_mentions(compile_error<UserError>(), {"the storage of \"in", "is folded over \"x\""});
 }
 
-// rule: what a C function reads or writes is stored where it is computed
-TEST_F(ExternErrors, StorageOutsideOfTheComputation) {
-  build();
-  f.compute_at(out, x).store_root();
-  expect_mentions(compile_error<Unsupported>(), {"\"f", "is stored outside of its compute level"});
-}
-
 TEST_F(ExternErrors, TheInterpreterCallsNothing) {
   build();
   expect_error<Unsupported>({"interpret \"f", "a Func is evaluated by its definitions"}, [&] {

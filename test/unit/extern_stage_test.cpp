@@ -68,6 +68,58 @@ EXPORTED int extern_test_fails(halide_buffer_t* in, int on_query, halide_buffer_
   return -4321;
 }
 
+// out(x) = x, in blocks of 16 only.
+EXPORTED int extern_test_blocks(halide_buffer_t* out) {
+  if (is_query(out)) {
+    out->dim[0].extent = (out->dim[0].extent + 15) / 16 * 16;
+    return 0;
+  }
+  if (out->dim[0].extent % 16 != 0) return -77;
+  for (int i = 0; i < out->dim[0].extent; i++)
+    element(out, out->dim[0].min + i) = out->dim[0].min + i;
+  return 0;
+}
+
+// out(x) = in(x) + x, in blocks of 17 only; it never reads beyond the region that it is given.
+EXPORTED int extern_test_rounds(halide_buffer_t* in, halide_buffer_t* out) {
+  if (is_query(in) || is_query(out)) {
+    if (is_query(out)) out->dim[0].extent = (out->dim[0].extent + 16) / 17 * 17;
+    if (is_query(in)) {
+      in->dim[0].min = out->dim[0].min;
+      in->dim[0].extent = out->dim[0].extent;
+    }
+    return 0;
+  }
+  const halide_dimension_t &from = in->dim[0], &to = out->dim[0];
+  if (to.extent % 17 != 0) return -77;
+  if (from.min > to.min || from.min + from.extent < to.min + to.extent) return -78;
+  for (int x = to.min; x < to.min + to.extent; x++) element(out, x) = element(in, x) + x;
+  return 0;
+}
+
+// Asks for more of its input the less it is asked for.
+EXPORTED int extern_test_insatiable(halide_buffer_t* in, halide_buffer_t* out) {
+  if (is_query(in)) {
+    in->dim[0].min = 0;
+    in->dim[0].extent = out->dim[0].extent == 1 ? 10 : out->dim[0].extent < 20 ? 1000 : 20;
+  }
+  return 0;
+}
+
+// out(x, y) = in(x, y) + x, in tiles of one size only.
+EXPORTED int extern_test_tile(halide_buffer_t* in, int width, int height, halide_buffer_t* out) {
+  if (is_query(in)) {
+    for (int d = 0; d < 2; d++) in->dim[d] = out->dim[d];
+    return 0;
+  }
+  if (out->dim[0].extent != width || out->dim[1].extent != height) return -79;
+  for (int y = out->dim[1].min; y < out->dim[1].min + height; y++) {
+    for (int x = out->dim[0].min; x < out->dim[0].min + width; x++)
+      element(out, x, y) = element(in, x, y) + x;
+  }
+  return 0;
+}
+
 EXPORTED int extern_test_twice(int value) { return 2 * value; }
 
 namespace retrograde {
@@ -155,6 +207,166 @@ TEST(ExternStage, AnImageIsAskedByTheFunctionItself) {
   in.set(data);
   Buffer<int> result = out.realize({12, 9});
   result.for_each_element([&](int i, int j) { EXPECT_EQ(result(i, j), 20 * i + 2 * j); });
+}
+
+TEST(ExternStage, MayComputeMoreThanIsNeeded) {
+  Var x("x");
+  Func f("f"), out("out");
+  f.define_extern("extern_test_blocks", {}, Int(32), {x});
+  out(x) = f(x) + f(x + 1);
+  f.compute_root();
+  const Buffer<int> result = out.realize({10});
+  for (int i = 0; i < 10; i++) EXPECT_EQ(result(i), 2 * i + 1);
+}
+
+TEST(ExternStage, MayComputeMoreThanIsNeededInEachIteration) {
+  Var x("x"), xo("xo"), xi("xi");
+  for (const bool at_root : {false, true}) {
+    for (const bool input_at_root : {false, true}) {
+      Func base("base"), in("in"), f("f"), out("out");
+      base(x) = 3 * x;
+      in(x) = base(x - 1) + base(x + 1);
+      f.define_extern("extern_test_rounds", {in}, Int(32), {x});
+      out(x) = 2 * f(x);
+      out.split(x, xo, xi, 10);
+      base.compute_root();
+      if (at_root) {
+        in.compute_root();
+        f.compute_root();
+      } else {
+        f.compute_at(out, xo);
+        if (input_at_root)
+          in.compute_root();
+        else
+          in.compute_at(out, xo);
+      }
+      const Buffer<int> result = out.realize({100});
+      for (int i = 0; i < 100; i++) EXPECT_EQ(result(i), 14 * i) << at_root << input_at_root;
+    }
+  }
+}
+
+// What is computed outside of the loop is all that the function asks for in any iteration.
+TEST(ExternStage, InALoopReadsWhatIsComputedOutside) {
+  Var x("x"), y("y");
+  Func base("base"), in("in"), f("f"), out("out");
+  base(x, y) = 10 * x + y;
+  in(x, y) = base(x, y + 1);
+  f.define_extern("extern_test_stencil", {in}, Int(32), {x, y});
+  out(x, y) = f(x, y) + 1;
+  base.compute_root();
+  in.compute_root();
+  f.compute_at(out, y);
+  const Buffer<int> result = out.realize({12, 9});
+  result.for_each_element(
+      [&](int i, int j) { EXPECT_EQ(result(i, j), 20 * i + 2 * j + 3) << i << " " << j; });
+}
+
+TEST(ExternStage, MayBeSaidToBeStoredFurtherOut) {
+  Var x("x"), y("y");
+  for (const bool of_input : {false, true}) {
+    Func in("in"), f("f"), out("out");
+    in(x, y) = 10 * x + y;
+    f.define_extern("extern_test_stencil", {in}, Int(32), {x, y});
+    out(x, y) = f(x, y) + f(x, y + 1);
+    in.compute_at(out, y);
+    f.compute_at(out, y);
+    (of_input ? in : f).store_root();
+    const Buffer<int> result = out.realize({12, 9});
+    result.for_each_element(
+        [&](int i, int j) { EXPECT_EQ(result(i, j), 40 * i + 4 * j + 2) << i << " " << j; });
+  }
+}
+
+TEST(ExternStage, IsCalledOnSlicesInItsOwnLoops) {
+  Var x("x"), y("y"), xo("xo"), yo("yo");
+  for (const bool is_output : {true, false}) {
+    for (const bool in_loop : {true, false}) {
+      Func in("in"), f("f"), out("out");
+      in(x, y) = x * y;
+      f.define_extern("extern_test_tile", {in, Expr(10), Expr(5)}, Int(32), {x, y});
+      out(x, y) = f(x, y);
+      f.compute_root().tile(x, y, xo, yo, x, y, 10, 5).serial(xo).parallel(yo);
+      if (in_loop)
+        in.compute_at(f, xo);
+      else
+        in.compute_root();
+      // Where tiles do not divide it, the last ones move inwards.
+      const Buffer<int> result = (is_output ? f : out).realize({33, 22});
+      result.for_each_element(
+          [&](int i, int j) { ASSERT_EQ(result(i, j), i * j + i) << i << " " << j; });
+    }
+  }
+}
+
+TEST(ExternStage, HasShorterSlicesWhereATailIsGuarded) {
+  Var x("x"), y("y"), xo("xo"), t("t");
+  Func base("base"), in("in"), f("f"), out("out");
+  base(x, y) = 10 * x + y;
+  in(x, y) = base(x, y);
+  f.define_extern("extern_test_stencil", {in}, Int(32), {x, y});
+  out(x, y) = f(x, y) + f(x, y + 1);
+  base.compute_root();
+  f.compute_root().split(x, xo, x, 8, TailStrategy::GuardWithIf).serial(y).serial(xo);
+  in.compute_at(f, y);
+  const Buffer<int> result = out.realize({13, 7});
+  result.for_each_element(
+      [&](int i, int j) { EXPECT_EQ(result(i, j), 40 * i + 4 * j + 2) << i << " " << j; });
+}
+
+TEST(ExternStage, SplitsAloneMakeNoLoops) {
+  Var x("x"), y("y"), xo("xo"), yo("yo");
+  Func in("in"), f("f");
+  in(x, y) = x * y;
+  f.define_extern("extern_test_tile", {in, Expr(30), Expr(20)}, Int(32), {x, y});
+  in.compute_root();
+  f.tile(x, y, xo, yo, x, y, 10, 5).reorder(xo, x);
+  const Buffer<int> result = f.realize({30, 20});
+  EXPECT_EQ(result(29, 19), 29 * 19 + 29);
+}
+
+TEST(ExternStage, MustAskForNoMoreInAnIterationThanInAll) {
+  Var x("x"), xo("xo"), xi("xi");
+  Func in("in"), f("f"), out("out");
+  in(x) = x;
+  f.define_extern("extern_test_insatiable", {in}, Int(32), {x});
+  out(x) = f(x);
+  out.split(x, xo, xi, 10);
+  in.compute_root();
+  f.compute_at(out, xo);
+  expect_error<RuntimeError>({"\"extern_test_insatiable\"", "for a part", "[0, 999]", "[0, 19]"},
+                             [&] { out.realize({100}); });
+}
+
+TEST(ExternStage, AnImageThatNothingElseReadsHasTheRegionThatTheFunctionAsksFor) {
+  Var x("x"), y("y");
+  for (const bool in_a_loop : {false, true}) {
+    ImageParam in(Int(32), 2, "in");
+    Func f("f"), out("out");
+    f.define_extern("extern_test_stencil", {in}, Int(32), {x, y});
+    out(x, y) = f(x, y);
+    if (in_a_loop)
+      f.compute_at(out, y);
+    else
+      f.compute_root();
+    out.infer_input_bounds({12, 9});
+    Buffer<int> image = in.get();
+    EXPECT_EQ(image.min(0), -1);
+    EXPECT_EQ(image.width(), 14);
+    EXPECT_EQ(image.height(), 9);
+    image.for_each_element([&](int i, int j) { image(i, j) = 10 * i + j; });
+    const Buffer<int> result = out.realize({12, 9});
+    result.for_each_element([&](int i, int j) { EXPECT_EQ(result(i, j), 20 * i + 2 * j); });
+  }
+}
+
+TEST(ExternStage, AnImageOfAnOutputIsAskedForToo) {
+  Var x("x"), y("y");
+  ImageParam in(Int(32), 2, "in");
+  Func f("f");
+  f.define_extern("extern_test_stencil", {in}, Int(32), {x, y});
+  f.infer_input_bounds({12, 9});
+  EXPECT_EQ(Buffer<int>(in.get()).width(), 14);
 }
 
 TEST(ExternStage, ErrorCodesPropagate) {

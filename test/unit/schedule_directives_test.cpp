@@ -371,7 +371,8 @@ TEST_F(Directives, ExternStagesHaveNoExpressions) {
   h.define_extern("compute_it", {}, Int(32), 1);
   expect_refused([&] { h.value(); }, {"compute_it"});
   expect_refused([&] { h(x) += 1; }, {"no updates", "compute_it"});
-  expect_refused([&] { h.parallel(x); }, {"no loops"});
+  expect_refused([&] { h.parallel(x); }, {"its loops are", "\"_0\""});
+  expect_refused([&] { h.vectorize(Var("_0")); }, {"calls of a C function", "\"h"});
 }
 
 // ---- orders of reductions ----

@@ -106,6 +106,7 @@ void define_extern(const FuncPtr& f, ExternDefinition definition, const std::vec
   f->pure = std::move(pure);
   f->schedule.storage_dims = variables;
   f->extern_definition = std::move(definition);
+  f->pure->schedule.dims = first_loops(*f, *f->pure);
   make_outputs(*f);
   f->version++;
 }

@@ -119,15 +119,19 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
 
   // The values come from the C function `function_name`, which is called as
   //   int function_name(args..., halide_buffer_t* outputs...)
-  // once with buffers whose host is null, to ask which regions of its inputs it needs for the
-  // outputs' shapes, and then to compute. Funcs and images are passed as halide_buffer_t*, Exprs as
-  // scalars; it returns 0 or an error code.
+  // first with buffers whose host is null, to ask how large it makes the outputs, which it may
+  // enlarge, and which regions of its inputs it needs for them, and then to compute. Outputs of the
+  // pipeline keep the size that they are given. Funcs and images are passed as halide_buffer_t*,
+  // Exprs as scalars; it returns 0 or an error code. What it reads and writes is stored where it is
+  // computed, whatever store_at says. One call computes all that is needed, unless serial, parallel
+  // or unroll makes a loop of one of the variables, or of a part of it after a split: then there is a
+  // call on a slice in each iteration. Where the stage is computed in a loop, the function asks for no
+  // more for a part of its output than for the whole, or the call fails.
   // Requires: the C function has a name; every argument is a Func, an image or an Expr; every Func
   // among the arguments has a definition; its arguments are different Vars; it has at least one
   // value; a Func is defined once; extern stages run on the CPU (Unsupported); the function's
   // symbol is its plain name (Unsupported); a Func that a C function reads has memory; what a C
-  // function reads or writes lies in memory as one box; what a C function reads or writes is stored
-  // where it is computed (Unsupported).
+  // function reads or writes lies in memory as one box.
   void define_extern(const std::string& function_name, const std::vector<ExternFuncArgument>& args,
                      const std::vector<Type>& types, const std::vector<Var>& arguments,
                      NameMangling mangling = NameMangling::Default,

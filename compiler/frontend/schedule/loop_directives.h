@@ -143,7 +143,8 @@ class LoopDirectives {
   //     body(x)         =>
   // Of a loop of constant extent; the same rule for reduction variables.
   // Requires: iterations that run at the same time must not touch the same element; the extent of a
-  // vectorized loop must be a constant, or have a constant above it; vectors have at most 4096 lanes.
+  // vectorized loop must be a constant, or have a constant above it; vectors have at most 4096 lanes;
+  // loops around the calls of a C function are serial, parallel or unrolled.
   Self& vectorize(const VarOrRVar& var) {
     return give(graph::RunLoop{var.name(), ForType::Vectorized});
   }

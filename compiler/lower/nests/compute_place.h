@@ -29,6 +29,11 @@ class ComputePlace {
   // The same for what a slide computes; always named.
   Range bind_part(const std::string& name, const Slide& slide, Interval& range);
 
+  // A name that is bound already, for an end of a part.
+  void bind_part(const std::string& name, const Interval& whole) {
+    note_part(variable(name), whole, whole);
+  }
+
   // Boxes in terms of what lies around the site.
   Box whole(const Box& box) { return expand(box, whole_); }
   Box touched(const Box& box) { return expand(box, touched_); }

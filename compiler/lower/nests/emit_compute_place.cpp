@@ -199,6 +199,7 @@ NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& cod
     code.overrun.inside.push_back(member.f);
   }
   merge_code(code, made);
+  if (site.around.empty()) ask_wholes(code, site);
   for (Member& member : members) keep(member, member.need, code, made, piece, site);
   piece.produce = made.stmt;
   return piece;

@@ -5,7 +5,10 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/nests/emitted.h"
+#include "lower/nests/run_time_check.h"
 #include "lower/runtime_call.h"
+#include "retrograde_runtime.h"
 
 namespace retrograde::lower {
 
@@ -45,17 +48,168 @@ std::vector<Expr> dense_strides(const std::vector<Range>& region) {
   return strides;
 }
 
+bool is_func(const ExternArgument& arg) { return arg.kind == ExternArgument::Kind::Func; }
+bool is_image(const ExternArgument& arg) { return arg.kind == ExternArgument::Kind::Buffer; }
+
+const std::string& name_of(const ExternArgument& arg) {
+  return is_func(arg) ? arg.func->name : arg.buffer->name;
+}
+
+Expr failed(const LoopedFunc& f, const Expr& code) {
+  return call_op(
+      Op::error, Int(32),
+      {code,
+       Expr(text("cannot compute ", quoted(f.name()), ": the C function ",
+                 quoted(f.func->extern_definition->function), " returned the error code ")),
+       code, Expr(". Look up what the function means by it.")});
+}
+
+std::vector<Range> ranges_of(const Box& box) {
+  return mapped(box, [](const Interval& side) { return Range{side.min, side.max - side.min + 1}; });
+}
+
+// One query: the function called with descriptors without memory, what it wrote into them read back
+// through the call.
+class Query {
+ public:
+  // Names begin with the prefix.
+  Query(const LoopedFunc& f, const std::string& prefix, Lets& bindings)
+      : f_(f), definition_(*f.func->extern_definition), prefix_(prefix), bindings_(bindings) {}
+
+  void ask(const Box& region) {
+    std::vector<Expr> args;
+    for (const ExternArgument& arg : definition_.args) {
+      if (is_func(arg)) {
+        const std::vector<Range> nothing(arg.func->args.size(), Range{0, 0});
+        for (const Type type : arg.func->types) add_input(arg, type, nothing, args);
+      } else if (is_image(arg)) {
+        // As large as it is: what the function leaves alone is not asked for beyond that.
+        std::vector<Range> actual;
+        for (int d = 0; d < arg.buffer->dimensions; d++) actual.push_back(range_of_image(arg, d));
+        add_input(arg, arg.buffer->type, actual, args);
+      } else {
+        args.push_back(arg.expr);
+      }
+    }
+    const std::vector<Range> wanted = ranges_of(region);
+    for (const Type type : f_.func->types) {
+      args.push_back(bind(text("query.", args.size()),
+                          packed({null_handle(), type, wanted, dense_strides(wanted)})));
+      outputs_.push_back(args.back());
+    }
+    code_ = bind("query.code", call_extern(definition_.function, Int(32), args));
+  }
+
+  // What the function wants to compute, which is no less than what it was asked for.
+  Box computed(const Box& region) const {
+    Box result = region;
+    for (const Expr& buffer : outputs_) result = hull(result, box_in(buffer, region.size()));
+    return simplified(result);
+  }
+
+  // What it reads of each Func and image. Of an image that is there all that is there will do: the
+  // function sees for itself how large it is.
+  Requirements inputs() const {
+    Requirements result;
+    for (const auto& [arg, buffer] : inputs_) {
+      Footprint use;
+      if (is_func(*arg)) {
+        use.box = box_in(buffer, arg->func->args.size());
+      } else {
+        const Expr is_asked =
+            call_op(Op::buffer_is_query, Bool(), {variable(name_of(*arg) + ".buffer", Handle())});
+        use.is_image = true;
+        use.symbol = SymbolRef(arg->buffer);
+        use.box = box_in(buffer, static_cast<size_t>(arg->buffer->dimensions));
+        for (int d = 0; d < arg->buffer->dimensions; d++) {
+          Interval& side = use.box[static_cast<size_t>(d)];
+          const Range actual = range_of_image(*arg, d);
+          side.min = make_select(is_asked, side.min, actual.min);
+          side.max = make_select(is_asked, side.max, actual.min + actual.extent - 1);
+        }
+      }
+      const Requirements one{{name_of(*arg), use}};
+      merge_footprints(result, one);
+    }
+    return result;
+  }
+
+ private:
+  const LoopedFunc& f_;
+  const ExternDefinition& definition_;
+  const std::string prefix_;
+  Lets& bindings_;
+  std::vector<std::pair<const ExternArgument*, Expr>> inputs_;
+  std::vector<Expr> outputs_;
+  Expr code_;
+
+  Expr bind(const std::string& name, const Expr& value) {
+    bindings_.emplace_back(prefix_ + name, value);
+    return variable(prefix_ + name, value.type());
+  }
+  void add_input(const ExternArgument& arg, Type type, const std::vector<Range>& region,
+                 std::vector<Expr>& args) {
+    args.push_back(bind(text("query.", args.size()),
+                        packed({null_handle(), type, region, dense_strides(region)})));
+    inputs_.emplace_back(&arg, args.back());
+  }
+  static Range range_of_image(const ExternArgument& arg, int d) {
+    return {variable(text(arg.buffer->name, ".min.", d)),
+            variable(text(arg.buffer->name, ".extent.", d))};
+  }
+  Box box_in(const Expr& buffer, size_t dimensions) const {
+    const auto field = [&](Op op, int d) {
+      return call_op(Op::require, Int(32),
+                     {code_ == 0, call_op(op, Int(32), {buffer, Expr(d)}), failed(f_, code_)});
+    };
+    return numbered(static_cast<int>(dimensions), [&](int d) {
+      const Expr min = field(Op::buffer_min, d);
+      return Interval{min, min + field(Op::buffer_extent, d) - 1};
+    });
+  }
+};
+
+// The box by names of its ends.
+Box bind_box(const std::string& name, const Box& box, Lets& bindings) {
+  Box named = box;
+  for (size_t d = 0; d < box.size(); d++) {
+    for (const auto& [end, what] :
+         {std::pair(&Interval::min, ".min."), std::pair(&Interval::max, ".max.")}) {
+      const std::string full = name + what + std::to_string(d);
+      bindings.emplace_back(full, box[d].*end);
+      named[d].*end = variable(full);
+    }
+  }
+  return named;
+}
+
+std::string prefix_of(const LoopedFunc& f) { return stage_prefix(f.name(), 0); }
+std::string whole_prefix(const LoopedFunc& f) { return prefix_of(f) + "whole."; }
+
+}  // namespace
+
+static ExternAnswer ask_extern_stage(const LoopedFunc& f, const Box& region,
+                                     const std::string& prefix, bool may_enlarge);
+
+namespace {
+
 class Emitter {
  public:
-  Emitter(const Program& program, const LoopedFunc& f, const Domain& region)
-      : program_(program), f_(f), definition_(*f.func->extern_definition) {
-    for (const std::string& arg : f.func->args) region_.push_back(region.at(arg));
-    prefix_ = stage_prefix(f.name(), 0);
-  }
+  Emitter(const Program& program, const LoopedFunc& f, const ExternCall& call)
+      : program_(program),
+        f_(f),
+        definition_(*f.func->extern_definition),
+        prefix_(prefix_of(f)),
+        call_(call) {}
 
   ExternStage emit() {
     check();
-    if (has_funcs()) query();
+    const bool may_enlarge = !f_.is_output && !call_.is_slice;
+    const ExternAnswer answer = ask_extern_stage(f_, call_.region, prefix_, may_enlarge);
+    stage_.bindings = answer.bindings;
+    stage_.computed = answer.computed;
+    stage_.uses = answer.uses;
+    if (call_.in_loops) note_parts();
     stage_.call = call();
     return std::move(stage_);
   }
@@ -64,13 +218,9 @@ class Emitter {
   const Program& program_;
   const LoopedFunc& f_;
   const ExternDefinition& definition_;
-  std::vector<Range> region_;
-  std::string prefix_;
+  const std::string prefix_;
+  const ExternCall& call_;
   ExternStage stage_;
-
-  static bool is_func(const ExternArgument& arg) { return arg.kind == ExternArgument::Kind::Func; }
-
-  bool has_funcs() const { return std::ranges::any_of(definition_.args, is_func); }
 
   void check() const {
     const std::string asked =
@@ -100,70 +250,37 @@ class Emitter {
                  text("the storage of ", quoted(f.name()), " is folded over ", quoted(rule.var)),
                  "Leave fold_storage out");
     }
-    if (is_stored_where_computed(f) || f.is_output) return;
-    unsupported(asked, "what a C function reads or writes is stored where it is computed",
-                text(quoted(f.name()), " is stored outside of its compute level"),
-                "Leave store_at and store_root out");
   }
 
-  Expr bind(const std::string& name, const Expr& value) {
-    stage_.bindings.emplace_back(prefix_ + name, value);
-    return variable(prefix_ + name, value.type());
-  }
-
-  // ---- the query ----
-
-  // One buffer without memory for each value of each Func; what the function wrote into them is
-  // read back through the call itself.
-  void query() {
-    std::vector<Expr> args;
-    struct Asked {
-      const FuncContents* func;
-      Expr buffer;
-    };
-    std::vector<Asked> asked;
-    for (const ExternArgument& arg : definition_.args) {
-      if (!is_func(arg)) {
-        args.push_back(other_argument(arg));
-        continue;
+  // Inside of a loop, code further out knows of each input what is asked for in the end.
+  void note_parts() {
+    for (auto& [name, use] : stage_.uses) {
+      if (use.is_image) continue;
+      const Box part = bind_box(prefix_ + "asked." + name, use.box, stage_.bindings);
+      for (size_t d = 0; d < part.size(); d++) {
+        const auto end = [&](const char* what) {
+          return variable(whole_prefix(f_) + "asked." + name + what + std::to_string(d));
+        };
+        const Interval whole{end(".min."), end(".max.")};
+        for (const Expr& e : {part[d].min, part[d].max})
+          stage_.parts.emplace_back(e.as<Variable>()->name, whole);
+        stage_.checks.push_back(inside_check(name, static_cast<int>(d), part[d], whole));
       }
-      for (size_t i = 0; i < arg.func->types.size(); i++) {
-        const std::vector<Range> nothing(arg.func->args.size(), Range{0, 0});
-        const Descriptor empty{null_handle(), arg.func->types[i], nothing, dense_strides(nothing)};
-        const Expr buffer = bind(text("query.", args.size()), packed(empty));
-        args.push_back(buffer);
-        asked.push_back({arg.func.get(), buffer});
-      }
+      use.box = part;
     }
-    for (size_t i = 0; i < f_.func->types.size(); i++) {
-      const Descriptor wanted{null_handle(), f_.func->types[i], region_, dense_strides(region_)};
-      args.push_back(bind(text("query.", args.size()), packed(wanted)));
-    }
-    const Expr code = bind("query.code", call_extern(definition_.function, Int(32), args));
-    for (const Asked& input : asked) add_use(*input.func, input.buffer, code);
   }
 
-  void add_use(const FuncContents& func, const Expr& buffer, const Expr& code) {
-    Footprint use;
-    for (int d = 0; d < func.dimensions(); d++) {
-      const auto field = [&](Op op) {
-        return call_op(Op::require, Int(32),
-                       {code == 0, call_op(op, Int(32), {buffer, Expr(d)}), failed(code)});
-      };
-      const Expr min = field(Op::buffer_min), extent = field(Op::buffer_extent);
-      use.box.push_back({min, min + extent - 1});
-    }
-    Requirements uses;
-    uses[func.name] = std::move(use);
-    merge_footprints(stage_.uses, uses);
-  }
-
-  Expr failed(const Expr& code) const {
-    return call_op(Op::error, Int(32),
-                   {code,
-                    Expr(text("cannot compute ", quoted(f_.name()), ": the C function ",
-                              quoted(definition_.function), " returned the error code ")),
-                    code, Expr(". Look up what the function means by it.")});
+  Stmt inside_check(const std::string& input, int d, const Interval& part,
+                    const Interval& whole) const {
+    const Expr is_inside = part.min > part.max || (part.min >= whole.min && part.max <= whole.max);
+    return run_time_check(
+        is_inside, retrograde_error_access_out_of_bounds,
+        text("cannot compute ", quoted(f_.name()), ": the C function ",
+             quoted(definition_.function),
+             " asks for no more for a part of its output than for the whole; in dimension ", d,
+             " of ", quoted(input), " it asks for ["),
+        part.min, Expr(", "), part.max, Expr("] for a part and for ["), whole.min, Expr(", "),
+        whole.max, Expr("] for the whole. Compute the stage at root."));
   }
 
   // ---- the call ----
@@ -176,18 +293,18 @@ class Emitter {
         continue;
       }
       const LoopedFunc& input = *program_.find(arg.func->name);
-      std::vector<Range> region;
-      for (const Interval& side : stage_.uses.at(arg.func->name).box)
-        region.push_back({side.min, side.max - side.min + 1});
+      const std::vector<Range> region = ranges_of(stage_.uses.at(arg.func->name).box);
       for (size_t i = 0; i < arg.func->types.size(); i++)
         args.push_back(packed(of_func(input, static_cast<int>(i), region)));
     }
     for (size_t i = 0; i < f_.func->types.size(); i++)
-      args.push_back(packed(of_func(f_, static_cast<int>(i), region_)));
+      args.push_back(packed(of_func(f_, static_cast<int>(i), ranges_of(stage_.computed))));
     const std::string code = prefix_ + "code";
     const Expr result = variable(code);
-    return make_let(code, call_extern(definition_.function, Int(32), args),
-                    make_assert(result == 0, failed(result)));
+    std::vector<Stmt> stmts = stage_.checks;
+    stmts.push_back(make_let(code, call_extern(definition_.function, Int(32), args),
+                             make_assert(result == 0, failed(f_, result))));
+    return make_block(std::move(stmts));
   }
 
   static Descriptor of_func(const LoopedFunc& f, int value, const std::vector<Range>& region) {
@@ -216,8 +333,48 @@ Expr packed_buffer(Type type, const Expr& host, const std::vector<Range>& region
   return packed({host, type, region, strides});
 }
 
-ExternStage emit_extern_stage(const Program& program, const LoopedFunc& f, const Domain& region) {
-  return Emitter(program, f, region).emit();
+// A function that enlarges its output is asked again, for what it reads then.
+static ExternAnswer ask_extern_stage(const LoopedFunc& f, const Box& region,
+                                     const std::string& prefix, bool may_enlarge) {
+  ExternAnswer answer;
+  answer.computed = region;
+  if (may_enlarge) {
+    Query query(f, prefix + "size.", answer.bindings);
+    query.ask(region);
+    answer.computed = bind_box(prefix + "computed", query.computed(region), answer.bindings);
+  }
+  const auto is_input = [](const ExternArgument& arg) { return is_func(arg) || is_image(arg); };
+  if (std::ranges::none_of(f.func->extern_definition->args, is_input)) return answer;
+  Query query(f, prefix, answer.bindings);
+  query.ask(answer.computed);
+  answer.uses = query.inputs();
+  return answer;
+}
+
+ExternStage emit_extern_stage(const Program& program, const LoopedFunc& f, const ExternCall& call) {
+  return Emitter(program, f, call).emit();
+}
+
+std::string whole_region_of(const LoopedFunc& f) { return whole_prefix(f) + "region"; }
+
+ExternAnswer ask_for_whole(const LoopedFunc& f, const Box& region) {
+  const std::string prefix = whole_prefix(f);
+  const bool may_enlarge = !f.is_output;
+  ExternAnswer whole = ask_extern_stage(f, region, prefix, may_enlarge);
+  Box first = region, last = region;
+  for (size_t d = 0; d < region.size(); d++) {
+    first[d].max = min(region[d].min, region[d].max);  // of nothing: nothing
+    last[d].min = max(region[d].min, region[d].max);
+  }
+  for (const auto& [corner, name] : {std::pair(&first, "first."), std::pair(&last, "last.")}) {
+    ExternAnswer part = ask_extern_stage(f, *corner, prefix + name, may_enlarge);
+    append(whole.bindings, part.bindings);
+    merge_footprints(whole.uses, part.uses);
+  }
+  for (auto& [name, use] : whole.uses) {
+    if (!use.is_image) use.box = bind_box(prefix + "asked." + name, use.box, whole.bindings);
+  }
+  return whole;
 }
 
 }  // namespace retrograde::lower

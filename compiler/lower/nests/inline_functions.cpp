@@ -86,6 +86,24 @@ void check_size(const FuncContents& f, const InlinedSizes& sizes) {
            ", or a Func that it reads, at root or at a loop of its consumer"));
 }
 
+// A C function gets each of its buffers as one box, which a Func is only where it lives no longer
+// than it is computed: wherever else it was said to be stored, values are the same.
+void store_with_extern_stages(Program& program) {
+  std::unordered_set<const FuncContents*> boxes;
+  for (const LoopedFunc& f : program.funcs) {
+    if (!f.func->is_extern()) continue;
+    boxes.insert(f.func.get());
+    for (const ExternArgument& arg : f.func->extern_definition->args) {
+      if (arg.kind == ExternArgument::Kind::Func) boxes.insert(arg.func.get());
+    }
+  }
+  for (LoopedFunc& f : program.funcs) {
+    if (!boxes.contains(f.func.get()) || f.is_output) continue;
+    f.schedule.store_level = f.schedule.compute_level;
+    f.schedule.hoist_level = f.schedule.compute_level;
+  }
+}
+
 }  // namespace
 
 Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
@@ -115,6 +133,7 @@ Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
     program.index_of[f->name] = static_cast<int>(program.funcs.size());
     program.funcs.push_back({f, f->schedule, std::move(stages), is_output});
   }
+  store_with_extern_stages(program);
   resolve_outermost_levels(program);
   refuse_unsupported(program);
   order_for_memory(program);

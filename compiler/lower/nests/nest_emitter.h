@@ -12,6 +12,7 @@
 #include "lower/nests/build_loop_nests.h"
 #include "lower/nests/compute_place.h"
 #include "lower/nests/emitted.h"
+#include "lower/nests/extern_stage.h"
 #include "lower/nests/fused_groups.h"
 #include "lower/nests/nest_storage.h"
 #include "lower/nests/stage_nest.h"
@@ -113,7 +114,12 @@ class NestEmitter {
   void leave_overrun(const std::vector<NestStage>& stages, Emitted& code) const;
   static bool is_one_of(const std::vector<NestStage>& stages, const std::string& func);
   void widen_by_own_reads(Member& member, Emitted& code) const;
-  Emitted emit_extern(const LoopedFunc& f, const Domain& domain, ComputePlace& site) const;
+  Emitted emit_extern(Member& member, const Domain& domain, ComputePlace& site);
+  Emitted emit_extern_call(const LoopedFunc& f, const ExternCall& call, ComputePlace& site,
+                           Box& computed) const;
+  Emitted emit_extern_loops(const LoopedFunc& f, std::vector<Loop>& loops, const Box& slice,
+                            const Expr& has_points, ComputePlace& home);
+  void ask_wholes(Emitted& code, ComputePlace& root) const;
   Emitted emit_variants(const FusedNest& nest, std::vector<NestStage> stages, ComputePlace& home);
   Emitted emit_nest(const FusedNest& nest, std::vector<NestStage> stages, ComputePlace& home);
   Emitted emit_stage(const FusedNest& nest, std::vector<NestStage>& stages, int index,
