@@ -86,9 +86,9 @@ const char* const preamble = R"(#include <stdint.h>
 struct halide_buffer_t;
 struct halide_filter_metadata_t;
 
-// Each function gives 0, or a code of HalideRuntime.h after it has called halide_error. A call in
-// which a buffer has neither host nor device memory computes nothing: it fills in the bounds of
-// such buffers.
+// Each function gives 0, or a code of HalideRuntime.h after it has called halide_error, which prints
+// the message and aborts unless halide_set_error_handler was given a handler. A call in which a
+// buffer has neither host nor device memory computes nothing: it fills in the bounds of such buffers.
 
 )";
 

@@ -1,10 +1,13 @@
 // Printing, errors and memory by HalideRuntime.h: a handler that the program sets, or the default.
 //
-// Two differences to Halide's defaults: an error is printed and its code returned, but the process
-// goes on; and memory comes from the pool of memory.cpp.
+// An error that no handler takes ends the process, as it does in Halide: a program that does not look
+// at the code that a function returns must not go on with what was never computed. With a handler of
+// its own the program gets the code. One difference to Halide's defaults: memory comes from the pool
+// of memory.cpp.
 #include <unistd.h>
 
 #include <atomic>
+#include <cstdlib>
 #include <cstring>
 
 #include "halide/weak.h"
@@ -45,6 +48,7 @@ RETROGRADE_WEAK void halide_default_error(void* user_context, const char* messag
   char line[4096];
   retrograde_format_message(line, sizeof line, "Error: %s\n", message);
   halide_print(user_context, line);
+  std::abort();
 }
 RETROGRADE_WEAK void halide_error(void* user_context, const char* message) {
   error_handler.load()(user_context, message);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -196,6 +197,28 @@ TEST_F(AotFiles, LibraryLinksWithNothingElse) {
   EXPECT_EQ(shell(path("main")), 0);
   // A program's own halide_error is called in place of the library's.
   EXPECT_EQ(WEXITSTATUS(shell(path("main") + " null")), 7);
+}
+
+// A program that does not look at the code must not take what was never computed for a result.
+TEST_F(AotFiles, AnErrorEndsAProgramThatSetsNoHandler) {
+  out.compile_to_static_library(path("a"), {in, gain}, "a", Target("host"));
+  std::ofstream(path("main.cpp"))
+      << "#include \"a.h\"\n#include <HalideBuffer.h>\n#include <cstdio>\n"
+         "int main(int argc, char**) {\n"
+         "  Halide::Runtime::Buffer<uint8_t> in(60, 16), out(64, 16);\n"
+         "  in.fill(50);\n"
+         "  if (argc > 1) halide_set_error_handler([](void*, const char*) {});\n"
+         "  const int code = a(in, 3.0f, out);\n"
+         "  std::puts(\"went on\");\n"
+         "  return code == halide_error_code_access_out_of_bounds ? 5 : 6;\n}\n";
+  ASSERT_EQ(link({"a.a"}), 0) << read_file(path("log"));
+  const int status = shell(path("main"));
+  EXPECT_TRUE(WIFSIGNALED(status) ? WTERMSIG(status) == SIGABRT
+                                  : WEXITSTATUS(status) == 128 + SIGABRT)
+      << status;
+  EXPECT_TRUE(has(read_file(path("log")), "Error: ")) << read_file(path("log"));
+  EXPECT_FALSE(has(read_file(path("log")), "went on"));
+  EXPECT_EQ(WEXITSTATUS(shell(path("main") + " handler")), 5);
 }
 
 // Objects bring the runtime, too, and any number of them can be linked together.
