@@ -13,6 +13,7 @@
 #include "graph/directive.h"
 #include "graph/names.h"
 #include "graph/own_reads.h"
+#include "graph/random_sequence.h"
 #include "ir/build.h"
 #include "ir/literal.h"
 #include "ir/print.h"
@@ -201,18 +202,12 @@ bool has_random(const std::vector<Expr>& values) {
   return std::ranges::any_of(values, [&](const Expr& value) { return any_node(value, is_random); });
 }
 
-// FNV-1a: equal programs draw equal numbers, whatever was compiled before.
-int32_t tag_of(const FuncContents& f, int stage) {
-  uint32_t hash = 2166136261u;
-  for (unsigned char c : f.name) hash = (hash ^ c) * 16777619u;
-  return static_cast<int32_t>(hash + static_cast<uint32_t>(stage));
-}
-
 std::vector<Expr> bind_all_random(const FuncContents& f, int stage,
                                   const std::vector<std::string>& variables,
                                   std::vector<Expr> values) {
   if (!has_random(values)) return values;
-  std::vector<Expr> point{Expr(tag_of(f, stage))};
+  std::vector<Expr> point{Expr(static_cast<int32_t>(static_cast<uint32_t>(random_tag(f.name)) +
+                                                    static_cast<uint32_t>(stage)))};
   for (const std::string& name : variables) point.push_back(variable(name));
   for (Expr& value : values) value = bind_random(value, point);
   return values;

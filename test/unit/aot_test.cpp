@@ -221,6 +221,24 @@ TEST_F(AotFiles, AnErrorEndsAProgramThatSetsNoHandler) {
   EXPECT_EQ(WEXITSTATUS(shell(path("main") + " handler")), 5);
 }
 
+TEST_F(AotFiles, SeveralTargetsDrawTheSameRandomNumbers) {
+  std::vector<std::vector<int>> drawn;
+  const auto make = [&](const std::string& name, const Target& target) {
+    Func inner, noise("noise");
+    inner(x) = random_int();
+    noise(x) = random_int() ^ inner(x) ^ random_int(3);
+    const Buffer<int> values = noise.realize({4});
+    drawn.push_back({values(0), values(1), values(2), values(3)});
+    return noise.compile_to_module({}, name, target);
+  };
+  const Target base("x86-64-linux-no_runtime");
+  compile_multitarget("noise", {{OutputFileType::static_library, path("noise.a")}},
+                      {base.with_feature(Target::AVX2), base}, {}, make);
+  ASSERT_EQ(drawn.size(), 2u);
+  EXPECT_EQ(drawn[0], drawn[1]);
+  EXPECT_NE(drawn[0][0], drawn[0][1]);
+}
+
 // Objects bring the runtime, too, and any number of them can be linked together.
 TEST_F(AotFiles, ObjectsLinkWithNothingElse) {
   Func twice("twice");

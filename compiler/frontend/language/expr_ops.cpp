@@ -1,8 +1,7 @@
 // expr_ops.cpp -- type rules of the operators that are calls.
 #include "frontend/language/expr_ops.h"
 
-#include <atomic>
-
+#include "graph/random_sequence.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 
@@ -114,7 +113,7 @@ Expr integer_power(const Expr& x, int64_t exponent) {
 // Every call without a seed is another stream.
 Expr random(Type type, Expr seed) {
   if (!seed.defined()) {
-    seed = Expr(int32_t{-1} - streams.fetch_add(1));
+    seed = Expr(int32_t{-1} - graph::next_random_stream());
   } else if (!seed.type().is_int_or_uint() || !seed.type().is_scalar()) {
     type_error("random", "its seed is an integer", seed);
   }

@@ -190,6 +190,7 @@ Expr fast_inverse(Expr x);
 Expr fast_inverse_sqrt(Expr x);
 
 // ---- random numbers: of the seed, the Func and the point; the same on every run ----
+// All targets that a function is compiled for draw the same numbers.
 // Requires: its seed is an integer.
 Expr random_float(Expr seed = {});  // float32 in [0, 1)
 Expr random_uint(Expr seed = {});   // uint32

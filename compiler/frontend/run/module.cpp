@@ -5,6 +5,7 @@
 
 #include "diagnostics/error.h"
 #include "frontend/run/compiler_interface.h"
+#include "graph/random_sequence.h"
 
 namespace retrograde {
 
@@ -205,6 +206,7 @@ void compile_multitarget(const std::string& function_name,
   for (size_t i = 0; i < targets.size(); i++) {
     endings.push_back("-" + (suffixes.empty() ? targets[i].to_string() : suffixes[i]));
     const std::string name = function_name + identifier(endings.back());
+    const graph::RandomSequence same_numbers;
     modules.push_back(module_factory(name, targets[i]));
   }
   module_compiler().write_multitarget(function_name, modules, endings, output_files);
