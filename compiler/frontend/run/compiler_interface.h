@@ -24,8 +24,8 @@ struct PipelineSpec {
   std::string name;
   std::vector<graph::FuncPtr> outputs;
   std::map<std::string, void*> externs = {};  // C functions by name, before those of the process
-  bool is_traced = false;                 // a call tells when it begins and ends
-  AutoscheduleOptions autoschedule = {};  // for what nobody scheduled
+  bool is_traced = false;                     // a call tells when it begins and ends
+  AutoscheduleOptions autoschedule = {};      // for what nobody scheduled
   // Pipelines by the name that extern stages call them by; see JITExtern.
   std::map<std::string, std::shared_ptr<const PipelineSpec>> pipelines = {};
 
