@@ -4,6 +4,7 @@
 #include "run_gen/filter.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 
 #include "run_gen/image_files.h"
@@ -100,11 +101,25 @@ void Call::set_scalar(Argument& argument) {
   throw Problem("the generator says no " + text + " of \"" + about.name + "\"");
 }
 
+// Functions number elements in 31 bits, and HalideBuffer.h multiplies extents in 32.
+void check_elements(const std::string& name, const std::vector<int>& extents) {
+  int64_t elements = 1;
+  for (const int extent : extents) {
+    elements *= std::max(1, extent);
+    if (elements > INT32_MAX) {
+      throw Problem("\"" + name +
+                    "\" would have more than 2147483647 elements, which no function " +
+                    "takes; give smaller extents");
+    }
+  }
+}
+
 Image made_up(const halide_filter_argument_t& about, const Shape& shape) {
   if (static_cast<int>(shape.extents.size()) != about.dimensions) {
     throw Problem(std::string("\"") + about.name + "\" has " + std::to_string(about.dimensions) +
                   " dimensions; " + std::to_string(shape.extents.size()) + " extents were given");
   }
+  check_elements(about.name, shape.extents);
   Image image(about.type, nullptr, shape.extents);
   for (size_t d = 0; d < shape.mins.size(); d++)
     image.translate(static_cast<int>(d), shape.mins[d]);
@@ -213,9 +228,13 @@ bool Call::shrink_outputs() {
 }
 
 // Memory for a shape, its dimensions in the order of the strides.
-Image allocated(Image shape) {
-  std::vector<int> order;
-  for (int d = 0; d < shape.dimensions(); d++) order.push_back(d);
+Image allocated(const std::string& name, Image shape) {
+  std::vector<int> order, extents;
+  for (int d = 0; d < shape.dimensions(); d++) {
+    order.push_back(d);
+    extents.push_back(shape.dim(d).extent());
+  }
+  check_elements(name, extents);
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
     return std::abs(shape.dim(a).stride()) < std::abs(shape.dim(b).stride());
   });
@@ -234,7 +253,8 @@ void Call::settle(const std::vector<Image>& required) {
     if (!is_buffer(a)) continue;
     const halide_buffer_t& shape = *required[i].raw_buffer();
     if (is_output(a) || !a.is_known) {
-      a.image = allocated(Image(a.about->type, nullptr, shape.dimensions, shape.dim));
+      a.image =
+          allocated(a.about->name, Image(a.about->type, nullptr, shape.dimensions, shape.dim));
       if (!is_output(a)) fill(a.image, a.spec);
       continue;
     }
@@ -248,7 +268,7 @@ void Call::settle(const std::vector<Image>& required) {
     Image laid_out(a.about->type, nullptr, shape.dimensions, a.image.raw_buffer()->dim);
     for (int d = 0; d < shape.dimensions; d++)
       laid_out.raw_buffer()->dim[d].stride = shape.dim[d].stride;
-    laid_out = allocated(laid_out);
+    laid_out = allocated(a.about->name, laid_out);
     if (a.image.data())
       laid_out.copy_from(a.image);
     else

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <string>
 
+#include "run_gen/filter.h"
 #include "run_gen/image_files.h"
 #include "support/temporary_folder.h"
 
@@ -89,6 +90,33 @@ TEST_P(RunGenFiles, CutOffFilesAreRefused) {
     EXPECT_NE(error_of_reading().find("cannot be read: "), std::string::npos)
         << kept << " bytes: " << error_of_reading();
   }
+}
+
+// A function of an image, which reads nothing and is never called but for its sizes.
+TEST(RunGenShapes, WithTooManyElementsAreRefused) {
+  halide_filter_argument_t arguments[2] = {};
+  arguments[0].name = "in", arguments[0].kind = halide_argument_kind_input_buffer;
+  arguments[1].name = "out", arguments[1].kind = halide_argument_kind_output_buffer;
+  for (auto& argument : arguments) argument.dimensions = 3, argument.type = bytes;
+  halide_filter_metadata_t metadata = {};
+  metadata.num_arguments = 2;
+  metadata.arguments = arguments;
+  metadata.name = "f";
+  const Filter filter{[](void**) { return 0; }, &metadata};
+  Options options;
+  for (const char* extents : {"[65536,32768,2]", "[50000,50000,1]", "[2147483647,2147483647,1]"}) {
+    options.values["in"] = std::string("zero:") + extents;
+    try {
+      Call(filter, options);
+      FAIL() << extents;
+    } catch (const Problem& problem) {
+      EXPECT_NE(std::string(problem.what()).find("\"in\" would have more than 2147483647"),
+                std::string::npos)
+          << problem.what();
+    }
+  }
+  options.values["in"] = "zero:[4,3,2]";
+  EXPECT_EQ(Call(filter, options).run(), 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, RunGenFiles, ::testing::Values("png", "jpg", "jpeg"));
