@@ -33,13 +33,30 @@ namespace {
 // Bytes by part of the compiler.
 using Work = std::map<std::string, double>;
 
+class Laps {
+ public:
+  void end(const std::string& part) {
+    const uint64_t now = allocated_bytes;
+    work[part] = static_cast<double>(now - before_);
+    before_ = now;
+  }
+  Work work;
+
+ private:
+  uint64_t before_ = allocated_bytes;
+};
+
+Stmt lower_gradient(const Func& loss, const Func& gradient, Laps& laps) {
+  const std::vector<graph::FuncPtr> outputs =
+      autoschedule::schedule_unscheduled({loss.function(), gradient.function()});
+  laps.end("schedule_unscheduled");
+  lower::LowerOptions options;
+  options.observe = [&](const std::string& pass, double, const Stmt&) { laps.end(pass); };
+  return lower::lower("chain", outputs, lower::infer_arguments(outputs), options).body;
+}
+
 Work work_of_chain(int stages) {
-  uint64_t before = allocated_bytes;
-  const auto lap = [&] {
-    const uint64_t now = allocated_bytes, bytes = now - before;
-    before = now;
-    return static_cast<double>(bytes);
-  };
+  Laps laps;
   constexpr int side = 1024;  // stages in strips, however many
   Buffer<float> image(side, side);
   Var x("x"), y("y");
@@ -54,24 +71,40 @@ Work work_of_chain(int stages) {
   RDom r(0, side, 0, side);
   loss() = 0.0f;
   loss() += last(r.x, r.y) * last(r.x, r.y);
-  Work work;
-  work["program"] = lap();
+  laps.end("program");
   const Func gradient = propagate_adjoints(loss)(image);
-  work["propagate_adjoints"] = lap();
+  laps.end("propagate_adjoints");
   Pipeline({loss, gradient}).auto_schedule(get_jit_target_from_environment());
-  work["auto_schedule"] = lap();
-  const std::vector<graph::FuncPtr> outputs =
-      autoschedule::schedule_unscheduled({loss.function(), gradient.function()});
-  work["schedule_unscheduled"] = lap();
-  lower::LowerOptions options;
-  options.observe = [&](const std::string& pass, double, const Stmt&) { work[pass] = lap(); };
-  lower::lower("chain", outputs, lower::infer_arguments(outputs), options);
-  return work;
+  laps.end("auto_schedule");
+  lower_gradient(loss, gradient, laps);
+  return laps.work;
 }
 
-TEST(ChainGrowth, EachStageCostsEveryPartOfTheCompilerAsMuch) {
-  work_of_chain(8);  // what is set up once
-  const Work some = work_of_chain(120), many = work_of_chain(480);
+// One expression of many statements, as a loop of the user's language unrolls it.
+Stmt lower_statements(int statements, Laps& laps) {
+  Buffer<float> image(64, 64), factor(64, 64);
+  Var x("x"), y("y");
+  Expr a = image(x, y), b = factor(x, y);
+  for (int i = 0; i < statements; i++) a = a + 0.001f * sin(b * a);
+  Func out("out"), loss("loss");
+  out(x, y) = a;
+  RDom r(0, 64, 0, 64);
+  loss() = 0.0f;
+  loss() += out(r.x, r.y) * out(r.x, r.y);
+  laps.end("program");
+  const Func gradient = propagate_adjoints(loss)(image);
+  laps.end("propagate_adjoints");
+  return lower_gradient(loss, gradient, laps);
+}
+
+Work work_of_statements(int statements) {
+  Laps laps;
+  lower_statements(statements, laps);
+  return laps.work;
+}
+
+// What a program four times as long asks for.
+void expect_linear(const Work& some, const Work& many) {
   double all = 0;
   for (const auto& [part, bytes] : many) all += bytes;
   for (const auto& [part, bytes] : many) {
@@ -79,6 +112,18 @@ TEST(ChainGrowth, EachStageCostsEveryPartOfTheCompilerAsMuch) {
     // n log n would be 1.18.
     EXPECT_LT(std::log(bytes / some.at(part)) / std::log(4), 1.2) << part;
   }
+}
+
+TEST(ChainGrowth, EachStageCostsEveryPartOfTheCompilerAsMuch) {
+  work_of_chain(8);  // what is set up once
+  const Work some = work_of_chain(120);
+  expect_linear(some, work_of_chain(480));
+}
+
+TEST(ChainGrowth, EachUnrolledStatementCostsEveryPartOfTheCompilerAsMuch) {
+  work_of_statements(8);
+  const Work some = work_of_statements(200);
+  expect_linear(some, work_of_statements(800));
 }
 
 }  // namespace

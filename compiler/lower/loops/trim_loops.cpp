@@ -81,12 +81,7 @@ class Trimmer {
     return match(
         s,
         [&](const LetStmt& n) {
-          Expr value = substitute(without_lets(n.value), lets_);
-          if (reads_memory(value, MemoryReads::Functions)) {
-            unusable_.insert(n.name);
-          } else {
-            lets_[n.name] = value;
-          }
+          note_let(n);
           return with_body(s, n.body);
         },
         [&](const For& n) {
@@ -140,6 +135,17 @@ class Trimmer {
     if (trimmed.same_as(body)) return s;
     return map_children(s,
                         [&](const Stmt& child) { return child.same_as(body) ? trimmed : child; });
+  }
+
+  // What cannot be known outside is not substituted: its value would grow with each let that reads
+  // the one before, and be walked as often.
+  void note_let(const LetStmt& let) {
+    if (reads_memory(let.value, MemoryReads::Functions) ||
+        uses_any_variable(let.value, unusable_)) {
+      unusable_.insert(let.name);
+    } else {
+      lets_[let.name] = substitute(without_lets(let.value), lets_);
+    }
   }
 
   // The condition less the conjuncts that became ends or go around the loop.
