@@ -58,6 +58,9 @@ namespace {
 constexpr int small_body = 1500;
 // An operation less an iteration is worth a copy of a body that has up to this many nodes.
 constexpr int nodes_an_operation = 64;
+// And a condition over lanes less, which is a gather or a select: two copies of the body, one of them
+// with the condition, are what LLVM compiles. Above that it is less than a hundredth of the work.
+constexpr int nodes_a_vector_condition = 2048;
 
 bool contains_likely(const Stmt& s) {
   return any_node(s, [](const Call& call) { return is_likely(&call); });
@@ -122,8 +125,10 @@ class Partitioner : public StatementRewriter {
 
   static bool is_worth_copies(const For& loop, const Saving& saving) {
     if (saving.always_pays || loop.partition == Partition::Always) return true;
-    if (saving.operations == 0) return false;
-    return saving.divides || node_count(loop.body) <= nodes_an_operation * saving.operations;
+    if (saving.operations == 0 && saving.over_lanes == 0) return false;
+    return saving.divides ||
+           node_count(loop.body) <= nodes_an_operation * saving.operations +
+                                        nodes_a_vector_condition * saving.over_lanes;
   }
 
   // Loops inside a vectorized one have the same bounds in all lanes.

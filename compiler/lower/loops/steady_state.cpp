@@ -247,7 +247,7 @@ void SteadyRewriter::count_saving(const std::unordered_set<std::string>& names, 
   const bool over_lanes =
       std::ranges::any_of(lanes_, [&](const std::string& lane) { return names.count(lane) != 0; });
   if (inside_lanes_ || over_lanes) {
-    steady_.saving.always_pays = true;
+    ++steady_.saving.over_lanes;
     return;
   }
   if (enclosing_.empty() && has_inner_loops_) return;

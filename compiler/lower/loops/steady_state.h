@@ -40,11 +40,13 @@ class PartitionContext {
 //
 // A condition that an inner serial loop does not change, or that stands outside of all inner loops,
 // is computed once for a whole inner loop: nothing is saved. One over the lanes of a vector turns
-// gathers into dense loads and selects into nothing: it always pays. What is left, the min of a
+// gathers into dense loads and selects into nothing: it pays unless the body is very large beside
+// it. What is left, the min of a
 // shifted tile or a clamp of scalars, saves an operation or two an iteration, and maybe that the
 // start of a vector is known to be a multiple of something, for the divisions in the body.
 struct Saving {
   bool always_pays = false;
+  int over_lanes = 0;
   int operations = 0;
   bool divides = false;
 };
