@@ -16,7 +16,7 @@
 //   LoopUnroll     loops of few iterations altogether, other small innermost ones two or four times
 //   SROA, EarlyCSE allocations of which only such a loop hid the places; what it loaded twice
 //   InstCombine, SimplifyCFG, ADCE to clean up
-//   FenceLongBlocks so that LLVM's scheduler takes linear time
+//   cut_long_blocks and FenceLongBlocks, so that LLVM's code generator takes linear time
 //
 // Left out: loop and SLP vectorization, inlining, loop idioms (a memset call is slower on the short
 // rows that schedules produce). Strength reduction of addresses is part of LLVM's code generator.
@@ -45,7 +45,9 @@
 
 #include <algorithm>
 #include <optional>
+#include <vector>
 
+#include "codegen/cut_long_blocks.h"
 #include "codegen/fence_long_blocks.h"
 #include "codegen/split_addresses.h"
 
@@ -129,7 +131,7 @@ class MarkSmallLoops : public llvm::PassInfoMixin<MarkSmallLoops> {
   }
 };
 
-static llvm::FunctionPassManager pipeline(bool is_nvptx) {
+static llvm::FunctionPassManager pipeline() {
   llvm::FunctionPassManager passes;
   passes.addPass(llvm::SROAPass(llvm::SROAOptions::ModifyCFG));
   passes.addPass(llvm::EarlyCSEPass(true));
@@ -148,8 +150,16 @@ static llvm::FunctionPassManager pipeline(bool is_nvptx) {
   passes.addPass(llvm::InstCombinePass());
   passes.addPass(llvm::SimplifyCFGPass());
   passes.addPass(llvm::ADCEPass());
-  if (!is_nvptx) passes.addPass(FenceLongBlocks());  // which has no fences
   return passes;
+}
+
+static void shorten_blocks(llvm::Function& function, llvm::FunctionAnalysisManager& analyses) {
+  std::vector<llvm::Function*> pieces = cut_long_blocks(function);
+  pieces.push_back(&function);
+  for (llvm::Function* piece : pieces) {
+    FenceLongBlocks().run(*piece, analyses);
+    analyses.invalidate(*piece, llvm::PreservedAnalyses::none());
+  }
 }
 
 void optimize(llvm::Module& module, llvm::TargetMachine& machine) {
@@ -163,9 +173,15 @@ void optimize(llvm::Module& module, llvm::TargetMachine& machine) {
   builder.registerFunctionAnalyses(functions);
   builder.registerLoopAnalyses(loops);
   builder.crossRegisterProxies(loops, functions, call_graph, modules);
-  llvm::FunctionPassManager passes = pipeline(machine.getTargetTriple().isNVPTX());
+  llvm::FunctionPassManager passes = pipeline();
+  std::vector<llvm::Function*> defined;
   for (llvm::Function& function : module) {
-    if (!function.isDeclaration()) passes.run(function, functions);
+    if (!function.isDeclaration()) defined.push_back(&function);
+  }
+  for (llvm::Function* function : defined) {
+    passes.run(*function, functions);
+    // Kernels of devices are short, and have no fences of the own thread.
+    if (!machine.getTargetTriple().isNVPTX()) shorten_blocks(*function, functions);
   }
 }
 

@@ -481,6 +481,26 @@ TEST(CodegenIdioms, LongStraightCodeIsFenced) {
 }
 
 // Pieces of one function, which threads compile at the same time.
+// LLVM's code generator takes quadratic time for a block in which many values live for long.
+TEST(CodegenIdioms, NoBlockGrowsWithTheStatementsOfAProgram) {
+  ImageParam in(Float(32), 1, "in");
+  Var x("x");
+  Func f("f");
+  std::vector<Expr> values{in(x)};
+  for (int i = 0; i < 3000; i++) values.push_back(values.back() * (0.5f + 0.0001f * i) + in(x + i));
+  Expr all = 0.0f;  // the last value first
+  for (auto value = values.rbegin(); value != values.rend(); ++value) all = *value - all * 0.25f;
+  f(x) = all;
+  f.vectorize(x, 8);
+  size_t longest = 0, length = 0;
+  for (const std::string& line : assembly(f, avx2)) {
+    const bool is_label = !line.empty() && line[0] != '\t' && line[0] != ' ' && line[0] != '#';
+    length = is_label ? 0 : length + 1;
+    longest = std::max(longest, length);
+  }
+  EXPECT_LT(longest, 6000u);
+}
+
 TEST(CodegenIdioms, LongFunctionsAreCutBetweenTheirLoops) {
   ImageParam in(Float(32), 2, "in");
   Var x("x"), y("y"), yi("yi");

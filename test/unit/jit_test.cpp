@@ -2,6 +2,8 @@
 // for other machines.
 #include "jit/jit.h"
 
+#include <retrograde/retrograde.h>
+
 #include <atomic>
 #include <fstream>
 #include <sstream>
@@ -350,6 +352,38 @@ TEST(Codegen, PartsAreAnArchiveAndDeterministic) {
   const std::vector<uint8_t> object = codegen::compile_object(three_loops(), options).object;
   EXPECT_EQ(std::string(object.begin(), object.begin() + 7), "!<arch>");
   EXPECT_EQ(codegen::compile_object(three_loops(), options).object, object);
+}
+
+// A long block is compiled as several functions: values, masks and products that fuse pass between
+// them. Beside the same statements in Funcs of 100, whose blocks are short.
+TEST(Codegen, LongStraightCodeGivesTheNumbersOfShortCode) {
+  constexpr int statements = 3000, width = 64;
+  Buffer<float> in(width + statements), whole_out, parts_out;
+  for (int i = 0; i < width + statements; i++)
+    in(i) = static_cast<float>(i * 7919 % 1009) / 1009.0f - 0.25f;
+  Var x("x");
+  Func start("start"), whole("whole");
+  start(x) = in(x)*1.5f;
+  start.compute_root();
+  const auto statement = [&](const Expr& a, int i) {
+    const Expr first = start(x);
+    return select(first > 0.5f, a * 0.5f, a * 0.25f) + first * in(x + i);
+  };
+  Expr all = start(x);
+  for (int i = 0; i < statements; i++) all = statement(all, i);
+  whole(x) = all;
+  whole.vectorize(x, 8);
+  Func part = start;
+  for (int i = 0; i < statements;) {
+    Expr some = part(x);
+    for (const int end = i + 100; i < end; i++) some = statement(some, i);
+    part = Func("part");
+    part(x) = some;
+    part.compute_root().vectorize(x, 8);
+  }
+  whole_out = whole.realize({width});
+  parts_out = part.realize({width});
+  for (int i = 0; i < width; i++) EXPECT_EQ(whole_out(i), parts_out(i)) << i;
 }
 
 TEST(Codegen, UnknownTargetsAreUnsupported) {
