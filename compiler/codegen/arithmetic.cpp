@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 #include "codegen/emitter.h"
 #include "diagnostics/error.h"
@@ -235,6 +236,27 @@ static Value* clamp_integer(Emitter& e, Type to, Type from, Value* value) {
   return e.b.CreateIntCast(value, llvm_type(e, to), from.is_int());
 }
 
+// Vectors on x86, where LLVM takes its own intrinsics apart: five instructions for each lane. NaN gives
+// 0. The clamp is one of floats, so that it needs no wider integers; an upper end 2^n - 1 that floats
+// do not have is chosen after the conversion.
+static Value* saturate_vector(Emitter& e, Type to, Value* number) {
+  const auto real = [&](double value) { return float_constant(number, value); };
+  const double end = std::ldexp(1.0, to.is_int() ? to.bits() - 1 : to.bits());
+  const int digits = number->getType()->getScalarType()->isDoubleTy() ? 53 : 24;
+  const bool is_exact = to.bits() - (to.is_int() ? 1 : 0) <= digits;
+  const double low = to.is_int() ? -end : 0,
+               high = is_exact ? end - 1 : end - std::ldexp(end, -digits);
+  Value* ordered = number;
+  if (to.is_int()) ordered = e.b.CreateSelect(e.b.CreateFCmpORD(number, number), number, real(0));
+  // Of NaN the lower end, which is 0 where it comes here.
+  Value* clamped = e.b.CreateSelect(e.b.CreateFCmpOGT(ordered, real(low)), ordered, real(low));
+  clamped = e.b.CreateSelect(e.b.CreateFCmpOLT(clamped, real(high)), clamped, real(high));
+  Value* integer = float_to_integer(e, to, clamped);
+  if (is_exact) return integer;
+  return e.b.CreateSelect(e.b.CreateFCmpOGE(number, real(end)),
+                          int_constant(integer, static_cast<int64_t>(to.max_uint())), integer);
+}
+
 Value* convert_saturating(Emitter& e, Type to, Type from, Value* value) {
   if (to == from) return value;
   if (to.element_of() == Float(16)) return saturated_float16(e, to, from, value);
@@ -247,6 +269,9 @@ Value* convert_saturating(Emitter& e, Type to, Type from, Value* value) {
   }
   if (!from.is_float()) return clamp_integer(e, to, from, value);
   Value* number = is_half(from) ? half_to_float(e, from, value) : value;
+  // Only AVX-512 has conversions to vectors of 64-bit integers.
+  const bool has_conversion = to.bits() < 64 || e.machine.has_avx512_words();
+  if (to.is_vector() && e.machine.is_x86() && has_conversion) return saturate_vector(e, to, number);
   const auto id = to.is_int() ? llvm::Intrinsic::fptosi_sat : llvm::Intrinsic::fptoui_sat;
   return e.b.CreateIntrinsic(id, {llvm_type(e, to), number->getType()}, {number});
 }

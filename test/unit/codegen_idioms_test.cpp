@@ -481,6 +481,24 @@ TEST(CodegenIdioms, LongStraightCodeIsFenced) {
 }
 
 // Pieces of one function, which threads compile at the same time.
+// Of 16 numbers.
+TEST(CodegenIdioms, SaturatingCastsOfVectorsAreVectors) {
+  for (const Type from : {Float(32), Float(64)}) {
+    for (const Type to : {UInt(8), Int(8), UInt(16), Int(16), Int(32)}) {
+      ImageParam in(from, 1, "in");
+      Var x("x");
+      Func f("f");
+      f(x) = saturating_cast(to, in(x));
+      f.vectorize(x, 16);
+      for (const char* target : {avx2, avx512}) {
+        const auto code = assembly(f, target);
+        EXPECT_EQ(count(code, "vcvttss2si") + count(code, "vcvttsd2si"), 0u) << from << to;
+        EXPECT_GE(count(code, "vcvttp"), 1u) << from << to;
+      }
+    }
+  }
+}
+
 // LLVM's code generator takes quadratic time for a block in which many values live for long.
 TEST(CodegenIdioms, NoBlockGrowsWithTheStatementsOfAProgram) {
   ImageParam in(Float(32), 1, "in");

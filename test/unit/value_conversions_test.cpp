@@ -198,6 +198,56 @@ TEST(SaturatingCast, InfinitiesBecomeTheEndsOfIntegers) {
   EXPECT_EQ(ints(3), INT32_MAX);
 }
 
+template <typename To, typename From>
+To nearest_integer(From value) {
+  constexpr To low = std::numeric_limits<To>::min(), high = std::numeric_limits<To>::max();
+  if (std::isnan(value)) return 0;
+  if (value <= static_cast<From>(low)) return low;
+  return value >= static_cast<From>(high) ? high : static_cast<To>(value);
+}
+
+// The ends of the type and their neighbours, in vectors and one by one.
+template <typename To, typename From>
+void expect_saturated() {
+  const From inf = std::numeric_limits<From>::infinity();
+  std::vector<From> values{inf,        -inf,         From(NAN),    -From(NAN),
+                           From(-0.0), From(0.999f), From(-0.999f)};
+  for (const To end : {std::numeric_limits<To>::min(), std::numeric_limits<To>::max()}) {
+    const From middle = static_cast<From>(end);
+    for (const From v :
+         {middle, middle + 1, middle - 1, middle + From(0.5), middle - From(0.5),
+          std::nextafter(middle, inf), std::nextafter(middle, -inf), middle * 2, middle / 2})
+      values.push_back(v);
+  }
+  while (values.size() % 16) values.push_back(static_cast<From>(values.size()));
+  const int n = static_cast<int>(values.size());
+  Buffer<From> in(n);
+  for (int i = 0; i < n; i++) in(i) = values[static_cast<size_t>(i)];
+  for (const int lanes : {1, 4, 8, 16}) {
+    Var x("x"), xo("xo"), xi("xi");
+    Func f("f");
+    f(x) = saturating_cast<To>(in(x));
+    f.split(x, xo, xi, lanes).serial(xo);
+    if (lanes > 1) f.vectorize(xi);
+    const Buffer<To> out = f.realize({n});
+    for (int i = 0; i < n; i++)
+      EXPECT_EQ(out(i), (nearest_integer<To>(in(i)))) << in(i) << " in vectors of " << lanes;
+  }
+}
+
+template <typename From>
+void expect_all_saturated() {
+  expect_saturated<int8_t, From>(), expect_saturated<uint8_t, From>();
+  expect_saturated<int16_t, From>(), expect_saturated<uint16_t, From>();
+  expect_saturated<int32_t, From>(), expect_saturated<uint32_t, From>();
+  expect_saturated<int64_t, From>(), expect_saturated<uint64_t, From>();
+}
+
+TEST(SaturatingCast, IntegersOfFloatsEndAtTheirEnds) {
+  expect_all_saturated<float>();
+  expect_all_saturated<double>();
+}
+
 TEST(SaturatingCast, ConstantsFoldToTheSame) {
   EXPECT_EQ(*ir::as_const_float(saturating_cast<float>(Expr(1e300))), infinity);
   EXPECT_EQ(*ir::as_const_float(saturating_cast<float>(Expr(-infinity))), -infinity);
