@@ -184,6 +184,7 @@ constexpr Pass passes[] = {
      }},
     {"simplify_storage", Phase::FlatStorage, run_simplify},
     {"lower_atomics", Phase::FlatStorage, alone<lower_atomics>},
+    {"skip_empty_tiles", Phase::FlatStorage, alone<skip_empty_tiles>},
     {"partition_loops", Phase::FlatStorage, alone<partition_loops>},
     {"drop_guarded_clamps", Phase::FlatStorage, alone<drop_guarded_clamps>},
     {"trim_loops", Phase::FlatStorage, alone<trim_loops>},

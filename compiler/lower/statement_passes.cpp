@@ -35,6 +35,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"skip_stages",  // every Func that is stored
        [](const Stmt& s) { return skip_stages(s, [](const std::string&) { return true; }); }},
       {"transpose_loads", transpose_loads},
+      {"skip_empty_tiles", skip_empty_tiles},
       {"drop_guarded_clamps", drop_guarded_clamps},
       {"trim_loops", trim_loops},
       {"try_plain_products", try_plain_products},

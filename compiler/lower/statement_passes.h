@@ -19,6 +19,9 @@ Stmt lower_atomics(const Stmt& s);
 Stmt partition_loops(const Stmt& s);
 // What a condition says already is not said again where it holds. Loops, too.
 Stmt drop_guarded_clamps(const Stmt& s);
+// A tile without a point computes nothing of its producers, whose places need no clamp then. Before
+// loops are partitioned. Loops, too.
+Stmt skip_empty_tiles(const Stmt& s);
 // A condition that holds in one stretch of a loop becomes the ends of the loop. Loops, too.
 Stmt trim_loops(const Stmt& s);
 // Copies the body of every Unrolled loop once per iteration. Any phase. UserError when the extent of

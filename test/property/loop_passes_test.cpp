@@ -400,6 +400,7 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     if (HasFatalFailure()) return;
     Stmt partitioned = partition_loops(program);
     programs.expect_same("partition_loops", partitioned, Phase::FlatStorage);
+    programs.expect_same("skip_empty_tiles", skip_empty_tiles(program), Phase::FlatStorage);
     programs.expect_same("drop_guarded_clamps alone", drop_guarded_clamps(program),
                          Phase::FlatStorage);
     Stmt guarded = drop_guarded_clamps(partitioned);

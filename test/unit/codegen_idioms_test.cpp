@@ -499,6 +499,27 @@ TEST(CodegenIdioms, SaturatingCastsOfVectorsAreVectors) {
   }
 }
 
+// A tile beyond the end computes nothing; the others begin at a multiple of 16, so that what is packed
+// by 16 is read in a row.
+TEST(CodegenIdioms, PackedReadsUnderAGuardAreDense) {
+  ImageParam in(Float(32), 2, "in"), other(Float(32), 2, "other");
+  Var x("x"), y("y"), k("k"), xo("xo"), yo("yo");
+  Func packed("packed"), sum("sum"), out("out");
+  RDom r(0, 64, "r");
+  packed(x, k, xo) = in(xo * 16 + x, k);
+  sum(x, y) += packed(x % 16, r, x / 16) * other(r, y);
+  out(x, y) = sum(x, y) * 2.0f;
+  out.tile(x, y, xo, yo, x, y, 32, 8, TailStrategy::GuardWithIf);
+  Var xi("xi"), yi("yi");
+  out.tile(x, y, xi, yi, 16, 4);
+  out.bound(x, 0, in.width()).fuse(xo, yo, xo).parallel(xo);
+  packed.compute_root();
+  sum.compute_at(out, x).bound_extent(x, 16).bound_extent(y, 4).vectorize(x).unroll(y);
+  sum.update().reorder(x, y, r).vectorize(x).unroll(y);
+  const auto code = assembly(out, avx512);
+  EXPECT_EQ(count(code, "gather"), 0u);
+}
+
 // LLVM's code generator takes quadratic time for a block in which many values live for long.
 TEST(CodegenIdioms, NoBlockGrowsWithTheStatementsOfAProgram) {
   ImageParam in(Float(32), 1, "in");

@@ -18,6 +18,26 @@
 //           conjuncts together; arms of a select, both of which are evaluated over lanes.
 // Source: folklore. Tests: test/golden/lower/drop_guarded_clamps/,
 // test/property/loop_passes_test.cpp.
+//
+// skip_empty_tiles -- a tile without a point computes nothing of its producers.
+// In:  Loops or FlatStorage, before loops are partitioned; names unique.
+// Out: the same phase; the same stores to what outlives an iteration, in the same order.
+//
+//   for (yi, 0, 8) {                              for (yi, 0, 8) {
+//     let f.min = min(32*xo, n - 1)                 if (n - 32*xo - 1 >= 0) {
+//     produce f from f.min on                 =>      let f.min = 32*xo
+//     for (xi, 0, 32) {                               produce f from f.min on
+//       if (32*xo + xi < n) { ... f ... }             for (xi, 0, 32) { ... }
+//     }                                             }
+//   }                                             }
+//
+// Under a split with a guard the place of a producer is clamped only for the tiles beyond the end.
+// Without the clamp it is a multiple of the tile, so that what is packed by tiles is read in a row.
+//
+// Method: what must hold for an iteration to do anything (needed_conditions.h) becomes a condition
+//         around it where that decides a clamp, by the same proof as above.
+// Not done: loops around vectors and kernels.
+// Tests: test/golden/lower/skip_empty_tiles/.
 #include "lower/statement_passes.h"
 
 #include <algorithm>
@@ -26,8 +46,11 @@
 #include "analysis/linear.h"
 #include "ir/build.h"
 #include "ir/lets.h"
+#include "ir/markers.h"
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
+#include "lower/loops/needed_conditions.h"
+#include "lower/loops/steady_state.h"
 
 namespace retrograde::lower {
 
@@ -42,7 +65,13 @@ bool is_small(const Expr& e) {
   return count <= most_nodes;
 }
 
+// Where facts come from.
+enum class FactSource { Conditions, NeededConditions };
+
 class ClampDropper : public Rewriter {
+ public:
+  explicit ClampDropper(FactSource source) : source_(source) {}
+
  protected:
   Expr rewrite(const Expr& e) override {
     if (const auto* let = e.as<Let>())
@@ -59,11 +88,8 @@ class ClampDropper : public Rewriter {
     if (const auto* let = s.as<LetStmt>())
       return map_children(
           s, [&](const Expr& value) { return opened_value(let->name, value); }, *this);
-    if (!s.as<For>()) return children(s);
-    ++loops_;
-    Stmt result = children(s);
-    --loops_;
-    return result;
+    const auto* loop = s.as<For>();
+    return loop ? rewrite_loop(s, *loop) : children(s);
   }
 
  private:
@@ -71,6 +97,42 @@ class ClampDropper : public Rewriter {
     const Expr result = (*this)(value);
     open(name, result);
     return result;
+  }
+
+  Stmt rewrite_loop(const Stmt& s, const For& loop) {
+    ++loops_;
+    const bool has_lanes = loop.runs == ForType::Vectorized || is_gpu(loop.runs);
+    in_lanes_ += has_lanes;
+    const size_t known = facts_.size();
+    const bool adds_conditions = source_ == FactSource::NeededConditions && in_lanes_ == 0;
+    if (adds_conditions && is_serial(loop) && !has_kernel(loop.body)) add_needed(loop);
+    const bool is_new = facts_.size() > known;
+    if (is_new) forget();
+    Stmt body = (*this)(loop.body);
+    std::vector<Expr> used;
+    for (size_t i = known; i < facts_.size(); i++) {
+      if (facts_[i].used) used.push_back(facts_[i].condition);
+    }
+    facts_.resize(known);
+    if (is_new) forget();
+    if (!used.empty()) body = make_if(conjunction(used), body);
+    in_lanes_ -= has_lanes;
+    --loops_;
+    return map_children(
+        s, [&](const Expr& e) { return (*this)(e); }, [&](const Stmt&) { return body; });
+  }
+
+  // What all threads of a block do together stays outside of conditions.
+  static bool has_kernel(const Stmt& s) {
+    return any_node(s, [](const For& loop) { return is_gpu(loop.runs); });
+  }
+
+  void add_needed(const For& loop) {
+    for (const Sum& sum : needed_conditions(loop)) {
+      const Expr value = to_expr(sum), whole = opened(value);
+      if (!is_small(whole)) continue;
+      facts_.push_back({linear_form(whole), binary(Kind::GE, value, make_zero(sum.type))});
+    }
   }
 
   Stmt rewrite_branch(const IfThenElse& branch) {
@@ -85,12 +147,12 @@ class ClampDropper : public Rewriter {
   }
 
   void add_facts(const Expr& condition) {
-    if (loops_ == 0 || !is_small(condition)) return;
+    if (loops_ == 0 || source_ != FactSource::Conditions || !is_small(condition)) return;
     std::vector<Expr> conjuncts;
     add_conjuncts(opened(without_lets(condition)), conjuncts);
     for (const Expr& e : conjuncts) {
       auto form = nonnegative_where(e);
-      if (form && !reads_memory(e, MemoryReads::Calls)) facts_.push_back(*form);
+      if (form && !reads_memory(e, MemoryReads::Calls)) facts_.push_back({*form});
     }
   }
 
@@ -99,7 +161,11 @@ class ClampDropper : public Rewriter {
     const Expr whole = opened(without_lets(value));
     if (is_small(whole)) lets_[name] = whole;
   }
-  Expr opened(const Expr& e) const { return lets_.empty() ? e : substitute(e, lets_); }
+  Expr opened(const Expr& e) const { return substitute(plain(e), lets_); }
+  // A promise is kept where the program does anything.
+  Expr plain(const Expr& e) const {
+    return source_ == FactSource::NeededConditions ? without_promises(without_likely(e)) : e;
+  }
 
   // The operand that min or max is, where a fact says so.
   Expr decided(const Binary& n, const Expr& e) const {
@@ -112,20 +178,30 @@ class ClampDropper : public Rewriter {
     return e;
   }
   bool is_nonnegative(const Sum& form) const {
-    return std::any_of(facts_.begin(), facts_.end(), [&](const Sum& fact) {
-      if (fact.type != form.type) return false;
-      const Sum rest = plus(form, fact, -1);
+    const auto fact = std::ranges::find_if(facts_, [&](const Fact& fact) {
+      if (fact.form.type != form.type) return false;
+      const Sum rest = plus(form, fact.form, -1);
       return rest.valid && rest.is_constant() && rest.constant >= 0;
     });
+    if (fact == facts_.end()) return false;
+    fact->used = true;
+    return true;
   }
 
-  std::vector<Sum> facts_;  // sums that are at least 0
+  struct Fact {
+    Sum form;             // is at least 0
+    Expr condition = {};  // that has to be added for it
+    mutable bool used = false;
+  };
+  const FactSource source_;
+  std::vector<Fact> facts_;
   Substitution lets_;
-  int loops_ = 0;
+  int loops_ = 0, in_lanes_ = 0;
 };
 
 }  // namespace
 
-Stmt drop_guarded_clamps(const Stmt& s) { return ClampDropper()(s); }
+Stmt drop_guarded_clamps(const Stmt& s) { return ClampDropper(FactSource::Conditions)(s); }
+Stmt skip_empty_tiles(const Stmt& s) { return ClampDropper(FactSource::NeededConditions)(s); }
 
 }  // namespace retrograde::lower

@@ -35,6 +35,7 @@
 #include "ir/lets.h"
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
+#include "lower/loops/only_fills.h"
 #include "lower/loops/steady_state.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
@@ -46,24 +47,6 @@ namespace {
 
 // Constant extents up to this one are left alone.
 constexpr int64_t untrimmed_iterations = 16;
-
-// Whether it does nothing but fill memory of the names, and of its own.
-bool only_fills(const Stmt& s, std::unordered_set<std::string> own) {
-  const auto acts = [](const Expr& e) {
-    const auto* call = e.as<Call>();
-    return call &&
-           (call->call_type != CallType::Operator || op_info(call->op).cls == OpClass::Effect);
-  };
-  return !any_node(s, acts, [&](const Stmt& part) {
-    return match(
-        part, [&](const Allocate& n) { return own.insert(n.name), false; },
-        [&](const Store& n) { return !own.contains(n.name); },
-        [&](const Free& n) { return !own.contains(n.name); }, [](const Block&) { return false; },
-        [](const LetStmt&) { return false; }, [](const For&) { return false; },
-        [](const IfThenElse&) { return false; }, [](const ProducerConsumer&) { return false; },
-        [](const StmtNode&) { return true; });
-  });
-}
 
 bool may_end_elsewhere(const For& loop) {
   const auto extent = as_const_int(loop.extent);
