@@ -116,7 +116,7 @@ class Worker {
 #ifdef BENCH_RETROGRADE
   // Predicted and measured time of every stage, as JSON.
   void explain(const std::string& path, double seconds) {
-    Halide::ExplainOptions options;
+    retrograde::ExplainOptions options;
     options.measure = seconds > 0;
     options.seconds = seconds;
     options.threads = threads_;

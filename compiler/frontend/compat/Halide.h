@@ -142,7 +142,7 @@ using ::retrograde::operator|; using ::retrograde::operator||; using ::retrograd
 
 using ::retrograde::porting::CompileTimeErrorReporter;
 using ::retrograde::porting::set_custom_compile_time_error_reporter;
-using ::retrograde::internal::NamesInterface;
+using ::retrograde::NamesInterface;
 // clang-format on
 namespace BoundaryConditions = ::retrograde::BoundaryConditions;
 namespace ConciseCasts = ::retrograde::ConciseCasts;
