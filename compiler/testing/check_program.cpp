@@ -108,7 +108,8 @@ void compare_outputs(const Regions& regions, const RandomProgram& program,
 
 // What the checks of accesses find; where kernels run, races and their accesses out of bounds, too.
 bool is_finding(const RuntimeError& error, const Target& target) {
-  if (std::string_view(error.what()).find("checked_accesses") != std::string_view::npos) return true;
+  if (std::string_view(error.what()).find("checked_accesses") != std::string_view::npos)
+    return true;
   return target.has_feature(Target::CUDA) && !lacks_memory(error);
 }
 

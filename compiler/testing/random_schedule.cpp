@@ -376,8 +376,8 @@ class Scheduler {
     const int choice = random_.below(100);
     // How often the inlined body is repeated grows along chains of inlined Funcs.
     const int cost = reads_of(f) * static_cast<int>(sites_[f].size() + 1);
-    const bool inlines = choice < (is_pure(f) ? style_.inlined : style_.inlined / 3) && !is_shared(f) &&
-                         inlined_reads_ * cost <= max_reads_inlined;
+    const bool inlines = choice < (is_pure(f) ? style_.inlined : style_.inlined / 3) &&
+                         !is_shared(f) && inlined_reads_ * cost <= max_reads_inlined;
     if (inlines) {
       placements_[f].where = Where::Inlined;
       inlined_reads_ *= cost;

@@ -653,16 +653,6 @@ TEST(CallArguments, Sizes) {
   });
   expect_error<RuntimeError>({"sizes are not negative"}, [&] { s.f.realize({-3, 4}); });
   expect_error<UserError>({"address space"}, [&] { s.f.realize({INT32_MAX, INT32_MAX}); });
-  Func three("three");
-  three(s.x, s.y, s.z) = cast<uint8_t>(s.x + s.y + s.z);
-  expect_error<UserError>({"strides must fit 31 bits"}, [&] {
-    three.realize({1 << 16, 1 << 15, 2});
-  });
-  ImageParam in(UInt(8), 3, "in");
-  Func reads("reads");
-  RDom r(0, 1 << 16, 0, 1 << 15);
-  reads(s.x) = sum(cast<int>(in(r.x, r.y, s.x)));
-  expect_error<UserError>({"at most 2147483647 elements"}, [&] { reads.infer_input_bounds({2}); });
 }
 
 // rule: must have the right element type

@@ -37,8 +37,8 @@ ScheduleLog leave_out(ScheduleLog log, const std::string& directive) {
 Scheduled make(Choices& choices) {
   const bool is_chain = style == "chains" || (style.empty() && choices.chance(50));
   Scheduled result{make_program(choices, is_chain ? Style::chains() : Style::pipelines()), {}};
-  result.schedule =
-      random_schedule(result.program, choices, is_chain ? ScheduleStyle::windows() : ScheduleStyle());
+  result.schedule = random_schedule(result.program, choices,
+                                    is_chain ? ScheduleStyle::windows() : ScheduleStyle());
   for (const std::string& directive : without)
     result.schedule = leave_out(result.schedule, directive);
   return result;

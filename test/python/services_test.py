@@ -136,8 +136,11 @@ class CFunctions(unittest.TestCase):
         self.assertFalse(types.is_void_return())
         outer.set_jit_externs({"times_ten": rg.JITExtern(rg.ExternCFunction(signature(times_ten), types))})
         np.testing.assert_array_equal(outer.realize([3]), [10, 20, 30])
-        with self.assertRaisesRegex(rg.Unsupported, "is a C function"):
-            outer.set_jit_externs({"times_ten": rg.JITExtern(g)})
+        image, tens, by_func = rg.ImageParam("int32", 1), rg.Func("tens"), rg.Func("by_func")
+        tens[x] = 10 * image[x]
+        by_func.define_extern("tens_of", [g], "int32", 1)
+        by_func.set_jit_externs({"tens_of": rg.JITExtern(tens)})
+        np.testing.assert_array_equal(by_func.realize([3]), [10, 20, 30])
         self.assertTrue(rg.ExternFuncArgument(g).is_func())
         self.assertTrue(rg.ExternFuncArgument(rg.ImageParam("int32", 1)).is_image_param())
         self.assertTrue(rg.ExternFuncArgument(3).is_expr())

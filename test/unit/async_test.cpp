@@ -213,7 +213,8 @@ TEST_P(Async, AFuncStoredBesideTheAsyncOneHasStorageInBothBranches) {
 // In one loop nest: `first` is read by the async Func alone, `second` by what is computed after it,
 // or the other way round.
 TEST_P(Async, FuncsComputedTogetherOfWhichEachBranchReadsOne) {
-  for (const auto& [turned, traced] : {std::pair(false, false), {true, false}, {false, true}, {true, true}}) {
+  for (const auto& [turned, traced] :
+       {std::pair(false, false), {true, false}, {false, true}, {true, true}}) {
     Var x("x"), y("y");
     Func first("first"), second("second"), ahead("ahead"), out("out"), copy("copy");
     first(x) = x * 2;

@@ -54,8 +54,9 @@ TEST_F(CheckedAccesses, LetLegalProgramsRun) {
 
 TEST_F(CheckedAccesses, NameFuncStageElementAndStorageOfALoad) {
   places(11) = 123;
-  expect_parts(error_of(reader(), {16}), {"checked_accesses: \"table", "is read by stage 0 of \"read",
-                                          "at element 123", "elements 0 to 9", "report"});
+  expect_parts(error_of(reader(), {16}),
+               {"checked_accesses: \"table", "is read by stage 0 of \"read", "at element 123",
+                "elements 0 to 9", "report"});
 }
 
 TEST_F(CheckedAccesses, CheckEveryLane) {
@@ -92,7 +93,8 @@ TEST_F(CheckedAccesses, CheckBuffersOfTheCaller) {
   Func f("f");
   f(x) = image(unsafe_promise_clamped(places(x), 0, 9));
   places(7) = 10;
-  expect_parts(error_of(f, {16}), {"is read by stage 0 of \"f", "at element 10", "elements 0 to 9"});
+  expect_parts(error_of(f, {16}),
+               {"is read by stage 0 of \"f", "at element 10", "elements 0 to 9"});
 }
 
 TEST_F(CheckedAccesses, KnowBuffersThatRunBackwards) {

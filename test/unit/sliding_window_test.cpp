@@ -467,7 +467,8 @@ void expect_same_and_inside(const std::function<Func(bool)>& make,
   Func scheduled = make(true);
   for (const int size : sizes) {
     Buffer<int> expected = make(false).realize({size}), found = scheduled.realize({size}, target);
-    expected.for_each_element([&](int i) { EXPECT_EQ(expected(i), found(i)) << i << " of " << size; });
+    expected.for_each_element(
+        [&](int i) { EXPECT_EQ(expected(i), found(i)) << i << " of " << size; });
   }
 }
 
@@ -503,7 +504,8 @@ TEST_F(SlidingWindow, WarmUpLeavesVectorsAlongTheWindowInside) {
 
 // l4 runs from the loop's first iteration on, l3 from twelve before it, and l1 is read by both.
 TEST_F(SlidingWindow, NamesOfWhatStartsLaterAreNotReadBeforeIt) {
-  Var outer("outer"), inner("inner"), block("block"), lane("lane"), group("group"), rest("rest"), t("t");
+  Var outer("outer"), inner("inner"), block("block"), lane("lane"), group("group"), rest("rest"),
+      t("t");
   expect_same_and_inside([&](bool scheduled) {
     Func l1("l1"), l3("l3"), l4("l4"), l5("l5"), out("out");
     l1(x) = x * 9;
@@ -519,7 +521,9 @@ TEST_F(SlidingWindow, NamesOfWhatStartsLaterAreNotReadBeforeIt) {
     l4.split(x, outer, inner, 16, TailStrategy::GuardWithIf)
         .split(outer, group, rest, 4, TailStrategy::ShiftInwards)
         .fuse(rest, group, t);
-    l1.split(x, outer, inner, 4).split(outer, group, lane, 4, TailStrategy::RoundUp).vectorize(lane);
+    l1.split(x, outer, inner, 4)
+        .split(outer, group, lane, 4, TailStrategy::RoundUp)
+        .vectorize(lane);
     return out;
   });
 }
@@ -537,7 +541,8 @@ TEST_F(SlidingWindow, EmptyPartsAskForNothingOutside) {
       if (scheduled) p->store_root().compute_at(out, x);
     }
     if (scheduled)
-      f.split(x, xo, xi, 2, TailStrategy::ShiftInwards).split(xo, xo, yi, 16, TailStrategy::ShiftInwards);
+      f.split(x, xo, xi, 2, TailStrategy::ShiftInwards)
+          .split(xo, xo, yi, 16, TailStrategy::ShiftInwards);
     return out;
   });
 }

@@ -181,20 +181,20 @@ inline const bool prints_warnings = ::retrograde::porting::print_warnings_by_def
 #endif
 
 // Throws CompileError unless the condition holds: _halide_user_assert(x.defined()) << "no x\n";
-#define RETROGRADE_REPORT(condition, kind)                                                   \
-  (condition)                                                                                \
-      ? (void)0                                                                              \
-      : ::retrograde::porting::Voidifier() &                                                  \
-            ::retrograde::porting::ErrorReport(__FILE__, __LINE__, #condition,                \
-                                              ::retrograde::porting::ErrorReport::Kind::kind) \
+#define RETROGRADE_REPORT(condition, kind)                                                     \
+  (condition)                                                                                  \
+      ? (void)0                                                                                \
+      : ::retrograde::porting::Voidifier() &                                                   \
+            ::retrograde::porting::ErrorReport(__FILE__, __LINE__, #condition,                 \
+                                               ::retrograde::porting::ErrorReport::Kind::kind) \
                 .ref()
 #define _halide_user_assert(condition) RETROGRADE_REPORT(condition, User)
 #ifdef HALIDE_KEEP_MACROS
 #define user_assert(condition) RETROGRADE_REPORT(condition, User)
 #define internal_assert(condition) RETROGRADE_REPORT(condition, Internal)
-#define RETROGRADE_REPORT_ALWAYS(kind)                                             \
-  ::retrograde::porting::ErrorReport(__FILE__, __LINE__, nullptr,                   \
-                                    ::retrograde::porting::ErrorReport::Kind::kind) \
+#define RETROGRADE_REPORT_ALWAYS(kind)                                               \
+  ::retrograde::porting::ErrorReport(__FILE__, __LINE__, nullptr,                    \
+                                     ::retrograde::porting::ErrorReport::Kind::kind) \
       .ref()
 #define user_error RETROGRADE_REPORT_ALWAYS(User)
 #define user_warning RETROGRADE_REPORT_ALWAYS(Warning)

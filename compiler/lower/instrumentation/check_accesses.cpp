@@ -17,6 +17,7 @@
 // Tests: test/golden/lower/check_accesses/, test/unit/checked_accesses_test.cpp.
 #include "lower/instrumentation/check_accesses.h"
 
+#include <memory>
 #include <optional>
 #include <unordered_map>
 
@@ -49,14 +50,28 @@ Expr extreme(Kind which, const Expr& index, const Expr& predicate, const Expr& n
   return places.type().is_scalar() ? places : make_vector_reduce(which, places, 1);
 }
 
+// What all parts of the walk know.
+struct Surroundings {
+  std::unordered_map<std::string, Room> rooms;
+  LoopName stage;  // of the innermost loop around
+};
+
 class AccessChecker : public Rewriter {
  public:
-  explicit AccessChecker(std::unordered_map<std::string, Room> rooms) : rooms_(std::move(rooms)) {}
+  explicit AccessChecker(Surroundings& around)
+      : around_(around), undecided_(std::make_unique<AccessChecker>(around, false)) {}
+  AccessChecker(Surroundings& around, bool /*checks_promises*/) : around_(around) {}
 
  protected:
   Expr rewrite(const Expr& e) override {
     if (const auto* call = as_op(e, Op::address_of)) return address(e, *call);
-    if (as_op(e, Op::promise_clamped)) return checked_promise(children(e));
+    if (const auto* call = as_op(e, Op::if_then_else)) {
+      return call_op(Op::if_then_else, e.type(),
+                     {undecided(call->args[0]), (*this)(call->args[1]), (*this)(call->args[2])});
+    }
+    if (const auto* n = e.as<Select>())
+      return make_select(undecided(n->condition), (*this)(n->when_true), (*this)(n->when_false));
+    if (undecided_ && as_op(e, Op::promise_clamped)) return checked_promise(children(e));
     if (const auto* load = e.as<Load>()) return checked_load(*load);
     return children(e);
   }
@@ -68,56 +83,57 @@ class AccessChecker : public Rewriter {
         [&](const For& n) { return visit_loop(s, n); },
         [&](const Store& n) {
           const Stmt check = store_check(n);
-          return make_block({check, under(n.predicate, [&] { return children(s); })});
+          AccessChecker& parts = n.predicate.defined() && undecided_ ? *undecided_ : *this;
+          return make_block({check, parts.children(s)});
         },
-        [&](const Atomic& n) { return make_block({checks_of(n.body), s}); },
+        [&](const IfThenElse& n) {
+          return with_parts(n, undecided(n.condition), (*this)(n.when_true), (*this)(n.when_false));
+        },
+        [&](const Atomic& n) {
+          return make_block({checks_of(n.body), s});
+        },
         [&](const StmtNode&) { return children(s); });
   }
 
  private:
-  std::unordered_map<std::string, Room> rooms_;
-  LoopName stage_;
-  Expr mask_;  // of the access around: what its lanes that are off compute is of no matter
+  Surroundings& around_;
+  // For conditions, and what a predicate may turn off: promises hold there only where what they are a part of
+  // says so. None in itself.
+  const std::unique_ptr<AccessChecker> undecided_;
 
-  // What a predicate's access evaluates; without one, the mask around it stays.
-  template <class Part>
-  auto under(const Expr& predicate, const Part& part) -> decltype(part()) {
-    if (!predicate.defined()) return part();
-    const Expr around = mask_;
-    mask_ = predicate;
-    forget();
-    auto result = part();
-    mask_ = around;
-    forget();
-    return result;
-  }
+  Expr undecided(const Expr& e) { return undecided_ ? (*undecided_)(e) : (*this)(e); }
 
   // ---- rooms ----
 
   Stmt visit_allocate(const Stmt& s, const Allocate& n) {
     const Expr last = binary(Kind::Sub, n.elements, make_const(Int(64), 1));
     const Expr name = is_const(last) ? last : variable(n.name + ".last", Int(64));
-    rooms_[n.name] = {make_const(Int(64), 0), name};
+    around_.rooms[n.name] = {make_const(Int(64), 0), name};
     const Stmt result = children(s);
     return is_const(last) ? result : make_let(n.name + ".last", last, result);
   }
 
   Stmt visit_loop(const Stmt& s, const For& n) {
-    const LoopName around = stage_;
-    stage_ = decode_loop_name(n.name);
-    forget();  // messages name the stage
+    const LoopName outer = around_.stage;
+    enter(decode_loop_name(n.name));
     const Stmt result = children(s);
-    stage_ = around;
-    forget();
+    enter(outer);
     return result;
+  }
+
+  // Messages name the stage, so that what is known of shared expressions is known no more.
+  void enter(const LoopName& stage) {
+    around_.stage = stage;
+    forget();
+    if (undecided_) undecided_->forget();
   }
 
   // ---- checks ----
 
   std::string asked(const std::string& name, const char* access) const {
-    const std::string by = stage_.func.empty()
-                               ? std::string()
-                               : text(" by stage ", stage_.stage, " of ", quoted(stage_.func));
+    const std::string by = around_.stage.func.empty() ? std::string()
+                                                      : text(" by stage ", around_.stage.stage,
+                                                             " of ", quoted(around_.stage.func));
     return text("checked_accesses: ", quoted(name), " is ", access, by, " at element ");
   }
 
@@ -128,7 +144,7 @@ class AccessChecker : public Rewriter {
   // None for memory whose extent is not known here.
   std::optional<Check> check_of(const std::string& name, const char* access, const Expr& index,
                                 const Expr& predicate) const {
-    const Room* room = find_or_null(rooms_, name);
+    const Room* room = find_or_null(around_.rooms, name);
     if (!room) return {};
     const Expr low = extreme(Kind::Min, index, predicate, room->first);
     const Expr high = extreme(Kind::Max, index, predicate, room->last);
@@ -143,16 +159,17 @@ class AccessChecker : public Rewriter {
     message.emplace_back(" to ");
     message.push_back(room->last);
     message.emplace_back(
-        ". Correct what unsafe_promise_clamped() or allow_race_conditions() promises; a program without them "
+        ". Correct what unsafe_promise_clamped() or allow_race_conditions() promises; a program "
+        "without them "
         "has met a fault of the compiler: report it.");
-    const Expr holds = binary(Kind::And, binary(Kind::LE, room->first, low),
-                              binary(Kind::LE, high, room->last));
+    const Expr holds =
+        binary(Kind::And, binary(Kind::LE, room->first, low), binary(Kind::LE, high, room->last));
     return Check{holds, call_op(Op::error, Int(32), std::move(message))};
   }
 
   Expr checked_load(const Load& n) {
-    const Expr predicate = n.predicate.defined() ? (*this)(n.predicate) : Expr();
-    const Expr index = under(n.predicate, [&] { return (*this)(n.index); });
+    const Expr predicate = n.predicate.defined() ? undecided(n.predicate) : Expr();
+    const Expr index = predicate.defined() ? undecided(n.index) : (*this)(n.index);
     const Expr value = make_load(n.type, n.name, index, predicate, n.symbol);
     const auto check = check_of(n.name, "read", index, predicate);
     if (!check) return value;
@@ -160,8 +177,8 @@ class AccessChecker : public Rewriter {
   }
 
   Stmt store_check(const Store& n) {
-    const Expr predicate = n.predicate.defined() ? (*this)(n.predicate) : Expr();
-    const Expr index = under(n.predicate, [&] { return (*this)(n.index); });
+    const Expr predicate = n.predicate.defined() ? undecided(n.predicate) : Expr();
+    const Expr index = predicate.defined() ? undecided(n.index) : (*this)(n.index);
     const auto check = check_of(n.name, "written", index, predicate);
     return check ? make_assert(check->holds, check->error) : Stmt();
   }
@@ -175,26 +192,25 @@ class AccessChecker : public Rewriter {
                    {make_load(load->type, load->name, index, load->predicate, load->symbol)});
   }
 
+  // Lanes may be off where nothing says so: what they promise shows in what they access.
   Expr checked_promise(const Expr& promise) const {
+    if (!promise.type().is_scalar()) return promise;
     const auto* call = promise.as<Call>();
     const Expr &value = call->args[0], &low = call->args[1], &high = call->args[2];
-    const Expr error = call_op(
-        Op::error, Int(32),
-        {Expr(int32_t{retrograde_error_internal}),
-         Expr(text(asked_promise(), "a coordinate is taken to lie between ")), low, Expr(" and "),
-         high, Expr(", which its loops see to, but it is "), value,
-         Expr(". This is a fault of the compiler: report the program.")});
-    Expr holds = binary(Kind::And, binary(Kind::LE, low, value), binary(Kind::LE, value, high));
-    if (mask_.defined() && mask_.type().lanes() == holds.type().lanes())
-      holds = binary(Kind::Or, logical_not(mask_), holds);
-    else if (!holds.type().is_scalar())  // of a branch that some lanes take: it runs for one at least
-      holds = make_vector_reduce(Kind::Or, holds, 1);
+    const Expr error =
+        call_op(Op::error, Int(32),
+                {Expr(int32_t{retrograde_error_internal}),
+                 Expr(text(asked_promise(), "a coordinate is taken to lie between ")), low,
+                 Expr(" and "), high, Expr(", which its loops see to, but it is "), value,
+                 Expr(". This is a fault of the compiler: report the program.")});
+    const Expr holds =
+        binary(Kind::And, binary(Kind::LE, low, value), binary(Kind::LE, value, high));
     return call_op(Op::require, value.type(), {holds, value, error});
   }
   std::string asked_promise() const {
-    return stage_.func.empty() ? std::string("checked_accesses: ")
-                               : text("checked_accesses: in stage ", stage_.stage, " of ",
-                                      quoted(stage_.func), " ");
+    return around_.stage.func.empty() ? std::string("checked_accesses: ")
+                                      : text("checked_accesses: in stage ", around_.stage.stage,
+                                             " of ", quoted(around_.stage.func), " ");
   }
 
   // What an indivisible update would be checked for.
@@ -218,12 +234,13 @@ class AccessChecker : public Rewriter {
 };
 
 // What lies between the first and the last element of a buffer, whatever the signs of its strides.
-void add_room(const LoweredArgument& arg, Lets& lets, std::unordered_map<std::string, Room>& rooms) {
+void add_room(const LoweredArgument& arg, Lets& lets,
+              std::unordered_map<std::string, Room>& rooms) {
   const Expr buffer = variable(arg.name + ".buffer", Handle()), zero = make_const(Int(64), 0);
   Expr first = zero, last = zero, is_empty = const_false();
   // What the function has not checked yet when this runs.
-  const Expr is_usable = binary(Kind::EQ, call_op(Op::buffer_dimensions, Int(32), {buffer}),
-                                Expr(arg.dimensions));
+  const Expr is_usable =
+      binary(Kind::EQ, call_op(Op::buffer_dimensions, Int(32), {buffer}), Expr(arg.dimensions));
   const auto if_usable = [&](const Expr& value, int otherwise) {
     const Expr without = make_const(Int(64), otherwise);
     return call_op(Op::if_then_else, Int(64),
@@ -253,7 +270,8 @@ Stmt check_accesses(const Stmt& s, const std::vector<LoweredArgument>& args) {
   for (const LoweredArgument& arg : args) {
     if (arg.is_buffer()) add_room(arg, lets, rooms);
   }
-  return make_lets(lets, AccessChecker(std::move(rooms))(s));
+  Surroundings around{std::move(rooms), {}};
+  return make_lets(lets, AccessChecker(around)(s));
 }
 
 }  // namespace retrograde::lower

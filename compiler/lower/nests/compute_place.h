@@ -46,7 +46,8 @@ class ComputePlace {
  private:
   Substitution values_;  // of names that stand for one value, in terms of parts and outer names
   size_t known_ = 0;     // bindings that values_ has
-  std::vector<std::string> parts_, varying_parts_;  // names of ends; those of parts whose extent varies
+  std::vector<std::string> parts_,
+      varying_parts_;  // names of ends; those of parts whose extent varies
   Scope<Interval> whole_, touched_;
 
   Expr name(const std::string& name, const Expr& value, bool always);

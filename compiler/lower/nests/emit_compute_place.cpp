@@ -176,8 +176,7 @@ NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& cod
   const Wanted want = slide_together(members, wanted, site);
   piece.lead = want.first;
   for (Member& member : members) {
-    if (!site.around.empty())
-      keep_inside_needs(member.need, member.slides, want.first > 0, site);
+    if (!site.around.empty()) keep_inside_needs(member.need, member.slides, want.first > 0, site);
   }
   for (Member& member : members) member.required = member.need;
   Emitted made = emit_members(group, members, site, std::move(checks));

@@ -208,8 +208,7 @@ class Slider {
     else if (const auto reach = reach_of_first_part(slide, first))
       slide.touched = without_promises(from(at_least_as_far_back(*fresh, *reach)));
     const Expr start = simplify(slide.loop.min - slide.lead);
-    slide.part =
-        without_promises(from(select(variable(slide.loop.name) <= start, first, *fresh)));
+    slide.part = without_promises(from(select(variable(slide.loop.name) <= start, first, *fresh)));
     return true;
   }
 
