@@ -547,5 +547,33 @@ TEST_F(SlidingWindow, EmptyPartsAskForNothingOutside) {
   });
 }
 
+// Tiles of s4 that shift inwards compute again what an earlier iteration left in its storage: they need its operands.
+TEST_F(SlidingWindow, TilesThatShiftInwardsHaveTheOperandsOfWhatTheyRepeat) {
+  expect_same(
+      [&](bool scheduled) {
+        Var x6("x6"), x7("x7"), x8("x8"), x9("x9"), lane("lane"), y13("y13"), y14("y14");
+        Func s1("s1"), s3("s3"), s4("s4"), s5("s5"), out("out");
+        s1(x, y) = (x + y) % 12 * 17 % 101;
+        s3(x, y) = s1(x - 1, y) + s1(x, y - 1) + s1(x + 2, y + 2);
+        s4(x, y) = s3(x, y - 1) + s3(x + 1, y);
+        s5(x, y) = max(s4(x, y) + s4(x, y + 1), s4(x, y + 1)) / 3;
+        out(x, y) = s5(x, y);
+        for (Func* f : {&s1, &s3, &s4, &s5}) f->compute_root();
+        if (!scheduled) return out;
+        s5.split(x, x6, x7, 3, TailStrategy::PredicateStores)
+            .split(x7, x8, x9, 5, TailStrategy::GuardWithIf)
+            .vectorize(x9)
+            .unroll(x8);
+        s4.store_root().compute_at(s5, x8).split(x, x, lane, 3).vectorize(lane);
+        s3.compute_at(s5, x8)
+            .reorder(x, y)
+            .split(y, y13, y14, 8, TailStrategy::PredicateStores)
+            .vectorize(y14);
+        s1.compute_at(s3, y13);
+        return out;
+      },
+      23, 11);
+}
+
 }  // namespace
 }  // namespace retrograde

@@ -89,36 +89,38 @@ bool reads_memory(const Expr& e) {
   });
 }
 
-// A coordinate that any values leave inside of a table: lut(clamp(f(x), 0, 255)).
-bool is_within_constants(const Expr& coordinate) {
-  const Interval range = bounds_of(coordinate, Scope<Interval>());
-  return range.is_bounded() && is_const(simplify(range.min)) && is_const(simplify(range.max));
-}
-
-bool may_do_harm(const Call& call) {
-  if (call.call_type == CallType::Operator)
-    return op_info(call.op).cls == OpClass::Effect && !call.is_op(Op::random);
-  return call.call_type == CallType::Extern ||
-         std::ranges::any_of(call.args, [](const Expr& coordinate) {
-           return reads_memory(coordinate) && !is_within_constants(coordinate);
-         });
+// Whether values that do not count could do harm: as coordinates, or outside of the pipeline.
+bool depends_on_every_value(const Definition& definition) {
+  return any_node(definition, [](const Call& call) {
+    if (call.call_type == CallType::Operator)
+      return op_info(call.op).cls == OpClass::Effect && !call.is_op(Op::random);
+    return call.call_type == CallType::Extern || std::ranges::any_of(call.args, reads_memory);
+  });
 }
 
 }  // namespace
 
-bool takes_any_values(const Definition& definition) {
-  return !definition.predicate.defined() &&
-         !any_node(definition, [](const Call& call) { return may_do_harm(call); });
+std::set<std::string> funcs_read_rounded(const LoopedFunc& f, int stage, const StageNest& nest,
+                                         const Requirements& uses) {
+  std::set<std::string> names;
+  const Definition& definition = f.stages[stage];
+  if (!nest.rounds_up || stage > 0 || depends_on_every_value(definition)) return names;
+  for (const auto& [name, use] : uses) {
+    if (!use.is_image && name != f.name()) names.insert(name);
+  }
+  return names;
 }
 
-Requirements read_inside(const LoopedFunc& f, const Domain& domain, const ValueBounds& values) {
+Box read_inside(const LoopedFunc& f, int stage, const Domain& domain, const ValueBounds& values,
+                const std::string& func) {
   Scope<Interval> points;
   for (const auto& [var, range] : domain)
     points.push(var, {range.min, simplify(range.min + range.extent - 1)});
   Requirements uses;
-  for (const Expr& value : f.stages[0].values)
+  for (const Expr& value : f.stages[stage].values)
     merge_footprints(uses, footprints(value, points, &values));
-  return uses;
+  const auto found = uses.find(func);
+  return found == uses.end() ? Box{} : found->second.box;
 }
 
 bool never_stores(const LoopedFunc& f, int stage, const Requirements& uses) {
