@@ -9,10 +9,10 @@
 //                                            f[i] = require(0 <= ramp(j, 1, 8) && ..., g[ramp(j, 1, 8)], "g ...")
 //                                          }
 //
-// Method: it runs last, so that the code that it checks is the code that runs without it. A load is checked where
-//         its value is computed, under the conditions of the choices around it. Lanes that a predicate turns off
-//         may be anywhere, and their coordinates break what their loops promise. Inside of Atomic nothing changes, for its form is what makes it one instruction: the
-//         same checks stand before it.
+// Method: the pass runs last, so the checked code is the code that runs without it. A load is checked where its
+//         value is computed, under the conditions of the choices around it. Lanes that a predicate turns off may
+//         be anywhere. The body of an Atomic stays as it is, because its form makes it one instruction: its checks
+//         run before it. A promise is checked where it is a scalar outside of conditions and predicates.
 // Not done: kernels, whose accesses the simulated device checks; what extern stages do.
 // Tests: test/golden/lower/check_accesses/, test/unit/checked_accesses_test.cpp.
 #include "lower/instrumentation/check_accesses.h"
@@ -43,7 +43,7 @@ Expr lanes_like(const Expr& scalar, const Expr& e) {
   return e.type().is_scalar() ? scalar : make_broadcast(scalar, e.type().lanes());
 }
 
-// Of a vector the lane that lies lowest, or highest; a lane that is off counts as the place `neutral`.
+// The lowest or highest lane of an index; a lane that is off counts as `neutral`.
 Expr extreme(Kind which, const Expr& index, const Expr& predicate, const Expr& neutral) {
   Expr places = as_int64(index);
   if (predicate.defined()) places = make_select(predicate, places, lanes_like(neutral, places));
