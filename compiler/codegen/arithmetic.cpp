@@ -248,7 +248,7 @@ static Value* saturate_vector(Emitter& e, Type to, Value* number) {
                high = is_exact ? end - 1 : end - std::ldexp(end, -digits);
   Value* ordered = number;
   if (to.is_int()) ordered = e.b.CreateSelect(e.b.CreateFCmpORD(number, number), number, real(0));
-  // Of NaN the lower end, which is 0 where it comes here.
+  // NaN gives the lower end, which is 0 for the types that come here.
   Value* clamped = e.b.CreateSelect(e.b.CreateFCmpOGT(ordered, real(low)), ordered, real(low));
   clamped = e.b.CreateSelect(e.b.CreateFCmpOLT(clamped, real(high)), clamped, real(high));
   Value* integer = float_to_integer(e, to, clamped);

@@ -158,7 +158,7 @@ class GeneratorBase : public NamesInterface {
     members_.inputs.push_back(result);
     return result;
   }
-  // Of several types: add_output<Func>("pair", {Float(32), UInt(8)}, 2).
+  // Several types: add_output<Func>("pair", {Float(32), UInt(8)}, 2).
   template <typename T>
   GeneratorOutput<T>* add_output(const std::string& name, const std::vector<Type>& types,
                                  int dims) {

@@ -12,7 +12,7 @@
 namespace retrograde::graph {
 
 int32_t next_random_stream();
-// Of the Func with this name, which is unique in the process.
+// The tag of the Func with this name, which is unique in the process.
 int32_t random_tag(const std::string& func);
 
 struct RandomState;

@@ -54,8 +54,8 @@ struct Dim {
   bool is_reduction =
       false;  // derives from a reduction variable: order matters unless proven otherwise
   Partition partition = Partition::Auto;
-  // Of an extern stage: no loop, but what the C function computes in one call; until a directive
-  // says how the loop runs.
+  // An extern stage computes this dimension in one call of its C function, without a loop, until a
+  // directive says how the loop runs.
   bool is_in_call = false;
 };
 

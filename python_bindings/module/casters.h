@@ -40,7 +40,7 @@ py::object object_of(const VarOrRVar& loop);
 std::vector<Expr> operands(const std::vector<py::object>& objects);
 // The same of what an element of type `type` is given.
 Expr operand_for(Type type, py::handle object);
-// Of what is cast: a Python float is a float64, so that the cast is the only step that rounds it.
+// The operand of a cast: a Python float becomes a float64, so that only the cast rounds it.
 std::optional<Expr> unrounded_from(py::handle object);
 struct Unrounded {
   Expr expr;

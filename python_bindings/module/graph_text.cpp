@@ -32,7 +32,7 @@ void check_is_text(const graph::Graph& described) {
   }
 }
 
-// Of a Buffer that a program names: name, type, (min, extent) of each dimension, elements.
+// Describes a Buffer that a program names: name, type, (min, extent) of each dimension, elements.
 py::tuple described(const graph::ParameterContents& literal) {
   const auto contents = std::static_pointer_cast<frontend::BufferContents>(literal.buffer_owner);
   const Buffer<> dense = Buffer<>(contents).copy_to_planar();

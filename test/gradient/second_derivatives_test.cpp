@@ -177,7 +177,7 @@ struct Operands {
   }
   std::vector<Expr> at(const Var& i) const { return {values[0](i), values[1](i), values[2](i)}; }
 
-  // Of a pointwise Func, by an adjoint or a tangent of ones.
+  // The derivative of a pointwise Func, by an adjoint or a tangent of ones.
   Func derivative(const Func& f, char mode, size_t by) const {
     const Buffer<T>& image = values[by];
     if (mode == 'f') return propagate_tangents(f, {{image, Direction::as_func(ones)}})(f);
@@ -389,7 +389,7 @@ class HessiansAtExceptionalPoints : public ::testing::Test {
   Var i{"i"};
   HessiansAtExceptionalPoints() { one.fill(1); }
   Expr at(int k) { return a(Expr(k)); }
-  // Of loss(a(0), a(1)) at x, y.
+  // The Hessian of loss(a(0), a(1)) at x, y.
   std::array<float, 4> hessian_of(const Func& loss, float x, float y) {
     a(0) = x;
     a(1) = y;

@@ -481,7 +481,7 @@ TEST(CodegenIdioms, LongStraightCodeIsFenced) {
 }
 
 // Pieces of one function, which threads compile at the same time.
-// Of 16 numbers.
+// 16 numbers each.
 TEST(CodegenIdioms, SaturatingCastsOfVectorsAreVectors) {
   for (const Type from : {Float(32), Float(64)}) {
     for (const Type to : {UInt(8), Int(8), UInt(16), Int(16), Int(32)}) {

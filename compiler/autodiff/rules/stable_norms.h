@@ -11,7 +11,7 @@ namespace retrograde::autodiff {
 
 // Of sqrt(a * a + b * b + ...).
 StableForm norm_form(const Expr& e);
-// Of norm * norm and pow(norm, 2), where the norm is sqrt(a * a + b * b + ...) or hypot(a, b).
+// The stable form of norm * norm and pow(norm, 2), for a norm sqrt(a * a + b * b + ...) or hypot(a, b).
 StableForm squared_norm_form(const Expr& e);
 // Of a / norm, a / max(norm, c), a * (1 / norm), c / norm, where the norm is sqrt(a * a + b * b +
 // ...) or hypot(a, b), and its reciprocal also pow(..., -0.5) or fast_inverse_sqrt(...).

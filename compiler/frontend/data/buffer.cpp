@@ -74,8 +74,8 @@ void* allocate_or_throw(size_t bytes) {
 
 namespace {
 
-// Of dense elements: that of each dimension is the number of elements of those inside of it. HalideBuffer.h
-// multiplies them in 32 bits.
+// Strides of dense elements: each is the product of the extents of the inner dimensions. HalideBuffer.h multiplies
+// these in 32 bits.
 void check_strides(const std::vector<int>& sizes, const std::vector<int>& storage_order,
                    const std::string& asked) {
   int64_t stride = 1;

@@ -84,7 +84,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   Expr value() const;    // what its first definition stores
   Tuple values() const;  // the same of a Func of any number of values
   const std::vector<Type>& output_types() const { return types(); }  // of its values
-  // Of its values; before its definition as declared, or none.
+  // The types of its values; before its definition those that were declared, or none.
   const std::vector<Type>& types() const {
     return defined() ? func_->types : func_->required_types;
   }

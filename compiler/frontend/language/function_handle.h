@@ -25,7 +25,7 @@ class Function : public graph::FuncPtr {
   bool has_extern_definition() const { return checked().is_extern(); }
   bool is_pure() const { return has_pure_definition() && !has_update_definition(); }
   bool frozen() const { return checked().frozen; }
-  // Of the first definition; none without.
+  // The values of the pure definition; empty without one.
   std::vector<Expr> values() const {
     return has_pure_definition() ? checked().pure->values : std::vector<Expr>();
   }

@@ -40,7 +40,7 @@ Expr rounding_shift_right(const Expr& a, const Expr& b);
 // a * b has; the second rounds to the nearest, halves up.
 Expr mul_shift_right(const Expr& a, const Expr& b, const Expr& q);
 Expr rounding_mul_shift_right(const Expr& a, const Expr& b, const Expr& q);
-// Of `a` and a `b` of half its bits: in the type of `a`, where the result wraps.
+// Combines `a` with a `b` of half its bits, in the type of `a`; the result wraps.
 // Requires: the second operand has half the bits of the first.
 Expr widen_right_add(const Expr& a, const Expr& b);
 Expr widen_right_mul(const Expr& a, const Expr& b);

@@ -148,7 +148,7 @@ JITHandlers merged(JITHandlers handlers, const JITHandlers& first) {
   return handlers;
 }
 
-// Of a call: those of the process, then of the pipeline, then of the caller.
+// The handlers of a call: the caller's, else the pipeline's, else the process's.
 JITHandlers handlers_of(const JITHandlers& own, const JITUserContext* user) {
   JITHandlers handlers = defaults().are_set ? merged(default_handlers(), own) : own;
   return user ? merged(std::move(handlers), user->handlers) : handlers;

@@ -54,7 +54,7 @@ struct JITHandlers {
 };
 
 namespace frontend {
-// Of all calls of this process: those of a Pipeline and of a call go before them.
+// Handlers of all calls of this process. Handlers of a Pipeline or of a call take precedence.
 JITHandlers default_handlers();
 JITHandlers set_default_handlers(const JITHandlers& handlers);  // the ones before come back
 }  // namespace frontend

@@ -75,7 +75,7 @@ namespace {
 
 const char* const machine_keys[] = {"parallelism", "last_level_cache_size", "balance"};
 
-// Of those that are not told, the generic machine.
+// Parameters that are not given are those of the generic machine.
 MachineParams machine_of(const AutoschedulerParams& params) {
   std::string values;
   for (size_t i = 0; i < std::size(machine_keys); i++) {

@@ -24,7 +24,7 @@ bool is_usable(const Expr& e) {
   });
 }
 
-// Of numbers without NaN.
+// The negated condition, for numbers without NaN.
 Expr negation(const Expr& e) {
   const auto* compared = e.as<Binary>();
   if (!compared || compared->a.type().is_float()) return !e;

@@ -17,7 +17,7 @@ namespace retrograde::lower {
 // anywhere: no memory, no effects, and little work but in C functions, which are pure.
 Expr usable_where(const Expr& condition, bool holds);
 
-// Of "only where a" and "only where b": what holds in both, or where one of the two runs.
+// Combine "only where a" and "only where b": `both` hold, or `either` does.
 Expr both(const Expr& a, const Expr& b);
 Expr either(const Expr& a, const Expr& b);
 

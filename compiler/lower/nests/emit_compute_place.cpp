@@ -98,12 +98,12 @@ int slide_lead(const std::vector<Slide>& slides, int lead, const ComputePlace& s
   return lead;
 }
 
-// What is computed of a Func that does not slide over the loop around, next to Funcs that do.
+// Bounds the region of a Func that does not slide over the loop around, beside Funcs that do.
 //
-// Before the loop's first iteration it is what the first needs: only consumers that slide run there, and compute
-// parts of what the first iteration needs; what the others would read lies outside of all that is ever needed.
-// A part may be empty, and then begins right behind or ends right before what its iteration needs. Reads that
-// follow from its ends are kept inside of the reads of that whole, for storage and inputs hold no more.
+// Iterations before the loop's first run for sliding consumers only, which compute parts of what the first iteration
+// needs. So the Func computes there what the first iteration needs: the coordinates of other consumers lie outside
+// all that is ever required. A part may be empty; its ends then lie one element outside its iteration's region.
+// Regions that follow from them are clamped to those of the whole, since storage and inputs hold no more.
 void keep_inside_needs(Box& required, const std::vector<Slide>& slides, bool is_early,
                        ComputePlace& site) {
   const Loop& loop = site.around[0];

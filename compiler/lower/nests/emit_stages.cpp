@@ -212,7 +212,7 @@ Emitted NestEmitter::emit_extern_loops(const LoopedFunc& f, std::vector<Loop>& l
   return code;
 }
 
-// Of stages inside of the loops of what was emitted just now.
+// Asks extern stages inside of the loops that were emitted last for the whole regions that they need.
 void NestEmitter::ask_wholes(Emitted& code, ComputePlace& root) const {
   for (const LoopedFunc& f : program_.funcs) {
     if (!f.func->is_extern()) continue;

@@ -89,8 +89,7 @@ struct Style {
   static Style updates();    // Funcs that overwrite themselves at random places
   static Style pieces();     // of programs for images, at sizes that no vector divides
   static Style pipelines();  // all types and schedules: made to break the compiler
-  static Style
-  chains();  // of five to twelve Funcs at changing resolution: made to break sliding windows
+  static Style chains();     // five to twelve Funcs at changing resolution: for sliding windows
 };
 
 // Elements in each dimension of what updates work on.

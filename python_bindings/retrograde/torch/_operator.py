@@ -38,7 +38,7 @@ def operator(name, pipeline=None, inputs=None, outputs=None, *, sizes=None):
     return _registered(Operator(name, pipeline, inputs, sizes if outputs is None else outputs))
 
 
-# Of this process: by their names, and by the marks that their pickles have. A name that the user did not choose is
+# The operators of this process, by name and by the mark in their pickles. A name that the user did not choose is
 # another operator's in another process.
 _by_name, _by_mark, _registering = {}, {}, threading.RLock()
 
