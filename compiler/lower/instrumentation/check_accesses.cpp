@@ -59,8 +59,7 @@ struct Surroundings {
 class AccessChecker : public Rewriter {
  public:
   explicit AccessChecker(Surroundings& around)
-      : around_(around), undecided_(std::make_unique<AccessChecker>(around, false)) {}
-  AccessChecker(Surroundings& around, bool /*checks_promises*/) : around_(around) {}
+      : around_(around), undecided_(new AccessChecker(around, nullptr)) {}
 
  protected:
   Expr rewrite(const Expr& e) override {
@@ -101,6 +100,7 @@ class AccessChecker : public Rewriter {
   // says so. None in itself.
   const std::unique_ptr<AccessChecker> undecided_;
 
+  AccessChecker(Surroundings& around, std::nullptr_t) : around_(around) {}
   Expr undecided(const Expr& e) { return undecided_ ? (*undecided_)(e) : (*this)(e); }
 
   // ---- rooms ----
@@ -130,11 +130,10 @@ class AccessChecker : public Rewriter {
 
   // ---- checks ----
 
-  std::string asked(const std::string& name, const char* access) const {
-    const std::string by = around_.stage.func.empty() ? std::string()
-                                                      : text(" by stage ", around_.stage.stage,
-                                                             " of ", quoted(around_.stage.func));
-    return text("checked_accesses: ", quoted(name), " is ", access, by, " at element ");
+  // "by stage 0 of "f" ", or nothing outside of loops.
+  std::string stage(const char* preposition) const {
+    const auto& [func, number, var] = around_.stage;
+    return func.empty() ? "" : text(preposition, " stage ", number, " of ", quoted(func), " ");
   }
 
   struct Check {
@@ -149,7 +148,9 @@ class AccessChecker : public Rewriter {
     const Expr low = extreme(Kind::Min, index, predicate, room->first);
     const Expr high = extreme(Kind::Max, index, predicate, room->last);
     std::vector<Expr> message = {Expr(int32_t{retrograde_error_access_out_of_bounds}),
-                                 Expr(asked(name, access)), low};
+                                 Expr(text("checked_accesses: ", quoted(name), " is ", access, " ",
+                                           stage("by"), "at element ")),
+                                 low};
     if (!index.type().is_scalar()) {
       message.emplace_back(" to ");
       message.push_back(high);
@@ -197,20 +198,15 @@ class AccessChecker : public Rewriter {
     if (!promise.type().is_scalar()) return promise;
     const auto* call = promise.as<Call>();
     const Expr &value = call->args[0], &low = call->args[1], &high = call->args[2];
-    const Expr error =
-        call_op(Op::error, Int(32),
-                {Expr(int32_t{retrograde_error_internal}),
-                 Expr(text(asked_promise(), "a coordinate is taken to lie between ")), low,
-                 Expr(" and "), high, Expr(", which its loops see to, but it is "), value,
-                 Expr(". This is a fault of the compiler: report the program.")});
+    const Expr error = call_op(
+        Op::error, Int(32),
+        {Expr(int32_t{retrograde_error_internal}),
+         Expr(text("checked_accesses: ", stage("in"), "a coordinate is taken to lie between ")),
+         low, Expr(" and "), high, Expr(", which its loops see to, but it is "), value,
+         Expr(". This is a fault of the compiler: report the program.")});
     const Expr holds =
         binary(Kind::And, binary(Kind::LE, low, value), binary(Kind::LE, value, high));
     return call_op(Op::require, value.type(), {holds, value, error});
-  }
-  std::string asked_promise() const {
-    return around_.stage.func.empty() ? std::string("checked_accesses: ")
-                                      : text("checked_accesses: in stage ", around_.stage.stage,
-                                             " of ", quoted(around_.stage.func), " ");
   }
 
   // What an indivisible update would be checked for.

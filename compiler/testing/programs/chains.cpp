@@ -5,12 +5,6 @@
 
 namespace retrograde::fuzz {
 
-namespace {
-
-constexpr int wide_modulus = 4096;
-
-}  // namespace
-
 // Where a consumer at `u` reads: up- and down-sampled by 2 to 4, more often beside itself.
 Expr Maker::resampled(const Expr& u, int factor, bool reads_coarser) {
   const int offset = c_.around_zero(2);
@@ -27,7 +21,7 @@ void Maker::add_link() {
   if (is_first) {
     Expr value = c_.chance(50) ? cast(Int(32), read_image(at)) : Expr(0);
     for (size_t d = 0; d < vars.size(); ++d) value = value + vars[d] * (d == 0 ? 1 : 37);
-    f(vars) = value % wide_modulus;
+    f(vars) = kept_small(value, wide_modulus);
     return finish(f);
   }
   const auto along = static_cast<size_t>(c_.below(static_cast<int>(vars.size())));
@@ -44,11 +38,11 @@ void Maker::add_link() {
     const Expr read = source(place);
     value = value.defined() ? value + read * c_.between(1, 3) : read;
   }
-  f(vars) = value % wide_modulus;
+  f(vars) = kept_small(value, wide_modulus);
   // Some add to what they have: not pure, but pure along the window.
   if (c_.chance(10)) {
     std::vector<Expr> place(vars.begin(), vars.end());
-    f(vars) = (f(vars) + p_.funcs.back()(place)) % wide_modulus;
+    f(vars) = kept_small(f(vars) + p_.funcs.back()(place), wide_modulus);
   }
   finish(f);
 }

@@ -13,6 +13,9 @@
 
 namespace retrograde::fuzz {
 
+// Values of Funcs are reduced modulo this, so that a few additions never overflow.
+constexpr int wide_modulus = 4096;
+
 // The coordinates of a point, and the Func that is being updated there.
 struct Point {
   std::vector<Expr> all;    // pure variables, then reduction variables

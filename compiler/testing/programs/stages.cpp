@@ -5,13 +5,6 @@
 
 namespace retrograde::fuzz {
 
-namespace {
-
-// Values of Funcs are reduced modulo this, so that a few additions never overflow.
-constexpr int wide_modulus = 4096;
-
-}  // namespace
-
 std::vector<Var> first_variables(int dimensions) {
   const std::vector<Var> all{Var("x"), Var("y"), Var("z")};
   return {all.begin(), all.begin() + dimensions};
