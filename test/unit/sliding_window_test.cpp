@@ -575,5 +575,37 @@ TEST_F(SlidingWindow, TilesThatShiftInwardsHaveTheOperandsOfWhatTheyRepeat) {
       23, 11);
 }
 
+// Past the end of a guarded split the window has nothing to add; what is computed in its loops is not computed.
+TEST_F(SlidingWindow, WhatIsComputedInTheLoopsOfAnEmptyPartStaysInside) {
+  Var block("block"), row("row"), a("a"), b("b"), c("c"), d("d"), e("e"), f("f"), lane("lane");
+  const auto make = [&](bool scheduled) {
+    Func l0("l0"), l1("l1"), l2("l2"), l3("l3"), out("out");
+    l0(x, y) = x + y * 37;
+    l1(x, y) = l0(x, y) + l0(x + 1, y) * 2;
+    l2(x, y) = l1(x, y / 3);
+    l3(x, y) = l2(x + 1, y);
+    out(x, y) = l3(x, y);
+    for (Func* p : {&l0, &l1, &l2, &l3}) p->compute_root();
+    if (!scheduled) return out;
+    l3.split(y, yo, yi, 8, TailStrategy::GuardWithIf).split(yi, block, row, 5).unroll(row);
+    l2.store_at(l3, yo).compute_at(l3, row);
+    l2.split(y, a, b, 4, TailStrategy::PredicateStores)
+        .split(b, c, d, 5, TailStrategy::GuardWithIf)
+        .split(a, e, f, 4, TailStrategy::GuardWithIf)
+        .reorder(c, e, f, d, x)
+        .split(e, a, lane, 4, TailStrategy::RoundUp)
+        .vectorize(lane);
+    l1.store_at(l3, yo).compute_at(l2, x).split(y, e, f, 5, TailStrategy::GuardWithIf);
+    l0.store_at(l3, row).compute_at(l1, e);
+    return out;
+  };
+  const Target target = get_jit_target_from_environment().with_feature(Target::CheckedAccesses);
+  for (const int rows : {11, 13, 18}) {
+    Buffer<int> expected = make(false).realize({20, rows}),
+                found = make(true).realize({20, rows}, target);
+    expected.for_each_element([&](int i, int j) { EXPECT_EQ(expected(i, j), found(i, j)); });
+  }
+}
+
 }  // namespace
 }  // namespace retrograde

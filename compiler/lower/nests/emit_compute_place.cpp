@@ -190,8 +190,26 @@ NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& cod
   merge_code(code, made);
   if (site.around.empty()) ask_wholes(code, site);
   for (Member& member : members) keep(member, member.need, code, made, piece, site);
-  piece.produce = made.stmt;
+  piece.produce = members.size() == 1 ? unless_empty(members[0], made.stmt) : made.stmt;
   return piece;
+}
+
+// Skips the loops of a Func while its part is empty, if other Funcs are computed inside these loops. Their regions
+// follow from the ends of the part, which enclose nothing then.
+Stmt NestEmitter::unless_empty(const Member& member, const Stmt& stmt) const {
+  const bool has_children = std::any_of(at_.begin(), at_.end(), [&](const auto& entry) {
+    return entry.first.first == member.f->name();
+  });
+  Expr has_elements = const_true();
+  for (const Slide& slide : member.slides) {
+    const Interval& part = slide.part;
+    if (is_const(simplify(part.max - part.min + 1))) continue;
+    const std::string end =
+        stage_prefix(member.f->name(), static_cast<int>(member.f->stages.size()) - 1) +
+        member.f->func->args[slide.dimension];
+    has_elements = has_elements && variable(end + ".min") <= variable(end + ".max");
+  }
+  return has_children && !is_const_true(has_elements) ? make_if(has_elements, stmt) : stmt;
 }
 
 // Finds storage for what was computed of a Func.

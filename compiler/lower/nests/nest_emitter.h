@@ -91,6 +91,7 @@ class NestEmitter {
   Box take_required(const LoopedFunc& f, Emitted& code, Box& touched, std::vector<Stmt>& checks);
   Wanted slide_together(std::vector<Member>& members, const WantedFuncs& wanted,
                         ComputePlace& site) const;
+  Stmt unless_empty(const Member& member, const Stmt& stmt) const;
   void keep(Member& member, Box allocated, Emitted& code, Emitted& made, Piece& piece,
             ComputePlace& site);
   Box output_box(const LoopedFunc& f, const Box& read);
