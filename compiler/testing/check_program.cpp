@@ -108,9 +108,7 @@ void compare_outputs(const Regions& regions, const RandomProgram& program,
 
 // What the checks of accesses find; where kernels run, races and their accesses out of bounds, too.
 bool is_finding(const RuntimeError& error, const Target& target) {
-  if (std::string_view(error.what()).find("checked_accesses") != std::string_view::npos)
-    return true;
-  return target.has_feature(Target::CUDA) && !lacks_memory(error);
+  return is_access_outside(error) || (target.has_feature(Target::CUDA) && !lacks_memory(error));
 }
 
 int ignore_event(void*, const halide_trace_event_t*) { return 0; }
@@ -120,6 +118,10 @@ int ignore_event(void*, const halide_trace_event_t*) { return 0; }
 bool lacks_memory(const RuntimeError& error) {
   return error.code() == retrograde_error_out_of_memory ||
          std::string_view(error.what()).find("OUT_OF_MEMORY") != std::string_view::npos;
+}
+
+bool is_access_outside(const UserError& error) {
+  return std::string_view(error.what()).find("checked_accesses") != std::string_view::npos;
 }
 
 Judged check_program(const RandomProgram& program, const ScheduleLog& schedule,

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "frontend/language/inline_reductions.h"
+#include "support/checked_accesses.h"
 #include "testing/interpreter.h"
 #include "testing/programs/program.h"
 

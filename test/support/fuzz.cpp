@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "diagnostics/error.h"
+#include "support/checked_accesses.h"
 
 namespace retrograde::fuzz {
 

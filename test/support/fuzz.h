@@ -1,4 +1,5 @@
-// What fuzzers share. Each program runs in a process of its own under limits of time and
+// What fuzzers share. Accesses of the machine code are checked (Target::CheckedAccesses) unless RG_JIT_TARGET
+// names a target. Each program runs in a process of its own under limits of time and
 // memory, so that a crash or a hang is a finding like a wrong result. A finding is shrunk (testing/
 // choices.h) and printed with its choices. Refusals are counted by their rule.
 //

@@ -9,6 +9,7 @@
 
 #include "gradient/adversary/auto_scheduled.h"
 #include "gradient/adversary/check.h"
+#include "support/checked_accesses.h"
 #include "support/run_apart.h"
 
 namespace retrograde::gradient {

@@ -9,6 +9,7 @@
 #include "gradient/adversary/scheduled_program.h"
 #include "support/measured_threads.h"
 #include "support/same_numbers.h"
+#include "testing/check_program.h"
 #include "testing/interpreter.h"
 
 namespace retrograde::gradient {
@@ -30,6 +31,7 @@ std::string error_of(const std::function<void()>& f) {
     f();
     return "";
   } catch (const UserError& error) {
+    decide_by_access(error);
     return error.what();
   } catch (const Unsupported& error) {
     return error.what();
@@ -273,7 +275,7 @@ Judged judge_auto_scheduled(Choices& choices, bool compiles_all) {
   } catch (const Verdict& verdict) {
     return verdict.judged;
   } catch (const UserError& error) {
-    return {Judgement::Refused, error.what()};
+    return {fuzz::is_access_outside(error) ? Judgement::Broken : Judgement::Refused, error.what()};
   } catch (const Unsupported& error) {
     return {Judgement::Refused, error.what()};
   } catch (const std::exception& error) {

@@ -8,6 +8,7 @@
 #include "gradient/adversary/probe.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
+#include "testing/check_program.h"
 
 namespace retrograde::gradient {
 
@@ -214,7 +215,8 @@ Judged guard(const F& f) {
   } catch (const UserError& error) {
     // An error in something that the compiler wrote itself is not the author's.
     const bool of_synthesis = std::string(error.what()).find("_adj") != std::string::npos;
-    return {of_synthesis ? Judgement::Broken : Judgement::Refused, error.what()};
+    const bool is_compilers = of_synthesis || fuzz::is_access_outside(error);
+    return {is_compilers ? Judgement::Broken : Judgement::Refused, error.what()};
   } catch (const Unsupported& error) {
     return {Judgement::Refused, error.what()};
   } catch (const std::exception& error) {

@@ -35,6 +35,7 @@ class Compiled {
       try {
         compare(expected_.size() - 1, "");
       } catch (const UserError& error) {
+        decide_by_access(error);
         // Machine code bounds what is read before it runs.
         if (!primal_runs()) return false;
         decide(Judgement::Refused,
@@ -56,7 +57,8 @@ class Compiled {
       try {
         compare(i, scheduled(gradients_[i], funcs, choices), ", scheduled");
         ++compared;
-      } catch (const UserError&) {  // of the schedule
+      } catch (const UserError& error) {  // of the schedule
+        decide_by_access(error);
       } catch (const Unsupported&) {
       }
     }
@@ -84,7 +86,8 @@ class Compiled {
       for (const Type& t : output.types()) results.push_back(room_for(t, s_.program.region()));
       output.realize(Realization(results));
       return true;
-    } catch (const UserError&) {
+    } catch (const UserError& error) {
+      decide_by_access(error);
       return false;
     }
   }
@@ -154,7 +157,8 @@ int compare_machine_code(Subject& s, const Derivative& derivative, const Gradien
   if (!code.compare_unscheduled()) return 0;
   try {
     if (twin) code.compare_twin(*twin);
-  } catch (const UserError&) {  // what a C function reads must have bounds, and no versions
+  } catch (const UserError& error) {  // what a C function reads must have bounds, and no versions
+    decide_by_access(error);
   } catch (const Unsupported&) {
   }
   return s.program.checks.schedule > 0 ? code.compare_scheduled(derivative) : 0;

@@ -5,13 +5,17 @@
 #include <ctime>
 #include <string_view>
 
-#include "diagnostics/error.h"
 #include "ir/visit.h"
+#include "testing/check_program.h"
 #include "testing/interpreter.h"
 
 namespace retrograde::gradient {
 
 void decide(Judgement judgement, const std::string& detail) { throw Verdict{{judgement, detail}}; }
+
+void decide_by_access(const UserError& error) {
+  if (fuzz::is_access_outside(error)) decide(Judgement::Broken, error.what());
+}
 
 void Product::add(double a, double b) {
   sum += a * b;

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "autodiff/tangents.h"
+#include "diagnostics/error.h"
 #include "gradient/adversary/check.h"
 
 namespace retrograde::gradient {
@@ -18,6 +19,8 @@ struct Verdict {
   Judged judged;
 };
 [[noreturn]] void decide(Judgement judgement, const std::string& detail);
+// Breaks the compiler where the error is that of an access outside of its memory (Target::CheckedAccesses).
+void decide_by_access(const UserError& error);
 
 // sum a * b, and of the magnitudes.
 struct Product {
