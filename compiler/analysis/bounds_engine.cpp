@@ -9,6 +9,7 @@
 #include "analysis/nonnegative.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/join_clamps.h"
 #include "ir/scalar.h"
 #include "ir/visit.h"
 
@@ -55,7 +56,7 @@ Interval BoundsEngine::compute(const Expr& e) {
   if (!e.type().is_scalar()) return type_range(e.type());
   if (!varies(e)) return Interval::point(canonical(e));
   if (!has_linear_form(e.type())) return atom_bounds(e);
-  Sum form = with_remainders(linear_form(e));
+  Sum form = joined(linear_form(e));
   bool is_atom = form.terms.size() == 1 && form.terms[0].atom.same_as(e);
   return is_atom ? bounds_of_atom(e) : sum_bounds(form);
 }
@@ -126,8 +127,8 @@ std::optional<Interval> BoundsEngine::bounds_by_sides(const Sum& form) {
     if (!rest.valid || !a.valid || !b.valid || sides_taken_ >= most_sides) continue;
     if (!shares_varying(rest, a, term.factor) && !shares_varying(rest, b, term.factor)) continue;
     ++sides_taken_;
-    const Interval x = sum_bounds(with_remainders(plus(rest, a, term.factor)));
-    const Interval y = sum_bounds(with_remainders(plus(rest, b, term.factor)));
+    const Interval x = sum_bounds(joined(plus(rest, a, term.factor)));
+    const Interval y = sum_bounds(joined(plus(rest, b, term.factor)));
     --sides_taken_;
     const bool is_least = (atom.kind() == Kind::Min) == (term.factor > 0);
     return is_least ? interval_min(x, y) : interval_max(x, y);
@@ -181,9 +182,17 @@ Interval BoundsEngine::sum_of_bounds(const Sum& form) {
   return result;
 }
 
+namespace {
+
+Expr canonical_cut(Kind kind, const Expr& a, const Expr& b) {
+  return kind == Kind::Min ? canonical_min(a, b) : canonical_max(a, b);
+}
+
+}  // namespace
+
 // c*y - c*k*(y / k)  is  c*(y % k): two correlated terms become one. So do those of a part of y that
-// varies:  a + k*((b - a) / k), where the last of tiles begins, is  b - (b - a) % k, whatever a is.
-Sum BoundsEngine::with_remainders(Sum form) {
+// varies:  a + k*((b - a) / k), where the last of tiles begins, is  b - (b - a) % k, whatever a is. And two clamps of one value become one.
+Sum BoundsEngine::joined(Sum form) {
   for (const Term& term : std::vector<Term>(form.terms)) {
     const Div* div = term.atom.as<Div>();
     auto k = div ? as_const_int(div->b) : std::nullopt;
@@ -202,6 +211,8 @@ Sum BoundsEngine::with_remainders(Sum form) {
     form = plus(form, y, -c);
     form = plus(form, linear_form(term.atom), -term.factor);
     form = plus(form, linear_form(binary(Kind::Mod, div->a, div->b)), c);
+  }
+  while (join_clamps(form, canonical_cut)) {
   }
   return form;
 }
@@ -316,7 +327,7 @@ BoundsEngine::Truth BoundsEngine::compare_truth(Kind kind, const Expr& a, const 
   if (a.type().is_bool() || !a.type().is_int_or_uint()) return Truth::Unknown;
   std::optional<int64_t> low, high;  // of a - b
   if (has_linear_form(a.type())) {
-    Interval d = sum_bounds(with_remainders(plus(linear_form(a), linear_form(b), -1)));
+    Interval d = sum_bounds(joined(plus(linear_form(a), linear_form(b), -1)));
     low = constant_min(d);
     high = constant_max(d);
   } else if (a.type().bits() < 64) {
@@ -416,7 +427,7 @@ void BoundsEngine::narrow_nonpositive(const Sum& form, Narrowed& narrowed) {
     if (!old) continue;
     ++loose;
     Sum rest = plus(form, linear_form(term.atom), -term.factor);
-    Expr least = sum_bounds(with_remainders(rest)).min;
+    Expr least = sum_bounds(joined(rest)).min;
     if (!least.defined()) continue;
     int64_t c = term.factor;
     Sum limit = linear_form(least);  // c*v + limit <= 0

@@ -56,7 +56,7 @@ class BoundsEngine {
   std::optional<Interval> bounds_by_sides(const Sum& form);
   void collect_varying(const Sum& form, bool negated, std::vector<std::pair<Expr, bool>>& found);
   bool shares_varying(const Sum& rest, const Sum& side, int64_t factor);
-  Sum with_remainders(Sum form);
+  Sum joined(Sum form);
   Interval bounds_of_atom(const Expr& atom);
   Interval atom_bounds(const Expr& e);
   Interval cast_bounds(Type type, const Expr& value);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "ir/build.h"
+#include "ir/join_clamps.h"
 #include "simplify/simplifier.h"
 
 namespace retrograde::simplification {
@@ -71,7 +72,9 @@ Expr Simplifier::rebuild(Sum sum, Kind kind, const Expr& a, const Expr& b) {
 }
 
 Expr Simplifier::rebuild(Sum sum) {
-  while (cancel_names(sum) || join_divisions(sum) || expand_product(sum)) {
+  const auto build = [&](Kind kind, const Expr& a, const Expr& b) { return apply(kind, a, b); };
+  while (cancel_names(sum) || join_divisions(sum) || expand_product(sum) ||
+         join_clamps(sum, build)) {
   }
   if (!sum.type.is_vector()) {
     if (Expr pushed = push_into_min_max(sum); pushed.defined()) return pushed;

@@ -77,6 +77,44 @@ TEST(OddSizes, ValuesAndGradientsRunAndAreRight) {
   }
 }
 
+// The window that an element of a filter sees moves with the element: the end of the one and the place of the other
+// add up to the image's end.
+TEST(OddSizes, WindowsOverImagesWithBoundariesReadNothingOutside) {
+  using Bounded = Func (*)(const ImageParam&);
+  const std::map<std::string, Bounded> boundaries = {
+      {"mirror_image", [](const ImageParam& i) { return BoundaryConditions::mirror_image(i); }},
+      {"mirror_interior",
+       [](const ImageParam& i) { return BoundaryConditions::mirror_interior(i); }},
+      {"repeat_image", [](const ImageParam& i) { return BoundaryConditions::repeat_image(i); }},
+      {"repeat_edge", [](const ImageParam& i) { return BoundaryConditions::repeat_edge(i); }},
+      {"constant",
+       [](const ImageParam& i) { return BoundaryConditions::constant_exterior(i, 1.0f); }}};
+  Buffer<float> pixels(20, 33, 3), weights(5, 3);
+  pixels.fill(
+      [](int x, int y, int c) { return std::sin(static_cast<float>(x + 3 * y * y + 7 * c)); });
+  weights.fill([](int x, int y) { return 0.25f * static_cast<float>(x - y) + 0.125f; });
+  Var x("x"), y("y"), c("c");
+  for (const auto& [name, bounded] : boundaries) {
+    for (const int begin : {0, -1}) {
+      ImageParam image(Float(32), 3, "image"), filter(Float(32), 2, "filter");
+      image.set(pixels);
+      filter.set(weights);
+      RDom window(begin, 5, begin, 3), all(image);
+      Func f("f"), loss("loss");
+      f(x, y, c) = 0.0f;
+      f(x, y, c) += bounded(image)(x + window.x, y + window.y, c) *
+                    filter(window.x - begin, window.y - begin);
+      loss() = 0.0f;
+      loss() += f(all.x, all.y, all.z) * f(all.x, all.y, all.z);
+      const Derivative d = propagate_adjoints(loss);
+      EXPECT_LE(difference(d(filter), d(filter).realize({5, 3})), 1e-4)
+          << name << " from " << begin;
+      EXPECT_LE(difference(d(image), d(image).realize({20, 33, 3})), 1e-4)
+          << name << " from " << begin;
+    }
+  }
+}
+
 // The gain's gradient is summed in lanes of 16, of which 30 leave two over, by private parts that
 // compute the place of the smallest again.
 TEST(OddSizes, PrivatePartsComputeAgainNoMoreThanTheirDomainHas) {

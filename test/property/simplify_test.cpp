@@ -117,6 +117,32 @@ TEST(SimplifyRandom, KeepsVectors) {
   check_random(UInt(8, 4), 4, 1300001, 1500, Inputs::Extreme);
 }
 
+// Both orders of minimum and maximum, moved, one-sided and empty ones.
+TEST(Simplify, DifferencesOfClampsKeepTheirValues) {
+  std::vector<Expr> clamps;
+  const Expr x = ir::variable("x");
+  for (const int low : {-1, 0, 2}) {
+    for (const int high : {-1, 1, 2}) {
+      clamps.push_back(min(max(x, low), high));
+      clamps.push_back(max(min(x + 1, high), low));
+      clamps.push_back(max(min(x, high) - 1, low));
+    }
+    clamps.push_back(max(x, low));
+    clamps.push_back(min(x - 1, low));
+  }
+  for (const Expr& a : clamps) {
+    for (const Expr& b : clamps) {
+      const Expr before = 2 * a - 2 * b, after = simplification::simplify(before);
+      for (int at = -5; at <= 5; ++at) {
+        const std::map<std::string, Scalar> values = {{"x", Scalar::of_int(Int(32), at)}};
+        Evaluator old_values(values), new_values(values);
+        ASSERT_TRUE(test::same_value(old_values(before)[0], new_values(after)[0]))
+            << before << "\nafter: " << after << "\nat " << at;
+      }
+    }
+  }
+}
+
 // Variables within given bounds, some of them symbolic: y in [x, x + 9].
 TEST(SimplifyRandom, KeepsExpressionsWithinGivenBounds) {
   const Expr x = ir::variable("x");

@@ -93,6 +93,17 @@ TEST(Simplify, MakesOneClampOfClampsInOneAnother) {
   keep({"max(min(n, max(x - 1, 0)) - 1, 0)", "min(max(y, 0), max(x - 1, 0))"});
 }
 
+TEST(Simplify, JoinsClampsOfOneValue) {
+  check({{"n - min(max(x, 0), 9) + max(min(x, 9), 0)", "n"},
+         {"max(min(x, 2), 0) - max(min(x, 2), 1)", "max(min(x, 1), 0) - 1"},
+         {"max(min(x, 2), 1) - max(min(x, 2), 0)", "1 - max(min(x, 1), 0)"},
+         {"y + max(min(x - 1, 1), -1) - max(min(x, 2), 1)", "y + max(min(x, 1), 0) - 2"},
+         {"max(min(x, 9), 0) - max(min(x, 3), 0)", "max(min(x, 9), 3) - 3"},
+         {"min(x, 9) - max(min(x, 9), 0)", "min(x, 0)"},
+         {"3 * max(x, 2) - 3 * max(min(x, 7), 2)", "max(x, 7) * 3 - 21"}});
+  keep({"max(min(x, 9), 0) - max(min(y, 9), 0)", "max(min(x, 9), 0) - max(min(x, 6), 3)"});
+}
+
 TEST(Simplify, DecidesComparisons) {
   check({{"x + 3 < y + 5", "x <= y + 1"},
          {"x*8 + 7 <= x*8", "false"},
