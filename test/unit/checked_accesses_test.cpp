@@ -119,6 +119,21 @@ TEST_F(CheckedAccesses, StayWithNoAsserts) {
                {"checked_accesses"});
 }
 
+// Lanes of a lock's update run in turn, each under the condition of the split: what is promised of a lane beyond it is
+// not looked at.
+TEST_F(CheckedAccesses, LetPromisesOfLanesThatAreOffBe) {
+  RVar outer("outer"), inner("inner");
+  RDom r(0, 5);
+  Var u("u");
+  out(x, y) = Tuple(cast<int8_t>(x), cast<uint8_t>(y));
+  out(r, r) = Tuple(out(r, r)[0] + cast<int8_t>(places(clamp(r, 0, 4))), out(r, r)[1]);
+  out.update().split(r, outer, inner, 2);
+  Func parts = out.update().rfactor(outer, u);
+  parts.compute_root().update().atomic().vectorize(inner).parallel(u);
+  Realization result = out.realize({8, 8}, checked());
+  for (int i = 0; i < 8; ++i) EXPECT_EQ(Buffer<int8_t>(result[0])(i, i), i < 5 ? 2 * i : i);
+}
+
 TEST_F(CheckedAccesses, LetWhatIsNotComputedBe) {
   places(11) = 123;
   table(x) = x * 7;

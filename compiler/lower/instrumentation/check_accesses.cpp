@@ -12,7 +12,8 @@
 // Method: the pass runs last, so the checked code is the code that runs without it. A load is checked where its
 //         value is computed, under the conditions of the choices around it. Lanes that a predicate turns off may
 //         be anywhere. The body of an Atomic stays as it is, because its form makes it one instruction: its checks
-//         run before it. A promise is checked where it is a scalar outside of conditions and predicates.
+//         run before it. A promise is checked where it is a scalar outside of conditions and predicates; in a let
+//         right before a choice, where the choice is made.
 // Not done: kernels, whose accesses the simulated device checks; what extern stages do.
 // Tests: test/golden/lower/check_accesses/, test/unit/checked_accesses_test.cpp.
 #include "lower/instrumentation/check_accesses.h"
@@ -85,9 +86,8 @@ class AccessChecker : public Rewriter {
           AccessChecker& parts = n.predicate.defined() && undecided_ ? *undecided_ : *this;
           return make_block({check, parts.children(s)});
         },
-        [&](const IfThenElse& n) {
-          return with_parts(n, undecided(n.condition), (*this)(n.when_true), (*this)(n.when_false));
-        },
+        [&](const LetStmt& n) { return visit_let(s, n); },
+        [&](const IfThenElse& n) { return visit_condition(n); },
         [&](const Atomic& n) {
           return make_block({checks_of(n.body), s});
         },
@@ -99,9 +99,36 @@ class AccessChecker : public Rewriter {
   // For conditions, and what a predicate may turn off: promises hold there only where what they are a part of
   // says so. None in itself.
   const std::unique_ptr<AccessChecker> undecided_;
+  std::vector<Expr> postponed_;  // values of lets, checked under the condition that follows
 
   AccessChecker(Surroundings& around, std::nullptr_t) : around_(around) {}
   Expr undecided(const Expr& e) { return undecided_ ? (*undecided_)(e) : (*this)(e); }
+
+  // ---- conditions ----
+
+  // Statements that are nothing but lets and a choice: what is promised in a let holds where the choice is made.
+  static bool only_decides(const Stmt& s) {
+    if (const auto* let = s.as<LetStmt>()) return only_decides(let->body);
+    const auto* choice = s.as<IfThenElse>();
+    return choice && !choice->when_false.defined();
+  }
+
+  Stmt visit_let(const Stmt& s, const LetStmt& n) {
+    const bool promises =
+        any_node(n.value, [](const Expr& e) { return as_op(e, Op::promise_clamped) != nullptr; });
+    if (!promises || !undecided_ || !only_decides(n.body)) return children(s);
+    postponed_.push_back(n.value);
+    return make_let(n.name, undecided(n.value), (*this)(n.body));
+  }
+
+  Stmt visit_condition(const IfThenElse& n) {
+    std::vector<Stmt> checked = mapped(std::exchange(postponed_, {}), [&](const Expr& value) {
+      return make_evaluate((*this)(value));
+    });
+    const Expr condition = undecided(n.condition);
+    checked.push_back((*this)(n.when_true));
+    return with_parts(n, condition, make_block(std::move(checked)), (*this)(n.when_false));
+  }
 
   // ---- rooms ----
 
