@@ -607,5 +607,28 @@ TEST_F(SlidingWindow, WhatIsComputedInTheLoopsOfAnEmptyPartStaysInside) {
   }
 }
 
+// In the early iterations, far from 0, f(y - 2) and f(y / 2 + 2) are further apart than in those of the loop.
+TEST_F(SlidingWindow, FoldedStorageHoldsTheWindowsOfEarlyIterations) {
+  const auto make = [&](bool slides) {
+    Func f("f"), g("g"), h("h"), out("out");
+    f(y) = y * 37;
+    g(y) = f(y - 2) + f(y / 2 + 2);
+    h(y) = g(2 * y) + g(2 * y - 1) + g(y / 8) * 2 + g(y / 2 + 4);
+    out(y) = h(y);
+    out.bound(y, -4, 6);
+    if (slides) {
+      h.compute_root();
+      g.store_root().compute_at(h, y);
+      f.store_root().compute_at(h, y);
+    }
+    Buffer<int> result(6);
+    result.set_min(-4);
+    out.realize(result);
+    return result;
+  };
+  const Buffer<int> expected = make(false), found = make(true);
+  for (int i = -4; i < 2; ++i) EXPECT_EQ(expected(i), found(i)) << i;
+}
+
 }  // namespace
 }  // namespace retrograde

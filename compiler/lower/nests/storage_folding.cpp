@@ -20,7 +20,7 @@ class Folder {
          bool is_vectorized)
       : f_(f),
         slides_(slides),
-        facts_(facts_of(around)),
+        facts_(facts_with_early_iterations(around, slides)),
         is_vectorized_(is_vectorized),
         folds_(f.func->args.size()) {}
 
@@ -40,6 +40,17 @@ class Folder {
   const BoundsMap facts_;
   const bool is_vectorized_;
   std::vector<Fold> folds_;
+
+  // Windows are wider before a loop's first iteration where they follow from y / 2 beside y.
+  static BoundsMap facts_with_early_iterations(const std::vector<Loop>& around,
+                                               const std::vector<Slide>& slides) {
+    BoundsMap facts = facts_of(around);
+    for (const Slide& slide : slides) {
+      Interval& range = facts[slide.loop.name];
+      if (range.min.defined()) range.min = simplify(range.min - slide.lead);
+    }
+    return facts;
+  }
 
   Expr asked_factor(int d) const {
     for (const StorageRule& rule : f_.schedule.storage_rules) {
@@ -65,7 +76,8 @@ class Folder {
     const std::string& loop = at.loop.name;
     if (!uses_variable(window.min, loop) && !uses_variable(window.max, loop)) return;
     if (hands_on && !moves_one_way(window, loop)) return;
-    Expr touched = simplify(without_likely(window.max - window.min + 1), facts_);
+    const Expr extent = ir::without_promises(without_likely(window.max - window.min + 1));
+    Expr touched = simplify(extent, facts_);
     if (Expr asked = asked_factor(d); asked.defined()) {
       bool fits = can_prove(touched <= asked, facts_);
       folds_[d] = {asked, fits ? Expr() : touched};
