@@ -630,5 +630,33 @@ TEST_F(SlidingWindow, FoldedStorageHoldsTheWindowsOfEarlyIterations) {
   for (int i = -4; i < 2; ++i) EXPECT_EQ(expected(i), found(i)) << i;
 }
 
+// g's tile of 8 ends where the part of h that is new does, and begins far before what h ever reads.
+TEST_F(SlidingWindow, TilesMovedInwardsRunOverAllThatAnIterationNeeds) {
+  Var outer("outer"), inner("inner"), a("a"), b("b");
+  const Target target = get_jit_target_from_environment().with_feature(Target::CheckedAccesses);
+  const auto make = [&](bool slides) {
+    Func f("f"), g("g"), h("h"), k("k"), l("l"), out("out");
+    f(y) = y * 37;
+    g(y) = f(y / 2) + f(y - 2) + f(y * 4);
+    h(y) = g(y * 4 - 1) + f(y / 3 + 2);
+    k(y) = h(y) + g(y * 4) * 2 + h(y + 1);
+    l(y) = k(y + 2) + h(y / 3 + 1);
+    out(y) = l(y / 9);
+    out.bound(y, -5, 29);
+    if (slides) {
+      l.compute_root().split(y, outer, inner, 2, TailStrategy::RoundUp).reorder(outer, inner);
+      for (Func* p : {&k, &h}) p->store_root().compute_at(l, inner);
+      for (Func* p : {&g, &f}) p->compute_at(l, inner);
+      g.split(y, a, b, 8, TailStrategy::ShiftInwards);
+    }
+    Buffer<int> result(29);
+    result.set_min(-5);
+    out.realize(result, target);
+    return result;
+  };
+  const Buffer<int> expected = make(false), found = make(true);
+  for (int i = -5; i < 24; ++i) EXPECT_EQ(expected(i), found(i)) << i;
+}
+
 }  // namespace
 }  // namespace retrograde

@@ -98,14 +98,24 @@ int slide_lead(const std::vector<Slide>& slides, int lead, const ComputePlace& s
   return lead;
 }
 
+bool runs_beyond_regions(const LoopedFunc& f, size_t dimension) {
+  for (size_t s = 0; s < f.stages.size(); s++) {
+    if (!covers_exactly(f, static_cast<int>(s), f.func->args[dimension], variable("region.extent")))
+      return true;
+  }
+  return false;
+}
+
 // Bounds the region of a Func that does not slide over the loop around, beside Funcs that do.
 //
 // Iterations before the loop's first run for sliding consumers only, which compute parts of what the first iteration
 // needs. So the Func computes there what the first iteration needs: the coordinates of other consumers lie outside
 // all that is ever required. A part may be empty; its ends then lie one element outside its iteration's region.
-// Regions that follow from them are clamped to those of the whole, since storage and inputs hold no more.
-void keep_inside_needs(Box& required, const std::vector<Slide>& slides, bool is_early,
-                       ComputePlace& site) {
+// Regions that follow from them are clamped to those of the whole, since storage and inputs hold no more. Loops that
+// run beyond a small region, as tiles that are moved inwards, run over the whole: what they read beyond a part would
+// lie outside it.
+void keep_inside_needs(const LoopedFunc& f, Box& required, const std::vector<Slide>& slides,
+                       bool is_early, ComputePlace& site) {
   const Loop& loop = site.around[0];
   const Box whole = site.whole(required);
   for (size_t d = 0; d < required.size(); d++) {
@@ -120,7 +130,9 @@ void keep_inside_needs(Box& required, const std::vector<Slide>& slides, bool is_
     }
     if (!may_be_empty) continue;
     const auto [first, last] = is_early ? held_from_first(whole[d], loop) : whole[d];
-    side = {clamp(side.min, first, last), clamp(side.max, first, last)};
+    side = runs_beyond_regions(f, d)
+               ? Interval{first, last}
+               : Interval{clamp(side.min, first, last), clamp(side.max, first, last)};
   }
 }
 
@@ -170,7 +182,8 @@ NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& cod
   const Wanted want = slide_together(members, wanted, site);
   piece.lead = want.first;
   for (Member& member : members) {
-    if (!site.around.empty()) keep_inside_needs(member.need, member.slides, want.first > 0, site);
+    if (!site.around.empty())
+      keep_inside_needs(*member.f, member.need, member.slides, want.first > 0, site);
   }
   for (Member& member : members) member.required = member.need;
   Emitted made = emit_members(group, members, site, std::move(checks));
