@@ -658,5 +658,32 @@ TEST_F(SlidingWindow, TilesMovedInwardsRunOverAllThatAnIterationNeeds) {
   for (int i = -5; i < 24; ++i) EXPECT_EQ(expected(i), found(i)) << i;
 }
 
+// A tile of g begins in columns to the left, whose rows are kept for the rows of h that follow.
+TEST_F(SlidingWindow, WhatTilesComputeAgainInKeptStorageIsRight) {
+  Var column("column"), block("block"), z("z"), a("a"), b("b"), c("c"), d("d");
+  const auto make = [&](bool slides) {
+    Func f("f"), g("g"), h("h"), out("out");
+    f(x, y) = x * 37 + y * 101;
+    g(x, y) = f(x / 2 + 2, y) + f(x / 4 - 2, y);
+    h(x, y) = g(x, y / 4 + 2) + g(x, y / 2 + 2) * 2;
+    out(x, y, z) = h(x, y);
+    if (!slides) return out;
+    h.compute_at(out, z)
+        .split(x, block, column, 8, TailStrategy::RoundUp)
+        .reorder(block, column, y);
+    g.store_at(out, z).compute_at(h, block);
+    g.split(x, a, b, 4, TailStrategy::RoundUp).split(b, c, d, 16, TailStrategy::ShiftInwards);
+    f.compute_at(h, column);
+    return out;
+  };
+  Buffer<int> expected(5, 6, 2), found(5, 6, 2);
+  for (Buffer<int>* result : {&expected, &found}) result->set_min(-8, 0, 0);
+  make(false).realize(expected);
+  make(true).realize(found);
+  expected.for_each_element([&](int i, int j, int k) {
+    EXPECT_EQ(expected(i, j, k), found(i, j, k)) << i << " " << j << " " << k;
+  });
+}
+
 }  // namespace
 }  // namespace retrograde

@@ -170,6 +170,19 @@ inline const bool prints_warnings = ::retrograde::porting::print_warnings_by_def
 }  // namespace Internal
 }  // namespace Halide
 
+// An Expr finds these without Internal:: in front, as it does where its base class lives in Internal.
+namespace retrograde::ir {
+using porting::can_prove;
+using porting::is_const;
+using porting::is_const_one;
+using porting::is_const_power_of_two_integer;
+using porting::is_const_zero;
+using porting::is_negative_const;
+using porting::is_positive_const;
+using porting::is_pure;
+using porting::simplify;
+}  // namespace retrograde::ir
+
 // ---- macros that programs use ----
 
 #define HALIDE_VERSION_MAJOR 21

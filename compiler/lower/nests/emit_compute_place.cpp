@@ -98,14 +98,6 @@ int slide_lead(const std::vector<Slide>& slides, int lead, const ComputePlace& s
   return lead;
 }
 
-bool runs_beyond_regions(const LoopedFunc& f, size_t dimension) {
-  for (size_t s = 0; s < f.stages.size(); s++) {
-    if (!covers_exactly(f, static_cast<int>(s), f.func->args[dimension], variable("region.extent")))
-      return true;
-  }
-  return false;
-}
-
 // Bounds the region of a Func that does not slide over the loop around, beside Funcs that do.
 //
 // Iterations before the loop's first run for sliding consumers only, which compute parts of what the first iteration

@@ -51,6 +51,20 @@ Domain domain_of_earlier(const LoopedFunc& f, int s, const Domain& later, Comput
 
 }  // namespace
 
+// Whether what the loops of a Func compute beyond its region may be what it keeps for later iterations. Along a
+// dimension in which the region is the same for as long as the storage lasts, nothing beyond it is ever read.
+bool NestEmitter::keeps_beside_its_regions(const Member& member, ComputePlace& site) {
+  if (member.slides.empty()) return false;
+  const Box whole = site.whole(member.need);
+  for (size_t d = 0; d < whole.size(); d++) {
+    const bool moves = std::ranges::any_of(member.loops, [&](const Loop& loop) {
+      return uses_variable(whole[d].min, loop.name) || uses_variable(whole[d].max, loop.name);
+    });
+    if (moves && runs_beyond_regions(*member.f, d)) return true;
+  }
+  return false;
+}
+
 Emitted NestEmitter::emit_members(const FusedGroup& group, std::vector<Member>& members,
                                   ComputePlace& site, std::vector<Stmt> stmts) {
   Emitted result;
@@ -79,7 +93,10 @@ Emitted NestEmitter::emit_members(const FusedGroup& group, std::vector<Member>& 
     Emitted code = stages[0].f->func->is_extern()
                        ? emit_extern(member_of(fused[0]), stages[0].domain, site)
                        : emit_variants(group.nests[n], stages, site);
-    leave_rounded(stages[0], code);
+    if (keeps_beside_its_regions(member_of(fused[0]), site))
+      code.read_rounded.clear();
+    else
+      leave_rounded(stages[0], code);
     for (const FusedStage& stage : group.nests[n].stages)
       widen_by_own_reads(member_of(stage), code);
     nests[n] = code.stmt;

@@ -112,6 +112,7 @@ class NestEmitter {
   // come back in `storage`.
   Emitted emit_members(const FusedGroup& group, std::vector<Member>& members, ComputePlace& site,
                        std::vector<Stmt> stmts);
+  static bool keeps_beside_its_regions(const Member& member, ComputePlace& site);
   void leave_rounded(const NestStage& stage, Emitted& code) const;
   void widen_by_own_reads(Member& member, Emitted& code) const;
   Emitted emit_extern(Member& member, const Domain& domain, ComputePlace& site);

@@ -251,4 +251,12 @@ bool covers_exactly(const LoopedFunc& f, int stage, const std::string& var, cons
          can_prove(reached.max < first + extent, facts);
 }
 
+bool runs_beyond_regions(const LoopedFunc& f, size_t dimension) {
+  for (size_t s = 0; s < f.stages.size(); s++) {
+    if (!covers_exactly(f, static_cast<int>(s), f.func->args[dimension], variable("region.extent")))
+      return true;
+  }
+  return false;
+}
+
 }  // namespace retrograde::lower

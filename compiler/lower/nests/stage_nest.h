@@ -44,5 +44,7 @@ StageNest build_stage_nest(const LoopedFunc& f, int stage, const Domain& domain)
 // Whether the loops of a stage, over `extent` (> 0) coordinates of a pure variable, reach none
 // beyond.
 bool covers_exactly(const LoopedFunc& f, int stage, const std::string& var, const Expr& extent);
+// Whether some stage's loops may reach further than a region along a dimension of the Func.
+bool runs_beyond_regions(const LoopedFunc& f, size_t dimension);
 
 }  // namespace retrograde::lower
