@@ -94,7 +94,9 @@ class Expr : public ir::Ref<ir::ExprNode> {
  public:
   using Ref::Ref;
   Expr() = default;
-  Expr(bool value);
+  // Of bool alone: no pointer turns into a condition.
+  template <typename T>
+  requires std::same_as<T, bool> Expr(T value) : Expr(of_bool(value)) {}
   Expr(int8_t value);
   Expr(int16_t value);
   Expr(int32_t value);
@@ -110,11 +112,15 @@ class Expr : public ir::Ref<ir::ExprNode> {
   Expr(long long value) : Expr(static_cast<int64_t>(value)) {}
   Expr(unsigned long long value) : Expr(static_cast<uint64_t>(value)) {}
   Expr(const std::string& text);
+  // Explicit, so that functions of a text or an Expr take a literal as the text.
   // Requires: a text is not null.
-  Expr(const char* text);
+  explicit Expr(const char* text);
   Type type() const { return get()->type; }
   // Calls the visitor's function for the node's type: see ir/visitor.h.
   void accept(ir::IRVisitor* visitor) const;
+
+ private:
+  static Expr of_bool(bool value);
 };
 
 class Stmt : public ir::Ref<ir::StmtNode> {

@@ -61,7 +61,7 @@ void release(const Node* node) noexcept {
 
 }  // namespace ir
 
-Expr::Expr(bool value) : Expr(ir::make_uint_const(Bool(), value)) {}
+Expr Expr::of_bool(bool value) { return ir::make_uint_const(Bool(), value); }
 Expr::Expr(int8_t value) : Expr(ir::make_const(Int(8), int64_t{value})) {}
 Expr::Expr(int16_t value) : Expr(ir::make_const(Int(16), int64_t{value})) {}
 Expr::Expr(int32_t value) : Expr(ir::make_const(Int(32), int64_t{value})) {}

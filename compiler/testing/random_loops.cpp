@@ -45,7 +45,7 @@ class LoopScheduler {
     if (context_.may_specialize && random_.chance(12)) specialize();
     run_kinds();
     if (random_.chance(8)) partition();
-    if (has_failing_specialization_) add(graph::SpecializeFail{"no specialization fits"});
+    if (has_failing_specialization_) add(graph::SpecializeFail{Expr("no specialization fits")});
     variants_.insert(variants_.begin(), loops_);
     return variants_;
   }

@@ -254,6 +254,70 @@ TEST_F(SkipStages, MemoizedFuncsAreLookedUpWhereTheyAreRead) {
 // ---- what is computed all the same ----
 
 // Both arms of a select are evaluated: values that no one computed must not be places in memory.
+TEST_F(SkipStages, WhatReadersStoredFurtherOutDoNotNeed) {
+  Var outer("outer"), inner("inner");
+  a(x) = counted(0, x);
+  b(x) = counted(1, a(x) + 1);
+  c(x) = counted(2, a(x) + 1);
+  out(x) = select(p, b(x), 0) + select(q, c(x), 0);
+  out.split(x, outer, inner, 5);
+  a.compute_at(out, outer);
+  b.store_root().compute_at(out, outer);
+  c.store_at(out, outer).compute_at(out, inner);
+  for (const bool first : {false, true}) {
+    for (const bool second : {false, true}) {
+      p.set(first);
+      q.set(second);
+      const Buffer<int> result = run({10});
+      for (int i = 0; i < 10; i++) EXPECT_EQ(result(i), (first + second) * (i + 1));
+      expect_calls({first || second ? 10 : 0, first ? 10 : 0, second ? 10 : 0});
+    }
+  }
+}
+
+TEST_F(SkipStages, RowsByAValueThatIsComputedBefore) {
+  for (const bool at_root : {true, false}) {
+    Func flag("flag"), doubled("doubled");
+    out = Func("out");
+    RDom r(0, 10);
+    const auto input = [&](const Expr& column, const Expr& row) {
+      return select(row % 3 == 0 && column == 7, -1, column);
+    };
+    flag(y) = cast<bool>(false);
+    flag(y) = flag(y) || input(r, y) < 0;
+    doubled(x, y) = counted(0, input(x, y) * 2);
+    out(x, y) = select(flag(y), input(x, y), doubled(x, y));
+    doubled.compute_at(out, y);
+    at_root ? flag.compute_root() : flag.compute_at(out, y);
+    const Buffer<int> result = run({10, 10});
+    expect_calls({at_root ? 60 : 100});
+    result.for_each_element([&](int i, int j) {
+      EXPECT_EQ(result(i, j), j % 3 != 0 ? i * 2 : i == 7 ? -1 : i);
+    });
+  }
+}
+
+TEST_F(SkipStages, TilesByAnImageThatMarksThem) {
+  Var column("column"), row("row");
+  ImageParam marks(Bool(), 2, "marks");
+  Func tiles("tiles");
+  a(column, row, x, y) = counted(0, x * 40 + column + row);
+  tiles(column, row, x, y) = select(marks(x, y), a(column, row, x, y), -1);
+  out(x, y) = tiles(x % 4, y % 4, x / 4, y / 4);
+  out.bound(x, 0, 12).bound(y, 0, 8).tile(x, y, column, row, 4, 4);
+  tiles.compute_at(out, x);
+  a.compute_at(tiles, x);
+  Buffer<bool> marked(3, 2);
+  marked.fill(false);
+  marked(1, 0) = marked(2, 1) = true;
+  marks.set(marked);
+  const Buffer<int> result = run({12, 8});
+  expect_calls({2 * 16});
+  result.for_each_element([&](int i, int j) {
+    EXPECT_EQ(result(i, j), marked(i / 4, j / 4) ? i / 4 * 40 + i % 4 + j % 4 : -1);
+  });
+}
+
 TEST_F(SkipStages, CoordinatesAreAlwaysComputed) {
   Buffer<int> table(10);
   for (int i = 0; i < 10; i++) table(i) = 10 * i;

@@ -224,9 +224,9 @@ Expr undef() {
 // ---- effects ----
 namespace frontend {
 inline void collect_parts(std::vector<Expr>&) {}
-template <typename... Rest>
-void collect_parts(std::vector<Expr>& parts, Expr first, Rest&&... rest) {
-  parts.push_back(std::move(first));
+template <typename First, typename... Rest>
+void collect_parts(std::vector<Expr>& parts, First&& first, Rest&&... rest) {
+  parts.push_back(Expr(std::forward<First>(first)));
   collect_parts(parts, std::forward<Rest>(rest)...);
 }
 Expr print_values(std::vector<Expr> values);
@@ -239,8 +239,8 @@ void check_integer(const Expr& e, const char* what);
 // The first value; prints all of them, a line for each evaluation.
 // Requires: it gives the value of its first argument; every operand must be a defined expression.
 inline Expr print(const std::vector<Expr>& values) { return frontend::print_values(values); }
-template <std::convertible_to<Expr> First, typename... Rest>
-Expr print(First&& first, Rest&&... rest) {
+template <typename First, typename... Rest>
+requires std::constructible_from<Expr, First> Expr print(First&& first, Rest&&... rest) {
   std::vector<Expr> values{Expr(std::forward<First>(first))};
   frontend::collect_parts(values, std::forward<Rest>(rest)...);
   return frontend::print_values(std::move(values));

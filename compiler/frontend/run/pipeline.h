@@ -55,8 +55,9 @@ class Pipeline : public Runnable<Pipeline> {
   // Requires: a requirement is checked once, before anything is computed; a requirement is a
   // condition of type bool; every part of its message is a defined expression.
   void add_requirement(const Expr& condition, const std::vector<Expr>& message);
-  template <std::convertible_to<Expr>... Parts>
-  void add_requirement(const Expr& condition, Parts&&... message) {
+  template <typename... Parts>
+  requires(std::constructible_from<Expr, Parts>&&...) void add_requirement(const Expr& condition,
+                                                                           Parts&&... message) {
     add_requirement(condition, std::vector<Expr>{Expr(std::forward<Parts>(message))...});
   }
 

@@ -14,7 +14,8 @@
 namespace retrograde::lower {
 
 // What is known where `condition` is true (or false: `holds`), made of what can be evaluated
-// anywhere: no memory, no effects, and little work but in C functions, which are pure.
+// anywhere, and of what is read of Funcs and images: no other memory, no effects, and little work but in C functions, which are
+// pure.
 Expr usable_where(const Expr& condition, bool holds);
 
 // Combine "only where a" and "only where b": `both` hold, or `either` does.
@@ -35,6 +36,9 @@ enum class AtLoops : uint8_t {
 
 // The condition as it looks from outside of the binder.
 Expr from_outside(const Expr& condition, const Binder& binder, AtLoops at_loops);
+
+// Without the parts that read other Funcs and images than those that may be.
+Expr without_reads(const Expr& condition, FunctionRef<bool(const Call&)> may_read);
 
 // Without the parts that call C functions.
 Expr without_calls(const Expr& condition);

@@ -9,9 +9,9 @@
 //   } }                                            } }
 //
 // The consumers' selects and ifs say where they read it. A condition stays as far as it can be
-// evaluated where the storage of f begins: it is made of parameters, of extents of buffers, and of
-// variables of loops around that storage, and reads no memory. (A C function that a select calls
-// there anyway is pure, and called once for both.) What depends on loops inside counts
+// evaluated where the storage of f begins: it is made of parameters, of extents of buffers, of
+// variables of loops around that storage, and of elements of images and of Funcs that are complete there. (A C function that a
+// select calls there anyway is pure, and called once for both.) What depends on loops inside counts
 // as true; but in a choice between Funcs, select(x < n, a(x), b(x - n)), it is asked whether x
 // reaches the arm at all, so that concatenations compute one part where the other is not wanted.
 // What only a skipped Func reads is skipped with it.
@@ -102,14 +102,18 @@ class NeedFinder {
     Expr condition;
     size_t binders;
     AtLoops at_loops;
+    int guards = 0;  // around it
   };
   // A Func whose storage is open.
   struct Stage {
     size_t binders, held;  // outside of its storage
+    int guards;
     Expr needed = const_false();
     bool is_read = false;
     std::vector<Stmt> producers = {};
     std::set<std::string> mentioned_by = {};  // Funcs further out whose need speaks of this one's
+    std::set<std::string> complete =
+        {};  // Funcs whose values are all there when its storage begins
   };
 
   static std::string need_of(const std::string& func) { return func + ".needed"; }
@@ -152,15 +156,19 @@ class NeedFinder {
 
   void visit_branch(const IfThenElse& n) {
     visit_values({n.condition});
-    const auto where = [&](bool holds) { return without_calls(usable_where(n.condition, holds)); };
+    const auto where = [&](bool holds) {
+      return without_calls(without_any_reads(usable_where(n.condition, holds)));
+    };
     under(where(true), AtLoops::Forget, [&] { visit(n.when_true); });
     under(where(false), AtLoops::Forget, [&] { visit(n.when_false); });
   }
 
   void visit_store(const Provide& n) {
+    guards_around_ += n.predicate.defined();
     visit_values(n.args);
     visit_values({n.predicate});
     visit_values(n.values);
+    guards_around_ -= n.predicate.defined();
   }
 
   void visit_storage(const Realize& n) {
@@ -175,25 +183,51 @@ class NeedFinder {
       waiting_ -= waits;
       return;
     }
-    stages_.emplace(n.name, Stage{.binders = binders_.size(), .held = held_.size()});
+    stages_.emplace(n.name, Stage{.binders = binders_.size(),
+                                  .held = held_.size(),
+                                  .guards = guards_around_,
+                                  .complete = complete_});
     visit(n.body);
     close(n.name);
   }
 
   void visit_producer(const Stmt& s, const ProducerConsumer& n) {
     const auto stage = stages_.find(n.name);
-    if (!n.produces || stage == stages_.end()) return visit(n.body);
+    if (n.produces && runs_on_device(n.body)) on_device_.insert(n.name);
+    if (!n.produces) return visit_consumer(n);
+    if (stage == stages_.end()) return visit(n.body);
     stage->second.producers.push_back(s);
     producing_.push_back(n.name);
     under(variable(need_of(n.name), Bool()), AtLoops::Forget, [&] { visit(n.body); });
     producing_.pop_back();
   }
 
+  // What is complete, and in memory of the host, may be asked before it is read by the Funcs that follow.
+  void visit_consumer(const ProducerConsumer& n) {
+    const bool is_there =
+        may_skip_(n.name) && !on_device_.contains(n.name) && complete_.insert(n.name).second;
+    visit(n.body);
+    if (is_there) complete_.erase(n.name);
+  }
+
+  static bool runs_on_device(const Stmt& s) {
+    return any_stmt(s, [](const Stmt& part) {
+      const auto* loop = part.as<For>();
+      return loop && is_gpu(loop->runs);
+    });
+  }
+
+  static Expr without_any_reads(const Expr& condition) {
+    return without_reads(condition, [](const Call&) { return false; });
+  }
+
   template <class Body>
   void under(const Expr& condition, AtLoops at_loops, Body&& body) {
     const bool is_said = !is_const_true(condition);
-    if (is_said) held_.push_back({condition, binders_.size(), at_loops});
+    if (is_said) held_.push_back({condition, binders_.size(), at_loops, guards_around_});
+    guards_around_++;
     body();
+    guards_around_--;
     if (is_said) held_.pop_back();
   }
 
@@ -217,8 +251,15 @@ class NeedFinder {
     stage.is_read = true;
     if (is_const_true(stage.needed)) return;
     Expr where = const_true();
-    for (size_t i = stage.held; i < held_.size(); i++)
-      where = both(where, seen_from(held_[i], stage.binders));
+    for (size_t i = stage.held; i < held_.size(); i++) {
+      // What stands under another guard may read outside of its storage where that does not hold.
+      const bool is_outermost = held_[i].guards == stage.guards;
+      where =
+          both(where, without_reads(seen_from(held_[i], stage.binders), [&](const Call& call) {
+                 return is_outermost && kernels_ == 0 &&
+                        (call.call_type == CallType::Image || stage.complete.contains(call.name));
+               }));
+    }
     // C functions are called where they were, with their arguments: a select always does.
     if (outside_ > stage.held) where = without_calls(where);
     add_need(func, stage, where);
@@ -242,19 +283,40 @@ class NeedFinder {
     for (const std::string& reader : stage.mentioned_by) {
       const auto outer = stages_.find(reader);
       if (outer == stages_.end()) continue;
-      const Expr whole = seen_from({need, binders_.size(), AtLoops::Forget}, outer->second.binders);
+      const Expr whole = seen_from({without_any_reads(need), binders_.size(), AtLoops::Forget},
+                                   outer->second.binders);
       outer->second.needed = simplify(substitute(outer->second.needed, need_of(func), whole));
     }
-    if (!is_const_true(need)) guards_[func] = need;
+    resolve(func, need);
+    if (is_const_true(need)) return;
+    guards_[func] = need;
+    for (const auto& [name, open] : stages_) {
+      if (uses_variable(need, need_of(name))) unresolved_[name].push_back(func);
+    }
   }
 
-  // True where a condition is not worth its while, or not known to be right: as what is known later
-  // only, where a Func further out is needed.
+  // Guards inside of the Func's storage speak of its need, which is known now. It can be evaluated there, too.
+  void resolve(const std::string& func, const Expr& need) {
+    const auto inside = unresolved_.extract(func);
+    if (!inside) return;
+    for (const std::string& name : inside.mapped()) {
+      const auto guard = guards_.find(name);
+      if (guard == guards_.end()) continue;
+      guard->second = simplify(substitute(guard->second, need_of(func), need));
+      if (is_const_true(guard->second)) {
+        guards_.erase(guard);
+        continue;
+      }
+      for (const auto& [outer, open] : stages_) {
+        if (uses_variable(guard->second, need_of(outer))) unresolved_[outer].push_back(name);
+      }
+    }
+  }
+
+  // True where a condition is not worth its while, or not known to be right.
   Expr need_outside(const Stage& stage) const {
     if (!stage.is_read || is_const_true(stage.needed)) return const_true();
-    std::unordered_set<std::string> unknown = lanes_;
-    for (const auto& [name, open] : stages_) unknown.insert(need_of(name));
-    const Expr need = simplify(without_parts_of(stage.needed, unknown));
+    const Expr need = simplify(without_parts_of(stage.needed, lanes_));
     const bool varies = uses_any_variable(need, varying_);
     for (const Stmt& producer : stage.producers) {
       if ((varies && is_one_point(producer)) || computes_others(producer)) return const_true();
@@ -342,6 +404,9 @@ class NeedFinder {
 
   FunctionRef<bool(const std::string&)> may_skip_;
   Guards guards_;
+  int guards_around_ = 0;  // choices, branches, predicates, producers
+  std::map<std::string, std::vector<std::string>>
+      unresolved_;                       // by Func: whose guards speak of its need
   std::map<std::string, Stage> stages_;  // whose storage is open
   std::vector<Binder> binders_;
   std::vector<Held> held_;
@@ -349,6 +414,7 @@ class NeedFinder {
   std::unordered_set<std::string> varying_;  // variables of loops, and what depends on them
   std::unordered_set<std::string> lanes_;    // of vectors
   std::unordered_set<std::string> forbidden_;
+  std::set<std::string> complete_, on_device_;
   int kernels_ = 0, waiting_ = 0;  // around: loops of kernels, storage that producers wait for
 
   // In one expression.
