@@ -129,7 +129,8 @@ class AdjointInput {
 // backward from at least one kept state, the first; a budget is a number of bytes; an update that
 // runs backward needs to know the elements it may reach (Unsupported); a partial derivative may
 // need only values that are still there when the Func is complete; whether an update writes may not
-// depend on the values of the Func that it updates.
+// depend on the values of the Func that it updates; adjoints pass backward through iterations that
+// each update one point at a time (Unsupported).
 struct AdjointOptions {
   Overwritten overwritten = Overwritten::Auto;
   int64_t version_bytes = autodiff::default_version_bytes;  // 256 MiB; under Overwritten::Auto

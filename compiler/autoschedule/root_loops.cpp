@@ -104,7 +104,8 @@ class LoopChooser {
       return tile(*d);
     if (stages && !scatters && schedule_look_ups(f_, index_, stage_, lanes_of_values(), sizes_))
       return;
-    if (!scatters && pure_[0] == 0 && tile_in_registers()) return;
+    const bool may_be_tile = !scatters && !point_number(definition()) && pure_[0] == 0;
+    if (may_be_tile && tile_in_registers()) return;
     if (pure_[0] == 0 && scans_rows()) return cut_scan();
     make_tasks();
     if (pure_[0] != 0) return;
@@ -166,7 +167,7 @@ class LoopChooser {
   // Whether an update takes elements of other rows that it has made before.
   bool scans_rows() const {
     const Definition& update = definition();
-    if (index_ == 0 || !read_elsewhere(f_, update).defined()) return false;
+    if (index_ == 0 || point_number(update) || !read_elsewhere(f_, update).defined()) return false;
     const auto moves_row = [&](const ReductionVariable& r) {
       return std::any_of(update.args.begin() + 1, update.args.end(),
                          [&](const Expr& arg) { return uses_variable(arg, r.var); });

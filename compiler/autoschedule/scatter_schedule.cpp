@@ -28,10 +28,11 @@ int lanes_for(int64_t extent) {
 }
 
 bool adds_to_itself(const FuncContents& f, const Definition& update) {
-  return std::all_of(update.values.begin(), update.values.end(), [&](const Expr& value) {
-    const auto* sum = value.as<Add>();
-    return sum && is_old_value(sum->a, f, update) && !calls(sum->b, &f);
-  });
+  return !point_number(update) &&
+         std::all_of(update.values.begin(), update.values.end(), [&](const Expr& value) {
+           const auto* sum = value.as<Add>();
+           return sum && is_old_value(sum->a, f, update) && !calls(sum->b, &f);
+         });
 }
 
 bool scatters(const FuncContents& f, const Definition& update) {
@@ -61,7 +62,7 @@ bool is_tap(const Definition& update, const ReductionVariable& r) {
 std::vector<VarOrRVar> loops_of(const Definition& update, bool taps) {
   std::vector<VarOrRVar> loops;
   for (const ReductionVariable& r : update.rvars) {
-    if (is_tap(update, r) == taps) loops.push_back(RVar(r.var));
+    if (!r.numbers_points && is_tap(update, r) == taps) loops.push_back(RVar(r.var));
   }
   return loops;
 }

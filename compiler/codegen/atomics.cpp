@@ -171,20 +171,23 @@ void atomic_store(Values& values, const Store& s) {
 
 void FunctionGenerator::make(const Atomic& s) {
   const auto* store = s.body.as<Store>();
-  if (store && is_one_word(store->value.type())) return atomic_store(values_, *store);
+  const bool is_one = store && is_one_word(store->value.type());
+  if (is_one && !touches_several_elements(s.body)) return atomic_store(values_, *store);
   const Store* first = nullptr;
   any_stmt(s.body, [&](const Stmt& part) { return (first = part.as<Store>()) != nullptr; });
   if (!first) return;
   if (device_) {
-    unsupported("update " + quoted(s.name) + " atomically on a GPU",
-                "a kernel updates one value of at most 64 bits at a time",
-                "the values of a Tuple are updated together, which takes a lock",
-                "Reduce with rfactor, or update a Func for each value");
+    unsupported(
+        "update " + quoted(s.name) + " atomically on a GPU",
+        "a kernel updates one value of at most 64 bits at a time",
+        "the values of a Tuple, and several points, are updated together, which takes a lock",
+        "Reduce with rfactor, or update a Func for each value");
   }
   locked(s, *first);
 }
 
-// The address is known before the lock: what the index is made of is bound inside.
+// The address is known before the lock: what the index is made of is bound inside. Several elements
+// have the lock of the buffer's first: of all updates that may meet it is the same.
 void FunctionGenerator::locked(const Atomic& s, const Store& first) {
   Substitution lets;
   for (const auto* let = s.body.as<LetStmt>(); let; let = let->body.as<LetStmt>())
@@ -192,7 +195,7 @@ void FunctionGenerator::locked(const Atomic& s, const Store& first) {
   Value* element;
   {
     const MemoScope scope(c_.frame, false);
-    const Expr index = substitute(first.index, lets);
+    const Expr index = touches_several_elements(s.body) ? Expr(0) : substitute(first.index, lets);
     RETROGRADE_ASSERT(index.type().is_scalar(), "a lock for a vector of ", quoted(s.name));
     element = element_pointer(e_, c_.storage(first.name), first.value.type().element_of(),
                               values_.index64(index));

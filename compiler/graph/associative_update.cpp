@@ -22,6 +22,10 @@ Expr other_reference(const FuncContents& f, const Definition& update) {
 
 AssociativityProof prove_associative(const FuncContents& f, const Definition& update) {
   AssociativityProof proof;
+  if (point_number(update)) {
+    proof.why_not = "it updates several points at once";
+    return proof;
+  }
   if (const Expr other = other_reference(f, update); other.defined()) {
     proof.why_not = text("it reads ", other, ", which is not the element that it writes");
     return proof;

@@ -241,8 +241,9 @@ void add_loops(const StageLoops& schedule, const std::vector<Dim>& first,
 
 std::vector<Dim> first_loops(const FuncContents& f, const Definition& definition) {
   std::vector<Dim> loops;
-  for (const ReductionVariable& rvar : definition.rvars)
-    loops.push_back({rvar.var, ForType::Serial, true});
+  for (const ReductionVariable& rvar : definition.rvars) {
+    if (!rvar.numbers_points) loops.push_back({rvar.var, ForType::Serial, true});
+  }
   for (size_t d = 0; d < definition.args.size(); ++d) {
     const Variable* v = definition.args[d].as<Variable>();
     if (v && !v->symbol.defined() && v->name == f.args[d])

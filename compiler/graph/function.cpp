@@ -8,6 +8,7 @@
 #include "graph/names.h"
 #include "graph/own_reads.h"
 #include "graph/wrappers.h"
+#include "ir/build.h"
 #include "ir/print.h"
 
 namespace retrograde::graph {
@@ -171,6 +172,16 @@ void visit_exprs(AnyDefinition& definition, const Visit& visit) {
 }
 
 }  // namespace
+
+const ReductionVariable* point_number(const Definition& definition) {
+  const auto& rvars = definition.rvars;
+  return !rvars.empty() && rvars.back().numbers_points ? &rvars.back() : nullptr;
+}
+
+int number_of_points(const Definition& definition) {
+  const ReductionVariable* number = point_number(definition);
+  return number ? static_cast<int>(*as_const_int(number->extent)) : 1;
+}
 
 void for_each_expr(const Definition& definition, const std::function<void(const Expr&)>& visit) {
   visit_exprs(definition, visit);

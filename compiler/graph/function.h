@@ -126,6 +126,9 @@ FuncPtr func_of(const Call& call);
 std::vector<FuncPtr> topological_order(const std::vector<FuncPtr>& outputs);
 // Funcs called directly by any stage of f (f itself excluded), in first-use order.
 std::vector<FuncPtr> direct_callees(const FuncContents& f);
+// The variable that numbers the points which an iteration updates at once; null: it updates one.
+const ReductionVariable* point_number(const Definition& definition);
+int number_of_points(const Definition& definition);
 // Visits every expression of a definition: args, values, predicate, rvar bounds.
 void for_each_expr(const Definition& definition, const std::function<void(const Expr&)>& visit);
 // The same of all definitions of a Func.

@@ -18,7 +18,7 @@
 //     update
 //       place x
 //       place `r$0.y`
-//       loop(`r$0.y`, 0, 5)
+//       loop(`r$0.y`, 0, 5)            points(k, 0, 2): of this many points at once
 //       where (`r$0.y` < x)
 //       value (blur(x, `r$0.y`):float32 + 1f)
 //     schedule

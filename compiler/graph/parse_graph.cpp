@@ -305,11 +305,11 @@ class GraphReader {
       definition_->values.push_back(parse_expr(line.rest));
     } else if (line.word == "where") {
       definition_->predicate = parse_expr(line.rest);
-    } else if (line.word == "loop") {
+    } else if (line.word == "loop" || line.word == "points") {
       const std::vector<Expr> args = parse_arguments(line.rest);
       const Variable* v = args.size() == 3 && args[0].defined() ? args[0].as<Variable>() : nullptr;
       if (!v) fail(line, "a variable, its min and its extent");
-      definition_->rvars.push_back({v->name, args[1], args[2]});
+      definition_->rvars.push_back({v->name, args[1], args[2], line.word == "points"});
     } else {
       return reads_stage_schedule(line);
     }

@@ -145,7 +145,8 @@ class GraphPrinter {
       for (const Expr& place : definition.args) line("place ", place);
     }
     for (const ReductionVariable& v : definition.rvars)
-      line("loop(", quote_name(v.var), ", ", v.min, ", ", v.extent, ")");
+      line(v.numbers_points ? "points(" : "loop(", quote_name(v.var), ", ", v.min, ", ", v.extent,
+           ")");
     line_if("where", definition.predicate);
     for (const Expr& value : definition.values) line("value ", value);
     print(definition.schedule, first_loops(f, definition));

@@ -13,6 +13,10 @@ namespace retrograde::graph {
 struct ReductionVariable {
   std::string var;  // unique in the process: "r$0.x"
   Expr min, extent;
+  // No loop: its values number the points that one iteration of the others updates at once. Values,
+  // places and predicates of all of them are computed before the first is stored; then they are
+  // stored in order. At most one of a domain, the last; from 0 on, of constant extent.
+  bool numbers_points = false;
 };
 // Symbol behind each RVar's Variable node.
 struct ReductionDomainContents : Symbol {

@@ -78,8 +78,18 @@ class GraphValidator {
     std::unordered_set<std::string> bound(f.args.begin(), f.args.end());
     for (const ReductionVariable& v : stage.rvars)
       require(bound.insert(v.var).second, f, "the variables of a definition are different");
+    check_points(f, stage);
     for_each_expr(stage, [&](const Expr& e) { check_names(f, e, bound); });
     check(f, stage.schedule, first_loops(f, stage));
+  }
+
+  void check_points(const FuncContents& f, const Definition& stage) const {
+    for (const ReductionVariable& v : stage.rvars) {
+      if (!v.numbers_points) continue;
+      const auto points = as_const_int(v.extent);
+      require(&v == &stage.rvars.back() && is_zero(v.min) && points && *points > 0, f,
+              "points are numbered by the last reduction variable, from 0 to a constant");
+    }
   }
 
   // Every variable is bound by its definition or a let, or stands for a parameter or a fact.

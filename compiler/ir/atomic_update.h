@@ -41,6 +41,10 @@ Expr updated(const AtomicUpdate& update, const Expr& old, const Expr& operand);
 // Whether one instruction can exchange a value of the type.
 bool is_one_word(Type type);
 
+// Whether the body of an Atomic stores to several elements of a buffer, or reads one of a buffer that
+// it stores to elsewhere: such updates meet wherever they are.
+bool touches_several_elements(const Stmt& update);
+
 bool loads_from(const Expr& e, const std::string& buffer);
 
 }  // namespace retrograde::ir

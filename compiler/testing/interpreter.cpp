@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <unordered_map>
 
 #include "diagnostics/error.h"
@@ -329,8 +330,7 @@ class Interpreter::Impl {
     }
     loops.for_each([&](const Point& at) {
       for (size_t i = 0; i < at.size(); ++i) frame.point[positions[i]] = at[i];
-      ++frame.epoch;
-      update_point(f, frame, island);
+      update_points(f, frame, island);
     });
   }
 
@@ -338,24 +338,44 @@ class Interpreter::Impl {
     ++frame.epoch;
     int position = f.func->dimensions();
     for (const auto& rvar : frame.definition.rvars) {
+      if (rvar.numbers_points) continue;
       loops.mins.push_back(static_cast<int>(get(frame, rvar.min).scalar.i));
       loops.extents.push_back(static_cast<int>(get(frame, rvar.extent).scalar.i));
       positions.push_back(position++);
     }
   }
 
-  void update_point(FuncState& f, Frame& frame, Island& island) {
-    bool unsure = false;
+  // What an update stores at one point.
+  struct Stored {
+    Point point;
+    std::vector<Value> values;
+    bool unsure = false;  // whether it is stored
+  };
+
+  // All points of an iteration are computed before the first is stored.
+  void update_points(FuncState& f, Frame& frame, Island& island) {
+    const ReductionVariable* number = point_number(frame.definition);
+    std::vector<Stored> all;
+    for (int i = 0; i < number_of_points(frame.definition); ++i) {
+      if (number) frame.point.back() = i;
+      ++frame.epoch;
+      if (auto stored = update_at(frame, island)) all.push_back(std::move(*stored));
+    }
+    for (const Stored& s : all) store(f, island, s.point, s.values, s.unsure);
+  }
+
+  std::optional<Stored> update_at(Frame& frame, Island& island) {
+    Stored result;
     if (frame.definition.predicate.defined()) {
       const Value& condition = get(frame, frame.definition.predicate);
-      unsure = !condition.is_stable();
-      if (!unsure && !condition.scalar.as_bool()) return;
+      result.unsure = !condition.is_stable();
+      if (!result.unsure && !condition.scalar.as_bool()) return std::nullopt;
     }
-    const std::vector<Value> values = all_of(frame, frame.definition.values);
+    result.values = all_of(frame, frame.definition.values);
     bool stable = true;
-    const Point point = coordinates(frame, frame.definition.args, stable);
+    result.point = coordinates(frame, frame.definition.args, stable);
     if (!stable) island.poisoned = true;
-    store(f, island, point, values, unsure);
+    return result;
   }
 
   void store(FuncState& f, Island& island, const Point& point, const std::vector<Value>& values,

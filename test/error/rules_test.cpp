@@ -51,13 +51,9 @@ TEST_F(Rules, SeveralPointsInOneDefinition) {
   Func g("g");
   expect("a first definition is for all points", [&] { g(scatter(x, y)) = gather(1, 2); });
   g(x) = 0;
-  expect("scatter() names the places on the left-hand side", [&] { g(x) = gather(1, 2); });
   expect("scatter() names the places on the left-hand side", [&] { g(gather(1, 2)) = 3; });
   expect("an update's scatter() and gather() have as many points",
          [&] { g(scatter(1, 2)) = gather(1, 2, 3); });
-  RDom r(0, 3);
-  expect<Unsupported>("over an RDom, what is stored does not depend on what stood there",
-                      [&] { g(scatter(r, r + 1)) = g(gather(r + 1, r)); });
 }
 
 // ---- Funcs ----

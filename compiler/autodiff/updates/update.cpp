@@ -25,6 +25,7 @@ class UpdateDifferentiation {
   }
 
   UpdateAdjoint run() {
+    check_points();
     check_predicate();
     bool fixed_places = std::ranges::none_of(c_.write, [&](const Expr& e) { return calls(e, f_); });
     if (fixed_places && (accumulates() || selects() || is_recurrence())) return std::move(result_);
@@ -39,6 +40,15 @@ class UpdateDifferentiation {
   }
 
  private:
+  void check_points() const {
+    if (!point_number(c_.definition)) return;
+    unsupported(c_.asked(),
+                "adjoints pass backward through iterations that each update one point at a time",
+                text("an iteration updates ", number_of_points(c_.definition), " points of ",
+                     quoted(f_->name), " at once, from what stood at them"),
+                text("Give the iterations a dimension, as in f(x, t + 1) = ... f(x, t), give ",
+                     quoted(f_->name), " a custom_adjoint, or propagate_tangents"));
+  }
   void check_predicate() const {
     if (!calls(c_.domain.predicate, f_)) return;
     user_error(c_.asked(),

@@ -114,8 +114,8 @@ std::vector<RVar> Func::rvars(int index) const {
   walk(update, [&](const ir::Variable& v) {
     if (!domain) domain = graph::domain_of(v);
   });
-  return ir::numbered(update.rvars.size(),
-                      [&](size_t i) { return RVar(domain, static_cast<int>(i)); });
+  const size_t loops = update.rvars.size() - (graph::point_number(update) ? 1 : 0);
+  return ir::numbered(loops, [&](size_t i) { return RVar(domain, static_cast<int>(i)); });
 }
 
 // ---- running it ----

@@ -69,12 +69,13 @@ Expr concat_bits(const std::vector<Expr>& parts);
 Expr user_context_value();
 
 // f(scatter(a, b)) = gather(u, v): an update that stores to several points, from the first to the
-// last; what it reads of f is read before. Between operators they stand for one point after the
-// other: f(x + scatter(1, 0), y + scatter(0, 3)) = 2 * gather(x, y).
+// last; what it reads of f is read before. Over an RDom each iteration does so, and finds what those
+// before it stored: f(scatter(r, r + 1)) = f(gather(r + 1, r)) moves f(0) to the end. Between
+// operators they stand for one point after the other: f(x + scatter(1, 0), y + scatter(0, 3)) =
+// 2 * gather(x, y).
 // Requires: at least one point is named; each point is a defined Expr; all points are of one type;
 // a first definition is for all points; scatter() names the places on the left-hand side; all of an
-// update's scatter() and gather() have as many points; over an RDom, what is stored does not depend
-// on what stood there (Unsupported).
+// update's scatter() and gather() have as many points.
 Expr scatter(const std::vector<Expr>& points);
 Expr gather(const std::vector<Expr>& points);
 template <std::convertible_to<Expr>... Points>

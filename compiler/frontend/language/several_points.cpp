@@ -3,9 +3,11 @@
 //   f(scatter(a, b), y) = gather(u, v)
 //       =>   RDom k(0, 2);  f(select(k == 0, a, b), y) = select(k == 0, u, v)
 //
-// What is read of f itself is what was there before the update: of a copy of f as it was. Where the
-// update runs over an RDom, its iterations may read what earlier ones stored, which no copy has:
-// that is refused.
+// What is read of f itself is what was there before the update: without an RDom, of a copy of f as
+// it was; over one, whose iterations may read what earlier ones stored, k is no loop but numbers
+// points that each iteration computes before it stores the first
+// (graph::ReductionVariable::numbers_points). Where no point reads what an earlier one of its
+// iteration stores, k is a loop all the same: such updates have adjoints.
 #include "frontend/language/several_points.h"
 
 #include <algorithm>
@@ -14,11 +16,13 @@
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
 #include "graph/define.h"
+#include "graph/own_reads.h"
 #include "graph/wrappers.h"
 #include "ir/build.h"
 #include "ir/memory_reads.h"
 #include "ir/print.h"
 #include "ir/visit.h"
+#include "simplify/simplify.h"
 
 namespace retrograde {
 
@@ -79,30 +83,33 @@ class SeveralPoints {
         values_(values) {}
 
   void define() {
+    find_domain();
     check_points();
     if (!f_->is_defined())
       user_error(asked_, "a first definition is for all points", "it has no definition",
                  "Define it first, as in f(x) = 0");
-    choose_domain();
-    read_what_was_before();
+    const bool reads = reads_itself(args_) || reads_itself(values_) || reads_itself(conditions());
+    if (reads && !old_) read_a_copy();
+    make_domain(reads && old_ && !may_take_turns());
     const std::vector<Expr> args = at_point(args_), values = at_point(values_);
     define_update(f_, args, values, domain_);
-    Stage(f_, f_->stage_count() - 1).unroll(VarOrRVar(domain_->vars[0].var, true));
+    if (point_number(f_->updates.back())) return;
+    Stage(f_, f_->stage_count() - 1).unroll(VarOrRVar(number_, true));
   }
 
  private:
   void check_points() {
     const std::vector<const Call*> places = packs_in(args_);
-    std::vector<const Call*> all = places, read = packs_in(values_);
-    all.insert(all.end(), read.begin(), read.end());
-    const bool is_named = std::all_of(places.begin(), places.end(),
-                                      [](const Call* call) { return call->name == scatter_name; });
-    if (places.empty() || !is_named) {
-      user_error(
-          asked_, "scatter() names the places on the left-hand side",
-          places.empty() ? "only gather() stands there, on the right" : "gather() stands there",
-          "Write f(scatter(a, b)) = gather(u, v)");
+    std::vector<const Call*> all = places;
+    for (const std::vector<Expr>& exprs : {values_, conditions()}) {
+      const std::vector<const Call*> read = packs_in(exprs);
+      all.insert(all.end(), read.begin(), read.end());
     }
+    const bool is_named =
+        std::ranges::all_of(places, [](const Call* call) { return call->name == scatter_name; });
+    if (!is_named)
+      user_error(asked_, "scatter() names the places on the left-hand side",
+                 "gather() stands there", "Write f(scatter(a, b)) = gather(u, v)");
     for (const Call* call : all) {
       const int points = static_cast<int>(call->args.size());
       if (points_ == 0) points_ = points;
@@ -112,8 +119,7 @@ class SeveralPoints {
     }
   }
 
-  // The user's domain with the point in front.
-  void choose_domain() {
+  void find_domain() {
     std::vector<Expr> all = args_;
     all.insert(all.end(), values_.begin(), values_.end());
     for (const Expr& e : all) {
@@ -121,12 +127,23 @@ class SeveralPoints {
         if (!old_) old_ = domain_of(v);
       });
     }
+  }
+  std::vector<Expr> conditions() const {
+    return old_ && old_->predicate.defined() ? std::vector<Expr>{old_->predicate}
+                                             : std::vector<Expr>();
+  }
+
+  // The user's domain with the number of the point: as the innermost loop, or as none.
+  void make_domain(bool at_once) {
+    const graph::ReductionVariable number{number_, Expr(0), Expr(points_), at_once};
     domain_ = std::make_shared<ReductionDomainContents>();
-    domain_->vars.push_back({unique_name("points") + ".k", Expr(0), Expr(points_)});
-    if (!old_) return;
-    old_->frozen = true;
-    domain_->vars.insert(domain_->vars.end(), old_->vars.begin(), old_->vars.end());
-    if (old_->predicate.defined()) domain_->predicate = rebound(old_->predicate);
+    if (old_) {
+      old_->frozen = true;
+      domain_->vars = old_->vars;
+    }
+    domain_->vars.insert(at_once ? domain_->vars.end() : domain_->vars.begin(), number);
+    for (const Expr& condition : at_point(conditions()))  // lest the domain own itself
+      domain_->predicate = rebind_symbol(condition, SymbolRef::weak(domain_));
   }
   Expr rebound(const Expr& e) const {
     return old_ ? rebind_symbol(e, old_.get(), SymbolRef(domain_)) : e;
@@ -136,12 +153,7 @@ class SeveralPoints {
     return std::ranges::any_of(exprs, [&](const Expr& e) { return calls(e, f_.get()); });
   }
 
-  void read_what_was_before() {
-    if (!reads_itself(args_) && !reads_itself(values_)) return;
-    if (old_)
-      unsupported(asked_, "over an RDom, what is stored does not depend on what stood there",
-                  quoted(f_->name) + " reads itself",
-                  "Read another Func, or give the iterations a dimension of their own");
+  void read_a_copy() {
     const FuncPtr before = clone_of(f_, f_->name + "_before");
     before->schedule.compute_level.kind = graph::LoopLevel::Kind::Root;
     before->schedule.store_level = before->schedule.compute_level;
@@ -150,13 +162,45 @@ class SeveralPoints {
     }
   }
 
+  // ---- whether the points of an iteration may be stored as soon as they are computed ----
+
+  bool may_take_turns() const {
+    std::vector<std::vector<Expr>> stored;  // places of the points so far
+    for (int i = 0; i < points_; ++i) {
+      std::vector<Expr> place = of_point(args_, i), all = of_point(values_, i);
+      all.insert(all.end(), place.begin(), place.end());
+      for (const Expr& condition : of_point(conditions(), i)) all.push_back(condition);
+      for (const std::vector<Expr>& earlier : stored) {
+        if (may_read(all, earlier)) return false;
+      }
+      stored.push_back(std::move(place));
+    }
+    return true;
+  }
+  bool may_read(const std::vector<Expr>& exprs, const std::vector<Expr>& place) const {
+    return std::ranges::any_of(exprs, [&](const Expr& root) {
+      return any_node(root, [&](const Call& call) {
+        return is_call_of(call, f_.get()) && !are_apart(call.args, place);
+      });
+    });
+  }
+  static bool are_apart(const std::vector<Expr>& a, const std::vector<Expr>& b) {
+    for (size_t d = 0; d < a.size() && d < b.size(); ++d) {
+      if (simplification::can_prove(cast<int>(a[d]) != cast<int>(b[d]))) return true;
+    }
+    return false;
+  }
+  static std::vector<Expr> of_point(const std::vector<Expr>& exprs, int i) {
+    return mapped(exprs, [&](const Expr& e) { return element(e, i); });
+  }
+
   std::vector<Expr> at_point(const std::vector<Expr>& exprs) const {
     return mapped(exprs, [&](const Expr& e) { return rebound(chosen(e)); });
   }
   // The points of e; one for all where it names none.
   Expr chosen(const Expr& e) const {
     if (packs_in({e}).empty()) return e;
-    const Expr point = variable(domain_->vars[0].var, Int(32), SymbolRef(domain_));
+    const Expr point = variable(number_, Int(32), SymbolRef(domain_));
     Expr result = element(e, points_ - 1);
     for (int i = points_ - 2; i >= 0; --i) result = make_select(point == i, element(e, i), result);
     return result;
@@ -169,7 +213,7 @@ class SeveralPoints {
   }
 
   const FuncPtr f_;
-  const std::string asked_;
+  const std::string asked_, number_ = unique_name("points") + ".k";
   std::vector<Expr> args_, values_;
   int points_ = 0;
   std::shared_ptr<ReductionDomainContents> old_, domain_;

@@ -1,5 +1,6 @@
 // lower_atomics -- keep only what must be indivisible, and only where iterations may meet.
-// In:  FlatStorage; names unique; an Atomic holds one update of one point of a Func.
+// In:  FlatStorage; names unique; an Atomic holds one update of one point of a Func, or of several at
+//      once.
 // Out: FlatStorage. What does not read the Func is computed before the Atomic. An Atomic with one
 //      store is that store alone. Storage that no parallel loop and no Fork shares needs no Atomic.
 //
@@ -23,7 +24,6 @@
 #include "diagnostics/error.h"
 #include "ir/atomic_update.h"
 #include "ir/build.h"
-#include "ir/equal.h"
 #include "ir/visit.h"
 #include "lower/statement_rewriter.h"
 
@@ -66,7 +66,7 @@ Stmt narrowed(const Atomic& n) {
   }
   if (!rest.defined()) return rest;
   const Store* store = rest.as<Store>();
-  if (store && is_one_word(store->value.type())) {
+  if (store && is_one_word(store->value.type()) && !touches_several_elements(n.body)) {
     Substitution values;
     for (const auto& [name, value] : inside) values[name] = substitute(value, values);
     return make_lets(outside, make_atomic(n.name, substitute(rest, values)));
@@ -82,15 +82,8 @@ Stmt narrowed(const Atomic& n) {
 }
 
 // atomic(true) of f[r] = f[r - 2] + g: an iteration reads what another one stores.
-bool reads_other_elements(const Stmt& s) {
-  return any_node(s, [&](const Atomic& n) {
-    std::unordered_map<std::string, Expr> stored;  // the element of each buffer
-    walk(n.body, [&](const Store& store) { stored[store.name] = store.index; });
-    return any_node(n.body, [&](const Load& load) {
-      const auto element = stored.find(load.name);
-      return element != stored.end() && !equal(load.index, element->second);
-    });
-  });
+bool touches_other_elements(const Stmt& s) {
+  return any_node(s, [](const Atomic& n) { return touches_several_elements(n.body); });
 }
 
 }  // namespace
@@ -110,7 +103,7 @@ Stmt lower_atomics(const Stmt& s) {
     const For* loop = node.as<For>();
     const bool is_parallel = node.kind() == Kind::Fork || (loop && runs_at_once(loop->runs));
     // Lanes take turns: in the order of the loop, whatever they read.
-    if (loop && loop->runs == ForType::Vectorized && reads_other_elements(loop->body)) {
+    if (loop && loop->runs == ForType::Vectorized && touches_other_elements(loop->body)) {
       return all(make_for(loop->name, loop->min, loop->extent, ForType::Serial, loop->body,
                           loop->partition));
     }

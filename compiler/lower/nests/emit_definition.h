@@ -15,7 +15,8 @@
 
 namespace retrograde::lower {
 
-// if (guards && predicate) { lets; Provide }
+// if (guards && predicate) { lets; Provide }. Of an update at several points at once the lets hold
+// all that is read of f, and a Provide follows for each point.
 Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest);
 
 // Boxes that one point of the loops reads of other Funcs, images and (in updates) of f, and that it
