@@ -66,15 +66,6 @@ class Slider {
     for (Interval& side : box_) side = held_from_first(side, inner);
   }
 
-  // From here on of loops further out, each iteration of which runs `inner` once.
-  void run_once(const Loop& inner) {
-    for (Interval& side : box_) {
-      for (Expr* end : {&side.min, &side.max}) {
-        if (end->defined()) *end = simplify(substitute(*end, inner.name, inner.min));
-      }
-    }
-  }
-
   std::optional<Slide> over(const Loop& loop, bool is_directly_around, int lead) {
     int d = only_moving_dimension(loop.name);
     if (d < 0 || slid_[d] || !is_pure_in(f_, d)) return {};
@@ -248,10 +239,6 @@ std::vector<Slide> slides_of(const LoopedFunc& f, const Box& box, const std::vec
   std::vector<Slide> slides;
   Slider slider(f, box, around);
   for (size_t i = 0; i < loops.size() && can_slide_over(loops[i]); i++) {
-    if ((i > 0 || lead == 0) && is_one(simplify(loops[i].extent))) {
-      slider.run_once(loops[i]);
-      continue;
-    }
     const auto slide = slider.over(loops[i], i == 0, i == 0 ? lead : 0);
     if (slide) slides.push_back(*slide);
     if (i == 0 && (slide ? slide->lead : lead) > 0) slider.hold(loops[0]);
