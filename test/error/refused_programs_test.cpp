@@ -218,6 +218,49 @@ TEST_F(Refused, AtomicUpdatesOfATupleThatReadOtherElements) {
   for (int i = 1; i <= 8; i++) EXPECT_EQ(second(i), i > 1);
 }
 
+// ---- loops that are fused after they were made parallel ----
+
+TEST_F(Refused, LoopsThatRaceWhenTheyAreOne) {
+  RDom r(0, 9, "r");
+  RVar t("t");
+  const auto update = [&](const std::function<void(Stage)>& schedule) {
+    Func f("f");
+    f(x, y) = 0;
+    f(x, y) += r;
+    f.bound(x, 0, 8).bound(y, 0, 8);
+    schedule(f.update());
+    const Buffer<int> out = f.realize({8, 8});
+    for (int i = 0; i < 64; i++) ASSERT_EQ(out(i % 8, i / 8), 36);
+  };
+  const std::initializer_list<std::string_view> parallel{
+      "where \"x\" is parallel", "must not touch the same element", "is a reduction variable",
+      " apart; or make the update atomic()"};
+  expect_error(parallel, [&] { update([&](Stage s) { s.parallel(x).fuse(r, x, t); }); });
+  expect_error(parallel, [&] { update([&](Stage s) { s.parallel(x).fuse(x, r, t); }); });
+  expect_error({"where \"x\" is vectorized", "must not touch the same element"},
+               [&] { update([&](Stage s) { s.vectorize(x).fuse(x, r, t); }); });
+  expect_error({"where \"x\" is vectorized"},
+               [&] { update([&](Stage s) { s.vectorize(x).fuse(r, x, t); }); });
+  expect_error({"where \"x\" runs on a GPU"},
+               [&] { update([&](Stage s) { s.gpu_blocks(x).fuse(r, x, t); }); });
+  expect_error(parallel, [&] { update([&](Stage s) { s.parallel(x).fuse(r, x, t).serial(t); }); });
+  // Pure loops, serial ones, and updates that are atomic are as before.
+  update([&](Stage s) { s.parallel(y).fuse(x, y, Var("t")); });
+  update([&](Stage s) { s.fuse(r, x, t).parallel(y); });
+  update([&](Stage s) { s.atomic().parallel(x).fuse(r, x, t); });
+}
+
+TEST_F(Refused, NotParallelReductionLoopsThatNeverMeet) {
+  RDom r(0, 8, 0, 8, "r");
+  RVar t("t");
+  Func f("f");
+  f(x, y) = 0;
+  f(r.x, r.y) = r.x + 10 * r.y;
+  f.update().parallel(r.y).fuse(r.x, r.y, t);
+  const Buffer<int> out = f.realize({8, 8});
+  for (int i = 0; i < 64; i++) EXPECT_EQ(out(i % 8, i / 8), i % 8 + 10 * (i / 8));
+}
+
 // ---- undefined values ----
 
 TEST_F(Refused, TuplesThatAreUndefinedInDifferentPlaces) {
