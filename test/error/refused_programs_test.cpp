@@ -336,4 +336,12 @@ TEST_F(Refused, TargetsAndFeaturesThatDoNotExist) {
   EXPECT_EQ(Target::feature_from_name("sse99"), Target::FeatureEnd);
 }
 
+TEST_F(Refused, VectorsOfATargetThatNobodyNamed) {
+  Target half = get_host_target();
+  half.arch = Target::ArchUnknown;
+  for (const Target& target : {Target(), half})
+    expect_error({"the target is known", "unknown", "get_host_target()"},
+                 [&] { target.natural_vector_size<float>(); });
+}
+
 }  // namespace
