@@ -344,4 +344,21 @@ TEST_F(Refused, VectorsOfATargetThatNobodyNamed) {
                  [&] { target.natural_vector_size<float>(); });
 }
 
+TEST_F(Refused, DevicesThatTheTargetHasNot) {
+  const Target host = get_host_target(), cuda = host.with_feature(Target::CUDA);
+  Buffer<int> b(4);
+  b.fill(1);
+  const std::string named = host.to_string();
+  for (const DeviceAPI device : {DeviceAPI::CUDA, DeviceAPI::Default_GPU}) {
+    const std::initializer_list<std::string_view> phrases{"the target has a feature of the device",
+                                                          named, "Target::CUDA"};
+    expect_error(phrases, [&] { get_device_interface_for_device_api(device, host, "ask"); });
+    expect_error(phrases, [&] { b.copy_to_device(device, host); });
+    EXPECT_EQ(get_device_interface_for_device_api(device, host), nullptr);
+    EXPECT_NE(get_device_interface_for_device_api(device, cuda, "ask"), nullptr);
+    EXPECT_NE(get_device_interface_for_device_api(device, Target(), "ask"), nullptr);
+  }
+  EXPECT_EQ(get_device_interface_for_device_api(DeviceAPI::Host, host, "ask"), nullptr);
+}
+
 }  // namespace
