@@ -146,6 +146,31 @@ TEST_F(Refused, SizesAndCoordinatesBeyond32Bits) {
   expect_error({"of 32 bits"}, [&] { BoundaryConditions::repeat_edge(f, {{0, large}}); });
 }
 
+TEST_F(Refused, ConstantsThatOverflow) {
+  const Expr large = 0x12345678, huge = Expr(INT64_MAX);
+  const auto define = [&](const Expr& value) {
+    Func f("f");
+    f(x) = value;
+    return Buffer<>(f.realize({1})).type();
+  };
+  const std::initializer_list<std::string_view> phrases{
+      "constants of int32 and int64 do not overflow", "has no place in int32"};
+  expect_error(phrases, [&] { define(large * Expr(0x76543210)); });
+  expect_error(phrases, [&] { define(x + select(x > 3, x, Expr(INT32_MAX) + 1)); });
+  expect_error(phrases, [&] { define(Expr(INT32_MIN) - 1); });
+  expect_error({"has no place in int64"}, [&] { define(huge + huge); });
+  expect_error(phrases, [&] {
+    Func f("f");
+    f(x) = 0;
+    f(large * 16) += 1;
+  });
+  // Elsewhere there is room, or arithmetic wraps around.
+  EXPECT_EQ(define(cast<int64_t>(large) * Expr(0x76543210)), halide_type_of<int64_t>());
+  EXPECT_EQ(define(cast<uint32_t>(large) * cast<uint32_t>(0x76543210)), halide_type_of<uint32_t>());
+  EXPECT_EQ(define(cast<int16_t>(32767) + cast<int16_t>(1)), halide_type_of<int16_t>());
+  EXPECT_EQ(define(Expr(INT32_MAX - 1) + 1), halide_type_of<int32_t>());
+}
+
 // ---- points that would run twice ----
 
 TEST_F(Refused, AnUpdateRoundedUpInsideOfALoop) {
