@@ -6,6 +6,7 @@
 #include "autoschedule/cost_estimate.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
+#include "ir/vector_bytes.h"
 #include "ir/visit.h"
 
 namespace retrograde::autoschedule {
@@ -176,7 +177,7 @@ std::vector<int64_t> sizes_of_side(const FuncContents& f, size_t dimension,
 VectorUnit vector_unit_of(const Target& target) {
   const bool has_many = target.arch == Target::ARM || target.has_feature(Target::AVX512);
   const int64_t registers = has_many ? 32 : 16;
-  const int64_t bytes = target.natural_vector_size(UInt(8));
+  const int64_t bytes = ir::vector_bytes(target);
   return {registers * bytes * 3 / 4, bytes};
 }
 

@@ -218,9 +218,10 @@ std::string list_of(const std::vector<NamedLoop>& names) {
 
 // Iterations that may touch the same element need atomic() of an update that is proven associative
 // and commutative, atomic(true), or allow_race_conditions(). Lanes of what atomic(true) vouches for
-// take turns, so that they may read each other's elements.
+// take turns, so that they may read each other's elements. `otherwise`: what to do instead; empty:
+// to take a pure loop.
 void check_race_free(const SchedulePlace& at, const std::string& loop, bool is_vectorized,
-                     const std::string& asked) {
+                     const std::string& asked, const std::string& otherwise = {}) {
   const Definition& stage = at.definition();
   const StageLoops& now = at.schedule();
   if (now.allow_races) return;
@@ -245,8 +246,9 @@ void check_race_free(const SchedulePlace& at, const std::string& loop, bool is_v
         text(quoted(root),
              " is a reduction variable, and its iterations may read or write one element of ",
              quoted(at.f->name)),
-        text(pure.empty() ? "Reduce into more elements first, with rfactor"
-                          : "Use " + pure + " instead: its iterations are independent",
+        text(!otherwise.empty() ? otherwise
+             : pure.empty()     ? "Reduce into more elements first, with rfactor"
+                                : "Use " + pure + " instead: its iterations are independent",
              "; or make the update atomic(), or allow_race_conditions()"));
   }
 }
@@ -282,8 +284,28 @@ void check(SplitLoop& split, const SchedulePlace& at) {
   split.factor = cast_to(Int(32), split.factor);
 }
 
-// 1. Both loops exist and differ. 2. The fused name is new. 3. The outer loop may stand directly
-// around the inner one.
+bool has_concurrent_iterations(const Dim& loop) {
+  return runs_at_once(loop.runs) || loop.runs == ForType::Vectorized;
+}
+
+// Where one of the loops is parallel or vectorized, a fused loop that keeps this runs iterations of
+// both at the same time, and one that loses it is not what was asked for.
+void check_fused_race(const SchedulePlace& at, const Dim& inner, const Dim& outer,
+                      const std::string& asked) {
+  for (const Dim* given : {&inner, &outer}) {
+    if (!has_concurrent_iterations(*given)) continue;
+    const std::string as_given = text(asked, ", where ", quoted(given->var),
+                                      given->runs == ForType::Vectorized ? " is vectorized"
+                                      : is_gpu(given->runs)              ? " runs on a GPU"
+                                                                         : " is parallel");
+    for (const Dim* loop : {&inner, &outer})
+      check_race_free(at, loop->var, given->runs == ForType::Vectorized, as_given,
+                      text("Keep ", quoted(inner.var), " and ", quoted(outer.var), " apart"));
+  }
+}
+
+// 1. Both loops exist and differ. 2. The fused name is new. 3. Iterations that run at once touch
+// different elements. 4. The outer loop may stand directly around the inner one.
 void check(FuseLoops& fuse, const SchedulePlace& at) {
   const std::string asked =
       text("fuse ", quoted(fuse.inner), " and ", quoted(fuse.outer), " of ", at.name());
@@ -291,6 +313,7 @@ void check(FuseLoops& fuse, const SchedulePlace& at) {
   if (inner == outer)
     user_error(asked, "it takes two loops", "both are " + quoted(fuse.inner), "Name two loops");
   if (fuse.fused != fuse.outer) check_new_loop(at, fuse.fused, fuse.inner, asked);
+  check_fused_race(at, at.schedule().dims[inner], at.schedule().dims[outer], asked);
   if (outer == inner + 1) return;
   std::vector<Dim> dims = at.schedule().dims;
   const auto from = dims.begin() + static_cast<std::ptrdiff_t>(outer);

@@ -16,6 +16,7 @@
 #include "graph/random_sequence.h"
 #include "ir/build.h"
 #include "ir/literal.h"
+#include "ir/overflow.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -82,6 +83,17 @@ void check_coordinates(const Site& site, const std::vector<Expr>& args,
       for (const Expr& arg : call.args)
         if (mentions_undef(arg)) refuse(arg, "of " + quoted(call.name));
     });
+  }
+}
+
+// `exprs`: as they were written, of either side.
+void check_constants(const Site& site, const std::vector<Expr>& exprs) {
+  for (const Expr& root : exprs) {
+    const Expr part = overflowing_part(root);
+    if (!part.defined()) continue;
+    user_error(site.asked, "constants of int32 and int64 do not overflow",
+               text(part, " has no place in ", to_string(part.type())),
+               "Cast an operand to a wider type, or to an unsigned one, which wraps around");
   }
 }
 
@@ -407,6 +419,7 @@ void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vec
   if (f->is_defined())
     user_error(site.asked, "a Func is defined once", "it has a definition already", "Update it");
   check_values(site, raw);
+  check_constants(site, raw);
   const std::vector<std::string> variables = pure_names(site, args);
   check_declared(site, args.size(), raw);
   if (auto domain = domain_in(site, names_in(*f, raw))) {
@@ -452,6 +465,7 @@ void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
   }
   check_update_arity(site, raw_args);
   check_values(site, raw_values);
+  check_constants(site, with(raw_args, raw_values));
   check_types(site, raw_values, f->types, "the first definition");
   const auto domain = domain_in(site, names_in(*f, with(raw_args, raw_values)), given);
   std::vector<Expr> exprs = settled(with(update_coordinates(site, raw_args), raw_values));

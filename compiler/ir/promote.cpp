@@ -1,6 +1,7 @@
 // Promotion of operands, and the C++ operators that users write.
 #include "ir/build.h"
 #include "ir/literal.h"
+#include "ir/overflow.h"
 #include "ir/print.h"
 
 namespace retrograde {
@@ -72,14 +73,21 @@ Expr constant_like(const Expr& other, int64_t value, const char* what) {
 
 using ir::Kind;
 
+#define RETROGRADE_DEFINE_ARITHMETIC(name, kind)             \
+  Expr name(Expr a, Expr b) {                                \
+    ir::match_types(a, b, #name);                            \
+    return ir::arithmetic(kind, std::move(a), std::move(b)); \
+  }
+RETROGRADE_DEFINE_ARITHMETIC(operator+, Kind::Add)
+RETROGRADE_DEFINE_ARITHMETIC(operator-, Kind::Sub)
+RETROGRADE_DEFINE_ARITHMETIC(operator*, Kind::Mul)
+#undef RETROGRADE_DEFINE_ARITHMETIC
+
 #define RETROGRADE_DEFINE_OPERATOR(name, kind)           \
   Expr name(Expr a, Expr b) {                            \
     ir::match_types(a, b, #name);                        \
     return ir::binary(kind, std::move(a), std::move(b)); \
   }
-RETROGRADE_DEFINE_OPERATOR(operator+, Kind::Add)
-RETROGRADE_DEFINE_OPERATOR(operator-, Kind::Sub)
-RETROGRADE_DEFINE_OPERATOR(operator*, Kind::Mul)
 RETROGRADE_DEFINE_OPERATOR(operator/, Kind::Div)
 RETROGRADE_DEFINE_OPERATOR(operator%, Kind::Mod)
 RETROGRADE_DEFINE_OPERATOR(operator<, Kind::LT)

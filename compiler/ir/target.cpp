@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "diagnostics/error.h"
+#include "ir/vector_bytes.h"
 
 namespace retrograde {
 
@@ -337,11 +338,19 @@ Target::Feature Target::sme_svl_feature_from_bits(int bits) {
   return FeatureEnd;
 }
 
-int Target::natural_vector_size(Type type) const {
+int ir::vector_bytes(const Target& target) {
   const bool wide =
-      features_any_of({AVX512, AVX512_Skylake, AVX512_Cannonlake, AVX512_SapphireRapids});
-  const int vector_bytes = wide ? 64 : has_feature(AVX2) ? 32 : 16;
-  return vector_bytes / std::max(type.bytes(), 1);
+      target.features_any_of({Target::AVX512, Target::AVX512_Skylake, Target::AVX512_Cannonlake,
+                              Target::AVX512_SapphireRapids});
+  return wide ? 64 : target.has_feature(Target::AVX2) ? 32 : 16;
+}
+
+int Target::natural_vector_size(Type type) const {
+  if (has_unknowns())
+    user_error("ask a target for the length of its vectors", "the target is known",
+               text("it is ", quoted(to_string())),
+               "Take get_host_target(), or name one: Target(\"x86-64-linux-avx2\")");
+  return ir::vector_bytes(*this) / std::max(type.bytes(), 1);
 }
 
 std::string Target::to_string() const {

@@ -116,7 +116,7 @@ struct Target {
   int sme_streaming_vector_bits() const;
   static Feature sme_svl_feature_from_bits(int bits);  // FeatureEnd: there is none
 
-  // Natural lanes of a vector of the type: 64-byte vectors with AVX-512, 32 with AVX2, else 16.
+  // Lanes in 64 bytes with AVX-512, 32 with AVX2, else 16. Requires: the target is known.
   int natural_vector_size(Type type) const;
   template <class T>
   int natural_vector_size() const {

@@ -8,6 +8,7 @@
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/validate.h"
+#include "ir/vector_bytes.h"
 #include "lower/device/make_kernels.h"
 #include "lower/instrumentation/check_accesses.h"
 #include "lower/instrumentation/inject_profiling.h"
@@ -110,8 +111,8 @@ bool is_pure_loop(const Lowering& lowering, const For& loop) {
 Stmt vectorize_unscheduled(const Lowering& lowering, const Stmt& s) {
   const Target& target = lowering.options.target;
   if (target.has_feature(Target::DisableLLVMLoopOpt)) return s;
-  return vectorize_inner_loops(s, {target.natural_vector_size(UInt(8)),
-                                   [&](const For& loop) { return is_pure_loop(lowering, loop); }});
+  return vectorize_inner_loops(
+      s, {ir::vector_bytes(target), [&](const For& loop) { return is_pure_loop(lowering, loop); }});
 }
 
 Stmt run_simplify(Lowering&, const Stmt& s) { return simplify(s); }

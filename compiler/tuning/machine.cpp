@@ -15,6 +15,7 @@
 #include <tuple>
 
 #include "diagnostics/error.h"
+#include "ir/vector_bytes.h"
 #include "jit/private_folder.h"
 
 namespace retrograde::tuning {
@@ -154,7 +155,7 @@ std::string Machine::to_string() const {
 Machine constants_for(const Target& target) {
   Machine machine;
   machine.threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  machine.vector_bytes = target.natural_vector_size(UInt(8));
+  machine.vector_bytes = ir::vector_bytes(target);
   machine.registers = machine.vector_bytes >= 64 || target.arch == Target::ARM ? 32 : 16;
   const double threads = machine.threads, width = machine.vector_bytes;
   machine.levels = {Machine::Level{"L1", 32 << 10, 4 * width, 4 * width * threads},

@@ -134,6 +134,21 @@ class Contradicting : public Generator<Contradicting> {
   void generate() {}
 };
 
+// Realizes what depends on an input that has no value before the function is called.
+class Premature : public Generator<Premature> {
+ public:
+  Input<Buffer<float, 1>> in{"in"};
+  Input<float> gain{"gain"};
+  Output<Buffer<float, 1>> out{"out"};
+  void generate() {
+    Func table("table");
+    Var x;
+    table(x) = x * gain;
+    const Buffer<float> values = table.realize({256});
+    out(x) = in(x) + values(x);
+  }
+};
+
 template <typename G>
 std::string refusal_of() {
   return error_of([] { GeneratorContext(get_host_target()).create<G>()->build_module(); });
@@ -167,6 +182,12 @@ class OneTooFar : public Generator<OneTooFar> {
  private:
   Var x{"x"};
 };
+
+TEST(GeneratorErrors, InputsHaveNoValueInsideOfGenerate) {
+  const std::string text = error_of<RuntimeError>(
+      [] { GeneratorContext(get_host_target()).create<Premature>()->build_module(); });
+  expect_mentions(text, {"\"gain\" needs a value", "none was set"});
+}
 
 TEST(GeneratorErrors, NamesAreIdentifiers) {
   const std::string text = refusal_of<Misnamed>();

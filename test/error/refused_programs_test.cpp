@@ -146,6 +146,31 @@ TEST_F(Refused, SizesAndCoordinatesBeyond32Bits) {
   expect_error({"of 32 bits"}, [&] { BoundaryConditions::repeat_edge(f, {{0, large}}); });
 }
 
+TEST_F(Refused, ConstantsThatOverflow) {
+  const Expr large = 0x12345678, huge = Expr(INT64_MAX);
+  const auto define = [&](const Expr& value) {
+    Func f("f");
+    f(x) = value;
+    return Buffer<>(f.realize({1})).type();
+  };
+  const std::initializer_list<std::string_view> phrases{
+      "constants of int32 and int64 do not overflow", "has no place in int32"};
+  expect_error(phrases, [&] { define(large * Expr(0x76543210)); });
+  expect_error(phrases, [&] { define(x + select(x > 3, x, Expr(INT32_MAX) + 1)); });
+  expect_error(phrases, [&] { define(Expr(INT32_MIN) - 1); });
+  expect_error({"has no place in int64"}, [&] { define(huge + huge); });
+  expect_error(phrases, [&] {
+    Func f("f");
+    f(x) = 0;
+    f(large * 16) += 1;
+  });
+  // Elsewhere there is room, or arithmetic wraps around.
+  EXPECT_EQ(define(cast<int64_t>(large) * Expr(0x76543210)), halide_type_of<int64_t>());
+  EXPECT_EQ(define(cast<uint32_t>(large) * cast<uint32_t>(0x76543210)), halide_type_of<uint32_t>());
+  EXPECT_EQ(define(cast<int16_t>(32767) + cast<int16_t>(1)), halide_type_of<int16_t>());
+  EXPECT_EQ(define(Expr(INT32_MAX - 1) + 1), halide_type_of<int32_t>());
+}
+
 // ---- points that would run twice ----
 
 TEST_F(Refused, AnUpdateRoundedUpInsideOfALoop) {
@@ -216,6 +241,49 @@ TEST_F(Refused, AtomicUpdatesOfATupleThatReadOtherElements) {
   Realization out = f.realize({10});
   const Buffer<int> second = out[1];
   for (int i = 1; i <= 8; i++) EXPECT_EQ(second(i), i > 1);
+}
+
+// ---- loops that are fused after they were made parallel ----
+
+TEST_F(Refused, LoopsThatRaceWhenTheyAreOne) {
+  RDom r(0, 9, "r");
+  RVar t("t");
+  const auto update = [&](const std::function<void(Stage)>& schedule) {
+    Func f("f");
+    f(x, y) = 0;
+    f(x, y) += r;
+    f.bound(x, 0, 8).bound(y, 0, 8);
+    schedule(f.update());
+    const Buffer<int> out = f.realize({8, 8});
+    for (int i = 0; i < 64; i++) ASSERT_EQ(out(i % 8, i / 8), 36);
+  };
+  const std::initializer_list<std::string_view> parallel{
+      "where \"x\" is parallel", "must not touch the same element", "is a reduction variable",
+      " apart; or make the update atomic()"};
+  expect_error(parallel, [&] { update([&](Stage s) { s.parallel(x).fuse(r, x, t); }); });
+  expect_error(parallel, [&] { update([&](Stage s) { s.parallel(x).fuse(x, r, t); }); });
+  expect_error({"where \"x\" is vectorized", "must not touch the same element"},
+               [&] { update([&](Stage s) { s.vectorize(x).fuse(x, r, t); }); });
+  expect_error({"where \"x\" is vectorized"},
+               [&] { update([&](Stage s) { s.vectorize(x).fuse(r, x, t); }); });
+  expect_error({"where \"x\" runs on a GPU"},
+               [&] { update([&](Stage s) { s.gpu_blocks(x).fuse(r, x, t); }); });
+  expect_error(parallel, [&] { update([&](Stage s) { s.parallel(x).fuse(r, x, t).serial(t); }); });
+  // Pure loops, serial ones, and updates that are atomic are as before.
+  update([&](Stage s) { s.parallel(y).fuse(x, y, Var("t")); });
+  update([&](Stage s) { s.fuse(r, x, t).parallel(y); });
+  update([&](Stage s) { s.atomic().parallel(x).fuse(r, x, t); });
+}
+
+TEST_F(Refused, NotParallelReductionLoopsThatNeverMeet) {
+  RDom r(0, 8, 0, 8, "r");
+  RVar t("t");
+  Func f("f");
+  f(x, y) = 0;
+  f(r.x, r.y) = r.x + 10 * r.y;
+  f.update().parallel(r.y).fuse(r.x, r.y, t);
+  const Buffer<int> out = f.realize({8, 8});
+  for (int i = 0; i < 64; i++) EXPECT_EQ(out(i % 8, i / 8), i % 8 + 10 * (i / 8));
 }
 
 // ---- undefined values ----
@@ -291,6 +359,31 @@ TEST_F(Refused, TargetsAndFeaturesThatDoNotExist) {
                            "linux-x86", "x86-65-linux", "x86-64-linux-x86"})
     expect_error({rule}, [&] { Target target{std::string(name)}; });
   EXPECT_EQ(Target::feature_from_name("sse99"), Target::FeatureEnd);
+}
+
+TEST_F(Refused, VectorsOfATargetThatNobodyNamed) {
+  Target half = get_host_target();
+  half.arch = Target::ArchUnknown;
+  for (const Target& target : {Target(), half})
+    expect_error({"the target is known", "unknown", "get_host_target()"},
+                 [&] { target.natural_vector_size<float>(); });
+}
+
+TEST_F(Refused, DevicesThatTheTargetHasNot) {
+  const Target host = get_host_target(), cuda = host.with_feature(Target::CUDA);
+  Buffer<int> b(4);
+  b.fill(1);
+  const std::string named = host.to_string();
+  for (const DeviceAPI device : {DeviceAPI::CUDA, DeviceAPI::Default_GPU}) {
+    const std::initializer_list<std::string_view> phrases{"the target has a feature of the device",
+                                                          named, "Target::CUDA"};
+    expect_error(phrases, [&] { get_device_interface_for_device_api(device, host, "ask"); });
+    expect_error(phrases, [&] { b.copy_to_device(device, host); });
+    EXPECT_EQ(get_device_interface_for_device_api(device, host), nullptr);
+    EXPECT_NE(get_device_interface_for_device_api(device, cuda, "ask"), nullptr);
+    EXPECT_NE(get_device_interface_for_device_api(device, Target(), "ask"), nullptr);
+  }
+  EXPECT_EQ(get_device_interface_for_device_api(DeviceAPI::Host, host, "ask"), nullptr);
 }
 
 }  // namespace

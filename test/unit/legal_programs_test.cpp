@@ -536,5 +536,176 @@ TEST(Promises, MaySpeakOfThemselves) {
   EXPECT_EQ(line(wide), doubled(16));
 }
 
+// The buffers of a Tuple cover one region, so that what is promised of one holds for all.
+TEST(Promises, OfTheSecondBufferOfATuple) {
+  Func f("f");
+  f(x) = Tuple(2 * x, cast<float>(x));
+  f.output_buffers()[1].dim(0).set_min(4);
+  Buffer<int> twice(8);
+  Buffer<float> once(8);
+  expect_error<RuntimeError>({"promised to be 4"}, [&] { f.realize({twice, once}); });
+  twice.set_min(4);
+  once.set_min(4);
+  f.realize({twice, once});
+  for (int i = 4; i < 12; i++) {
+    EXPECT_EQ(twice(i), 2 * i);
+    EXPECT_EQ(once(i), static_cast<float>(i));
+  }
+}
+
+// ---- what Halide refuses ----
+
+TEST(RealizedFuncs, TakeMoreUpdates) {
+  Func f("f");
+  f(x) = x;
+  EXPECT_EQ(line(Buffer<int>(f.realize({3}))), (std::vector<int>{0, 1, 2}));
+  f(x) += x;
+  EXPECT_EQ(line(Buffer<int>(f.realize({10}))), doubled(10));
+}
+
+TEST(Splits, ArePredicatedAlsoWhereTheyAreSplitAgain) {
+  const Var xo("xo"), xi("xi"), xio("xio"), xii("xii");
+  using Schedule = std::function<void(Func&)>;
+  for (const Schedule& schedule :
+       {Schedule([&](Func& f) {
+          f.split(x, xo, xi, 8, TailStrategy::PredicateStores).split(xi, xio, xii, 9);
+        }),
+        Schedule([&](Func& f) {
+          f.split(x, xo, xi, 2).split(xi, xio, xii, 4, TailStrategy::PredicateLoads);
+        })}) {
+    for (const int size : {1, 7, 8, 10, 17}) {
+      Func f = twice(), g("g");
+      f.compute_root();
+      schedule(f);
+      g(x) = f(x);
+      EXPECT_EQ(line(Buffer<int>(g.realize({size}))), doubled(size));
+    }
+  }
+}
+
+// Tails that blend store the old values beyond the end elsewhere, and nothing here.
+TEST(Splits, OfParallelUpdatesMayBlend) {
+  const Var xo("xo"), xi("xi");
+  using Schedule = std::function<void(Stage)>;
+  for (const Schedule& schedule :
+       {Schedule([&](Stage s) {
+          s.split(x, xo, xi, 8, TailStrategy::RoundUp)
+              .vectorize(xi, 16, TailStrategy::RoundUpAndBlend)
+              .parallel(xo);
+        }),
+        Schedule(
+            [&](Stage s) { s.vectorize(x, 8, TailStrategy::ShiftInwardsAndBlend).parallel(x); })}) {
+    for (int round = 0; round < 20; round++) {
+      Func f = twice();
+      f(x) += 4;
+      schedule(f.update());
+      const Buffer<int> out = f.realize({64});
+      for (int i = 0; i < 64; i++) ASSERT_EQ(out(i), 2 * i + 4);
+    }
+  }
+}
+
+TEST(Differences, AreFactoredAsSumsOfNegatives) {
+  Param<int> columns("columns"), rows("rows");
+  columns.set(7);
+  rows.set(5);
+  RDom r(3, columns, 2, rows);
+  Func f("f");
+  f(x) = 1000;
+  f(x) -= r.x * r.y + x;
+  f.update().rfactor(r.x, c);
+  const Buffer<int> out = f.realize({2});
+  EXPECT_EQ(out(0), 1000 - (3 + 4 + 5 + 6 + 7 + 8 + 9) * (2 + 3 + 4 + 5 + 6));
+  EXPECT_EQ(out(1), out(0) - 35);
+}
+
+TEST(AsyncFuncs, ReadFuncsThatAreComputedOutsideOfThem) {
+  for (int round = 0; round < 20; round++) {
+    Func f("f"), g("g"), h("h");
+    f(x) = x + 7;
+    g(x) = f(x);
+    h(x) = g(x);
+    f.store_root().compute_at(h, x);
+    g.store_root().compute_at(h, x).async();
+    const Buffer<int> out = h.realize({32});
+    for (int i = 0; i < 32; i++) ASSERT_EQ(out(i), i + 7);
+  }
+}
+
+TEST(AsyncFuncs, ReadAsyncFuncsThatAreStoredInsideOfTheirLoop) {
+  for (int round = 0; round < 20; round++) {
+    Func f("f"), g("g"), h("h");
+    f(x, y) = x + y;
+    g(x, y) = f(x, y);
+    h(x, y) = g(x, y - 1) + g(x, y + 1);
+    f.compute_at(h, y).async();
+    g.store_root().compute_at(h, y).async();
+    const Buffer<int> out = h.realize({16, 16});
+    for (int i = 0; i < 256; i++) ASSERT_EQ(out(i % 16, i / 16), 2 * (i % 16 + i / 16));
+  }
+}
+
+TEST(SharedLoops, OfAnUpdateAndItsPureDefinition) {
+  Func f("f");
+  f(x, y) = x + y;
+  f(x, y) += 2;
+  f.update(0).compute_with(f, x);
+  const Buffer<int> out = f.realize({10, 10});
+  for (int i = 0; i < 100; i++) EXPECT_EQ(out(i % 10, i / 10), i % 10 + i / 10 + 2);
+}
+
+// "a" is needed by the update alone, the others by the first definition alone.
+TEST(SharedLoops, OfFuncsThatDifferentStagesRead) {
+  Func a("a"), b("b"), d("d"), f("f");
+  a(x, y) = x + y;
+  b(x, y) = x - y;
+  d(x, y) = x * y;
+  f(x, y) = b(x + 2, y - 2) + d(x, y);
+  f(x, y) += a(x - 1, y + 1);
+  for (Func func : {a, b, d}) func.compute_at(f, y);
+  d.compute_with(a, x);
+  b.compute_with(a, x);
+  const Buffer<int> out = f.realize({20, 20});
+  for (int j = 0; j < 20; j++)
+    for (int i = 0; i < 20; i++) ASSERT_EQ(out(i, j), (i - j + 4) + i * j + (i + j));
+}
+
+TEST(Inputs, OfOneNameWhereOneIsPartOfTheProgram) {
+  ImageParam in(Int(32), 1, "input");
+  Buffer<int> given(4), table(4, "input");
+  given.fill(3);
+  table.fill(5);
+  in.set(given);
+  Func f("f");
+  f(x) = in(x) + 10 * table(x);
+  EXPECT_EQ(line(Buffer<int>(f.realize({2}))), (std::vector<int>{53, 53}));
+}
+
+TEST(Levels, AreAskedAsSoonAsTheyAreSet) {
+  EXPECT_EQ(LoopLevel::root().to_string(), "root");
+  EXPECT_TRUE(LoopLevel::root().is_root());
+}
+
+TEST(AutoschedulerBesideTheUser, KeepsTheDirectivesThatThereAre) {
+  Func f("f"), g("g");
+  f(x, y) = x + y;
+  g(x, y) = f(x + 10, y) + f(x, y);
+  g.set_estimates({{0, 50}, {0, 40}});
+  g.reorder(y, x);
+  Pipeline(g).auto_schedule(get_jit_target_from_environment());
+  const auto& loops = g.get_schedule().dims;
+  ASSERT_EQ(loops.size(), 2u);
+  EXPECT_EQ(loops[0].var, "y");
+  EXPECT_EQ(loops[1].runs, ForType::Serial);
+  const Buffer<int> out = g.realize({50, 40});
+  for (int i = 0; i < 2000; i++) ASSERT_EQ(out(i % 50, i / 50), 2 * (i % 50 + i / 50) + 10);
+}
+
+TEST(PartitionedLoops, MayHaveNothingToPartition) {
+  Func f = twice();
+  f.partition(x, Partition::Always);
+  expect_ten(f);
+}
+
 }  // namespace
 }  // namespace retrograde

@@ -29,6 +29,13 @@ bool is_shared(const Runtime::Buffer<>& buffer) {
 const halide_device_interface_t* get_device_interface_for_device_api(DeviceAPI device,
                                                                      const Target& target,
                                                                      const char* error_site) {
+  // A target that nobody named leaves devices open.
+  if (!target.has_unknowns() && !target.supports_device_api(device)) {
+    if (!error_site) return nullptr;
+    user_error(error_site, "the target has a feature of the device",
+               text("the target is ", quoted(target.to_string())),
+               "Add a feature such as Target::CUDA to the target, or name no target");
+  }
   if (device == DeviceAPI::Default_GPU)
     device = target.has_gpu_feature() ? get_default_device_api_for_target(target) : DeviceAPI::CUDA;
   if (device == DeviceAPI::CUDA) return retrograde_gpu_interface();

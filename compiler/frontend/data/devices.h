@@ -12,9 +12,9 @@ namespace retrograde {
 
 namespace Runtime = ::Halide::Runtime;
 
-// What HalideRuntime.h's functions want for memory on such a device. Default_GPU is CUDA unless the
-// target has features of another kind of device. Null for Host and None.
-// Requires: devices are CUDA's (Unsupported).
+// What HalideRuntime.h's functions want for memory on such a device. Default_GPU: CUDA, or the known
+// target's. Null for Host and None, and without an error site for what a known target has not.
+// Requires: devices are CUDA's (Unsupported); the target has a feature of the device.
 const halide_device_interface_t* get_device_interface_for_device_api(
     DeviceAPI device, const Target& target = Target(), const char* error_site = nullptr);
 

@@ -27,7 +27,7 @@ class FuncRef {
   // definition are different Vars; a definition has the dimensions that the Func was declared
   // with; a right-hand side that uses _ needs _ on the left-hand side; every variable on the
   // right-hand side stands on the left-hand side, or is of an RDom; a parameter and a pure
-  // variable of one definition have different names.
+  // variable of one definition have different names; constants of int32 and int64 do not overflow.
   Stage operator=(const Expr& value);
   Stage operator=(const Tuple& values);
   Stage operator=(const FuncRef& value);

@@ -64,9 +64,9 @@ class LoopDirectives {
   //   for y in [0, m):           for t in [0, n * m):
   //     for x in [0, n):    =>     body(t % n, t / n)
   //       body(x, y)
-  // Two reduction variables, or two pure ones; a pure one with a reduction variable gives a loop
-  // that counts as a reduction loop.
-  // Requires: it takes two loops.
+  // The fused loop runs as the outer one did. A pure loop with a reduction loop gives the latter.
+  // Requires: it takes two loops; iterations that run at the same time must not touch the same
+  // element.
   Self& fuse(const VarOrRVar& inner, const VarOrRVar& outer, const VarOrRVar& fused) {
     return give(graph::FuseLoops{inner.name(), outer.name(), fused.name()});
   }
