@@ -134,6 +134,9 @@ void check(FoldStorage& fold, const FuncContents& f) {
   check_size(fold.extent, "extent", asked);
   check_is_dimension(f, fold.dimension, asked);
 }
+void check(RingBuffer& ring, const FuncContents& f) {
+  check_size(ring.copies, "number of copies", "keep a ring buffer of " + quoted(f.name));
+}
 void check(BoundStorage& bound, const FuncContents& f) {
   const std::string asked =
       text("bound the storage of ", quoted(f.name), " in ", quoted(bound.dimension));

@@ -157,6 +157,7 @@ void give(const FoldStorage& fold, FuncPlacement& schedule) {
   rule.fold = fold.extent;
   rule.fold_forward = fold.forward;
 }
+void give(const RingBuffer& ring, FuncPlacement& schedule) { schedule.ring = ring.copies; }
 void give(const Memoize& memoize, FuncPlacement& schedule) {
   schedule.memoized = true;
   if (memoize.key.defined()) schedule.eviction_key = memoize.key;
@@ -338,6 +339,7 @@ std::vector<Directive> directives_of(const FuncContents& f) {
     if (rule.bound.defined()) log.push_back(BoundStorage{rule.var, rule.bound});
     if (rule.fold.defined()) log.push_back(FoldStorage{rule.var, rule.fold, rule.fold_forward});
   }
+  if (schedule.ring.defined()) log.push_back(RingBuffer{schedule.ring});
   if (schedule.memoized) log.push_back(Memoize{schedule.eviction_key});
   if (schedule.async) log.push_back(Async{});
   for (const Bound& bound : schedule.bounds) {

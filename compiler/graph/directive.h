@@ -148,6 +148,10 @@ struct FoldStorage {
   Expr extent;
   bool forward = true;
 };
+struct RingBuffer {
+  RETROGRADE_DIRECTIVE("ring_buffer", copies)
+  Expr copies;
+};
 struct Memoize {
   RETROGRADE_DIRECTIVE("memoize", key)
   Expr key;  // undefined: none
@@ -211,9 +215,9 @@ using Directive =
     std::variant<SplitLoop, FuseLoops, RenameLoop, ReorderLoops, RunLoop, PartitionLoop, MakeAtomic,
                  AllowRaces, Unscheduled, PrefetchData, ComputeWith, Specialize, SpecializeFail,
                  FactorOut, ComputeAt, StoreAt, HoistStorage, StoreIn, ReorderStorage, AlignStorage,
-                 BoundStorage, FoldStorage, Memoize, Async, BoundDimension, AlignBounds, Estimate,
-                 TraceLoads, TraceStores, TraceRealizations, AddTraceTag, DebugToFile, Wrap, Clone,
-                 CopyInput>;
+                 BoundStorage, FoldStorage, RingBuffer, Memoize, Async, BoundDimension, AlignBounds,
+                 Estimate, TraceLoads, TraceStores, TraceRealizations, AddTraceTag, DebugToFile,
+                 Wrap, Clone, CopyInput>;
 bool is_of_stage(const Directive& directive);  // not of the Func as a whole
 const char* name_of(const Directive& directive);
 std::vector<std::string> directive_names();

@@ -222,6 +222,7 @@ class ParameterCollector {
     for (const StorageRule& rule : f.schedule.storage_rules) {
       for (const Expr& e : {rule.alignment, rule.bound, rule.fold}) add_expr(e);
     }
+    add_expr(f.schedule.ring);
     add_expr(f.schedule.eviction_key);
     for (int i = 0; i < f.stage_count(); i++) add_stage(f.stage(i).schedule);
     if (f.extern_definition) {

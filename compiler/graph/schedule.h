@@ -134,6 +134,7 @@ struct FuncPlacement {
   std::vector<std::string> storage_dims;   // innermost first; the pure args unless reordered
   std::vector<StorageRule> storage_rules;  // of dimensions that have any
   MemoryType memory = MemoryType::Auto;
+  Expr ring;  // ring_buffer: copies of hoisted storage, used in turn; undefined: one
   bool memoized = false;
   Expr eviction_key;  // memoize: undefined when none
   bool async = false;

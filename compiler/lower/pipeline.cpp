@@ -20,6 +20,7 @@
 #include "lower/loops/insert_prefetches.h"
 #include "lower/loops/keep_accumulators.h"
 #include "lower/loops/memoize.h"
+#include "lower/loops/ring_buffers.h"
 #include "lower/loops/skip_stages.h"
 #include "lower/lower.h"
 #include "lower/nests/argument_checks.h"
@@ -64,6 +65,7 @@ StorageLayouts storage_layouts(const Lowering& lowering) {
           std::find(f.func->args.begin(), f.func->args.end(), var) - f.func->args.begin()));
     if (!is_hoisted(f)) continue;
     layout.lies_in = place_name(f.name());
+    layout.is_in_ring = f.schedule.ring.defined();
     layouts[layout.lies_in].is_place = layout.lies_in;
     layouts[layout.lies_in].folds = layout.folds;
   }
@@ -179,6 +181,8 @@ constexpr Pass passes[] = {
      [](Lowering& lowering, const Stmt& s) {
        return keep_accumulators(s, [&](const For& loop) { return is_pure_loop(lowering, loop); });
      }},
+    {"ring_buffers", Phase::Loops,
+     [](Lowering& lowering, const Stmt& s) { return ring_buffers(s, lowering.program); }},
     {"flatten_storage", Phase::FlatStorage,
      [](Lowering& lowering, const Stmt& s) {
        return flatten_storage(s, storage_layouts(lowering));

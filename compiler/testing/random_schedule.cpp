@@ -40,6 +40,7 @@ struct Placement {
   Where where = Where::Root;
   Level compute;
   bool stored_outside = false;
+  bool in_ring = false;
 };
 
 // A Func whose outer loops, from this one on, are another's.
@@ -487,9 +488,13 @@ class Scheduler {
     if (legal.empty()) return;
     const int store = random_.below(static_cast<int>(legal.size()));
     placements_[f].stored_outside = true;
-    if (random_.chance(20)) {
+    if (random_.chance(50)) {
       const int hoist = random_.between(store, static_cast<int>(legal.size()) - 1);
       add(f, HoistStorage{{loop_level(legal[hoist])}});
+      if (hoist > store && random_.chance(90)) {
+        add(f, RingBuffer{random_.between(1, 4)});
+        placements_[f].in_ring = true;
+      }
     }
     add(f, StoreAt{{loop_level(legal[store])}});
   }
@@ -521,7 +526,8 @@ class Scheduler {
     const bool memoized =
         !stored_outside && random_.chance(8) && !is_shared(f) && !reads_image_parameters();
     if (memoized) add(f, Memoize{});
-    if (!memoized && random_.chance(8) && !is_shared(f)) add(f, Async{});
+    const bool in_ring = placements_[f].in_ring;  // and stored outside: not async
+    if (!memoized && !in_ring && random_.chance(8) && !is_shared(f)) add(f, Async{});
     if (dimensions(f) == 0) return;
     if (!memoized && random_.chance(12)) {
       const int alignment = random_.pick(std::vector<int>{2, 4, 16, 5});

@@ -164,6 +164,13 @@ const std::vector<Directive>& storage_directives() {
         (Func f("f"), g("g"); g(x, y) = 3 * x - y; f(x, y) = g(x - 1, y) ^ g(x + 2, y);
          f.split(x, xo, xi, 8); g.compute_at(f, xo)),
         (g.hoist_storage_root())),
+    DIRECTIVE("ring_buffer",
+              "Hoisted memory has several copies, which iterations use in turn. An async Func is "
+              "computed that far ahead.",
+              Storage,
+              (Func f("f"), g("g"); g(x, y) = 3 * x - y; f(x, y) = g(x, y) ^ g(x + 2, y);
+               g.compute_at(f, y).hoist_storage_root().bound_extent(x, 64)),
+              (g.ring_buffer(2))),
     DIRECTIVE("fold_storage", "Coordinates are taken modulo an extent.", Storage,
               (Func f("f"), g("g"); g(x, y) = 3 * x - y; g.store_root().compute_at(f, y);
                f(x, y) = max(g(x, y), g(x, y + 2))),

@@ -347,8 +347,6 @@ TEST(NewDirectives, ThatAreNotThereAreRefusedByName) {
                                         [&] { f.stream_stores(); });
   expect_error<retrograde::Unsupported>({"stream the loads", "\"streamed\""},
                                         [&] { f.stream_loads({f}); });
-  expect_error<retrograde::Unsupported>({"ring buffer", "a Func has one copy of its storage"},
-                                        [&] { f.ring_buffer(2); });
 }
 
 TEST(Tuples, OfSeveralChoices) {

@@ -174,11 +174,7 @@ Func& Func::set_estimates(const Region& estimates) {
   return *this;
 }
 
-Func& Func::ring_buffer(const Expr&) {
-  unsupported("keep a ring buffer of " + quoted(name()), "a Func has one copy of its storage",
-              "several are asked for",
-              "Fold its storage with fold_storage(), which an async Func runs ahead in");
-}
+Func& Func::ring_buffer(const Expr& copies) { return give(graph::RingBuffer{copies}); }
 
 Stage Func::update(int index) {
   checked_update(index, "schedule update");

@@ -239,8 +239,17 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
     return give(graph::HoistStorage{{{}, level.contents()}});
   }
   Func& hoist_storage_root() { return hoist_storage(LoopLevel::root()); }
-  // Refused: a Func has one copy of its storage.
-  // Requires: a Func has one copy of its storage (Unsupported).
+  // That many copies of hoisted storage, which the iterations of the loops between use in turn: what
+  // one iteration stores is there until as many more have begun. An async Func computes that far
+  // ahead of its users.
+  //   allocate g                 allocate g[copies]
+  //   for y:                =>   for y:
+  //     g(...) = ...               g[y % copies](...) = ...
+  // Requires: the number of copies must be a defined expression; the number of copies is an integer;
+  // the number of copies is at least 1 and fits an int32; the number of copies has one value in each
+  // call: it is made of parameters and facts about buffers; a ring buffer lies in storage that is
+  // hoisted over serial loops; an async Func has a constant number of copies; an async Func in a ring
+  // buffer is computed where it is stored, at one place, in loops of fixed extent (Unsupported).
   Func& ring_buffer(const Expr& copies);
   // In which memory.
   // Requires: storage lies in memory that a CPU or a CUDA device has (Unsupported); shared memory is that

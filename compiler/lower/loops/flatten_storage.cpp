@@ -44,6 +44,7 @@ std::string element_name(const std::string& func, size_t value_count, size_t com
 // What addressing needs to know of a buffer: an Expr per dimension.
 struct Layout {
   std::vector<Expr> mins, strides, folds;
+  Expr first;  // the element it begins with, in a ring buffer; undefined: 0
 };
 
 // What the whole statement says about names, found before any rewriting.
@@ -97,7 +98,8 @@ class Flattener : public Rewriter {
   // `func` is empty for images.
   Expr index_of(const std::string& func, const std::string& buffer, const std::vector<Expr>& args) {
     auto realized = layouts_.find(func);
-    Expr index = Expr(0);
+    const Expr first = realized == layouts_.end() ? Expr() : realized->second.first;
+    Expr index = first.defined() ? first : Expr(0);
     for (size_t d = 0; d < args.size(); ++d) {
       bool known = realized != layouts_.end();
       Expr min = known ? realized->second.mins[d] : variable(fact(buffer, "min", d));
@@ -148,10 +150,14 @@ class Flattener : public Rewriter {
   Stmt allocate(const Realize& n) {
     Lets bindings;
     Layout layout;
-    layout.strides.resize(n.bounds.size());
+    const auto asked = asked_.find(n.name);
+    const bool is_in_ring = asked != asked_.end() && asked->second.is_in_ring;
+    const size_t dimensions = n.bounds.size() - (is_in_ring ? 1 : 0);
+    if (is_in_ring) layout.first = bind(n.name + ".first", (*this)(n.bounds.back().min), bindings);
+    layout.strides.resize(dimensions);
     std::vector<Expr> extents;
-    layout.folds = folds_of(n.name, n.bounds.size());
-    for (size_t d = 0; d < n.bounds.size(); ++d) {
+    layout.folds = folds_of(n.name, dimensions);
+    for (size_t d = 0; d < dimensions; ++d) {
       const Expr& fold = layout.folds[d];
       Expr min = fold.defined() ? Expr(0) : (*this)(n.bounds[d].min);
       layout.mins.push_back(bind(fact(n.name, "min", d), min, bindings));
@@ -160,7 +166,7 @@ class Flattener : public Rewriter {
       extents.push_back(is_named ? bind(fact(n.name, "extent", d), extent, bindings) : extent);
     }
     Expr stride = Expr(1), elements = make_const(Int(64), 1);
-    for (int d : storage_order(n.name, n.bounds.size())) {
+    for (int d : storage_order(n.name, dimensions)) {
       layout.strides[d] = stride = bind(fact(n.name, "stride", d), stride, bindings);
       stride = binary(Kind::Mul, stride, extents[d]);
       elements = binary(Kind::Mul, elements, cast_to(Int(64), count_of(extents[d])));

@@ -17,6 +17,8 @@ struct StorageLayout {
   std::vector<Expr> folds;  // per dimension: coordinates modulo this; undefined: as they are
   std::string lies_in;   // the place around, by its name before renaming; empty: memory of its own
   std::string is_place;  // of a place: its name before renaming
+  // The last bound of its Realize is no dimension, but the element that it begins with.
+  bool is_in_ring = false;
 };
 using StorageLayouts = std::map<std::string, StorageLayout>;  // by Func; a missing one is plain
 

@@ -21,6 +21,8 @@
 //         its own to that producer. What else the producer reads and is computed in the same loops
 //         is computed in its branch, and in the other as well where that reads it too, or what is
 //         computed together with it (compute_with).
+//         A Func with a ring buffer (ring_buffers.h) is forked around its place: both branches lie in
+//         it, and the producer may be ahead by as many iterations as there are copies.
 // Errors: such a value that both branches read, and whose storage lasts longer than theirs; loops
 //         between storage and computation that are not serial, or belong to a memoized Func.
 // Source: Halide's documentation of async; the handshake is a bounded buffer's (Dijkstra 1965).
@@ -35,6 +37,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/loops/ring_buffers.h"
 #include "lower/loops/semaphores.h"
 #include "lower/nests/make_names_unique.h"
 #include "lower/statement_rewriter.h"
@@ -343,6 +346,7 @@ class AsyncForker : public StatementRewriter {
     const Stmt s = producers_outermost(given);
     const Realize* n = s.as<Realize>();
     if (n) around_[original(n->name)] = s;
+    if (const Realize* func = n ? ring_at(*n) : nullptr) return fork_ring(*n, *func);
     if (!n || !is_async(n->name) || !produces(n->body, n->name)) return children(s);
     const Stmt body = has_loop_around(n->body, n->name) ? fork_loops(*n) : fork_once(*n);
     return make_realize(n->name, n->types, n->memory, n->bounds, body);
@@ -355,11 +359,49 @@ class AsyncForker : public StatementRewriter {
   std::vector<std::string> forked_;     // async Funcs around whose consumers this is
   std::map<std::string, int> readers_;  // of those, with semaphores of their own
   std::map<std::string, Stmt> around_;  // by original name, the last one entered
+  Names rings_;                         // Funcs whose ring buffer is around, and was forked
+  Names shared_places_;                 // theirs: both branches lie in them
 
   const std::string& original(const std::string& name) const { return program_.original(name); }
   bool is_async(const std::string& name) const {
     const LoopedFunc* f = program_.find(name);
-    return f && f->schedule.async;
+    return f && f->schedule.async && !rings_.count(f->name());
+  }
+
+  // The Realize of an async Func in its ring buffer, which loops hand on; null where this is no such
+  // place.
+  const Realize* ring_at(const Realize& place) const {
+    const std::string& name = original(place.name);
+    const LoopedFunc* f = program_.find(name.substr(0, name.rfind('.')));
+    if (!f || !f->schedule.ring.defined() || !is_async(f->name()) || name != place_name(f->name()))
+      return nullptr;
+    const Realize* found = nullptr;
+    int places = 0;
+    walk(place.body, [&](const Realize& n) {
+      if (original(n.name) != f->name()) return;
+      found = &n;
+      places++;
+    });
+    if (!found || !has_loop_around(place.body, found->name)) return nullptr;
+    if (places > 1) refuse_ring(*f, text("it is computed at ", places, " places"));
+    if (has_loop_around(found->body, found->name))
+      refuse_ring(*f, "loops run between its storage and its computation");
+    return found;
+  }
+
+  // Both branches realize the Func, whose memory is the place around.
+  Stmt fork_ring(const Realize& place, const Realize& func) {
+    const LoopedFunc& f = *program_.find(func.name);
+    const Stmt around = make_realize(func.name, func.types, func.memory, func.bounds, place.body);
+    const Realize& whole = *around.as<Realize>();
+    check_is_consumed(whole);
+    const int room = copies_in_ring(f);
+    rings_.insert(f.name());
+    shared_places_.insert(original(place.name));
+    const Stmt both = forked(whole, room, branches_of(whole, room));
+    shared_places_.erase(original(place.name));
+    rings_.erase(f.name());
+    return make_realize(place.name, place.types, place.memory, place.bounds, both);
   }
 
   // Realizes directly inside each other: those of async Funcs first, producers around what reads
@@ -399,7 +441,8 @@ class AsyncForker : public StatementRewriter {
     const Names here = places_of(producer, program_), there = places_of(consumer, program_);
     for (const std::string& place : here) {
       const auto around = around_.find(place);
-      if (!there.count(place) || around == around_.end()) continue;
+      const bool is_shared = shared_places_.count(place) > 0;
+      if (!there.count(place) || around == around_.end() || is_shared) continue;
       const Realize& n = *around->second.as<Realize>();
       producer = make_realize(n.name, n.types, n.memory, n.bounds, producer);
     }

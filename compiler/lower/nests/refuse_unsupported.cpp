@@ -120,6 +120,7 @@ void check_inlined(const FuncContents& f, const FuncPlacement& schedule) {
     refuse("store " + quoted(f.name) + " at a level", inlined);
   if (schedule.hoist_level.kind != LoopLevel::Kind::Inlined)
     refuse("hoist the storage of " + quoted(f.name), inlined);
+  if (schedule.ring.defined()) refuse("keep a ring buffer of " + quoted(f.name), inlined);
   if (const LoopLevel& level = f.pure->schedule.fuse_level; level.kind == LoopLevel::Kind::At)
     refuse(text("compute ", quoted(f.name), " with ", quoted(level.func)), inlined);
   for (const StorageRule& rule : schedule.storage_rules) {

@@ -15,6 +15,8 @@ class SizeChecks {
       check(rule.alignment, const_true(),
             text("align the storage of ", quoted(f.name()), " in ", quoted(rule.var)),
             "the alignment");
+    check(f.schedule.ring, const_true(), text("keep a ring buffer of ", quoted(f.name())),
+          "the number of copies");
     for (const Bound& bound : f.schedule.bounds)
       check(bound.modulus, const_true(),
             text("align the bounds of ", quoted(bound.var), " of ", quoted(f.name())),
