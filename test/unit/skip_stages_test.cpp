@@ -254,27 +254,6 @@ TEST_F(SkipStages, MemoizedFuncsAreLookedUpWhereTheyAreRead) {
 // ---- what is computed all the same ----
 
 // Both arms of a select are evaluated: values that no one computed must not be places in memory.
-TEST_F(SkipStages, WhatReadersStoredFurtherOutDoNotNeed) {
-  Var outer("outer"), inner("inner");
-  a(x) = counted(0, x);
-  b(x) = counted(1, a(x) + 1);
-  c(x) = counted(2, a(x) + 1);
-  out(x) = select(p, b(x), 0) + select(q, c(x), 0);
-  out.split(x, outer, inner, 5);
-  a.compute_at(out, outer);
-  b.store_root().compute_at(out, outer);
-  c.store_at(out, outer).compute_at(out, inner);
-  for (const bool first : {false, true}) {
-    for (const bool second : {false, true}) {
-      p.set(first);
-      q.set(second);
-      const Buffer<int> result = run({10});
-      for (int i = 0; i < 10; i++) EXPECT_EQ(result(i), (first + second) * (i + 1));
-      expect_calls({first || second ? 10 : 0, first ? 10 : 0, second ? 10 : 0});
-    }
-  }
-}
-
 TEST_F(SkipStages, RowsByAValueThatIsComputedBefore) {
   for (const bool at_root : {true, false}) {
     Func flag("flag"), doubled("doubled");

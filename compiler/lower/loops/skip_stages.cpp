@@ -287,36 +287,16 @@ class NeedFinder {
                                    outer->second.binders);
       outer->second.needed = simplify(substitute(outer->second.needed, need_of(func), whole));
     }
-    resolve(func, need);
-    if (is_const_true(need)) return;
-    guards_[func] = need;
-    for (const auto& [name, open] : stages_) {
-      if (uses_variable(need, need_of(name))) unresolved_[name].push_back(func);
-    }
+    if (!is_const_true(need)) guards_[func] = need;
   }
 
-  // Guards inside of the Func's storage speak of its need, which is known now. It can be evaluated there, too.
-  void resolve(const std::string& func, const Expr& need) {
-    const auto inside = unresolved_.extract(func);
-    if (!inside) return;
-    for (const std::string& name : inside.mapped()) {
-      const auto guard = guards_.find(name);
-      if (guard == guards_.end()) continue;
-      guard->second = simplify(substitute(guard->second, need_of(func), need));
-      if (is_const_true(guard->second)) {
-        guards_.erase(guard);
-        continue;
-      }
-      for (const auto& [outer, open] : stages_) {
-        if (uses_variable(guard->second, need_of(outer))) unresolved_[outer].push_back(name);
-      }
-    }
-  }
-
-  // True where a condition is not worth its while, or not known to be right.
+  // True where a condition is not worth its while, or not known to be right: as what is known later
+  // only, where a Func further out is needed.
   Expr need_outside(const Stage& stage) const {
     if (!stage.is_read || is_const_true(stage.needed)) return const_true();
-    const Expr need = simplify(without_parts_of(stage.needed, lanes_));
+    std::unordered_set<std::string> unknown = lanes_;
+    for (const auto& [name, open] : stages_) unknown.insert(need_of(name));
+    const Expr need = simplify(without_parts_of(stage.needed, unknown));
     const bool varies = uses_any_variable(need, varying_);
     for (const Stmt& producer : stage.producers) {
       if ((varies && is_one_point(producer)) || computes_others(producer)) return const_true();
@@ -404,9 +384,7 @@ class NeedFinder {
 
   FunctionRef<bool(const std::string&)> may_skip_;
   Guards guards_;
-  int guards_around_ = 0;  // choices, branches, predicates, producers
-  std::map<std::string, std::vector<std::string>>
-      unresolved_;                       // by Func: whose guards speak of its need
+  int guards_around_ = 0;                // choices, branches, predicates, producers
   std::map<std::string, Stage> stages_;  // whose storage is open
   std::vector<Binder> binders_;
   std::vector<Held> held_;
