@@ -191,7 +191,8 @@ Expr canonical_cut(Kind kind, const Expr& a, const Expr& b) {
 }  // namespace
 
 // c*y - c*k*(y / k)  is  c*(y % k): two correlated terms become one. So do those of a part of y that
-// varies:  a + k*((b - a) / k), where the last of tiles begins, is  b - (b - a) % k, whatever a is. And two clamps of one value become one.
+// varies:  a + k*((b - a) / k), where the last of tiles begins, is  b - (b - a) % k, whatever a is.
+// And the difference of two clamps of one value becomes one clamp.
 Sum BoundsEngine::joined(Sum form) {
   for (const Term& term : std::vector<Term>(form.terms)) {
     const Div* div = term.atom.as<Div>();

@@ -94,7 +94,7 @@ class Expr : public ir::Ref<ir::ExprNode> {
  public:
   using Ref::Ref;
   Expr() = default;
-  // Of bool alone: no pointer turns into a condition.
+  // A bool and nothing else, so that no pointer turns into a condition.
   template <typename T>
   requires std::same_as<T, bool> Expr(T value) : Expr(of_bool(value)) {}
   Expr(int8_t value);

@@ -25,7 +25,7 @@ Judged check_with_schedule(const RandomProgram& program, const std::function<voi
 
 // Of a run: what there is of some memory, of a device among others, was not enough. No finding.
 bool lacks_memory(const RuntimeError&);
-// Of Target::CheckedAccesses: an access outside of its memory, or a false promise. A finding.
+// Whether Target::CheckedAccesses gave the error: an access outside of its memory, or a false promise. A finding.
 bool is_access_outside(const UserError&);
 
 }  // namespace retrograde::fuzz

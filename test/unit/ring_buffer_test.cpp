@@ -203,7 +203,7 @@ TEST(RingBuffer, OfAsyncFuncsIsUsedAsAWhole) {
   });
 }
 
-// Of g, each y needs more: its tiles are as many as y says, and f is computed for each.
+// Each y needs more of g: its tiles are as many as y says, and f is computed for each.
 TEST(RingBuffer, OfAsyncFuncsTakesTurnsInLoopsOfFixedExtent) {
   for (bool runs_ahead : {false, true}) {
     Func f("f"), g("g"), h("h");

@@ -17,8 +17,7 @@ bool is_usable(const Expr& e) {
   return !any_node(e, [&](const Expr& node) {
     const auto* call = node.as<Call>();
     const bool is_pure =
-        !call || call->call_type != CallType::Operator ||
-        (call->call_type == CallType::Operator && op_info(call->op).cls == OpClass::Pure);
+        !call || call->call_type != CallType::Operator || op_info(call->op).cls == OpClass::Pure;
     return ++nodes > largest_condition || !is_pure || node.as<Load>() || node.as<ir::Let>() ||
            node.as<Broadcast>() || node.type().lanes() > 1;
   });
@@ -128,27 +127,30 @@ Expr from_outside(const Expr& condition, const Binder& binder, AtLoops at_loops)
   });
 }
 
+namespace {
+
+Expr without_parts(const Expr& condition, FunctionRef<bool(const Expr&)> drops) {
+  return map_parts(condition, [&](const Expr& part) { return drops(part) ? const_true() : part; });
+}
+
+}  // namespace
+
 Expr without_parts_of(const Expr& condition, const std::unordered_set<std::string>& names) {
-  return map_parts(condition, [&](const Expr& part) {
-    return uses_any_variable(part, names) ? const_true() : part;
-  });
+  return without_parts(condition, [&](const Expr& part) { return uses_any_variable(part, names); });
 }
 
 Expr without_reads(const Expr& condition, FunctionRef<bool(const Call&)> may_read) {
-  return map_parts(condition, [&](const Expr& part) {
-    const bool reads_others = any_node(part, [&](const Call& call) {
+  return without_parts(condition, [&](const Expr& part) {
+    return any_node(part, [&](const Call& call) {
       const bool reads = call.call_type == CallType::Func || call.call_type == CallType::Image;
       return reads && !may_read(call);
     });
-    return reads_others ? const_true() : part;
   });
 }
 
 Expr without_calls(const Expr& condition) {
-  return map_parts(condition, [](const Expr& part) {
-    const bool calls =
-        any_node(part, [](const Call& call) { return call.call_type == CallType::Extern; });
-    return calls ? const_true() : part;
+  return without_parts(condition, [](const Expr& part) {
+    return any_node(part, [](const Call& call) { return call.call_type == CallType::Extern; });
   });
 }
 
