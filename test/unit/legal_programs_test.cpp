@@ -495,6 +495,77 @@ TEST(InputRegions, StayWhereValuesArePlaces) {
   EXPECT_EQ(inferred_extent(f, in, 12), 16);
 }
 
+// a(x) = in(x) * 2, at root; `schedule` is given b; the input is asked for what is needed alone.
+void expect_exact_region(const std::function<Func(Func a)>& define, int size, int reach) {
+  ImageParam in(Int(32), 1, "in");
+  Func a("a");
+  a(x) = in(x)*2;
+  a.compute_root();
+  Func out = define(a);
+  out.infer_input_bounds({size});
+  Buffer<int> data = in.get();
+  EXPECT_EQ(data.min(0), 0) << size;
+  EXPECT_EQ(data.width(), size + reach) << size;
+  data.for_each_element([&](int i) { data(i) = i * i; });
+  const Buffer<int> found = out.realize({size});
+  for (int i = 0; i < size; i++) {
+    int expected = 0;
+    for (int k : {i, i + 1, i + 2, i + 3}) expected += 2 * k * k;
+    ASSERT_EQ(found(i), expected) << i << " of " << size;
+  }
+}
+
+// out(x) = b(x) + b(x + 1), b(x) = a(x) + a(x + 2)
+TEST(InputRegions, EndWithWhatIsNeededOfVectorsThatShift) {
+  for (const TailStrategy tail : {TailStrategy::Auto, TailStrategy::ShiftInwards}) {
+    for (const int size : {4, 15, 16, 40}) {
+      const auto define = [&](const Func& a) {
+        Func b("b"), out("out");
+        b(x) = a(x) + a(x + 2);
+        out(x) = b(x) + b(x + 1);
+        b.compute_root().vectorize(x, 16, tail);
+        return out;
+      };
+      expect_exact_region(define, size, 3);
+    }
+  }
+}
+
+// The same, with a Func between b and a that is computed inside of the loops of b.
+TEST(InputRegions, EndWithWhatFuncsInsideOfSuchLoopsNeed) {
+  for (const TailStrategy tail : {TailStrategy::RoundUp, TailStrategy::ShiftInwards}) {
+    for (const int size : {4, 15, 16, 40}) {
+      const auto define = [&](const Func& a) {
+        Var xo("xo"), xi("xi");
+        Func inside("inside"), b("b"), out("out");
+        inside(x) = a(x) + a(x + 2);
+        b(x) = inside(x);
+        out(x) = b(x) + b(x + 1);
+        b.compute_root().split(x, xo, xi, 16, tail).vectorize(xi);
+        inside.compute_at(b, xo).vectorize(x);
+        return out;
+      };
+      expect_exact_region(define, size, 3);
+    }
+  }
+}
+
+// A table is read inside of its bounds, whatever the values beyond are.
+TEST(InputRegions, EndWithThemWhereCoordinatesAreClamped) {
+  for (const int size : {4, 16, 40}) {
+    const auto define = [&](const Func& a) {
+      Func table("table"), b("b"), out("out");
+      table(x) = x;
+      b(x) = table(clamp(a(x), 0, 5000)) + table(clamp(a(x + 2), 0, 5000));
+      out(x) = b(x) + b(x + 1);
+      table.compute_root();
+      b.compute_root().vectorize(x, 16);
+      return out;
+    };
+    expect_exact_region(define, size, 3);
+  }
+}
+
 TEST(InputRegions, OfGuardedTilesInsideOfGuardedTilesEndWithThem) {
   Var y("y"), xi("xi"), yi("yi"), tile("tile");
   ImageParam in(Float(32), 2, "in");
