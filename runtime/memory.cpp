@@ -164,7 +164,7 @@ bool allocation_bytes(int64_t elements, int64_t element_bytes, size_t* bytes) {
   int64_t product = 0;
   if (elements < 0 || element_bytes < 0) return false;
   if (__builtin_mul_overflow(elements, element_bytes, &product) || product > largest) return false;
-  *bytes = static_cast<size_t>(product) + retrograde_allocation_padding;
+  *bytes = std::max<size_t>(static_cast<size_t>(product), 1);
   return true;
 }
 

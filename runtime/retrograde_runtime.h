@@ -139,9 +139,8 @@ int32_t retrograde_semaphore_init(retrograde_context*, void* semaphore, int32_t 
 int32_t retrograde_semaphore_acquire(retrograde_context*, void* semaphore, int32_t count);
 int32_t retrograde_semaphore_release(retrograde_context*, void* semaphore, int32_t count);
 
-/* Room for `elements` of `element_bytes` each, plus retrograde_allocation_padding readable bytes;
- * null when the count is negative, the size overflows, or there is no memory. */
-enum { retrograde_allocation_padding = 64 };
+/* Room for `elements` of `element_bytes` each, for one byte at least; null when the count is
+ * negative, the size overflows, or there is no memory. */
 void* retrograde_allocate(retrograde_context*, int64_t elements, int64_t element_bytes);
 /* Tells the error handler why retrograde_allocate gave null, and returns the code for it. */
 int32_t retrograde_allocation_error(retrograde_context*, const char* name, int64_t elements,

@@ -18,7 +18,6 @@ struct StackLimit {
 };
 constexpr StackLimit free_choice{16 << 10, 128 << 10};  // of allocations that may go anywhere
 constexpr StackLimit asked_for{256 << 10, 512 << 10};   // of those that ask for the stack
-constexpr int64_t stack_padding_bytes = 64;             // readable past the end, as on the heap
 }  // namespace
 
 FunctionGenerator::FunctionGenerator(Emitter& emitter, const LoweredFunction& function,
@@ -191,12 +190,11 @@ bool FunctionGenerator::fits_stack(const Allocate& s, int64_t elements) const {
   const StackLimit& limit = s.memory == MemoryType::Stack ? asked_for : free_choice;
   const int64_t element_bytes = s.type.bytes() * s.type.lanes();
   if (elements > limit.block_bytes / element_bytes) return false;
-  return c_.frame.stack_bytes + elements * element_bytes + stack_padding_bytes <=
-         limit.function_bytes;
+  return c_.frame.stack_bytes + elements * element_bytes <= limit.function_bytes;
 }
 
 Storage FunctionGenerator::allocate_on_stack(const Allocate& s, int64_t elements) {
-  const int64_t bytes = elements * s.type.bytes() * s.type.lanes() + stack_padding_bytes;
+  const int64_t bytes = elements * s.type.bytes() * s.type.lanes();
   c_.frame.stack_bytes += bytes;
   llvm::AllocaInst* block = c_.entry_alloca(b_.getInt8Ty(), bytes, s.name);
   block->setAlignment(llvm::Align(64));
