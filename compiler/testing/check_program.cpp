@@ -7,6 +7,7 @@
 
 #include "frontend/run/pipeline.h"
 #include "retrograde_runtime.h"
+#include "testing/guarded_memory.h"
 #include "testing/interpreter.h"
 
 namespace retrograde::fuzz {
@@ -125,26 +126,28 @@ bool is_access_outside(const UserError& error) {
 }
 
 Judged check_program(const RandomProgram& program, const ScheduleLog& schedule,
-                     const Target& target) {
+                     const Target& target, Watch watch) {
   return check_with_schedule(
-      program, [&] { apply(schedule, program); }, target);
+      program, [&] { apply(schedule, program); }, target, {[] {}}, watch);
 }
 
 Judged check_with_schedule(const RandomProgram& program, const std::function<void()>& schedule,
                            const Target& target,
-                           const std::vector<std::function<void()>>& preparations) {
+                           const std::vector<std::function<void()>>& preparations, Watch watch) {
   Judged judged;
-  const Target checked = target.with_feature(Target::CheckedAccesses);
+  const Target watched =
+      watch == Watch::Accesses ? target.with_feature(Target::CheckedAccesses) : target;
   try {
     schedule();
     Pipeline compiled(program.outputs);
     compiled.set_custom_trace(ignore_event);
+    if (watch == Watch::Pages) compiled.set_custom_allocator(allocate_guarded, free_guarded);
     for (const Regions& regions : program.runs) {
       oracle::Interpreter interpreter({.rounding = oracle::Rounding::Contraction});
       std::optional<std::vector<oracle::Array>> expected;  // of what runs at all
       for (const std::function<void()>& prepare : preparations) {
         prepare();
-        const std::vector<GuardedOutput> actual = run(compiled, regions, program, checked);
+        const std::vector<GuardedOutput> actual = run(compiled, regions, program, watched);
         if (!expected) expected = interpreter.realize(outputs_of(program), regions);
         compare_outputs(regions, program, *expected, actual, judged);
       }

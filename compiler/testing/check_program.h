@@ -11,17 +11,23 @@
 
 namespace retrograde::fuzz {
 
+// How an access outside of its storage becomes a finding.
+enum class Watch {
+  Accesses,  // the machine code checks accesses and promises (Target::CheckedAccesses)
+  Pages,     // the machine code as users get it; its heap blocks end before a forbidden page
+};
+
 // Floats may differ by twice the error that contraction to FMA and the stated ULP of math functions
 // can cause in this very computation (tracked_value.h); everything else is compared bit for bit. The
 // program has the schedule afterwards. Counts: "values", and those "unstable", which say nothing.
-// Accesses and promises of the machine code are checked (Target::CheckedAccesses): a false one is a finding.
 Judged check_program(const RandomProgram& program, const ScheduleLog& schedule,
-                     const Target& target);
+                     const Target& target, Watch watch = Watch::Accesses);
 // The same; `schedule` gives the schedule. What is compiled runs once after each of `preparations`, which
 // set how it runs: each run is compared.
 Judged check_with_schedule(const RandomProgram& program, const std::function<void()>& schedule,
                            const Target& target,
-                           const std::vector<std::function<void()>>& preparations = {[] {}});
+                           const std::vector<std::function<void()>>& preparations = {[] {}},
+                           Watch watch = Watch::Accesses);
 
 // Of a run: what there is of some memory, of a device among others, was not enough. No finding.
 bool lacks_memory(const RuntimeError&);

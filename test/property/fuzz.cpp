@@ -20,7 +20,10 @@ using namespace retrograde::fuzz;
 struct Scheduled {
   RandomProgram program;
   ScheduleLog schedule;
+  Watch watch = Watch::Accesses;
 };
+
+constexpr int watched_by_pages = 25;  // percent
 
 std::vector<std::string> without;
 std::string only;
@@ -41,6 +44,7 @@ Scheduled make(Choices& choices) {
                                     is_chain ? ScheduleStyle::windows() : ScheduleStyle());
   for (const std::string& directive : without)
     result.schedule = leave_out(result.schedule, directive);
+  if (choices.chance(watched_by_pages)) result.watch = Watch::Pages;
   return result;
 }
 
@@ -61,7 +65,7 @@ bool take(const std::string& name, const std::string& directive) {
 int main(int argc, char** argv) {
   const auto judge = [](Choices& choices, bool) {
     const Scheduled s = make(choices);
-    return check_program(s.program, s.schedule, get_jit_target_from_environment());
+    return check_program(s.program, s.schedule, get_jit_target_from_environment(), s.watch);
   };
   const auto text = [](Choices& choices) {
     const Scheduled s = make(choices);
