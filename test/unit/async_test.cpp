@@ -453,6 +453,24 @@ TEST_P(Async, AnErrorOfTheProducerReleasesTheConsumer) {
   }
 }
 
+// What both branches read each of them computes, and each checks that there is room for it.
+TEST_P(Async, RoomForWhatBothBranchesReadIsCheckedInBoth) {
+  Var x("x");
+  Func shared("shared"), f("f"), out("out");
+  shared(x) = x;
+  f(x) = shared(x) + shared(x + 1);
+  out(x) = f(x) + shared(x);
+  shared.compute_root().bound_storage(x, 8);
+  f.store_root().compute_at(out, x);
+  async(f);
+  limit(out);
+  for (const Target& target :
+       {get_host_target(), get_host_target().with_feature(Target::CheckedAccesses)}) {
+    expect_error<RuntimeError>({"bounded to 8 coordinates, but 101 are needed"},
+                               [&] { out.realize({100}, target); });
+  }
+}
+
 TEST_P(Async, AnErrorOfTheConsumerReleasesTheProducer) {
   Var x("x"), y("y");
   Func f("f"), out("out");

@@ -36,6 +36,7 @@
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/memory_reads.h"
 #include "ir/visit.h"
 #include "lower/loops/ring_buffers.h"
 #include "lower/loops/semaphores.h"
@@ -288,6 +289,12 @@ class AsyncBranches {
     return n && !needs(n->body, n->name, program_) ? n->body : result;
   }
 
+  // A condition of the schedule or of the sizes, which what stands beside it relies on.
+  static bool is_check(const Stmt& s) {
+    const auto* check = s.defined() ? s.as<Assert>() : nullptr;
+    return check && !reads_memory(check->condition, MemoryReads::Storage);
+  }
+
   // Just the work of the producer and of what it needs, and the control around. Undefined where
   // there is none.
   Stmt only_producer(const Stmt& s) {
@@ -301,7 +308,10 @@ class AsyncBranches {
         });
       };
       std::vector<Stmt> stmts;
-      for (const Stmt& child : n->stmts) stmts.push_back(is_wait(child) ? child : part(child));
+      for (const Stmt& child : n->stmts) {
+        const bool stays = is_wait(child) || is_check(child);
+        stmts.push_back(stays ? child : part(child));
+      }
       return make_block(std::move(stmts));
     }
     if (const For* n = s.as<For>()) {
