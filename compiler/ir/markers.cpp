@@ -20,4 +20,8 @@ Expr without_likely(const Expr& e) { return without(e, Op::likely, Op::likely_if
 Stmt without_likely(const Stmt& s) { return without(s, Op::likely, Op::likely_if_innermost); }
 Expr without_promises(const Expr& e) { return without(e, Op::promise_clamped); }
 
+Expr without_any_promises(const Expr& e) {
+  return without(e, Op::promise_clamped, Op::unsafe_promise_clamped);
+}
+
 }  // namespace retrograde::ir

@@ -68,6 +68,29 @@ TEST(Prefetch, EveryBoundStrategyKeepsTheResult) {
   }
 }
 
+// What a split promises of an iteration's coordinates says nothing of those that are fetched early.
+TEST(Prefetch, LaterCoordinatesKeepNoPromises) {
+  for (auto strategy : {PrefetchBoundStrategy::Clamp, PrefetchBoundStrategy::GuardWithIf,
+                        PrefetchBoundStrategy::NonFaulting}) {
+    Var x("x"), xo("xo"), xi("xi"), tile("tile"), column("column");
+    Func f("f"), g("g"), h("h"), out("out");
+    f(x) = x * 3;
+    g(x) = f(x);
+    h(x) = g(x) + g(x / 3);
+    out(x) = h(x);
+    f.compute_root();
+    out.split(x, xo, xi, 8, TailStrategy::ShiftInwards);
+    h.compute_at(out, xi).split(x, tile, column, 4, TailStrategy::GuardWithIf);
+    g.compute_at(h, column);
+    h.prefetch(f, column, tile, 1, strategy);
+    const Target target = get_host_target().with_feature(Target::CheckedAccesses);
+    for (int size : {8, 13}) {
+      const Buffer<int> found = out.realize({size}, target);
+      for (int i = 0; i < size; i++) ASSERT_EQ(found(i), 3 * i + 3 * (i / 3)) << size;
+    }
+  }
+}
+
 TEST(Prefetch, OneRequestForEachCacheLine) {
   Blur blur;
   blur.out.prefetch(blur.in, blur.y, blur.y, 1, PrefetchBoundStrategy::NonFaulting);

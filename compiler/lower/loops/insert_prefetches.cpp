@@ -16,6 +16,7 @@
 #include "lower/loops/insert_prefetches.h"
 
 #include "ir/build.h"
+#include "ir/markers.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
@@ -107,8 +108,9 @@ class Inserter : public StatementRewriter {
     std::vector<Range> region, data;
     for (size_t d = 0; d < box.size(); d++) {
       if (!box[d].is_bounded()) return {};
-      const Expr min = simplify(substitute(box[d].min, later));
-      const Expr max = simplify(substitute(box[d].max, later));
+      // What holds of this iteration's coordinates need not hold of a later one's.
+      const Expr min = simplify(without_any_promises(substitute(box[d].min, later)));
+      const Expr max = simplify(without_any_promises(substitute(box[d].max, later)));
       region.push_back({min, simplify(max - min + 1)});
       data.push_back(extent_of_data(name, d));
     }
