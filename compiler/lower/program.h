@@ -58,6 +58,7 @@ bool is_stored_where_computed(const LoopedFunc& f);
 // Whether the memory of f is allocated further out than it is stored, and the name of its place.
 bool is_hoisted(const LoopedFunc& f);
 std::string place_name(const std::string& func);
+bool is_place_name(const std::string& name);
 
 // "f.s1.": what the names of loops and bounds of a stage begin with.
 std::string stage_prefix(const std::string& func, int stage);

@@ -685,5 +685,56 @@ TEST_F(SlidingWindow, WhatTilesComputeAgainInKeptStorageIsRight) {
   });
 }
 
+// A tile that begins before its region would give back their first values to elements that an update
+// has finished, and that are kept for other columns.
+TEST_F(SlidingWindow, UpdatesOfKeptElementsAreNotUndoneByTiles) {
+  expect_same(
+      [&](bool slides) {
+        Var below("below"), block("block"), row("row");
+        Func f("f"), g("g"), out("out");
+        f(x, y) = x * 4 + y * 37;
+        f(x, y) += x + y;
+        g(x, y) = f(x, y + 1);
+        out(x, y) = g(x, y);
+        if (!slides) return out;
+        out.split(y, yo, yi, 8, TailStrategy::Predicate);
+        g.compute_at(out, yo)
+            .split(x, xo, xi, 5, TailStrategy::ShiftInwards)
+            .split(y, below, row, 8, TailStrategy::PredicateStores)
+            .reorder(xo, row, below, xi);
+        f.store_root().compute_at(g, row).split(y, block, y, 8);
+        f.update().unscheduled();
+        return out;
+      },
+      11, 11);
+}
+
+// The box of an iteration before the first is larger than any other.
+TEST_F(SlidingWindow, HoistedStorageHasRoomForEarlyIterations) {
+  const auto make = [&](bool slides) {
+    Var tile("tile"), in_tile("in_tile"), part("part"), in_part("in_part"), block("block"),
+        column("column");
+    Func f("f"), g("g"), h("h"), out("out");
+    f(x) = x * 7;
+    g(x) = f(x / 3 + 1);
+    h(x) = g(x / 3 + 2) + g(x + 2);
+    out(x, y) = h(x);
+    if (!slides) return out;
+    h.compute_at(out, x)
+        .split(x, tile, in_tile, 8, TailStrategy::GuardWithIf)
+        .split(in_tile, part, in_part, 16, TailStrategy::ShiftInwards);
+    g.store_root().compute_at(h, tile).split(x, block, column, 8, TailStrategy::PredicateStores);
+    f.hoist_storage(LoopLevel::root()).store_at(h, tile).compute_at(g, column);
+    f.vectorize(x, 16, TailStrategy::PredicateLoads);
+    return out;
+  };
+  Buffer<int> expected(5, 3), found(5, 3);
+  for (Buffer<int>* result : {&expected, &found}) result->set_min(-8, 0);
+  make(false).realize(expected);
+  make(true).realize(found, get_host_target().with_feature(Target::CheckedAccesses));
+  expected.for_each_element(
+      [&](int i, int j) { EXPECT_EQ(expected(i, j), found(i, j)) << i << " " << j; });
+}
+
 }  // namespace
 }  // namespace retrograde

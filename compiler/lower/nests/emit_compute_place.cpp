@@ -150,6 +150,9 @@ NestEmitter::Wanted NestEmitter::slide_together(std::vector<Member>& members,
       if (!member.loops.empty() && !is_last_round)
         member.slides =
             slides_of(*member.f, site.whole(member.need), member.loops, site.around, lead);
+      // Its first stage would write again what the updates have made of elements that are kept.
+      if (member.f->stages.size() > 1 && keeps_beside_its_regions(member, site))
+        member.slides.clear();
       all.first = std::max(all.first, slide_lead(member.slides, lead, site));
     }
     if (all.first == lead || members.size() == 1) break;

@@ -2,6 +2,7 @@
 
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/program.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::lower {
@@ -66,13 +67,26 @@ Stmt without_promises_about(const std::string& loop, const Stmt& s) {
   });
 }
 
+// Iterations before a loop's first need no more than the first does, but a box that follows from the
+// loop's variable may be larger there. Hoisted storage has room for each.
+void make_room_for_early_iterations(const Loop& early, Emitted& code) {
+  range_over_loops(code);
+  for (auto& [name, box] : code.storage) {
+    if (is_place_name(name)) box = ranged_over({early}, box);
+  }
+}
+
 }  // namespace
 
 void wrap(const Loop& loop, Emitted& code) {
-  if (code.lead > 0) code.stmt = without_promises_about(loop.name, code.stmt);
-  Expr min = code.lead > 0 ? simplify(loop.min - code.lead) : loop.min;
-  Expr extent = code.lead > 0 ? simplify(loop.extent + code.lead) : loop.extent;
-  code.stmt = make_for(loop.name, min, extent, loop.runs, code.stmt, loop.partition);
+  Loop run = loop;
+  if (code.lead > 0) {
+    code.stmt = without_promises_about(loop.name, code.stmt);
+    run.min = simplify(loop.min - code.lead);
+    run.extent = simplify(loop.extent + code.lead);
+    make_room_for_early_iterations(run, code);
+  }
+  code.stmt = make_for(loop.name, run.min, run.extent, loop.runs, code.stmt, loop.partition);
   code.lead = 0;
   code.unranged.push_back(loop);
   for (Strand& strand : code.strands) {

@@ -38,7 +38,9 @@ bool is_hoisted(const LoopedFunc& f) {
                        is_given(at.store_level) ? at.store_level : at.compute_level);
 }
 
-std::string place_name(const std::string& func) { return func + ".place"; }
+constexpr const char* place_suffix = ".place";
+std::string place_name(const std::string& func) { return func + place_suffix; }
+bool is_place_name(const std::string& name) { return name.ends_with(place_suffix); }
 
 std::string stage_prefix(const std::string& func, int stage) {
   return func + ".s" + std::to_string(stage) + ".";
