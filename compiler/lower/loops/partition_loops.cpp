@@ -23,8 +23,9 @@
 //
 // Method: outermost loop first. One walk over the body of a loop rewrites it as if its likely
 //         conditions held, and asks analysis/linear.h where each of them holds: an interval of the
-//         loop variable, for all values of inner vectorized and unrolled loops and of loops with
-//         constant extents. Conditions without such an interval stay. The intersection of the
+//         loop variable, for all values of inner vectorized and unrolled loops, of loops with constant
+//         extents, and, for conditions over lanes in a body that is not large, of loops of unknown
+//         extent. Conditions without such an interval stay. The intersection of the
 //         intervals is the steady state. Inner loops are then partitioned in the steady state
 //         only; in the rest too where the rest may be large (a border of whole tiles) and the body
 //         is small.
@@ -33,8 +34,8 @@
 //         loop along a row beside rows of other Funcs.
 //         A loop is cut only if that saves something that is worth the copies (`Saving` in
 //         steady_state.h), or if the schedule says always.
-// Not done: a condition that both this loop and an inner loop of unknown extent decide: it is left
-//         to the inner loop. Ends that depend on the lane of an enclosing vectorized loop: the
+// Not done: a scalar condition that both this loop and an inner loop of unknown extent decide: it is
+//         left to the inner loop. Ends that depend on the lane of an enclosing vectorized loop: the
 //         worst lane decides.
 // Source: folklore (index-set splitting).
 // Tests: test/golden/lower/partition_loops/, test/property/loop_passes_test.cpp.

@@ -18,6 +18,10 @@ constexpr int64_t thick_points = 32;
 // Iterations of an inner loop beside which its own borders are nothing.
 constexpr int64_t long_row = 16;
 
+// Of bodies with more nodes than this there is no copy for what inner loops of unknown extent decide,
+// too: all of the loop may be border, of which no copy is partitioned further.
+constexpr int most_around_unknown = 1500;
+
 // A loop whose extent varies has at most so many iterations if it follows what is unrolled around
 // it: what is prepared for its copies, say. No more than they does it count as a loop.
 constexpr int short_iterations = 4;
@@ -105,6 +109,7 @@ SteadyRewriter::SteadyRewriter(const For& loop, const PartitionContext& outer, b
       inside_lanes_(inside_lanes),
       has_inner_loops_(contains_serial_loop(loop.body)),
       has_costly_rows_(has_several_rows(loop.body) && node_count(loop.body) > costly_border),
+      has_room_for_unknown_(node_count(loop.body) <= most_around_unknown),
       dependent_{loop.name} {}
 
 Expr SteadyRewriter::rewrite(const Expr& e) {
@@ -150,7 +155,6 @@ Expr SteadyRewriter::bind(const std::string& name, const Expr& original) {
   return value;
 }
 
-// Inner loops of unknown extent keep their variables to themselves.
 Stmt SteadyRewriter::rewrite_loop(const Stmt& s, const For& n) {
   auto extent = as_const_int(simplify(n.extent));
   if (!is_serial(n) || extent) {
@@ -158,7 +162,8 @@ Stmt SteadyRewriter::rewrite_loop(const Stmt& s, const For& n) {
     context_.add_loop(n);
     if (uses_any_variable(context_.expand(n.min), dependent_)) dependent_.insert(n.name);
   } else {
-    context_.add_range(n.name, Interval::everything());
+    context_.add_loop(n);
+    of_unknown_extent_.insert(n.name);
   }
   if (n.runs == ForType::Vectorized) lanes_.insert(n.name);
   if (!is_serial(n)) return children(s);
@@ -230,6 +235,9 @@ bool SteadyRewriter::holds(const Expr& condition, bool is_true, bool is_choice) 
   const auto is_in = [&](const std::string& name) { return names.count(name) != 0; };
   if (std::ranges::none_of(dependent_, is_in)) return false;
   if (std::ranges::any_of(decide_alone_, is_in)) return false;
+  const bool is_over_unknown = std::ranges::any_of(of_unknown_extent_, is_in);
+  const bool is_over_lanes = inside_lanes_ || std::ranges::any_of(lanes_, is_in);
+  if (is_over_unknown && !(is_over_lanes && has_room_for_unknown_)) return false;
   auto solution = solve_for(expanded, loop_.name, context_.ranges());
   if (!solution) return false;
   ++steady_.solved;
@@ -238,7 +246,7 @@ bool SteadyRewriter::holds(const Expr& condition, bool is_true, bool is_choice) 
     steady_.needed = steady_.needed.defined() ? binary(Kind::And, steady_.needed, solution->needed)
                                               : solution->needed;
   }
-  steady_.has_thick_border |= is_about_tiles(names);
+  steady_.has_thick_border |= is_over_unknown || is_about_tiles(names);
   count_saving(names, is_choice);
   return true;
 }

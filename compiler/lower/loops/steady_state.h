@@ -89,11 +89,11 @@ class SteadyRewriter : public Rewriter {
   const For& loop_;
   PartitionContext context_;
   const bool inside_lanes_;
-  const bool has_inner_loops_, has_costly_rows_;
+  const bool has_inner_loops_, has_costly_rows_, has_room_for_unknown_;
   SteadyState steady_;
   std::unordered_set<std::string>
       dependent_;  // the loop's variable, and those of inner loops that start from it
-  std::unordered_set<std::string> inner_serial_, lanes_;
+  std::unordered_set<std::string> inner_serial_, lanes_, of_unknown_extent_;
   std::unordered_set<std::string> decide_alone_;  // of these, what their own borders are
   std::vector<std::string> enclosing_;            // inner serial loops around the place of the walk
   std::unordered_map<std::string, int64_t> inner_extents_;  // constant ones
