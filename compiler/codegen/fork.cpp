@@ -58,7 +58,8 @@ void FunctionGenerator::make(const Fork& s) {
   Value* list = c_.entry_alloca(pointer, std::max<int64_t>(count, 1), "semaphores");
   for (unsigned i = 0; i < semaphores.size(); i++)
     b_.CreateStore(semaphores[i], b_.CreateConstGEP1_64(pointer, list, i));
-  const Task first = outline(s.first, "fork"), rest = outline(s.rest, "join");
+  const Task first = outline(s.first, "parallel", "fork"),
+             rest = outline(s.rest, "parallel", "join");
   Value* code = c_.call_runtime("retrograde_fork", b_.getInt32Ty(),
                                 {first.function, first.closure, rest.function, rest.closure, list,
                                  b_.getInt32(semaphores.size())});

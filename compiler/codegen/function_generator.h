@@ -47,10 +47,15 @@ class FunctionGenerator {
     llvm::Function* function;
     Value* closure;
   };
-  // The statement as a function; `index` names its number, when it has one.
-  Task outline(const Stmt& body, const std::string& name, const std::string& index = "",
-               Type index_type = Int(32));
+  // The statement as a function; `index` names its number, when it has one. `what` it is becomes part
+  // of the function's name.
+  Task outline(const Stmt& body, const std::string& what, const std::string& name,
+               const std::string& index = "", Type index_type = Int(32));
   void parallel_loop(const ir::For& s);
+
+  // long_functions.cpp: outermost loops as functions of their own
+  bool is_worth_a_function(const ir::For& s) const;
+  void called_loop(const ir::For& s);
 
   // fork.cpp: statements that run at the same time
   void make(const ir::Fork& s);
@@ -80,7 +85,9 @@ class FunctionGenerator {
   KernelSet kernels_;
   FunctionContext c_;
   Values values_{c_};
-  int parallel_loops_ = 0;
+  int outlined_ = 0;
+  bool is_long_ = false;
+  int loops_around_ = 0;
 };
 
 }  // namespace retrograde::codegen

@@ -57,6 +57,12 @@ int x86_vector_bits(const Machine& machine) {
   return has_any(machine.target, {F::AVX, F::AVX2}) ? 256 : 128;
 }
 
+void set_option(const char* name) {
+  const auto& options = llvm::cl::getRegisteredOptions();
+  if (const auto found = options.find(name); found != options.end())
+    static_cast<llvm::cl::opt<bool>*>(found->second)->setValue(true);
+}
+
 void initialize_llvm() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -72,10 +78,11 @@ void initialize_llvm() {
     LLVMInitializeNVPTXTarget();
     LLVMInitializeNVPTXTargetMC();
     LLVMInitializeNVPTXAsmPrinter();
-    // Pointers of 32 bits to shared, constant and local memory: LLVM has no other way to ask for them.
-    const auto& options = llvm::cl::getRegisteredOptions();
-    if (const auto found = options.find("nvptx-short-ptr"); found != options.end())
-      static_cast<llvm::cl::opt<bool>*>(found->second)->setValue(true);
+    // LLVM has no other way to ask for these.
+    set_option("nvptx-short-ptr");  // pointers of 32 bits to shared, constant and local memory
+    // It moves integers to mask registers, takes time quadratic in the length of a function (half of
+    // that for the gradient of forty steps of a wave), and is worth nothing here.
+    set_option("disable-x86-domain-reassignment");
   });
 }
 
@@ -167,9 +174,11 @@ static const llvm::Target& llvm_target(const Machine& machine) {
   return *target;
 }
 
-// Where it does not, LLVM takes gathers apart, after all addresses have been computed as vectors.
+// Whether gathers beat loads one by one, which is so of some processors only: on Zen 4 they take twice
+// as long, and on most with AVX2 since their microcode was mended.
 static bool gathers_fast(const Machine& machine) {
-  if (!machine.has_avx2() || machine.has_avx512()) return machine.has_avx512();
+  const bool is_for_any = machine.tune_cpu.empty() || machine.tune_cpu.starts_with("x86-64");
+  if (!machine.has_avx2() || is_for_any) return false;
   const std::unique_ptr<llvm::MCSubtargetInfo> tuned(llvm_target(machine).createMCSubtargetInfo(
       machine.triple, machine.tune_cpu, machine.features));
   return tuned->checkFeatures("+fast-gather");

@@ -35,7 +35,8 @@ Uses names_in(const Stmt& s) {
 
 }  // namespace
 
-FunctionGenerator::Task FunctionGenerator::outline(const Stmt& body, const std::string& name,
+FunctionGenerator::Task FunctionGenerator::outline(const Stmt& body, const std::string& what,
+                                                   const std::string& name,
                                                    const std::string& index, Type index_type) {
   const Uses uses = names_in(body);
   std::vector<std::string> variables, storages;
@@ -63,7 +64,7 @@ FunctionGenerator::Task FunctionGenerator::outline(const Stmt& body, const std::
   auto* int32 = b_.getInt32Ty();
   auto* task_type = llvm::FunctionType::get(int32, {pointer, int32, pointer}, false);
   const std::string task_name =
-      source_.name + ".parallel" + std::to_string(parallel_loops_++) + "." + name;
+      source_.name + "." + what + std::to_string(outlined_++) + "." + name;
   auto* task =
       llvm::Function::Create(task_type, llvm::GlobalValue::InternalLinkage, task_name, e_.module);
   const llvm::IRBuilderBase::InsertPointGuard guard(b_);
@@ -83,7 +84,9 @@ FunctionGenerator::Task FunctionGenerator::outline(const Stmt& body, const std::
   }
   if (!index.empty())
     c_.frame.variables[index] = b_.CreateIntCast(task->getArg(1), llvm_type(e_, index_type), true);
+  ++loops_around_;
   statement(body);
+  --loops_around_;
   c_.finish(b_.getInt32(0));
   c_.frame = std::move(outer);
   return {task, closure};
@@ -96,7 +99,7 @@ void FunctionGenerator::parallel_loop(const For& s) {
     min = b_.CreateIntCast(values_.of(s.min), b_.getInt32Ty(), true);
     extent = b_.CreateIntCast(values_.of(s.extent), b_.getInt32Ty(), true);
   }
-  const Task task = outline(s.body, s.name, s.name, s.min.type());
+  const Task task = outline(s.body, "parallel", s.name, s.name, s.min.type());
   Value* code = c_.call_runtime("retrograde_parallel_for", b_.getInt32Ty(),
                                 {task.function, min, extent, task.closure});
   c_.fail_unless(b_.CreateICmpEQ(code, b_.getInt32(0)), [&] { return code; });

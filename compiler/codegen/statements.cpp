@@ -2,6 +2,7 @@
 #include "codegen/access.h"
 #include "codegen/calls.h"
 #include "codegen/function_generator.h"
+#include "codegen/long_functions.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/print.h"
@@ -53,9 +54,13 @@ void FunctionGenerator::generate() {
   auto* type = llvm::FunctionType::get(b_.getInt32Ty(), params, false);
   auto* function =
       llvm::Function::Create(type, llvm::GlobalValue::ExternalLinkage, source_.name, e_.module);
-  const Contraction contraction(e_, !e_.machine.target.has_feature(Target::StrictFloat));
+  // Checks stand between what is contracted in one copy of a definition, and not in another.
+  const bool contracts = !e_.machine.target.has_feature(Target::StrictFloat) &&
+                         !e_.machine.target.has_feature(Target::CheckedAccesses);
+  const Contraction contraction(e_, contracts);
   c_.begin(function);
   bind_arguments();
+  is_long_ = is_long(source_.body);
   if (source_.body.defined()) statement(source_.body);
   c_.finish(b_.getInt32(0));
   make_argv_wrapper(function);
@@ -148,7 +153,7 @@ void FunctionGenerator::make(const LetStmt& s) {
 void FunctionGenerator::make(const For& s) {
   switch (s.runs) {
     case ForType::Serial:
-      return serial_loop(s);
+      return is_worth_a_function(s) ? called_loop(s) : serial_loop(s);
     case ForType::Parallel:
       return parallel_loop(s);
     default:
@@ -175,7 +180,9 @@ void FunctionGenerator::serial_loop(const For& s) {
   counter->addIncoming(min, before);
   c_.frame.variables[s.name] = b_.CreateTrunc(counter, llvm_type(e_, s.min.type()));
   if (s.min.type() == Int(32)) c_.frame.indices[s.name] = counter;
+  ++loops_around_;
   statement(s.body);
+  --loops_around_;
   Value* next = b_.CreateNSWAdd(counter, b_.getInt64(1));
   counter->addIncoming(next, b_.GetInsertBlock());
   b_.CreateCondBr(b_.CreateICmpSLT(next, end), body, after);
