@@ -241,7 +241,7 @@ Target::Feature Target::checked(Feature feature) {
 bool Target::validate_target_string(const std::string& text) {
   Target target;
   Parts parts;
-  return read_words(text, target, parts).empty() && parts.all();
+  return read_words(text, target, parts).empty() && parts.all() && !target.has_unknowns();
 }
 
 Target Target::with_feature(Feature feature) const {

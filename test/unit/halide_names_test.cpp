@@ -321,6 +321,8 @@ TEST(Printing, ChoicesByTheirNames) {
   EXPECT_EQ(shown(LoopAlignStrategy::AlignEnd), "AlignEnd");
   EXPECT_EQ(shown(PrefetchBoundStrategy::NonFaulting), "NonFaulting");
   EXPECT_EQ(shown(Partition::Never), "Never");
+  EXPECT_EQ(shown(Int(8).code()) + shown(UInt(1).code()) + shown(Handle().code()), "intuinthandle");
+  EXPECT_EQ(shown(Float(16).code()) + shown(BFloat(16).code()), "floatbfloat");
 }
 
 TEST(Printing, TargetsAndLoopLevels) {
