@@ -5,7 +5,10 @@
 #include <algorithm>
 
 #include <retrograde/retrograde.h>
+#include <cstdlib>
 #include <functional>
+
+#include "support/errors.h"
 
 namespace retrograde {
 namespace {
@@ -230,6 +233,18 @@ TEST_F(LoopSchedules, StencilWithHoles) {
     }
     return f;
   });
+}
+
+TEST_F(LoopSchedules, LoopsOfAnyExtentStayWhereUnrollingThemMayFail) {
+  Func f("f");
+  f(x) = 3 * x;
+  f.unroll(x);
+  expect_error<CompileError>({"the extent of an unrolled loop must be a constant"},
+                             [&] { f.realize({17}); });
+  ASSERT_EQ(setenv("HL_PERMIT_FAILED_UNROLL", "1", 1), 0);
+  Buffer<int> result = f.realize({17});
+  unsetenv("HL_PERMIT_FAILED_UNROLL");
+  EXPECT_EQ(result(16), 48);
 }
 
 TEST_F(LoopSchedules, NarrowTypesWrapTheSame) {
