@@ -55,10 +55,6 @@ void check_values(const Site& site, const std::vector<Expr>& values) {
                                     : text("element ", i, " of the Tuple was never assigned"),
                  "Assign every Expr before it is used");
     }
-    if (values[i].as<StringImm>()) {
-      user_error(site.asked, "values are numbers or pointers", text(values[i], " is a text"),
-                 "Give the text as a Param<const char*>");
-    }
   }
 }
 
