@@ -195,6 +195,7 @@ constexpr Pass passes[] = {
     {"trim_loops", Phase::FlatStorage, alone<trim_loops>},
     {"unroll_loops", Phase::FlatStorage, alone<unroll_loops>},
     {"join_indices", Phase::FlatStorage, alone<join_indices>},
+    {"hoist_calls", Phase::FlatStorage, alone<hoist_calls>},
     {"vectorize_inner_loops", Phase::FlatStorage,
      [](Lowering& lowering, const Stmt& s) { return vectorize_unscheduled(lowering, s); }},
     {"vectorize_loops", Phase::Vector, alone<vectorize_loops>},

@@ -28,6 +28,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"free_early", free_early},
       {"fuzz_float_stores", fuzz_float_stores},
       {"join_indices", join_indices},
+      {"hoist_calls", hoist_calls},
       {"lower_atomics", lower_atomics},
       {"partition_loops", partition_loops},
       {"simplify", [](const Stmt& s) { return simplify(s); }},
