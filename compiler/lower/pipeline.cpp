@@ -226,6 +226,8 @@ constexpr Pass passes[] = {
            target.has_feature(Target::CheckedAccesses) || target.has_feature(Target::ASAN);
        return wanted ? check_accesses(s, lowering.args) : s;
      }},
+    // Last: accesses are checked against what was asked for.
+    {"bound_allocations", Phase::Vector, alone<bound_allocations>},
 };
 
 std::vector<std::string> names_of(const std::vector<LoweredArgument>& args) {
