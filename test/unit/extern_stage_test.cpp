@@ -297,7 +297,7 @@ TEST(ExternStage, IsCalledOnSlicesInItsOwnLoops) {
       in(x, y) = x * y;
       f.define_extern("extern_test_tile", {in, Expr(10), Expr(5)}, Int(32), {x, y});
       out(x, y) = f(x, y);
-      f.compute_root().tile(x, y, xo, yo, x, y, 10, 5).serial(xo).parallel(yo);
+      f.compute_root().tile(x, y, xo, yo, x, y, 10, 5).parallel(yo);
       if (in_loop)
         in.compute_at(f, xo);
       else
@@ -325,13 +325,13 @@ TEST(ExternStage, HasShorterSlicesWhereATailIsGuarded) {
       [&](int i, int j) { EXPECT_EQ(result(i, j), 40 * i + 4 * j + 2) << i << " " << j; });
 }
 
-TEST(ExternStage, SplitsAloneMakeNoLoops) {
+TEST(ExternStage, HasALoopForEachSplitOfItsOwn) {
   Var x("x"), y("y"), xo("xo"), yo("yo");
   Func in("in"), f("f");
   in(x, y) = x * y;
-  f.define_extern("extern_test_tile", {in, Expr(30), Expr(20)}, Int(32), {x, y});
-  in.compute_root();
-  f.tile(x, y, xo, yo, x, y, 10, 5).reorder(xo, x);
+  f.define_extern("extern_test_tile", {in, Expr(10), Expr(20)}, Int(32), {x, y});
+  f.split(x, xo, x, 10).reorder(y, x);
+  in.compute_at(f, xo);
   const Buffer<int> result = f.realize({30, 20});
   EXPECT_EQ(result(29, 19), 29 * 19 + 29);
 }
