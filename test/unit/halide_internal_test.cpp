@@ -350,6 +350,24 @@ TEST(DeclaredFuncs, HaveTypesAndDimensionsBeforeTheirDefinition) {
   expect_error({"\"none\"", "needs a definition first"}, [&] { none.type(); });
 }
 
+TEST(DeclaredFuncs, PromiseTheirOutputBeforeTheirDefinition) {
+  Var x("x"), y("y");
+  Func one(Int(32), 2, "one"), two({Int(32), UInt(8)}, 1, "two"), none("none");
+  one.output_buffer().dim(0).set_bounds(0, 10).dim(1).set_bounds(0, 6);
+  two.output_buffers()[1].dim(0).set_min(0);
+  one(x, y) = x + y;
+  two(x) = Tuple(x, cast<uint8_t>(x));
+  Buffer<int> result = one.realize({10, 6});
+  EXPECT_EQ(result(9, 5), 14);
+  EXPECT_THROW(one.realize(Buffer<int>(9, 6)), RuntimeError);
+  Realization both = two.realize({3});
+  EXPECT_EQ(Buffer<uint8_t>(both[1])(2), 2);
+  both[1].set_min(1);
+  both[0].set_min(1);
+  EXPECT_THROW(two.realize(both), RuntimeError);
+  expect_error({"\"none", "needs a definition first"}, [&] { none.output_buffer(); });
+}
+
 TEST(EagerInline, TakesWhatHasNoScheduleOfItsOwn) {
   Var x("x");
   Func f("f"), g("g"), h("h");
