@@ -256,6 +256,7 @@ int32_t retrograde_trace_region(retrograde_context* context, const char* func, i
   e.coordinates = coordinates;
   e.trace_tag = tag;
   e.event = static_cast<halide_trace_event_code_t>(event);
+  e.type = halide_type_t(halide_type_handle, 0, 0);  // there is no value
   e.parent_id = parent;
   e.dimensions = count;
   return retrograde_trace(context, &e);

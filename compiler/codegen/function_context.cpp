@@ -167,7 +167,12 @@ Storage& FunctionContext::storage(const std::string& name) {
 
 Value* FunctionContext::string_constant(const std::string& text) {
   Value*& constant = strings_[text];
-  if (!constant) constant = b.CreateGlobalString(text, "text");
+  if (!constant) {
+    auto* global = b.CreateGlobalString(text, "text");
+    global->setAlignment(
+        llvm::Align(8));  // as memory that holds more than bytes: low bits are free
+    constant = global;
+  }
   return constant;
 }
 

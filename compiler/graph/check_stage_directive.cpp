@@ -217,7 +217,8 @@ std::string list_of(const std::vector<NamedLoop>& names) {
 }
 
 // Iterations that may touch the same element need atomic() of an update that is proven associative
-// and commutative, atomic(true), or allow_race_conditions(). Lanes of what atomic(true) vouches for
+// and commutative, or stores one value there whichever comes last, atomic(true), or
+// allow_race_conditions(). Lanes of what atomic(true) vouches for
 // take turns, so that they may read each other's elements. `otherwise`: what to do instead; empty:
 // to take a pure loop.
 void check_race_free(const SchedulePlace& at, const std::string& loop, bool is_vectorized,
@@ -229,6 +230,7 @@ void check_race_free(const SchedulePlace& at, const std::string& loop, bool is_v
     if (can_prove_race_free(*at.f, stage, root)) continue;
     if (now.atomic) {
       if (now.override_associativity && is_vectorized) continue;
+      if (stores_one_value(*at.f, stage)) continue;
       check_atomic_reads(*at.f, stage, asked);
       if (now.override_associativity) continue;
       const AssociativityProof update = prove_associative(*at.f, stage);

@@ -55,10 +55,6 @@ void check_values(const Site& site, const std::vector<Expr>& values) {
                                     : text("element ", i, " of the Tuple was never assigned"),
                  "Assign every Expr before it is used");
     }
-    if (values[i].as<StringImm>()) {
-      user_error(site.asked, "values are numbers or pointers", text(values[i], " is a text"),
-                 "Give the text as a Param<const char*>");
-    }
   }
 }
 
@@ -353,13 +349,16 @@ Definition make_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Exp
 }  // namespace
 
 void make_outputs(FuncContents& f) {
-  for (size_t i = 0; i < f.types.size(); i++) {
+  if (!f.outputs.empty()) return;
+  const std::vector<Type>& types = f.types.empty() ? f.required_types : f.types;
+  const int dimensions = f.types.empty() ? f.required_dimensions : f.dimensions();
+  for (size_t i = 0; i < types.size(); i++) {
     auto output = std::make_shared<ParameterContents>();
-    output->name = f.types.size() == 1 ? f.name : f.name + "." + std::to_string(i);
-    output->type = f.types[i];
+    output->name = types.size() == 1 ? f.name : f.name + "." + std::to_string(i);
+    output->type = types[i];
     output->is_buffer = true;
-    output->dimensions = f.dimensions();
-    output->constraints.resize(f.args.size());
+    output->dimensions = dimensions;
+    output->constraints.resize(static_cast<size_t>(dimensions));
     f.outputs.push_back(std::move(output));
   }
 }

@@ -18,7 +18,8 @@ void define_update(const FuncPtr& f, const std::vector<Expr>& args, const std::v
 // f's values come from a C function; `asked` for messages.
 void define_extern(const FuncPtr& f, ExternDefinition definition, const std::vector<Type>& types,
                    const std::vector<std::string>& variables, const std::string& asked);
-// The buffers that stand for f when it is an output; once its args and types are known.
+// The buffers that stand for f when it is an output, unless it has them; once its args and types are known,
+// or those that it was declared with.
 void make_outputs(FuncContents& f);
 
 // CompileError unless `e` has one value in a call: made of parameters, facts of buffers, constants

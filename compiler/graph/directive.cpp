@@ -30,6 +30,7 @@ void give(const SplitLoop& split, StageLoops& schedule) {
   Dim outer = schedule.dims[at], inner = outer;
   outer.var = split.outer;
   inner.var = split.inner;
+  outer.is_in_call = false;  // each call computes what the inner loop would
   schedule.splits.push_back({Split::Kind::Split, split.old, split.outer, split.inner, split.factor,
                              split.tail, outer.is_reduction});
   schedule.dims[at] = std::move(inner);

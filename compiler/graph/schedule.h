@@ -55,8 +55,18 @@ struct Dim {
       false;  // derives from a reduction variable: order matters unless proven otherwise
   Partition partition = Partition::Auto;
   // An extern stage computes this dimension in one call of its C function, without a loop, until a
-  // directive says how the loop runs.
+  // directive splits it or says how the loop runs.
   bool is_in_call = false;
+  // As Halide asks: whether iterations are known to be independent, and whether it is an RVar's.
+  bool is_pure() const { return !is_reduction; }
+  bool is_rvar() const { return is_reduction; }
+};
+
+// Loops, innermost first. dims() is what Halide's programs call, of get_schedule().
+struct LoopList : std::vector<Dim> {
+  using std::vector<Dim>::vector;
+  LoopList(std::vector<Dim> loops) : std::vector<Dim>(std::move(loops)) {}
+  const std::vector<Dim>& operator()() const { return *this; }
 };
 
 // Where a Func is computed or stored.
@@ -90,9 +100,9 @@ struct PrefetchDirective {
 
 struct StageLoops {
   std::vector<Split> splits;  // in the order given
-  std::vector<Dim> dims;      // loops innermost first
-  bool is_given = false;      // a directive was given for this stage
-  bool atomic = false;        // updates of one element may come from several iterations at once
+  LoopList dims;
+  bool is_given = false;  // a directive was given for this stage
+  bool atomic = false;    // updates of one element may come from several iterations at once
   bool override_associativity = false;  // atomic(true): the user vouches for it
   bool allow_races = false;
   std::vector<PrefetchDirective> prefetches;

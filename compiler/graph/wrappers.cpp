@@ -346,6 +346,8 @@ FuncPtr copied_input(const FuncPtr& handle, const std::shared_ptr<ParameterConte
 FuncPtr func_of_image(const std::shared_ptr<ParameterContents>& image) {
   if (!image->func) {
     image->func = reader_of(image, image->name + "_im", SymbolRef::weak(image));
+    image->func->required_types = {image->type};
+    image->func->required_dimensions = image->dimensions;
     image->version++;
   }
   return owning(image, image->func);

@@ -466,8 +466,9 @@ Expr call_op(Op op, std::vector<Expr> args) {
   return call_op(op, type, std::move(args));
 }
 
-Expr call_extern(const std::string& name, Type type, std::vector<Expr> args) {
-  return make_node<Call>(type, CallType::Extern, Op::none, name, std::move(args), 0, SymbolRef());
+Expr call_extern(const std::string& name, Type type, std::vector<Expr> args, bool is_pure) {
+  return make_node<Call>(type, CallType::Extern, Op::none, name, std::move(args),
+                         is_pure ? Call::pure_extern : 0, SymbolRef());
 }
 
 Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int component,

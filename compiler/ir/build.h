@@ -63,7 +63,7 @@ Expr make_vector_reduce(Kind op, Expr value, int result_lanes);
 // An operator with its result type given; the one-argument form takes the first argument's type.
 Expr call_op(Op op, Type type, std::vector<Expr> args);
 Expr call_op(Op op, std::vector<Expr> args);  // with the type of the first
-Expr call_extern(const std::string& name, Type type, std::vector<Expr> args);
+Expr call_extern(const std::string& name, Type type, std::vector<Expr> args, bool is_pure = false);
 Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int component,
                SymbolRef symbol);
 Expr call_image(const std::string& name, Type type, std::vector<Expr> args, SymbolRef symbol);

@@ -309,7 +309,7 @@ enum class CallType : uint8_t {
   Operator,  // `op`, see operators.def
   Func,      // a value of another Func at integer coordinates; symbol: the Func's contents
   Image,     // an element of an ImageParam or Buffer at integer coordinates; symbol: the parameter
-  Extern,    // a C function `name` by value, pure
+  Extern,    // a C function `name` by value
 };
 struct Call : ExprNode {
   RETROGRADE_NODE(Call, call_type, op, name, component, args)
@@ -327,6 +327,10 @@ struct Call : ExprNode {
   template <class... Ops>
   requires(sizeof...(Ops) >= 1) bool is_intrinsic(Ops... which) const { return is_op(which...); }
   bool is_extern() const { return call_type == CallType::Extern; }
+  // Of a C function that depends on its arguments alone and does nothing else: loops call it once for what
+  // does not change in them.
+  bool is_pure_extern() const { return is_extern() && component == pure_extern; }
+  static constexpr int pure_extern = 1;
   bool is_pure() const {
     return call_type != CallType::Operator || op_info(op).cls != OpClass::Effect;
   }
@@ -340,7 +344,7 @@ struct Call : ExprNode {
   const Op op;             // Op::none unless Operator
   const std::string name;  // of the Func, image or C function; the operator's name for operators
   const std::vector<Expr> args;
-  const int component;  // which value of a Tuple-valued Func
+  const int component;  // which value of a Tuple-valued Func; of a C function: pure_extern, or 0
   const SymbolRef symbol;
 };
 // The call of one of these operators; null when `e` is none.

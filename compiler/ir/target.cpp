@@ -241,7 +241,7 @@ Target::Feature Target::checked(Feature feature) {
 bool Target::validate_target_string(const std::string& text) {
   Target target;
   Parts parts;
-  return read_words(text, target, parts).empty() && parts.all();
+  return read_words(text, target, parts).empty() && parts.all() && !target.has_unknowns();
 }
 
 Target Target::with_feature(Feature feature) const {
@@ -297,6 +297,14 @@ const std::vector<Implication>& implications() {
       {Target::HVX_v65, {Target::HVX_v62}},
       {Target::HVX_v62, {Target::HVX_128}},
       {Target::SVE2, {Target::SVE}},
+      {Target::ARMv89a, {Target::ARMv88a}},
+      {Target::ARMv88a, {Target::ARMv87a}},
+      {Target::ARMv87a, {Target::ARMv86a}},
+      {Target::ARMv86a, {Target::ARMv85a}},
+      {Target::ARMv85a, {Target::ARMv84a}},
+      {Target::ARMv84a, {Target::ARMv83a}},
+      {Target::ARMv83a, {Target::ARMv82a}},
+      {Target::ARMv82a, {Target::ARMv81a}},
       {Target::ARMv81a, {Target::ARMv8a}}};
   return all;
 }
@@ -350,15 +358,24 @@ int Target::natural_vector_size(Type type) const {
     user_error("ask a target for the length of its vectors", "the target is known",
                text("it is ", quoted(to_string())),
                "Take get_host_target(), or name one: Target(\"x86-64-linux-avx2\")");
-  return ir::vector_bytes(*this) / std::max(type.bytes(), 1);
+  // AVX alone has instructions of 32 bytes for floats, of 16 for integers.
+  const int bytes = type.is_float() && has_feature(AVX) ? std::max(ir::vector_bytes(*this), 32)
+                                                        : ir::vector_bytes(*this);
+  return bytes / std::max(type.bytes(), 1);
 }
 
 std::string Target::to_string() const {
   std::string result = name_of(arch_names, arch);
   result += "-" + std::to_string(bits) + "-" + name_of(os_names, os);
   std::vector<std::string> features;
+  Target named = *this;
+  if (features_all_of({TraceLoads, TraceStores, TraceRealizations})) {
+    features.push_back("trace_all");
+    for (Feature part : {TraceLoads, TraceStores, TraceRealizations})
+      named.set_feature(part, false);
+  }
   for (const auto& entry : feature_names) {
-    if (has_feature(entry.value)) features.push_back(entry.name);
+    if (named.has_feature(entry.value)) features.push_back(entry.name);
   }
   std::ranges::sort(features);
   for (const std::string& feature : features) result += "-" + feature;
@@ -449,6 +466,11 @@ bool Target::get_runtime_compatible_target(const Target& other, Target& result) 
   const std::vector<Feature> either = {CUDA, OpenCL, Metal, D3D12Compute, OpenGLCompute, HVX_128};
   const std::vector<Feature> same = {Debug, SoftFloatABI, MSAN, TSAN, ASAN};
   Target common(os, arch, bits);
+  const auto has_v8 = [](Target target) {
+    target.set_implied_features();
+    return target.has_feature(ARMv8a);
+  };
+  common.set_feature(ARMv8a, has_v8(*this) && has_v8(other));
   for (Feature feature : either) {
     common.set_feature(feature, has_feature(feature) || other.has_feature(feature));
   }

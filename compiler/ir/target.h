@@ -91,6 +91,7 @@ struct Target {
   explicit Target(const std::string& text);
   explicit Target(const char* text);  // UserError when it is null
   explicit Target(std::nullptr_t) = delete;
+  // Whether it is the text of a target, all of whose parts are known.
   static bool validate_target_string(const std::string& text);
 
   // Every target has FeatureEnd.

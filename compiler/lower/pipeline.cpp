@@ -195,6 +195,7 @@ constexpr Pass passes[] = {
     {"trim_loops", Phase::FlatStorage, alone<trim_loops>},
     {"unroll_loops", Phase::FlatStorage, alone<unroll_loops>},
     {"join_indices", Phase::FlatStorage, alone<join_indices>},
+    {"hoist_calls", Phase::FlatStorage, alone<hoist_calls>},
     {"vectorize_inner_loops", Phase::FlatStorage,
      [](Lowering& lowering, const Stmt& s) { return vectorize_unscheduled(lowering, s); }},
     {"vectorize_loops", Phase::Vector, alone<vectorize_loops>},
@@ -225,6 +226,8 @@ constexpr Pass passes[] = {
            target.has_feature(Target::CheckedAccesses) || target.has_feature(Target::ASAN);
        return wanted ? check_accesses(s, lowering.args) : s;
      }},
+    // Last: accesses are checked against what was asked for.
+    {"bound_allocations", Phase::Vector, alone<bound_allocations>},
 };
 
 std::vector<std::string> names_of(const std::vector<LoweredArgument>& args) {

@@ -13,6 +13,7 @@ const std::vector<StatementPass>& statement_passes() {
   static const std::vector<StatementPass> passes = {
       {"accumulate_vectors", accumulate_vectors},
       {"blend_masked_stores", blend_masked_stores},
+      {"bound_allocations", bound_allocations},
       {"check_accesses",  // of allocations alone: a statement does not name its buffers
        [](const Stmt& s) { return check_accesses(s, {}); }},
       {"check_promises", check_promises},
@@ -27,6 +28,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"flatten_storage", [](const Stmt& s) { return flatten_storage(s); }},
       {"free_early", free_early},
       {"fuzz_float_stores", fuzz_float_stores},
+      {"hoist_calls", hoist_calls},
       {"join_indices", join_indices},
       {"lower_atomics", lower_atomics},
       {"partition_loops", partition_loops},

@@ -27,6 +27,10 @@ Stmt trim_loops(const Stmt& s);
 // Copies the body of every Unrolled loop once per iteration. Any phase. UserError when the extent of
 // such a loop is not a constant.
 Stmt unroll_loops(const Stmt& s);
+// A pure C function of what does not change in a loop is called once, before it.
+Stmt hoist_calls(const Stmt& s);
+// Storage that is small whatever its size is has a constant size. FlatStorage or Vector.
+Stmt bound_allocations(const Stmt& s);
 // A quotient and its remainder that make up an index together are one again.
 Stmt join_indices(const Stmt& s);
 

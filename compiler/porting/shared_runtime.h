@@ -11,6 +11,10 @@ struct JITSharedRuntime {
   // Handlers of all calls: those of a Pipeline or of a call's context go before them. The ones
   // before come back.
   static JITHandlers set_default_handlers(const JITHandlers& handlers);
+  // Makes the context's handlers those of a call with `handlers`, and its custom_malloc and custom_free
+  // functions that handlers can call in theirs, where nothing else is set.
+  // Requires: there is a context.
+  static void populate_jit_handlers(JITUserContext* context, const JITHandlers& handlers);
   // Bytes that results of memoized Funcs may hold; 0: the default.
   static void memoization_cache_set_size(int64_t bytes);
   static void memoization_cache_evict(uint64_t eviction_key);

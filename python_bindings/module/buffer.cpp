@@ -240,9 +240,9 @@ void bind_facts(Class<Buffer<>>& c) {
       .def("device_dirty", &Buffer<>::device_dirty)
       .def("set_device_dirty", &Buffer<>::set_device_dirty, py::arg("dirty") = true)
       .def("has_device_allocation", &Buffer<>::has_device_allocation)
-      .def("copy_to_host", &Buffer<>::copy_to_host)
-      .def("device_sync", &Buffer<>::device_sync)
-      .def("device_free", &Buffer<>::device_free)
+      .def("copy_to_host", [](Buffer<>& b) { return b.copy_to_host(); })
+      .def("device_sync", [](Buffer<>& b) { return b.device_sync(); })
+      .def("device_free", [](Buffer<>& b) { return b.device_free(); })
       .def("copy_to_device", [](Buffer<>& b) { return b.copy_to_device(); });
 }
 

@@ -149,14 +149,6 @@ TEST(DefinitionErrors, UndefinedLeftHandSide) {
   });
 }
 
-TEST(DefinitionErrors, TextsAsValues) {
-  Var x("x");
-  expect_error({"values are numbers or pointers"}, [&] {
-    Func g;
-    g(x) = Expr("text");
-  });
-}
-
 // rule: the arguments of a first definition are Vars
 TEST(DefinitionErrors, ArgumentsOfAFirstDefinitionAreDistinctVars) {
   Var x("x");

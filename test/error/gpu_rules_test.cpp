@@ -131,6 +131,11 @@ TEST_F(GpuRules, KernelsCallNothingOfTheHost) {
   g.gpu_tile(x, y, xi, yi, 8, 8);
   expect_error<Unsupported>({"a kernel computes, and calls nothing of the host", "print"},
                             [&] { lower(g); });
+  Func words("words");
+  words(x, y) = Expr(std::string("word"));
+  words.gpu_tile(x, y, xi, yi, 8, 8);
+  expect_error<Unsupported>({"a kernel computes", "the address of the text \"word\""},
+                            [&] { lower(words); });
 }
 
 TEST_F(GpuRules, ReductionsRaceOnGpusAsElsewhere) {

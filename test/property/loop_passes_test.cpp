@@ -418,6 +418,7 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     programs.expect_same("both vectorizers", vectorize_loops(inner), Phase::Vector);
     Stmt vectorized = vectorize_loops(unrolled);
     programs.expect_same("vectorize_loops", vectorized, Phase::Vector);
+    programs.expect_same("bound_allocations", bound_allocations(vectorized), Phase::Vector);
     Stmt with_sums = accumulate_vectors(vectorized);
     programs.expect_same("accumulate_vectors", with_sums, Phase::Vector);
     accumulated += !with_sums.same_as(vectorized);

@@ -200,6 +200,39 @@ TEST(Atomic, VectorizedOverPointsAndParallelOverTheReduction) {
   }
 }
 
+// Whichever comes last: an element gets what each of its iterations stores.
+TEST(Atomic, OneValueMayBeStoredInAnyOrder) {
+  Buffer<int> in = indices();
+  Var x("x"), b("b");
+  RVar ro("ro"), ri("ri");
+  for (const bool has_two : {false, true}) {
+    RDom r(0, points);
+    Func f("f");
+    const Expr bin = unsafe_promise_clamped(in(r), 0, bins - 1);
+    if (has_two) {
+      f(b, x) = Tuple(-1, -1);
+      f(bin, x) = Tuple(x * x, x);
+    } else {
+      f(b, x) = -1;
+      f(bin, x) = x * x;
+    }
+    f.update().split(r, ro, ri, 8).reorder(ro, x, ri).atomic().parallel(ri).parallel(x);
+    if (!has_two) f.update().vectorize(ro);
+    Realization result = f.realize({bins, 5});
+    Buffer<int> first = result[0];
+    std::vector<bool> is_hit(bins);
+    for (int i = 0; i < points; i++) is_hit[static_cast<size_t>(in(i))] = true;
+    for (int i = 0; i < bins; i++)
+      for (int j = 0; j < 5; j++)
+        EXPECT_EQ(first(i, j), is_hit[static_cast<size_t>(i)] ? j * j : -1) << i << " " << j;
+  }
+  Func g("g");
+  RDom r(0, points);
+  g(x) = 0;
+  g(clamp(in(r), 0, bins - 1)) = r;
+  EXPECT_THROW(g.update().atomic().parallel(r), CompileError) << "the last one wins";
+}
+
 TEST(Atomic, AllocationsInsideTheLoopNeedNoAtomic) {
   const auto lowered = [](const std::string& text) {
     return ir::print(lower::lower_atomics(ir::parse_stmt(text)));

@@ -73,6 +73,24 @@ TEST(DeviceBuffers, CropsAndSlicesAreParts) {
                              [&] { part.device_free(); });
 }
 
+TEST(DeviceBuffers, ErrorsGoToTheHandlerOfTheContext) {
+  struct Told : JITUserContext {
+    std::string text;
+  } context;
+  Buffer<int> b = ramp(20, 10);
+  EXPECT_EQ(b.copy_to_device(with_gpu, &context), 0);
+  EXPECT_EQ(b.copy_to_host(&context), 0);
+  EXPECT_EQ(b.device_sync(&context), 0);
+  Buffer<int> part = b.cropped(0, 4, 3);
+  EXPECT_THROW(b.device_free(&context), RuntimeError) << "the context has no handler";
+  context.handlers.custom_error = [](JITUserContext* to, const char* text) {
+    static_cast<Told*>(to)->text = text;
+  };
+  EXPECT_EQ(b.device_free(&context), halide_error_code_device_free_failed);
+  expect_mentions(context.text, {"device_free", "no other Buffer may use its device memory"});
+  EXPECT_TRUE(b.has_device_allocation());
+}
+
 TEST(DeviceBuffers, TheLastHandleFreesWhatIsNewerThere) {
   const int64_t before = retrograde_simt_call_count("cuMemAlloc_v2");
   {

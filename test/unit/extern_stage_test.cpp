@@ -2,6 +2,8 @@
 #include <HalideRuntime.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+
 #include "frontend/include/retrograde/retrograde.h"
 #include "support/errors.h"
 
@@ -17,6 +19,15 @@ int& element(halide_buffer_t* b, int x, int y = 0) {
   return reinterpret_cast<int*>(b->host)[index];
 }
 }  // namespace
+
+// value, and one more call of `which`
+namespace {
+std::atomic<int> calls[4];
+}
+EXPORTED int extern_test_count(int which, int value) {
+  calls[which]++;
+  return value;
+}
 
 // out(x) = x * scale
 EXPORTED int extern_test_iota(int scale, halide_buffer_t* out) {
@@ -286,7 +297,7 @@ TEST(ExternStage, IsCalledOnSlicesInItsOwnLoops) {
       in(x, y) = x * y;
       f.define_extern("extern_test_tile", {in, Expr(10), Expr(5)}, Int(32), {x, y});
       out(x, y) = f(x, y);
-      f.compute_root().tile(x, y, xo, yo, x, y, 10, 5).serial(xo).parallel(yo);
+      f.compute_root().tile(x, y, xo, yo, x, y, 10, 5).parallel(yo);
       if (in_loop)
         in.compute_at(f, xo);
       else
@@ -314,13 +325,13 @@ TEST(ExternStage, HasShorterSlicesWhereATailIsGuarded) {
       [&](int i, int j) { EXPECT_EQ(result(i, j), 40 * i + 4 * j + 2) << i << " " << j; });
 }
 
-TEST(ExternStage, SplitsAloneMakeNoLoops) {
+TEST(ExternStage, HasALoopForEachSplitOfItsOwn) {
   Var x("x"), y("y"), xo("xo"), yo("yo");
   Func in("in"), f("f");
   in(x, y) = x * y;
-  f.define_extern("extern_test_tile", {in, Expr(30), Expr(20)}, Int(32), {x, y});
-  in.compute_root();
-  f.tile(x, y, xo, yo, x, y, 10, 5).reorder(xo, x);
+  f.define_extern("extern_test_tile", {in, Expr(10), Expr(20)}, Int(32), {x, y});
+  f.split(x, xo, x, 10).reorder(y, x);
+  in.compute_at(f, xo);
   const Buffer<int> result = f.realize({30, 20});
   EXPECT_EQ(result(29, 19), 29 * 19 + 29);
 }
@@ -514,6 +525,43 @@ TEST(ExternFunction, ArgumentsHaveTheDeclaredTypes) {
   EXPECT_EQ(result(6), 14);
   const auto wrong = [&] { return call_c_function<int, int>("extern_test_twice", cast<float>(x)); };
   EXPECT_THROW(wrong(), UserError);
+}
+
+// rule: its arguments have the types that it was declared with
+TEST(ExternFunction, APureOneIsCalledOnceForWhatALoopDoesNotChange) {
+  Var x("x"), y("y"), xo("xo");
+  const auto counted = [](int which, const Expr& value) {
+    return call_pure_c_function<int, int, int>("extern_test_count", Expr(which), value);
+  };
+  const auto expect_calls = [&](const char* schedule, int of_all, int of_rows, int of_points,
+                                Func f) {
+    std::ranges::fill(calls, 0);
+    Buffer<int> result = f.realize({32, 8});
+    for (int j = 0; j < 8; j++)
+      for (int i = 0; i < 32; i++) EXPECT_EQ(result(i, j), 7 + j + 100 * i + j) << schedule;
+    EXPECT_EQ(calls[0], of_all) << schedule;
+    EXPECT_EQ(calls[1], of_rows) << schedule;
+    EXPECT_EQ(calls[2], of_points) << schedule;
+  };
+  const auto make = [&] {
+    Func f("f");
+    f(x, y) = counted(0, 7) + counted(1, y) + counted(2, 100 * x + y);
+    return f;
+  };
+  expect_calls("plain", 1, 8, 256, make());
+  expect_calls("vectors", 1, 8, 256, make().vectorize(x, 8));
+  expect_calls("threads", 1, 8, 256, make().parallel(y).split(x, xo, x, 8));
+  Func none = make();
+  none.realize({0, 8});
+  none.realize({32, 0});
+  EXPECT_EQ(calls[0], 1) << "loops that do not run call nothing";
+
+  Func impure("impure");
+  impure(x, y) = call_c_function<int, int, int>("extern_test_count", Expr(3), Expr(7));
+  impure.realize({32, 8});
+  EXPECT_EQ(calls[3], 256);
+  EXPECT_THROW((call_pure_c_function<int, int, int>("extern_test_count", x, 2.0f)), CompileError);
+  EXPECT_THROW((call_pure_c_function<int, int, int>("extern_test_count", x, Expr())), CompileError);
 }
 
 TEST(ExternFunction, AnUnknownOneIsAnError) {

@@ -85,6 +85,12 @@ TEST(Targets, SayWhomTheyAreTunedFor) {
   EXPECT_FALSE(Target::validate_target_string("x86-64-linux-vector_bits_many"));
 }
 
+TEST(Targets, AreValidWhereAllIsKnown) {
+  EXPECT_TRUE(Target::validate_target_string("x86-32-linux-sse41"));
+  EXPECT_FALSE(Target::validate_target_string(Target().to_string()));
+  EXPECT_TRUE(Target(Target().to_string()).has_unknowns()) << "it is read all the same";
+}
+
 TEST(Targets, ImplyFeatures) {
   Target target("x86-64-linux-avx512_skylake");
   target.set_implied_features();

@@ -284,6 +284,29 @@ TEST(Functions, AnswerWhatFuncsDo) {
   EXPECT_TRUE(f(x, y)[0].function().same_as(function));
   EXPECT_EQ(Func(Int(32), 1, "declared").function().required_dimensions(), 1);
   EXPECT_EQ(Func(Int(32), 1, "declared").function().required_types()[0], Int(32));
+  const Func of_image = ImageParam(UInt(8), 3, "image");
+  EXPECT_EQ(of_image.function().required_dimensions(), 3);
+  EXPECT_EQ(of_image.function().required_types(), std::vector<Type>{UInt(8)});
+}
+
+// A program that schedules what it did not write.
+TEST(Functions, LoopsSayWhatTheyAre) {
+  Var x("x"), y("y");
+  Func f("f");
+  RDom r(0, 10, "r");
+  f(x, y) = 0.0f;
+  f(x, y) += sin(r + x) * y;
+  std::string pure, others;
+  const auto loops = f.update(0).get_schedule().dims();
+  for (auto loop : loops) {
+    (loop.is_pure() ? pure : others) += loop.var + " ";
+    EXPECT_NE(loop.is_pure(), loop.is_rvar());
+    if (loop.is_pure() && loop.var == "x")
+      f.update(0).vectorize(VarOrRVar(loop.var, loop.is_rvar()), 4);
+  }
+  EXPECT_EQ(pure, "x y ");
+  EXPECT_EQ(others, r.x.name() + " ");
+  EXPECT_EQ(f.update(0).get_schedule().dims().size(), 4u) << "x is split";
 }
 
 TEST(Functions, OfNothingAreErrors) {
@@ -325,6 +348,24 @@ TEST(DeclaredFuncs, HaveTypesAndDimensionsBeforeTheirDefinition) {
   EXPECT_FALSE(one.defined());
   EXPECT_EQ(none.outputs() + none.dimensions(), 0);
   expect_error({"\"none\"", "needs a definition first"}, [&] { none.type(); });
+}
+
+TEST(DeclaredFuncs, PromiseTheirOutputBeforeTheirDefinition) {
+  Var x("x"), y("y");
+  Func one(Int(32), 2, "one"), two({Int(32), UInt(8)}, 1, "two"), none("none");
+  one.output_buffer().dim(0).set_bounds(0, 10).dim(1).set_bounds(0, 6);
+  two.output_buffers()[1].dim(0).set_min(0);
+  one(x, y) = x + y;
+  two(x) = Tuple(x, cast<uint8_t>(x));
+  Buffer<int> result = one.realize({10, 6});
+  EXPECT_EQ(result(9, 5), 14);
+  EXPECT_THROW(one.realize(Buffer<int>(9, 6)), RuntimeError);
+  Realization both = two.realize({3});
+  EXPECT_EQ(Buffer<uint8_t>(both[1])(2), 2);
+  both[1].set_min(1);
+  both[0].set_min(1);
+  EXPECT_THROW(two.realize(both), RuntimeError);
+  expect_error({"\"none", "needs a definition first"}, [&] { none.output_buffer(); });
 }
 
 TEST(EagerInline, TakesWhatHasNoScheduleOfItsOwn) {
@@ -502,6 +543,14 @@ TEST(SharedRuntime, HasHandlersForAllCalls) {
   JITSharedRuntime::set_num_threads(0);
   expect_error({"the number of threads", "it is not negative"},
                [] { JITSharedRuntime::set_num_threads(-1); });
+  JITUserContext context;
+  JITSharedRuntime::populate_jit_handlers(&context, handlers);
+  void* memory = context.handlers.custom_malloc(&context, 100);
+  ASSERT_NE(memory, nullptr);
+  context.handlers.custom_free(&context, memory);
+  EXPECT_EQ(context.handlers.custom_print, handlers.custom_print);
+  expect_error({"there is a context"},
+               [&] { JITSharedRuntime::populate_jit_handlers(nullptr, handlers); });
   JITSharedRuntime::memoization_cache_set_size(1 << 16);
   JITSharedRuntime::memoization_cache_set_size(0);
   JITSharedRuntime::memoization_cache_evict(1);

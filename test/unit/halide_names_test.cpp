@@ -321,6 +321,8 @@ TEST(Printing, ChoicesByTheirNames) {
   EXPECT_EQ(shown(LoopAlignStrategy::AlignEnd), "AlignEnd");
   EXPECT_EQ(shown(PrefetchBoundStrategy::NonFaulting), "NonFaulting");
   EXPECT_EQ(shown(Partition::Never), "Never");
+  EXPECT_EQ(shown(Int(8).code()) + shown(UInt(1).code()) + shown(Handle().code()), "intuinthandle");
+  EXPECT_EQ(shown(Float(16).code()) + shown(BFloat(16).code()), "floatbfloat");
 }
 
 TEST(Printing, TargetsAndLoopLevels) {
@@ -370,6 +372,23 @@ TEST_F(Pointers, OfParamsAndImagesAreValues) {
   EXPECT_EQ(same(2), texts[0]);
   reversed(x) = in(3 - x);
   expect_reversed(reversed);
+}
+
+TEST_F(Pointers, OfTextsAreValues) {
+  Func text("text"), chosen("chosen"), copied("copied");
+  text(x) = cast<const char*>(std::string("one text"));
+  chosen(x) = select(x % 2 == 0, Expr(std::string("even")), Expr(std::string("odd")));
+  copied(x) = Tuple(text(x), chosen(x));
+  text.compute_root().vectorize(x, 4);
+  chosen.compute_root().vectorize(x, 4).parallel(x);
+  Realization both = copied.realize({20});
+  Buffer<const char*> texts = both[0], choices = both[1];
+  for (int i = 0; i < 20; i++) {
+    EXPECT_STREQ(texts(i), "one text");
+    EXPECT_EQ(texts(i), texts(0));
+    EXPECT_STREQ(choices(i), i % 2 == 0 ? "even" : "odd");
+  }
+  EXPECT_EQ(reinterpret_cast<uintptr_t>(texts(0)) % 4, 0u);
 }
 
 TEST_F(Pointers, RunInVectorsAndThreads) {

@@ -221,6 +221,8 @@ TEST(Target, RoundTripsThroughText) {
   }
   EXPECT_EQ(Target(get_host_target().to_string()), get_host_target());
   EXPECT_TRUE(Target("host-no_asserts").has_feature(Target::NoAsserts));
+  EXPECT_EQ(Target("x86-64-linux-trace_all").to_string(), "x86-64-linux-trace_all");
+  EXPECT_TRUE(Target("x86-64-linux-trace_all").has_feature(Target::TraceStores));
   EXPECT_THROW(Target("x86-64-linux-avx3"), UserError);
   EXPECT_THROW(Target("x86-64"), UserError);
   EXPECT_THROW(Target("x86-64-linux-arm"), UserError);
@@ -228,6 +230,8 @@ TEST(Target, RoundTripsThroughText) {
   EXPECT_FALSE(Target::validate_target_string("linux"));
   EXPECT_EQ(Target(""), get_host_target());
   EXPECT_EQ(Target("x86-64-linux-avx2").natural_vector_size<float>(), 8);
+  EXPECT_EQ(Target("x86-64-linux-avx").natural_vector_size<float>(), 8);
+  EXPECT_EQ(Target("x86-64-linux-avx").natural_vector_size<int>(), 4);
   EXPECT_EQ(Target("x86-64-linux-avx512_skylake").natural_vector_size<uint8_t>(), 64);
   EXPECT_EQ(Target("arm-64-linux").natural_vector_size<int16_t>(), 8);
 }
@@ -256,6 +260,9 @@ TEST(Target, OneRuntimeServesFeaturesThatItDoesNotSee) {
   EXPECT_TRUE(avx.get_runtime_compatible_target(wide, common));
   EXPECT_EQ(common, Target("x86-64-linux"));
   EXPECT_FALSE(avx.get_runtime_compatible_target(Target("arm-64-linux"), common));
+  const Target newer("arm-64-linux-armv87a-armv8a"), older("arm-64-linux-armv82a-armv83a");
+  EXPECT_TRUE(newer.get_runtime_compatible_target(older, common));
+  EXPECT_EQ(common.to_string(), "arm-64-linux-armv8a");
 }
 
 TEST(Select, LiteralsTakeTheTypeOfTheOtherArm) {

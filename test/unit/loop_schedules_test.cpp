@@ -5,7 +5,10 @@
 #include <algorithm>
 
 #include <retrograde/retrograde.h>
+#include <cstdlib>
 #include <functional>
+
+#include "support/errors.h"
 
 namespace retrograde {
 namespace {
@@ -230,6 +233,44 @@ TEST_F(LoopSchedules, StencilWithHoles) {
     }
     return f;
   });
+}
+
+// What is needed of f in the last tile, or by a choice, is less than in the others.
+TEST_F(LoopSchedules, SmallStorageOfAnySizeIsNoHeapMemory) {
+  struct Counting : JITUserContext {
+    int allocations = 0;
+  } context;
+  context.handlers.custom_malloc = [](JITUserContext* c, size_t bytes) {
+    static_cast<Counting*>(c)->allocations++;
+    return std::malloc(bytes);
+  };
+  context.handlers.custom_free = [](JITUserContext*, void* memory) { std::free(memory); };
+  Param<bool> far("far", true);
+  Func f("f"), g("g"), heap("heap"), out("out");
+  Var xo("xo"), xi("xi");
+  f(x) = 3 * x;
+  g(x) = x + 1;
+  heap(x) = x + 2;
+  out(x) = f(x) + g(select(far, 0, 2)) + g(0) + heap(0);
+  out.split(x, xo, xi, 8, TailStrategy::GuardWithIf);
+  f.compute_at(out, xo);
+  g.compute_root();
+  heap.compute_root().store_in(MemoryType::Heap);
+  Buffer<int> result = out.realize(&context, {21});
+  EXPECT_EQ(context.allocations, 1);
+  for (int i = 0; i < 21; i++) EXPECT_EQ(result(i), 3 * i + 4) << i;
+}
+
+TEST_F(LoopSchedules, LoopsOfAnyExtentStayWhereUnrollingThemMayFail) {
+  Func f("f");
+  f(x) = 3 * x;
+  f.unroll(x);
+  expect_error<CompileError>({"the extent of an unrolled loop must be a constant"},
+                             [&] { f.realize({17}); });
+  ASSERT_EQ(setenv("HL_PERMIT_FAILED_UNROLL", "1", 1), 0);
+  Buffer<int> result = f.realize({17});
+  unsetenv("HL_PERMIT_FAILED_UNROLL");
+  EXPECT_EQ(result(16), 48);
 }
 
 TEST_F(LoopSchedules, NarrowTypesWrapTheSame) {

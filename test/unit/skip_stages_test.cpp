@@ -85,6 +85,31 @@ TEST_F(SkipStages, WhatOnlyASkippedFuncReads) {
   EXPECT_EQ(found(3), 8);
 }
 
+TEST_F(SkipStages, WhatOnlyASkippedFuncThatIsStoredFurtherOutReads) {
+  Var xo("xo"), xi("xi");
+  a(x) = counted(0, x);
+  b(x) = counted(1, a(x) + 1);
+  c(x) = counted(2, b(x) + 2);
+  Func d("d");
+  d(x) = a(x) + 5;
+  out(x) = select(p, c(x), 0) + select(q, d(x), 0);
+  out.split(x, xo, xi, 5);
+  a.compute_at(out, xo);
+  b.compute_at(out, xo);
+  c.store_root().compute_at(out, xo);
+  d.store_at(out, xo).compute_at(out, xi);
+  for (const bool wants_c : {false, true}) {
+    for (const bool wants_d : {false, true}) {
+      p.set(wants_c);
+      q.set(wants_d);
+      Buffer<int> found = run({10});
+      expect_calls({wants_c || wants_d ? 10 : 0, wants_c ? 10 : 0, wants_c ? 10 : 0});
+      for (int i = 0; i < 10; i++)
+        EXPECT_EQ(found(i), (wants_c ? i + 3 : 0) + (wants_d ? i + 5 : 0)) << i;
+    }
+  }
+}
+
 TEST_F(SkipStages, WhatIsReadUnderOppositeConditions) {
   a(x) = counted(0, x);
   b(x) = counted(1, select(p, a(x), x));

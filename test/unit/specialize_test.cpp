@@ -130,6 +130,40 @@ TEST_F(Specialize, ConditionsAreFactsInTheirBranches) {
   }
 }
 
+// Also those that are tried after others, which have changed what is left.
+TEST_F(Specialize, CompoundConditionsAreFactsInLaterBranches) {
+  struct Counting : JITUserContext {
+    int loads = 0;
+  } context;
+  context.handlers.custom_trace = [](JITUserContext* to, const halide_trace_event_t* event) {
+    static_cast<Counting*>(to)->loads += event->event == halide_trace_load;
+    return 1;
+  };
+  Param<float> across("across"), down("down");
+  ImageParam in(Int(32), 2, "in");
+  Buffer<int> image(16, 16);
+  image.for_each_element([&](int i, int j) { image(i, j) = i + 100 * j; });
+  in.set(image);
+  in.trace_loads();
+  const Expr wide = across > 1.0f, high = down > 1.0f;
+  const Expr grows = wide && high, shrinks = !wide && !high;
+  Func f("f");
+  f(x, y) = select(grows, in(x / 2, y / 2), select(shrinks, in(x * 2, y * 2), 0));
+  f.specialize(grows && !shrinks);
+  f.specialize(!grows && shrinks);
+  f.specialize(!grows && !shrinks);
+  const auto loads_at = [&](float a, float d, int (*value)(int, int)) {
+    across.set(a);
+    down.set(d);
+    context.loads = 0;
+    expect_values(Buffer<int>(f.realize(&context, {8, 8})), value);
+    return context.loads;
+  };
+  EXPECT_EQ(loads_at(2, 2, [](int i, int j) { return i / 2 + 100 * (j / 2); }), 64);
+  EXPECT_EQ(loads_at(0.5f, 0.5f, [](int i, int j) { return 2 * i + 200 * j; }), 64);
+  loads_at(0.5f, 2, [](int, int) { return 0; });
+}
+
 TEST_F(Specialize, FailsWhenNoneFits) {
   Param<int> n("n");
   Func f("f");

@@ -183,6 +183,7 @@ int32_t collect(JITUserContext* context, const halide_trace_event_t* e) {
   const std::lock_guard lock(collector.mutex);
   const auto id = static_cast<int32_t>(collector.events.size() + 1);
   collector.events.push_back({id, e->parent_id, e->event, e->func});
+  if (!e->value) EXPECT_EQ(e->type, halide_type_t(halide_type_handle, 0, 0)) << e->func;
   return id;
 }
 

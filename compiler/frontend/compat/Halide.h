@@ -229,61 +229,74 @@ struct halide_global_ns;
 #define HALIDE_REGISTER_GENERATOR(...) RETROGRADE_REGISTER_GENERATOR(__VA_ARGS__)
 #define HALIDE_REGISTER_GENERATOR_ALIAS(...) RETROGRADE_REGISTER_GENERATOR_ALIAS(__VA_ARGS__)
 
-// name(a1, ...): calls the C function of that name.
-#define HalideExtern_1(rt, name, t1)                         \
-  Halide::Expr name(const Halide::Expr& a1) {                \
-    return ::retrograde::call_c_function<rt, t1>(#name, a1); \
-  }
-#define HalideExtern_2(rt, name, t1, t2)                              \
+// name(a1, ...): calls the C function of that name, by `call`.
+#define RETROGRADE_EXTERN_1(call, rt, name, t1) \
+  Halide::Expr name(const Halide::Expr& a1) { return ::retrograde::call<rt, t1>(#name, a1); }
+#define RETROGRADE_EXTERN_2(call, rt, name, t1, t2)                   \
   Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2) { \
-    return ::retrograde::call_c_function<rt, t1, t2>(#name, a1, a2);  \
+    return ::retrograde::call<rt, t1, t2>(#name, a1, a2);             \
   }
-#define HalideExtern_3(rt, name, t1, t2, t3)                                                  \
+#define RETROGRADE_EXTERN_3(call, rt, name, t1, t2, t3)                                       \
   Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3) { \
-    return ::retrograde::call_c_function<rt, t1, t2, t3>(#name, a1, a2, a3);                  \
+    return ::retrograde::call<rt, t1, t2, t3>(#name, a1, a2, a3);                             \
   }
-#define HalideExtern_4(rt, name, t1, t2, t3, t4)                                            \
+#define RETROGRADE_EXTERN_4(call, rt, name, t1, t2, t3, t4)                                 \
   Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3, \
                     const Halide::Expr& a4) {                                               \
-    return ::retrograde::call_c_function<rt, t1, t2, t3, t4>(#name, a1, a2, a3, a4);        \
+    return ::retrograde::call<rt, t1, t2, t3, t4>(#name, a1, a2, a3, a4);                   \
   }
-#define HalideExtern_5(rt, name, t1, t2, t3, t4, t5)                                         \
-  Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3,  \
-                    const Halide::Expr& a4, const Halide::Expr& a5) {                        \
-    return ::retrograde::call_c_function<rt, t1, t2, t3, t4, t5>(#name, a1, a2, a3, a4, a5); \
+#define RETROGRADE_EXTERN_5(call, rt, name, t1, t2, t3, t4, t5)                             \
+  Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3, \
+                    const Halide::Expr& a4, const Halide::Expr& a5) {                       \
+    return ::retrograde::call<rt, t1, t2, t3, t4, t5>(#name, a1, a2, a3, a4, a5);           \
   }
-#define HalideExtern_6(rt, name, t1, t2, t3, t4, t5, t6)                                        \
-  Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3,     \
-                    const Halide::Expr& a4, const Halide::Expr& a5, const Halide::Expr& a6) {   \
-    return ::retrograde::call_c_function<rt, t1, t2, t3, t4, t5, t6>(#name, a1, a2, a3, a4, a5, \
-                                                                     a6);                       \
+#define RETROGRADE_EXTERN_6(call, rt, name, t1, t2, t3, t4, t5, t6)                           \
+  Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3,   \
+                    const Halide::Expr& a4, const Halide::Expr& a5, const Halide::Expr& a6) { \
+    return ::retrograde::call<rt, t1, t2, t3, t4, t5, t6>(#name, a1, a2, a3, a4, a5, a6);     \
   }
-#define HalideExtern_7(rt, name, t1, t2, t3, t4, t5, t6, t7)                                    \
-  Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3,     \
-                    const Halide::Expr& a4, const Halide::Expr& a5, const Halide::Expr& a6,     \
-                    const Halide::Expr& a7) {                                                   \
-    return ::retrograde::call_c_function<rt, t1, t2, t3, t4, t5, t6, t7>(#name, a1, a2, a3, a4, \
-                                                                         a5, a6, a7);           \
-  }
-#define HalideExtern_8(rt, name, t1, t2, t3, t4, t5, t6, t7, t8)                                  \
+#define RETROGRADE_EXTERN_7(call, rt, name, t1, t2, t3, t4, t5, t6, t7)                           \
   Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3,       \
                     const Halide::Expr& a4, const Halide::Expr& a5, const Halide::Expr& a6,       \
-                    const Halide::Expr& a7, const Halide::Expr& a8) {                             \
-    return ::retrograde::call_c_function<rt, t1, t2, t3, t4, t5, t6, t7, t8>(#name, a1, a2, a3,   \
-                                                                             a4, a5, a6, a7, a8); \
+                    const Halide::Expr& a7) {                                                     \
+    return ::retrograde::call<rt, t1, t2, t3, t4, t5, t6, t7>(#name, a1, a2, a3, a4, a5, a6, a7); \
   }
-#define HalidePureExtern_1(rt, name, t1) HalideExtern_1(rt, name, t1)
-#define HalidePureExtern_2(rt, name, t1, t2) HalideExtern_2(rt, name, t1, t2)
-#define HalidePureExtern_3(rt, name, t1, t2, t3) HalideExtern_3(rt, name, t1, t2, t3)
-#define HalidePureExtern_4(rt, name, t1, t2, t3, t4) HalideExtern_4(rt, name, t1, t2, t3, t4)
+#define RETROGRADE_EXTERN_8(call, rt, name, t1, t2, t3, t4, t5, t6, t7, t8)                      \
+  Halide::Expr name(const Halide::Expr& a1, const Halide::Expr& a2, const Halide::Expr& a3,      \
+                    const Halide::Expr& a4, const Halide::Expr& a5, const Halide::Expr& a6,      \
+                    const Halide::Expr& a7, const Halide::Expr& a8) {                            \
+    return ::retrograde::call<rt, t1, t2, t3, t4, t5, t6, t7, t8>(#name, a1, a2, a3, a4, a5, a6, \
+                                                                  a7, a8);                       \
+  }
+#define HalideExtern_1(rt, name, t1) RETROGRADE_EXTERN_1(call_c_function, rt, name, t1)
+#define HalideExtern_2(rt, name, t1, t2) RETROGRADE_EXTERN_2(call_c_function, rt, name, t1, t2)
+#define HalideExtern_3(rt, name, t1, t2, t3) \
+  RETROGRADE_EXTERN_3(call_c_function, rt, name, t1, t2, t3)
+#define HalideExtern_4(rt, name, t1, t2, t3, t4) \
+  RETROGRADE_EXTERN_4(call_c_function, rt, name, t1, t2, t3, t4)
+#define HalideExtern_5(rt, name, t1, t2, t3, t4, t5) \
+  RETROGRADE_EXTERN_5(call_c_function, rt, name, t1, t2, t3, t4, t5)
+#define HalideExtern_6(rt, name, t1, t2, t3, t4, t5, t6) \
+  RETROGRADE_EXTERN_6(call_c_function, rt, name, t1, t2, t3, t4, t5, t6)
+#define HalideExtern_7(rt, name, t1, t2, t3, t4, t5, t6, t7) \
+  RETROGRADE_EXTERN_7(call_c_function, rt, name, t1, t2, t3, t4, t5, t6, t7)
+#define HalideExtern_8(rt, name, t1, t2, t3, t4, t5, t6, t7, t8) \
+  RETROGRADE_EXTERN_8(call_c_function, rt, name, t1, t2, t3, t4, t5, t6, t7, t8)
+#define HalidePureExtern_1(rt, name, t1) RETROGRADE_EXTERN_1(call_pure_c_function, rt, name, t1)
+#define HalidePureExtern_2(rt, name, t1, t2) \
+  RETROGRADE_EXTERN_2(call_pure_c_function, rt, name, t1, t2)
+#define HalidePureExtern_3(rt, name, t1, t2, t3) \
+  RETROGRADE_EXTERN_3(call_pure_c_function, rt, name, t1, t2, t3)
+#define HalidePureExtern_4(rt, name, t1, t2, t3, t4) \
+  RETROGRADE_EXTERN_4(call_pure_c_function, rt, name, t1, t2, t3, t4)
 #define HalidePureExtern_5(rt, name, t1, t2, t3, t4, t5) \
-  HalideExtern_5(rt, name, t1, t2, t3, t4, t5)
+  RETROGRADE_EXTERN_5(call_pure_c_function, rt, name, t1, t2, t3, t4, t5)
 #define HalidePureExtern_6(rt, name, t1, t2, t3, t4, t5, t6) \
-  HalideExtern_6(rt, name, t1, t2, t3, t4, t5, t6)
+  RETROGRADE_EXTERN_6(call_pure_c_function, rt, name, t1, t2, t3, t4, t5, t6)
 #define HalidePureExtern_7(rt, name, t1, t2, t3, t4, t5, t6, t7) \
-  HalideExtern_7(rt, name, t1, t2, t3, t4, t5, t6, t7)
+  RETROGRADE_EXTERN_7(call_pure_c_function, rt, name, t1, t2, t3, t4, t5, t6, t7)
 #define HalidePureExtern_8(rt, name, t1, t2, t3, t4, t5, t6, t7, t8) \
-  HalideExtern_8(rt, name, t1, t2, t3, t4, t5, t6, t7, t8)
+  RETROGRADE_EXTERN_8(call_pure_c_function, rt, name, t1, t2, t3, t4, t5, t6, t7, t8)
 
 // HALIDE_DECLARE_EXTERN_*: names types behind handles; here all handles are alike.
 #define HALIDE_DECLARE_EXTERN_SIMPLE_TYPE(T)

@@ -541,36 +541,44 @@ class Buffer {
   // ---- devices: copies of the elements on a GPU ----
   // host_dirty: the host's elements are newer than the device's; device_dirty: the other way round. Copies
   // are made where they say so. Results are 0; what goes wrong is a RuntimeError with the runtime's
-  // text.
-  int copy_to_host() { return on_device("copy_to_host").copy_to_host(); }
-  int device_sync() { return on_device("device_sync").sync(); }
+  // text, or goes to the error handler of the context, whose other handlers are not asked; then the
+  // result is its code.
+  int copy_to_host(JITUserContext* user = nullptr) {
+    return on_device("copy_to_host", user).copy_to_host();
+  }
+  int device_sync(JITUserContext* user = nullptr) { return on_device("device_sync", user).sync(); }
   // Requires: only memory that the Buffer allocated is freed (RuntimeError); no other Buffer may use its
   // device memory (RuntimeError).
-  int device_free() { return on_device("device_free").free(); }
+  int device_free(JITUserContext* user = nullptr) { return on_device("device_free", user).free(); }
   // As if the handle had never had device memory; what was newer there is lost.
   void device_deallocate() { frontend::leave_device(checked("device_deallocate")->buffer); }
   // Device memory comes with the first copy.
   // Requires: devices are CUDA's (Unsupported); a GPU must be named.
-  int copy_to_device(const Target& target = Target()) {
-    return copy_to_device(DeviceAPI::Default_GPU, target);
+  int copy_to_device(const Target& target = Target(), JITUserContext* user = nullptr) {
+    return copy_to_device(DeviceAPI::Default_GPU, target, user);
   }
-  int copy_to_device(DeviceAPI device, const Target& target = Target()) {
-    return on_device("copy_to_device").copy_to_device(device, target);
+  int copy_to_device(DeviceAPI device, const Target& target = Target(),
+                     JITUserContext* user = nullptr) {
+    return on_device("copy_to_device", user).copy_to_device(device, target);
   }
   // Memory on the device, unless there is some.
-  int device_malloc(const Target& target = Target()) {
-    return device_malloc(DeviceAPI::Default_GPU, target);
+  int device_malloc(const Target& target = Target(), JITUserContext* user = nullptr) {
+    return device_malloc(DeviceAPI::Default_GPU, target, user);
   }
-  int device_malloc(DeviceAPI device, const Target& target = Target()) {
-    return on_device("device_malloc").allocate(device, target);
+  int device_malloc(DeviceAPI device, const Target& target = Target(),
+                    JITUserContext* user = nullptr) {
+    return on_device("device_malloc", user).allocate(device, target);
   }
   // The Buffer's device memory is what is at this device address, which stays the caller's.
   // Requires: a Buffer has one device memory at a time (RuntimeError).
-  int device_wrap_native(DeviceAPI device, uint64_t handle, const Target& target = Target()) {
-    return on_device("device_wrap_native").wrap(device, handle, target);
+  int device_wrap_native(DeviceAPI device, uint64_t handle, const Target& target = Target(),
+                         JITUserContext* user = nullptr) {
+    return on_device("device_wrap_native", user).wrap(device, handle, target);
   }
   // Requires: only memory that was wrapped is detached (RuntimeError).
-  int device_detach_native() { return on_device("device_detach_native").detach(); }
+  int device_detach_native(JITUserContext* user = nullptr) {
+    return on_device("device_detach_native", user).detach();
+  }
   bool has_device_allocation() const { return runtime().has_device_allocation(); }
   bool device_dirty() const { return runtime().device_dirty(); }
   bool host_dirty() const { return runtime().host_dirty(); }
@@ -617,9 +625,9 @@ class Buffer {
     frontend::check_dimension(runtime(), name(), d, method);
   }
   const Runtime::Buffer<>& runtime() const { return checked("shape")->buffer; }
-  frontend::DeviceCall on_device(const char* method) const {
+  frontend::DeviceCall on_device(const char* method, JITUserContext* user = nullptr) const {
     checked(method);
-    return {contents_->buffer, contents_->name, method};
+    return {contents_->buffer, contents_->name, method, user};
   }
   Buffer<Bare, Dims> copied(frontend::Layout layout, const char* method) const {
     check_on_host(method);

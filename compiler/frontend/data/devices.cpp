@@ -3,6 +3,7 @@
 #include "frontend/data/devices.h"
 
 #include "diagnostics/error.h"
+#include "frontend/run/call.h"
 #include "gpu/gpu_calls.h"
 #include "report.h"
 
@@ -64,12 +65,13 @@ std::string DeviceCall::asked() const {
 
 template <typename Call>
 int DeviceCall::run(Call call) const {
-  runtime::Failure failure;
-  const runtime::FailureScope scope(&failure);
-  const int code = call();
-  if (code != 0)
-    throw RuntimeError(text("the Buffer ", quoted(name_), ": ", failure.message), code);
-  return code;
+  return prepared({}, user_, [&] {
+    runtime::Failure failure;
+    const runtime::FailureScope scope(&failure);
+    const int code = call();
+    if (code != 0)
+      throw RuntimeError(text("the Buffer ", quoted(name_), ": ", failure.message), code);
+  });
 }
 
 const halide_device_interface_t* DeviceCall::interface_of(DeviceAPI device,
@@ -136,22 +138,28 @@ int DeviceCall::allocate(DeviceAPI device, const Target& target) const {
 
 int DeviceCall::free() const {
   if (!buffer_.has_device_allocation()) return 0;
-  check_sole_owner(Runtime::BufferDeviceOwnership::Allocated);
-  return run([&] { return buffer_.device_free(); });
+  return run([&] {
+    check_sole_owner(Runtime::BufferDeviceOwnership::Allocated);
+    return buffer_.device_free();
+  });
 }
 
 int DeviceCall::wrap(DeviceAPI device, uint64_t handle, const Target& target) const {
   const auto* interface = interface_of(device, target);
-  if (buffer_.has_device_allocation())
-    call_error(asked(), "a Buffer has one device memory at a time", "it already has some",
-               "Free or detach it first", halide_error_code_device_wrap_native_failed);
-  return run([&] { return buffer_.device_wrap_native(interface, handle); });
+  return run([&] {
+    if (buffer_.has_device_allocation())
+      call_error(asked(), "a Buffer has one device memory at a time", "it already has some",
+                 "Free or detach it first", halide_error_code_device_wrap_native_failed);
+    return buffer_.device_wrap_native(interface, handle);
+  });
 }
 
 int DeviceCall::detach() const {
   if (!buffer_.has_device_allocation()) return 0;
-  check_sole_owner(Runtime::BufferDeviceOwnership::WrappedNative);
-  return run([&] { return buffer_.device_detach_native(); });
+  return run([&] {
+    check_sole_owner(Runtime::BufferDeviceOwnership::WrappedNative);
+    return buffer_.device_detach_native();
+  });
 }
 
 }  // namespace frontend

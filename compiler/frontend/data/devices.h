@@ -10,6 +10,8 @@
 
 namespace retrograde {
 
+struct JITUserContext;
+
 namespace Runtime = ::Halide::Runtime;
 
 // What HalideRuntime.h's functions want for memory on such a device. Default_GPU: CUDA, or the known
@@ -23,11 +25,13 @@ namespace frontend {
 // As if it had never had device memory.
 void leave_device(Runtime::Buffer<>& buffer);
 
-// One call of the runtime on a Buffer's device memory. They throw RuntimeError with what the runtime says.
+// One call of the runtime on a Buffer's device memory. They throw RuntimeError with what the runtime says;
+// the error handler of `user`, where there is one, is told instead, and the code comes back.
 class DeviceCall {
  public:
-  DeviceCall(Runtime::Buffer<>& buffer, const std::string& name, const char* method)
-      : buffer_(buffer), name_(name), method_(method) {}
+  DeviceCall(Runtime::Buffer<>& buffer, const std::string& name, const char* method,
+             JITUserContext* user = nullptr)
+      : buffer_(buffer), name_(name), method_(method), user_(user) {}
   int copy_to_host() const;
   int copy_to_device(DeviceAPI, const Target&) const;
   int sync() const;
@@ -50,6 +54,7 @@ class DeviceCall {
   Runtime::Buffer<>& buffer_;
   const std::string& name_;
   const char* const method_;
+  JITUserContext* const user_;
 };
 
 }  // namespace frontend

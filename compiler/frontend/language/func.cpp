@@ -141,8 +141,14 @@ std::vector<Argument> Func::infer_arguments() const {
   return Pipeline(*this).infer_arguments();
 }
 
+// There before the definition, too, of a Func that was declared with types and dimensions.
+void Func::check_has_outputs(const std::string& asked) const {
+  if (defined() || func_->required_types.empty()) return check_defined(asked);
+  graph::make_outputs(*func_);
+}
+
 OutputImageParam Func::output_buffer() const {
-  check_defined("use the output buffer of " + quoted(name()));
+  check_has_outputs("use the output buffer of " + quoted(name()));
   if (outputs() != 1) {
     user_error("use the output buffer of " + quoted(name()), "it has one only if it is no Tuple",
                text("it has ", outputs()), "Use output_buffers()");
@@ -151,7 +157,7 @@ OutputImageParam Func::output_buffer() const {
 }
 
 std::vector<OutputImageParam> Func::output_buffers() const {
-  check_defined("use the output buffers of " + quoted(name()));
+  check_has_outputs("use the output buffers of " + quoted(name()));
   return ir::mapped(func_->outputs, [&](const auto& output) { return OutputImageParam(output); });
 }
 

@@ -366,6 +366,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
     return *this;
   }
   void check_defined(const std::string& asked) const;
+  void check_has_outputs(const std::string& asked) const;
   const graph::Definition& checked_update(int index, const char* asked) const;
   Func wrap(const std::vector<Func>& users, const std::string& name, bool clone) const;
   Func copied(const std::shared_ptr<graph::ParameterContents>& image) const;

@@ -15,14 +15,15 @@ class FuncTupleElementRef;
 
 // f(x, y). Assigning to it for the first time defines f at all points; after that it adds an update
 // definition. f(x) += e on an undefined f first defines it as 0 (for *= and /= as 1) everywhere.
+// A text as a value is the address of its characters, which live as long as the compiled code.
 class FuncRef {
  public:
   FuncRef(graph::FuncPtr func, std::vector<Expr> args)
       : func_(std::move(func)), args_(std::move(args)) {}
 
   // Requires: every argument on the left-hand side must be a defined expression; a definition
-  // has at least one value; the right-hand side must be a defined expression; values are
-  // numbers or pointers; a Func is defined once; a first definition has no reduction
+  // has at least one value; the right-hand side must be a defined expression; a Func is
+  // defined once; a first definition has no reduction
   // variables; the arguments of a first definition are Vars; the arguments of a first
   // definition are different Vars; a definition has the dimensions that the Func was declared
   // with; a right-hand side that uses _ needs _ on the left-hand side; every variable on the

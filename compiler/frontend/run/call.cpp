@@ -110,25 +110,6 @@ void* Arguments::bind_buffer(const ParameterPtr& parameter, bool is_query) {
   return queries_.back().buffer.raw_buffer();
 }
 
-namespace {
-
-// Beside what the program itself prints.
-void default_print(const char* message) {
-  std::fputs(message, stdout);
-  std::fflush(stdout);
-}
-
-struct DefaultHandlers {
-  std::mutex mutex;
-  JITHandlers handlers;
-  std::atomic<bool> are_set = false;
-};
-DefaultHandlers& defaults() {
-  static DefaultHandlers result;
-  return result;
-}
-
-// Handlers with others in front of them.
 JITHandlers merged(JITHandlers handlers, const JITHandlers& first) {
   const auto take = [](auto& to, const auto& from) {
     if (from) to = from;
@@ -146,6 +127,24 @@ JITHandlers merged(JITHandlers handlers, const JITHandlers& first) {
   take(handlers.print, first.print);
   if (first.thread_limit > 0) handlers.thread_limit = first.thread_limit;
   return handlers;
+}
+
+namespace {
+
+// Beside what the program itself prints.
+void default_print(const char* message) {
+  std::fputs(message, stdout);
+  std::fflush(stdout);
+}
+
+struct DefaultHandlers {
+  std::mutex mutex;
+  JITHandlers handlers;
+  std::atomic<bool> are_set = false;
+};
+DefaultHandlers& defaults() {
+  static DefaultHandlers result;
+  return result;
 }
 
 // The handlers of a call: the caller's, else the pipeline's, else the process's.

@@ -50,6 +50,9 @@ class Arguments {
   void* bind_buffer(const ParameterPtr& parameter, bool is_query);
 };
 
+// Handlers with others in front of them.
+JITHandlers merged(JITHandlers handlers, const JITHandlers& first);
+
 // Runs what checks and binds the arguments of a call. A RuntimeError goes to the handler of errors
 // where there is one: then its code is returned, which is not 0.
 int prepared(const JITHandlers& own, JITUserContext* user, FunctionRef<void()> prepare);

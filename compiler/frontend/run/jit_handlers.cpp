@@ -23,7 +23,8 @@ JITExtern::JITExtern(Pipeline pipeline) : pipeline_(std::move(pipeline)) {
 JITExtern::JITExtern(const Func& func) : JITExtern(Pipeline(func)) {}
 
 Expr frontend::checked_extern_call(const std::string& function, Type result,
-                                   const std::vector<Type>& types, const std::vector<Expr>& args) {
+                                   const std::vector<Type>& types, const std::vector<Expr>& args,
+                                   bool is_pure) {
   const std::string asked = "call the C function " + quoted(function);
   for (size_t i = 0; i < args.size(); i++) {
     if (!args[i].defined())
@@ -35,7 +36,7 @@ Expr frontend::checked_extern_call(const std::string& function, Type result,
                     to_string(types[i])),
                "Cast it");
   }
-  return call_extern(function, result, args);
+  return call_extern(function, result, args, is_pure);
 }
 
 }  // namespace retrograde

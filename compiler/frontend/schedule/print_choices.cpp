@@ -10,6 +10,11 @@ std::ostream& operator<<(std::ostream& out, const Target& target) {
   return out << "target(" << target.to_string() << ")";
 }
 
+std::ostream& operator<<(std::ostream& out, TypeCode code) {
+  static constexpr const char* names[] = {"int", "uint", "float", "bfloat", "handle"};
+  return out << names[static_cast<int>(code)];
+}
+
 std::ostream& operator<<(std::ostream& out, DeviceAPI device) {
   static constexpr const char* names[] = {"None",       "Host",          "Default_GPU", "CUDA",
                                           "OpenCL",     "OpenGLCompute", "Metal",       "Hexagon",

@@ -1,4 +1,5 @@
-// print_choices.h -- targets, and what schedules choose among, as text: std::cout << tail.
+// print_choices.h -- targets, codes of types, and what schedules choose among, as text:
+// std::cout << tail.
 #pragma once
 
 #include <iosfwd>
@@ -11,6 +12,7 @@ namespace retrograde {
 
 // Enumerators by their names in C++; a target as target(x86-64-linux-avx2), as Halide writes it.
 std::ostream& operator<<(std::ostream& out, const Target& target);
+std::ostream& operator<<(std::ostream& out, TypeCode code);  // int, uint, float, bfloat, handle
 std::ostream& operator<<(std::ostream& out, DeviceAPI device);
 std::ostream& operator<<(std::ostream& out, MemoryType memory);
 std::ostream& operator<<(std::ostream& out, TailStrategy tail);

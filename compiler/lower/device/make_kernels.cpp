@@ -76,6 +76,9 @@ class KernelMaker : public StatementRewriter {
                    "Keep it serial");
         },
         [&](const Fork&) { refuse("what is async() in it runs in a thread", "Drop async()"); },
+        [&](const StringImm& n) {
+          refuse(text("it takes the address of the text ", Expr(&n)), "Compute it on the host");
+        },
         [&](const Call& n) {
           if (n.call_type == CallType::Extern)
             refuse(text("it calls the C function ", quoted(n.name)), "Compute it on the host");

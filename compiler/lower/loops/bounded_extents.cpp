@@ -97,6 +97,22 @@ Stmt BoundedExtents::chosen(const IfThenElse& choice) {
                     under(logical_not(choice.condition), choice.when_false));
 }
 
+bool BoundedExtents::is_made_of_few(const Expr& extent, int names) const {
+  return takes_names(extent, names);
+}
+
+// Names that are left of so many; fewer than none: no.
+bool BoundedExtents::takes_names(const Expr& e, int& left) const {
+  walk(e, [&](const Expr& part) {
+    const auto* name = part.as<Variable>();
+    if (!name) return left >= 0;
+    const auto value = values_.find(name->name);
+    if (--left >= 0 && value != values_.end()) takes_names(value->second, left);
+    return false;
+  });
+  return left >= 0;
+}
+
 std::optional<int64_t> BoundedExtents::largest(const Expr& extent, int64_t most) const {
   const auto full = [&](const Expr& e) { return simplify(without_likely(in_full(e, values_))); };
   Facts facts;

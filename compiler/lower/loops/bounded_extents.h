@@ -25,6 +25,8 @@ class BoundedExtents : public StatementRewriter {
   // A constant that the extent does not exceed where the statement at hand runs; none when there is
   // none up to `most`.
   std::optional<int64_t> largest(const Expr& extent, int64_t most) const;
+  // Whether the extent is made of at most so many names, those in the values of its names included.
+  bool is_made_of_few(const Expr& extent, int names) const;
 
  private:
   Substitution values_;            // of names around the statement at hand, as they are written
@@ -32,6 +34,7 @@ class BoundedExtents : public StatementRewriter {
   std::vector<Expr> conditions_;   // that hold there
 
   Stmt chosen(const IfThenElse& choice);
+  bool takes_names(const Expr& e, int& left) const;
 };
 
 }  // namespace retrograde::lower

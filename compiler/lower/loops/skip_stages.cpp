@@ -23,7 +23,8 @@
 // Method: one walk, from outside in, with the conditions and the binders (loops, lets) around. A
 //         read of f adds the conditions between its storage and the read, seen from outside of the
 //         binders in between. A producer of g is a condition of its own, a name for what g's
-//         storage has not seen in full yet; where g's storage ends, the name is replaced.
+//         storage has not seen in full yet; where g's storage ends, the name is replaced, also in the needs
+//         of Funcs that were stored inside of it.
 // Not done: outputs, and Funcs that are async or computed inside the storage of one (producer and
 //         consumer wait for each other); what kernels compute, or is computed in them; Funcs that
 //         share loops with others (compute_with); conditions over the lanes of a vector; a single
@@ -267,6 +268,10 @@ class NeedFinder {
 
   void add_need(const std::string& func, Stage& stage, const Expr& where) {
     stage.needed = either(stage.needed, where);
+    note_mentions(where, func);
+  }
+
+  void note_mentions(const Expr& where, const std::string& func) {
     walk(where, [&](const Variable& v) {
       const size_t mark = v.name.rfind(".needed");
       if (mark == std::string::npos) return;
@@ -279,29 +284,56 @@ class NeedFinder {
   void close(const std::string& func) {
     const Stage stage = std::move(stages_.at(func));
     stages_.erase(func);
-    const Expr need = need_outside(stage);
+    Expr need = need_outside(stage);
+    // Whether a point is worth a branch is decided at once: what it reads is needed where it is computed.
+    if (std::ranges::any_of(stage.producers, is_one_point)) {
+      need = known_part(need);
+      if (uses_any_variable(need, varying_)) need = const_true();
+    }
     for (const std::string& reader : stage.mentioned_by) {
       const auto outer = stages_.find(reader);
       if (outer == stages_.end()) continue;
       const Expr whole = seen_from({without_any_reads(need), binders_.size(), AtLoops::Forget},
                                    outer->second.binders);
       outer->second.needed = simplify(substitute(outer->second.needed, need_of(func), whole));
+      note_mentions(whole, reader);
     }
-    if (!is_const_true(need)) guards_[func] = need;
+    open_needs_[func] = need;
+    settle(func);
   }
 
-  // True where a condition is not worth its while, or not known to be right: as what is known later
-  // only, where a Func further out is needed.
+  // What speaks of Funcs whose storage is around and still open waits for them: where those are computed,
+  // and so read this one, is known at their end, and is the same all through their storage.
+  void settle(const std::string& func) {
+    const Expr need = open_needs_.at(func);
+    if (uses_any_variable(need, unsettled())) return;
+    open_needs_.erase(func);
+    if (!is_const_true(need)) guards_[func] = need;
+    std::vector<std::string> waiting;
+    for (auto& [name, other] : open_needs_) {
+      if (!uses_variable(other, need_of(func))) continue;
+      other = simplify(substitute(other, need_of(func), need));
+      waiting.push_back(name);
+    }
+    for (const std::string& name : waiting) {
+      if (open_needs_.contains(name)) settle(name);
+    }
+  }
+
+  std::unordered_set<std::string> unsettled() const {
+    std::unordered_set<std::string> names;
+    for (const auto& [name, stage] : stages_) names.insert(need_of(name));
+    for (const auto& [name, need] : open_needs_) names.insert(need_of(name));
+    return names;
+  }
+  // What is known later counts as true.
+  Expr known_part(const Expr& need) const { return simplify(without_parts_of(need, unsettled())); }
+
+  // True where it is not known to be right.
   Expr need_outside(const Stage& stage) const {
     if (!stage.is_read || is_const_true(stage.needed)) return const_true();
-    std::unordered_set<std::string> unknown = lanes_;
-    for (const auto& [name, open] : stages_) unknown.insert(need_of(name));
-    const Expr need = simplify(without_parts_of(stage.needed, unknown));
-    const bool varies = uses_any_variable(need, varying_);
-    for (const Stmt& producer : stage.producers) {
-      if ((varies && is_one_point(producer)) || computes_others(producer)) return const_true();
-    }
-    return need;
+    if (std::ranges::any_of(stage.producers, computes_others)) return const_true();
+    return simplify(without_parts_of(stage.needed, lanes_));
   }
 
   // Kernels, or Funcs stored elsewhere.
@@ -384,8 +416,9 @@ class NeedFinder {
 
   FunctionRef<bool(const std::string&)> may_skip_;
   Guards guards_;
-  int guards_around_ = 0;                // choices, branches, predicates, producers
-  std::map<std::string, Stage> stages_;  // whose storage is open
+  int guards_around_ = 0;                   // choices, branches, predicates, producers
+  std::map<std::string, Stage> stages_;     // whose storage is open
+  std::map<std::string, Expr> open_needs_;  // of Funcs whose storage has ended, in terms of others
   std::vector<Binder> binders_;
   std::vector<Held> held_;
   std::vector<std::string> producing_;

@@ -11,6 +11,9 @@
 //     f[x] = g[x]               =>    if (1 < min(n, 2)) f[a + 1] = g[a + 1]
 //   }
 //
+// HL_PERMIT_FAILED_UNROLL=1 in the environment makes a loop serial whose extent has no constant above
+// it; otherwise that is an error.
+//
 // Method: inner loops first; copies after the first get fresh names for everything that they bind.
 //         Of select(x == 0, .., select(x == 1, ..)) a copy has its own arm, which is looked up: n
 //         copies of a choice from n arms take n steps. Constants above extents: bounded_extents.h.
@@ -18,7 +21,9 @@
 // Source: folklore. Tests: test/golden/lower/unroll_loops/.
 #include "lower/statement_passes.h"
 
+#include <cstdlib>
 #include <optional>
+#include <string_view>
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
@@ -35,6 +40,12 @@ namespace {
 
 constexpr int64_t most_guarded = 256;  // copies of a loop whose extent is not known
 
+// As Halide: for schedules that hold for constant extents, tried on others.
+bool may_stay_loops() {
+  const char* text = std::getenv("HL_PERMIT_FAILED_UNROLL");
+  return text && std::string_view(text) == "1";
+}
+
 class Unroller : public BoundedExtents {
  public:
   explicit Unroller(const Stmt& s) : fresh_(s) {}
@@ -46,6 +57,9 @@ class Unroller : public BoundedExtents {
     if (!loop || loop->runs != ForType::Unrolled) return inner;
     if (auto extent = as_const_int(simplify(loop->extent))) return unrolled(*loop, *extent, false);
     if (auto most = largest(loop->extent, most_guarded)) return unrolled(*loop, *most, true);
+    if (may_stay_loops())
+      return make_for(loop->name, loop->min, loop->extent, ForType::Serial, loop->body,
+                      loop->partition);
     user_error(
         "unroll " + describe_loop(loop->name),
         "the extent of an unrolled loop must be a constant, or have a constant above it",

@@ -41,6 +41,8 @@ Definition assuming(const Definition& definition, const Expr& condition, bool va
   std::vector<Known> known;
   Substitution constants;
   take_apart(condition, value, known, constants);
+  // What another specialization left is in this form.
+  take_apart(simplify(condition), value, known, constants);
   StepRewriter under([&](const Expr& e, const auto&) -> Expr {
     if (const Variable* v = e.as<Variable>()) {
       if (const auto* it = find_or_null(constants, v->name)) return *it;

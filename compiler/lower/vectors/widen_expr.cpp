@@ -312,7 +312,8 @@ Expr Widener::widen_extern(const Call& n) {
   std::iota(indices.begin(), indices.end(), 0);
   for (int lane : indices) {
     auto scalars = mapped(args, [&](const Expr& arg) { return extract_iteration(arg, lane, 1); });
-    results.push_back(call_extern(n.name, n.type.element_of(), std::move(scalars)));
+    results.push_back(
+        call_extern(n.name, n.type.element_of(), std::move(scalars), n.is_pure_extern()));
   }
   return make_lets(lets, make_shuffle(std::move(results), std::move(indices)));
 }
