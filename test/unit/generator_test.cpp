@@ -138,11 +138,14 @@ class Mixed : public Generator<Mixed> {
   Input<Func[]> funcs{"funcs", Int(32), 1};
   Input<int32_t[2]> factors{"factors", 1};
   Input<Expr> offset{"offset"};
-  Output<Func> sums{"sums", {Int(32), Int(64)}, 1};
+  Output<Func> sums{"sums", 1};
   Output<int32_t> count{"count"};
   Output<Func[]> copies{"copies", 1};
 
-  void configure() { offset.set_type(Int(16)); }
+  void configure() {
+    offset.set_type(Int(16));
+    sums.set_type({Int(32), Int(64)});
+  }
   void generate() {
     Expr sum = cast<int32_t>(offset);
     for (const ImageParam& image : images) sum += image(x) * factors[0];
@@ -340,6 +343,30 @@ TEST(Generator, ModulesTakeInputsAndThenOutputs) {
   EXPECT_EQ(argument_names(mixed->build_module("mixed")),
             (Names{"images_0", "images_1", "images_2", "funcs_0", "factors_0", "factors_1",
                    "offset", "sums.0", "sums.1", "count", "copies_0", "copies_1"}));
+}
+
+// What a declaration leaves open is known once the output is defined.
+class Late : public Generator<Late> {
+ public:
+  Output<Func> late{"late"};
+  void generate() {
+    late(x, y) = Tuple(cast<uint8_t>(x), y);
+    types = late.types();
+    dimensions = late.dimensions();
+  }
+  std::vector<Type> types;
+  int dimensions = 0;
+
+ private:
+  Var x{"x"}, y{"y"};
+};
+
+TEST(Generator, OutputsKnowTheTypesOfTheirDefinitions) {
+  auto late = GeneratorContext(get_host_target()).create<Late>();
+  EXPECT_THROW(late->late.types(), CompileError) << "nothing has said them";
+  late->apply();
+  EXPECT_EQ(late->types, (std::vector<Type>{UInt(8), Int(32)}));
+  EXPECT_EQ(late->dimensions, 2);
 }
 
 // out = in * in * w + table: every image gets a gradient, scalars none.

@@ -4,6 +4,7 @@
 
 #include <retrograde/retrograde.h>
 
+#include "generator/command_line.h"
 #include "porting/internal.h"
 
 // Programs rely on these.
@@ -284,6 +285,11 @@ struct halide_global_ns;
   HalideExtern_7(rt, name, t1, t2, t3, t4, t5, t6, t7)
 #define HalidePureExtern_8(rt, name, t1, t2, t3, t4, t5, t6, t7, t8) \
   HalideExtern_8(rt, name, t1, t2, t3, t4, t5, t6, t7, t8)
+
+// Throws CompileError unless argument number `k` of the function `name` has the type.
+#define _halide_check_arg_type(t, name, e, k)                                     \
+  _halide_user_assert((e).type() == (t)) << "argument " << (k) << " of " << #name \
+                                         << " has the type " << (t) << ", not " << (e).type()
 
 // HALIDE_DECLARE_EXTERN_*: names types behind handles; here all handles are alike.
 #define HALIDE_DECLARE_EXTERN_SIMPLE_TYPE(T)
