@@ -265,7 +265,8 @@ TEST_F(ExecuteGenerator, TakesAFunctionThatMakesTheGenerator) {
   };
   execute_generator(args);
   expect_mentions(contents("files.h"), {"int anything(struct halide_buffer_t *_in_buffer"});
-  args.build_mode = ExecuteGeneratorArgs::Gradient;
+  const ExecuteGeneratorArgs::BuildMode gradient = ExecuteGeneratorArgs::Gradient;
+  args.build_mode = gradient;
   expect_error({"gradients are of floating-point outputs"}, [&] { execute_generator(args); });
 }
 

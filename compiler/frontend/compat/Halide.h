@@ -4,7 +4,7 @@
 
 #include <retrograde/retrograde.h>
 
-#include "generator/command_line.h"
+#include "generator/execute_generator.h"
 #include "porting/internal.h"
 
 // Programs rely on these.
