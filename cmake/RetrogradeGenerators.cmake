@@ -7,7 +7,7 @@
 #     [NAMESPACE <ns>] [GRADIENT | SEPARATE_GRADIENTS] [PARAMS <param=value>...] [TARGETS <target>...]
 #     [FEATURES <feature>...] [USE_RUNTIME <target>] [AUTOSCHEDULER <name>] [PLUGINS <target>...]
 #     [SIMULATED_GPU] [HEADER <var>] [ASSEMBLY <var>] [BITCODE <var>] [LLVM_ASSEMBLY <var>] [STMT <var>]
-#     [STMT_HTML <var>] [REGISTRATION <var>])
+#     [STMT_HTML <var>] [REGISTRATION <var>] [FUNCTION_INFO_HEADER <var>])
 #     A library with the function that the generator makes, and <target>.h on its include path.
 #     GENERATOR and FUNCTION_NAME default to <target>; TARGETS to host, or to what the variable
 #     Retrograde_TARGET says. Of several TARGETS the machine decides at run time; the last one is what
@@ -87,12 +87,13 @@ function(add_retrograde_runtime target)
 endfunction()
 
 function(add_retrograde_library target)
-  set(extra_types ASSEMBLY BITCODE COMPILER_LOG FEATURIZATION LLVM_ASSEMBLY PYTHON_EXTENSION
-    PYTORCH_WRAPPER REGISTRATION SCHEDULE STMT STMT_HTML)
+  set(extra_types ASSEMBLY BITCODE COMPILER_LOG FEATURIZATION FUNCTION_INFO_HEADER LLVM_ASSEMBLY
+    PYTHON_EXTENSION PYTORCH_WRAPPER REGISTRATION SCHEDULE STMT STMT_HTML)
   set(ASSEMBLY_extension .s)
   set(BITCODE_extension .bc)
   set(COMPILER_LOG_extension .halide_compiler_log)
   set(FEATURIZATION_extension .featurization)
+  set(FUNCTION_INFO_HEADER_extension .function_info.h)
   set(LLVM_ASSEMBLY_extension .ll)
   set(PYTHON_EXTENSION_extension .py.cpp)
   set(PYTORCH_WRAPPER_extension .pytorch.h)

@@ -101,6 +101,7 @@ class Pool {
     leave(loop);
   }
 
+  int threads() { return threads_for(0); }
   int set_threads(int count) {
     const int before = threads_for(0);
     wanted_ = std::min(count, max_threads);
@@ -230,6 +231,7 @@ void run_on_threads(int64_t extent, int32_t thread_limit, RunRange run, void* da
   pool().run(extent, thread_limit, run, data);
 }
 
+int thread_count() { return pool().threads(); }
 int set_thread_count(int count) { return pool().set_threads(count); }
 void shut_down_threads() { pool().shut_down(); }
 

@@ -6,13 +6,25 @@
 #include "diagnostics/error.h"
 
 namespace retrograde::aot {
-namespace {
 
 std::string identifier(const std::string& text) {
   std::string result;
   for (char c : text) result += std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
   return result;
 }
+
+std::string in_namespaces(const std::string& name, const std::string& text) {
+  std::vector<std::string> parts = name_parts(name);
+  parts.pop_back();
+  std::string begin, end;
+  for (const std::string& part : parts) {
+    begin += "namespace " + part + " {\n";
+    end = "}  // namespace " + part + "\n" + end;
+  }
+  return begin + text + end;
+}
+
+namespace {
 
 std::string parameter_name(const codegen::ExportArgument& argument) {
   if (argument.name == "__user_context") return argument.name;
@@ -54,17 +66,6 @@ std::string declaration(const DeclaredFunction& function) {
             "_metadata();\n\n";
   }
   return text;
-}
-
-std::string in_namespaces(const std::string& name, const std::string& text) {
-  std::vector<std::string> parts = name_parts(name);
-  parts.pop_back();
-  std::string begin, end;
-  for (const std::string& part : parts) {
-    begin += "namespace " + part + " {\n";
-    end = "}  // namespace " + part + "\n" + end;
-  }
-  return begin + text + end;
 }
 
 const char* const preamble = R"(#include <stdint.h>

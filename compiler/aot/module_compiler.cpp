@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "aot/files.h"
+#include "aot/function_info.h"
 #include "aot/header.h"
 #include "aot/html.h"
 #include "aot/mangle.h"
@@ -143,6 +144,9 @@ class Outputs {
         return page_text(module_, texts_.at(Format::Assembly));
       case OutputFileType::c_header:
         return aot::header_text(module_.name(), module_.target(), declared_functions(module_));
+      case OutputFileType::function_info_header:
+        return aot::function_info_text(module_.name(), module_.target(),
+                                       declared_functions(module_));
       case OutputFileType::registration:
         return aot::registration_text(declared_functions(module_), module_.target());
       case OutputFileType::pytorch_wrapper:
@@ -243,6 +247,8 @@ class MultitargetOutputs {
         {name_, aot::dispatcher_signature(name_, baseline())}};
     if (type == OutputFileType::c_header)
       return aot::header_text(name_, baseline().target(), functions);
+    if (type == OutputFileType::function_info_header)
+      return aot::function_info_text(name_, baseline().target(), functions);
     if (type == OutputFileType::registration)
       return aot::registration_text(functions, baseline().target());
     if (type == OutputFileType::pytorch_wrapper)

@@ -132,10 +132,22 @@ std::string base_name(const std::string& function) {
   return colons == std::string::npos ? function : function.substr(colons + 2);
 }
 
+// A scheduler is part of the context that a generator is made in.
 std::unique_ptr<GeneratorBase> make_generator(const CommandLine& command, const Target& target) {
-  auto generator = GeneratorRegistry::create(command.generator, GeneratorContext(target));
-  generator->set_generator_param_values(
-      GeneratorParamsMap(command.params.begin(), command.params.end()));
+  AutoschedulerParams scheduler;
+  GeneratorParamsMap params;
+  for (const auto& [key, value] : command.params) {
+    if (key == "autoscheduler")
+      scheduler.name = value;
+    else if (key.starts_with("autoscheduler."))
+      scheduler.extra[key.substr(key.find('.') + 1)] = value;
+    else
+      params.insert_or_assign(key, value);
+  }
+  const GeneratorContext context(target, scheduler);
+  auto generator = command.create ? as_generator_base(command.create(command.generator, context))
+                                  : GeneratorRegistry::create(command.generator, context);
+  generator->set_generator_param_values(params);
   return generator;
 }
 
@@ -156,6 +168,11 @@ std::map<OutputFileType, std::string> files_of(const CommandLine& command,
   return files;
 }
 
+void log(const CommandLine& command, const std::map<OutputFileType, std::string>& files) {
+  if (!command.log) return;
+  for (const auto& [type, path] : files) *command.log << path << "\n";
+}
+
 void run_runtime(const CommandLine& command) {
   Target common = command.targets[0];
   for (const Target& target : command.targets) {
@@ -165,7 +182,7 @@ void run_runtime(const CommandLine& command) {
                    " need different ones",
                "Make one for each");
   }
-  compile_standalone_runtime(files_of(command, command.runtime), common);
+  log(command, compile_standalone_runtime(files_of(command, command.runtime), common));
 }
 
 // One for each target, as a schedule may ask for it.
@@ -200,6 +217,7 @@ void run_generator(const CommandLine& command) {
                text(command.targets.size(), " targets are given"), "Name one, or ask for -d 1");
   }
   auto files = files_of(command, base);
+  log(command, files);
   if (const auto stub = files.find(OutputFileType::cpp_stub); stub != files.end()) {
     make_generator(command, command.targets[0])->emit_cpp_stub(stub->second);
     files.erase(stub);
@@ -253,6 +271,53 @@ CommandLine read_command_line(int argc, const char* const* argv) {
 void run(const CommandLine& command) {
   if (!command.runtime.empty()) run_runtime(command);
   if (!command.generator.empty()) run_generator(command);
+}
+
+namespace {
+
+void check(const ExecuteGeneratorArgs& args) {
+  if (args.output_dir.empty())
+    user_error(asked, "output_dir names the folder of the files", "it is empty",
+               "Set it, as to \".\"");
+  if (args.output_types.empty())
+    user_error(asked, "output_types names what to write", "it is empty", "Name one or more types");
+  if (args.targets.empty())
+    user_error(asked, "targets name what to compile for", "there is none",
+               "Name one or more targets");
+  if (!args.suffixes.empty() && args.suffixes.size() != args.targets.size()) {
+    user_error(asked, "there is one suffix for each target",
+               text("there are ", args.suffixes.size(), " for ", args.targets.size()),
+               "Name as many, or none");
+  }
+  if (args.generator_name.empty() && args.runtime_name.empty()) {
+    user_error(asked, "generator_name names the generator, or runtime_name a runtime",
+               "both are empty", "Set one of them");
+  }
+}
+
+}  // namespace
+
+void execute_generator(const ExecuteGeneratorArgs& args) {
+  check(args);
+  CommandLine command;
+  command.generator = args.generator_name;
+  command.function = args.function_name;
+  command.folder = args.output_dir;
+  command.file_base = args.file_base_name;
+  command.runtime = args.runtime_name;
+  command.emit.assign(args.output_types.begin(), args.output_types.end());
+  command.targets = args.targets;
+  command.suffixes = args.suffixes;
+  if (command.suffixes.empty()) {
+    command.suffixes =
+        ir::mapped(args.targets, [](const Target& target) { return target.to_string(); });
+  }
+  command.params = args.generator_params;
+  if (args.build_mode == ExecuteGeneratorArgs::Gradient)
+    command.gradient = CommandLine::Gradient::Whole;
+  command.create = args.create_generator;
+  if (args.log_outputs) command.log = &std::cout;
+  run(command);
 }
 
 std::string usage() {

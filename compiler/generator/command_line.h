@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "frontend/run/module.h"
+#include "generator/execute_generator.h"
 
 namespace retrograde::internal {
 
@@ -22,7 +23,9 @@ struct CommandLine {
   std::vector<std::string> suffixes;  // of the targets: their text
   std::map<std::string, std::string> params;
   enum class Gradient { None, Whole, Separate } gradient = Gradient::None;
-  int timeout_seconds = 900;  // 0: none
+  int timeout_seconds = 900;                       // 0: none
+  ExecuteGeneratorArgs::CreateGeneratorFn create;  // null: by the registry
+  std::ostream* log = nullptr;                     // gets the paths of the files
 };
 
 // Reads it all before anything is generated.
@@ -39,6 +42,5 @@ std::string usage();
 // All of it: what goes wrong is written to `errors`, and nothing else; with --help, or without any
 // argument, the usage. The program's exit status: 0, or 1.
 int generate_filter_main(int argc, char** argv, std::ostream& errors);
-int generate_filter_main(int argc, char** argv);  // errors to the standard error stream
 
 }  // namespace retrograde::internal

@@ -195,7 +195,10 @@ class StubWriter {
                   ? "      all.insert(all.end(), " + name + ".begin(), " + name + ".end());\n"
                   : "      all.push_back(" + name + ");\n";
     }
-    return body +
+    std::string as_func;
+    if (outputs_.size() == 1 && !is_array_output_[0])
+      as_func = "    operator ::retrograde::Func() const { return " + outputs_[0].name + "; }\n";
+    return as_func + body +
            "      return ::retrograde::Pipeline(all);\n    }\n"
            "    ::retrograde::Realization realize(const std::vector<int32_t>& sizes) const {\n"
            "      return get_pipeline().realize(sizes, target);\n    }\n"
@@ -235,13 +238,14 @@ class StubWriter {
 
 }  // namespace
 
-void GeneratorBase::emit_cpp_stub(const std::string& path) const {
-  check_names();
+bool GeneratorBase::emit_cpp_stub(const std::string& path) {
+  configure_once();
   StubWriter writer(name_, stub_name_.empty() ? name_ : stub_name_);
   for (const GeneratorParamBase* param : members_.params) writer.add(*param);
   for (const GeneratorInputBase* input : members_.inputs) writer.add(*input);
   for (const GeneratorOutputBase* output : members_.outputs) writer.add(*output);
   module_compiler().write_text(path, writer.text());
+  return true;
 }
 
 }  // namespace retrograde::internal

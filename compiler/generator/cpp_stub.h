@@ -5,8 +5,8 @@
 //   output(x, y) = small.resized(x, y);
 //
 // The header declares a class with the structs Inputs, GeneratorParams and Outputs and a static
-// function generate(). It needs no source of the generator, which is linked into the program; what
-// configure() adds has no place in it.
+// function generate(). It needs no source of the generator, which is linked into the program. What
+// configure() adds is in it, as configure() adds it for the params that the header was made with.
 #pragma once
 
 #include <type_traits>

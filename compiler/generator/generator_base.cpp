@@ -68,7 +68,7 @@ void GeneratorBase::set_generator_param_values(const GeneratorParamsMap& values)
         autoscheduler_.name = value.text;
       else if (key.starts_with("autoscheduler."))
         autoscheduler_.extra[key.substr(key.find('.') + 1)] = value.text;
-      else if (!set_open_part(key, value.text))
+      else if (!set_declared_part(key, value))
         unknown_param(key);
     } else if (value.level.defined()) {
       (*param)->set_from_loop_level(value.level);
@@ -89,7 +89,8 @@ GeneratorPort* GeneratorBase::find_io(const std::string& name) const {
 }
 
 // in.type=float32, in.dim=2, in.size=3
-bool GeneratorBase::set_open_part(const std::string& key, const std::string& text) {
+bool GeneratorBase::set_declared_part(const std::string& key, const StringOrLoopLevel& value) {
+  const std::string& text = value.text;
   const size_t dot = key.find('.');
   if (dot == std::string::npos) return false;
   GeneratorPort* io = find_io(key.substr(0, dot));
@@ -222,6 +223,61 @@ Expr constant_for_input(const Expr& value, const GeneratorPort& input) {
   return ir::to_expr(converted);
 }
 
+// ---- by name ----
+
+std::vector<AbstractGenerator::ArgInfo> GeneratorBase::arginfos() {
+  configure_once();
+  std::vector<ArgInfo> infos;
+  const auto add = [&](const GeneratorPort& port, ArgInfoDirection direction) {
+    infos.push_back({port.name(), direction, port.kind(),
+                     port.types_defined() ? port.types() : std::vector<Type>(),
+                     port.dims_defined() ? port.dims() : any_size});
+  };
+  for (const GeneratorInputBase* input : members_.inputs) add(*input, ArgInfoDirection::Input);
+  for (const GeneratorOutputBase* output : members_.outputs) add(*output, ArgInfoDirection::Output);
+  return infos;
+}
+
+size_t GeneratorBase::find_input(const std::string& name) {
+  configure_once();
+  const auto found = std::ranges::find_if(
+      members_.inputs, [&](const GeneratorInputBase* input) { return input->name() == name; });
+  if (found != members_.inputs.end()) return static_cast<size_t>(found - members_.inputs.begin());
+  const std::string list = listed(
+      members_.inputs, [](const GeneratorInputBase* input) { return quoted(input->name()); });
+  user_error("take the input " + quoted(name) + " of the generator " + quoted(name_),
+             "an input has the name that the generator declares",
+             list.empty() ? "it has none" : "its inputs are " + list, "Name one of these");
+}
+
+void GeneratorBase::bind_input(const std::string& name, const std::vector<Parameter>& values) {
+  const size_t i = find_input(name);
+  GeneratorInputBase& input = *members_.inputs[i];
+  input.set_values(ir::mapped(
+      values, [&](const Parameter& parameter) { return input.value_of(parameter.contents()); }));
+}
+
+void GeneratorBase::bind_input(const std::string& name, const std::vector<Func>& values) {
+  set_input(find_input(name), values);
+}
+
+void GeneratorBase::bind_input(const std::string& name, const std::vector<Expr>& values) {
+  set_input(find_input(name), values);
+}
+
+Pipeline GeneratorBase::build_pipeline() {
+  schedule_all();
+  return get_pipeline();
+}
+
+std::vector<Parameter> GeneratorBase::input_parameter(const std::string& name) {
+  const GeneratorInputBase& input = *members_.inputs[find_input(name)];
+  return ir::mapped(input.values(), [&](const InputValue& value) {
+    if (!value.parameter || value.parameter->is_literal) refuse_value_of(input);
+    return Parameter(value.parameter);
+  });
+}
+
 // ---- what it makes ----
 
 Pipeline GeneratorBase::get_pipeline() {
@@ -240,6 +296,11 @@ Pipeline GeneratorBase::get_pipeline() {
     if (is_traced_) pipeline_.trace_pipeline();
   }
   return pipeline_;
+}
+
+void GeneratorBase::use_pipeline(Pipeline pipeline) {
+  pipeline_ = std::move(pipeline);
+  if (is_traced_) pipeline_.trace_pipeline();
 }
 
 void GeneratorBase::trace_pipeline() {
@@ -262,16 +323,18 @@ void GeneratorBase::add_requirements(Pipeline& pipeline) const {
   for (const Requirement& r : requirements_) pipeline.add_requirement(r.condition, r.message);
 }
 
+void GeneratorBase::refuse_value_of(const GeneratorInputBase& input) const {
+  user_error("compile the generator " + quoted(name_) + " ahead of time",
+             "its inputs are those of the compiled function",
+             quoted(input.name()) + " was given a value from C++",
+             "Take build_module() of a generator without inputs set");
+}
+
 std::vector<Argument> GeneratorBase::input_arguments() const {
   std::vector<Argument> arguments;
   for (const GeneratorInputBase* input : members_.inputs) {
     for (const InputValue& value : input->values()) {
-      if (!value.parameter || value.parameter->is_literal) {
-        user_error("compile the generator " + quoted(name_) + " ahead of time",
-                   "its inputs are those of the compiled function",
-                   quoted(input->name()) + " was given a value from C++",
-                   "Take build_module() of a generator without inputs set");
-      }
+      if (!value.parameter || value.parameter->is_literal) refuse_value_of(*input);
       arguments.push_back(frontend::argument_of(*value.parameter));
     }
   }

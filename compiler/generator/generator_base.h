@@ -12,6 +12,7 @@
 
 #include "frontend/language/lambda.h"
 #include "frontend/run/module.h"
+#include "generator/abstract_generator.h"
 #include "generator/generator_context.h"
 #include "generator/generator_input.h"
 #include "generator/generator_output.h"
@@ -51,16 +52,17 @@ class AutoScheduleParam : public GeneratorParamBase {
   std::string scheduler_;
 };
 
-class GeneratorBase : public NamesInterface {
+class GeneratorBase : public NamesInterface, public AbstractGenerator {
  public:
-  virtual ~GeneratorBase() = default;
+  ~GeneratorBase() override = default;
   GeneratorBase(const GeneratorBase&) = delete;
   GeneratorBase& operator=(const GeneratorBase&) = delete;
 
   const std::string& name() const { return name_; }
+  std::string name() override { return name_; }
   void set_name(const std::string& name) { name_ = name; }
   void init_from_context(const GeneratorContext& context);
-  GeneratorContext context() const;
+  GeneratorContext context() const override;
   Target get_target() const { return target; }
   bool get_auto_schedule() const { return auto_schedule; }
   bool using_autoscheduler() const { return auto_schedule || !autoscheduler_.name.empty(); }
@@ -80,7 +82,7 @@ class GeneratorBase : public NamesInterface {
   // it.
   void set_generator_param_values(const GeneratorParamsMap& values);
   // Writes a header with a class that runs this generator inside another one: see cpp_stub.h.
-  void emit_cpp_stub(const std::string& path) const;
+  bool emit_cpp_stub(const std::string& path) override;
   // Writes a header whose function
   //   void apply_schedule_<function>(retrograde::Pipeline pipeline, retrograde::Target target)
   // gives the schedule that build_module() compiles with to a pipeline of the same Funcs.
@@ -132,9 +134,9 @@ class GeneratorBase : public NamesInterface {
                                const std::map<std::string, JITExtern>* externs = nullptr);
   // The gradient of every output with respect to every image: the function takes the same inputs,
   // then for each output _grad_loss_for_<output>, then for each output and each image input
-  // _grad_loss_<output>_wrt_<input>, all of the shape of what they belong to. schedule() is not
-  // called: it speaks of another pipeline. Funcs that generate() has not scheduled get the default
-  // schedule of gradients.
+  // _grad_loss_<output>_wrt_<input>, all of the shape of what they belong to, with _dummy in front
+  // where the output does not read the input. schedule() is not called: it speaks of another
+  // pipeline. Funcs that generate() has not scheduled get the default schedule of gradients.
   // Requires: gradients are of outputs with one value; gradients are of floating-point outputs.
   Module build_gradient_module(const std::string& function_name = "");
   // The gradients by images and numbers of floating-point types, summed over the outputs, for who
@@ -146,16 +148,36 @@ class GeneratorBase : public NamesInterface {
   // gradients are by floating-point inputs.
   Module build_separate_gradients(const std::string& function_name = "");
 
+  // ---- by name: see AbstractGenerator ----
+  // Runs configure().
+  std::vector<ArgInfo> arginfos() override;
+  bool allow_out_of_order_inputs_and_outputs() const override { return false; }
+  void set_generatorparam_value(const std::string& name, const std::string& value) override {
+    set_generator_param_values({{name, value}});
+  }
+  void set_generatorparam_value(const std::string& name, const LoopLevel& value) override {
+    set_generator_param_values({{name, value}});
+  }
+  // Requires: an input has the name that the generator declares.
+  void bind_input(const std::string& name, const std::vector<Parameter>& values) override;
+  void bind_input(const std::string& name, const std::vector<Func>& values) override;
+  void bind_input(const std::string& name, const std::vector<Expr>& values) override;
+  // Runs generate() and schedule().
+  Pipeline build_pipeline() override;
+  // Requires: an input has the name that the generator declares.
+  std::vector<Parameter> input_parameter(const std::string& name) override;
+  std::vector<Func> output_func(const std::string& name) override { return output_funcs(name); }
+  bool emit_hlpipe(const std::string&) override {
+    return false;
+  }  // pipelines have no form as bytes
+
   // ---- in configure() ----
   // Requires: inputs and outputs are added in configure().
   template <typename T, typename... Args>
   GeneratorInput<T>* add_input(const std::string& name, const Args&... args) {
     check_configuring("input", name);
-    auto input = std::make_unique<GeneratorInput<T>>(name, args...);
-    GeneratorInput<T>* result = input.get();
-    adopt(result);
-    extras_.push_back(std::move(input));
-    members_.inputs.push_back(result);
+    auto* result = new GeneratorInput<T>(name, args...);
+    add_port(result);
     return result;
   }
   // Several types: add_output<Func>("pair", {Float(32), UInt(8)}, 2).
@@ -171,11 +193,8 @@ class GeneratorBase : public NamesInterface {
   template <typename T, typename... Args>
   GeneratorOutput<T>* add_output(const std::string& name, const Args&... args) {
     check_configuring("output", name);
-    auto output = std::make_unique<GeneratorOutput<T>>(name, args...);
-    GeneratorOutput<T>* result = output.get();
-    adopt(result);
-    extras_.push_back(std::move(output));
-    members_.outputs.push_back(result);
+    auto* result = new GeneratorOutput<T>(name, args...);
+    add_port(result);
     return result;
   }
 
@@ -194,6 +213,19 @@ class GeneratorBase : public NamesInterface {
   virtual void call_configure() = 0;
   virtual void call_generate() = 0;
   virtual void call_schedule() = 0;
+  // Something by this name that is no GeneratorParam; false where there is none.
+  virtual bool set_declared_part(const std::string& key, const StringOrLoopLevel& value);
+  // In configure(). The generator owns it from now on.
+  void add_port(GeneratorInputBase* input) {
+    adopt(input);
+    members_.inputs.push_back(input);
+  }
+  void add_port(GeneratorOutputBase* output) {
+    adopt(output);
+    members_.outputs.push_back(output);
+  }
+  // In generate(), instead of the one that its outputs would make.
+  void use_pipeline(Pipeline pipeline);
 
  private:
   // First: params, inputs and outputs below and in derived classes register there.
@@ -218,9 +250,13 @@ class GeneratorBase : public NamesInterface {
   void check_names() const;
   void check_input_count(size_t given);
   void check_configuring(const char* role, const std::string& name) const;
-  void adopt(GeneratorPort* extra) { extra->generator_ = this; }
+  void adopt(GeneratorPort* extra) {
+    extras_.emplace_back(extra);
+    extra->generator_ = this;
+  }
   void add_requirements(Pipeline& pipeline) const;
   void auto_schedule_pipeline(Pipeline& pipeline) const;
+  [[noreturn]] void refuse_value_of(const GeneratorInputBase& input) const;
   std::vector<Argument> input_arguments() const;
   std::vector<std::string> input_names() const;
   using NamedParameter = std::pair<std::string, std::shared_ptr<graph::ParameterContents>>;
@@ -230,9 +266,9 @@ class GeneratorBase : public NamesInterface {
   Module to_module(Pipeline& pipeline, const std::vector<Argument>& inputs,
                    const std::vector<std::string>& declared_names, const std::string& function_name,
                    LinkageType linkage);
-  bool set_open_part(const std::string& key, const std::string& text);
   [[noreturn]] void unknown_param(const std::string& key) const;
   GeneratorPort* find_io(const std::string& name) const;
+  size_t find_input(const std::string& name);
 
   template <typename A>
   void set_input(size_t i, const A& arg);

@@ -43,20 +43,28 @@ GeneratorInputBase::GeneratorInputBase(Declared declared, IOKind kind, Declared 
 void GeneratorInputBase::make_parameters() {
   std::vector<InputValue> values;
   for (size_t i = 0; i < array_size(); i++) {
-    InputValue value;
-    value.kind = kind();
     if (kind() == IOKind::Scalar) {
-      value.parameter = frontend::make_scalar_parameter(type(), element_name(i));
-      value.expr = ir::variable(value.parameter->name, type(), ir::SymbolRef(value.parameter));
-      describe(*value.parameter);
+      const auto parameter = frontend::make_scalar_parameter(type(), element_name(i));
+      describe(*parameter);
+      values.push_back(value_of(parameter));
     } else {
-      const ImageParam image(type(), dims(), element_name(i));
-      value.parameter = image.parameter();
-      if (kind() == IOKind::Function) value.func = image;
+      values.push_back(value_of(ImageParam(type(), dims(), element_name(i)).parameter()));
     }
-    values.push_back(std::move(value));
   }
   set_values(std::move(values));
+}
+
+InputValue GeneratorInputBase::value_of(
+    const std::shared_ptr<graph::ParameterContents>& parameter) const {
+  InputValue value;
+  value.parameter = parameter;
+  value.kind = !parameter->is_buffer        ? IOKind::Scalar
+               : kind() == IOKind::Function ? IOKind::Function
+                                            : IOKind::Buffer;
+  if (value.kind == IOKind::Function) value.func = ImageParam(parameter);
+  if (value.kind == IOKind::Scalar)
+    value.expr = ir::variable(parameter->name, parameter->type, ir::SymbolRef(parameter));
+  return value;
 }
 
 void GeneratorInputBase::set_values(std::vector<InputValue> values) {

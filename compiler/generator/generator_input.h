@@ -38,10 +38,12 @@ class GeneratorInputBase : public GeneratorPort {
   const std::vector<InputValue>& values() const { return values_; }
   // Makes parameters of the compiled function. CompileError when types, dimensions or array size
   // are still open.
-  void make_parameters();
+  virtual void make_parameters();
   // Values from C++.
   // Requires: the value is what the input declares.
   void set_values(std::vector<InputValue> values);
+  // A parameter as a value of this input.
+  InputValue value_of(const std::shared_ptr<graph::ParameterContents>& parameter) const;
 
  protected:
   GeneratorInputBase(Declared declared, IOKind kind, Declared said, bool is_array);

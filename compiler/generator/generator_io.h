@@ -66,6 +66,7 @@ class GeneratorPort {
   // Requires: configure() is the place for that; its type is declared once; its dimensions are
   // declared once; its size is said once, and not negative.
   void set_type(const Type& type) { set_types({type}); }
+  void set_type(const std::vector<Type>& types) { set_types(types); }  // of a Tuple
   void set_types(const std::vector<Type>& types);
   void set_dimensions(int dims);
   void set_array_size(int size);
@@ -90,6 +91,8 @@ class GeneratorPort {
   void agree_on_size(size_t size);
   void check_not_generated(const char* asked) const;
   void check_index(size_t i) const;
+
+  void become_array() { is_array_ = true; }
 
  private:
   friend class GeneratorBase;

@@ -64,9 +64,14 @@ class GeneratorOutput : public internal::OutputElements<T>, public Func {
  public:
   using Base::name;
   using Base::OutputElements;
-  using Base::type;
-  using Base::types;
-  int dimensions() const { return Base::dims(); }
+  // Those of its definition, where the declaration leaves them open.
+  std::vector<Type> types() const {
+    return asks_func(Base::types_defined()) ? Func::types() : Base::types();
+  }
+  Type type() const { return asks_func(Base::types_defined()) ? Func::type() : Base::type(); }
+  int dimensions() const {
+    return asks_func(Base::dims_defined()) ? Func::dimensions() : Base::dims();
+  }
   Func& handle() { return *this; }
 
   // This Func becomes the output.
@@ -100,6 +105,9 @@ class GeneratorOutput : public internal::OutputElements<T>, public Func {
   void make_funcs() override {
     if (!Func::defined()) Base::declare(*this, 0);
   }
+
+ private:
+  bool asks_func(bool is_declared) const { return !is_declared && Func::defined(); }
 };
 
 // An array of outputs.

@@ -4,9 +4,10 @@
 //
 // L is never named: whoever trains gives L_y, its gradient at the output. For several outputs the
 // gradients are kept apart, one for each pair of output and input; the caller sums what it needs.
-// Names, order and types of the arguments are those of Halide 14's gradient modules: images only.
+// Names, order and types of the arguments are those of Halide's gradient modules: images only.
 // An image of integers gets a gradient of zeros; so does every image from an output of integers,
-// which stands still while the inputs change a little.
+// which stands still while the inputs change a little. L_y is of floats where y is of integers. An
+// image that y does not read gets zeros, too, of L_y's type; its name begins with _dummy.
 //
 // Separate gradients are another form of the same, for who asks for some of the gradients only:
 // summed over the outputs, of numbers too, and without what is known to be 0.
@@ -63,7 +64,8 @@ void check_differentiable(const std::vector<NamedOutput>& outputs, const std::st
 ImageParam add_seed(const NamedOutput& output, std::vector<Argument>& arguments,
                     std::vector<std::string>& names) {
   names.push_back("_grad_loss_for_" + output.name);
-  ImageParam seed(output.func.type(), output.func.dimensions(), names.back());
+  const Type type = output.func.type().is_float() ? output.func.type() : Float(32);
+  ImageParam seed(type, output.func.dimensions(), names.back());
   arguments.push_back(frontend::argument_of(*seed.parameter()));
   return seed;
 }
@@ -80,6 +82,18 @@ Func sum_of(const std::vector<Func>& parts, const graph::ParameterContents& inpu
   for (const Func& part : parts) total = total + part(at);
   f(at) = total;
   return f;
+}
+
+Func zeros(const Type& type, int dimensions) {
+  Func f("zeros");
+  f(ir::numbered(dimensions, [&](int d) { return Var::implicit(d); })) = cast(type, 0);
+  return f;
+}
+
+std::set<std::string> inputs_of(const Func& f) {
+  std::set<std::string> names;
+  for (const Argument& argument : f.infer_arguments()) names.insert(argument.name);
+  return names;
 }
 
 }  // namespace
@@ -114,12 +128,17 @@ Module GeneratorBase::build_gradient_module(const std::string& function_name) {
     std::optional<Derivative> derivative;
     if (output.func.type().is_float())
       derivative = propagate_adjoints(output.func, seed, region_of(seed), options);
+    const std::set<std::string> read = inputs_of(output.func);
     for (size_t k = 0; k < images.size(); k++) {
-      const bool has = derivative && derivative->has(images[k]);
-      Func gradient = has ? (*derivative)(images[k]) : sum_of({}, *images[k].parameter());
+      const graph::ParameterContents& image = *images[k].parameter();
+      const bool is_read = read.count(image.name) > 0;
+      const bool has = is_read && derivative && derivative->has(images[k]);
+      Func gradient = has ? (*derivative)(images[k])
+                          : zeros(is_read ? image.type : seed.type(), image.dimensions);
       if (!seen.insert(gradient.function().get()).second) gradient = lambda(gradient(_));
       gradients.push_back(gradient);
-      gradient_names.push_back("_grad_loss_" + output.name + "_wrt_" + image_names[k]);
+      gradient_names.push_back((is_read ? "_grad_loss_" : "_dummy_grad_loss_") + output.name +
+                               "_wrt_" + image_names[k]);
     }
   }
   names.insert(names.end(), gradient_names.begin(), gradient_names.end());

@@ -69,7 +69,7 @@ std::unique_ptr<GeneratorBase> GeneratorRegistry::create(const std::string& name
     user_error("create the generator " + quoted(name), "a name is registered once",
                "two generators have it", "Rename one of them");
   }
-  std::unique_ptr<GeneratorBase> generator = factory(context);
+  std::unique_ptr<GeneratorBase> generator = as_generator_base(factory(context));
   generator->set_stub_name(stub_name);
   return generator;
 }

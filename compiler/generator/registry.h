@@ -7,14 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "generator/abstract_generator.h"
 #include "generator/generator_context.h"
 
 namespace retrograde::internal {
 
 class GeneratorBase;
 struct StringOrLoopLevel;
-using GeneratorFactory =
-    std::function<std::unique_ptr<GeneratorBase>(const GeneratorContext& context)>;
+using GeneratorFactory = std::function<AbstractGeneratorPtr(const GeneratorContext& context)>;
 
 class GeneratorRegistry {
  public:
@@ -31,7 +31,7 @@ class GeneratorRegistry {
 };
 
 struct RegisterGenerator {
-  RegisterGenerator(const char* name, GeneratorFactory factory, const char* stub_name = "") {
+  RegisterGenerator(const std::string& name, GeneratorFactory factory, const char* stub_name = "") {
     GeneratorRegistry::register_factory(name, std::move(factory), stub_name);
   }
 };
@@ -61,7 +61,7 @@ Callable create_callable_from_generator(const Target& target, const std::string&
   static const ::retrograde::internal::RegisterGenerator register_##name( \
       #name,                                                              \
       [](const ::retrograde::GeneratorContext& context)                   \
-          -> std::unique_ptr<::retrograde::internal::GeneratorBase> {     \
+          -> ::retrograde::internal::AbstractGeneratorPtr {               \
         using Generated = std::remove_pointer_t<decltype(new Class)>;     \
         return Generated::create(context, #name);                         \
       },                                                                  \

@@ -158,6 +158,24 @@ Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target) {
   return copy;
 }
 
+// Numbers are as good as their text.
+void bind_params(py::module_& m) {
+  Class<AutoschedulerParams>(m, "AutoschedulerParams")
+      .def(py::init([](const std::string& name, const py::dict& extra) {
+             AutoschedulerParams params(name);
+             for (const auto& [key, value] : extra)
+               params.extra[std::string(py::str(key))] = std::string(py::str(value));
+             return params;
+           }),
+           arg("name") = "", arg("extra") = py::dict())
+      .def_readwrite("name", &AutoschedulerParams::name)
+      .def_readwrite("extra", &AutoschedulerParams::extra)
+      .def("to_string", &AutoschedulerParams::to_string)
+      .def("__repr__", [](const AutoschedulerParams& params) {
+        return "<retrograde.AutoschedulerParams " + params.to_string() + ">";
+      });
+}
+
 void bind_scheduling(py::module_& m) {
   Class<Pipeline> c = reopened<Pipeline>(m, "Pipeline", {"Runnable"});
   c.def(
@@ -183,6 +201,13 @@ void bind_scheduling(py::module_& m) {
           },
           arg("name"), arg("target"), arg("machine_params") = MachineParams())
       .def(
+          "apply_autoscheduler",
+          [](const Pipeline& p, const Target& target, const AutoschedulerParams& params) {
+            return unlocked(
+                [=](const Interruption&) { return p.apply_autoscheduler(target, params); });
+          },
+          arg("target"), arg("params"))
+      .def(
           "_scheduled_copy",
           [](const Pipeline& p, const Target& target) {
             return unlocked([=](const Interruption&) { return scheduled_copy(p, target); });
@@ -207,6 +232,7 @@ void bind_autoschedule(py::module_& m) {
   bind_machine(m);
   bind_results(m);
   bind_schedulers(m);
+  bind_params(m);
   bind_scheduling(m);
 }
 

@@ -34,7 +34,7 @@ Func bounded(const py::object& source, const std::optional<Region>& bounds, Make
         return bounded(source, bounds,                                                           \
                        [](const auto&... given) { return BoundaryConditions::name(given...); }); \
       },                                                                                         \
-      py::arg("source"), py::arg("bounds") = py::none())
+      py::arg("f"), py::arg("bounds") = py::none())
 
 void bind_boundary_conditions(py::module_& m) {
   py::module_ sub =
@@ -61,7 +61,7 @@ void bind_boundary_conditions(py::module_& m) {
           }
         });
       },
-      py::arg("source"), py::arg("value"), py::arg("bounds") = py::none());
+      py::arg("f"), py::arg("exterior"), py::arg("bounds") = py::none());
   RETROGRADE_BOUNDARY_CONDITION(repeat_edge);
   RETROGRADE_BOUNDARY_CONDITION(repeat_image);
   RETROGRADE_BOUNDARY_CONDITION(mirror_image);

@@ -32,11 +32,22 @@ std::optional<Expr> expr_from(py::handle object) {
   return number_from(object);
 }
 
+bool is_tuple_like(py::handle object) {
+  if (is_sequence(object)) return true;
+  for (const char* name : {"__len__", "__getitem__"}) {
+    if (!py::hasattr(object, name)) return false;
+  }
+  for (const char* name : {"keys", "__array__", "__array_interface__", "__dlpack__"}) {
+    if (py::hasattr(object, name)) return false;
+  }
+  return !PyObject_CheckBuffer(object.ptr()) && !expr_from(object);
+}
+
 std::optional<Tuple> tuple_from(py::handle object) {
   if (const auto* ref = as<FuncRef>(object)) return Tuple(*ref);
-  if (is_sequence(object)) {
+  if (is_tuple_like(object)) {
     std::vector<Expr> exprs;
-    for (py::handle element : object) {
+    for (py::handle element : py::iter(object)) {
       std::optional<Expr> expr = expr_from(element);
       if (!expr) return {};
       exprs.push_back(std::move(*expr));

@@ -54,6 +54,9 @@ Tuple tuple_for(const std::vector<Type>& types, py::handle object);
 // A Python int or float, which has no type of its own here.
 bool is_plain_number(py::handle object);
 
+// Tuples, lists, and objects of a user's class with a length and elements, such as complex numbers; no arrays, no dicts.
+bool is_tuple_like(py::handle object);
+
 // f[x, y]: one coordinate or a tuple of them; `...` stands for the placeholder _.
 std::vector<Expr> coordinates(py::handle index);
 

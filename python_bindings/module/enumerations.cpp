@@ -26,6 +26,7 @@ void bind_output_files(py::module_& m) {
   RETROGRADE_VALUE(compiler_log);
   RETROGRADE_VALUE(cpp_stub);
   RETROGRADE_VALUE(featurization);
+  RETROGRADE_VALUE(function_info_header);
   RETROGRADE_VALUE(llvm_assembly);
   RETROGRADE_VALUE(object);
   RETROGRADE_VALUE(python_extension);

@@ -34,8 +34,8 @@ void assign(const Func& f, const py::object& index, const py::object& value) {
     ref = value.cast<const FuncRef&>();
   } else if (py::isinstance<Tuple>(value)) {
     ref = value.cast<const Tuple&>();
-  } else if (py::isinstance<py::tuple>(value) || py::isinstance<py::list>(value)) {
-    ref = Tuple(values_for(f, py::reinterpret_borrow<py::sequence>(value)));
+  } else if (is_tuple_like(value)) {
+    ref = Tuple(values_for(f, py::tuple(py::reinterpret_borrow<py::sequence>(value))));
   } else {
     ref = values_for(f, py::make_tuple(value))[0];
   }

@@ -23,8 +23,7 @@ void bind_update(Class<FuncRef>& c, const char* name, Op op) {
       [op](FuncRef& ref, const py::object& value) {
         if (py::isinstance<FuncRef>(value)) {
           op(ref, value.cast<const FuncRef&>());
-        } else if (py::isinstance<Tuple>(value) || py::isinstance<py::tuple>(value) ||
-                   py::isinstance<py::list>(value)) {
+        } else if (py::isinstance<Tuple>(value) || is_tuple_like(value)) {
           op(ref, tuple_for(value_types(*ref.function()), value));
         } else {
           op(ref, operand_of(ref, 0, value));

@@ -91,6 +91,7 @@ void add_to(py::object cls) {
   method("__neg__", [](const Expr& a) { return -a; });
   method("__pos__", [](const Expr& a) { return a; });
   method("__invert__", &not_of);
+  method("logical_not", [](const Expr& a) { return !a; });
   method("__abs__", [](const Expr& a) { return abs(a); });
   method("__bool__", &refuse_bool);
 }

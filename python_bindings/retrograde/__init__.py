@@ -30,10 +30,11 @@ else:
     from ._linking import *
     from ._names import funcs, vars
 
+    lambda_func = lambda_  # as Halide's package calls it
     for _name in ("abs", "max", "min", "pow", "print", "round", "sum", "_"):
         globals()[_name] = getattr(_retrograde, _name)
     for _n in range(10):
         globals()[f"_{_n}"] = getattr(_retrograde, f"_{_n}")
-    __all__ += ["_", "funcs", "main"] + _generator.__all__ + _linking.__all__ + [
+    __all__ += ["_", "funcs", "lambda_func", "main"] + _generator.__all__ + _linking.__all__ + [
         _name for _name in dir(_retrograde) if not _name.startswith("_") and _name not in _BUILTIN]
     __version__ = _retrograde.__version__

@@ -27,7 +27,7 @@ from . import _retrograde as rg
 from ._errors import CompileError, error
 
 __all__ = ["Generator", "GeneratorParam", "InputBuffer", "InputScalar", "OutputBuffer", "OutputScalar",
-           "create_callable_from_generator", "generator", "generators"]
+           "alias", "create_callable_from_generator", "generator", "generators"]
 
 generators = {}  # by name: what @generator registered
 
@@ -79,7 +79,9 @@ class _Port:
 
     @staticmethod
     def _types(type):
-        return [rg.Type(t) for t in type] if isinstance(type, (list, tuple)) else [rg.Type(type)]
+        """One or several, of which Python's own number types are some."""
+        own = {bool: "bool", int: "int32", float: "float32"}
+        return [rg.Type(own.get(t, t)) for t in (type if isinstance(type, (list, tuple)) else [type])]
 
     def make(self, name):
         if self.types is None or self.dimensions is None:
@@ -143,6 +145,7 @@ class Generator:
     def __init__(self, target=None, **params):
         self._target = rg.Target(target) if isinstance(target, str) else target or rg.get_jit_target_from_environment()
         self._auto_schedule, self._machine_params = False, rg.MachineParams()
+        self._autoscheduler = rg.AutoschedulerParams()
         self._ports = {k: copy.copy(v) for k, v in self._declared(_Port)}
         self._params = dict(self._declared(GeneratorParam))
         for name, param in self._params.items():
@@ -163,7 +166,7 @@ class Generator:
         port, _, what = name.partition(".")
         if name in self._params:
             setattr(self, name, self._params[name].read(name, value))
-        elif name in ("auto_schedule", "machine_params"):
+        elif name in ("auto_schedule", "machine_params", "autoscheduler") or port == "autoscheduler":
             self._set_schedule(name, value)
         elif port in self._ports and what in ("type", "dim", "size"):
             self._set_port(self._ports[port], what, value)
@@ -173,7 +176,11 @@ class Generator:
                         "a param is one of the generator's", f"it has {', '.join(names)}", "Choose one of them")
 
     def _set_schedule(self, name, value):
-        if name == "auto_schedule":
+        if name == "autoscheduler":
+            self._autoscheduler.name = str(value)
+        elif name.startswith("autoscheduler."):
+            self._autoscheduler.extra = {**self._autoscheduler.extra, name.partition(".")[2]: str(value)}
+        elif name == "auto_schedule":
             self._auto_schedule = GeneratorParam(False).read(name, value)
         else:
             self._machine_params = rg.MachineParams(value) if isinstance(value, str) else value
@@ -214,7 +221,7 @@ class Generator:
         return self._target
 
     def using_autoscheduler(self):
-        return self._auto_schedule
+        return self._auto_schedule or bool(self._autoscheduler.name)
 
     def machine_params(self):
         return self._machine_params
@@ -256,7 +263,9 @@ class Generator:
                 self._pipeline.add_requirement(*requirement)
             if self._traced:
                 self._pipeline.trace_pipeline()
-            if self._auto_schedule and not self._given:
+            if self._autoscheduler.name and not self._given:
+                self._pipeline.apply_autoscheduler(self._target, self._autoscheduler)
+            elif self._auto_schedule and not self._given:
                 self._pipeline.auto_schedule(self._target, self._machine_params)
         return self._pipeline
 
@@ -335,6 +344,18 @@ def create_callable_from_generator(target, name, params=None):
                     "a generator is created by the name that it is registered under",
                     f"there are {', '.join(generators) or 'none'}", "Name one of them")
     return generators[name](target, **(params or {})).compile_to_callable()
+
+
+def alias(**aliases):
+    """Registers more generators: the class with other values of its params. `@alias(wide={"radius": 4})` stands above
+    `@generator`."""
+    def register(cls):
+        for name, given in aliases.items():
+            def init(self, target=None, _given=given, **params):
+                cls.__init__(self, target, **{**_given, **params})
+            generator(name)(type(name, (cls,), {"__init__": init}))
+        return cls
+    return register
 
 
 def generator(name=""):

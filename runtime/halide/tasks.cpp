@@ -61,6 +61,8 @@ RETROGRADE_WEAK halide_do_par_for_t halide_set_custom_do_par_for(halide_do_par_f
   return par_for_handler.exchange(handler ? handler : halide_default_do_par_for);
 }
 
+// Declared by later releases alone.
+RETROGRADE_WEAK int halide_get_num_threads() { return retrograde::runtime::thread_count(); }
 RETROGRADE_WEAK int halide_set_num_threads(int count) {
   if (count < 0) {
     halide_error(nullptr,

@@ -130,6 +130,7 @@ class Operators(unittest.TestCase):
         yes, no = rg.Expr(True), rg.Expr(False)
         self.assertEqual([value(v) for v in (yes & no, yes | no, yes ^ yes, ~yes)], [False, True, False, False])
         self.assertEqual(value(rg.logical_and(yes, rg.logical_not(no))), True)
+        self.assertEqual([value(yes.logical_not()), value((rg.Expr(1) > 2).logical_not())], [False, True])
         self.assertEqual([value(v) for v in (rg.Expr(1) >= 2, rg.Expr(1) == 1, 3 != rg.Expr(3), 1 < rg.Expr(2))],
                          [False, True, False, True])
 

@@ -114,11 +114,32 @@ class Definitions(unittest.TestCase):
         g[x] = f[x + 1]
         np.testing.assert_array_equal(g.realize([2])[0], [1, 42])
 
+    def test_objects_with_elements_are_tuples(self):
+        class Complex:
+            def __init__(self, real, imaginary):
+                self.parts = real, imaginary
+
+            def __len__(self):
+                return 2
+
+            def __getitem__(self, i):
+                return self.parts[i]
+
+        f, g = rg.Func(), rg.Func()
+        f[x] = Complex(1.5, rg.f32(x))
+        f[x] += Complex(2.0, 3.0)
+        real, imaginary = f.realize([3])
+        self.assertEqual((real[2], imaginary[2]), (3.5, 5))
+        for none in ({0: 1}, np.ones(2), object()):
+            with self.assertRaises((TypeError, RuntimeError)):
+                g[x] = none
+
     def test_of_expressions_images_and_lambdas(self):
         a = np.arange(6, dtype=np.uint8).reshape(2, 3)
         np.testing.assert_array_equal(array(rg.Func(rg.Buffer(a)), 3, 2), a)
         self.assertEqual(rg.Func(rg.Expr(7)).realize()[()], 7)
         np.testing.assert_array_equal(array(rg.lambda_(x, y, x * y), 3, 3), np.outer(range(3), range(3)))
+        self.assertIs(rg.lambda_func, rg.lambda_)
 
     def test_declared_types_are_kept(self):
         f = rg.Func(rg.Float(32), 1, "f")
@@ -226,6 +247,13 @@ class BoundaryConditions(unittest.TestCase):
             self.check(bc.constant_exterior(source, 9, *more), [9, 9, 9, 1, 2, 3, 4, 9, 9, 9])
         with self.assertRaises(TypeError):
             bc.repeat_edge(f)
+
+    def test_arguments_go_by_the_names_of_halide(self):
+        bc = rg.BoundaryConditions
+        f = rg.Func()
+        f[x] = x + 1
+        self.check(bc.constant_exterior(f=f, exterior=9, bounds=[(0, 4)]), [9, 9, 9, 1, 2, 3, 4, 9, 9, 9])
+        self.check(bc.mirror_interior(f=f, bounds=[(0, 4)]), [4, 3, 2, 1, 2, 3, 4, 3, 2, 1])
 
 
 if __name__ == "__main__":

@@ -49,6 +49,18 @@ class Several(rg.Generator):
         self.count[()] = len(self.images)
 
 
+@rg.alias(tripled={"factor": 3}, tripled_by_rules={"factor": 3, "autoscheduler": "Mullapudi2016"})
+@rg.generator()
+class Doubled:
+    factor = rg.GeneratorParam(2)
+    image = rg.InputBuffer(int, 2)
+    offset = rg.InputScalar(float)
+    out = rg.OutputBuffer("int32", 2)
+
+    def generate(self):
+        self.out[x, y] = self.image[x, y] * self.factor + rg.cast("int32", self.offset)
+
+
 A = np.arange(12, dtype=np.float32).reshape(3, 4)
 
 
@@ -75,6 +87,28 @@ class InProcess(unittest.TestCase):
         np.testing.assert_array_equal(out, 4 * A)
         with self.assertRaisesRegex(rg.CompileError, "there are brighten"):
             rg.create_callable_from_generator(rg.get_host_target(), "dim")
+
+    def test_by_its_aliases(self):
+        out, image = np.zeros((3, 4), np.int32), np.arange(12, dtype=np.int32).reshape(3, 4)
+        for name, factor in (("Doubled", 2), ("tripled", 3), ("tripled_by_rules", 3)):
+            rg.create_callable_from_generator(rg.get_host_target(), name)(image, 1.0, out)
+            np.testing.assert_array_equal(out, factor * image + 1)
+        rg.create_callable_from_generator(rg.get_host_target(), "tripled", {"factor": 5})(image, 0.0, out)
+        np.testing.assert_array_equal(out, 5 * image)
+        self.assertEqual([i.type() for i in Doubled().inputs()], [rg.Int(32), rg.Float(32)])
+
+    def test_a_scheduler_of_halide_means_the_built_in_one(self):
+        g = Brighten(autoscheduler="Adams2019", **{"autoscheduler.parallelism": 4})
+        self.assertTrue(g.using_autoscheduler())
+        self.assertIn("vectorized", g.outputs()[0].loop_nest())
+        params = rg.AutoschedulerParams("Adams2019", {"parallelism": 8})
+        self.assertEqual(params.to_string(), "autoscheduler=Adams2019 autoscheduler.parallelism=8")
+        f = rg.Func()
+        f[x, y] = rg.f32(x) * y
+        f.set_estimates([(0, 640), (0, 480)])
+        pipeline = rg.Pipeline(f)
+        pipeline.apply_autoscheduler(rg.get_host_target(), params)
+        self.assertIn("vectorized", f.loop_nest())
 
     def test_requirements(self):
         class Positive(Brighten):

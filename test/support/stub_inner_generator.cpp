@@ -44,6 +44,19 @@ class Inner : public Halide::Generator<Inner> {
   Func partial{"partial"};
 };
 
+// One output, and an input that configure() adds.
+class Configured : public Halide::Generator<Configured> {
+ public:
+  Input<int> offset{"offset"};
+  Output<Func> out{"out", Int(32), 1};
+  void configure() { added = add_input<int>("added"); }
+  void generate() { out(Var("x")) = Var("x") * *added + offset; }
+
+ private:
+  Input<int>* added = nullptr;
+};
+
 }  // namespace
 
+HALIDE_REGISTER_GENERATOR(Configured, stub_configured)
 HALIDE_REGISTER_GENERATOR(Inner, stub_inner, test::inner::InnerStub)

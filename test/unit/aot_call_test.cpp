@@ -27,6 +27,9 @@
 #include "aot_tuple.h"
 #include "aot_variants.h"
 
+// Of releases later than the header's.
+extern "C" int halide_get_num_threads();
+
 using Halide::Runtime::Buffer;
 
 namespace {
@@ -388,6 +391,7 @@ TEST_F(Aot, TasksGoToTheHandler) {
 TEST_F(Aot, ThreadsCanBeCountedAndEnded) {
   Buffer<uint8_t, 2> in = make_input();
   halide_set_num_threads(3);
+  EXPECT_EQ(halide_get_num_threads(), 3);
   EXPECT_EQ(halide_set_num_threads(5), 3);
   for (int i = 0; i < 3; i++) {
     Buffer<uint16_t, 2> out(64, 32);

@@ -137,6 +137,46 @@ TEST_F(AotFiles, HeaderIsReadByCAndByCpp) {
       << read_file(path("log"));
 }
 
+// Read by a compiler: with the HalideRuntime.h of Halide 14, which has no such types, ...
+TEST_F(AotFiles, FunctionInfoIsConstant) {
+  Func pair("pair");
+  pair(x, y) = Tuple(cast<float16_t>(in(x, y)), cast<int64_t>(in(x, y)));
+  pair.compile_to({{OutputFileType::function_info_header, path("pair.h")}}, {in, gain}, "ns::pair",
+                  Target("host-user_context-c_plus_plus_name_mangling"));
+  out.compile_to({{OutputFileType::function_info_header, path("out.h")}}, {in, gain}, "out",
+                 Target("host"));
+  std::ofstream(path("main.cpp")) << R"(#include "pair.h"
+#include "out.h"
+using namespace HalideFunctionInfo;
+constexpr auto infos = ns::pair_argument_info();
+static_assert(infos.size() == 5 && infos[0].name == "__user_context");
+static_assert(infos[1].name == "in" && infos[1].kind == InputBuffer && infos[1].dimensions == 2);
+static_assert(infos[1].type == halide_type_t(halide_type_uint, 8));
+static_assert(infos[2].kind == InputScalar && infos[2].dimensions == 0);
+static_assert(infos[2].type == halide_type_t(halide_type_float, 32));
+static_assert(infos[3].kind == OutputBuffer && infos[3].type == halide_type_t(halide_type_float, 16));
+static_assert(infos[4].type == halide_type_t(halide_type_int, 64));
+static_assert(out_argument_info().size() == 3);
+constexpr ArgumentInfo copy = HalideFunctionInfo::ArgumentInfo(out_argument_info()[2]);
+static_assert(copy.kind == HalideFunctionInfo::OutputBuffer);
+)";
+  const std::string compile = "c++ -std=c++17 -Wall -Wextra -Werror -fsyntax-only ";
+  const std::string file = path("main.cpp");
+  EXPECT_EQ(shell(compile + RETROGRADE_TEST_COMPILE_FLAGS " " + file), 0) << read_file(path("log"));
+  // ... and with one of a release that has them.
+  std::ofstream(path("HalideRuntime.h")) << R"(#pragma once
+#include_next "HalideRuntime.h"
+#define HALIDE_VERSION_MAJOR 21
+namespace HalideFunctionInfo {
+enum ArgumentKind { InputScalar = 0, InputBuffer = 1, OutputBuffer = 2 };
+struct ArgumentInfo { std::string_view name; ArgumentKind kind; int32_t dimensions; halide_type_t type; };
+}
+)";
+  EXPECT_EQ(shell(compile + RETROGRADE_TEST_COMPILE_FLAGS " " + file), 0) << read_file(path("log"));
+  EXPECT_NE(shell("c++ -std=c++14 -fsyntax-only " RETROGRADE_TEST_COMPILE_FLAGS " " + file), 0);
+  EXPECT_TRUE(has(read_file(path("log")), "function_info headers need C++17"));
+}
+
 // What it does with tensors: test/install/torch_op.
 TEST_F(AotFiles, WrapperForPyTorchTakesTensorsAndNumbers) {
   out.compile_to({{OutputFileType::pytorch_wrapper, path("a.pytorch.h")}}, {in, gain}, "brighter");

@@ -310,6 +310,20 @@ TEST(ExternStage, IsCalledOnSlicesInItsOwnLoops) {
   }
 }
 
+TEST(ExternStage, HasTheLoopsThatFuncsAreComputedIn) {
+  Var x("x"), y("y"), xo("xo"), yo("yo");
+  for (const bool in_rows : {true, false}) {
+    Func in("in"), f("f");
+    in(x, y) = x * y;
+    f.define_extern("extern_test_tile", {in, Expr(in_rows ? 30 : 10), Expr(5)}, Int(32), {x, y});
+    f.tile(x, y, xo, yo, x, y, 10, 5);
+    in.compute_at(f, in_rows ? yo : xo);
+    const Buffer<int> result = f.realize({30, 20});
+    result.for_each_element(
+        [&](int i, int j) { ASSERT_EQ(result(i, j), i * j + i) << i << " " << j; });
+  }
+}
+
 TEST(ExternStage, HasShorterSlicesWhereATailIsGuarded) {
   Var x("x"), y("y"), xo("xo"), t("t");
   Func base("base"), in("in"), f("f"), out("out");

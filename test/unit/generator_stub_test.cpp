@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "Halide.h"
+#include "stub_configured.stub.h"
 #include "stub_inner.schedule.h"
 #include "stub_inner.stub.h"
 
@@ -90,6 +91,13 @@ TEST(GeneratorStub, GivesImagesThatCanBeRealized) {
   Buffer<int16_t> open = all[4];
   EXPECT_EQ(open(3), 3);
   EXPECT_TRUE(inner.target.has_feature(Target::JIT) || !inner.target.has_unknowns());
+}
+
+TEST(GeneratorStub, HasWhatConfigureAddsAndIsItsOnlyOutput) {
+  const Target target = get_jit_target_from_environment();
+  Func f = stub_configured::generate(target, {4, 10});
+  Buffer<int> values = f.realize({3});
+  EXPECT_EQ(values(2), 2 * 10 + 4);
 }
 
 // api: GeneratorBase::emit_schedule

@@ -411,6 +411,31 @@ TEST(Warnings, AreOfWhatIsHardlyMeant) {
   expect_mentions(found[3], {"specialization of \"h", "does not depend on the call"});
 }
 
+TEST(Warnings, NameARequirementThatNeverHolds) {
+  Func f("f"), g("g");
+  Var x("x");
+  Param<int> p("p");
+  f(x) = require(Expr(1) + Expr(2) == 4, x, "three is not four");
+  g(x) = f(x) + require(p > 0, x, "p is positive");
+  const std::vector<std::string> found = warnings_of(Pipeline(g));
+  ASSERT_EQ(found.size(), 1u);
+  expect_mentions(found[0], {"\"f", "requires what never holds", "is false"});
+}
+
+TEST(Warnings, NameFloatsThatTheTargetLacks) {
+  Func f("f");
+  Var x("x");
+  f(x) = cast<uint8_t>(cast<float16_t>(x) / 3);
+  std::vector<std::string> told;
+  WarningScope scope([&](const std::string& warning) { told.push_back(warning); });
+  f.compile_to_module({}, "f", Target("x86-64-linux"));
+  ASSERT_EQ(told.size(), 1u);
+  expect_mentions(told[0], {"performance note", "float16 by software", "no f16c"});
+  f.compile_to_module({}, "f", Target("x86-64-linux-sse41-avx-f16c"));
+  f.compile_to_module({}, "f", Target("arm-64-linux"));
+  EXPECT_EQ(told.size(), 1u);
+}
+
 TEST(Warnings, SpareProgramsThatMeanWhatTheySay) {
   Func f("f"), g("g"), h("h");
   Var x("x"), y("y");

@@ -4,6 +4,7 @@
 
 #include <retrograde/retrograde.h>
 
+#include "generator/execute_generator.h"
 #include "porting/internal.h"
 
 // Programs rely on these.
@@ -297,6 +298,11 @@ struct halide_global_ns;
   RETROGRADE_EXTERN_7(call_pure_c_function, rt, name, t1, t2, t3, t4, t5, t6, t7)
 #define HalidePureExtern_8(rt, name, t1, t2, t3, t4, t5, t6, t7, t8) \
   RETROGRADE_EXTERN_8(call_pure_c_function, rt, name, t1, t2, t3, t4, t5, t6, t7, t8)
+
+// Throws CompileError unless argument number `k` of the function `name` has the type.
+#define _halide_check_arg_type(t, name, e, k)                                     \
+  _halide_user_assert((e).type() == (t)) << "argument " << (k) << " of " << #name \
+                                         << " has the type " << (t) << ", not " << (e).type()
 
 // HALIDE_DECLARE_EXTERN_*: names types behind handles; here all handles are alike.
 #define HALIDE_DECLARE_EXTERN_SIMPLE_TYPE(T)

@@ -171,7 +171,7 @@ Module Pipeline::module(const std::vector<Argument>& args, const std::string& fu
       function.args.push_back(output_argument(argument));
   }
   add_estimates(pipeline.outputs, function.args);
-  frontend::tell_warnings(pipeline.outputs);
+  frontend::tell_warnings(pipeline.outputs, target);
   Module module(name, target);
   module.append(function);
   return module;

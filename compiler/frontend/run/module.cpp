@@ -35,6 +35,7 @@ std::map<OutputFileType, const OutputInfo> get_output_info(const Target& target)
       {OutputFileType::compiler_log, {"compiler_log", ".halide_compiler_log", true}},
       {OutputFileType::cpp_stub, {"cpp_stub", ".stub.h", false}},
       {OutputFileType::featurization, {"featurization", ".featurization", true}},
+      {OutputFileType::function_info_header, {"function_info_header", ".function_info.h", false}},
       {OutputFileType::llvm_assembly, {"llvm_assembly", ".ll", true}},
       {OutputFileType::object, {"object", is_windows ? ".obj" : ".o", true}},
       {OutputFileType::python_extension, {"python_extension", ".py.cpp", false}},

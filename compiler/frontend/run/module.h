@@ -24,10 +24,11 @@ enum class OutputFileType {
   assembly,
   bitcode,
   c_header,
-  c_source,       // Unsupported
-  compiler_log,   // Unsupported
-  cpp_stub,       // Unsupported in Module::compile: generators write it
-  featurization,  // Unsupported
+  c_source,              // Unsupported
+  compiler_log,          // Unsupported
+  cpp_stub,              // Unsupported in Module::compile: generators write it
+  featurization,         // Unsupported
+  function_info_header,  // name_argument_info(), the arguments as constants of C++17
   llvm_assembly,
   object,
   python_extension,  // Unsupported

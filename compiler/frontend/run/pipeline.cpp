@@ -236,7 +236,7 @@ std::shared_ptr<CompiledPipeline> Pipeline::compiled(const Target& wanted) const
     contents.stamp = Stamp::of(pipeline);
     contents.compiled = default_compiler().compile(pipeline, target);
     contents.target = target;
-    frontend::tell_warnings(contents.outputs);
+    frontend::tell_warnings(contents.outputs, target);
   }
   return contents.compiled;
 }

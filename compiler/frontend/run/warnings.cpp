@@ -7,7 +7,9 @@
 //   f.update().atomic() alone              nothing runs at the same time
 //   RDom r(0, 0)                           the update never runs
 //   f.specialize(true)                     a condition that no call decides
+//   require(1 > 2, ...)                    every call fails
 //   a gradient without a schedule          the compiler chooses one
+//   float16 without f16c                   each conversion is a function of many instructions
 #include "frontend/run/warnings.h"
 
 #include <algorithm>
@@ -62,6 +64,7 @@ class Findings {
     find_forgotten(f);
     for (int s = 0; s < f.stage_count(); s++) {
       find_empty_domain(f, s);
+      find_failing_requirement(f, s);
       find_idle(f, s, f.stage(s).schedule);
     }
   }
@@ -73,6 +76,30 @@ class Findings {
         text("of its ", funcs.size(), " Funcs ", count, " have no directive, adjoints among them"),
         "Give them schedules, call Pipeline::auto_schedule() to see and edit what it chooses, say "
         "set_autoschedule() how it is to choose, or Pipeline::unscheduled() for no schedule");
+  }
+
+  void note_slow_floats(const FuncContents& f, const Target& target) {
+    const std::vector<Target::Feature> converting = {Target::F16C,
+                                                     Target::AVX512,
+                                                     Target::AVX512_KNL,
+                                                     Target::AVX512_Skylake,
+                                                     Target::AVX512_Cannonlake,
+                                                     Target::AVX512_SapphireRapids};
+    if (target.arch != Target::X86 || target.features_any_of(converting) || f.is_extern()) return;
+    bool has_halves = false;
+    for (int s = 0; s < f.stage_count() && !has_halves; s++) {
+      for_each_expr(f.stage(s), [&](const Expr& root) {
+        walk(root, [&](const Expr& e) {
+          has_halves =
+              has_halves || (e.type().is_float() && e.type().bits() == 16 && !e.type().is_bfloat());
+          return !has_halves;
+        });
+      });
+    }
+    if (!has_halves) return;
+    add("performance note: " + quoted(f.name) + " converts float16 by software",
+        "the target " + quoted(target.to_string()) + " has no f16c",
+        "Add the feature f16c where the machine has it, or keep values in float32");
   }
 
   void find_hidden(const FuncContents& f) {
@@ -118,6 +145,15 @@ class Findings {
     }
   }
 
+  void find_failing_requirement(const FuncContents& f, int s) {
+    walk(f.stage(s), [&](const Call& call) {
+      if (!call.is_op(Op::require) || as_const_int(call.args[0]) != 0) return;
+      add(words_for_stage(f, s) + " requires what never holds",
+          "the condition does not depend on the call, and is false",
+          "Require a condition on parameters or facts about buffers");
+    });
+  }
+
   void find_idle(const FuncContents& f, int s, const StageLoops& schedule) {
     find_single_lanes(f, s, schedule);
     find_idle_atomic(f, s, schedule);
@@ -158,11 +194,15 @@ class Findings {
 
 }  // namespace
 
-std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs, bool with_hidden) {
+std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs, bool with_hidden,
+                                     const Target& target) {
   std::vector<std::string> messages;
   Findings findings(messages);
   const std::vector<FuncPtr> funcs = functions_of(outputs);
-  for (const FuncPtr& f : funcs) findings.look_at(*f, with_hidden);
+  for (const FuncPtr& f : funcs) {
+    findings.look_at(*f, with_hidden);
+    findings.note_slow_floats(*f, target);
+  }
   findings.note_default_schedule(funcs, *outputs[0]);
   return messages;
 }
@@ -192,10 +232,11 @@ void tell_warning(const std::string& warning) {
   if (const WarningHandler tell = handler_of_process()) tell(warning);
 }
 
-void tell_warnings(const std::vector<FuncPtr>& outputs) {
+void tell_warnings(const std::vector<FuncPtr>& outputs, const Target& target) {
   if (!listener && !handler_of_process()) return;
   const bool with_hidden = has_warning_scope();
-  for (const std::string& warning : warnings_of(outputs, with_hidden)) tell_warning(warning);
+  for (const std::string& warning : warnings_of(outputs, with_hidden, target))
+    tell_warning(warning);
 }
 
 void warn_of_hidden_definitions(const FuncContents& f) {

@@ -41,9 +41,11 @@ using WarningHandler = std::function<void(const std::string&)>;
 WarningHandler set_warning_handler(WarningHandler handler);
 
 namespace frontend {
-std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs, bool with_hidden = true);
+// With a target, also of what is slow on it.
+std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs, bool with_hidden = true,
+                                     const Target& target = {});
 // To the scope around, if there is one.
-void tell_warnings(const std::vector<FuncPtr>& outputs);
+void tell_warnings(const std::vector<FuncPtr>& outputs, const Target& target);
 void tell_warning(const std::string& warning);
 bool has_warning_scope();
 // Tells the handler of the process, unless a scope is told when the Func is compiled, that the last

@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "HalideBuffer.h"
+#include TONE_INFO
 #include "tone.h"
 #include "tone_gradient.h"
 #include "tone_wide.h"
@@ -11,6 +12,8 @@
 using Halide::Runtime::Buffer;
 
 namespace {
+
+static_assert(tone_argument_info().size() == 4 && tone_argument_info()[2].name == "gain");
 
 constexpr int width = 37, height = 11;
 constexpr float gain = 0.25f;

@@ -18,7 +18,7 @@ INTERNAL_HEADERS = {
 # Parts of templates that users name in no other way than by the whole.
 INTERNAL_SCOPES = {"Declared", "ArrayTraits", "ElementTraits", "InputValue", "InputElements", "ScalarElements",
                    "OutputElements", "GeneratorParamBase::InCpp", "RegisterGenerator", "tell_pass_observers",
-                   "GeneratorInputBase::values", "GeneratorOutput::OutputElements", "ParamMap::Entry", "AutoScheduleParam"}
+                   "GeneratorInputBase::values", "GeneratorInputBase::value_of", "GeneratorOutput::OutputElements", "ParamMap::Entry", "AutoScheduleParam"}
 INTERNAL_NAMES = re.compile(
     r"contents|function|parameter|symbol|raw|handle|make_funcs|make_parameters|in_cpp|set_from_string|set_values|"
     r"set_from_loop_level|check_\w+|role_name|element_name|cpp_\w+|read_\w+|type_choices|number_text|param_text|"

@@ -1,0 +1,15 @@
+// The header that describes the arguments of compiled functions as constants of C++17, for code that
+// asks while it compiles: wrappers of calls, checks by static_assert.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "aot/header.h"
+
+namespace retrograde::aot {
+
+std::string function_info_text(const std::string& module_name, const Target& target,
+                               const std::vector<DeclaredFunction>& functions);
+
+}  // namespace retrograde::aot
