@@ -113,8 +113,7 @@ class NestEmitter {
   Emitted emit_members(const FusedGroup& group, std::vector<Member>& members, ComputePlace& site,
                        std::vector<Stmt> stmts);
   static bool keeps_beside_its_regions(const Member& member, ComputePlace& site);
-  void leave_overrun(const std::vector<NestStage>& stages, Emitted& code) const;
-  static bool is_one_of(const std::vector<NestStage>& stages, const std::string& func);
+  void leave_rounded(const NestStage& stage, Emitted& code) const;
   void widen_by_own_reads(Member& member, Emitted& code) const;
   Emitted emit_extern(Member& member, const Domain& domain, ComputePlace& site);
   Emitted emit_extern_call(const LoopedFunc& f, const ExternCall& call, ComputePlace& site,
