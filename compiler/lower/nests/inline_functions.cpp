@@ -106,20 +106,6 @@ void store_with_extern_stages(Program& program) {
   }
 }
 
-// An extern stage has loops around its calls where a directive says how they run, and where a Func is
-// computed in one of them.
-void open_loops_of_extern_stages(Program& program) {
-  for (const LoopedFunc& f : program.funcs) {
-    const LoopLevel& level = f.schedule.compute_level;
-    if (level.kind != LoopLevel::Kind::At) continue;
-    const auto host = program.index_of.find(level.func);
-    if (host == program.index_of.end() || !program.funcs[host->second].func->is_extern()) continue;
-    std::vector<Dim>& dims = program.funcs[host->second].stages[0].schedule.dims;
-    const auto at = std::ranges::find(dims, level.var, &Dim::var);
-    for (auto dim = at; dim != dims.end(); ++dim) dim->is_in_call = false;
-  }
-}
-
 }  // namespace
 
 Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
@@ -151,7 +137,6 @@ Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
   }
   store_with_extern_stages(program);
   resolve_outermost_levels(program);
-  open_loops_of_extern_stages(program);
   refuse_unsupported(program);
   order_for_memory(program);
   order_fused_groups(program);
