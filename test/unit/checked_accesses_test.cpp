@@ -144,5 +144,36 @@ TEST_F(CheckedAccesses, LetWhatIsNotComputedBe) {
   EXPECT_EQ(error_of(out, {8}), "");
 }
 
+// The end of a loop's steady state is computed before the guard under which what it promises holds.
+TEST_F(CheckedAccesses, TakePromisesBeforeSeveralGuardsAsTheyAreUnderThem) {
+  Var x("x"), block("block"), i("i"), group("group"), j("j"), both("both"), k("k"), xo("xo"),
+      xi("xi"), xio("xio"), lane("lane");
+  const auto make = [&](bool is_scheduled) {
+    Func f("f"), g("g"), h("h"), out("out");
+    f(x) = x * 7;
+    g(x) = f(x - 1) + f(x / 4 - 1);
+    h(x) = g(x + 1);
+    out(x) = h(x / 2) + h(x);
+    if (!is_scheduled) return out;
+    h.compute_root()
+        .split(x, block, i, 8, TailStrategy::PredicateLoads)
+        .split(block, group, j, 3)
+        .fuse(j, group, both)
+        .split(both, both, k, 5, TailStrategy::GuardWithIf);
+    g.compute_at(h, i);
+    f.hoist_storage(h, both).compute_at(h, k);
+    f.split(x, xo, xi, 4, TailStrategy::Predicate)
+        .split(xi, xio, lane, 2, TailStrategy::ShiftInwards)
+        .vectorize(lane);
+    return out;
+  };
+  for (const int size : {1, 14, 50}) {
+    const Buffer<int> expected = make(false).realize({size});
+    const Buffer<int> found =
+        make(true).realize({size}, get_host_target().with_feature(Target::CheckedAccesses));
+    for (int at = 0; at < size; at++) ASSERT_EQ(found(at), expected(at)) << at << " of " << size;
+  }
+}
+
 }  // namespace
 }  // namespace retrograde

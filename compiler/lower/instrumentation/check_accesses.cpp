@@ -87,6 +87,7 @@ class AccessChecker : public Rewriter {
           return make_block({check, parts.children(s)});
         },
         [&](const LetStmt& n) { return visit_let(s, n); },
+        [&](const Block& n) { return postponed_.empty() ? children(s) : visit_choices(n); },
         [&](const IfThenElse& n) { return visit_condition(n); },
         [&](const Atomic& n) {
           return make_block({checks_of(n.body), s});
@@ -99,16 +100,17 @@ class AccessChecker : public Rewriter {
   // For conditions, and what a predicate may turn off: promises hold there only where what they are a part of
   // says so. None in itself.
   const std::unique_ptr<AccessChecker> undecided_;
-  std::vector<Expr> postponed_;  // values of lets, checked under the condition that follows
+  std::vector<Expr> postponed_;  // values of lets, checked under the conditions that follow
 
   AccessChecker(Surroundings& around, std::nullptr_t) : around_(around) {}
   Expr undecided(const Expr& e) { return undecided_ ? (*undecided_)(e) : (*this)(e); }
 
   // ---- conditions ----
 
-  // Statements that are nothing but lets and a choice: what is promised in a let holds where the choice is made.
+  // Statements that are nothing but lets and choices: what is promised in a let holds where a choice is made.
   static bool only_decides(const Stmt& s) {
     if (const auto* let = s.as<LetStmt>()) return only_decides(let->body);
+    if (const auto* block = s.as<Block>()) return std::ranges::all_of(block->stmts, only_decides);
     const auto* choice = s.as<IfThenElse>();
     return choice && !choice->when_false.defined();
   }
@@ -119,6 +121,14 @@ class AccessChecker : public Rewriter {
     if (!promises || !undecided_ || !only_decides(n.body)) return children(s);
     postponed_.push_back(n.value);
     return make_let(n.name, undecided(n.value), (*this)(n.body));
+  }
+
+  Stmt visit_choices(const Block& n) {
+    const std::vector<Expr> postponed = std::exchange(postponed_, {});
+    return make_block(mapped(n.stmts, [&](const Stmt& choice) {
+      postponed_ = postponed;
+      return (*this)(choice);
+    }));
   }
 
   Stmt visit_condition(const IfThenElse& n) {
