@@ -736,5 +736,27 @@ TEST_F(SlidingWindow, HoistedStorageHasRoomForEarlyIterations) {
       [&](int i, int j) { EXPECT_EQ(expected(i, j), found(i, j)) << i << " " << j; });
 }
 
+// Nor does a split's promise hold in it.
+TEST_F(SlidingWindow, HoistedStorageHasRoomForIterationsBeforeASplit) {
+  const auto make = [&](bool slides) {
+    Var tile("tile"), in_tile("in_tile"), block("block"), column("column");
+    Func f("f"), g("g"), h("h"), out("out");
+    f(x) = x * 7;
+    g(x) = f(x / 4 + 1);
+    h(x) = g(x - 2) + g(x / 3) * 2 + g(x + 1);
+    out(x) = h(x / 2);
+    if (!slides) return out;
+    h.compute_root().split(x, tile, in_tile, 2, TailStrategy::GuardWithIf);
+    g.store_at(h, tile).compute_at(h, in_tile);
+    g.split(x, block, column, 8, TailStrategy::Predicate);
+    f.hoist_storage(h, tile).store_at(h, in_tile).compute_at(g, block);
+    return out;
+  };
+  const Buffer<int> expected = make(false).realize({26});
+  const Buffer<int> found =
+      make(true).realize({26}, get_host_target().with_feature(Target::CheckedAccesses));
+  for (int i = 0; i < 26; i++) EXPECT_EQ(expected(i), found(i)) << i;
+}
+
 }  // namespace
 }  // namespace retrograde

@@ -54,8 +54,9 @@ void merge_code(Emitted& into, const Emitted& from) {
 namespace {
 
 // Splits promise where the coordinates of a loop's iterations lie, not those of iterations before its first.
-Stmt without_promises_about(const std::string& loop, const Stmt& s) {
-  return rewrite(s, [&](const Expr& e, const auto& recurse) {
+template <class Tree>
+Tree without_promises_about(const std::string& loop, const Tree& tree) {
+  return rewrite(tree, [&](const Expr& e, const auto& recurse) {
     const auto* promise = as_op(e, Op::promise_clamped);
     return promise && uses_variable(e, loop) ? recurse(promise->args[0]) : Expr();
   });
@@ -66,7 +67,11 @@ Stmt without_promises_about(const std::string& loop, const Stmt& s) {
 void make_room_for_early_iterations(const Loop& early, Emitted& code) {
   range_over_loops(code);
   for (auto& [name, box] : code.storage) {
-    if (is_place_name(name)) box = ranged_over({early}, box);
+    if (!is_place_name(name)) continue;
+    for (Interval& side : box) {
+      if (side.max.defined()) side.max = without_promises_about(early.name, side.max);
+    }
+    box = ranged_over({early}, box);
   }
 }
 
