@@ -20,14 +20,13 @@ JITHandlers JITSharedRuntime::set_default_handlers(const JITHandlers& handlers) 
 namespace {
 void* allocate(JITUserContext*, size_t bytes) {
   constexpr size_t alignment = 64;
-  return std::aligned_alloc(alignment, (std::max<size_t>(bytes, 1) + alignment - 1) / alignment *
-                                           alignment);
+  return std::aligned_alloc(alignment,
+                            (std::max<size_t>(bytes, 1) + alignment - 1) / alignment * alignment);
 }
 void release(JITUserContext*, void* memory) { std::free(memory); }
 }  // namespace
 
-void JITSharedRuntime::populate_jit_handlers(JITUserContext* context,
-                                             const JITHandlers& handlers) {
+void JITSharedRuntime::populate_jit_handlers(JITUserContext* context, const JITHandlers& handlers) {
   if (!context) {
     user_error("fill in the handlers of a context", "there is a context", "it is null",
                "Give the address of a JITUserContext");
@@ -35,8 +34,8 @@ void JITSharedRuntime::populate_jit_handlers(JITUserContext* context,
   JITHandlers own;
   own.custom_malloc = allocate;
   own.custom_free = release;
-  context->handlers = frontend::merged(
-      frontend::merged(std::move(own), frontend::default_handlers()), handlers);
+  context->handlers =
+      frontend::merged(frontend::merged(std::move(own), frontend::default_handlers()), handlers);
 }
 
 void JITSharedRuntime::memoization_cache_set_size(int64_t bytes) {
