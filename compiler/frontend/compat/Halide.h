@@ -269,35 +269,22 @@ struct halide_global_ns;
     return ::retrograde::call<rt, t1, t2, t3, t4, t5, t6, t7, t8>(#name, a1, a2, a3, a4, a5, a6, \
                                                                   a7, a8);                       \
   }
-#define HalideExtern_1(rt, name, t1) RETROGRADE_EXTERN_1(call_c_function, rt, name, t1)
-#define HalideExtern_2(rt, name, t1, t2) RETROGRADE_EXTERN_2(call_c_function, rt, name, t1, t2)
-#define HalideExtern_3(rt, name, t1, t2, t3) \
-  RETROGRADE_EXTERN_3(call_c_function, rt, name, t1, t2, t3)
-#define HalideExtern_4(rt, name, t1, t2, t3, t4) \
-  RETROGRADE_EXTERN_4(call_c_function, rt, name, t1, t2, t3, t4)
-#define HalideExtern_5(rt, name, t1, t2, t3, t4, t5) \
-  RETROGRADE_EXTERN_5(call_c_function, rt, name, t1, t2, t3, t4, t5)
-#define HalideExtern_6(rt, name, t1, t2, t3, t4, t5, t6) \
-  RETROGRADE_EXTERN_6(call_c_function, rt, name, t1, t2, t3, t4, t5, t6)
-#define HalideExtern_7(rt, name, t1, t2, t3, t4, t5, t6, t7) \
-  RETROGRADE_EXTERN_7(call_c_function, rt, name, t1, t2, t3, t4, t5, t6, t7)
-#define HalideExtern_8(rt, name, t1, t2, t3, t4, t5, t6, t7, t8) \
-  RETROGRADE_EXTERN_8(call_c_function, rt, name, t1, t2, t3, t4, t5, t6, t7, t8)
-#define HalidePureExtern_1(rt, name, t1) RETROGRADE_EXTERN_1(call_pure_c_function, rt, name, t1)
-#define HalidePureExtern_2(rt, name, t1, t2) \
-  RETROGRADE_EXTERN_2(call_pure_c_function, rt, name, t1, t2)
-#define HalidePureExtern_3(rt, name, t1, t2, t3) \
-  RETROGRADE_EXTERN_3(call_pure_c_function, rt, name, t1, t2, t3)
-#define HalidePureExtern_4(rt, name, t1, t2, t3, t4) \
-  RETROGRADE_EXTERN_4(call_pure_c_function, rt, name, t1, t2, t3, t4)
-#define HalidePureExtern_5(rt, name, t1, t2, t3, t4, t5) \
-  RETROGRADE_EXTERN_5(call_pure_c_function, rt, name, t1, t2, t3, t4, t5)
-#define HalidePureExtern_6(rt, name, t1, t2, t3, t4, t5, t6) \
-  RETROGRADE_EXTERN_6(call_pure_c_function, rt, name, t1, t2, t3, t4, t5, t6)
-#define HalidePureExtern_7(rt, name, t1, t2, t3, t4, t5, t6, t7) \
-  RETROGRADE_EXTERN_7(call_pure_c_function, rt, name, t1, t2, t3, t4, t5, t6, t7)
-#define HalidePureExtern_8(rt, name, t1, t2, t3, t4, t5, t6, t7, t8) \
-  RETROGRADE_EXTERN_8(call_pure_c_function, rt, name, t1, t2, t3, t4, t5, t6, t7, t8)
+#define HalideExtern_1(...) RETROGRADE_EXTERN_1(call_c_function, __VA_ARGS__)
+#define HalideExtern_2(...) RETROGRADE_EXTERN_2(call_c_function, __VA_ARGS__)
+#define HalideExtern_3(...) RETROGRADE_EXTERN_3(call_c_function, __VA_ARGS__)
+#define HalideExtern_4(...) RETROGRADE_EXTERN_4(call_c_function, __VA_ARGS__)
+#define HalideExtern_5(...) RETROGRADE_EXTERN_5(call_c_function, __VA_ARGS__)
+#define HalideExtern_6(...) RETROGRADE_EXTERN_6(call_c_function, __VA_ARGS__)
+#define HalideExtern_7(...) RETROGRADE_EXTERN_7(call_c_function, __VA_ARGS__)
+#define HalideExtern_8(...) RETROGRADE_EXTERN_8(call_c_function, __VA_ARGS__)
+#define HalidePureExtern_1(...) RETROGRADE_EXTERN_1(call_pure_c_function, __VA_ARGS__)
+#define HalidePureExtern_2(...) RETROGRADE_EXTERN_2(call_pure_c_function, __VA_ARGS__)
+#define HalidePureExtern_3(...) RETROGRADE_EXTERN_3(call_pure_c_function, __VA_ARGS__)
+#define HalidePureExtern_4(...) RETROGRADE_EXTERN_4(call_pure_c_function, __VA_ARGS__)
+#define HalidePureExtern_5(...) RETROGRADE_EXTERN_5(call_pure_c_function, __VA_ARGS__)
+#define HalidePureExtern_6(...) RETROGRADE_EXTERN_6(call_pure_c_function, __VA_ARGS__)
+#define HalidePureExtern_7(...) RETROGRADE_EXTERN_7(call_pure_c_function, __VA_ARGS__)
+#define HalidePureExtern_8(...) RETROGRADE_EXTERN_8(call_pure_c_function, __VA_ARGS__)
 
 // Throws CompileError unless argument number `k` of the function `name` has the type.
 #define _halide_check_arg_type(t, name, e, k)                                     \

@@ -48,6 +48,7 @@
 #include "ir/lets.h"
 #include "ir/markers.h"
 #include "ir/memory_reads.h"
+#include "ir/node_count.h"
 #include "ir/visit.h"
 #include "lower/loops/needed_conditions.h"
 #include "lower/loops/steady_state.h"
@@ -59,11 +60,7 @@ namespace {
 // Lets with more nodes than this, once those in them are opened, stay closed.
 constexpr int most_nodes = 60;
 
-bool is_small(const Expr& e) {
-  int count = 0;
-  walk(e, [&](const Expr&) { return ++count <= most_nodes; });
-  return count <= most_nodes;
-}
+bool is_small(const Expr& e) { return has_at_most_nodes(e, most_nodes); }
 
 // Where facts come from.
 enum class FactSource { Conditions, NeededConditions };

@@ -30,6 +30,7 @@
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/memory_reads.h"
+#include "ir/node_count.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
 #include "simplify/simplify.h"
@@ -176,12 +177,7 @@ class CallHoister : public Rewriter {
     return any_node(body, [](const Assert&) { return true; });
   }
 
-  static bool is_small(const Expr& e) {
-    constexpr int most_nodes = 100;
-    int nodes = 0;
-    walk(e, [&](const Expr&) { return ++nodes <= most_nodes; });
-    return nodes <= most_nodes;
-  }
+  static bool is_small(const Expr& e) { return has_at_most_nodes(e, 100); }
 
   static bool uses(const Hoisted& value, const std::string& name) {
     return uses_variable(value.runs, name) || uses_variable(value.call, name);

@@ -55,8 +55,6 @@ namespace retrograde::lower {
 
 namespace {
 
-// Border bodies with more nodes than this are not partitioned further.
-constexpr int small_body = 1500;
 // An operation less an iteration is worth a copy of a body that has up to this many nodes.
 constexpr int nodes_an_operation = 64;
 // And a condition over lanes less, which is a gather or a select: two copies of the body, one of them

@@ -18,10 +18,6 @@ constexpr int64_t thick_points = 32;
 // Iterations of an inner loop beside which its own borders are nothing.
 constexpr int64_t long_row = 16;
 
-// Of bodies with more nodes than this there is no copy for what inner loops of unknown extent decide,
-// too: all of the loop may be border, of which no copy is partitioned further.
-constexpr int most_around_unknown = 1500;
-
 // A loop whose extent varies has at most so many iterations if it follows what is unrolled around
 // it: what is prepared for its copies, say. No more than they does it count as a loop.
 constexpr int short_iterations = 4;
@@ -109,7 +105,7 @@ SteadyRewriter::SteadyRewriter(const For& loop, const PartitionContext& outer, b
       inside_lanes_(inside_lanes),
       has_inner_loops_(contains_serial_loop(loop.body)),
       has_costly_rows_(has_several_rows(loop.body) && node_count(loop.body) > costly_border),
-      has_room_for_unknown_(node_count(loop.body) <= most_around_unknown),
+      partitions_borders_(node_count(loop.body) <= small_body),
       dependent_{loop.name} {}
 
 Expr SteadyRewriter::rewrite(const Expr& e) {
@@ -237,7 +233,8 @@ bool SteadyRewriter::holds(const Expr& condition, bool is_true, bool is_choice) 
   if (std::ranges::any_of(decide_alone_, is_in)) return false;
   const bool is_over_unknown = std::ranges::any_of(of_unknown_extent_, is_in);
   const bool is_over_lanes = inside_lanes_ || std::ranges::any_of(lanes_, is_in);
-  if (is_over_unknown && !(is_over_lanes && has_room_for_unknown_)) return false;
+  // All iterations may be border where inner loops are long: the border must be partitioned, too.
+  if (is_over_unknown && !(is_over_lanes && partitions_borders_)) return false;
   auto solution = solve_for(expanded, loop_.name, context_.ranges());
   if (!solution) return false;
   ++steady_.solved;

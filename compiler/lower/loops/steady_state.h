@@ -16,8 +16,10 @@ namespace retrograde::lower {
 bool is_likely(const Call* call);
 bool is_serial(const For& loop);  // or parallel: it runs one iteration after the other
 
-// Of bodies with more nodes than this, a copy costs more than a branch in each iteration.
+// A copy of a body with more nodes costs more than a branch in each iteration.
 inline constexpr int costly_border = 200;
+// The copy for the borders of a body with more nodes is not partitioned further.
+inline constexpr int small_body = 1500;
 int node_count(const Stmt& s);
 
 // Names whose values a solution may not mention: what a let stands for, and between what a loop
@@ -89,7 +91,7 @@ class SteadyRewriter : public Rewriter {
   const For& loop_;
   PartitionContext context_;
   const bool inside_lanes_;
-  const bool has_inner_loops_, has_costly_rows_, has_room_for_unknown_;
+  const bool has_inner_loops_, has_costly_rows_, partitions_borders_;
   SteadyState steady_;
   std::unordered_set<std::string>
       dependent_;  // the loop's variable, and those of inner loops that start from it
