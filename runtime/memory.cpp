@@ -215,8 +215,7 @@ int32_t retrograde_allocation_error(retrograde_context* context, const char* nam
     return retrograde_report_error(
         context, retrograde_error_allocation_too_large,
         "cannot allocate \"%s\": places in it are numbered in 31 bits, so that it may have "
-        "2147483647 "
-        "elements; it has %i. Compute it in smaller parts, for example with compute_at",
+        "2147483647 elements; it has %i. Compute it in smaller parts, for example with compute_at",
         name, elements);
   }
   if (!rt::allocation_bytes(elements, element_bytes, &bytes)) {

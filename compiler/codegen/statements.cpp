@@ -54,7 +54,8 @@ void FunctionGenerator::generate() {
   auto* type = llvm::FunctionType::get(b_.getInt32Ty(), params, false);
   auto* function =
       llvm::Function::Create(type, llvm::GlobalValue::ExternalLinkage, source_.name, e_.module);
-  // Checks stand between what is contracted in one copy of a definition, and not in another.
+  // Checks keep LLVM from fusing some products and sums, in one copy of a definition and not in another:
+  // threads that compute the same element would give different last bits.
   const bool contracts = !e_.machine.target.has_feature(Target::StrictFloat) &&
                          !e_.machine.target.has_feature(Target::CheckedAccesses);
   const Contraction contraction(e_, contracts);

@@ -27,7 +27,7 @@
 #include "aot_tuple.h"
 #include "aot_variants.h"
 
-// Of releases later than the header's.
+// Declared by releases later than the header's.
 extern "C" int halide_get_num_threads();
 
 using Halide::Runtime::Buffer;

@@ -453,7 +453,8 @@ TEST_P(Async, AnErrorOfTheProducerReleasesTheConsumer) {
   }
 }
 
-// What both branches read each of them computes, and each checks that there is room for it.
+// A Func that the async producer and its consumer both read is computed in both branches; each branch
+// checks the bound of its storage.
 TEST_P(Async, RoomForWhatBothBranchesReadIsCheckedInBoth) {
   Var x("x");
   Func shared("shared"), f("f"), out("out");

@@ -709,7 +709,7 @@ TEST_F(SlidingWindow, UpdatesOfKeptElementsAreNotUndoneByTiles) {
       11, 11);
 }
 
-// The box of an iteration before the first is larger than any other.
+// A loop starts before its first iteration, where the box of the hoisted Func is largest.
 TEST_F(SlidingWindow, HoistedStorageHasRoomForEarlyIterations) {
   const auto make = [&](bool slides) {
     Var tile("tile"), in_tile("in_tile"), part("part"), in_part("in_part"), block("block"),
@@ -736,7 +736,7 @@ TEST_F(SlidingWindow, HoistedStorageHasRoomForEarlyIterations) {
       [&](int i, int j) { EXPECT_EQ(expected(i, j), found(i, j)) << i << " " << j; });
 }
 
-// Nor does a split's promise hold in it.
+// The room counts iterations before the first, although a split promises coordinates from the first on.
 TEST_F(SlidingWindow, HoistedStorageHasRoomForIterationsBeforeASplit) {
   const auto make = [&](bool slides) {
     Var tile("tile"), in_tile("in_tile"), block("block"), column("column");

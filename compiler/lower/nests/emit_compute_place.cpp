@@ -150,7 +150,7 @@ NestEmitter::Wanted NestEmitter::slide_together(std::vector<Member>& members,
       if (!member.loops.empty() && !is_last_round)
         member.slides =
             slides_of(*member.f, site.whole(member.need), member.loops, site.around, lead);
-      // Its first stage would write again what the updates have made of elements that are kept.
+      // The first stage, run beyond the region, would overwrite finished elements with their initial values.
       if (member.f->stages.size() > 1 && keeps_beside_its_regions(member, site))
         member.slides.clear();
       all.first = std::max(all.first, slide_lead(member.slides, lead, site));
