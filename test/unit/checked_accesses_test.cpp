@@ -175,5 +175,62 @@ TEST_F(CheckedAccesses, TakePromisesBeforeSeveralGuardsAsTheyAreUnderThem) {
   }
 }
 
+// A place is computed before the condition of its store, which turns all its lanes off beyond the domain.
+TEST_F(CheckedAccesses, LetPlacesOfStoresThatDoNotHappenBe) {
+  Var u("u"), yo("yo"), yi("yi");
+  RVar outer("outer"), inner("inner");
+  const auto make = [&](bool is_scheduled) {
+    Func f("f"), sums("sums");
+    f(x, y) = x + 2 * y;
+    f.compute_root();
+    RDom r(0, 5, 0, 3);
+    r.where(!(f(abs(y), r.x + 2) < r.y));
+    sums(x, y) = x + y;
+    sums(r.x - 2, y) += r.y + 1;
+    if (!is_scheduled) return sums;
+    sums.update().split(r.x, outer, inner, 4);
+    Func parts = sums.update().rfactor(outer, u);
+    parts.compute_root().update().split(y, yo, yi, 4, TailStrategy::GuardWithIf).vectorize(yi);
+    return sums;
+  };
+  const Buffer<int> expected = make(false).realize({5, 6});
+  const Buffer<int> found = make(true).realize({5, 6}, checked());
+  for (int j = 0; j < 6; j++)
+    for (int i = 0; i < 5; i++) EXPECT_EQ(found(i, j), expected(i, j)) << i << ", " << j;
+}
+
+// The end of a steady state stands before the guard that encloses its loop, and storage is freed behind the guard.
+TEST_F(CheckedAccesses, TakePromisesBeforeAGuardInsideAllocationsAsTheyAreUnderIt) {
+  Var outer("outer"), inner("inner"), group("group"), member("member"), tile("tile"), i("i"),
+      half("half"), j("j"), third("third"), k("k"), lane("lane");
+  Param<int> selector("selector");
+  const auto make = [&](bool is_scheduled) {
+    Func f("f"), g("g"), h("h"), l("l"), out("out");
+    f(x, y) = x + 37 * (y / 3) + x * (y / 2);
+    g(x, y) = f(x + 1, y);
+    h(x, y) = g(x, y / 2 + 2);
+    l(x, y) = h(x - 2, y);
+    out(x) = l(x, 1) + 2 * l(x, x);
+    if (!is_scheduled) return out;
+    l.compute_at(out, x)
+        .split(y, outer, inner, 8, TailStrategy::PredicateStores)
+        .split(outer, group, member, 3, TailStrategy::GuardWithIf)
+        .split(inner, tile, i, 3, TailStrategy::ShiftInwards);
+    h.store_at(l, member).compute_at(l, tile);
+    h.split(y, half, j, 2, TailStrategy::RoundUp)
+        .split(half, third, k, 3, TailStrategy::GuardWithIf);
+    g.compute_at(h, third);
+    f.store_root().compute_at(l, member);
+    f.specialize(selector == 2).split(y, y, lane, 2, TailStrategy::PredicateLoads).vectorize(lane);
+    return out;
+  };
+  for (const int chosen : {0, 2}) {
+    selector.set(chosen);
+    const Buffer<int> expected = make(false).realize({45});
+    const Buffer<int> found = make(true).realize({45}, checked());
+    for (int at = 0; at < 45; at++) ASSERT_EQ(found(at), expected(at)) << at;
+  }
+}
+
 }  // namespace
 }  // namespace retrograde

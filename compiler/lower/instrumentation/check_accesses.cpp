@@ -12,8 +12,8 @@
 // Method: the pass runs last, so the checked code is the code that runs without it. A load is checked where its
 //         value is computed, under the conditions of the choices around it. Lanes that a predicate turns off may
 //         be anywhere. The body of an Atomic stays as it is, because its form makes it one instruction: its checks
-//         run before it. A promise is checked where it is a scalar outside of conditions and predicates; in a let
-//         right before a choice, where the choice is made.
+//         run before it. A promise is checked where it is a scalar outside of conditions and predicates; that of
+//         a let where what it names is used: inside the choices and loops between the two.
 // Not done: kernels, whose accesses the simulated device checks; what extern stages do.
 // Tests: test/golden/lower/check_accesses/, test/unit/checked_accesses_test.cpp.
 #include "lower/instrumentation/check_accesses.h"
@@ -51,6 +51,39 @@ Expr extreme(Kind which, const Expr& index, const Expr& predicate, const Expr& n
   return places.type().is_scalar() ? places : make_vector_reduce(which, places, 1);
 }
 
+// ---- where a let is used ----
+
+// Whether evaluating it reads the variable, whatever its conditions and predicates are.
+bool is_read(const std::string& name, const Expr& e) {
+  bool found = false;
+  walk(e, [&](const Expr& part) {
+    const auto* variable = part.as<Variable>();
+    const auto* load = part.as<Load>();
+    const bool may_skip =
+        as_op(part, Op::if_then_else) || (load != nullptr && load->predicate.defined());
+    found |= variable != nullptr && variable->name == name;
+    return !found && !may_skip;
+  });
+  return found;
+}
+
+// Whether running it reads the variable, whatever is chosen and however often its loops run.
+bool is_read(const std::string& name, const Stmt& s) {
+  const auto in = [&](const auto& part) { return is_read(name, part); };
+  return match(
+      s, [&](const LetStmt& n) { return in(n.body) || (in(n.value) && is_read(n.name, n.body)); },
+      [&](const For& n) { return in(n.min) || in(n.extent); },
+      [&](const Store& n) { return !n.predicate.defined() && (in(n.index) || in(n.value)); },
+      [&](const IfThenElse&) { return false; },
+      [&](const StmtNode&) {
+        bool found = false;
+        for_each_child(
+            s, [&](const Expr& part) { found = found || in(part); },
+            [&](const Stmt& part) { found = found || in(part); });
+        return found;
+      });
+}
+
 // What all parts of the walk know.
 struct Surroundings {
   std::unordered_map<std::string, Room> rooms;
@@ -86,8 +119,7 @@ class AccessChecker : public Rewriter {
           AccessChecker& parts = n.predicate.defined() && undecided_ ? *undecided_ : *this;
           return make_block({check, parts.children(s)});
         },
-        [&](const LetStmt& n) { return visit_let(s, n); },
-        [&](const Block& n) { return postponed_.empty() ? children(s) : visit_choices(n); },
+        [&](const LetStmt& n) { return visit_let(n); },
         [&](const IfThenElse& n) { return visit_condition(n); },
         [&](const Atomic& n) {
           return make_block({checks_of(n.body), s});
@@ -100,44 +132,44 @@ class AccessChecker : public Rewriter {
   // For conditions, and what a predicate may turn off: promises hold there only where what they are a part of
   // says so. None in itself.
   const std::unique_ptr<AccessChecker> undecided_;
-  std::vector<Expr> postponed_;  // values of lets, checked under the conditions that follow
+  std::vector<const LetStmt*>
+      unchecked_;  // lets around that promise something and were not used yet
 
   AccessChecker(Surroundings& around, std::nullptr_t) : around_(around) {}
   Expr undecided(const Expr& e) { return undecided_ ? (*undecided_)(e) : (*this)(e); }
 
-  // ---- conditions ----
+  // ---- lets and conditions ----
 
-  // Statements that are nothing but lets and choices: what is promised in a let holds where a choice is made.
-  static bool only_decides(const Stmt& s) {
-    if (const auto* let = s.as<LetStmt>()) return only_decides(let->body);
-    if (const auto* block = s.as<Block>()) return std::ranges::all_of(block->stmts, only_decides);
-    const auto* choice = s.as<IfThenElse>();
-    return choice && !choice->when_false.defined();
-  }
-
-  Stmt visit_let(const Stmt& s, const LetStmt& n) {
+  Stmt visit_let(const LetStmt& n) {
     const bool promises =
         any_node(n.value, [](const Expr& e) { return as_op(e, Op::promise_clamped) != nullptr; });
-    if (!promises || !undecided_ || !only_decides(n.body)) return children(s);
-    postponed_.push_back(n.value);
-    return make_let(n.name, undecided(n.value), (*this)(n.body));
+    if (!promises || !undecided_) return make_let(n.name, (*this)(n.value), (*this)(n.body));
+    const Expr value = undecided(n.value);
+    unchecked_.push_back(&n);
+    const Stmt body = part(n.body);
+    unchecked_.pop_back();
+    return make_let(n.name, value, body);
   }
 
-  Stmt visit_choices(const Block& n) {
-    const std::vector<Expr> postponed = std::exchange(postponed_, {});
-    return make_block(mapped(n.stmts, [&](const Stmt& choice) {
-      postponed_ = postponed;
-      return (*this)(choice);
-    }));
+  // What runs as a whole or not at all: before it, what the lets promise that it uses.
+  Stmt part(const Stmt& s) {
+    if (!s.defined() || unchecked_.empty()) return s.defined() ? (*this)(s) : s;
+    const std::vector<const LetStmt*> around = unchecked_;
+    std::vector<Stmt> stmts;
+    std::erase_if(unchecked_, [&](const LetStmt* let) {
+      const bool is_used = is_read(let->name, s);
+      if (is_used) stmts.push_back(make_evaluate((*this)(let->value)));
+      return is_used;
+    });
+    stmts.push_back((*this)(s));
+    unchecked_ = around;
+    return make_block(std::move(stmts));
   }
 
   Stmt visit_condition(const IfThenElse& n) {
-    std::vector<Stmt> checked = mapped(std::exchange(postponed_, {}), [&](const Expr& value) {
-      return make_evaluate((*this)(value));
-    });
     const Expr condition = undecided(n.condition);
-    checked.push_back((*this)(n.when_true));
-    return with_parts(n, condition, make_block(std::move(checked)), (*this)(n.when_false));
+    const Stmt when_true = part(n.when_true);
+    return with_parts(n, condition, when_true, part(n.when_false));
   }
 
   // ---- rooms ----
@@ -153,7 +185,8 @@ class AccessChecker : public Rewriter {
   Stmt visit_loop(const Stmt& s, const For& n) {
     const LoopName outer = around_.stage;
     enter(decode_loop_name(n.name));
-    const Stmt result = children(s);
+    const Stmt result = map_children(
+        s, [&](const Expr& e) { return (*this)(e); }, [&](const Stmt& body) { return part(body); });
     enter(outer);
     return result;
   }
