@@ -232,5 +232,28 @@ TEST_F(CheckedAccesses, TakePromisesBeforeAGuardInsideAllocationsAsTheyAreUnderI
   }
 }
 
+// Where one of two stages that share loops does not run, what its splits promise chooses nothing.
+TEST_F(CheckedAccesses, LetWhatIsNotChosenBe) {
+  Func f("f"), g("g"), copy("copy");
+  Var outer("outer"), inner("inner");
+  f(x, y) = x + 37 * y;
+  g(x, y) = f(x, y / 4) + f(x, 2 * y + 1);
+  out(x, y) = g(x, y - 3);
+  copy(x, y) = f(x, y);
+  copy.split(y, outer, inner, 4, TailStrategy::GuardWithIf).parallel(outer);
+  g.compute_root().split(y, outer, inner, 4, TailStrategy::GuardWithIf).parallel(outer);
+  f.compute_at(g, inner);
+  copy.compute_with(g, inner);
+  for (const int rows : {1, 2, 7}) {
+    Buffer<int> first(5, rows), second(5, 9);
+    second.set_min(-4, -4);
+    Pipeline({out, copy}).realize({first, second}, checked());
+    first.for_each_element([&](int i, int j) {
+      EXPECT_EQ(first(i, j), 2 * i + 37 * ((j < 3 ? -1 : (j - 3) / 4) + 2 * (j - 3) + 1));
+    });
+    second.for_each_element([&](int i, int j) { EXPECT_EQ(second(i, j), i + 37 * j); });
+  }
+}
+
 }  // namespace
 }  // namespace retrograde

@@ -102,8 +102,7 @@ class AccessChecker : public Rewriter {
       return call_op(Op::if_then_else, e.type(),
                      {undecided(call->args[0]), (*this)(call->args[1]), (*this)(call->args[2])});
     }
-    if (const auto* n = e.as<Select>())
-      return make_select(undecided(n->condition), (*this)(n->when_true), (*this)(n->when_false));
+    if (const auto* n = e.as<Select>()) return checked_select(*n);
     if (undecided_ && as_op(e, Op::promise_clamped)) return checked_promise(children(e));
     if (const auto* load = e.as<Load>()) return checked_load(*load);
     return children(e);
@@ -236,6 +235,21 @@ class AccessChecker : public Rewriter {
     const Expr holds =
         binary(Kind::And, binary(Kind::LE, room->first, low), binary(Kind::LE, high, room->last));
     return Check{holds, call_op(Op::error, Int(32), std::move(message))};
+  }
+
+  // Both arms are computed, so what they load is checked; what they promise holds of the one that is chosen.
+  Expr checked_select(const Select& n) {
+    const auto loads = [](const Expr& arm) {
+      return any_node(arm, [](const Load&) { return true; });
+    };
+    const Expr condition = undecided(n.condition);
+    if (loads(n.when_true) || loads(n.when_false))
+      return make_select(condition, undecided(n.when_true), undecided(n.when_false));
+    const Expr a = (*this)(n.when_true), b = (*this)(n.when_false);
+    const bool has_checks = !a.same_as(n.when_true) || !b.same_as(n.when_false);
+    return has_checks && condition.type().is_scalar()
+               ? call_op(Op::if_then_else, a.type(), {condition, a, b})
+               : make_select(condition, a, b);
   }
 
   Expr checked_load(const Load& n) {
