@@ -495,6 +495,126 @@ TEST(InputRegions, StayWhereValuesArePlaces) {
   EXPECT_EQ(inferred_extent(f, in, 12), 16);
 }
 
+// a(x) = in(x) * 2, at root; `schedule` is given b; the input is asked for what is needed alone.
+void expect_exact_region(const std::function<Func(Func a)>& define, int size, int reach) {
+  ImageParam in(Int(32), 1, "in");
+  Func a("a");
+  a(x) = in(x)*2;
+  a.compute_root();
+  Func out = define(a);
+  out.infer_input_bounds({size});
+  Buffer<int> data = in.get();
+  EXPECT_EQ(data.min(0), 0) << size;
+  EXPECT_EQ(data.width(), size + reach) << size;
+  data.for_each_element([&](int i) { data(i) = i * i; });
+  const Buffer<int> found = out.realize({size});
+  for (int i = 0; i < size; i++) {
+    int expected = 0;
+    for (int k : {i, i + 1, i + 2, i + 3}) expected += 2 * k * k;
+    ASSERT_EQ(found(i), expected) << i << " of " << size;
+  }
+}
+
+// out(x) = b(x) + b(x + 1), b(x) = a(x) + a(x + 2)
+TEST(InputRegions, EndWithWhatIsNeededOfVectorsThatShift) {
+  for (const TailStrategy tail : {TailStrategy::Auto, TailStrategy::ShiftInwards}) {
+    for (const int size : {4, 15, 16, 40}) {
+      const auto define = [&](const Func& a) {
+        Func b("b"), out("out");
+        b(x) = a(x) + a(x + 2);
+        out(x) = b(x) + b(x + 1);
+        b.compute_root().vectorize(x, 16, tail);
+        return out;
+      };
+      expect_exact_region(define, size, 3);
+    }
+  }
+}
+
+// The same, with a Func between b and a that is computed inside of the loops of b.
+TEST(InputRegions, EndWithWhatFuncsInsideOfSuchLoopsNeed) {
+  for (const TailStrategy tail : {TailStrategy::RoundUp, TailStrategy::ShiftInwards}) {
+    for (const int size : {4, 15, 16, 40}) {
+      const auto define = [&](const Func& a) {
+        Var xo("xo"), xi("xi");
+        Func inside("inside"), b("b"), out("out");
+        inside(x) = a(x) + a(x + 2);
+        b(x) = inside(x);
+        out(x) = b(x) + b(x + 1);
+        b.compute_root().split(x, xo, xi, 16, tail).vectorize(xi);
+        inside.compute_at(b, xo).vectorize(x);
+        return out;
+      };
+      expect_exact_region(define, size, 3);
+    }
+  }
+}
+
+// b slides along y by tiles of two rows, and keeps them: of these rows all that is needed of x is right. The vectors
+// along x run beyond, and ask for no more.
+TEST(InputRegions, EndWithWhatIsNeededOfTilesThatAreKept) {
+  for (const int size : {16, 40}) {
+    ImageParam in(Int(32), 2, "in");
+    Func a("a"), b("b"), out("out");
+    Var y("y"), strip("strip"), xi("xi"), yi("yi");
+    a(x, y) = in(x, y) * 2;
+    b(x, y) = a(x, y) + a(x + 2, y);
+    out(x, y) = b(x, y) + b(x + 1, y + 1);
+    out.split(y, strip, y, 8);
+    b.store_at(out, strip)
+        .compute_at(out, y)
+        .tile(x, y, xi, yi, 16, 2, TailStrategy::RoundUp)
+        .vectorize(xi);
+    a.store_at(out, strip).compute_at(out, y).vectorize(x, 8, TailStrategy::RoundUp);
+    out.infer_input_bounds({size, size});
+    Buffer<int> data = in.get();
+    EXPECT_EQ(data.min(0), 0);
+    EXPECT_EQ(data.width(), (size + 3 + 7) / 8 * 8);
+    data.for_each_element([&](int i, int j) { data(i, j) = i * i + 5 * j; });
+    const Buffer<int> found =
+        out.realize({size, size}, get_host_target().with_feature(Target::CheckedAccesses));
+    const auto f = [](int i, int j) { return 2 * (i * i + 5 * j); };
+    for (int j = 0; j < size; j++)
+      for (int i = 0; i < size; i++)
+        ASSERT_EQ(found(i, j), f(i, j) + f(i + 2, j) + f(i + 1, j + 1) + f(i + 3, j + 1))
+            << i << ", " << j;
+  }
+}
+
+// What loops read beyond a region has room, also where two stages share the loops around.
+TEST(InputRegions, HaveRoomForVectorsInsideOfSharedLoops) {
+  Func a("a"), inside("inside"), one("one"), other("other");
+  Var y("y");
+  a(x, y) = x + 3 * y;
+  inside(x, y) = a(x, y) + a(x + 1, y);
+  one(x, y) = inside(x, y);
+  other(x, y) = a(x, y) + 1;
+  inside.compute_at(one, x).vectorize(x, 16, TailStrategy::RoundUp);
+  a.compute_at(one, y);
+  other.compute_with(one, y);
+  Buffer<int> ones(20, 7), others(20, 5);
+  Pipeline({one, other})
+      .realize({ones, others}, get_host_target().with_feature(Target::CheckedAccesses));
+  ones.for_each_element([&](int i, int j) { EXPECT_EQ(ones(i, j), 2 * i + 1 + 6 * j); });
+  others.for_each_element([&](int i, int j) { EXPECT_EQ(others(i, j), i + 3 * j + 1); });
+}
+
+// A table is read inside of its bounds, whatever the values beyond are.
+TEST(InputRegions, EndWithThemWhereCoordinatesAreClamped) {
+  for (const int size : {4, 16, 40}) {
+    const auto define = [&](const Func& a) {
+      Func table("table"), b("b"), out("out");
+      table(x) = x;
+      b(x) = table(clamp(a(x), 0, 5000)) + table(clamp(a(x + 2), 0, 5000));
+      out(x) = b(x) + b(x + 1);
+      table.compute_root();
+      b.compute_root().vectorize(x, 16);
+      return out;
+    };
+    expect_exact_region(define, size, 3);
+  }
+}
+
 TEST(InputRegions, OfGuardedTilesInsideOfGuardedTilesEndWithThem) {
   Var y("y"), xi("xi"), yi("yi"), tile("tile");
   ImageParam in(Float(32), 2, "in");

@@ -83,6 +83,9 @@ Emitted NestEmitter::emit_children(const std::vector<int>& children, Emitted cod
     gather_uses(code, {loops, home}, i, names, [&](const std::string& name) {
       return !is_stored_where_computed(*program_.find(name));
     });
+    gather_boxes(code, {loops, home}, i, &Needs::touched, [&](const std::string& name) {
+      return std::ranges::find(names, name) != names.end();
+    });
   }
   bool any = std::any_of(children.begin(), children.end(),
                          [&](int c) { return code.uses.count(program_.funcs[c].name()); });
@@ -104,7 +107,7 @@ Emitted NestEmitter::store_here(const LoopedFunc& f, int s, Emitted code, std::v
     return level.kind == LoopLevel::Kind::At && level.func == f.name() && level.var == loop.var &&
            (level.stage < 0 || (s <= level.stage && level.stage <= last));
   };
-  gather_storage(code, {loops, home}, i, [&](const std::string& name) {
+  gather_boxes(code, {loops, home}, i, &Needs::storage, [&](const std::string& name) {
     const FuncPlacement& schedule = storage_.stored_func(name)->schedule;
     return is_here(schedule.store_level) || is_here(schedule.hoist_level);
   });

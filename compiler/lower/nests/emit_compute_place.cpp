@@ -4,6 +4,7 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/loops/memoize.h"
+#include "lower/nests/emit_definition.h"
 #include "lower/nests/nest_checks.h"
 #include "lower/nests/nest_emitter.h"
 #include "lower/nests/promised_bounds.h"
@@ -73,7 +74,6 @@ Box NestEmitter::take_required(const LoopedFunc& f, Emitted& code, Box& touched,
   if (auto use = code.uses.find(f.name()); use != code.uses.end()) {
     required = use->second.box;
     code.uses.erase(use);
-    code.read_rounded.erase(f.name());
   }
   if (auto more = code.touched.extract(f.name())) {
     const bool has_own_storage =
@@ -160,6 +160,12 @@ NestEmitter::Wanted NestEmitter::slide_together(std::vector<Member>& members,
   return all;
 }
 
+// Whether a Func may be computed of values that do not count, where its own do not.
+static bool may_be_partly_right(const LoopedFunc& f, const ValueBounds& values) {
+  return !f.func->is_extern() && f.stages.size() == 1 && is_stored_where_computed(f) &&
+         !f.schedule.memoized && !f.schedule.async && takes_any_values(f.stages[0], values);
+}
+
 // Computes a group: takes it out of what `code` uses, and adds what the group itself needs.
 NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& code,
                                            WantedFuncs& wanted, ComputePlace& site) {
@@ -194,6 +200,10 @@ NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& cod
     if (is_first || !code.uses.count(name)) it->second = {piece.lead, piece.lead};
     it->second.first = std::max(it->second.first, piece.lead);
     it->second.last = std::min(it->second.last, piece.lead);
+  }
+  for (const Member& member : members) {
+    code.overrun.counts |= !may_be_partly_right(*member.f, values_);
+    code.overrun.inside.push_back(member.f);
   }
   merge_code(code, made);
   if (site.around.empty()) ask_wholes(code, site);

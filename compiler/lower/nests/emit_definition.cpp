@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "ir/memory_reads.h"
 #include "ir/text.h"
 #include "ir/visit.h"
@@ -209,40 +210,45 @@ Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& ne
 
 namespace {
 
-// Whether values that do not count could do harm: as coordinates, or outside of the pipeline.
-bool depends_on_every_value(const Definition& definition) {
-  return any_node(definition, [](const Call& call) {
-    if (call.call_type == CallType::Operator)
-      return op_info(call.op).cls == OpClass::Effect && !call.is_op(Op::random);
-    return call.call_type == CallType::Extern ||
-           std::ranges::any_of(
-               call.args, [](const Expr& arg) { return reads_memory(arg, MemoryReads::Storage); });
-  });
+// A coordinate that any values leave inside of a table: lut(clamp(f(x), 0, 255)). The table must have
+// all of it, too: it has less where f is known to have values of its own.
+bool is_within_constants(const Expr& coordinate, const ValueBounds& values) {
+  const Interval any = bounds_of(coordinate, Scope<Interval>());
+  if (!any.is_bounded()) return false;
+  const Interval usual = bounds_of(coordinate, Scope<Interval>(), &values);
+  const auto is_same_constant = [](const Expr& a, const Expr& b) {
+    const Expr constant = simplify(a);
+    return is_const(constant) && equal(constant, simplify(b));
+  };
+  return usual.is_bounded() && is_same_constant(any.min, usual.min) &&
+         is_same_constant(any.max, usual.max);
+}
+
+bool may_do_harm(const Call& call, const ValueBounds& values) {
+  if (call.call_type == CallType::Operator)
+    return op_info(call.op).cls == OpClass::Effect && !call.is_op(Op::random);
+  return call.call_type == CallType::Extern ||
+         std::ranges::any_of(call.args, [&](const Expr& coordinate) {
+           return reads_memory(coordinate, MemoryReads::Storage) &&
+                  !is_within_constants(coordinate, values);
+         });
 }
 
 }  // namespace
 
-std::set<std::string> funcs_read_rounded(const LoopedFunc& f, int stage, const StageNest& nest,
-                                         const Requirements& uses) {
-  std::set<std::string> names;
-  const Definition& definition = f.stages[stage];
-  if (!nest.rounds_up || stage > 0 || depends_on_every_value(definition)) return names;
-  for (const auto& [name, use] : uses) {
-    if (!use.is_image && name != f.name()) names.insert(name);
-  }
-  return names;
+bool takes_any_values(const Definition& definition, const ValueBounds& values) {
+  return !definition.predicate.defined() &&
+         !any_node(definition, [&](const Call& call) { return may_do_harm(call, values); });
 }
 
-Box read_inside(const LoopedFunc& f, int stage, const Domain& domain, const ValueBounds& values,
-                const std::string& func) {
+Requirements read_inside(const LoopedFunc& f, const Domain& domain, const ValueBounds& values) {
   Scope<Interval> points;
   for (const auto& [var, range] : domain)
     points.push(var, {range.min, simplify(range.min + range.extent - 1)});
   Requirements uses;
-  for (const Expr& value : f.stages[stage].values)
+  for (const Expr& value : f.stages[0].values)
     merge_footprints(uses, footprints(value, points, &values));
-  const auto found = uses.find(func);
-  return found == uses.end() ? Box{} : found->second.box;
+  return uses;
 }
 
 bool never_stores(const LoopedFunc& f, int stage, const Requirements& uses) {

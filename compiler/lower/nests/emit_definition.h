@@ -7,7 +7,6 @@
 // of the DAG.
 #pragma once
 
-#include <set>
 #include <string>
 
 #include "lower/nests/build_loop_nests.h"
@@ -24,13 +23,11 @@ Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest);
 Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest,
                              const ValueBounds& values);
 
-// The Funcs among `uses` of which a stage may read any values beyond its domain, where its loops
-// round up: what it computes there does not count. None where values are places, or have effects.
-std::set<std::string> funcs_read_rounded(const LoopedFunc& f, int stage, const StageNest& nest,
-                                         const Requirements& uses);
-// What a stage reads of a Func at the points of its domain.
-Box read_inside(const LoopedFunc& f, int stage, const Domain& domain, const ValueBounds& values,
-                const std::string& func);
+// Whether any values may stand for those that a first definition reads, as far as its own do not
+// count: they are no coordinates, unless clamped, and have no effects.
+bool takes_any_values(const Definition& definition, const ValueBounds& values);
+// What a first definition reads at the points of its domain.
+Requirements read_inside(const LoopedFunc& f, const Domain& domain, const ValueBounds& values);
 
 // Whether no point passes the predicate, by the same analysis: what the stage reads is then not
 // computed anywhere.

@@ -2,6 +2,8 @@
 // innermost body of every stage up to the place where the group is computed.
 #include <algorithm>
 #include <map>
+#include <optional>
+#include <utility>
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
@@ -51,18 +53,47 @@ Domain domain_of_earlier(const LoopedFunc& f, int s, const Domain& later, Comput
 
 }  // namespace
 
-// Whether what the loops of a Func compute beyond its region may be what it keeps for later iterations. Along a
-// dimension in which the region is the same for as long as the storage lasts, nothing beyond it is ever read.
-bool NestEmitter::keeps_beside_its_regions(const Member& member, ComputePlace& site) {
+// Whether what the loops of a Func compute beyond its region along a dimension may be what it keeps for later
+// iterations. Where the region is the same for as long as the storage lasts, nothing beyond it is ever read.
+bool NestEmitter::keeps_beside_its_region(const Member& member, size_t dimension,
+                                          ComputePlace& site) {
   if (member.slides.empty()) return false;
-  const Box whole = site.whole(member.need);
-  for (size_t d = 0; d < whole.size(); d++) {
-    const bool moves = std::ranges::any_of(member.loops, [&](const Loop& loop) {
-      return uses_variable(whole[d].min, loop.name) || uses_variable(whole[d].max, loop.name);
-    });
-    if (moves && runs_beyond_regions(*member.f, d)) return true;
+  const Interval whole = site.whole(member.need)[dimension];
+  const bool moves = std::ranges::any_of(member.loops, [&](const Loop& loop) {
+    return uses_variable(whole.min, loop.name) || uses_variable(whole.max, loop.name);
+  });
+  return moves && runs_beyond_regions(*member.f, dimension);
+}
+
+bool NestEmitter::keeps_beside_its_regions(const Member& member, ComputePlace& site) {
+  for (size_t d = 0; d < member.need.size(); d++) {
+    if (keeps_beside_its_region(member, d, site)) return true;
   }
   return false;
+}
+
+// The points whose values may be read: those of the domain, and along a dimension in which values beside the region
+// are kept, all that the loops run over. None where that is not known.
+std::optional<Domain> NestEmitter::counted_points(const NestStage& stage, const Member& member,
+                                                  ComputePlace& site) {
+  Domain result = stage.domain;
+  for (size_t d = 0; d < member.need.size(); d++) {
+    if (!keeps_beside_its_region(member, d, site)) continue;
+    if (!stage.f->stages[stage.stage].schedule.specializations.empty()) return {};
+    const StageNest nest = build_stage_nest(*stage.f, stage.stage, stage.domain);
+    Scope<Interval> loops;
+    for (const Loop& loop : nest.loops) loops.push(loop.name, loop.range());
+    const std::string& arg = stage.f->func->args[d];
+    const Interval reached = bounds_of(nest.guarded_coordinate.at(arg), loops);
+    if (!reached.is_bounded()) return {};
+    result[arg] = {reached.min, simplify(reached.max - reached.min + 1)};
+  }
+  return result;
+}
+
+bool NestEmitter::is_one_of(const std::vector<NestStage>& stages, const std::string& func) {
+  return std::ranges::any_of(stages,
+                             [&](const NestStage& stage) { return stage.f->name() == func; });
 }
 
 Emitted NestEmitter::emit_members(const FusedGroup& group, std::vector<Member>& members,
@@ -93,10 +124,14 @@ Emitted NestEmitter::emit_members(const FusedGroup& group, std::vector<Member>& 
     Emitted code = stages[0].f->func->is_extern()
                        ? emit_extern(member_of(fused[0]), stages[0].domain, site)
                        : emit_variants(group.nests[n], stages, site);
-    if (keeps_beside_its_regions(member_of(fused[0]), site))
-      code.read_rounded.clear();
-    else
-      leave_rounded(stages[0], code);
+    for (size_t i = 0; i < fused.size(); i++) {
+      const auto counted = counted_points(stages[i], member_of(fused[i]), site);
+      if (counted)
+        stages[i].domain = *counted;
+      else
+        code.overrun.leaves_domain = false;
+    }
+    leave_overrun(stages, code);
     for (const FusedStage& stage : group.nests[n].stages)
       widen_by_own_reads(member_of(stage), code);
     nests[n] = code.stmt;
@@ -112,16 +147,33 @@ Emitted NestEmitter::emit_members(const FusedGroup& group, std::vector<Member>& 
   return result;
 }
 
-// Outside of its loops, a stage needs what the points of its domain read. What loops that round up
-// read beyond that must be there, and no more.
-void NestEmitter::leave_rounded(const NestStage& stage, Emitted& code) const {
-  for (const std::string& name : code.read_rounded) {
-    Box& needed = code.uses.at(name).box;
-    Box& touched = code.touched[name];
-    touched = hull(touched, needed);
-    needed = read_inside(*stage.f, stage.stage, stage.domain, values_, name);
+// Outside of its loops, a nest needs what the points that count need: what they read themselves,
+// and what these need of the Funcs computed in the loops. What loops that leave the domains read
+// beyond that must be there, and no more.
+void NestEmitter::leave_overrun(const std::vector<NestStage>& stages, Emitted& code) const {
+  const Overrun& overrun = code.overrun;
+  if (!std::exchange(code.overrun.leaves_domain, false) || overrun.counts) return;
+  Requirements needed;
+  for (const NestStage& stage : stages)
+    merge_footprints(needed, read_inside(*stage.f, stage.domain, values_));
+  for (const LoopedFunc* f : overrun.inside) {
+    const auto use = needed.find(f->name());
+    if (use == needed.end()) continue;
+    Domain domain;
+    for (size_t d = 0; d < use->second.box.size(); d++) {
+      const Interval& side = use->second.box[d];
+      if (!side.is_bounded()) return;
+      domain[f->func->args[d]] = {side.min, simplify(side.max - side.min + 1)};
+    }
+    merge_footprints(needed, read_inside(*f, domain, values_));
   }
-  code.read_rounded.clear();
+  for (auto& [name, use] : code.uses) {
+    const auto inside = needed.find(name);
+    if (use.is_image || inside == needed.end() || is_one_of(stages, name)) continue;
+    Box& touched = code.touched[name];
+    touched = hull(touched, use.box);
+    use.box = inside->second.box;
+  }
 }
 
 // What an update reads of its own Func, the stages before it compute.
@@ -345,9 +397,8 @@ Emitted NestEmitter::emit_stage(const FusedNest& nest, std::vector<NestStage>& s
   code.stmt = emit_definition(f, own.stage, own.nest);
   code.uses = requirements_of(f, own.stage, own.nest, values_);
   if (never_stores(f, own.stage, code.uses)) code.stmt = make_evaluate(0);
-  const bool is_alone =
-      nest.stages.size() == 1 && f.stages[own.stage].schedule.specializations.empty();
-  if (is_alone) code.read_rounded = funcs_read_rounded(f, own.stage, own.nest, code.uses);
+  code.overrun.leaves_domain = own.nest.rounds_up;
+  code.overrun.counts = own.stage > 0 || !takes_any_values(f.stages[own.stage], values_);
   code = emit_children(computed_innermost_in(f), std::move(code), loops, 0, home);
   for (size_t i = 0; i < loops.size(); i++) {
     const int depth = static_cast<int>(loops.size() - i);

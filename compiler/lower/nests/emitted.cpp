@@ -38,8 +38,14 @@ Box simplified(Box box) {
   return box;
 }
 
+void Overrun::add(const Overrun& other) {
+  leaves_domain |= other.leaves_domain;
+  counts |= other.counts;
+  inside.insert(inside.end(), other.inside.begin(), other.inside.end());
+}
+
 void merge_needs(Needs& into, const Needs& from) {
-  for (const auto& [name, use] : from.uses) into.read_rounded.erase(name);
+  into.overrun.add(from.overrun);
   merge_footprints(into.uses, from.uses);
   for (const auto& [name, box] : from.storage) into.storage[name] = hull(into.storage[name], box);
   for (const auto& [name, box] : from.touched) into.touched[name] = hull(into.touched[name], box);

@@ -3,7 +3,6 @@
 
 #include <functional>
 #include <map>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -11,6 +10,15 @@
 #include "lower/nests/stage_nest.h"
 
 namespace retrograde::lower {
+
+// Of the loops of a nest as far as they are built: whether they run beyond the domains of their
+// stages, and whether the values that are computed there count.
+struct Overrun {
+  bool leaves_domain = false;
+  bool counts = false;                    // some value beyond a domain could do harm
+  std::vector<const LoopedFunc*> inside;  // Funcs computed in these loops, consumers first
+  void add(const Overrun& other);
+};
 
 // Boxes of what a statement reads and of what is computed in it. They speak of names that are bound
 // outside the statement, except for `unranged` loops, over which they are still to be extended.
@@ -21,8 +29,7 @@ struct Needs {
   // What is read of a Func beyond what is needed of it: there must be storage, the values are of no
   // matter.
   std::map<std::string, Box> touched;
-  // Inside of the loops of one stage that round up: Funcs that nothing but its definition reads.
-  std::set<std::string> read_rounded;
+  Overrun overrun;
 };
 
 // What one of several stages that share loops needs, while the loops around are still shared.

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -112,8 +113,12 @@ class NestEmitter {
   // come back in `storage`.
   Emitted emit_members(const FusedGroup& group, std::vector<Member>& members, ComputePlace& site,
                        std::vector<Stmt> stmts);
+  static bool keeps_beside_its_region(const Member& member, size_t dimension, ComputePlace& site);
   static bool keeps_beside_its_regions(const Member& member, ComputePlace& site);
-  void leave_rounded(const NestStage& stage, Emitted& code) const;
+  static std::optional<Domain> counted_points(const NestStage& stage, const Member& member,
+                                              ComputePlace& site);
+  void leave_overrun(const std::vector<NestStage>& stages, Emitted& code) const;
+  static bool is_one_of(const std::vector<NestStage>& stages, const std::string& func);
   void widen_by_own_reads(Member& member, Emitted& code) const;
   Emitted emit_extern(Member& member, const Domain& domain, ComputePlace& site);
   Emitted emit_extern_call(const LoopedFunc& f, const ExternCall& call, ComputePlace& site,

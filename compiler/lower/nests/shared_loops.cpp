@@ -236,16 +236,17 @@ void gather_uses(Emitted& code, SharedLoops around, size_t inner,
   }
 }
 
-void gather_storage(Emitted& code, SharedLoops around, size_t inner,
-                    const std::function<bool(const std::string&)>& is_wanted) {
+void gather_boxes(Emitted& code, SharedLoops around, size_t inner,
+                  std::map<std::string, Box> Needs::*boxes,
+                  const std::function<bool(const std::string&)>& is_wanted) {
   range_over_loops(code);
   for (Strand& strand : code.strands) {
-    if (strand.storage.empty()) continue;
+    if ((strand.*boxes).empty()) continue;
     range_over_loops(strand);
     const InLoops here = in_loops(strand, around, inner);
-    std::erase_if(strand.storage, [&](const auto& entry) {
+    std::erase_if(strand.*boxes, [&](const auto& entry) {
       if (!is_wanted(entry.first)) return false;
-      Box& box = code.storage[entry.first];
+      Box& box = (code.*boxes)[entry.first];
       box = hull(box, substituted(entry.second, here.inside));
       return true;
     });

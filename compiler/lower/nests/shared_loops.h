@@ -16,6 +16,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -41,8 +42,10 @@ void join(Emitted& code, SharedLoops around, Emitted other, const std::vector<Lo
 void gather_uses(Emitted& code, SharedLoops around, size_t inner,
                  const std::vector<std::string>& names,
                  const std::function<bool(const std::string&)>& keeps_moving);
-void gather_storage(Emitted& code, SharedLoops around, size_t inner,
-                    const std::function<bool(const std::string&)>& is_wanted);
+// The same of their boxes of storage, or of what is read beside what they need.
+void gather_boxes(Emitted& code, SharedLoops around, size_t inner,
+                  std::map<std::string, Box> Needs::*boxes,
+                  const std::function<bool(const std::string&)>& is_wanted);
 
 // No loops are shared any more.
 void merge_strands(Emitted& code);

@@ -131,6 +131,8 @@ class NestBuilder {
         rounds_up_ = rounds_up_ || !is_zero(simplify(old.extent % factor));
         return derive(split.old_var, base + inner + old.min);
       case TailStrategy::ShiftInwards:
+        // Where the extent is less than the factor, the only block begins before the domain.
+        rounds_up_ = rounds_up_ || !can_prove(old.extent >= factor);
         base = min(likely(base), old.extent - factor);
         return derive(split.old_var, base + inner + old.min);
       default: {  // GuardWithIf and its predicated forms
