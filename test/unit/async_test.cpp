@@ -398,7 +398,8 @@ TEST(AsyncErrors, AFuncThatBothBranchesReadAndThatIsStoredFurtherOut) {
   } catch (const UserError& error) {
     const std::string message = error.what();
     expect_mentions(message,
-                    {"compute \"g\" async", "\"f\" is computed in these loops and stored around"});
+                    {"compute \"" + g.name() + "\" async",
+                     "\"" + f.name() + "\" is computed in these loops and stored around"});
   }
 }
 
