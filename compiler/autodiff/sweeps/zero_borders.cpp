@@ -1,5 +1,7 @@
 #include "autodiff/sweeps/zero_borders.h"
 
+#include <algorithm>
+
 #include "autodiff/rules/derivative_rules.h"
 #include "autodiff/sweeps/border_conditions.h"
 #include "graph/function.h"
@@ -93,9 +95,12 @@ Expr zero_without(const Expr& term, const Expr& condition) {
 }
 
 // Whether a condition is of a border between taps, and this little of all: where taps are many beside the
-// elements, it leaves out much.
+// elements, it leaves out much. One that names no element may fail as far beyond a border as a parameter is large,
+// and the zeros up to there would be stored.
 constexpr double least_of_a_tap = 4;
 bool is_thin(const Expr& condition, const Gather& g, const AdjointTarget& target) {
+  const auto is_of = [&](const std::string& arg) { return uses_variable(condition, arg); };
+  if (std::ranges::none_of(target.args, is_of)) return false;
   double taps = 1;
   for (const ReductionVariable& r : g.rdom->vars) {
     if (uses_variable(condition, r.var))
