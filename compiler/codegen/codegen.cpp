@@ -69,6 +69,7 @@ auto with_generated(const Program& program, const Options& options, bool keep_na
     const bool is_empty = program.functions.empty();
     Unit unit(machine, is_empty ? "retrograde" : program.functions[0].name, keep_names);
     generate(program, machine, unit);
+    unit.note_length();
     result = use(unit, machine);
   });
   return result;

@@ -57,12 +57,6 @@ int x86_vector_bits(const Machine& machine) {
   return has_any(machine.target, {F::AVX, F::AVX2}) ? 256 : 128;
 }
 
-void set_option(const char* name) {
-  const auto& options = llvm::cl::getRegisteredOptions();
-  if (const auto found = options.find(name); found != options.end())
-    static_cast<llvm::cl::opt<bool>*>(found->second)->setValue(true);
-}
-
 void initialize_llvm() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -79,10 +73,11 @@ void initialize_llvm() {
     LLVMInitializeNVPTXTargetMC();
     LLVMInitializeNVPTXAsmPrinter();
     // LLVM has no other way to ask for these.
-    set_option("nvptx-short-ptr");  // pointers of 32 bits to shared, constant and local memory
+    set_option("nvptx-short-ptr",
+               true);  // pointers of 32 bits to shared, constant and local memory
     // It moves integers to mask registers, takes time quadratic in the length of a function (half of
     // that for the gradient of forty steps of a wave), and is worth nothing here.
-    set_option("disable-x86-domain-reassignment");
+    set_option("disable-x86-domain-reassignment", true);
   });
 }
 
@@ -98,6 +93,12 @@ std::string sleef_suffix(const Machine& machine, int vector_bits) {
 }
 
 }  // namespace
+
+void set_option(const char* name, bool value) {
+  const auto& options = llvm::cl::getRegisteredOptions();
+  if (const auto found = options.find(name); found != options.end())
+    static_cast<llvm::cl::opt<bool>*>(found->second)->setValue(value);
+}
 
 bool Machine::has_avx512() const {
   return is_x86() && (has_any(target, {F::AVX512}) || has_skylake(target));

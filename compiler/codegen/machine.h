@@ -55,4 +55,7 @@ Machine machine_for(const Target& target, bool tune_for_host);
 Machine device_machine(const Machine& host, Machine::Device device);
 std::unique_ptr<llvm::TargetMachine> make_target_machine(const Machine& machine);
 
+// One of LLVM's options of the whole process; nothing where this LLVM has none of the name.
+void set_option(const char* name, bool value);
+
 }  // namespace retrograde::codegen

@@ -24,6 +24,8 @@ class Unit {
   Unit(const Machine& machine, const std::string& name, bool keep_names);
   Unit(const Machine& machine, const std::string& name, const std::string& bitcode);
   llvm::Module& module() { return *module_; }
+  // To be called when the module is complete: how it is compiled depends on its length, also in parts.
+  void note_length();
 
   void optimize();
   std::string emit(Format format);

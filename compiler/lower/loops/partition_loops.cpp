@@ -61,6 +61,10 @@ constexpr int nodes_an_operation = 64;
 // with the condition, are what LLVM compiles. Above that it is less than a hundredth of the work.
 constexpr int nodes_a_vector_condition = 2048;
 
+// Both borders of a body with more nodes are one loop, where their order is free: a third of what LLVM compiles of a
+// long pipeline. A copy of a smaller one costs less than the choice between the two.
+constexpr int joined_border = 60;
+
 bool contains_likely(const Stmt& s) {
   return any_node(s, [](const Call& call) { return is_likely(&call); });
 }
@@ -205,7 +209,7 @@ class Partitioner : public StatementRewriter {
     if (has_epilogue) end = variable(end_name, loop.min.type());
 
     std::vector<Stmt> loops;
-    if (has_prologue && has_epilogue && node_count(rest) > costly_border &&
+    if (has_prologue && has_epilogue && node_count(rest) > joined_border &&
         runs_in_any_order(loop)) {
       loops.push_back(both_borders(loop, begin, end, loop_end, rest));
       has_prologue = has_epilogue = false;
