@@ -8,6 +8,10 @@
 // share of what is left (guided self-scheduling, Polychronopoulos and Kuck 1987): large at first,
 // single iterations at the end.
 //
+// A starter that waits takes pieces of the loops that were started inside of its own: what it waits for
+// ends earlier, and nothing else can delay it (leapfrogging, Wagner and Calder 1993). Its stack holds
+// no more loops at once than are nested.
+//
 // Who waits spins for some microseconds before it sleeps (competitive spinning, Karlin, Li, Manasse
 // and Owicki 1991): to wake a thread costs more than many a loop takes, and loops follow one
 // another.
@@ -20,6 +24,7 @@
 #include <mutex>
 #include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "spin.h"
@@ -53,8 +58,9 @@ std::unique_lock<std::mutex> lock_briefly(std::mutex& mutex) {
 
 class SharedLoop {
  public:
+  // Started by the piece that this thread runs, if any.
   SharedLoop(int64_t extent, int threads, RunRange run, void* data)
-      : extent_(extent), threads_(threads), run_(run), data_(data) {}
+      : extent_(extent), threads_(threads), run_(run), data_(data), around_(innermost) {}
 
   // Runs one piece; false when none is left.
   bool run_piece() {
@@ -63,22 +69,39 @@ class SharedLoop {
       if (begin >= extent_) return false;
       end = begin + std::max<int64_t>(1, (extent_ - begin) / (4 * threads_));
     } while (!next_.compare_exchange_weak(begin, end, std::memory_order_relaxed));
+    SharedLoop* const outer = std::exchange(innermost, this);
     run_(data_, begin, end);
+    innermost = outer;
     return true;
   }
   bool takes_workers() const { return inside < threads_ - 1 && has_pieces(); }
 
-  std::atomic<int> inside{0};  // workers; they enter under the pool's mutex, while it is listed
+  // The loops around one that is listed outlive it.
+  SharedLoop* around() const { return around_; }
+  bool is_inside(const SharedLoop& other) const {
+    for (const SharedLoop* loop = around_; loop; loop = loop->around_) {
+      if (loop == &other) return true;
+    }
+    return false;
+  }
+
+  std::atomic<int> inside{0};   // workers; they enter under the pool's mutex, while it is listed
+  bool starter_sleeps = false;  // under the pool's mutex
 
  private:
+  static thread_local SharedLoop* innermost;  // of which this thread runs a piece
+
   const int64_t extent_;
   const int threads_;  // that may run it, its starter included
   const RunRange run_;
   void* const data_;
+  SharedLoop* const around_;
   std::atomic<int64_t> next_{0};
 
   bool has_pieces() const { return next_.load(std::memory_order_relaxed) < extent_; }
 };
+
+thread_local SharedLoop* SharedLoop::innermost = nullptr;
 
 int default_threads() {
   for (const char* name : {"HL_NUM_THREADS", "HL_NUMTHREADS"}) {
@@ -142,14 +165,18 @@ class Pool {
 
   void enter(SharedLoop& loop, int helpers) {
     int sleepers = 0;
+    bool starter_sleeps = false;
     {
       const std::unique_lock lock = lock_briefly(mutex_);
       loops_.push_back(&loop);
       grow(helpers);
       changes_.fetch_add(1, std::memory_order_release);
       sleepers = sleepers_;
+      for (const SharedLoop* outer = loop.around(); outer; outer = outer->around())
+        starter_sleeps |= outer->starter_sleeps;
     }
     if (sleepers > 0) helpers == 1 ? wake_.notify_one() : wake_.notify_all();
+    if (starter_sleeps) done_.notify_all();
   }
 
   // A thread that cannot be had is done without.
@@ -163,16 +190,31 @@ class Pool {
 
   // The loop is gone when this returns: no worker touches it after it has counted itself out.
   void leave(SharedLoop& loop) {
-    {
-      const std::unique_lock lock = lock_briefly(mutex_);
-      loops_.erase(std::find(loops_.begin(), loops_.end(), &loop));
+    std::unique_lock lock = lock_briefly(mutex_);
+    loops_.erase(std::find(loops_.begin(), loops_.end(), &loop));
+    while (loop.inside.load() > 0) {
+      if (SharedLoop* inner = newest_with_work(&loop))
+        work_on(*inner, lock);
+      else
+        wait_for_workers(loop, lock);
     }
-    const auto is_left = [&] { return loop.inside.load() == 0; };
-    if (spin_until(is_left)) return;
-    std::unique_lock lock(mutex_);
+  }
+
+  // Until they have left the loop, or another one is there.
+  void wait_for_workers(SharedLoop& loop, std::unique_lock<std::mutex>& lock) {
+    const uint64_t seen = changes_.load(std::memory_order_relaxed);
+    const auto is_over = [&] {
+      return loop.inside.load() == 0 || changes_.load(std::memory_order_acquire) != seen;
+    };
+    lock.unlock();
+    const bool was_short = spin_until(is_over);
+    lock = lock_briefly(mutex_);
+    if (was_short) return;
     sleeping_starters_++;  // before it looks again, as a worker counts itself out before it looks
                            // here
-    done_.wait(lock, is_left);
+    loop.starter_sleeps = true;
+    done_.wait(lock, is_over);
+    loop.starter_sleeps = false;
     sleeping_starters_--;
   }
 
@@ -182,28 +224,32 @@ class Pool {
     done_.notify_all();
   }
 
-  // A loop that takes a worker, and has counted this one in.
-  SharedLoop* newest_with_work() const {
+  // A loop that takes a worker, and has counted this one in; of those inside of `outer`, if given.
+  SharedLoop* newest_with_work(const SharedLoop* outer = nullptr) const {
     for (auto it = loops_.rbegin(); it != loops_.rend(); ++it) {
-      if (!(*it)->takes_workers()) continue;
+      if (!(*it)->takes_workers() || (outer && !(*it)->is_inside(*outer))) continue;
       (*it)->inside++;
       return *it;
     }
     return nullptr;
   }
 
+  // The mutex is free meanwhile.
+  void work_on(SharedLoop& loop, std::unique_lock<std::mutex>& lock) {
+    lock.unlock();
+    while (loop.run_piece()) {
+    }
+    count_out(loop);
+    lock = lock_briefly(mutex_);
+  }
+
   void work() {
     std::unique_lock lock = lock_briefly(mutex_);
     while (!stops_) {
-      if (SharedLoop* loop = newest_with_work()) {
-        lock.unlock();
-        while (loop->run_piece()) {
-        }
-        count_out(*loop);
-        lock = lock_briefly(mutex_);
-      } else {
+      if (SharedLoop* loop = newest_with_work())
+        work_on(*loop, lock);
+      else
         wait_for_change(lock);
-      }
     }
   }
 

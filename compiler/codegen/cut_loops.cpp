@@ -1,8 +1,10 @@
 #include "codegen/cut_loops.h"
 
+#include <llvm/ADT/STLExtras.h>
 #include <llvm/Analysis/CaptureTracking.h>
 #include <llvm/Analysis/LoopInfo.h>
 #include <llvm/IR/Dominators.h>
+#include <llvm/IR/IRBuilder.h>
 #include <llvm/IR/InstIterator.h>
 #include <llvm/IR/Module.h>
 #include <llvm/IR/PatternMatch.h>
@@ -25,6 +27,9 @@ constexpr uint64_t least_work = 16000;
 constexpr uint64_t unknown_iterations = 4;
 // As many bytes as a processor has in vector registers.
 constexpr uint64_t register_bytes = 2048;
+// Of one allocation, as far as they are looked at. Unrolled tiles use their accumulators hundreds of
+// times, and LLVM looks at a hundred by default.
+constexpr unsigned most_uses = 10000;
 
 using Blocks = std::vector<llvm::BasicBlock*>;
 
@@ -86,16 +91,26 @@ Blocks blocks_of(const llvm::Loop& loop) {
 bool may_be_registers(const llvm::AllocaInst& block) {
   const auto size = block.getAllocationSize(block.getModule()->getDataLayout());
   return size && size->getFixedValue() <= register_bytes &&
-         !llvm::PointerMayBeCaptured(&block, /*ReturnCaptures=*/true, /*StoreCaptures=*/true);
+         !llvm::PointerMayBeCaptured(&block, /*ReturnCaptures=*/true, /*StoreCaptures=*/true,
+                                     most_uses);
 }
 
 bool is_scratch(const llvm::AllocaInst& block) { return block.hasMetadata(scratch_mark); }
 
-bool begins_anew(const llvm::Value& block) {
-  return llvm::any_of(block.users(), [](const llvm::User* user) {
-    return llvm::cast<llvm::Instruction>(user)->isLifetimeStartOrEnd();
-  });
+// The marker of a block of memory that has one.
+llvm::Instruction* beginning_of(const llvm::AllocaInst& block) {
+  for (const llvm::User* user : block.users()) {
+    auto* one = const_cast<llvm::Instruction*>(llvm::cast<llvm::Instruction>(user));
+    if (one->isLifetimeStartOrEnd()) return one;
+  }
+  return nullptr;
 }
+
+// Memory on the stack that only a loop uses, and begins anew each time.
+struct OwnMemory {
+  llvm::AllocaInst* block;
+  llvm::Instruction* begins_before;
+};
 
 class Cutter {
  public:
@@ -106,9 +121,11 @@ class Cutter {
   llvm::Function* cut(const std::string& name) {
     const llvm::Loop* loop = best_loop();
     if (!loop) return nullptr;
+    const Blocks blocks = blocks_of(*loop);
+    const std::vector<OwnMemory> own = take_own_memory(blocks);
     const llvm::CodeExtractorAnalysisCache cache(function_);
-    llvm::Function* piece = extractor(blocks_of(*loop), name).extractCodeRegion(cache);
-    if (piece) move_memory(*piece);
+    llvm::Function* piece = extractor(blocks, name).extractCodeRegion(cache);
+    if (piece) move_memory(*piece, own);
     return piece;
   }
 
@@ -154,33 +171,55 @@ class Cutter {
   static bool is_shared(const llvm::Value* input, const Blocks& blocks) {
     if (input->getType()->isVectorTy()) return true;
     const auto* block = llvm::dyn_cast<llvm::AllocaInst>(input);
-    if (!block || is_scratch(*block) || !may_be_registers(*block)) return false;
-    const bool is_alone = llvm::all_of(block->users(), [&](const llvm::User* user) {
-      const llvm::BasicBlock* where = llvm::cast<llvm::Instruction>(user)->getParent();
-      return std::find(blocks.begin(), blocks.end(), where) != blocks.end();
-    });
-    return !is_alone || !begins_anew(*block);
+    return block && !is_scratch(*block) && !is_own(*block, blocks) && may_be_registers(*block);
   }
 
-  // Memory on the stack of which nothing but the call of the piece speaks goes to the piece; scratch
-  // memory it gets of its own.
-  static void move_memory(llvm::Function& piece) {
+  static bool is_own(const llvm::AllocaInst& block, const Blocks& blocks) {
+    return beginning_of(block) && llvm::all_of(block.users(), [&](const llvm::User* user) {
+             return llvm::is_contained(blocks, llvm::cast<llvm::Instruction>(user)->getParent());
+           });
+  }
+
+  // Without its markers, which the extractor would put around the call.
+  static std::vector<OwnMemory> take_own_memory(const Blocks& blocks) {
+    std::vector<OwnMemory> own;
+    for (llvm::BasicBlock* where : blocks) {
+      for (llvm::Instruction& one : llvm::make_early_inc_range(*where)) {
+        if (!one.isLifetimeStartOrEnd()) continue;
+        auto* block = llvm::dyn_cast<llvm::AllocaInst>(one.getOperand(1));
+        if (!block || !is_own(*block, blocks)) continue;
+        llvm::Instruction* next = one.getNextNode();
+        while (next->isLifetimeStartOrEnd()) next = next->getNextNode();
+        own.push_back({block, next});
+        one.eraseFromParent();
+      }
+    }
+    return own;
+  }
+
+  // The piece has its own memory, and scratch memory of its own.
+  static void move_memory(llvm::Function& piece, const std::vector<OwnMemory>& own) {
     auto* call = llvm::cast<llvm::CallInst>(*piece.user_begin());
     llvm::Instruction* const begin = &*piece.getEntryBlock().getFirstInsertionPt();
-    for (unsigned i = 0; i < call->arg_size(); i++) {
-      auto* block = llvm::dyn_cast<llvm::AllocaInst>(call->getArgOperand(i));
-      if (!block || !may_move(*block, *piece.getArg(i))) continue;
-      call->setArgOperand(i, llvm::PoisonValue::get(block->getType()));
-      llvm::Instruction* own = block;
+    const auto give = [&](llvm::AllocaInst* block, llvm::Argument* argument) {
+      call->setArgOperand(argument->getArgNo(), llvm::PoisonValue::get(block->getType()));
+      llvm::Instruction* its = block;
       if (block->use_empty())
         block->moveBefore(begin);
       else
-        (own = block->clone())->insertBefore(begin);
-      piece.getArg(i)->replaceAllUsesWith(own);
+        (its = block->clone())->insertBefore(begin);
+      argument->replaceAllUsesWith(its);
+    };
+    for (llvm::Argument& argument : piece.args()) {
+      auto* block = llvm::dyn_cast<llvm::AllocaInst>(call->getArgOperand(argument.getArgNo()));
+      if (block && (is_scratch(*block) || is_among(*block, own))) give(block, &argument);
     }
+    for (const OwnMemory& memory : own)
+      llvm::IRBuilder<>(memory.begins_before).CreateLifetimeStart(memory.block);
   }
-  static bool may_move(const llvm::AllocaInst& block, const llvm::Argument& in_piece) {
-    return is_scratch(block) || (block.hasOneUse() && begins_anew(in_piece));
+
+  static bool is_among(const llvm::AllocaInst& block, const std::vector<OwnMemory>& own) {
+    return llvm::any_of(own, [&](const OwnMemory& memory) { return memory.block == &block; });
   }
 };
 

@@ -13,7 +13,8 @@
 //   LoopLoadElim   what a scan stored in the iteration before stays in a register
 //   DSE            stores that a later one replaces: the steps of an unrolled sum, of which GVN has
 //                  taken the loads
-//   LoopUnroll     loops of few iterations altogether, other small innermost ones two or four times
+//   LoopUnroll     loops of few iterations altogether, other small innermost ones two or four times,
+//                  unless iterations wait for a sum of floats
 //   SROA, EarlyCSE allocations of which only such a loop hid the places; what it loaded twice
 //   InstCombine, SimplifyCFG, ADCE to clean up
 //   cut_long_blocks and FenceLongBlocks, so that LLVM's code generator takes linear time
@@ -103,10 +104,36 @@ static std::optional<unsigned> unrolled_cost(const llvm::Loop& loop,
   return cost * count <= most_unrolled ? std::optional<unsigned>(cost * count) : std::nullopt;
 }
 
-// Copies of the body of a small innermost loop, where counting costs a good part of the work.
-static unsigned unroll_count(const llvm::Loop& loop) {
-  constexpr unsigned room = 48;
+// Whether e is computed from the phi, in floating point, within the block.
+static bool follows_from(const llvm::Value* e, const llvm::PHINode& phi) {
+  if (e == &phi) return true;
+  const auto* one = llvm::dyn_cast<llvm::Instruction>(e);
+  if (!one || one->getParent() != phi.getParent() || llvm::isa<llvm::PHINode>(one) ||
+      !one->getType()->isFPOrFPVectorTy())
+    return false;
+  return llvm::any_of(one->operands(),
+                      [&](const llvm::Use& use) { return follows_from(use, phi); });
+}
+
+// Whether iterations wait for what the one before adds up in floating point. That takes longer than
+// counting does.
+static bool adds_up_floats(const llvm::BasicBlock& body) {
+  return llvm::any_of(body.phis(), [&](const llvm::PHINode& phi) {
+    const int latch = phi.getBasicBlockIndex(&body);
+    if (latch < 0 || !phi.getType()->isFPOrFPVectorTy()) return false;
+    const llvm::Value* next = phi.getIncomingValue(static_cast<unsigned>(latch));
+    return next != &phi && follows_from(next, phi);
+  });
+}
+
+// Copies of the body of a small innermost loop, where counting costs a good part of the work. Iterations
+// that are left over run in a loop of their own, whose addresses are computed apart: loops that run
+// a few times would spend as much on that.
+static unsigned unroll_count(const llvm::Loop& loop, llvm::ScalarEvolution& evolution) {
+  constexpr unsigned room = 48, least_iterations = 8;
   if (!loop.isInnermost() || loop.getNumBlocks() != 1) return 1;
+  const unsigned most = evolution.getSmallConstantMaxTripCount(&loop);  // 0: unknown
+  if ((most > 0 && most < least_iterations) || adds_up_floats(*loop.getHeader())) return 1;
   const llvm::BasicBlock& body = *loop.getHeader();
   const bool calls = std::any_of(body.begin(), body.end(), [](const llvm::Instruction& one) {
     return llvm::isa<llvm::CallBase>(one) && !llvm::isa<llvm::IntrinsicInst>(one);
@@ -123,7 +150,7 @@ class MarkSmallLoops : public llvm::PassInfoMixin<MarkSmallLoops> {
     for (llvm::Loop* loop : analyses.getResult<llvm::LoopAnalysis>(function).getLoopsInPreorder()) {
       if (unrolled_cost(*loop, evolution)) {
         llvm::addStringMetadataToLoop(loop, "llvm.loop.unroll.full", 1);
-      } else if (const unsigned count = unroll_count(*loop); count > 1) {
+      } else if (const unsigned count = unroll_count(*loop, evolution); count > 1) {
         llvm::addStringMetadataToLoop(loop, "llvm.loop.unroll.count", count);
       }
     }

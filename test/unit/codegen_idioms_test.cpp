@@ -301,7 +301,8 @@ TEST(CodegenIdioms, LanesOfAnAccumulatorAreSummedInRegisters) {
   check(avx512, 16, 64);
 }
 
-// One product in each of four iterations; lanes are combined behind the loop.
+// Lanes are combined behind the loop. Each iteration waits for the sum of the one before, so that
+// copies of the body would gain nothing.
 TEST(CodegenIdioms, SumsAreCarriedAsVectors) {
   ImageParam a(Float(32), 1, "a"), b(Float(32), 1, "b");
   RDom r(0, 4096, "r");
@@ -310,7 +311,7 @@ TEST(CodegenIdioms, SumsAreCarriedAsVectors) {
   f() += a(r) * b(r);
   f.update().atomic().vectorize(r, 8);
   const auto loop = block_with_most(assembly(f, avx2), "vfmadd");
-  EXPECT_EQ(count(loop, "vfmadd"), 4u);
+  EXPECT_EQ(count(loop, "vfmadd"), 1u);
   EXPECT_EQ(count(loop, "vextract") + count(loop, "vhadd") + count(loop, "vaddss"), 0u);
 }
 
@@ -404,8 +405,8 @@ TEST(CodegenIdioms, ScansCarryTheirLastValueInARegister) {
   scan.compute_at(f, x).vectorize(x, 8).update().reorder(x, t).vectorize(x, 8);
   f.vectorize(x, 8);
   const auto loop = block_with_most(assembly(f, avx2), "vfmadd");
-  EXPECT_EQ(count(loop, "vfmadd"), 4u);
-  EXPECT_EQ(count(loop, "(%r"), 3u) << "stores between them, no loads";
+  EXPECT_EQ(count(loop, "vfmadd"), 1u);
+  EXPECT_EQ(count(loop, "(%r"), 0u) << "nothing is loaded before the step";
 }
 
 // The last part of a reduction in lanes is masked, the others are not.
@@ -421,8 +422,8 @@ TEST(CodegenIdioms, FactoredReductionsAreMaskedOnlyAtTheirEnd) {
   lanes.compute_root().vectorize(lane, 8).update().reorder(lane, ro).vectorize(lane, 8);
   const auto loop = block_with_most(assembly(f, avx2), "vfmadd");
   EXPECT_EQ(count(loop, "vmaskmov"), 0u);
-  EXPECT_EQ(count(loop, "vfmadd"), 4u);
-  EXPECT_EQ(count(loop, "(%r"), 4u) << "loads of the input";
+  EXPECT_EQ(count(loop, "vfmadd"), 1u);
+  EXPECT_EQ(count(loop, "(%r"), 1u) << "a load of the input";
 }
 
 // The loop of a small reduction inside of a vector is straight code.
@@ -434,6 +435,22 @@ TEST(CodegenIdioms, ReductionsOverAFewElementsAreUnrolled) {
   f(x, y) = minimum(in(x + r.x, y + r.y));
   f.vectorize(x, 32);
   EXPECT_GE(count(block_with_most(assembly(f, avx2), "vpminub"), "vpminub"), 24u);
+}
+
+// A loop over at most three elements, however many of them an image has.
+TEST(CodegenIdioms, LoopsOfFewIterationsAreNotUnrolled) {
+  const auto adds = [](int most) {
+    ImageParam in(Int(32), 2, "in");
+    Var x("x"), y("y");
+    RDom r(0, clamp(in.dim(1).extent(), 0, most), "r");
+    Func f("f");
+    f(x) += in(x, r) ^ 5;
+    f.vectorize(x, 8, TailStrategy::RoundUp);
+    f.update().reorder(r, x).vectorize(x, 8, TailStrategy::RoundUp);
+    return count(block_with_most(assembly(f, avx2), "vpaddd"), "vpaddd");
+  };
+  EXPECT_EQ(adds(3), 1u);
+  EXPECT_GE(adds(1000), 2u);
 }
 
 TEST(CodegenIdioms, ShortVectorLoopsAreUnrolled) {
@@ -593,6 +610,53 @@ TEST(CodegenIdioms, LoopsThatShareRegistersStayInOneFunction) {
   f(x) = sums[0](x) * sums[1](x);
   f.split(x, xo, x, 8).vectorize(x);
   EXPECT_EQ(count(assembly(f, avx2), ".loop0:"), 0u);
+}
+
+// However often unrolled code uses them: twenty accumulators, each at two steps of k.
+TEST(CodegenIdioms, LoopsOverLargeTilesStayBesideTheirAccumulators) {
+  ImageParam a(Float(32), 2, "a"), b(Float(32), 2, "b");
+  Var j("j"), i("i"), ji("ji"), ii("ii");
+  RDom k(0, 512, "k");
+  Func product("product"), f("f");
+  product(j, i) += a(k, i) * b(j, k);
+  f(j, i) = max(product(j, i), 0.0f);
+  f.bound(j, 0, 512).bound(i, 0, 500).tile(j, i, ji, ii, 64, 5);
+  f.vectorize(ji, 16).unroll(ji).unroll(ii).parallel(i);
+  product.compute_at(f, j).vectorize(j, 16).unroll(j).unroll(i);
+  product.update().reorder(j, i, k).vectorize(j, 16).unroll(j).unroll(i).unroll(k, 2);
+  const auto code = assembly(f, avx512);
+  EXPECT_EQ(count(code, ".loop0:"), 0u);
+  const auto inner = block_with_most(code, "vfmadd");
+  EXPECT_EQ(count(inner, "vfmadd"), 40u);
+  EXPECT_EQ(count(inner, "vmovups\t%zmm") + count(inner, "vmovaps\t%zmm"), 0u) << "a store";
+}
+
+// What each iteration of such a loop begins anew goes with it, and may be registers there.
+TEST(CodegenIdioms, LoopsThatAreCutTakeTheirMemoryAlong) {
+  ImageParam in(Float(32), 2, "in");
+  Var x("x"), xo("xo"), y("y"), yi("yi");
+  RDom r(0, 32, "r");
+  Func f("f"), sums[2], stages[2];
+  for (int i = 0; i < 2; i++) {
+    Expr terms = 0.0f;
+    for (int tap = 0; tap < 60; tap++) terms += in(x + tap, y + r) * (1.0f + tap * tap);
+    sums[i](x, y) += terms;
+    stages[i](x, y) = sums[i](x, y);
+    stages[i].compute_at(f, y).split(x, xo, x, 8).vectorize(x);
+    sums[i].compute_at(stages[i], xo).vectorize(x, 8);
+    sums[i].update().reorder(x, y, r).vectorize(x, 8);
+  }
+  f(x, y) = stages[0](x, y) * stages[1](x, y);
+  f.split(y, y, yi, 16).parallel(y);
+  const auto code = assembly(f, avx2);
+  const auto begin = std::find_if(code.begin(), code.end(), [](const std::string& line) {
+    return !line.empty() && line[0] != '\t' && line.find(".loop0:") != std::string::npos;
+  });
+  ASSERT_NE(begin, code.end());
+  const auto end = std::find_if(begin, code.end(), [](const std::string& line) {
+    return line.find(".Lfunc_end") != std::string::npos;
+  });
+  EXPECT_EQ(count({begin, end}, "vmovups\t%ymm"), 1u) << "the stage, and not the sum";
 }
 
 }  // namespace

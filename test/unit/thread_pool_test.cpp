@@ -128,6 +128,57 @@ TEST_F(ThreadPool, StartersThatSleepAreWoken) {
   }
 }
 
+// The starter's iteration ends as soon as a worker is in the other one.
+TEST_F(ThreadPool, StartersThatWaitHelpInTheLoopsInsideOfTheirs) {
+  using namespace std::chrono_literals;
+  set_thread_count(2);
+  const auto starter = std::this_thread::get_id();
+  for (const auto pause :
+       {0ms, 20ms}) {  // until the inner loop starts: the starter spins, or sleeps
+    std::atomic<bool> worker_is_there{false}, starter_helps{false};
+    run(2, 0, [&](int64_t, int64_t) {
+      if (std::this_thread::get_id() == starter) {
+        while (!worker_is_there) std::this_thread::sleep_for(1ms);
+        return;
+      }
+      worker_is_there = true;
+      std::this_thread::sleep_for(pause);
+      run(100, 0, [&](int64_t begin, int64_t end) {
+        std::this_thread::sleep_for((end - begin) * 1ms);
+        if (std::this_thread::get_id() == starter) starter_helps = true;
+      });
+    });
+    EXPECT_TRUE(starter_helps) << pause.count();
+  }
+}
+
+// They may take long.
+TEST_F(ThreadPool, StartersThatWaitLeaveOtherLoopsAlone) {
+  using namespace std::chrono_literals;
+  set_thread_count(2);
+  const auto starter = std::this_thread::get_id();
+  std::atomic<bool> worker_is_there{false}, other_is_over{false}, starter_helps{false};
+  std::thread other([&] {
+    while (!worker_is_there) std::this_thread::sleep_for(1ms);
+    std::this_thread::sleep_for(20ms);
+    run(100, 0, [&](int64_t begin, int64_t end) {
+      std::this_thread::sleep_for((end - begin) * 1ms);
+      if (std::this_thread::get_id() == starter) starter_helps = true;
+    });
+    other_is_over = true;
+  });
+  run(2, 0, [&](int64_t, int64_t) {
+    if (std::this_thread::get_id() == starter) {
+      while (!worker_is_there) std::this_thread::sleep_for(1ms);
+      return;
+    }
+    worker_is_there = true;
+    while (!other_is_over) std::this_thread::sleep_for(1ms);
+  });
+  other.join();
+  EXPECT_FALSE(starter_helps);
+}
+
 TEST_F(ThreadPool, TheLowestFailureWins) {
   retrograde_context context = {};
   std::string message;
