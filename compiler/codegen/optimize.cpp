@@ -106,13 +106,14 @@ static std::optional<unsigned> unrolled_cost(const llvm::Loop& loop,
 
 // Whether e is computed from the phi, in floating point, within the block.
 static bool follows_from(const llvm::Value* e, const llvm::PHINode& phi) {
-  if (e == &phi) return true;
-  const auto* one = llvm::dyn_cast<llvm::Instruction>(e);
-  if (!one || one->getParent() != phi.getParent() || llvm::isa<llvm::PHINode>(one) ||
-      !one->getType()->isFPOrFPVectorTy())
-    return false;
-  return llvm::any_of(one->operands(),
-                      [&](const llvm::Use& use) { return follows_from(use, phi); });
+  llvm::SmallPtrSet<const llvm::Value*, 32> follow = {&phi};
+  for (const llvm::Instruction& one : *phi.getParent()) {
+    const bool is_next =
+        llvm::any_of(one.operands(), [&](const llvm::Use& use) { return follow.contains(use); });
+    if (is_next && !llvm::isa<llvm::PHINode>(one) && one.getType()->isFPOrFPVectorTy())
+      follow.insert(&one);
+  }
+  return follow.contains(e);
 }
 
 // Whether iterations wait for what the one before adds up in floating point. That takes longer than
