@@ -425,6 +425,20 @@ TEST(Warnings, AreOfWhatIsHardlyMeant) {
   expect_mentions(found[3], {"specialization of \"h", "does not depend on the call"});
 }
 
+TEST(Warnings, NameBoundsOfWhatIsInlined) {
+  Func f("bounded"), g("g");
+  Var x("x");
+  f(x) = x;
+  f.bound(x, 0, 127);
+  g(x) = f(x * x);
+  g.bound(x, 0, 16);
+  const std::vector<std::string> found = warnings_of(Pipeline(g));
+  ASSERT_EQ(found.size(), 1u);
+  expect_mentions(found[0], {"bounds of \"x\" of \"bounded", "changes nothing", "is inlined"});
+  f.compute_root();
+  EXPECT_TRUE(warnings_of(Pipeline(g)).empty());
+}
+
 TEST(Warnings, NameARequirementThatNeverHolds) {
   Func f("f"), g("g");
   Var x("x");
