@@ -257,7 +257,7 @@ std::string body_of(const DeclaredFunction& function, const Target& target) {
                   at, "], ", is_written ? "true" : "false", ", ",
                   is_bfloat(argument) ? "true" : "false", ")) return nullptr;\n");
     if (!target.has_gpu_feature()) continue;
-    dirty += "  " + value + ".is_new_on_host();\n";
+    if (!is_written) dirty += "  " + value + ".is_new_on_host();\n";
     back += text("  if (const int code = ", value, ".back_to_host(", is_written ? "true" : "false",
                  "); code && !result) result = code;\n");
   }

@@ -137,6 +137,24 @@ class Modules(unittest.TestCase):
         module.negate(np.array([True, False]), out)
         self.assertEqual(list(out), [False, True])
 
+    def test_of_kernels(self):
+        image, f, xo, xi = rg.ImageParam("float32", 1, "image"), rg.Func("f"), rg.Var("xo"), rg.Var("xi")
+        f[x] = image[x] + 1
+        f.gpu_tile(x, xo, xi, 16)
+        # Kernels for the simulated device, which the module finds at run time.
+        library = os.path.join(os.environ["RETROGRADE_BUILD_DIR"], "libretrograde_simt.so")
+        os.environ.update(RETROGRADE_GPU="simulated", RETROGRADE_SIMT_LIBRARY=library)
+        module = built("kernels", write(f, [image], "on_device", rg.Target.Feature.CUDA),
+                       "-DHALIDE_PYTHON_EXTENSION_MODULE_NAME=kernels")
+        image, out = np.arange(40, dtype=np.float32), np.zeros(40, np.float32)
+        for array in (image, image[::-1].copy()):
+            module.on_device(array, out)
+            np.testing.assert_array_equal(out, array + 1)
+        part = rg.Buffer(np.zeros(20, np.float32))
+        part.set_min([7])
+        module.on_device(rg.Buffer(image), part)
+        np.testing.assert_array_equal(np.asarray(part), image[7:27] + 1)
+
     def test_scalars_that_python_has_not(self):
         f, half = rg.Func("f"), rg.Param("float16", "half")
         f[x] = half
