@@ -532,6 +532,8 @@ Interval BoundsEngine::bounds_by_rule(const Call& call) {
       return interval_shift(call.op, type, arg(0), arg(1));
     case Op::lerp:
       return type.is_float() ? Interval::everything() : hull(arg(0), arg(1));
+    case Op::fma:
+      return interval_fma(arg(0), arg(1), arg(2));
     case Op::saturating_cast: {
       Interval v = arg(0), range = type_range(type);
       Type from = call.args[0].type();

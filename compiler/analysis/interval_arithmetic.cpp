@@ -180,6 +180,27 @@ Interval interval_mul(Type type, const Interval& a, const Interval& b) {
   return hull(scaled(Kind::Mul, a, b.min), scaled(Kind::Mul, a, b.max));
 }
 
+// Rounded once, and so monotone in the product and in c: extreme at corners of a and b.
+Interval interval_fma(const Interval& a, const Interval& b, const Interval& c) {
+  if (!a.is_bounded() || !b.is_bounded() || !c.is_bounded()) return Interval::everything();
+  const auto ends = [](const Interval& v) {
+    return v.is_point() ? std::vector<Expr>{v.min} : std::vector<Expr>{v.min, v.max};
+  };
+  Interval result;
+  for (const Expr& x : ends(a)) {
+    for (const Expr& y : ends(b)) {
+      Expr low = call_op(Op::fma, {x, y, c.min}), high = call_op(Op::fma, {x, y, c.max});
+      for (const Expr& corner : {low, high}) {
+        const auto number = as_const_float(corner);
+        if (number && !std::isfinite(*number)) return Interval::everything();
+      }
+      result.min = result.min.defined() ? canonical_min(result.min, low) : low;
+      result.max = result.max.defined() ? canonical_max(result.max, high) : high;
+    }
+  }
+  return result;
+}
+
 Interval interval_div(Type type, const Interval& a, const Interval& b) {
   if (type.is_float()) {
     auto divisor = float_ends(b);

@@ -20,6 +20,7 @@ bool is_nonnegative(const Interval& v);  // certainly
 Interval interval_add(Type type, const Interval& a, const Interval& b);
 Interval interval_sub(Type type, const Interval& a, const Interval& b);
 Interval interval_mul(Type type, const Interval& a, const Interval& b);
+Interval interval_fma(const Interval& a, const Interval& b, const Interval& c);
 Interval interval_div(Type type, const Interval& a, const Interval& b);
 Interval interval_mod(Type type, const Interval& a, const Interval& b);
 Interval interval_min(const Interval& a, const Interval& b);

@@ -11,6 +11,7 @@
 #include "aot/mangle.h"
 #include "aot/merge_objects.h"
 #include "aot/program.h"
+#include "aot/python_extension.h"
 #include "aot/pytorch_wrapper.h"
 #include "aot/runtime_object.h"
 #include "autoschedule/choose_schedule.h"
@@ -44,7 +45,6 @@ void check_type(OutputFileType type, const std::string& module) {
                             " of the module " + quoted(module);
   switch (type) {
     case OutputFileType::c_source:
-    case OutputFileType::python_extension:
     case OutputFileType::featurization:
     case OutputFileType::compiler_log:
       unsupported(asked,
@@ -149,6 +149,9 @@ class Outputs {
                                        declared_functions(module_));
       case OutputFileType::registration:
         return aot::registration_text(declared_functions(module_), module_.target());
+      case OutputFileType::python_extension:
+        return aot::python_extension_text(module_.name(), module_.target(),
+                                          declared_functions(module_));
       case OutputFileType::pytorch_wrapper:
         return aot::pytorch_wrapper_text(module_.name(), module_.target(),
                                          declared_functions(module_));
@@ -251,6 +254,8 @@ class MultitargetOutputs {
       return aot::function_info_text(name_, baseline().target(), functions);
     if (type == OutputFileType::registration)
       return aot::registration_text(functions, baseline().target());
+    if (type == OutputFileType::python_extension)
+      return aot::python_extension_text(name_, baseline().target(), functions);
     if (type == OutputFileType::pytorch_wrapper)
       return aot::pytorch_wrapper_text(name_, baseline().target(), functions);
     RETROGRADE_ASSERT(type == OutputFileType::static_library, "an output without a writer");
@@ -316,6 +321,12 @@ class AheadOfTime : public ModuleCompiler {
     std::vector<aot::File> files;
     for (const auto& [type, path] : output_files) {
       const bool is_library = type == OutputFileType::static_library;
+      if (type == OutputFileType::python_extension) {
+        const std::string file = path.substr(path.rfind('/') + 1);
+        files.push_back(
+            {path, aot::python_extension_text(file.substr(0, file.find('.')), target, {})});
+        continue;
+      }
       files.push_back(
           {path, is_library ? codegen::archive({{"retrograde_runtime.o", object}}) : object});
     }

@@ -256,6 +256,8 @@ class Complexifier {
       case Op::lerp:
         if (!x[2].im.defined()) break;
         return x[0] + (x[1] - x[0]) * x[2];
+      case Op::fma:
+        return x[0] * x[1] + x[2];
       case Op::strong_mul:
         return chosen(x[0].re == zero() && x[0].im == zero(), real(zero()), x[0] * x[1]);
       case Op::strong_div:

@@ -151,6 +151,38 @@ Value* strong(Emitter& e, llvm::Instruction::BinaryOps op, Type type, Value* adj
   return convert(e, type, wide, e.b.CreateSelect(is_zero, float_constant(a, 0.0), result));
 }
 
+// ---- fma ----
+
+// ir/operators.cpp in vectors: a sum in double that remembers in its last bit what was cut off.
+Value* sum_rounded_to_odd(Emitter& e, Value* product, Value* c) {
+  Value* sum = e.b.CreateFAdd(product, c);
+  Value* taken = e.b.CreateFSub(sum, product);
+  Value* lost =
+      e.b.CreateFAdd(e.b.CreateFSub(product, e.b.CreateFSub(sum, taken)), e.b.CreateFSub(c, taken));
+  Value* zero = float_constant(sum, 0.0);
+  Value* bits = bits_as_integer(e, sum);
+  Value* is_even =
+      e.b.CreateICmpEQ(e.b.CreateAnd(bits, int_constant(bits, 1)), int_constant(bits, 0));
+  Value* is_inexact = e.b.CreateFCmpONE(lost, zero);
+  Value* is_outwards =
+      e.b.CreateICmpEQ(e.b.CreateFCmpOGT(lost, zero), e.b.CreateFCmpOGT(sum, zero));
+  Value* step = e.b.CreateSelect(is_outwards, int_constant(bits, 1), int_constant(bits, -1));
+  Value* odd = bits_as_float(e, e.b.CreateAdd(bits, step));
+  return e.b.CreateSelect(e.b.CreateAnd(is_inexact, is_even), odd, sum);
+}
+
+// Where the processor has no instruction for it, or none of the width, in double: a product of
+// narrower numbers is exact there.
+Value* fused(Emitter& e, Type type, Value* a, Value* b, Value* c) {
+  if (type.bits() == 64 || (type == Float(32, type.lanes()) && e.machine.has_fma()))
+    return e.b.CreateIntrinsic(llvm::Intrinsic::fma, {a->getType()}, {a, b, c});
+  const Contraction off(e, false);
+  const Type wide = Float(64, type.lanes());
+  const auto widened = [&](Value* v) { return convert(e, wide, type, v); };
+  return convert(e, type, wide,
+                 sum_rounded_to_odd(e, e.b.CreateFMul(widened(a), widened(b)), widened(c)));
+}
+
 }  // namespace
 
 Value* simple_operator(Emitter& e, Op op, Type result, const std::vector<Type>& types,
@@ -176,6 +208,8 @@ Value* simple_operator(Emitter& e, Op op, Type result, const std::vector<Type>& 
       return absolute_difference(e, type, arg(0), arg(1));
     case Op::lerp:
       return lerp(e, type, types.at(2), arg(0), arg(1), arg(2));
+    case Op::fma:
+      return fused(e, type, arg(0), arg(1), arg(2));
     case Op::floor:
       return by_intrinsic(e, llvm::Intrinsic::floor, type, arg(0));
     case Op::ceil:

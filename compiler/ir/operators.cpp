@@ -91,6 +91,25 @@ Scalar interpolate(const Scalar& a, const Scalar& b, const Scalar& weight, Type 
   return lerp_integers(a, b, fixed_point_weight(weight, a.type));
 }
 
+// ---- fma ----
+
+// Of numbers whose product is exact in double. A sum that double has to round keeps that something
+// was cut off in its last bit, so that rounding it to a type of half as many digits rounds the
+// exact sum (Boldo and Melquiond, 2008).
+double sum_rounded_to_odd(double product, double c) {
+  const double sum = product + c;
+  const double taken = sum - product;
+  const double lost = (product - (sum - taken)) + (c - taken);
+  const auto bits = std::bit_cast<int64_t>(sum);
+  if (!(lost < 0 || lost > 0) || bits % 2 != 0) return sum;
+  return std::bit_cast<double>(bits + ((lost > 0) == (sum > 0) ? 1 : -1));
+}
+
+Scalar multiplied_and_added(const Scalar& a, const Scalar& b, const Scalar& c, Type type) {
+  if (type.bits() == 64) return Scalar::of_float(type, std::fma(a.f, b.f, c.f));
+  return Scalar::of_float(type, sum_rounded_to_odd(a.f * b.f, c.f));
+}
+
 // ---- others ----
 
 Scalar saturated(Type type, const Scalar& a) {

@@ -82,8 +82,10 @@ Stmt nest_loops(Lowering& lowering, const Stmt&) {
   lowering.folds = nests.folds;
   lowering.async_room = nests.async_room;
   inject_tracing(nests, lowering.program, lowering.name, lowering.options.target);
-  UniqueNames unique = make_names_unique(add_argument_checks(
-      nests, lowering.args, lowering.program, lowering.options.target.has_feature(Target::CUDA)));
+  UniqueNames unique =
+      make_names_unique(add_argument_checks(nests, lowering.args, lowering.program,
+                                            lowering.options.target.has_feature(Target::CUDA)),
+                        mapped(lowering.args, &LoweredArgument::name));
   lowering.program.renamed = std::move(unique.original);
   return unique.stmt;
 }

@@ -241,6 +241,11 @@ void bind_facts(Class<Buffer<>>& c) {
       .def("set_device_dirty", &Buffer<>::set_device_dirty, py::arg("dirty") = true)
       .def("has_device_allocation", &Buffer<>::has_device_allocation)
       .def("copy_to_host", [](Buffer<>& b) { return b.copy_to_host(); })
+      // What extension modules take in place of an array: compiler/aot/python_extension.h.
+      .def("_get_raw_halide_buffer_t",
+           [](Buffer<>& b) {
+             return reinterpret_cast<uintptr_t>(b.defined() ? b.raw_buffer() : nullptr);
+           })
       .def("device_sync", [](Buffer<>& b) { return b.device_sync(); })
       .def("device_free", [](Buffer<>& b) { return b.device_free(); })
       .def("copy_to_device", [](Buffer<>& b) { return b.copy_to_device(); });

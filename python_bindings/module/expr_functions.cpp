@@ -161,6 +161,13 @@ void bind_arithmetic(py::module_& m) {
         return lerp(ends[0], ends[1], w);
       },
       arg("zero"), arg("one"), arg("weight"));
+  def(
+      m, "fma",
+      [](const py::object& a, const py::object& b, const py::object& c) {
+        const std::vector<Expr> all = operands({a, b, c});
+        return fma(all[0], all[1], all[2]);
+      },
+      arg("a"), arg("b"), arg("c"));
   binary(m, "div_round_to_zero", &div_round_to_zero, "a", "b");
   binary(m, "mod_round_to_zero", &mod_round_to_zero, "a", "b");
   unary(m, "popcount", &popcount);

@@ -6,7 +6,9 @@
 #include "binding.h"
 #include "c_address.h"
 #include "callback.h"
+#include "frontend/run/warnings.h"
 #include "func_class.h"
+#include "numbers.h"
 #include "runnable.h"
 
 namespace retrograde::python {
@@ -65,10 +67,26 @@ void bind_class(py::module_& m) {
       });
 }
 
+// For the package `halide` (retrograde/compat), which sends prints and warnings where Halide's does.
+void bind_defaults(py::module_& m) {
+  m.def("_set_default_print", [](const std::optional<py::function>& print) {
+    JITHandlers handlers = frontend::default_handlers();
+    handlers.print = printer_of(print);
+    frontend::set_default_handlers(handlers);
+  });
+  m.def("_warn_of_rounding", &warn_of_rounding);
+  m.def("_set_warning_handler", [](const std::optional<py::function>& tell) {
+    const std::function<void(const char*)> told = printer_of(tell);
+    set_warning_handler(told ? [told](const std::string& text) { told(text.c_str()); }
+                             : WarningHandler());
+  });
+}
+
 }  // namespace
 
 void bind_handlers(py::module_& m) {
   bind_class(m);
+  bind_defaults(m);
   constexpr auto inside = py::return_value_policy::reference_internal;
   reopened<Func>(m, "Func", {"Pipeline"}).def("jit_handlers", &Func::jit_handlers, inside);
   reopened<Pipeline>(m, "Pipeline", {}).def("jit_handlers", &Pipeline::jit_handlers, inside);

@@ -2,6 +2,7 @@
 #include "numbers.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "casters.h"
 #include "ir/build.h"
@@ -58,15 +59,27 @@ std::optional<Expr> numpy_constant(py::handle object) {
   return ir::to_expr(scalar_of(*type, object.attr("item")()));
 }
 
+bool warns_of_rounding = false;
+
+Expr rounded_constant(py::handle number, Type type) {
+  const double value = PyFloat_AS_DOUBLE(number.ptr());
+  const bool is_held = !std::isfinite(value) || ir::round_to_type(type, value) == value;
+  if (warns_of_rounding && !is_held) {
+    const std::string message = std::string(py::repr(number)) + " is rounded to " +
+                                to_string(type) + ": f64() keeps its digits";
+    if (PyErr_WarnEx(PyExc_RuntimeWarning, message.c_str(), 1) < 0) throw py::error_already_set();
+  }
+  return ir::make_const(type, value);
+}
+
 // A plain number in the type of an operand beside it; as it is where it does not fit.
 Expr beside(Type type, py::handle number) {
   if (PyFloat_Check(number.ptr())) {
     const double value = PyFloat_AS_DOUBLE(number.ptr());
     if (type.is_float() && (type.can_represent(value) || value != value)) {
-      return ir::make_const(type.element_of(), value);
+      return rounded_constant(number, type.element_of());
     }
-    return type.is_float() && type.bits() < 32 ? ir::make_const(Float(32), value)
-                                               : *number_from(number);
+    return rounded_constant(number, Float(32));
   }
   const Integer value = integer_of(number);
   const bool fits =
@@ -108,12 +121,14 @@ bool is_plain_number(py::handle object) {
   return PyFloat_Check(object.ptr()) && !is_numpy_scalar(object);  // np.float64 is a float
 }
 
+void warn_of_rounding(bool warns) { warns_of_rounding = warns; }
+
 std::optional<Expr> number_from(py::handle object) {
   if (PyBool_Check(object.ptr())) return Expr(object.ptr() == Py_True);
   if (PyLong_Check(object.ptr())) return integer_constant(object);
   if (is_numpy_scalar(object)) return numpy_constant(object);
   if (PyFloat_Check(object.ptr())) {
-    return Expr(static_cast<float>(PyFloat_AS_DOUBLE(object.ptr())));
+    return rounded_constant(object, Float(32));
   }
   return {};
 }

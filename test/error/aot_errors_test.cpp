@@ -136,6 +136,17 @@ TEST_F(AotErrors, WrappersForPyTorchOfWhatItHasNot) {
   EXPECT_TRUE(is_empty());
 }
 
+TEST_F(AotErrors, PythonModulesOfScalarsThatPythonHasNot) {
+  Param<float16_t> half("half");
+  Func wide("wide");
+  wide(x) = half;
+  expect_error<Unsupported>(
+      {"Python has numbers for the scalars", "\"half\" is of type float16"}, [&] {
+        wide.compile_to({{OutputFileType::python_extension, path("a")}}, {half}, "a", host);
+      });
+  EXPECT_TRUE(is_empty());
+}
+
 TEST_F(AotErrors, OutputsThatOnlyGeneratorsHave) {
   expect_error<Unsupported>({"cpp_stub", "only generators"}, [&] {
     f.compile_to({{OutputFileType::cpp_stub, path("a")}}, {in, gain}, "a", host);

@@ -52,6 +52,12 @@ TEST(ExpressionErrors, LerpOfDifferentTypes) {
   expect_error({"weight"}, [&] { lerp(cast<float>(x), cast<float>(x), x); });
 }
 
+TEST(ExpressionErrors, FmaOfIntegers) {
+  Var x;
+  expect_error({"fma", "it takes floats", "int32"}, [&] { fma(x, x, 1); });
+  expect_error({"fma", "must be a defined expression"}, [&] { fma(1.0f, Expr(), 1.0f); });
+}
+
 TEST(ExpressionErrors, FastFunctionsOfDoubles) {
   expect_error({"fast_exp", "float32"}, [] { fast_exp(Expr(1.0)); });
 }

@@ -149,6 +149,7 @@ TEST(DerivativeRules, SmoothOperatorsAgreeWithCentralDifferences) {
       {Op::abs, {{{"x", 0.7}}, {{"x", -1.3}}}},
       {Op::absd, {{{"x", 0.7}, {"y", 1.5}}, {{"x", 2.0}, {"y", 0.5}}}},
       {Op::lerp, {{{"x", 0.7}, {"y", 1.5}, {"w", 0.3}}}},
+      {Op::fma, {{{"x", 0.7}, {"y", 1.5}, {"w", -0.3}}}},
       {Op::sqrt, {{{"x", 0.4}}, {{"x", 9.0}}}},
       {Op::exp, {{{"x", -1.2}}, {{"x", 2.0}}}},
       {Op::log, {{{"x", 0.4}}, {{"x", 7.0}}}},

@@ -126,6 +126,10 @@ const std::vector<Row>& rows() {
          [](const Operands& o) {
            return std::vector<Real>{1 - o.w, o.w, o.y - o.x};
          }),
+      of(Op::fma, 0,
+         [](const Operands& o) {
+           return std::vector<Real>{o.y, o.x, 1};
+         }),
       {"add", 2, [](const std::vector<Expr>& a) { return a[0] + a[1]; },
        [](const Operands&) {
          return std::vector<Real>{1, 1};

@@ -61,6 +61,7 @@ const std::vector<Operation>& operations() {
       of(Op::abs, on_axis({0.7, -1.3})),
       of(Op::absd, {{0.7, 1.5}, {2.0, 0.5}}),
       of(Op::lerp, {{0.7, 1.5, 0.3}, {-2.0, 0.5, 0.75}}),
+      of(Op::fma, {{0.7, 1.5, 0.3}, {-2.0, 0.5, 0.75}}),
       of(Op::sqrt, on_axis({0.4, 9})),
       of(Op::exp, on_axis({-1.2, 2})),
       of(Op::log, on_axis({0.4, 7})),

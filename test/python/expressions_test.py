@@ -174,6 +174,8 @@ class Functions(unittest.TestCase):
         self.assertAlmostEqual(value(rg.atan2(rg.Expr(np.float64(1)), 2)), math.atan2(1, 2), delta=1e-15)
         self.assertAlmostEqual(value(rg.hypot(rg.Expr(np.float64(3)), 4)), 5, delta=1e-14)
         self.assertEqual(value(rg.fract(rg.Expr(2.5))), 0.5)
+        near_one = 1 + 2.0**-30
+        self.assertEqual(value(rg.fma(rg.Expr(np.float64(near_one)), near_one, -1)), 2.0**-29 + 2.0**-60)
         self.assertEqual(value(rg.round(rg.Expr(2.5))), 2)
 
     def test_fast_ones_are_close(self):

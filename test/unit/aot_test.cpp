@@ -189,6 +189,20 @@ TEST_F(AotFiles, WrapperForPyTorchTakesTensorsAndNumbers) {
   EXPECT_TRUE(has(text, "(Tensor in, float gain) -> Tensor"));
 }
 
+// What it does with arrays: test/python/python_extension_test.py.
+TEST_F(AotFiles, PythonModuleDeclaresWhatItCalls) {
+  out.compile_to({{OutputFileType::python_extension, path("a.py.cpp")}}, {in, gain}, "brighter");
+  const std::string text = read_file(path("a.py.cpp"));
+  EXPECT_TRUE(has(text, "int brighter(struct halide_buffer_t *_in_buffer, float _gain,")) << text;
+  EXPECT_TRUE(has(text, "names[] = {\"in\", \"gain\", "));
+  EXPECT_TRUE(has(text, "#define HALIDE_PYTHON_EXTENSION_FUNCTIONS X(brighter)"));
+  compile_standalone_runtime({{OutputFileType::python_extension, path("both.py.cpp")}},
+                             Target("host"));
+  EXPECT_EQ(files(), (std::vector<std::string>{"a.py.cpp", "both.py.cpp"}));
+  EXPECT_TRUE(
+      has(read_file(path("both.py.cpp")), "#define HALIDE_PYTHON_EXTENSION_MODULE_NAME both"));
+}
+
 TEST_F(AotFiles, SeveralTargetsAsObjects) {
   const Target base("x86-64-linux-no_runtime");
   out.compile_to_multitarget_object_files(

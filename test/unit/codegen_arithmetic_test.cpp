@@ -329,6 +329,25 @@ TEST(CodegenArithmetic, IntegerOperators) {
   }
 }
 
+// Products that lie between two numbers or cancel with what is added, and additions that are far
+// smaller than what double keeps of the product.
+Operands near_ties(Type type) {
+  Operands operands;
+  for (int k = 0; k < 3; ++k) operands.push_back(std::make_unique<Array>(type, count));
+  const int digits = type.is_bfloat() ? 8 : type.bits() == 16 ? 11 : type.bits() == 32 ? 24 : 53;
+  std::mt19937 random(7);
+  const auto number = [&] {
+    return 1 + std::ldexp(random() % 8, 1 - digits) + (random() % 4) / 4.0;
+  };
+  for (size_t i = 0; i < count; ++i) {
+    const Scalar a = Scalar::of_float(type, number()), b = Scalar::of_float(type, number());
+    const double tiny = std::ldexp(i % 2 ? 1.0 : -1.0, type == Float(16) ? -24 : -110);
+    const Scalar c = Scalar::of_float(type, i % 4 < 2 ? tiny : -a.f * b.f);
+    operands[0]->set(i, a), operands[1]->set(i, b), operands[2]->set(i, c);
+  }
+  return operands;
+}
+
 TEST(CodegenArithmetic, FloatOperators) {
   std::vector<Target> targets = older_targets();
   targets.push_back(test_target());
@@ -346,6 +365,8 @@ TEST(CodegenArithmetic, FloatOperators) {
               {operator_case(Op::absd, type, lanes), operator_case(Op::strong_mul, type, lanes),
                operator_case(Op::strong_div, type, lanes)},
               target);
+        check({type, type, type}, lanes, {operator_case(Op::fma, type, lanes)}, target);
+        check(near_ties(type), lanes, {operator_case(Op::fma, type, lanes)}, target);
       }
     }
   }

@@ -28,6 +28,20 @@ struct Addition {
 
 namespace {
 
+TEST(Fma, RoundsOnceWhateverMayContract) {
+  Var x("x");
+  const float e = 0x1p-12f;
+  Buffer<float> a(3);
+  a(0) = 1 + e, a(1) = 1 - e, a(2) = 3;
+  for (const bool strict : {false, true}) {
+    Func f("f");
+    Expr value = fma(a(x), a(x), -1);
+    f(x) = strict ? strict_float(value) : value;
+    const Buffer<float> found = f.realize({3});
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(found(i), std::fma(a(i), a(i), -1.0f)) << i << strict;
+  }
+}
+
 TEST(HalideHeader, BringsWhatProgramsRelyOn) {
   std::mt19937 random(1);
   std::vector<float> values = {std::sqrt(4.0f), static_cast<float>(random() % 2)};
@@ -409,6 +423,20 @@ TEST(Warnings, AreOfWhatIsHardlyMeant) {
   expect_mentions(found[1], {"atomic()", "changes nothing"});
   expect_mentions(found[2], {"never runs", "is 0"});
   expect_mentions(found[3], {"specialization of \"h", "does not depend on the call"});
+}
+
+TEST(Warnings, NameBoundsOfWhatIsInlined) {
+  Func f("bounded"), g("g");
+  Var x("x");
+  f(x) = x;
+  f.bound(x, 0, 127);
+  g(x) = f(x * x);
+  g.bound(x, 0, 16);
+  const std::vector<std::string> found = warnings_of(Pipeline(g));
+  ASSERT_EQ(found.size(), 1u);
+  expect_mentions(found[0], {"bounds of \"x\" of \"bounded", "changes nothing", "is inlined"});
+  f.compute_root();
+  EXPECT_TRUE(warnings_of(Pipeline(g)).empty());
 }
 
 TEST(Warnings, NameARequirementThatNeverHolds) {

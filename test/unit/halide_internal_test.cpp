@@ -380,14 +380,15 @@ TEST(EagerInline, TakesWhatHasNoScheduleOfItsOwn) {
   expect_error({"what is inlined has no schedule of its own"}, [&] { h.eager_inline(g); });
 }
 
-TEST(NewDirectives, ThatAreNotThereAreRefusedByName) {
+TEST(NewDirectives, StreamingIsAHintThatChangesNoValue) {
   Var x("x");
-  Func f("streamed");
-  f(x) = x;
-  expect_error<retrograde::Unsupported>({"stream the stores", "go through the caches"},
-                                        [&] { f.stream_stores(); });
-  expect_error<retrograde::Unsupported>({"stream the loads", "\"streamed\""},
-                                        [&] { f.stream_loads({f}); });
+  Func table("table"), f("streamed");
+  table(x) = x * x;
+  table.compute_root();
+  f(x) = table(x) + 1;
+  f.vectorize(x, 8).stream_stores().stream_loads({table});
+  const Buffer<int> found = f.realize({19});
+  for (int i = 0; i < 19; ++i) EXPECT_EQ(found(i), i * i + 1);
 }
 
 TEST(Tuples, OfSeveralChoices) {

@@ -101,6 +101,17 @@ TEST_F(IntervalTest, ClampBoundsTheUnbounded) {
             "[0, 7]");
 }
 
+// The ends are rounded as the value is: 4097 * 4097 - 16785408 is 1, of rounded products 0.
+TEST_F(IntervalTest, FmaLiesBetweenItsCorners) {
+  Expr whole = cast(Float(32), i);  // 0 to 7
+  EXPECT_EQ(bounds(cast(Int(32), call_op(Op::fma, {whole, Expr(-2.0f), Expr(3.0f)}))), "[-11, 3]");
+  EXPECT_EQ(bounds(cast(Int(32), call_op(Op::fma, {whole, whole - 2.0f, whole}))), "[-14, 42]");
+  Expr large = clamp(whole, 4097.0f, 4097.0f);
+  EXPECT_EQ(bounds(cast(Int(32), call_op(Op::fma, {large, large, Expr(-16785408.0f)}))), "[1, 1]");
+  Expr loaded = call_image("in", Float(32), {x}, {});
+  EXPECT_EQ(bounds(cast(Int(32), call_op(Op::fma, {loaded, whole, whole}))), "[?, ?]");
+}
+
 TEST_F(IntervalTest, AValueThatMayBeNaNHasNoBounds) {
   Expr loaded = call_image("in", Float(32), {x}, {});
   EXPECT_EQ(bounds(cast(Int(32), loaded)), "[?, ?]");

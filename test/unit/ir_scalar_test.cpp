@@ -136,6 +136,24 @@ TEST(Operator, RoundGoesToEvenOnTies) {
   EXPECT_EQ(run(Op::round, {f32(-2.5)}, Float(32)).f, -2);
 }
 
+TEST(Operator, FmaRoundsOnce) {
+  const double e = std::ldexp(1.0, -12);
+  EXPECT_EQ(run(Op::fma, {f32(1 + e), f32(1 + e), f32(-(1 + 2 * e))}, Float(32)).f, e * e);
+  const auto f64 = [](double v) { return Scalar::of_float(Float(64), v); };
+  EXPECT_EQ(run(Op::fma, {f64(1 + e * e * e), f64(1 + e * e * e), f64(-1)}, Float(64)).f,
+            2 * e * e * e + std::ldexp(1.0, -72));
+  // The product lies halfway between two numbers; what is added is too small for double, and decides.
+  const auto bf16 = [](double v) { return Scalar::of_float(BFloat(16), v); };
+  const double tiny = std::ldexp(1.0, -100);
+  EXPECT_EQ(run(Op::fma, {bf16(9), bf16(29 / 256.0), bf16(tiny)}, BFloat(16)).f, 131 / 128.0);
+  EXPECT_EQ(run(Op::fma, {bf16(7), bf16(37 / 256.0), bf16(-tiny)}, BFloat(16)).f, 129 / 128.0);
+  EXPECT_EQ(run(Op::fma, {f32(4097), f32(4097 * 1024.0), f32(tiny)}, Float(32)).f,
+            static_cast<double>(std::fma(4097.0f, 4097 * 1024.0f, static_cast<float>(tiny))));
+  EXPECT_TRUE(std::isnan(run(Op::fma, {f32(INFINITY), f32(0), f32(1)}, Float(32)).f));
+  EXPECT_EQ(run(Op::fma, {f32(INFINITY), f32(1), f32(1)}, Float(32)).f, INFINITY);
+  EXPECT_TRUE(std::signbit(run(Op::fma, {f32(-1), f32(0), f32(-0.0)}, Float(32)).f));
+}
+
 TEST(Operator, LerpOfIntegersIsExactlyRounded) {
   for (int w = 0; w < 256; ++w) {
     for (int b : {0, 69, 255}) {

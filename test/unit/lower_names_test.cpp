@@ -24,6 +24,22 @@ TEST(MakeNamesUnique, RenamesAllButTheFirstBinding) {
   EXPECT_EQ(unique.original.at("f.$1"), "f");
 }
 
+TEST(MakeNamesUnique, LeavesNamesOfArgumentsToThem) {
+  Stmt s = ir::parse_stmt("{ let code = 3 assert((code == 0), code) } out(0) = {code:int32}");
+  const std::string text = ir::print(lower::make_names_unique(s, {"code"}).stmt);
+  expect_mentions(text, {"let code.$1 = 3", "assert((code.$1 == 0), code.$1)", "out(0) = {code}"});
+}
+
+// The checks of arguments have a name of their own for what they give.
+TEST(MakeNamesUnique, AParameterMayBeCalledCode) {
+  Param<int> code("code", 113);
+  Var x("x");
+  Func f("f");
+  f(x) = code + x;
+  const Buffer<int> found = f.realize({3});
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(found(i), 113 + i);
+}
+
 // Reduced by the fuzzer: f is computed innermost both in g and in the sum that g reads.
 TEST(MakeNamesUnique, AnUpdateThatIsComputedInTwoStagesAtOnce) {
   Var x("x"), y("y");

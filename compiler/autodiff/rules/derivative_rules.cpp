@@ -54,6 +54,9 @@ Partials absd_partials(Args a, const Expr&) {
 Partials lerp_partials(Args a, const Expr&) {
   return {plain(num(a[2], 1) - a[2]), plain(a[2]), plain(a[1] - a[0])};
 }
+Partials fma_partials(Args a, const Expr&) {
+  return {plain(a[1]), plain(a[0]), plain(make_one(a[2].type()))};
+}
 Partials sqrt_partials(Args a, const Expr& v) { return {quotient(num(a[0], 0.5), v)}; }
 Partials exp_partials(Args, const Expr& v) { return {strong(v)}; }
 Partials log_partials(Args a, const Expr&) { return {quotient(num(a[0], 1), a[0])}; }
@@ -201,6 +204,8 @@ OpTable smooth_operators() {
       {Op::lerp,
        smooth(lerp_partials, "everywhere", "floating weights; integer weights are constants",
               "1 - w, w, y - x", "infinite or NaN, as the value", 1, "definition")},
+      {Op::fma, smooth(fma_partials, "everywhere", "as a product and a sum", "y, x, 1",
+                       "as a product and a sum", 0)},
       {Op::sqrt,
        smooth(sqrt_partials, "x > 0", "+inf at 0 (-inf at -0), times a strong zero; NaN below 0",
               "1 / (2 v)", "0 at +inf", 2)},

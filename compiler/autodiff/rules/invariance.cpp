@@ -138,6 +138,8 @@ Response of_operator(const Call& call, const std::vector<Response>& a) {
       return power(a[0], 1);
     case Op::hypot:
       return joined(power(a[0], 1), power(a[1], 1));
+    case Op::fma:
+      return sum(product(a[0], a[1], 1), a[2], 1);
     case Op::if_then_else:
       return joined(a[1], a[2]);
     case Op::strong_mul:

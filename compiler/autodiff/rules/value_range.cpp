@@ -105,6 +105,8 @@ ValueRange of_operator(Op op, const std::vector<ValueRange>& a, bool infinite) {
       return root(sum(square(a[0]), square(a[1])));
     case Op::pow:
       return power(a[0], a[1]);
+    case Op::fma:
+      return sum(product(a[0], a[1]), a[2]);
     case Op::strong_mul:
       return product(joined(a[0], constant(0)), a[1]);
     case Op::strong_div:

@@ -82,7 +82,7 @@ using ::retrograde::fast_integer_divide; using ::retrograde::fast_integer_divide
 using ::retrograde::fast_integer_modulo; using ::retrograde::fast_inverse;
 using ::retrograde::fast_inverse_sqrt; using ::retrograde::fast_log; using ::retrograde::fast_pow;
 using ::retrograde::fast_sin; using ::retrograde::Float; using ::retrograde::float16_t;
-using ::retrograde::floor; using ::retrograde::fract; using ::retrograde::Func;
+using ::retrograde::floor; using ::retrograde::fma; using ::retrograde::fract; using ::retrograde::Func;
 using ::retrograde::FuncRef; using ::retrograde::FuncTupleElementRef; using ::retrograde::gather;
 using ::retrograde::Generator; using ::retrograde::GeneratorContext;
 using ::retrograde::GeneratorInput; using ::retrograde::GeneratorOutput;

@@ -272,6 +272,19 @@ Expr lerp(Expr zero, Expr one, Expr weight) {
   return call_op(Op::lerp, type, {zero, one, weight});
 }
 
+Expr fma(Expr a, Expr b, Expr c) {
+  bool has_float = false;
+  for (const Expr& e : {a, b, c}) {
+    check_defined(e, "fma");
+    has_float |= e.type().is_float();
+  }
+  if (!has_float) type_error("fma", "it takes floats", a);
+  ir::match_types(a, b, "fma");
+  ir::match_types(b, c, "fma");
+  ir::match_types(a, b, "fma");  // to the type of c
+  return call_op(Op::fma, {a, b, c});
+}
+
 Expr div_round_to_zero(Expr a, Expr b) {
   match_integers(a, b, "div_round_to_zero");
   if (a.type().is_uint()) return a / b;

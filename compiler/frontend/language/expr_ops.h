@@ -142,6 +142,10 @@ requires(std::is_arithmetic_v<Zero>&& std::is_arithmetic_v<One>&& std::is_arithm
     lerp(Zero zero, One one, Weight weight) {
   return lerp(Expr(zero), Expr(one), Expr(weight));
 }
+// a * b + c, rounded once: the value of std::fma on every target, in code that may contract and in
+// strict_float. Slower than a product and a sum where the processor has no instruction for it.
+// Requires: it takes floats.
+Expr fma(Expr a, Expr b, Expr c);
 // Requires: it takes integers.
 Expr div_round_to_zero(Expr a, Expr b);  // as C++ does; x / 0 == 0
 Expr mod_round_to_zero(Expr a, Expr b);

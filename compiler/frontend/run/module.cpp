@@ -138,7 +138,8 @@ Module link_modules(const std::string& name, const std::vector<Module>& modules)
 std::map<OutputFileType, std::string> compile_standalone_runtime(
     const std::map<OutputFileType, std::string>& output_files, const Target& target) {
   std::map<OutputFileType, std::string> written;
-  for (OutputFileType type : {OutputFileType::object, OutputFileType::static_library}) {
+  for (OutputFileType type :
+       {OutputFileType::object, OutputFileType::static_library, OutputFileType::python_extension}) {
     const auto found = output_files.find(type);
     if (found != output_files.end()) written.insert(*found);
   }

@@ -31,7 +31,7 @@ enum class OutputFileType {
   function_info_header,  // name_argument_info(), the arguments as constants of C++17
   llvm_assembly,
   object,
-  python_extension,  // Unsupported
+  python_extension,  // C++ that makes a Python module of the functions; see aot/python_extension.h
   pytorch_wrapper,   // C++ that calls the functions on tensors; see aot/pytorch_wrapper.h
   registration,      // C++ that hands name_argv and name_metadata to the program
   schedule,          // Unsupported in Module::compile: generators write it
@@ -94,7 +94,8 @@ class Module {
   // code, LLVM's formats, statements and headers (Unsupported); only generators have stubs and
   // schedules (Unsupported); functions of a module and its submodules have different names; a
   // module and its submodules are made for one target (Unsupported); what PyTorch calls has tensors
-  // and numbers that PyTorch has (Unsupported); what PyTorch calls has a name of C (Unsupported).
+  // and numbers that PyTorch has (Unsupported); what PyTorch calls has a name of C
+  // (Unsupported); Python has numbers for the scalars (Unsupported).
   void compile(const std::map<OutputFileType, std::string>& output_files) const;
   // The object file.
   Buffer<uint8_t> compile_to_buffer() const;
@@ -112,7 +113,8 @@ class Module {
 // Requires: there must be at least one; all must be made for one target.
 Module link_modules(const std::string& name, const std::vector<Module>& modules);
 
-// The runtime as an object file, a static library, or both; returns what was written.
+// The runtime as an object file, a static library, or both; returns what was written. As a
+// python_extension: the definition of a Python module that has the functions of other files.
 // Requires: a runtime is there for this machine and for those that a cross compiler was found for
 // when the compiler was built (Unsupported).
 void compile_standalone_runtime(const std::string& object_filename, const Target& target);

@@ -8,6 +8,7 @@
 //   RDom r(0, 0)                           the update never runs
 //   f.specialize(true)                     a condition that no call decides
 //   require(1 > 2, ...)                    every call fails
+//   f.bound(x, 0, 9) of an inlined f       no loop runs over f's region
 //   a gradient without a schedule          the compiler chooses one
 //   float16 without f16c                   each conversion is a function of many instructions
 #include "frontend/run/warnings.h"
@@ -100,6 +101,18 @@ class Findings {
     add("performance note: " + quoted(f.name) + " converts float16 by software",
         "the target " + quoted(target.to_string()) + " has no f16c",
         "Add the feature f16c where the machine has it, or keep values in float32");
+  }
+
+  // Outputs are computed over what a call asks for, and what has updates in loops of its own.
+  void find_idle_bounds(const FuncContents& f) {
+    if (f.is_extern() || !f.updates.empty()) return;
+    if (f.schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined) return;
+    for (const graph::Bound& bound : f.schedule.bounds) {
+      add("what is said of the bounds of " + quoted(bound.var) + " of " + quoted(f.name) +
+              " changes nothing",
+          quoted(f.name) + " is inlined: it is computed at each point that its consumers read",
+          "Compute it in a loop or at root, or leave the bounds out");
+    }
   }
 
   void find_hidden(const FuncContents& f) {
@@ -202,6 +215,10 @@ std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs, bool w
   for (const FuncPtr& f : funcs) {
     findings.look_at(*f, with_hidden);
     findings.note_slow_floats(*f, target);
+  }
+  const bool may_be_placed = unscheduled_beside_adjoints(funcs) > 0;  // by the compiler
+  for (const FuncPtr& f : funcs) {
+    if (!may_be_placed && !std::ranges::count(outputs, f)) findings.find_idle_bounds(*f);
   }
   findings.note_default_schedule(funcs, *outputs[0]);
   return messages;

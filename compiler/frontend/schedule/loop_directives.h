@@ -37,7 +37,6 @@ PrefetchData prefetch_of(const SchedulePlace& place,
                          const std::shared_ptr<ParameterContents>& image, PrefetchData prefetch);
 void check_device(const SchedulePlace& place, const std::vector<VarOrRVar>& loops,
                   DeviceAPI device);
-[[noreturn]] void refuse_streaming(const SchedulePlace& place, const char* what);
 
 }  // namespace frontend
 
@@ -440,17 +439,11 @@ class LoopDirectives {
   Self& eager_inline(const Func& first, const Rest&... rest) {
     return eager_inline(std::vector<Func>{first, rest...});
   }
-  // Stores and loads that bypass the caches: not generated (Unsupported).
-  // Requires: stores and loads go through the caches (Unsupported).
-  Self& stream_stores() {
-    frontend::refuse_streaming(place(), "stores");
-    return self();
-  }
-  Self& stream_loads() {
-    frontend::refuse_streaming(place(), "loads");
-    return self();
-  }
-  Self& stream_loads(const std::vector<Func>&) { return stream_loads(); }
+  // Hints that what this stage stores, or loads (of these Funcs), is not used again soon. They change
+  // no value, and today no code either: all stores and loads go through the caches.
+  Self& stream_stores() { return hint(); }
+  Self& stream_loads() { return hint(); }
+  Self& stream_loads(const std::vector<Func>&) { return hint(); }
 
   void unscheduled() { give(graph::Unscheduled{}); }  // says that no directive was forgotten
   const graph::StageLoops& get_schedule() const { return place().schedule(); }
@@ -458,6 +451,10 @@ class LoopDirectives {
  private:
   Self& self() { return static_cast<Self&>(*this); }
   graph::SchedulePlace place() const { return static_cast<const Self&>(*this).loops(); }
+  Self& hint() {
+    place().schedule();  // is a stage that has loops
+    return self();
+  }
   Self& give(graph::Directive directive) {
     graph::give_directive(place(), std::move(directive));
     return self();

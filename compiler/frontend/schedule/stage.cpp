@@ -71,12 +71,6 @@ PrefetchData prefetch_of(const SchedulePlace& place,
 }
 
 // Directives for other devices are declared so that programs written for them build.
-void refuse_streaming(const SchedulePlace& place, const char* what) {
-  unsupported(text("stream the ", what, " of ", place.name()),
-              "stores and loads go through the caches", "no non-temporal ones are generated",
-              "Leave the directive out: it changes no value");
-}
-
 void check_device(const SchedulePlace& place, const std::vector<VarOrRVar>& loops,
                   DeviceAPI device) {
   if (device == DeviceAPI::Default_GPU || device == DeviceAPI::CUDA) return;

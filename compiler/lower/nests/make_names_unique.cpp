@@ -44,7 +44,8 @@ Expr with_uses_renamed(const Expr& root, const Renamings& renamings) {
 
 class Uniquifier {
  public:
-  explicit Uniquifier(const Stmt& s) : fresh_(s) {}
+  Uniquifier(const Stmt& s, const std::vector<std::string>& taken)
+      : fresh_(s), bound_(taken.begin(), taken.end()) {}
 
   Stmt rename(const Stmt& s) {
     return match(
@@ -107,8 +108,8 @@ class Uniquifier {
 
 }  // namespace
 
-UniqueNames make_names_unique(const Stmt& s) {
-  Uniquifier uniquifier(s);
+UniqueNames make_names_unique(const Stmt& s, const std::vector<std::string>& taken) {
+  Uniquifier uniquifier(s, taken);
   Stmt stmt = uniquifier.rename(s);
   return {stmt, std::move(uniquifier.original)};
 }

@@ -3,7 +3,8 @@
 // In:  Loops, as build_loop_nests makes it: a Func that is computed at several places binds its
 // names at each of them, nested
 //      places included. Names mean the innermost binding around them.
-// Out: the same program; every name is bound once. First bindings keep their names.
+// Out: the same program; every name is bound once. First bindings keep their names, unless an argument
+// has it.
 //
 //   produce g: realize f: ...                produce g: realize f: ...
 //   produce h: realize f: ...       =>       produce h: realize f.$1: ...
@@ -13,6 +14,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "ir/expr.h"
 
@@ -22,6 +24,7 @@ struct UniqueNames {
   Stmt stmt;
   std::map<std::string, std::string> original;  // of each Func that was renamed
 };
-UniqueNames make_names_unique(const Stmt& s);
+// `taken`: names that have a meaning in all of s, as arguments of its function do.
+UniqueNames make_names_unique(const Stmt& s, const std::vector<std::string>& taken = {});
 
 }  // namespace retrograde::lower
