@@ -1,6 +1,7 @@
 // callable.cpp -- Callable: a compiled pipeline as a function of its arguments and outputs.
 #include "frontend/run/callable.h"
 
+#include <algorithm>
 #include <chrono>
 
 #include "any_stride.h"
@@ -55,16 +56,21 @@ class Bound {
  public:
   using Compile = std::function<Callable()>;
   Bound(Compile compile, std::vector<Argument> args, std::vector<Parameter> parameters,
-        std::vector<Parameter> outputs)
+        std::vector<Parameter> outputs, const std::vector<std::string>& output_names)
       : compile_(std::move(compile)),
         args_(std::move(args)),
         parameters_(std::move(parameters)),
         outputs_(std::move(outputs)) {
     compile_again();
-    for (const Argument& arg : args_) counts_ |= arg.is_scalar() && !arg.type.is_float();
+    for (const Argument& arg : args_) {
+      counts_ |= arg.is_scalar() && !arg.type.is_float();
+      names_.push_back(given_name(arg.name));
+    }
+    for (const std::string& name : output_names) names_.push_back(given_name(name));
   }
 
-  void call(const py::args& given) {
+  void call(const py::args& positional, const py::kwargs& named) {
+    const py::tuple given = named.empty() ? py::tuple(positional) : in_order(positional, named);
     std::vector<Buffer<>> buffers(given.size());
     std::vector<DynamicCall::Value> values(given.size());
     for (size_t i = 0; i < given.size(); i++) {
@@ -72,7 +78,12 @@ class Bound {
         values[i] = DynamicCall::value_of(scalar_of(args_[i].type, given[i]));
         continue;
       }
-      buffers[i] = given[i].cast<Buffer<>>();
+      try {
+        buffers[i] = given[i].cast<Buffer<>>();
+      } catch (const py::cast_error&) {
+        throw py::type_error((i < names_.size() ? quoted(names_[i]) : "a buffer") +
+                             " is an array, not " + std::string(py::repr(given[i])));
+      }
       if (i >= args_.size()) check_writable(buffers[i], "call a Callable");
       lift(i, buffers[i]);
       values[i] = DynamicCall::value_of(buffers[i]);
@@ -115,6 +126,35 @@ class Bound {
   }
 
  private:
+  // Without the number that makes it unique.
+  static std::string given_name(const std::string& name) { return name.substr(0, name.find('$')); }
+
+  // Every argument and output in its place.
+  py::tuple in_order(const py::args& positional, const py::kwargs& named) const {
+    std::string all;
+    for (const std::string& name : names_) all += (all.empty() ? "" : ", ") + name;
+    const auto refuse = [&](const std::string& what) {
+      throw py::type_error("this Callable takes " + all + ": " + what);
+    };
+    if (positional.size() > names_.size()) refuse(text(positional.size(), " were given"));
+    std::vector<py::object> values(names_.size());
+    for (size_t i = 0; i < positional.size(); i++) values[i] = positional[i];
+    for (const auto& [key, value] : named) {
+      const auto name = key.cast<std::string>();
+      const auto found = std::find(names_.begin(), names_.end(), name);
+      if (found == names_.end()) refuse(quoted(name) + " is none of them");
+      py::object& place = values[static_cast<size_t>(found - names_.begin())];
+      if (place) refuse(quoted(name) + " is given twice");
+      place = py::reinterpret_borrow<py::object>(value);
+    }
+    py::tuple result(names_.size());
+    for (size_t i = 0; i < names_.size(); i++) {
+      if (!values[i]) refuse(quoted(names_[i]) + " is missing");
+      result[i] = values[i];
+    }
+    return result;
+  }
+
   // What a call touches, for as long as it runs. Values point into buffers, also of what it is moved to.
   struct Tensors {
     explicit Tensors(size_t count) : buffers(count), values(count) {}
@@ -217,6 +257,7 @@ class Bound {
   Compile compile_;
   std::vector<Argument> args_;
   std::vector<Parameter> parameters_, outputs_;  // null: of a scalar
+  std::vector<std::string> names_;               // of arguments, then outputs
   Callable callable_;
   size_t lifted_ = 0;            // when it was compiled
   int64_t short_elements_ = -1;  // calls on so many were short
@@ -278,17 +319,20 @@ void bind_compile(Class<Self> c) {
         const Pinned<Self> self(object);
         std::vector<Argument> args;
         std::vector<Parameter> parameters, outputs;
+        std::vector<std::string> output_names;
         for (py::handle one : given) {
           args.push_back(one.cast<Argument>());
           parameters.push_back(parameter_of(one));
         }
         for (const Func& f : outputs_of(*self.self)) {
-          for (const OutputImageParam& output : f.output_buffers())
+          for (const OutputImageParam& output : f.output_buffers()) {
             outputs.push_back(output.parameter());
+            output_names.push_back(output.name());
+          }
         }
         const Target to = target ? *target : get_jit_target_from_environment();
         return std::make_unique<Bound>([=] { return self->compile_to_callable(args, to); }, args,
-                                       parameters, outputs);
+                                       parameters, outputs, output_names);
       },
       arg("arguments"), arg("target") = py::none());
 }

@@ -309,7 +309,10 @@ class Generator:
         stand in a dict: `generator_params={"gain": 3.0}`."""
         made = cls(target, **params.pop("generator_params", {}))
         names = [name for name, port in made._ports.items() if port.role == "input"]
-        given = dict(zip(names, inputs), **params)
+        given = dict(zip(names, inputs))
+        for name in given.keys() & params.keys():
+            raise TypeError(f"{made.name()} was given {name} twice")
+        given.update(params)
         if len(inputs) > len(names) or set(given) != set(names):
             raise TypeError(f"{made.name()} takes {', '.join(names)}")
         made._given = {name: _input(made._ports[name], value) for name, value in given.items()}

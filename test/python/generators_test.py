@@ -127,6 +127,8 @@ class InProcess(unittest.TestCase):
         np.testing.assert_array_equal(bright.realize([4, 3]), 10 * A + 0.5)
         twice = Brighten.call(Brighten.call(A, 0), 0)
         np.testing.assert_array_equal(twice.realize([4, 3]), 4 * A)
+        with self.assertRaisesRegex(TypeError, "brighten was given offset twice"):
+            Brighten.call(A, 0, offset=1)
         with self.assertRaisesRegex(TypeError, "brighten takes image, offset"):
             Brighten.call(f)
 

@@ -26,6 +26,20 @@ class Callables(unittest.TestCase):
         call(a, np.float32(3), rg.Buffer(out))
         np.testing.assert_array_equal(out, 3 * a)
 
+    def test_by_name(self):
+        call = self.f.compile_to_callable([self.image, self.gain])
+        a, out = np.arange(6, dtype=np.float32).reshape(2, 3), np.zeros((2, 3), np.float32)
+        call(a, f=out, gain=2)
+        np.testing.assert_array_equal(out, 2 * a)
+        call(f=out, gain=3, image=a)
+        np.testing.assert_array_equal(out, 3 * a)
+        for arguments, named, words in (((a, 2), {"out": out}, '"out" is none of them'),
+                                        ((a, 2, out), {"gain": 3}, '"gain" is given twice'),
+                                        ((a,), {"f": out}, '"gain" is missing'),
+                                        ((a, 2, out, out), {"f": out}, "4 were given")):
+            with self.assertRaisesRegex(TypeError, f"takes image, gain, f: {words}"):
+                call(*arguments, **named)
+
     def test_any_strides(self):
         call = rg.Pipeline(self.f).compile_to_callable([self.image, self.gain])
         a, out = np.arange(24, dtype=np.float32).reshape(4, 6), np.zeros((3, 2), np.float32)
@@ -43,6 +57,8 @@ class Callables(unittest.TestCase):
             call(a, 2, fixed)
         with self.assertRaises(TypeError):
             call(a, "loud", a.copy())
+        with self.assertRaisesRegex(TypeError, '"f" is an array, not \'loud\''):
+            call(a, 2, "loud")
         with self.assertRaisesRegex(rg.CompileError, "all that the outputs need"):
             self.f.compile_to_callable([self.image])
 
