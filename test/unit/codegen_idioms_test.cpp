@@ -442,7 +442,7 @@ TEST(CodegenIdioms, LoopsOfFewIterationsAreNotUnrolled) {
   const auto adds = [](int most) {
     ImageParam in(Int(32), 2, "in");
     Var x("x"), y("y");
-    RDom r(0, clamp(in.dim(1).extent(), 0, most), "r");
+    RDom r(0, clamp(in.height(), 0, most), "r");
     Func f("f");
     f(x) += in(x, r) ^ 5;
     f.vectorize(x, 8, TailStrategy::RoundUp);

@@ -81,6 +81,37 @@ TEST_F(SlidingWindow, ComputesEachRowOnce) {
   EXPECT_EQ(stored_elements(g, "f"), width * 4);  // three rows are alive
 }
 
+// Choices between a loop's first iteration and others that are left at the end.
+int choices_left(const Func& output) {
+  lower::LowerOptions options;
+  options.stop_after = "simplify_vectors";
+  ir::LoweredFunction lowered = lower::lower("test", {output.function()},
+                                             lower::infer_arguments({output.function()}), options);
+  int choices = 0;
+  ir::walk(
+      lowered.body, [&](const Expr& e) { return choices += e.as<ir::Select>() != nullptr, true; },
+      [](const Stmt&) { return true; });
+  return choices;
+}
+
+// The first row of a strip computes three rows of f, each other one its last: no iteration along the
+// row asks which it is. Where the body is large, a second copy costs more than that.
+TEST_F(SlidingWindow, FirstRowsOfStripsAreLoopsOfTheirOwn) {
+  const auto strips = [&](int taps) {
+    ImageParam in(Int(32), 2, "in");
+    Func f("f"), g("g");
+    Expr sum = 0;
+    for (int tap = 0; tap < taps; tap++) sum += in(x + tap, y) * (tap + 1);
+    f(x, y) = sum;
+    g(x, y) = f(x, y) + f(x, y + 1) * f(x, y + 2);
+    g.split(y, y, yi, 16).vectorize(x, 8);
+    f.store_at(g, y).compute_at(g, x).vectorize(x, 8);
+    return g;
+  };
+  EXPECT_EQ(choices_left(strips(3)), 0);
+  EXPECT_GT(choices_left(strips(300)), 0);
+}
+
 // The loop of a split that stays within 5 of its 8 iterations: those before them, in which the window
 // is filled, know nothing of where the others lie.
 TEST_F(SlidingWindow, FillsTheWindowBeforeASplitThatStaysInside) {

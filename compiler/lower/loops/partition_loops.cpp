@@ -27,8 +27,9 @@
 //         extents, and, for conditions over lanes in a body that is not large, of loops of unknown
 //         extent. Conditions without such an interval stay. The intersection of the
 //         intervals is the steady state. Inner loops are then partitioned in the steady state
-//         only; in the rest too where the rest may be large (a border of whole tiles) and the body
-//         is small.
+//         only; in the rest too where the rest may be large (a border of whole tiles), or is the
+//         first iteration of a sliding window, and the body is small. Large bodies keep the choice
+//         between the first iteration and others.
 //         Conditions that an inner loop decides, too, are left to it where a copy of a large body
 //         would save no more than a branch a row: to a loop over the rows of a strip, and to a long
 //         loop along a row beside rows of other Funcs.
@@ -122,7 +123,8 @@ class Partitioner : public StatementRewriter {
     const SteadyState& steady = rewriter.steady();
     if (steady.solved == 0 || !is_worth_copies(loop, steady.saving)) return children(s);
     Stmt rest = loop.body;
-    if (steady.has_thick_border && node_count(rest) <= small_body) rest = (*this)(rest);
+    if ((steady.has_thick_border || steady.has_warm_up) && node_count(rest) <= small_body)
+      rest = (*this)(rest);
     return assemble(loop, (*this)(body), rest, steady);
   }
 

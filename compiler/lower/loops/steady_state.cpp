@@ -237,6 +237,10 @@ bool SteadyRewriter::holds(const Expr& condition, bool is_true, bool is_choice) 
   if (is_over_unknown && !(is_over_lanes && partitions_borders_)) return false;
   auto solution = solve_for(expanded, loop_.name, context_.ranges());
   if (!solution) return false;
+  if (is_choice && is_warm_up(solution->interval, names)) {
+    if (!partitions_borders_) return false;
+    steady_.has_warm_up = true;
+  }
   ++steady_.solved;
   steady_.range = intersection(steady_.range, solution->interval);
   if (solution->needed.defined()) {
@@ -261,6 +265,16 @@ void SteadyRewriter::count_saving(const std::unordered_set<std::string>& names, 
   } else if (enclosing_.empty() || names.count(enclosing_.back())) {
     ++steady_.saving.operations;
   }
+}
+
+// Whether all but the first iteration are steady, and no inner loop has a part in that.
+bool SteadyRewriter::is_warm_up(const Interval& steady,
+                                const std::unordered_set<std::string>& names) const {
+  const auto is_inside = [&](const std::string& name) {
+    return name != loop_.name && (inner_extents_.count(name) || of_unknown_extent_.count(name));
+  };
+  return has_inner_loops_ && steady.min.defined() && !steady.max.defined() &&
+         std::ranges::none_of(names, is_inside) && can_prove(steady.min <= loop_.min + 1);
 }
 
 bool SteadyRewriter::is_about_tiles(const std::unordered_set<std::string>& names) const {

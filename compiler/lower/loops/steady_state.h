@@ -58,6 +58,7 @@ struct SteadyState {
   Interval range;                 // of the loop variable
   Expr needed;                    // and only if this holds; undefined: always
   bool has_thick_border = false;  // some iteration of the rest is a tile or more
+  bool has_warm_up = false;       // the first iteration chooses otherwise, whatever runs inside
   int solved = 0;
   Saving saving;
 };
@@ -86,6 +87,7 @@ class SteadyRewriter : public Rewriter {
   Mark mark(const Expr& e);
   bool holds(const Expr& condition, bool is_true, bool is_choice);
   bool is_about_tiles(const std::unordered_set<std::string>& names) const;
+  bool is_warm_up(const Interval& steady, const std::unordered_set<std::string>& names) const;
   void count_saving(const std::unordered_set<std::string>& names, bool is_choice);
 
   const For& loop_;

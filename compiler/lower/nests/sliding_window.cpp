@@ -208,7 +208,10 @@ class Slider {
     else if (const auto reach = reach_of_first_part(slide, first))
       slide.touched = without_promises(from(at_least_as_far_back(*fresh, *reach)));
     const Expr start = simplify(slide.loop.min - slide.lead);
-    slide.part = without_promises(from(select(variable(slide.loop.name) <= start, first, *fresh)));
+    const Expr is_first = variable(slide.loop.name) <= start;
+    // Marked, so that partition_loops takes the first iteration off.
+    if (simplify(select(is_first, first, *fresh)).as<Select>()) fresh = likely(*fresh);
+    slide.part = without_promises(from(select(is_first, first, *fresh)));
     return true;
   }
 
@@ -222,7 +225,7 @@ class Slider {
 
   // The loops of every stage, over a part like this one, write nothing outside of it.
   bool stays_inside(const Slide& slide) const {
-    Expr extent = simplify(slide.part.max - slide.part.min + 1);
+    Expr extent = simplify(without_likely(slide.part.max - slide.part.min + 1));
     for (size_t s = 0; s < f_.stages.size(); s++) {
       Expr known = is_const(extent) ? extent : variable("part.extent") * alignment(slide.dimension);
       if (!covers_exactly(f_, static_cast<int>(s), f_.func->args[slide.dimension], known))
