@@ -14,7 +14,7 @@
 //   DSE            stores that a later one replaces: the steps of an unrolled sum, of which GVN has
 //                  taken the loads
 //   LoopUnroll     loops of few iterations altogether, other small innermost ones two or four times,
-//                  unless iterations wait for a sum of floats
+//                  unless short iterations wait for a sum of floats
 //   SROA, EarlyCSE allocations of which only such a loop hid the places; what it loaded twice
 //   InstCombine, SimplifyCFG, ADCE to clean up
 //   cut_long_blocks and FenceLongBlocks, so that LLVM's code generator takes linear time
@@ -116,8 +116,8 @@ static bool follows_from(const llvm::Value* e, const llvm::PHINode& phi) {
   return follow.contains(e);
 }
 
-// Whether iterations wait for what the one before adds up in floating point. That takes longer than
-// counting does.
+// Whether iterations wait for what the one before adds up in floating point. Beside that, counting takes no
+// time where the body is short.
 static bool adds_up_floats(const llvm::BasicBlock& body) {
   return llvm::any_of(body.phis(), [&](const llvm::PHINode& phi) {
     const int latch = phi.getBasicBlockIndex(&body);
@@ -132,10 +132,12 @@ static bool adds_up_floats(const llvm::BasicBlock& body) {
 // a few times would spend as much on that.
 static unsigned unroll_count(const llvm::Loop& loop, llvm::ScalarEvolution& evolution) {
   constexpr unsigned room = 48, least_iterations = 8;
+  constexpr size_t during_a_sum = 20;  // instructions that take no longer than one addition
   if (!loop.isInnermost() || loop.getNumBlocks() != 1) return 1;
   const unsigned most = evolution.getSmallConstantMaxTripCount(&loop);  // 0: unknown
-  if ((most > 0 && most < least_iterations) || adds_up_floats(*loop.getHeader())) return 1;
+  if (most > 0 && most < least_iterations) return 1;
   const llvm::BasicBlock& body = *loop.getHeader();
+  if (body.size() <= during_a_sum && adds_up_floats(body)) return 1;
   const bool calls = std::any_of(body.begin(), body.end(), [](const llvm::Instruction& one) {
     return llvm::isa<llvm::CallBase>(one) && !llvm::isa<llvm::IntrinsicInst>(one);
   });
