@@ -167,10 +167,12 @@ Value* gather(FunctionContext& c, const Storage& from, Type type, Value* indices
     auto* gathered = c.b.CreateMaskedGather(vector, pointers, alignment_of(type), mask, off);
     return from_memory(c.e, type, tagged(gathered, from));
   }
-  indices = c.b.CreateSExt(indices, with_lanes(c.b.getInt64Ty(), type.lanes()));
   std::vector<Value*> lanes;
-  for (int i = 0; i < type.lanes(); i++)
-    lanes.push_back(load_scalar(c, from, type.element_of(), lane(c.e, indices, i), nullptr));
+  for (int i = 0; i < type.lanes(); i++) {
+    // Extended one by one: a vector of them would be twice as many registers to take apart.
+    Value* index = c.b.CreateSExt(lane(c.e, indices, i), c.b.getInt64Ty());
+    lanes.push_back(load_scalar(c, from, type.element_of(), index, nullptr));
+  }
   return from_lanes(c.e, lanes);
 }
 
