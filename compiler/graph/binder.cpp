@@ -87,4 +87,11 @@ SymbolRef Binder::symbol_of(const std::string& name) const {
   return buffer ? SymbolRef(buffer) : SymbolRef();
 }
 
+void declare(const FuncContents& f, NameTypes& types) { types.declare_components(f.name, f.types); }
+
+void declare(const ParameterContents& parameter, NameTypes& types) {
+  types.declare(parameter.is_buffer ? NameUse::Call : NameUse::Variable, parameter.name,
+                parameter.type);
+}
+
 }  // namespace retrograde::graph

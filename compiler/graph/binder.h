@@ -6,6 +6,7 @@
 #include <string>
 
 #include "graph/function.h"
+#include "ir/text.h"
 
 namespace retrograde::graph {
 
@@ -19,6 +20,10 @@ struct NamedEntities {
   // The buffer of a fact such as "input.extent.1"; null when the name is none.
   ParameterPtr buffer_of_fact(const std::string& name) const;
 };
+
+// The types that the text of a graph leaves out in mentions of a Func, an image or a parameter.
+void declare(const FuncContents& f, NameTypes& types);
+void declare(const ParameterContents& parameter, NameTypes& types);
 
 // Calls and variables of expressions in `f` (null: outside of Funcs) with their symbols: Funcs,
 // images, parameters, facts of buffers, and the variables of `domain` (may be null).

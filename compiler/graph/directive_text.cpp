@@ -139,9 +139,10 @@ bool same(const T& a, const T& b) {
 
 std::string print_argument(const Expr& e) { return e.defined() ? print(e) : "_"; }
 
-std::vector<Expr> parse_arguments(const std::string& line) {
+std::vector<Expr> parse_arguments(const std::string& line, const NameTypes& declared) {
   const size_t open = line.find('(');
-  const Expr all = parse_expr("arguments" + (open == std::string::npos ? "()" : line.substr(open)));
+  const Expr all =
+      parse_expr("arguments" + (open == std::string::npos ? "()" : line.substr(open)), declared);
   std::vector<Expr> args = all.as<Call>()->args;
   for (Expr& arg : args) {
     const Variable* v = arg.as<Variable>();

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "graph/directive.h"
+#include "ir/text.h"
 
 namespace retrograde::graph {
 
@@ -17,7 +18,7 @@ std::optional<Directive> parse_directive(const std::string& line);
 bool equal(const Directive& a, const Directive& b);
 
 // The arguments of a line such as "name(a, b, _)": undefined where it says _.
-std::vector<Expr> parse_arguments(const std::string& line);
+std::vector<Expr> parse_arguments(const std::string& line, const NameTypes& declared = {});
 std::string print_argument(const Expr& e);  // "_" when undefined
 
 }  // namespace retrograde::graph

@@ -9,18 +9,18 @@
 //   func blur(x, y) float32              several types: a Tuple
 //     made adjoint of blur               by whom, unless by the user
 //     define
-//       value (image input(x, y):uint8 * gain:float32)
+//       value image input(x, y) * gain        typed by their declarations
 //       split(x, xo, xi, 8, Auto)        the schedule, as in directive.h
 //       run(xi, Vectorized)
-//       specialize (gain:float32 == 1f)
+//       specialize gain == 1f
 //         run(xi, Unrolled)
 //       end
 //     update
 //       place x
 //       place `r$0.y`
 //       loop(`r$0.y`, 0, 5)            points(k, 0, 2): of this many points at once
-//       where (`r$0.y` < x)
-//       value (blur(x, `r$0.y`):float32 + 1f)
+//       where `r$0.y` < x
+//       value blur(x, `r$0.y`) + 1f
 //     schedule
 //       compute_at(loop(out, x, 0))
 //   output blur

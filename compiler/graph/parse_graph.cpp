@@ -55,13 +55,14 @@ class GraphReader {
     p->is_literal = line.word == "buffer";
     p->dimensions = integer(line, parse_arguments(line.rest.substr(open)), 0);
     p->constraints.resize(static_cast<size_t>(p->dimensions));
+    declare(*p, types_);
   }
   void make_param(const Line& line) {
     const size_t space = line.rest.find(' ');
     Type type;
     if (space == std::string::npos || !read_type(line.rest.substr(0, space), type))
       fail(line, "a type and a name");
-    make_parameter(line, line.rest.substr(space + 1), type);
+    declare(*make_parameter(line, line.rest.substr(space + 1), type), types_);
   }
   ParameterPtr make_parameter(const Line& line, const std::string& word, Type type) {
     parameter_ = std::make_shared<ParameterContents>();
@@ -84,6 +85,7 @@ class GraphReader {
       f_->args.push_back(v->name);
     }
     f_->types = types_of(line, line.rest.substr(close + 1));
+    declare(*f_, types_);
     f_->schedule.storage_dims = f_->args;
     make_outputs(*f_);
     for (const auto& output : f_->outputs) names_.outputs[output->name] = output;
@@ -168,7 +170,7 @@ class GraphReader {
     if (line.word != "dim" && line.word != "estimates" && line.word != "any_stride" &&
         line.word != "aligned")
       return false;
-    const std::vector<Expr> args = bound(parse_arguments(line.rest));
+    const std::vector<Expr> args = bound(parse_arguments(line.rest, types_));
     const int first = integer(line, args, 0);
     if (line.word == "aligned") {
       p.host_alignment = first;
@@ -242,9 +244,9 @@ class GraphReader {
     if (const auto flag = flags.find(line.word); flag != flags.end()) {
       *flag->second = true;
     } else if (line.word == "lanes") {
-      made.lanes = integer(line, {parse_expr(line.rest)}, 0);
+      made.lanes = integer(line, {parse_expr(line.rest, types_)}, 0);
     } else if (line.word == "blocks") {
-      made.blocks = integer(line, {parse_expr(line.rest)}, 0);
+      made.blocks = integer(line, {parse_expr(line.rest, types_)}, 0);
     } else if (line.word == "work") {
       made.work.emplace_back();
     } else if ((line.word == "work_value" || line.word == "work_loop") && !made.work.empty()) {
@@ -300,13 +302,13 @@ class GraphReader {
 
   bool reads_definition(const Line& line) {
     if (line.word == "place") {
-      definition_->args.push_back(parse_expr(line.rest));
+      definition_->args.push_back(parse_expr(line.rest, types_));
     } else if (line.word == "value") {
-      definition_->values.push_back(parse_expr(line.rest));
+      definition_->values.push_back(parse_expr(line.rest, types_));
     } else if (line.word == "where") {
-      definition_->predicate = parse_expr(line.rest);
+      definition_->predicate = parse_expr(line.rest, types_);
     } else if (line.word == "loop" || line.word == "points") {
-      const std::vector<Expr> args = parse_arguments(line.rest);
+      const std::vector<Expr> args = parse_arguments(line.rest, types_);
       const Variable* v = args.size() == 3 && args[0].defined() ? args[0].as<Variable>() : nullptr;
       if (!v) fail(line, "a variable, its min and its extent");
       definition_->rvars.push_back({v->name, args[1], args[2], line.word == "points"});
@@ -378,7 +380,7 @@ class GraphReader {
 
   bool reads_output(const Line& line) {
     if (line.word == "component") {
-      const int i = integer(line, {parse_expr(line.rest)}, 0);
+      const int i = integer(line, {parse_expr(line.rest, types_)}, 0);
       if (i < 0 || i >= static_cast<int>(f_->outputs.size())) fail(line, "a component of the Func");
       output_ = f_->outputs[static_cast<size_t>(i)];
     } else if (line.word == "require") {
@@ -398,7 +400,9 @@ class GraphReader {
     if (found == names_.funcs.end()) fail(line, "a Func of the graph");
     return found->second;
   }
-  Expr expr(const Line& line) const { return Binder(names_, f_, nullptr)(parse_expr(line.rest)); }
+  Expr expr(const Line& line) const {
+    return Binder(names_, f_, nullptr)(parse_expr(line.rest, types_));
+  }
   std::vector<Expr> bound(std::vector<Expr> args) const {
     for (Expr& arg : args) {
       if (arg.defined()) arg = Binder(names_, nullptr, nullptr)(arg);
@@ -419,6 +423,7 @@ class GraphReader {
 
   std::vector<Line> lines_;
   NamedEntities names_;
+  NameTypes types_;  // of all that is declared
   std::vector<FuncPtr> outputs_;
   // Where the line stands.
   FuncPtr f_;

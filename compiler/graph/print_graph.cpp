@@ -1,4 +1,5 @@
 #include "diagnostics/error.h"
+#include "graph/binder.h"
 #include "graph/directive_text.h"
 #include "graph/graph.h"
 #include "graph/wrappers.h"
@@ -11,6 +12,11 @@ namespace {
 
 class GraphPrinter {
  public:
+  explicit GraphPrinter(const Graph& graph) {
+    for (const FuncPtr& f : graph.funcs) declare(*f, types_);
+    for (const ParameterPtr& p : graph.parameters) declare(*p, types_);
+  }
+
   std::string run(const Graph& graph) {
     for (const auto& parameter : graph.parameters) print(*parameter);
     for (const FuncPtr& f : graph.funcs) print(*f);
@@ -22,7 +28,15 @@ class GraphPrinter {
   template <typename... Parts>
   void line(const Parts&... parts) {
     out_.append(2 * indent_, ' ');
-    out_ += text(parts...) + '\n';
+    out_ += text(shown(parts)...) + '\n';
+  }
+  template <typename Part>
+  const Part& shown(const Part& part) const {
+    return part;
+  }
+  std::string shown(const Expr& e) const {
+    NameTypes types(&types_);
+    return e.defined() ? ir::print(e, types) : "_";
   }
   template <typename Body>
   void indented(const Body& body) {
@@ -59,12 +73,10 @@ class GraphPrinter {
     for (size_t d = 0; d < p.constraints.size(); ++d) {
       const BufferConstraint& c = p.constraints[d];
       if (c.min.defined() || c.extent.defined() || c.stride.defined()) {
-        line("dim(", d, ", ", print_argument(c.min), ", ", print_argument(c.extent), ", ",
-             print_argument(c.stride), ")");
+        line("dim(", d, ", ", c.min, ", ", c.extent, ", ", c.stride, ")");
       }
       if (c.min_estimate.defined() || c.extent_estimate.defined()) {
-        line("estimates(", d, ", ", print_argument(c.min_estimate), ", ",
-             print_argument(c.extent_estimate), ")");
+        line("estimates(", d, ", ", c.min_estimate, ", ", c.extent_estimate, ")");
       }
       if (c.any_stride) line("any_stride(", d, ")");
     }
@@ -189,6 +201,7 @@ class GraphPrinter {
     });
   }
 
+  NameTypes types_;
   std::string out_;
   size_t indent_ = 0;
 };
@@ -199,6 +212,6 @@ Graph graph_of(const std::vector<FuncPtr>& outputs) {
   return {outputs, functions_of(outputs), parameters_of(outputs)};
 }
 
-std::string to_text(const Graph& graph) { return GraphPrinter().run(graph); }
+std::string to_text(const Graph& graph) { return GraphPrinter(graph).run(graph); }
 
 }  // namespace retrograde::graph

@@ -1,5 +1,4 @@
-// Recursive descent over IR text; print.cpp shows the language. Operators may also be written
-// without parentheses, with C's precedence.
+// A recursive-descent parser of IR text; print.cpp shows the language.
 #include "ir/parse.h"
 
 #include <algorithm>
@@ -52,8 +51,8 @@ Expr special_float(const std::string& word, bool negative) {
 
 class Parser {
  public:
-  explicit Parser(const std::string& text)
-      : lexer_(text), token_(lexer_.next()), ahead_(lexer_.next()) {}
+  explicit Parser(const std::string& text, NameTypes types = {})
+      : lexer_(text), token_(lexer_.next()), ahead_(lexer_.next()), types_(std::move(types)) {}
 
   Expr whole_expr() {
     Expr e = expr();
@@ -110,7 +109,12 @@ class Parser {
     take();
     return result;
   }
-  Type type_suffix() { return accept(":") ? type() : Int(32); }
+  // The type behind a mention of a name, or the one that its name implies.
+  Type type_suffix(NameUse use, const std::string& name, int lanes, int component = 0) {
+    const Type result = accept(":") ? type() : types_.implied(use, name, lanes, component);
+    types_.mention(use, name, use == NameUse::Variable ? result : result.element_of(), component);
+    return result;
+  }
 
   // Runs a builder whose complaint is about the text.
   template <class F>
@@ -230,6 +234,7 @@ class Parser {
     const std::string bound = name();
     expect("=");
     Expr value = expr_before("in");
+    types_.declare(NameUse::Variable, bound, value.type());
     return make_let(bound, value, expr_before(")"));
   }
   Expr named() {
@@ -296,18 +301,19 @@ class Parser {
     expect("(");
     std::vector<Expr> args = expr_list(")");
     const int component = accept(".") ? integer() : 0;
-    const Type result = type_suffix();
+    const Type result = type_suffix(NameUse::Call, callee, lanes_of(args), component);
     return make_node<Call>(result, call_type, Op::none, callee, std::move(args), component,
                            SymbolRef());
   }
   // A load, or a variable when no bracket follows.
   Expr load(const std::string& name) {
     const Token at = token_;
-    if (!accept("[")) return variable(name, type_suffix());
+    if (!accept("[")) return variable(name, type_suffix(NameUse::Variable, name, 1));
     Expr index = expr(), predicate;
     if (accept("if")) predicate = expr();
     expect("]");
-    return make_load(type_suffix(), name, index, predicate);
+    const Type result = type_suffix(NameUse::Buffer, name, index.type().lanes());
+    return make_load(result, name, index, predicate);
   }
   Expr shuffle() {
     const Token at = take();
@@ -389,6 +395,7 @@ class Parser {
     if (accept("let")) {
       const std::string bound = name();
       Expr value = expr_behind("=");
+      types_.declare(NameUse::Variable, bound, value.type());
       return make_let(bound, value, block_rest());
     }
     if (accept("assert")) {
@@ -438,6 +445,7 @@ class Parser {
     const std::string variable = name();
     expect(",");
     Expr min = expr_before(","), extent = expr_before(")");
+    types_.declare(NameUse::Variable, variable, Int(32));
     return make_for(variable, min, extent, runs, block(), partition);
   }
   Stmt launch() {
@@ -461,6 +469,7 @@ class Parser {
     expect(")");
     const MemoryType where = memory();
     std::vector<Range> bounds = ranges();
+    types_.declare_components(func, types);
     return make_realize(func, std::move(types), where, std::move(bounds), block());
   }
   Stmt prefetch() {
@@ -484,6 +493,7 @@ class Parser {
     const Type element = type();
     const MemoryType where = memory();
     const Expr offset = accept("at") ? expr() : Expr();
+    types_.declare(NameUse::Buffer, buffer, element);
     return make_allocate(buffer, element, where, elements, block(), offset);
   }
   Stmt if_stmt() {
@@ -501,6 +511,7 @@ class Parser {
       if (accept("if")) predicate = expr();
       expect("]");
       Expr value = expr_behind("=");
+      types_.mention(NameUse::Buffer, target, value.type().element_of());
       return build(at, [&] { return make_store(target, value, index, predicate); });
     }
     if (!accept("(")) Lexer::fail(at, "a statement");
@@ -515,6 +526,7 @@ class Parser {
     expect("=");
     expect("{");
     std::vector<Expr> values = expr_list("}");
+    types_.mention_components(target, values);
     return make_provide(target, std::move(values), std::move(args), predicate);
   }
   MemoryType memory() {
@@ -528,12 +540,16 @@ class Parser {
   Lexer lexer_;
   Token token_, ahead_;
   int depth_ = 0;
+  NameTypes types_;
   std::unordered_map<std::string, Expr> shared_;
 };
 
 }  // namespace
 
 Expr parse_expr(const std::string& text) { return Parser(text).whole_expr(); }
+Expr parse_expr(const std::string& text, const NameTypes& declared) {
+  return Parser(text, NameTypes(&declared)).whole_expr();
+}
 Stmt parse_stmt(const std::string& text) { return Parser(text).whole_stmt(); }
 
 }  // namespace retrograde::ir

@@ -2,15 +2,18 @@
 //
 // Expressions
 //   3  2.5f  7_u8  1.5_f64  true  nan_f32  "text"    immediates: int32, float32, others by suffix
-//   x  y:float32  `odd name`                         variables: int32 unless said
-//   (a + b)  min(a, b)  !c  select(c, a, b)
+//   x  y:float32  `odd name`                         variables
+//   a + b * c  min(a, b)  !c  select(c, a, b)        C's precedence; parentheses only where it asks for them
 //   float32x8(v)  reinterpret<int32>(v)
 //   ramp(b, s, 8)  broadcast(v, 8)  shuffle(u, v; 0, 2, 1)  reduce(add, v, 1)
-//   a[i]:float32x8  a[i if p]:float32                loads
+//   a[i]:float32  a[i if p]:float32                  loads
 //   floor(v)  abs<uint32>(v)                         operators; <type> unless the first argument's
 //   f(x, y).1:float32  image in(x, y):uint8  extern hypotf(x, y):float32
 //   (let t = v in body)
 //   {#0 = v; #1 = w; body}                           nodes that a large expression uses repeatedly
+// A type behind a colon is left out where it is known: from the name's declaration (let, for, allocate, realize), else
+// from its first store or mention. What is mentioned first without a type is int32. A load has the lanes of its index,
+// a call those of its arguments, unless a type says otherwise.
 // Statements
 //   let t = v                                        its body is the rest of the block
 //   assert(c, e)  free a  evaluate v  a[i if p] = v  f(x, y if p) = {u, v}
@@ -22,6 +25,7 @@
 //   allocate a[elements]:float32 heap {..}           of a kernel's shared memory: gpu_shared at bytes {..}
 #include "ir/print.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <ostream>
@@ -107,10 +111,15 @@ class Sharing {
   std::vector<Expr> order_;
 };
 
+bool is_comparison(Kind kind) {
+  const InfixOperator* op = infix_operator(kind);
+  return op->precedence > infix_operator(Kind::And)->precedence && op->precedence < sum_precedence;
+}
+
 // Appends text and expressions, one after the other.
 class ExprPrinter {
  public:
-  explicit ExprPrinter(std::string& out) : out_(out) {}
+  ExprPrinter(std::string& out, NameTypes& types) : out_(out), types_(types) {}
 
   void print_root(const Expr& e) {
     const std::vector<Expr> named = Sharing::find(e);
@@ -138,8 +147,24 @@ class ExprPrinter {
       print_node(e);
     }
   }
-  void put(Type type_unless_int32) {
-    if (type_unless_int32 != Int(32)) put(':' + to_string(type_unless_int32));
+  void put_type(NameUse use, const std::string& name, int lanes, Type type, int component = 0) {
+    const bool is_implied = types_.implied(use, name, lanes, component) == type;
+    types_.mention(use, name, use == NameUse::Variable ? type : type.element_of(), component);
+    if (!is_implied) put(':' + to_string(type));
+  }
+  // An operand that binds as tightly as `precedence` needs no parentheses.
+  struct Operand {
+    const Expr& e;
+    int precedence;
+  };
+  void put(Operand operand) {
+    const InfixOperator* op =
+        names_.count(operand.e.get()) ? nullptr : infix_operator(operand.e.kind());
+    if (op && op->precedence < operand.precedence) {
+      write("(", operand.e, ")");
+    } else {
+      put(operand.e);
+    }
   }
   template <class... Parts>
   void write(const Parts&... parts) {
@@ -157,22 +182,32 @@ class ExprPrinter {
         },
         [&](const FloatImm& n) { put(float_text(n.type, n.value)); },
         [&](const StringImm& n) { put(string_text(n.value)); },
-        [&](const Variable& n) { write(quote_name(n.name), n.type); },
+        [&](const Variable& n) {
+          put(quote_name(n.name));
+          put_type(NameUse::Variable, n.name, n.type.lanes(), n.type);
+        },
         [&](const Cast& n) { write(to_string(n.type), "(", n.value, ")"); },
         [&](const Reinterpret& n) { write("reinterpret<", to_string(n.type), ">(", n.value, ")"); },
         [&](const Binary& n) {
-          if (const InfixOperator* op = infix_operator(n.kind))
-            return write("(", n.a, " ", op->symbol, " ", n.b, ")");
+          if (const InfixOperator* op = infix_operator(n.kind)) {
+            // C would read a comparison of comparisons from left to right; few readers would.
+            const int left = is_comparison(n.kind) ? sum_precedence : op->precedence;
+            return write(Operand{n.a, left}, " ", op->symbol, " ",
+                         Operand{n.b, std::max(left, op->precedence + 1)});
+          }
           write(kind_word(n.kind), "(", n.a, ", ", n.b, ")");
         },
-        [&](const Not& n) { write("!", n.a); },
+        [&](const Not& n) {
+          write("!", Operand{n.a, prefix_precedence});
+        },
         [&](const Select& n) {
           write("select(", n.condition, ", ", n.when_true, ", ", n.when_false, ")");
         },
         [&](const Load& n) {
           write(quote_name(n.name), "[", n.index);
           if (n.predicate.defined()) write(" if ", n.predicate);
-          write("]", n.type);
+          put("]");
+          put_type(NameUse::Buffer, n.name, n.index.type().lanes(), n.type);
         },
         [&](const Ramp& n) {
           write("ramp(", n.base, ", ", n.stride, ", ", std::to_string(n.lanes), ")");
@@ -182,7 +217,9 @@ class ExprPrinter {
         },
         [&](const Call& n) { print_call(n); },
         [&](const Let& n) {
-          write("(let ", quote_name(n.name), " = ", n.value, " in ", n.body, ")");
+          write("(let ", quote_name(n.name), " = ", n.value, " in ");
+          types_.declare(NameUse::Variable, n.name, n.value.type());
+          write(n.body, ")");
         },
         [&](const Shuffle& n) {
           write("shuffle(", n.vectors, "; ",
@@ -203,10 +240,11 @@ class ExprPrinter {
     if (n.call_type == CallType::Extern) put("extern ");
     write(quote_name(n.name), "(", n.args, ")");
     if (n.component) put('.' + std::to_string(n.component));
-    put(n.type);
+    put_type(NameUse::Call, n.name, lanes_of(n.args), n.type, n.component);
   }
 
   std::string& out_;
+  NameTypes& types_;
   std::unordered_map<const ExprNode*, std::string> names_;
 };
 
@@ -222,6 +260,7 @@ class StmtPrinter {
         s,
         [&](const LetStmt& n) {
           write("let ", quote_name(n.name), " = ", n.value, "\n");
+          types_.declare(NameUse::Variable, n.name, n.value.type());
           print(n.body);
         },
         [&](const Assert& n) { write("assert(", n.condition, ", ", n.error, ")"); },
@@ -231,23 +270,30 @@ class StmtPrinter {
         [&](const For& n) {
           if (n.partition != Partition::Auto) write(partition_name(n.partition), " ");
           if (n.runs != ForType::Serial) write(for_name(n.runs), " ");
-          write("for (", quote_name(n.name), ", ", n.min, ", ", n.extent, ")", Body{n.body});
+          write("for (", quote_name(n.name), ", ", n.min, ", ", n.extent, ")");
+          types_.declare(NameUse::Variable, n.name, Int(32));
+          put(Body{n.body});
         },
         [&](const Store& n) {
           write(quote_name(n.name), "[", n.index, If{n.predicate}, "] = ", n.value);
+          types_.mention(NameUse::Buffer, n.name, n.value.type().element_of());
         },
         [&](const Provide& n) {
           write(quote_name(n.name), "(", n.args, If{n.predicate}, ") = {", n.values, "}");
+          types_.mention_components(n.name, n.values);
         },
         [&](const Realize& n) {
           write("realize ", quote_name(n.name), "(",
                 listed(n.types, [](Type type) { return to_string(type); }), ") ",
-                memory_name(n.memory), n.bounds, Body{n.body});
+                memory_name(n.memory), n.bounds);
+          types_.declare_components(n.name, n.types);
+          put(Body{n.body});
         },
         [&](const Allocate& n) {
           write("allocate ", quote_name(n.name), "[", n.elements, "]:", to_string(n.type), " ",
                 memory_name(n.memory));
           if (n.offset.defined()) write(" at ", n.offset);
+          types_.declare(NameUse::Buffer, n.name, n.type);
           put(Body{n.body});
         },
         [&](const Free& n) { write("free ", quote_name(n.name)); },
@@ -280,7 +326,7 @@ class StmtPrinter {
   };
   void put(const char* text) { out_ += text; }
   void put(const std::string& text) { out_ += text; }
-  void put(const Expr& e) { ExprPrinter(out_).print_root(e); }
+  void put(const Expr& e) { ExprPrinter(out_, types_).print_root(e); }
   void put(const std::vector<Expr>& list) {
     for (size_t i = 0; i < list.size(); ++i) write(i ? ", " : "", list[i]);
   }
@@ -321,15 +367,21 @@ class StmtPrinter {
   }
 
   std::string& out_;
+  NameTypes types_;
   size_t indent_ = 0;
 };
 
 }  // namespace
 
 std::string PrintFunction::operator()(const Expr& e) const {
-  std::string out;
+  NameTypes types;
+  return (*this)(e, types);
+}
+
+std::string PrintFunction::operator()(const Expr& e, NameTypes& types) const {
   if (!e.defined()) return "<undefined>";
-  ExprPrinter(out).print_root(e);
+  std::string out;
+  ExprPrinter(out, types).print_root(e);
   return out;
 }
 

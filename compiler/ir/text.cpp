@@ -33,7 +33,7 @@ std::string kind_word(Kind op) {
 
 namespace {
 
-// With C's precedence.
+// With C's precedence; sum_precedence is that of + and -.
 constexpr InfixOperator infix_operators[] = {
     {Kind::Or, "||", 0}, {Kind::And, "&&", 1}, {Kind::EQ, "==", 2}, {Kind::NE, "!=", 2},
     {Kind::LT, "<", 3},  {Kind::LE, "<=", 3},  {Kind::GT, ">", 3},  {Kind::GE, ">=", 3},
@@ -149,6 +149,49 @@ std::string quote_name(const std::string& name) {
   std::string quoted = "`";
   for (char c : name) quoted += c == '`' ? std::string("``") : std::string(1, c);
   return quoted + '`';
+}
+
+std::string NameTypes::key(NameUse use, const std::string& name, int component) {
+  return static_cast<char>(use) + name + (component ? '.' + std::to_string(component) : "");
+}
+
+const Type* NameTypes::find(const std::string& key) const {
+  const auto known = types_.find(key);
+  if (known != types_.end()) return &known->second;
+  return outer_ ? outer_->find(key) : nullptr;
+}
+
+void NameTypes::declare(NameUse use, const std::string& name, Type type, int component) {
+  types_[key(use, name, component)] = type;
+}
+
+Type NameTypes::implied(NameUse use, const std::string& name, int lanes, int component) const {
+  const Type* known = find(key(use, name, component));
+  const Type type = known ? *known : Int(32);
+  return use == NameUse::Variable ? type : type.with_lanes(lanes);
+}
+
+void NameTypes::mention(NameUse use, const std::string& name, Type type, int component) {
+  const std::string mentioned = key(use, name, component);
+  if (!find(mentioned)) types_.emplace(mentioned, type);
+}
+
+void NameTypes::declare_components(const std::string& func, const std::vector<Type>& types) {
+  for (size_t i = 0; i < types.size(); ++i)
+    declare(NameUse::Call, func, types[i], static_cast<int>(i));
+}
+
+void NameTypes::mention_components(const std::string& func, const std::vector<Expr>& values) {
+  for (size_t i = 0; i < values.size(); ++i)
+    mention(NameUse::Call, func, values[i].type().element_of(), static_cast<int>(i));
+}
+
+int lanes_of(const std::vector<Expr>& args) {
+  int lanes = 1;
+  for (const Expr& arg : args) {
+    if (arg.defined()) lanes = std::max(lanes, arg.type().lanes());
+  }
+  return lanes;
 }
 
 }  // namespace retrograde::ir

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <string>
+#include <unordered_map>
+#include <vector>
 
 #include "ir/expr.h"
 
@@ -17,6 +19,7 @@ struct InfixOperator {
   const char* symbol;
   int precedence;
 };
+constexpr int sum_precedence = 4, prefix_precedence = 6;
 // Null when it is none.
 const InfixOperator* infix_operator(Kind kind);
 const InfixOperator* infix_operator(const std::string& symbol);
@@ -25,5 +28,36 @@ bool is_reserved(const std::string& word);  // a keyword, a type or an operator
 bool read_type(const std::string& word, Type& type);
 // As it is, or in back quotes when it is not an identifier or is reserved.
 std::string quote_name(const std::string& name);
+
+// What a mention of a name names: a variable, the elements of a buffer, the values of a Func or C function.
+enum class NameUse : char { Variable = 'v', Buffer = '[', Call = '(' };
+
+// The types that names have where the text leaves them out. A declaration (let, for, allocate, realize) says a name's
+// type; without one, its first mention does. A first mention without a type is of int32. The printer and the parser
+// each keep such a table and meet the names in the same order, so that they agree.
+class NameTypes {
+ public:
+  NameTypes() = default;
+  // On top of `outer`, which stays as it is and must outlive this.
+  explicit NameTypes(const NameTypes* outer) : outer_(outer) {}
+
+  void declare(NameUse use, const std::string& name, Type type, int component = 0);
+  // The type of a mention without one; `lanes` are those of its index or arguments. A variable has its own.
+  Type implied(NameUse use, const std::string& name, int lanes, int component = 0) const;
+  // A mention of this type: it settles the type of a name that has none.
+  void mention(NameUse use, const std::string& name, Type type, int component = 0);
+  // Of every component of a Func.
+  void declare_components(const std::string& func, const std::vector<Type>& types);
+  void mention_components(const std::string& func, const std::vector<Expr>& values);
+
+ private:
+  static std::string key(NameUse use, const std::string& name, int component);
+  const Type* find(const std::string& key) const;  // null when the name has none
+
+  const NameTypes* outer_ = nullptr;
+  std::unordered_map<std::string, Type> types_;
+};
+
+int lanes_of(const std::vector<Expr>& args);  // of a call with these arguments
 
 }  // namespace retrograde::ir

@@ -242,7 +242,7 @@ void NestEmitter::keep(Member& member, Box allocated, Emitted& code, Emitted& ma
   made.stmt =
       storage_.fold(f, touched, member.loops, member.slides, code.has_vectors, site, made.stmt);
   if (f.schedule.async && !member.loops.empty())
-    storage_.note_async_room(f, member.slides, site.touched(touched));
+    storage_.note_async_room(f, member.loops, member.slides, site.touched(touched));
   if (is_stored_where_computed(f)) {
     piece.realized.push_back({&f, member.required, allocated});
     storage_.note_place(f, allocated, code.storage);

@@ -60,6 +60,25 @@ Stmt realize_place(const LoopedFunc& f, const Box& room, const Stmt& stmt) {
   return make_realize(place_name(f.name()), f.func->types, f.schedule.memory, ranges, stmt);
 }
 
+// By how many iterations a producer may be ahead in folded storage; 0: any number.
+int room_in_folds(const std::vector<Fold>& folds, const std::vector<Slide>& slides,
+                  const Box& touched) {
+  const auto extent = [](const Interval& side) {
+    return as_const_int(simplify(without_likely(side.max - side.min + 1)));
+  };
+  int room = 0;
+  for (size_t d = 0; d < folds.size(); d++) {
+    if (!folds[d].factor.defined()) continue;
+    auto slide = std::ranges::find(slides, static_cast<int>(d), &Slide::dimension);
+    const auto fold = as_const_int(folds[d].factor), window = extent(touched[d]);
+    const auto step = slide == slides.end() ? window : extent(slide->part);
+    const bool known = fold && window && step && *step > 0 && *fold >= *window;
+    const int here = known ? static_cast<int>((*fold - *window) / *step) + 1 : 1;
+    room = room == 0 ? here : std::min(room, here);
+  }
+  return room;
+}
+
 }  // namespace
 
 NestStorage::NestStorage(const Program& program, bool folds)
@@ -106,25 +125,19 @@ Stmt NestStorage::fold(const LoopedFunc& f, const Box& touched, const std::vecto
   return stmt;
 }
 
-// Values that are each computed once, into a place of their own, can be computed at any time. In
-// folded storage of F coordinates, of which an iteration touches W and computes S, there is room
-// for (F - W) / S more.
-void NestStorage::note_async_room(const LoopedFunc& f, const std::vector<Slide>& slides,
-                                  const Box& touched) {
+// Along one loop a window computes each value once, into a place of its own: its producer may run ahead of the
+// consumer as far as the storage allows. In folded storage of F coordinates, of which an iteration touches W and
+// computes S, there is room for (F - W) / S more iterations. Under several loops the window begins anew in each
+// iteration of the outer ones, and overwrites what may still be read. That does no harm where nothing is folded and
+// the same value is written; an update definition writes others in between.
+void NestStorage::note_async_room(const LoopedFunc& f, const std::vector<Loop>& loops,
+                                  const std::vector<Slide>& slides, const Box& touched) {
   const std::vector<Fold>& folds = folds_.at(f.name());
-  int room = slides.empty() ? 1 : 0;
-  for (size_t d = 0; d < folds.size(); d++) {
-    if (!folds[d].factor.defined()) continue;
-    auto slide = std::ranges::find(slides, static_cast<int>(d), &Slide::dimension);
-    const auto extent = [](const Interval& side) {
-      return as_const_int(simplify(without_likely(side.max - side.min + 1)));
-    };
-    const auto fold = as_const_int(folds[d].factor), window = extent(touched[d]);
-    const auto step = slide == slides.end() ? window : extent(slide->part);
-    const bool known = fold && window && step && *step > 0 && *fold >= *window;
-    const int here = known ? static_cast<int>((*fold - *window) / *step) + 1 : 1;
-    room = room == 0 ? here : std::min(room, here);
-  }
+  const bool is_folded =
+      std::ranges::any_of(folds, [](const Fold& fold) { return fold.factor.defined(); });
+  const bool is_computed_once = !slides.empty() && loops.size() == 1;
+  const bool keeps_values = !slides.empty() && !is_folded && f.stages.size() == 1;
+  int room = is_computed_once ? room_in_folds(folds, slides, touched) : keeps_values ? 0 : 1;
   auto [it, is_first] = async_room_.emplace(f.name(), room);
   if (!is_first && (it->second == 0 || (room != 0 && room < it->second))) it->second = room;
 }

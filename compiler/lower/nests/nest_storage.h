@@ -24,7 +24,9 @@ class NestStorage {
   // Decides where f wraps around. `touched`: by the code of the site, in terms of its names.
   Stmt fold(const LoopedFunc& f, const Box& touched, const std::vector<Loop>& loops,
             const std::vector<Slide>& slides, bool is_vectorized, ComputePlace& site, Stmt stmt);
-  void note_async_room(const LoopedFunc& f, const std::vector<Slide>& slides, const Box& touched);
+  // Decides how far an async producer may run ahead. `loops`: between f's computation and its storage.
+  void note_async_room(const LoopedFunc& f, const std::vector<Loop>& loops,
+                       const std::vector<Slide>& slides, const Box& touched);
 
   Stmt realize(const LoopedFunc& f, const Box& box, Stmt stmt);
   // Storage that lies in a place further out: room for the largest that it is at any time.
