@@ -23,7 +23,7 @@ bool stays(const Instruction& one) {
   return llvm::isa<llvm::PHINode, llvm::AllocaInst>(one) || one.isTerminator();
 }
 
-// Instructions that mean something in their own function alone.
+// Instructions that cannot move to another function.
 bool ties(const Instruction& one) {
   if (const auto* memory = llvm::dyn_cast<llvm::AllocaInst>(&one))
     return !llvm::isa<llvm::ConstantInt>(memory->getArraySize());
@@ -44,20 +44,21 @@ Instructions movable(llvm::BasicBlock& block) {
   return all;
 }
 
-// Masks of vectors.
+// Vector masks, which are recomputed in each piece.
 bool is_recomputed(const Instruction& one) {
   return one.getType()->isVectorTy() && one.getType()->getScalarType()->isIntegerTy(1) &&
          llvm::isa<llvm::CmpInst, llvm::BinaryOperator, llvm::FreezeInst>(one);
 }
 
-// What the code generator fuses into the only reader, when both are in one block.
+// Instructions that the code generator fuses into their only user if both are in the same block.
 bool may_fuse(const Instruction& one) {
   const unsigned opcode = one.getOpcode();
   return one.hasOneUse() && (opcode == Instruction::FMul || opcode == Instruction::FNeg ||
                              opcode == Instruction::FPExt || opcode == Instruction::FPTrunc);
 }
 
-// Says to which piece each instruction of a block belongs, and takes to a piece what must be there.
+// Assigns each instruction of a block to a piece, and moves or copies instructions that must be in the piece of their
+// user.
 class Division {
  public:
   explicit Division(llvm::BasicBlock& block) : block_(block) {
@@ -65,7 +66,7 @@ class Division {
     count_ = std::max<size_t>(all.size() / piece_length, 1);
     const size_t length = (all.size() + count_ - 1) / count_;
     for (size_t i = 0; i < all.size(); i++) places_[all[i]] = {i / length, {i, 0}, all[i]};
-    // Readers before what they read: what is taken along may have to take something along, too.
+    // Users before their operands: an instruction that moves along may need its own operands to move too.
     for (Instruction* one : llvm::reverse(all)) take_along(*one);
   }
 
@@ -80,7 +81,7 @@ class Division {
   struct Place {
     size_t piece;
     Order order;
-    Instruction* anchor;  // an instruction of the block as it was, before which it stands
+    Instruction* anchor;  // an instruction of the original block; this one is placed before it
   };
 
   void take_along(Instruction& one) {
@@ -109,7 +110,7 @@ class Division {
     return first;
   }
 
-  // Before everything that was put before the same anchor: some of that may read it.
+  // Placed before everything that was already placed before the same anchor, since some of that may read it.
   void put_before(Instruction& reader, Instruction& one) {
     const Place there = places_[&reader];
     Instruction*& head = heads_[there.anchor];
@@ -149,7 +150,7 @@ class BlockCutter {
   }
 
  private:
-  // What is read outside of its piece has a slot in the frame.
+  // Gives a slot in the frame to each value that another piece reads.
   void find_crossing() {
     llvm::SmallVector<llvm::Type*> types;
     for (size_t piece = 0; piece < pieces_.size(); piece++) {
@@ -196,7 +197,7 @@ class BlockCutter {
     made_.push_back(piece);
   }
 
-  // Operands from outside of the piece become arguments and loads.
+  // Replaces operands from outside the piece by arguments and loads.
   void read_inside(Instruction& one, llvm::Value* frame) {
     for (llvm::Use& use : one.operands()) {
       auto* computed = llvm::dyn_cast<Instruction>(use.get());
@@ -220,7 +221,7 @@ class BlockCutter {
     return made;
   }
 
-  // The same function without the arguments that it does not read, which `given` then lacks, too.
+  // The same function without its unused arguments, which are removed from `given` too.
   llvm::Function* without_unread(llvm::Function* draft, std::vector<llvm::Value*>& given) {
     std::vector<llvm::Value*> read;
     std::vector<llvm::Argument*> from;
@@ -269,7 +270,8 @@ class BlockCutter {
   llvm::DenseMap<const llvm::Value*, unsigned> slots_;
   Instructions crossing_;
   llvm::SetVector<llvm::Value*> elsewhere_;
-  llvm::DenseMap<llvm::Value*, llvm::Value*> inside_;  // what the piece at hand reads instead
+  llvm::DenseMap<llvm::Value*, llvm::Value*>
+      inside_;  // replacements for operands in the current piece
   llvm::StructType* frame_type_ = nullptr;
   llvm::AllocaInst* frame_ = nullptr;
   std::vector<llvm::Function*> made_;

@@ -16,7 +16,7 @@ namespace retrograde::codegen {
 
 KernelUse& KernelSet::add(const Stmt& launch, std::vector<KernelUse::Argument> arguments) {
   auto kernel = std::make_unique<KernelUse>();
-  // Names that PTX takes.
+  // Keep only characters that PTX allows in names.
   kernel->name = source_.name + "_" + std::to_string(kernels_.size());
   for (char& c : kernel->name) {
     if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
@@ -70,7 +70,7 @@ void KernelSet::compile_for_executor(std::vector<llvm::Function*>& functions) {
 std::string kernel_image_name(const std::string& function) { return function + ".kernels.image"; }
 
 llvm::GlobalVariable* KernelSet::own_global(llvm::Type* type, const char* what) {
-  // No constant: parts of a module that is compiled in several share one.
+  // Not constant: when a module is compiled in several parts, they share this one.
   return new llvm::GlobalVariable(host_.module, type, false, llvm::GlobalValue::InternalLinkage,
                                   llvm::Constant::getNullValue(type),
                                   source_.name + ".kernels." + what);
@@ -85,7 +85,7 @@ llvm::StructType* KernelSet::image_type() const {
 llvm::GlobalVariable* KernelSet::image() {
   if (image_) return image_;
   image_ = own_global(image_type(), "image");
-  image_->setLinkage(llvm::GlobalValue::ExternalLinkage);  // who unloads the code looks for it
+  image_->setLinkage(llvm::GlobalValue::ExternalLinkage);  // whoever unloads the code looks for it
   return image_;
 }
 llvm::GlobalVariable* KernelSet::state() {

@@ -17,7 +17,7 @@ string_view trimmed(string_view text) {
   return begin == string_view::npos ? string_view() : text.substr(begin, end + 1 - begin);
 }
 
-// "min.s32 %r1, %r2, 5;" without what stands before and behind; no operands: it is something else.
+// An instruction such as "min.s32 %r1, %r2, 5;" without surrounding blanks and semicolon. No operands: any other line.
 struct Instruction {
   string_view name;
   std::vector<string_view> operands;
@@ -48,8 +48,8 @@ bool is_of(const Instruction& instruction, const Kind& kind) {
   return instruction.name == kind.name && instruction.operands.size() == 3;
 }
 
-// The registers of a function that may hold the result of such an instruction, copied or not: ptxas unrolls
-// loops, whose minima are of those before by a copy.
+// The registers of a function that may hold the result of such an instruction, also after copies: ptxas unrolls loops,
+// in which a copy carries one iteration's minimum to the next.
 std::set<string_view> results_of(const Kind& kind, const std::vector<Instruction>& function) {
   std::set<string_view> registers;
   for (size_t before = size_t(-1); before != registers.size();) {
@@ -106,7 +106,7 @@ std::string part_minima(const std::string& ptx) {
     const size_t end = std::min(rest.find('\n'), rest.size());
     function.push_back(rest.substr(0, end));
     rest.remove_prefix(std::min(end + 1, rest.size()));
-    // LLVM closes functions at the line's beginning, and nothing else.
+    // LLVM ends each function with a "}" at the beginning of a line, and no other line is just that.
     if (function.back() != "}" && !rest.empty()) continue;
     add_function(function, out);
     function.clear();

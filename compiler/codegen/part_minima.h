@@ -1,10 +1,11 @@
-// part_minima.h -- PTX without a minimum of a minimum, or a maximum of a maximum, of signed integers.
+// part_minima.h -- works around a bug of ptxas: rewrites PTX so that no signed minimum reads the result of another
+// signed minimum. The same holds for maxima.
 //
-// For two such instructions ptxas takes one of three operands (VIMNMX3, from sm_90 on) and drops the sign of an
-// operand that is a negation: min(min(a, -b), c) becomes min(min(a, b), c). Seen with ptxas 13.0 and the driver
-// 580.159 on an H200, for int32 and int16; reported of ptxas 12.8 to 13.3 for sm_100 (pytorch/pytorch#190973).
-// Unsigned minima are right, so every second one of a chain is one: min(a, b) is the unsigned minimum of both with
-// their sign bits turned, its own turned back.
+// ptxas combines two such instructions to one with three operands (VIMNMX3, from sm_90 on) and drops the sign of a
+// negated operand: min(min(a, -b), c) becomes min(min(a, b), c). Seen with ptxas 13.0 and driver 580.159 on an H200,
+// for int32 and int16; reported for ptxas 12.8 to 13.3 on sm_100 (pytorch/pytorch#190973). Unsigned minima are correct.
+// So an instruction that reads such a result becomes unsigned: min(a, b) is the unsigned minimum of both with their
+// sign bits flipped, with the result's sign bit flipped back.
 #pragma once
 
 #include <string>
