@@ -1,5 +1,5 @@
-// pytorch_wrapper.cpp -- see pytorch_wrapper.h. What depends on the function's arguments is put together here, into
-// texts that do not.
+// pytorch_wrapper.cpp -- see pytorch_wrapper.h. Inserts the parts that depend on the function's arguments into fixed
+// texts.
 #include "aot/pytorch_wrapper.h"
 
 #include "aot/mangle.h"
@@ -37,7 +37,7 @@ std::string wrapper(const TorchFunction& function) {
   for (const ExportArgument& argument : function.outputs) add(argument);
   return filled(
       R"(
-// The function's code: 0, or that of an error. c10::Error for tensors that it cannot take.
+// Returns the function's code: 0 or an error code. Throws c10::Error for unsuitable tensors.
 inline int $name$_th_($parameters$) {
 $views$  return ::$name$($call$);
 }
