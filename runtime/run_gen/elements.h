@@ -17,7 +17,7 @@ using Image = Halide::Runtime::Buffer<void>;
 // "uint8", "float32", "bool", "handle"
 std::string type_name(halide_type_t type);
 
-// Calls f(T{}) with the C++ type of these elements; Problem for those of 16-bit floats and handles.
+// Calls f(T{}) with the C++ type of these elements. Throws Problem for 16-bit floats and handles.
 template <typename F>
 void with_type(halide_type_t type, F&& f) {
   const auto is = [&](halide_type_code_t code, int bits) {
@@ -37,7 +37,7 @@ void with_type(halide_type_t type, F&& f) {
   throw Problem("values of type " + type_name(type) + " cannot be made here");
 }
 
-// The text as a value of the type, to its last character; Problem when it is none.
+// Parses the whole text as a value of the type. Throws Problem if that fails.
 halide_scalar_value_t read_scalar(halide_type_t type, const std::string& text);
 
 }  // namespace retrograde::run_gen

@@ -71,7 +71,7 @@ Image read_tmp(const std::string& path) {
 
 // ---- .npy: version 1, as NumPy and debug_to_file write it ----
 
-// What stands behind 'key': in the header.
+// The value after 'key': in the header.
 std::string npy_field(const std::string& path, const std::string& header, const std::string& key) {
   const size_t at = header.find("'" + key + "':");
   if (at == std::string::npos) refuse(path, "has no " + key);
@@ -180,7 +180,7 @@ void write_pnm(const std::string& path, const Image& image) {
   if (!out.flush()) refuse(path, "cannot be written");
 }
 
-// ---- .png, of 8 bits ----
+// ---- .png, 8 bits ----
 
 #ifdef RETROGRADE_RUN_GEN_PNG
 struct PngImage {
@@ -238,7 +238,7 @@ void write_as_jpeg(const std::string& path, const Image& image) {
 
 // ---- types and dimensions ----
 
-// As fractions of the largest value, which floats hold as they are.
+// Converts as fractions of the type's largest value; floats already hold the fraction.
 template <typename To, typename From>
 To rescaled(From value) {
   double fraction = static_cast<double>(value);
@@ -272,7 +272,7 @@ Image converted(const Image& image, halide_type_t type, bool is_picture) {
   return result;
 }
 
-// Dimensions of extent 1 come and go at the end.
+// Adds or removes trailing dimensions of extent 1.
 Image with_dimensions(const std::string& path, Image image, int dimensions) {
   while (image.dimensions() > dimensions) {
     const int last = image.dimensions() - 1;

@@ -17,7 +17,7 @@ double read_seconds(const std::string& value) {
     size_t used = 0;
     const double seconds = std::stod(value, &used);
     if (used == value.size() && seconds > 0) return seconds;
-  } catch (const std::exception&) {  // the same message
+  } catch (const std::exception&) {  // falls through to the same message
   }
   throw Problem("--benchmark_min_time takes a number of seconds, not \"" + value + "\"");
 }

@@ -27,7 +27,7 @@ struct Calls {
   std::list<Failure> failures;
 };
 
-// function:nth:result,function:nth:result
+// Format: function:nth:result,function:nth:result
 void Calls::read_environment() {
   const char* text = std::getenv("RETROGRADE_SIMT_FAIL");
   std::istringstream entries(text ? text : "");
