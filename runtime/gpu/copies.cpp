@@ -11,7 +11,7 @@ namespace {
 
 constexpr int64_t max_pitch = 0x7fffffff;
 
-// Makes the destination's stride positive, and drops repeated copies to one element.
+// Reverses a dimension whose destination stride is negative.
 void normalize(Copy& copy, Copy::Dimension& dim) {
   if (dim.to_stride >= 0) return;
   copy.from += (dim.extent - 1) * dim.from_stride;

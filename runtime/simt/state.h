@@ -143,8 +143,8 @@ Result enqueue(StreamState&, std::function<Result()>);
 Result complete(ContextState&, const std::vector<OperationPtr>&);
 Result complete_all(ContextState&);
 Result complete_stream(StreamState&);
-// Refuses what may not be called while this thread, or anyone in global mode, captures, unless this
-// thread is in relaxed mode; the captures are invalid then.
+// Rejects calls that are forbidden while this thread, or any thread in global mode, captures, unless this thread is in
+// relaxed mode. A rejected call invalidates the captures.
 Result refuse_in_capture();
 Result refuse_on(StreamState&);  // rejects work that a captured stream forbids
 
