@@ -9,7 +9,7 @@ namespace bilateral_slice {
 
 namespace {
 
-// One photo, a folder of pairs, or a photo and a look: what is to be done must be one of them.
+// Checks that the options select exactly one task: one photo, a folder of pairs, or applying a look.
 void check_work(const Options& options) {
   if (options.pairs.empty() != options.input.empty() &&
       (options.apply.empty() || options.pairs.empty()))
@@ -22,7 +22,7 @@ void check_work(const Options& options) {
 
 }  // namespace
 
-// The identity is the same in each layer of the grid: what the guide says then makes no difference.
+// If the grid stays the identity, all its layers are equal, and then the guide has no effect.
 void check_groups(const Options& options) {
   if (options.resume && !options.start.empty()) {
     retrograde::call_error("understand the command line",
