@@ -16,7 +16,7 @@ using retrograde::text;
 
 namespace {
 
-// The groups named on the command line are known to CLI only as free text: this is what may be.
+// CLI takes the group names as free text; this checks them.
 void add_optimize_option(CLI::App& cli, CommonOptions& options,
                          const std::vector<std::string>& groups) {
   options.optimize = groups;

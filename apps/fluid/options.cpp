@@ -60,7 +60,7 @@ Solver solver_named(const std::string& name) {
                          "this is neither", "Give one of these names");
 }
 
-// What is optimized as a logarithm needs a start over 0.
+// A variable that is optimized as a logarithm needs a positive initial value.
 void require_start(const Options& o, const char* group, const char* option, double value) {
   if (!apps::optimizes(o.common, group) || value > 0) return;
   retrograde::call_error(
