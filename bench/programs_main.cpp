@@ -1,5 +1,5 @@
-// programs_main.cpp -- programs as users write them for Halide, compiled ahead of time by Halide 14
-// and by Retrograde and run in turn: see README.md.
+// programs_main.cpp -- programs as users write them for Halide, compiled ahead of time by Halide 14 and by Retrograde
+// and run in turns: see README.md.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <csignal>
@@ -68,7 +68,7 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--output", options.output, "the report, as JSON")->capture_default_str();
 }
 
-// False when only help was asked for.
+// Returns false if only help was requested.
 bool read(int argc, char** argv, Options& options) {
   CLI::App app("Programs as users write them, compiled ahead of time by Halide 14 and Retrograde.");
   add_options(app, options);
@@ -126,7 +126,7 @@ int run(const Options& options) {
 }  // namespace programs
 
 int main(int argc, char** argv) {
-  std::signal(SIGPIPE, SIG_IGN);  // a worker that has ended is an error of its program only
+  std::signal(SIGPIPE, SIG_IGN);  // a crashed worker is an error of its program only
   try {
     programs::Options options;
     return programs::read(argc, argv, options) ? programs::run(options) : 0;
