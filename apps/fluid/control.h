@@ -27,7 +27,7 @@ class Control {
   void keep_states(int slots);
   // Compiles everything and runs it once, so that all memory that it needs is allocated.
   void compile();
-  // Other starts of time step, viscosity and diffusion; `logarithms`: see Variables.
+  // Sets other initial values of time step, viscosity and diffusion; `logarithms`: see Variables.
   void start_from(const Physics& physics, bool logarithms);
 
   double loss(std::span<const double> x);
