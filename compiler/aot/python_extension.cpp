@@ -64,7 +64,7 @@ class BufferArgument {
       return false;
     is_viewed_ = true;
     if (!element_type_of(view_, &own_.type)) {
-      PyErr_Format(PyExc_TypeError, "%s holds elements of format \"%s\", which are no numbers of the machine", name,
+      PyErr_Format(PyExc_TypeError, "%s holds elements of format \"%s\", which is not a supported element type", name,
                    view_.format);
       return false;
     }

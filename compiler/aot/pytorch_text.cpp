@@ -262,12 +262,12 @@ inline double number_of(const char* function, const char* argument, const at::Te
 }
 [[noreturn]] inline void refuse_elsewhere(const char* name, Place place) {
   if (place == Place::host) {
-    TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot call \"", name, "\" on tensors of CUDA: its code is the CPU's; it was "
-                                "compiled for no GPU. Move the tensors with tensor.cpu(), or compile it with "
+    TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot call \"", name, "\" on CUDA tensors: it was compiled for the CPU "
+                                "only. Move the tensors with tensor.cpu(), or compile it with "
                                 "FEATURES cuda.");
   }
-  TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot call \"", name, "\" on tensors of the CPU: its code is a GPU's; it was "
-                              "compiled with FEATURES cuda. Move the tensors with tensor.cuda().");
+  TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot call \"", name, "\" on CPU tensors: it was compiled for GPUs, with "
+                              "FEATURES cuda. Move the tensors with tensor.cuda().");
   throw std::logic_error("not reached");
 }
 

@@ -176,11 +176,10 @@ void FunctionGenerator::make(const Atomic& s) {
   any_stmt(s.body, [&](const Stmt& part) { return (first = part.as<Store>()) != nullptr; });
   if (!first) return;
   if (device_) {
-    unsupported(
-        "update " + quoted(s.name) + " atomically on a GPU",
-        "a kernel updates one value of at most 64 bits at a time",
-        "the values of a Tuple, and several points, are updated together, which takes a lock",
-        "Reduce with rfactor, or update a Func for each value");
+    unsupported("update " + quoted(s.name) + " atomically on a GPU",
+                "a kernel updates one value of at most 64 bits at a time",
+                "updating a Tuple or several points together needs a lock",
+                "Reduce with rfactor, or update a Func for each value");
   }
   locked(s, *first);
 }

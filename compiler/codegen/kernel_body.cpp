@@ -40,7 +40,7 @@ llvm::Function* FunctionGenerator::generate_kernel(KernelUse& kernel) {
   statement(launch.body);
   if (c_.frame.error_exit) {
     unsupported("run " + quoted(launch.name) + " on a GPU", "a kernel cannot fail",
-                "a check stands in it", "Compute what is checked on the host");
+                "it contains a check", "Compute the checked values on the host");
   }
   c_.finish(nullptr);
   device_->finish(e_, function, site_metadata());

@@ -104,11 +104,11 @@ std::map<std::string, int64_t> local_bytes_by_kernel(std::string_view ptx) {
 }
 
 std::string local_memory_note(const std::string& kernel, int64_t bytes) {
-  return text("performance note: each thread of the kernel ", quoted(kernel), " keeps ", bytes,
-              " bytes in local memory, which is a part of the device's: places in arrays that are "
-              "known only when it runs have no registers. Unroll the loops over these arrays, make "
-              "them smaller, or compute the Func at a loop over blocks, which keeps it in shared "
-              "memory.");
+  return text(
+      "performance note: each thread of the kernel ", quoted(kernel), " keeps ", bytes,
+      " bytes in local memory, which is slow device memory: arrays cannot be in registers if "
+      "their indices are unknown at compile time. Unroll the loops over these arrays, make them "
+      "smaller, or compute the Func at a loop over blocks, which keeps it in shared memory.");
 }
 
 KernelCode compile_kernels(const ir::LoweredFunction& function, const Options& options) {

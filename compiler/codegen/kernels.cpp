@@ -47,7 +47,7 @@ std::string KernelSet::ptx() {
   const std::string unselectable = find_unselectable(unit.module());
   if (!unselectable.empty()) {
     unsupported("run a part of " + quoted(source_.name) + " on a GPU",
-                "kernels consist of what LLVM translates for NVPTX", unselectable,
+                "kernels contain only operations that LLVM can translate to PTX", unselectable,
                 "Compute that part on the host: leave out its gpu_ directives");
   }
   return part_minima(unit.emit_last(llvm::CodeGenFileType::AssemblyFile));

@@ -140,10 +140,11 @@ void refuse_sanitizers(const Target& target) {
     if (!target.has_feature(sanitizer)) continue;
     const std::string name = quoted(Target::feature_to_name(sanitizer));
     unsupported("generate code for target \"" + target.to_string() + "\"",
-                "generated code carries no checks of a sanitizer", "the target asks for " + name,
+                "generated code cannot contain this sanitizer's checks",
+                "the target asks for " + name,
                 "Leave out " + name +
-                    ": code without it links with programs that a sanitizer checks, and bounds "
-                    "are checked at every call");
+                    ": code without it can be linked with sanitized programs, and bounds are "
+                    "checked at every call");
   }
 }
 
@@ -151,8 +152,8 @@ void refuse_sanitizers(const Target& target) {
 void refuse_large_buffers(const Target& target) {
   if (!target.has_feature(F::LargeBuffers)) return;
   unsupported("generate code for target \"" + target.to_string() + "\"",
-              "the elements of a buffer are numbered in 31 bits",
-              "the target asks for \"large_buffers\", whose buffers have more",
+              "a buffer has at most 2147483647 elements",
+              "the target has the feature \"large_buffers\", which allows more",
               "Leave out \"large_buffers\", and process an image of 2147483648 elements or more in "
               "tiles, each a cropped() part of it");
 }

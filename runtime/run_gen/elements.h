@@ -34,7 +34,7 @@ void with_type(halide_type_t type, F&& f) {
   if (is(halide_type_uint, 64)) return f(uint64_t{});
   if (is(halide_type_float, 32)) return f(float{});
   if (is(halide_type_float, 64)) return f(double{});
-  throw Problem("values of type " + type_name(type) + " cannot be made here");
+  throw Problem("values of type " + type_name(type) + " are not supported");
 }
 
 // Parses the whole text as a value of the type. Throws Problem if that fails.

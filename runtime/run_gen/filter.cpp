@@ -98,7 +98,7 @@ void Call::set_scalar(Argument& argument) {
     argument.scalar = read_scalar(about.type, word);
     return;
   }
-  throw Problem("the generator says no " + text + " of \"" + about.name + "\"");
+  throw Problem("the generator sets no " + text + " for \"" + about.name + "\"");
 }
 
 // Generated functions use 31-bit element offsets, and HalideBuffer.h multiplies extents in 32 bits.
@@ -142,7 +142,7 @@ void Call::set_input(Argument& argument) {
     return;
   }
   if (argument.spec.from_estimate && !has_estimate)
-    throw Problem(std::string("the generator says no estimate of \"") + about.name + "\"");
+    throw Problem(std::string("the generator sets no estimate for \"") + about.name + "\"");
   argument.image = made_up(about, shape);
 }
 
@@ -199,7 +199,7 @@ std::vector<Image> Call::query() {
                                             : static_cast<void*>(&arguments_[i].scalar));
   }
   if (const int code = filter_.call(argv.data()))
-    throw Problem("asked for its sizes, the function returned the error code " +
+    throw Problem("the bounds query of the function returned the error code " +
                   std::to_string(code));
   return asked;
 }

@@ -47,7 +47,7 @@ BufferSpec read_buffer_spec(const std::string& text) {
   using Kind = BufferSpec::Kind;
   BufferSpec spec;
   const std::vector<std::string> parts = split(text, ':');
-  const Problem problem("\"" + text + "\" is no input: see --help");
+  const Problem problem("\"" + text + "\" is not an input; see --help");
   if (parts.size() == 1 && (text.front() == '[' || text == "auto" || text == "estimate" ||
                             text == "estimate_then_auto")) {
     spec.kind = Kind::Random;

@@ -96,9 +96,9 @@ void tell_timing(const Options& options, const std::string& name, const Timing& 
               << name << "  THROUGHPUT_MPIX_PER_SEC  " << rate << "\n";
     return;
   }
-  std::cout << "Benchmark for " << name << " gives as its best " << timing.best << " sec/iter (of "
+  std::cout << "Benchmark for " << name << ": best time " << timing.best << " sec/iter (of "
             << timing.samples << " samples of " << timing.iterations << " iterations)\n"
-            << "That is " << rate << " megapixels of output a second\n";
+            << "Throughput: " << rate << " megapixels of output per second\n";
 }
 
 void tell_memory(const Options& options, const std::string& name) {
