@@ -99,10 +99,10 @@ codegen::Export export_of(const internal::LoweredFunc& function, const Module& m
   return result;
 }
 
-// Collects the functions of `module`, which is `whole` or one of its submodules.
-void collect(const Module& module, const Module& whole,
+// Collects the functions of `module`, which is `root` or one of its submodules.
+void collect(const Module& module, const Module& root,
              std::vector<std::pair<internal::LoweredFunc, Module>>& found) {
-  const std::string asked = "compile the module " + quoted(whole.name());
+  const std::string asked = "compile the module " + quoted(root.name());
   for (const internal::LoweredFunc& function : module.functions()) {
     if (function.linkage == LinkageType::Internal) continue;
     for (const auto& [other, where] : found) {
@@ -114,7 +114,7 @@ void collect(const Module& module, const Module& whole,
   }
   for (const Module& submodule : module.submodules()) {
     if (submodule.target() == module.target()) {
-      collect(submodule, whole, found);
+      collect(submodule, root, found);
       continue;
     }
     unsupported(asked, "a module and its submodules are made for one target",

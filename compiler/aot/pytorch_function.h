@@ -24,7 +24,7 @@ struct TorchFunction {
 TorchFunction torch_function_of(const DeclaredFunction& declared, const Target& target);
 
 // The argument's name as a C++ identifier.
-std::string word(const std::string& name);
+std::string cpp_identifier(const std::string& name);
 std::string name_of(const ExportArgument& argument);
 // The tensor's element type: at::kFloat.
 std::string scalar_type(const ExportArgument& argument);

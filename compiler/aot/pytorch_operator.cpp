@@ -50,10 +50,10 @@ std::string shape_function(const TorchFunction& function, const ExportArgument& 
   std::string ranks;
   for (const ExportArgument& image : function.images) {
     ranks += text("  retrograde_torch::check_rank(\"", function.name, "\", \"", image.name, "\", ",
-                  word(image.name), ", ", image.dimensions, ");\n");
+                  cpp_identifier(image.name), ", ", image.dimensions, ");\n");
   }
   const std::string otherwise =
-      like ? "  const auto sizes = " + word(like->name) +
+      like ? "  const auto sizes = " + cpp_identifier(like->name) +
                  ".sym_sizes();\n  return {sizes.begin(), sizes.end()};"
            : "#error no input has the dimensions of the output: say its SHAPE";
   return filled(R"(
@@ -65,7 +65,7 @@ $otherwise$
 #endif
 }
 )",
-                {{"output", word(output.name)},
+                {{"output", cpp_identifier(output.name)},
                  {"parameters", listed(function.inputs, parameter)},
                  {"ranks", ranks},
                  {"otherwise", otherwise}});

@@ -81,13 +81,13 @@ Coordinate coordinate_of(const Frame& frame, const Expr& index) {
     const auto* name = e.as<Variable>();
     const auto known = name ? frame.coordinates.find(name->name) : frame.coordinates.end();
     if (known != frame.coordinates.end()) {
-      result.is_held |= known->second.is_held;
+      result.is_clamped |= known->second.is_clamped;
       return false;
     }
     const bool is_bound = e.kind() == Kind::Min || e.kind() == Kind::Max;
     const bool is_sum = e.kind() == Kind::Add || e.kind() == Kind::Sub || e.kind() == Kind::Mul;
     const bool is_leaf = e.kind() == Kind::Ramp || e.kind() == Kind::Broadcast;
-    result.is_held |= is_bound;
+    result.is_clamped |= is_bound;
     result.is_plain = is_bound || is_sum || is_leaf;
     return !is_leaf;
   });

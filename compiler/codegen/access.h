@@ -42,7 +42,7 @@ Instruction* tagged(Instruction* instruction, const Storage& storage) {
   return instruction;
 }
 
-// ---- loads.cpp, held_loads.cpp ----
+// ---- loads.cpp, clamped_loads.cpp ----
 
 Value* load(Values& values, const ir::Load& e);
 Value* load_dense(FunctionContext& c, const Storage& from, Type type, Value* first,
@@ -52,8 +52,8 @@ Value* gather_compactly(FunctionContext& c, const Storage& from, Type type, Valu
                         Value* predicate);
 // Loads a ramp that is clamped to an image's bounds. Null if the index has another form, or if a gather is equally fast
 // on this machine.
-Value* load_held(Values& values, const Storage& from, Type type, const Expr& index,
-                 Value* predicate);
+Value* load_clamped(Values& values, const Storage& from, Type type, const Expr& index,
+                    Value* predicate);
 
 // ---- stores.cpp, atomics.cpp ----
 

@@ -40,7 +40,7 @@ static bool is_costly(const Values& values, const Expr& arm) {
 }
 
 // The arm if any lane of `wanted` is true; else `otherwise`.
-static Value* value_where(Values& values, Value* wanted, const Expr& arm, Value* otherwise) {
+static Value* value_if_any_lane(Values& values, Value* wanted, const Expr& arm, Value* otherwise) {
   return values.c.value_if(
       any_lane(values.c.e, wanted), [&] { return values.of(arm); }, otherwise);
 }
@@ -52,8 +52,8 @@ Value* selected(Values& values, const Select& e) {
   Value* a = is_costly_a ? nullptr : values.of(e.when_true);
   Value* b = is_costly_b ? nullptr : values.of(e.when_false);
   const auto nothing = [&] { return llvm::Constant::getNullValue(llvm_type(values.c.e, e.type)); };
-  if (!a) a = value_where(values, condition, e.when_true, b ? b : nothing());
-  if (!b) b = value_where(values, values.c.b.CreateNot(condition), e.when_false, a);
+  if (!a) a = value_if_any_lane(values, condition, e.when_true, b ? b : nothing());
+  if (!b) b = value_if_any_lane(values, values.c.b.CreateNot(condition), e.when_false, a);
   return values.c.b.CreateSelect(condition, a, b);
 }
 

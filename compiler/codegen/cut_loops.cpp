@@ -239,7 +239,7 @@ void cut(llvm::Function& function, unsigned longest) {
 }
 
 // LLVM's passes do not need them.
-void drop_marks(llvm::Module& module) {
+void drop_lifetime_markers(llvm::Module& module) {
   for (llvm::Function& function : module) {
     for (llvm::Instruction& one : llvm::make_early_inc_range(llvm::instructions(function))) {
       if (one.isLifetimeStartOrEnd()) one.eraseFromParent();
@@ -256,7 +256,7 @@ void cut_loops(llvm::Module& module) {
     if (!function.isDeclaration()) functions.push_back(&function);
   }
   for (llvm::Function* function : functions) cut(*function, longest);
-  drop_marks(module);
+  drop_lifetime_markers(module);
 }
 
 }  // namespace retrograde::codegen

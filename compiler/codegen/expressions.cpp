@@ -22,15 +22,14 @@ Value* Values::known(Memo MemoFrame::*memo, const Expr& e) const {
   return nullptr;
 }
 
-Value* Values::remembered(Memo MemoFrame::*memo, const Expr& e,
-                          Value* (Values::*make)(const Expr&)) {
+Value* Values::memoised(Memo MemoFrame::*memo, const Expr& e, Value* (Values::*make)(const Expr&)) {
   if (Value* value = known(memo, e)) return value;
   Value* result = (this->*make)(e);
   if (e.kind() != Kind::Variable) (c.frame.memo.back().*memo)[e.get()] = {e, result};
   return result;
 }
 
-Value* Values::of(const Expr& e) { return remembered(&MemoFrame::values, e, &Values::make_value); }
+Value* Values::of(const Expr& e) { return memoised(&MemoFrame::values, e, &Values::make_value); }
 
 Value* Values::alone(const Expr& e) {
   const MemoScope scope(c.frame, false);
@@ -186,7 +185,7 @@ Value* Values::make(const VectorReduce& e) {
   if (e.type.is_bool() && e.type.is_scalar() && e.op == Kind::Or) return any_lane(c.e, of(e.value));
   if (e.type.is_bool() && e.type.is_scalar() && e.op == Kind::And)
     return c.b.CreateNot(any_lane(c.e, c.b.CreateNot(of(e.value))));
-  return reduce_groups(c.e, reduced_in_part(*this, e), e.type.lanes(), [&](Value* a, Value* b) {
+  return reduce_groups(c.e, partly_reduced(*this, e), e.type.lanes(), [&](Value* a, Value* b) {
     return binary(c.e, e.op, element.with_lanes(lanes_of(a)), a, b);
   });
 }
@@ -194,7 +193,7 @@ Value* Values::make(const VectorReduce& e) {
 // ---- indices ----
 
 Value* Values::index64(const Expr& e) {
-  return remembered(&MemoFrame::indices, e, &Values::make_index64);
+  return memoised(&MemoFrame::indices, e, &Values::make_index64);
 }
 
 Value* Values::make_index64(const Expr& e) {

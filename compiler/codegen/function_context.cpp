@@ -28,7 +28,7 @@ void FunctionContext::finish(Value* code) {
   Value* count = int64(frame.owned_count);
   if (frame.error_exit) {
     b.SetInsertPoint(frame.error_exit);
-    for (auto due = frame.farewells.rbegin(); due != frame.farewells.rend(); ++due)
+    for (auto due = frame.exit_calls.rbegin(); due != frame.exit_calls.rend(); ++due)
       call_runtime(due->function, b.getInt32Ty(), {b.CreateLoad(b.getPtrTy(), due->argument)});
     if (frame.owned_slots)
       call_runtime("retrograde_free_all", b.getVoidTy(), {frame.owned_slots, count});
@@ -40,7 +40,7 @@ void FunctionContext::finish(Value* code) {
     b.CreateMemSet(frame.owned_slots, b.getInt8(0), static_cast<uint64_t>(8 * frame.owned_count),
                    llvm::Align(8));
   }
-  for (const auto& due : frame.farewells) b.CreateStore(null_pointer(), due.argument);
+  for (const auto& due : frame.exit_calls) b.CreateStore(null_pointer(), due.argument);
   b.CreateBr(&*std::next(frame.function->begin()));
 }
 

@@ -36,7 +36,7 @@ struct MemoFrame {
 
 // The form of an index vector. Plain: only sums, minima and maxima of ramps. Held: some of them are clamped to a bound.
 struct Coordinate {
-  bool is_plain, is_held;
+  bool is_plain, is_clamped;
   Expr index;
 };
 struct LinearIndex {  // lane i is base + i * stride, the base a scalar
@@ -56,11 +56,11 @@ struct Frame {
   int64_t owned_count = 0;
   // A runtime function to call if the function exits early, so that the profiler learns of it. `argument` holds the
   // call's argument while the call is due, else null.
-  struct Farewell {
+  struct ExitCall {
     std::string function;
     llvm::AllocaInst* argument;
   };
-  std::vector<Farewell> farewells;
+  std::vector<ExitCall> exit_calls;
   int64_t stack_bytes = 0;  // used by allocations
   std::array<llvm::AllocaInst*, 2> scratch = {};
   std::vector<MemoFrame> memo;

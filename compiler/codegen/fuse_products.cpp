@@ -43,7 +43,7 @@ llvm::Value* fused(llvm::Instruction& sum, llvm::BinaryOperator*& product) {
   return fma(build, first, product->getOperand(1), a);
 }
 
-llvm::Value* whole(llvm::Instruction& one) {
+llvm::Value* expanded_fmuladd(llvm::Instruction& one) {
   const auto* call = llvm::dyn_cast<llvm::IntrinsicInst>(&one);
   if (!call || call->getIntrinsicID() != llvm::Intrinsic::fmuladd) return nullptr;
   llvm::IRBuilder<> build(&one);
@@ -56,7 +56,7 @@ void fuse_products(llvm::Function& function) {
   for (llvm::Instruction& one : llvm::make_early_inc_range(llvm::instructions(function))) {
     llvm::BinaryOperator* product = nullptr;
     llvm::Value* instead = fused(one, product);
-    if (!instead) instead = whole(one);
+    if (!instead) instead = expanded_fmuladd(one);
     if (!instead) continue;
     one.replaceAllUsesWith(instead);
     one.eraseFromParent();

@@ -5,7 +5,7 @@
 #include "codegen/device_math.h"
 #include "codegen/function_generator.h"
 #include "codegen/fuse_products.h"
-#include "codegen/part_minima.h"
+#include "codegen/nested_minima.h"
 #include "codegen/selectable.h"
 #include "codegen/unit.h"
 #include "diagnostics/error.h"
@@ -50,7 +50,7 @@ std::string KernelSet::ptx() {
                 "kernels contain only operations that LLVM can translate to PTX", unselectable,
                 "Compute that part on the host: leave out its gpu_ directives");
   }
-  return part_minima(unit.emit_last(llvm::CodeGenFileType::AssemblyFile));
+  return rewrite_nested_minima(unit.emit_last(llvm::CodeGenFileType::AssemblyFile));
 }
 
 void KernelSet::compile_for_executor(std::vector<llvm::Function*>& functions) {

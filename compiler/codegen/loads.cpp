@@ -117,8 +117,8 @@ Value* load_apart(FunctionContext& c, const Storage& from, Type type, Value* fir
 
 // Gives inactive lanes the index of the first active one, so that every lane may load. This takes one branch instead of
 // one per lane.
-Value* where_any(FunctionContext& c, Type type, Value* indices, Value* predicate,
-                 const std::function<Value*(Value* safe)>& load) {
+Value* load_if_any_lane(FunctionContext& c, Type type, Value* indices, Value* predicate,
+                        const std::function<Value*(Value* safe)>& load) {
   return c.value_if(any_lane(c.e, predicate), [&] {
     Value* bits = c.b.CreateBitCast(predicate, c.b.getIntNTy(static_cast<unsigned>(type.lanes())));
     Value* first = c.b.CreateBinaryIntrinsic(llvm::Intrinsic::cttz, bits, c.b.getTrue());
@@ -132,8 +132,8 @@ Value* gather(FunctionContext& c, const Storage& from, Type type, Value* indices
 
 // Pads a gather of an odd width. LLVM would pad it with undefined indices, and may then assign them the register of the
 // result, which the machine forbids. Here the padding lanes are inactive and have the index of the first lane.
-Value* gather_filled_up(FunctionContext& c, const Storage& from, Type type, Value* indices,
-                        Value* mask) {
+Value* gather_padded(FunctionContext& c, const Storage& from, Type type, Value* indices,
+                     Value* mask) {
   const int lanes = type.lanes(), full = static_cast<int>(std::bit_ceil(unsigned(lanes)));
   std::vector<int> index_picks, mask_picks;
   for (int i = 0; i < full; i++) {
@@ -150,13 +150,13 @@ Value* gather_filled_up(FunctionContext& c, const Storage& from, Type type, Valu
 Value* gather(FunctionContext& c, const Storage& from, Type type, Value* indices,
               Value* predicate) {
   if (predicate && !c.e.machine.gathers(type)) {
-    return where_any(c, type, indices, predicate,
-                     [&](Value* safe) { return gather(c, from, type, safe, nullptr); });
+    return load_if_any_lane(c, type, indices, predicate,
+                            [&](Value* safe) { return gather(c, from, type, safe, nullptr); });
   }
   if (predicate || (c.e.machine.gathers(type) && c.e.machine.gathers_fast)) {
     if (!std::has_single_bit(unsigned(type.lanes()))) {
       Value* all = splat(c.e, c.b.getTrue(), type.lanes());
-      return gather_filled_up(c, from, type, indices, predicate ? predicate : all);
+      return gather_padded(c, from, type, indices, predicate ? predicate : all);
     }
     auto* vector = with_lanes(memory_type(c.e, type), type.lanes());
     Value* pointers = element_pointer(c.e, from, type, indices);
@@ -220,8 +220,8 @@ Value* gather_in_loop(FunctionContext& c, const Storage& from, Type type, Value*
 Value* gather_compactly(FunctionContext& c, const Storage& from, Type type, Value* indices,
                         Value* predicate) {
   if (!predicate) return gather_in_loop(c, from, type, indices);
-  return where_any(c, type, indices, predicate,
-                   [&](Value* safe) { return gather_in_loop(c, from, type, safe); });
+  return load_if_any_lane(c, type, indices, predicate,
+                          [&](Value* safe) { return gather_in_loop(c, from, type, safe); });
 }
 
 namespace {
@@ -267,8 +267,8 @@ Value* load_vector(Values& values, const Storage& from, Type type, const Expr& i
     return load_apart(c, from, type, values.index64(ramp->base), values.index64(ramp->stride));
   const std::vector<Expr> pieces = pieces_of(index);
   const Coordinate at = coordinate_of(c.frame, index);
-  if (pieces.empty() && at.is_plain && at.is_held && type.lanes() >= min_loop_lanes) {
-    if (Value* loaded = load_held(values, from, type, index, predicate)) return loaded;
+  if (pieces.empty() && at.is_plain && at.is_clamped && type.lanes() >= min_loop_lanes) {
+    if (Value* loaded = load_clamped(values, from, type, index, predicate)) return loaded;
     if (!c.e.machine.gathers(type))
       return gather_compactly(c, from, type, values.index_vector(index), predicate);
   }

@@ -18,7 +18,7 @@ bool is_long(const Stmt& body) { return body.defined() && !has_at_most_nodes(bod
 
 // A loop inside a profiled region stays, because the profiler is notified by the function that contains it.
 bool FunctionGenerator::is_worth_a_function(const For& s) const {
-  return is_long_ && loops_around_ == 0 && !device_ && c_.frame.farewells.empty() &&
+  return is_long_ && loops_around_ == 0 && !device_ && c_.frame.exit_calls.empty() &&
          !has_at_most_nodes(Stmt(&s), least_loop);
 }
 

@@ -17,7 +17,7 @@ constexpr int min_lanes = 8;
 // Longer sums are left alone. So a sum of shared sums costs no more than this to analyse.
 constexpr size_t max_terms = 64;
 
-Value* reduced_in_part(Values& values, const VectorReduce& e) {
+Value* partly_reduced(Values& values, const VectorReduce& e) {
   const bool has_pairs = e.value.type().lanes() / e.type.lanes() % 2 == 0;
   if (e.op == Kind::Add && has_pairs && values.c.e.machine.is_x86()) {
     if (const auto product = as_narrow_product(e.value))

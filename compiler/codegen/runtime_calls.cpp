@@ -22,15 +22,15 @@ constexpr PairedCall paired_calls[] = {
 };
 
 // Ensures that an early exit also ends what a paired call has begun.
-void keep_farewell(FunctionContext& c, const std::string& name, Value* result) {
+void record_exit_call(FunctionContext& c, const std::string& name, Value* result) {
   for (const PairedCall& call : paired_calls) {
     if (name == call.begins) {
-      c.frame.farewells.push_back({call.ends, c.entry_alloca(c.b.getPtrTy(), 1, "due")});
-      c.b.CreateStore(result, c.frame.farewells.back().argument);
+      c.frame.exit_calls.push_back({call.ends, c.entry_alloca(c.b.getPtrTy(), 1, "due")});
+      c.b.CreateStore(result, c.frame.exit_calls.back().argument);
     }
     if (name != call.ends) continue;
     // Calls are nested, so this ends the latest one that is still due.
-    for (auto due = c.frame.farewells.rbegin(); due != c.frame.farewells.rend(); ++due) {
+    for (auto due = c.frame.exit_calls.rbegin(); due != c.frame.exit_calls.rend(); ++due) {
       if (due->function != name) continue;
       c.b.CreateStore(c.null_pointer(), due->argument);
       break;
@@ -62,7 +62,7 @@ Value* runtime_call(Values& values, const Call& e) {
     args.push_back(values.of(e.args[i]));
   }
   Value* result = c.call_runtime(name->value, llvm_type(c.e, e.type), args);
-  keep_farewell(c, name->value, result);
+  record_exit_call(c, name->value, result);
   return result;
 }
 

@@ -30,7 +30,7 @@ class Values {
  private:
   Value* known(Memo MemoFrame::*memo, const Expr& e) const;
   // The node's known value, or else the result of `make`, which is then recorded.
-  Value* remembered(Memo MemoFrame::*memo, const Expr& e, Value* (Values::*make)(const Expr&));
+  Value* memoised(Memo MemoFrame::*memo, const Expr& e, Value* (Values::*make)(const Expr&));
   Value* make_value(const Expr& e);
   Value* make_index64(const Expr& e);
   Value* make_immediate(const Expr& e);
@@ -45,9 +45,9 @@ class Values {
 
 // ---- special forms that have better code than node-by-node translation ----
 
-// narrow_products.cpp. reduced_in_part: the operand of the reduction, partly reduced already. sum_of_products: the sum
+// narrow_products.cpp. partly_reduced: the operand of the reduction, partly reduced already. sum_of_products: the sum
 // if it has products to be added in pairs, else null.
-Value* reduced_in_part(Values& values, const ir::VectorReduce& e);
+Value* partly_reduced(Values& values, const ir::VectorReduce& e);
 Value* sum_of_products(Values& values, const Expr& e);
 // strong_products.cpp: the sum if it contains a strong product that may fuse, else null.
 Value* sum_with_strong_product(Values& values, const ir::Binary& e);

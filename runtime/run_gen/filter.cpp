@@ -114,7 +114,7 @@ void check_elements(const std::string& name, const std::vector<int>& extents) {
   }
 }
 
-Image made_up(const halide_filter_argument_t& about, const Shape& shape) {
+Image generated_image(const halide_filter_argument_t& about, const Shape& shape) {
   if (static_cast<int>(shape.extents.size()) != about.dimensions) {
     throw Problem(std::string("\"") + about.name + "\" has " + std::to_string(about.dimensions) +
                   " dimensions; " + std::to_string(shape.extents.size()) + " extents were given");
@@ -143,7 +143,7 @@ void Call::set_input(Argument& argument) {
   }
   if (argument.spec.from_estimate && !has_estimate)
     throw Problem(std::string("the generator sets no estimate for \"") + about.name + "\"");
-  argument.image = made_up(about, shape);
+  argument.image = generated_image(about, shape);
 }
 
 void Call::set_output(Argument& argument) {
@@ -156,7 +156,7 @@ void Call::set_output(Argument& argument) {
   else
     shape.extents = read_extents(*options_.output_extents);
   argument.is_wanted = *options_.output_extents != "estimate" || !shape.extents.empty();
-  if (argument.is_wanted) argument.image = made_up(about, shape);
+  if (argument.is_wanted) argument.image = generated_image(about, shape);
 }
 
 // ---- shapes ----
@@ -176,7 +176,7 @@ void Call::guess_outputs() {
       shape.mins.push_back(is_there ? largest->dim(d).min() : 0);
       shape.extents.push_back(is_there ? largest->dim(d).extent() : largest ? 1 : plain);
     }
-    a.image = made_up(*a.about, shape);
+    a.image = generated_image(*a.about, shape);
   }
 }
 

@@ -13,7 +13,7 @@ Result begin_call(const char* function);
 int64_t call_count(const char* function);
 const char* function_name(int32_t index);
 void add_failure(const char* function, int64_t nth, Result);
-int32_t call_off_failures();
+int32_t cancel_failures();
 
 template <typename Work>
 Result call(const char* function, Work work) {

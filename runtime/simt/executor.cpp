@@ -156,7 +156,7 @@ void Executor::run_waiting_block() {
     if (options_.order == retrograde_simt_warp_ahead) run_ahead();
     run_round(0, count_);
     if (!is_running()) return;
-    if (!let_go()) explain_waiting();
+    if (!let_go()) report_deadlock();
   }
 }
 

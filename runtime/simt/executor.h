@@ -73,7 +73,7 @@ class Executor {
   // ---- errors ----
   void fail(Result, const std::string& text);
   void fail_in_kernel(Result, const std::string& text);
-  void explain_waiting();
+  void report_deadlock();
   std::string statement(int32_t site) const;
   std::string name_of(const Moment&) const;
   std::string name_of(const ThreadState&) const;

@@ -79,7 +79,7 @@ void Executor::fail_in_kernel(Result result, const std::string& text) {
 
 // Reports a deadlock: the first thread that waits, and another thread that should wait for the same barrier and does
 // not.
-void Executor::explain_waiting() {
+void Executor::report_deadlock() {
   const ThreadState *all = threads_.get(), *all_end = all + count_;
   const auto* first =
       std::find_if(all, all_end, [](const ThreadState& t) { return t.wait != Wait::ended; });

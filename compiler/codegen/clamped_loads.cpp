@@ -90,13 +90,13 @@ std::optional<bool> climbs(const Frame& frame, const Expr& e, int& room) {
 }
 
 // The coordinate without its uniform terms. Loops that change only those terms keep the rest invariant.
-Expr climbing_part(const Frame& frame, const Expr& e) {
+Expr varying_part(const Frame& frame, const Expr& e) {
   if (const auto* name = e.as<Variable>())
-    return climbing_part(frame, frame.coordinates.at(name->name).index);
+    return varying_part(frame, frame.coordinates.at(name->name).index);
   if (e.kind() != Kind::Add && e.kind() != Kind::Sub) return e;
   const auto* n = e.as<Binary>();
   int room = most_coordinate_nodes;
-  return climbing_part(frame, *climbs(frame, n->a, room) ? n->a : n->b);
+  return varying_part(frame, *climbs(frame, n->a, room) ? n->a : n->b);
 }
 
 // The first and last lane whose predicate is true. If there is none, the values are still valid lanes.
@@ -129,11 +129,11 @@ Value* at_lane(Values& values, const Expr& e, Value* lane) {
 }
 
 // Loads the lanes from `start` on, in a type that fills a register.
-Value* load_spread(Values& values, const Storage& from, Type type, const Expr& index, int start,
-                   Value* predicate) {
+Value* load_and_permute(Values& values, const Storage& from, Type type, const Expr& index,
+                        int start, Value* predicate) {
   FunctionContext& c = values.c;
   const int lanes = type.lanes();
-  const Expr climbing = climbing_part(c.frame, index);
+  const Expr climbing = varying_part(c.frame, index);
   Value* base = at_lane(values, climbing, c.b.getInt32(static_cast<uint32_t>(start)));
   llvm::Type* number = c.b.getIntNTy(static_cast<unsigned>(8 * type.bytes()));
   const auto step_at = [&](Value* lane) {
@@ -178,8 +178,8 @@ Value* load_dense_or_gather(Values& values, const Storage& from, Type type, cons
 
 }  // namespace
 
-Value* load_held(Values& values, const Storage& from, Type type, const Expr& index,
-                 Value* predicate) {
+Value* load_clamped(Values& values, const Storage& from, Type type, const Expr& index,
+                    Value* predicate) {
   FunctionContext& c = values.c;
   int room = most_coordinate_nodes;
   if (index.type().element_of() != Int(32) || !climbs(c.frame, index, room).value_or(false))
@@ -190,7 +190,7 @@ Value* load_held(Values& values, const Storage& from, Type type, const Expr& ind
     std::vector<Value*> parts;
     for (int start = 0; start < lanes; start += piece) {
       Value* mask = predicate ? slice(c.e, predicate, start, piece) : nullptr;
-      parts.push_back(load_spread(values, from, type.with_lanes(piece), index, start, mask));
+      parts.push_back(load_and_permute(values, from, type.with_lanes(piece), index, start, mask));
     }
     return concat(c.e, parts);
   }

@@ -1,4 +1,4 @@
-// part_minima.h -- works around a bug of ptxas: rewrites PTX so that no signed minimum reads the result of another
+// nested_minima.h -- works around a bug of ptxas: rewrites PTX so that no signed minimum reads the result of another
 // signed minimum. The same holds for maxima.
 //
 // ptxas combines two such instructions to one with three operands (VIMNMX3, from sm_90 on) and drops the sign of a
@@ -12,6 +12,6 @@
 
 namespace retrograde::codegen {
 
-std::string part_minima(const std::string& ptx);
+std::string rewrite_nested_minima(const std::string& ptx);
 
 }  // namespace retrograde::codegen

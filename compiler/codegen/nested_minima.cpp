@@ -1,4 +1,4 @@
-#include "codegen/part_minima.h"
+#include "codegen/nested_minima.h"
 
 #include <algorithm>
 #include <array>
@@ -63,7 +63,7 @@ std::set<string_view> results_of(const Kind& kind, const std::vector<Instruction
   return registers;
 }
 
-void add_parted(const Instruction& one, const Kind& kind, std::string& out) {
+void add_unsigned(const Instruction& one, const Kind& kind, std::string& out) {
   const auto line = [&](std::initializer_list<string_view> parts) {
     out += "\t";
     for (const string_view part : parts) out += part;
@@ -87,19 +87,19 @@ void add_function(const std::vector<string_view>& lines, std::string& out) {
   for (size_t k = 0; k < kinds.size(); ++k) results[k] = results_of(kinds[k], function);
   for (size_t i = 0; i < lines.size(); ++i) {
     const Instruction& one = function[i];
-    bool is_parted = false;
-    for (size_t k = 0; k < kinds.size() && !is_parted; ++k) {
-      is_parted = is_of(one, kinds[k]) &&
-                  (results[k].count(one.operands[1]) > 0 || results[k].count(one.operands[2]) > 0);
-      if (is_parted) add_parted(one, kinds[k], out);
+    bool is_rewritten = false;
+    for (size_t k = 0; k < kinds.size() && !is_rewritten; ++k) {
+      is_rewritten = is_of(one, kinds[k]) && (results[k].count(one.operands[1]) > 0 ||
+                                              results[k].count(one.operands[2]) > 0);
+      if (is_rewritten) add_unsigned(one, kinds[k], out);
     }
-    if (!is_parted) out.append(lines[i]).append("\n");
+    if (!is_rewritten) out.append(lines[i]).append("\n");
   }
 }
 
 }  // namespace
 
-std::string part_minima(const std::string& ptx) {
+std::string rewrite_nested_minima(const std::string& ptx) {
   std::string out;
   std::vector<string_view> function;
   for (string_view rest = ptx; !rest.empty();) {
