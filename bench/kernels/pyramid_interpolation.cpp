@@ -33,8 +33,8 @@ Pixel pulled(const Func& fine, Var x, Var y) {
   return sum * (1.0f / max(sum.trust, 1.0f));
 }
 
-// Centres of coarse pixels lie between those of fine ones. Of the two next to a fine pixel, the nearer one counts three
-// times as much (biquadratic B-splines).
+// Centres of coarse pixels lie between those of fine ones. The nearer of the two centres next to a fine pixel counts
+// three times as much (biquadratic B-splines).
 Pixel mixed(const Pixel& nearer, const Pixel& farther) { return nearer * 0.75f + farther * 0.25f; }
 Expr farther(Var x) { return x / 2 + 2 * (x % 2) - 1; }
 

@@ -63,7 +63,7 @@ double terms_of(const Func& f, int update) {
 }
 
 constexpr double many_terms =
-    16384;  // a sum of so many is a vector of sums along its first variable
+    16384;  // from this many terms on, a sum is a vector of partial sums along its first variable
 
 void schedule_sum(Func& f, int update, int lanes);
 

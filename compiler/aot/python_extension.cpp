@@ -95,7 +95,7 @@ class BufferArgument {
   void is_new_on_host() {
     if (!raw_) own_.set_host_dirty(true);
   }
-  // Frees the device memory that the call allocated for an array.
+  // Copies a written array back from the device, and frees the device memory that the call allocated for it.
   int back_to_host(bool is_written) {
     const int result = is_written ? halide_copy_to_host(nullptr, get()) : 0;
     if (!raw_) halide_device_free(nullptr, get());

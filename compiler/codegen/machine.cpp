@@ -76,7 +76,7 @@ void initialize_llvm() {
     set_option("nvptx-short-ptr",
                true);  // 32-bit pointers to shared, constant and local memory
     // This pass moves integers to mask registers and gains nothing here. It takes time quadratic in the length of a
-    // function: half of the code generator's time for the gradient of forty steps of a wave.
+    // function, and took half of the time for the gradient of forty steps of a wave.
     set_option("disable-x86-domain-reassignment", true);
   });
 }

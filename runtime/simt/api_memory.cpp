@@ -118,7 +118,7 @@ bool attribute_of(Address address, int attribute, void* value) {
   return true;
 }
 
-// Runs `work` on a stream. Rejects it if another stream's capture forbids it.
+// Runs `work` on a stream. Rejects the call if it would involve a stream that is being captured in this context.
 template <typename Work>
 Result copy_on(const char* function, Stream handle, Work work) {
   return call_on_stream(function, handle, [&](StreamState& stream) -> Result {

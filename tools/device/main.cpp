@@ -65,7 +65,7 @@ struct Arguments {
 double number(const std::string& flag, const std::string& text) {
   char* end = nullptr;
   const double value = std::strtod(text.c_str(), &end);
-  if (text.empty() || *end || !(value >= 0)) usage(flag + " wants a number, not \"" + text + "\"");
+  if (text.empty() || *end || !(value >= 0)) usage(flag + " needs a number, not \"" + text + "\"");
   return value;
 }
 
@@ -77,7 +77,7 @@ Arguments arguments_of(int argc, char** argv) {
       result.is_simulated = true;
       continue;
     }
-    if (i + 1 == argc) usage(flag + " is no flag, or wants a value");
+    if (i + 1 == argc) usage(flag + " is not a flag, or needs a value");
     const std::string value = argv[++i];
     if (flag == "--output")
       result.output = value;
@@ -273,7 +273,7 @@ class Check {
       told["modules"].push_back(record.name);
       told["compiled"] = told["compiled"].get<int64_t>() + std::ranges::count(record.bytes, '\n');
     }
-    if (told["modules"].empty()) problem("of the kernels of every operator none was compiled");
+    if (told["modules"].empty()) problem("no kernel of any operator was compiled");
     std::cout << "  " << told["compiled"] << " kernels in " << told["modules"].size() << " modules"
               << std::endl;
   }
@@ -299,7 +299,7 @@ class Check {
       std::ranges::move(told.records, std::back_inserter(all));
       if (told.ended.succeeded()) continue;
       problem(part + " end early on " + where +
-              (told.ended.timed_out ? ", its time was over" : "") + ", status " +
+              (told.ended.timed_out ? ", its time limit was reached" : "") + ", status " +
               std::to_string(told.ended.status) + ": " + told.ended.err);
     }
     return all;
@@ -348,7 +348,7 @@ class Check {
       words.insert(words.end(), own.begin(), own.end());
       const Ended ended = run_child(words, environment(), std::min(60.0, seconds_left() / 4));
       std::string verdict = ended.succeeded() ? "clean"
-                            : ended.timed_out ? "its time was over"
+                            : ended.timed_out ? "time limit reached"
                                               : "findings";
       if (verdict == "findings")
         problem(std::string(tool) + ": " + ended.out.substr(0, 2000) + ended.err);
