@@ -169,10 +169,10 @@ OIIO::TypeDesc stored_type(const std::filesystem::path& path, const std::string&
     return OIIO::TypeDesc::FLOAT;
   if (suffix == ".png") return bits > 8 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8;
   if (suffix == ".jpg" || suffix == ".jpeg") return OIIO::TypeDesc::UINT8;
-  retrograde::call_error(text("write ", retrograde::quoted(path.string())),
-                         "an image's suffix says how it is stored",
-                         suffix.empty() ? "it has none" : text("nothing is known of ", suffix),
-                         "Give .png, .exr, .tif, .hdr or .jpg");
+  retrograde::call_error(
+      text("write ", retrograde::quoted(path.string())), "an image's suffix selects its format",
+      suffix.empty() ? "it has none" : text("the format ", suffix, " is unknown"),
+      "Give .png, .exr, .tif, .hdr or .jpg");
 }
 
 [[noreturn]] void refuse_encoding(const std::filesystem::path& path, const std::string& suffix,
@@ -262,7 +262,7 @@ std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder
   if (!found.empty()) return found;
   retrograde::call_error(text("read images of ", retrograde::quoted(folder.string())),
                          "it must be a folder with images in it",
-                         failed ? failed.message() : std::string("none of its files is one"),
+                         failed ? failed.message() : std::string("none of its files is an image"),
                          "Give a folder of photographs");
 }
 

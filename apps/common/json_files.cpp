@@ -72,7 +72,7 @@ std::string read_json(const std::filesystem::path& path, nlohmann::json& to) {
   const std::string bytes = bytes_of(file);
   if (bytes.size() > most_bytes) return text("it has more than ", most_bytes, " bytes");
   if (const size_t end = end_of_text(bytes); end < bytes.size())
-    return text("it is a binary file: byte ", end + 1, " of it is no part of a text");
+    return text("it is a binary file: byte ", end + 1, " is not text");
   try {
     to = nlohmann::json::parse(bytes);
   } catch (const nlohmann::json::exception& error) {

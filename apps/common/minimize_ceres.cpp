@@ -74,7 +74,7 @@ void run_ceres(MinimizeRun& run, std::vector<double> x) {
     ceres::Solve(options, problem, x.data(), &summary);
     if (run.ended()) return;
     if (summary.termination_type == ceres::CONVERGENCE) return run.end("it converged");
-    if (!(run.found().loss < before)) return run.end("no step along the line is lower");
+    if (!(run.found().loss < before)) return run.end("the line search found no decrease");
     x = run.found().x;
   }
 }

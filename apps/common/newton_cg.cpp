@@ -94,7 +94,7 @@ void run_newton_cg(MinimizeRun& run, Vector x) {
       // As a last resort, go downhill.
       const Vector product = run.product(x, g);
       if (!search_along(run, x, loss, g, downhill(g, inner_product(g, product))))
-        return run.end("no step along the line is lower");
+        return run.end("the line search found no decrease");
     }
   } while (!run.ends_after_step(loss, g));
 }

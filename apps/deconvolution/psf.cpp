@@ -179,7 +179,7 @@ Psf psf_of(const std::string& description) {
   const std::string rest = description.substr(colon + 1);
   const size_t second = rest.find(':');
   const auto first = number_of(rest.substr(0, second));
-  if (!first) refuse(description, text(quoted(rest.substr(0, second)), " is no number"));
+  if (!first) refuse(description, text(quoted(rest.substr(0, second)), " is not a number"));
   if (kind == "disc") {
     if (!(*first > 0 && *first <= most_psf_size / 2))
       refuse(description, text("its radius is ", *first, " pixels"));
@@ -192,7 +192,7 @@ Psf psf_of(const std::string& description) {
   if (second == std::string::npos) return motion_path(size, 1);
   const auto seed = number_of(rest.substr(second + 1));
   if (!seed || *seed < 0 || *seed > 1e15 || *seed != std::floor(*seed))
-    refuse(description, text(quoted(rest.substr(second + 1)), " is no seed"));
+    refuse(description, text(quoted(rest.substr(second + 1)), " is not a seed"));
   return motion_path(size, static_cast<uint64_t>(*seed));
 }
 

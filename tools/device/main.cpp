@@ -320,7 +320,7 @@ class Check {
     const std::vector<Record> other = records_of(part, "the executor", here);
     const Agreement agreement = compare(own, other);
     for (const std::string& text : agreement.problems) problem(text);
-    if (agreement.compared == 0) problem("of the " + part + " none was compared");
+    if (agreement.compared == 0) problem("nothing was compared in the part " + part);
     std::cout << "  " << agreement.compared << " compared bit for bit, " << agreement.refused
               << " refused by the compiler, " << agreement.problems.size() << " problems"
               << std::endl;
