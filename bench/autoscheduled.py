@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""autoscheduled.py -- the kernels, scheduled by the built-in autoscheduler, beside the newest Halide's
-autoschedulers and our own schedules by hand, in one run.
+"""autoscheduled.py -- compares our autoscheduler, Halide's autoschedulers and schedules by hand on the kernels.
+
+All of them run in turn, in one run.
 
     autoscheduled.py PROGRAMS [--kernel NAME]... [--rounds N] [--threads N] [--no-halide] [--output FILE]
 
-PROGRAMS is the folder of bench_kernels_retrograde and bench_machine. Halide is the wheel of the Python
-package index, as operators/operators.py has it: each of its autoschedulers, 60 s for search and
-compilation. Our results are held against those by hand. See README.md for the figures.
+PROGRAMS is the folder of bench_kernels_retrograde and bench_machine. Halide is the wheel from the Python
+package index, as in operators/operators.py, with each of its autoschedulers and 60 s for search and
+compilation. Results are checked against those of the schedules by hand. README.md explains the figures.
 """
 import argparse
 import json
@@ -22,7 +23,7 @@ import operators  # noqa: E402
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 SCHEDULES = [s for s in operators.SCHEDULES if s != "root"]
-MOST_ERROR = 1e-3  # of the norm
+MOST_ERROR = 1e-3  # relative to the norm
 
 
 def kernel_names():
@@ -31,7 +32,7 @@ def kernel_names():
 
 
 def error_of(workers, scratch):
-    """Of the autoscheduled results beside those by hand, by norm; the largest."""
+    """The largest error of the autoscheduled results relative to those by hand, by norm."""
     found = []
     for worker in workers:
         path = os.path.join(scratch, worker.name)

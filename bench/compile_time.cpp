@@ -1,6 +1,5 @@
-// How the time to compile grows with the length of a pipeline, from the Func graph to callable
-// machine code. The fitted complexity is printed last and should be N. Halide 14 compiles the
-// shorter chains in the same run.
+// Measures how compile time grows with the length of a pipeline, from the Func graph to callable machine code. The
+// fitted complexity is printed last and should be N. Halide 14 compiles the shorter chains in the same run.
 #include <benchmark/benchmark.h>
 
 #include "retrograde/retrograde.h"
@@ -27,8 +26,7 @@ BENCHMARK(compile_stencil_chain)
     ->Arg(250)
     ->Arg(500)
     ->Unit(benchmark::kMillisecond)
-    ->Iterations(
-        1)  // the compile cache knows functions by what they compute: a second time is free
+    ->Iterations(1)  // the compile cache would make a second compilation of the same function free
     ->Complexity(benchmark::oN);
 
 }  // namespace

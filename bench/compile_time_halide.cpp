@@ -1,5 +1,4 @@
-// The same chains compiled by Halide 14. Its machine code is never run, so any target of this
-// processor will do.
+// Compiles the same chains with Halide 14. The machine code is never run, so any target of this processor will do.
 #include <Halide.h>
 #include <benchmark/benchmark.h>
 

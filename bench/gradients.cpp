@@ -1,13 +1,12 @@
-// gradients.cpp -- run time of gradients beside that of their programs.
+// gradients.cpp -- run time of gradients compared with that of their programs.
 //
 //   bench_gradients [--program NAME] [--output FILE] [--side N] [--rounds N]
 //
-// The programs are the large ones of the gradient suite (test/gradient/programs_large.h). Both
-// sides have a fair schedule: gradients their default one; programs the same kind (what reduces or
-// is updated is stored, rows run in parallel, in vectors along x), and their final sum is cut into
-// parallel rows and lanes. Rounds alternate; the least time of each side counts, since a busy
-// machine only adds to it. The ratio is that of a gradient by all inputs, which computes what it
-// needs of the program itself.
+// The programs are the large ones of the gradient suite (test/gradient/programs_large.h). Both sides have a fair
+// schedule. Gradients have their default one. Programs have one of the same kind (reductions and updated Funcs are
+// stored; rows run in parallel, in vectors along x), and their final sum is split into parallel rows and lanes. Rounds
+// alternate; the least time of each side counts, because other load on the machine only adds time. The ratio is that of
+// a gradient by all inputs, including the values of the program that it needs.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -51,12 +50,12 @@ Options parse(int argc, char** argv) {
   return options;
 }
 
-// Rows in parallel, in vectors along the first dimension: of the pure dimensions.
+// Rows in parallel and vectors along the first dimension, both over pure dimensions.
 template <typename StageOrFunc>
 void schedule_stage(StageOrFunc stage, const std::vector<Var>& pure) {
   if (pure.size() > 1) stage.parallel(pure.back());
   if (!pure.empty()) stage.vectorize(pure[0], lanes, TailStrategy::GuardWithIf);
-  if (pure.size() == 1) stage.parallel(pure[0]);  // of the vectors
+  if (pure.size() == 1) stage.parallel(pure[0]);  // over the vectors
 }
 
 void schedule_sum(const Func& loss) {
@@ -75,7 +74,7 @@ void schedule_sum(const Func& loss) {
   partial.update().vectorize(v, lanes).parallel(u);
 }
 
-// Of everything but the final sum.
+// Schedules everything except the final sum.
 void schedule_primal(const Func& loss) {
   for (const graph::FuncPtr& contents : graph::topological_order({loss.function()})) {
     if (contents == loss.function() || contents->is_pure()) continue;
@@ -99,7 +98,7 @@ void schedule_primal(const Func& loss) {
   schedule_sum(loss);
 }
 
-// Compiles at the first call.
+// Compiled on the first call.
 struct Side {
   Pipeline pipeline;
   std::vector<Buffer<>> results;

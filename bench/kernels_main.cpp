@@ -1,8 +1,7 @@
-// kernels_main.cpp -- run time, compile time and memory of forward pipelines and of gradients,
-// beside Halide 14's.
+// kernels_main.cpp -- compares run time, compile time and memory of forward pipelines and gradients with Halide 14's.
 //
-// Google Benchmark runs each kernel as one benchmark with manual time: an iteration is one run of
-// each side. See README.md.
+// Google Benchmark runs each kernel as one benchmark with manual time: an iteration is one run of each side. See
+// README.md.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -45,7 +44,7 @@ void run_pair(benchmark::State& state, Session& session, const Job& job) {
   session.results.push_back(result);
 }
 
-// Prints a row when its kernel is done.
+// Prints a row when a kernel is done.
 class TableReporter : public benchmark::BenchmarkReporter {
  public:
   explicit TableReporter(const Session& session) : session_(session) {}
@@ -59,7 +58,7 @@ class TableReporter : public benchmark::BenchmarkReporter {
   const Session& session_;
 };
 
-// All threads; the matrix multiplication on one core as well.
+// Runs on all threads; the matrix multiplication also runs on one core.
 std::vector<Job> jobs(const std::vector<std::string>& names, const Machine& machine) {
   std::vector<Job> out;
   for (const std::string& name : names) {
@@ -96,7 +95,7 @@ int run(const Options& options) {
 }  // namespace bench
 
 int main(int argc, char** argv) {
-  std::signal(SIGPIPE, SIG_IGN);  // a worker that has ended is an error of its kernel only
+  std::signal(SIGPIPE, SIG_IGN);  // a crashed worker is an error of its kernel only
   try {
     benchmark::Initialize(&argc, argv);
     const auto options = bench::read_options(argc, argv);

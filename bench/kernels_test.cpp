@@ -1,4 +1,4 @@
-// Each kernel at a small size computes the same on both sides.
+// Checks that each kernel gives the same results on both sides, at a small size.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -19,7 +19,7 @@ class Kernel : public testing::TestWithParam<std::string> {
   Kernel() { std::filesystem::create_directories(scratch_); }
   ~Kernel() override { std::filesystem::remove_all(scratch_); }
 
-  // Or, of a gradient, what differences say, where Halide's gradient does not.
+  // For a gradient that differs from Halide's, ours must agree with differences and Halide's must not.
   void expect_what_halide_gives(Pair& pair) const {
     pair.run();
     const PairResult result = pair.result(scratch_);
@@ -53,7 +53,7 @@ class GradientKernel : public Kernel {};
 TEST_P(GradientKernel, GivesWhatHalideGivesInTheSameBitsOnAnyThreads) {
   Pair pair({GetParam(), true, 2, true}, BENCH_PROGRAMS);
   expect_what_halide_gives(pair);
-  // Of more threads than Halide's schedulers take well.
+  // Uses more threads than Halide's schedulers handle well.
   Worker worker(Side::Retrograde, {GetParam(), true, 5, true}, BENCH_PROGRAMS);
   EXPECT_TRUE(has_same_bits_on({1, 2, 3, 5, 5}, worker, scratch_))
       << "the bits depend on how many threads there are";

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Writes what a benchmark measured into its section of a page (tools/bench --record).
+"""Writes the results of a benchmark into its section of a page (tools/bench --record).
 
 usage: measurements.py SECTION REPORT.json PAGE --commit COMMIT [--machine WORDS]
 
-A section stands between the lines "<!-- measured: SECTION -->" and "<!-- end of section -->"; what is
-around it is written by hand. The first line says on which machine and at which commit.
+A section is between the lines "<!-- measured: SECTION -->" and "<!-- end of section -->"; the text around it
+is written by hand. The section's first line names the machine and the commit.
 """
 import argparse
 import json

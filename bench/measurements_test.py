@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""measurements.py: a section is replaced, the text around it stays, and missing ones are errors."""
+"""Tests measurements.py: a section is replaced, the text around it stays, and missing sections are errors."""
 import json
 import os
 import subprocess

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
-"""model.py -- predicted and measured time of every stage of the operators and of the kernels under the
-autoscheduler, and how well the one orders the other.
+"""model.py -- compares the cost model's prediction of every stage with its measured time.
+
+The stages are those of the operators and of the autoscheduled kernels. The report also says how well predictions
+order the measurements.
 
     model.py PROGRAMS [--program NAME]... [--threads N] [--seconds S] [--output FILE] [--plot FILE]
 
-PROGRAMS is the folder of bench_operators_retrograde and bench_kernels_retrograde. The machine is the one
-that RETROGRADE_MACHINE names or that was measured before (tools/tune --machine): figures of the machine,
-never of a program. Stages that take less than 5 us are left out: the profiler looks every millisecond.
+PROGRAMS is the folder of bench_operators_retrograde and bench_kernels_retrograde. The machine's figures are
+those that RETROGRADE_MACHINE names or that were measured before (tools/tune --machine); they never depend on
+a program. Stages that take less than 5 us are left out, because the profiler samples every millisecond.
 """
 import argparse
 import json
@@ -51,7 +53,7 @@ def explain(options, kind, name):
 
 
 def ranks(values):
-    """From 1; equal values share the mean of theirs."""
+    """Ranks from 1; equal values share the mean of their ranks."""
     order = sorted(range(len(values)), key=values.__getitem__)
     result = [0.0] * len(values)
     begin = 0
@@ -66,7 +68,7 @@ def ranks(values):
 
 
 def spearman(pairs):
-    """Of (predicted, measured); None where there is nothing to order."""
+    """The rank correlation of (predicted, measured); None if there are fewer than two pairs."""
     if len(pairs) < 2:
         return None
     a, b = ranks([p for p, _ in pairs]), ranks([m for _, m in pairs])

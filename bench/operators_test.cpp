@@ -1,5 +1,5 @@
-// Each operator at a small size: its gradients in double are what differences of its program say, and
-// those in float, what the benchmark measures, are the same, bit by bit on any number of threads.
+// Tests each operator at a small size: its gradients in double agree with differences of its program, and its gradients
+// in float, which the benchmark measures, agree with them and are bit-identical for any number of threads.
 #include <gtest/gtest.h>
 
 #include <filesystem>

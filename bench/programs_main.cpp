@@ -1,5 +1,5 @@
-// programs_main.cpp -- programs as users write them for Halide, compiled ahead of time by Halide 14
-// and by Retrograde and run in turn: see README.md.
+// programs_main.cpp -- programs as users write them for Halide, compiled ahead of time by Halide 14 and by Retrograde
+// and run in turns: see README.md.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <csignal>
@@ -54,21 +54,21 @@ void check_names(const std::vector<std::string>& asked) {
 void add_options(CLI::App& app, Options& options) {
   app.add_option("--program", options.programs, "run this program; may be given several times");
   app.add_flag("--second", options.second,
-               "the second set instead, for which the compiler was not changed");
+               "run the second set instead, on which the compiler is not tuned");
   app.add_flag("--gradients", options.gradients,
-               "gradients instead, Halide's scheduled by Li2018, ours as they come");
+               "run gradients instead, Halide's with Li2018, ours with the default schedule");
   app.add_flag("--quick", options.quick, "the smallest size of each, few runs");
   app.add_flag("--compile-only", options.compile_only,
-               "make the libraries, for a run with --reuse");
-  app.add_flag("--reuse", options.reuse, "take the libraries that an earlier run made");
-  app.add_flag("--reuse-halide", options.reuse_halide, "take only Halide's");
-  app.add_option("--seconds", options.seconds, "for the runs of each program at each size")
+               "only compile the libraries, for a later run with --reuse");
+  app.add_flag("--reuse", options.reuse, "reuse the libraries of an earlier run");
+  app.add_flag("--reuse-halide", options.reuse_halide, "reuse only Halide's libraries");
+  app.add_option("--seconds", options.seconds, "time for the runs of each program at each size")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
   app.add_option("--output", options.output, "the report, as JSON")->capture_default_str();
 }
 
-// False when only help was asked for.
+// Returns false if only help was requested.
 bool read(int argc, char** argv, Options& options) {
   CLI::App app("Programs as users write them, compiled ahead of time by Halide 14 and Retrograde.");
   add_options(app, options);
@@ -126,7 +126,7 @@ int run(const Options& options) {
 }  // namespace programs
 
 int main(int argc, char** argv) {
-  std::signal(SIGPIPE, SIG_IGN);  // a worker that has ended is an error of its program only
+  std::signal(SIGPIPE, SIG_IGN);  // a crashed worker is an error of its program only
   try {
     programs::Options options;
     return programs::read(argc, argv, options) ? programs::run(options) : 0;

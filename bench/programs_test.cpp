@@ -1,5 +1,5 @@
-// Programs at their smallest size compute the same on both sides; what they are called with
-// survives its text.
+// Tests that programs at their smallest size give the same results on both sides, and that the text of their cases
+// round-trips.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace programs {
 
 namespace {
 
-// Of the running test alone: others run at the same time.
+// For the running test only, because others run at the same time.
 std::filesystem::path scratch() {
   std::string test = testing::UnitTest::GetInstance()->current_test_info()->name();
   std::replace(test.begin(), test.end(), '/', '_');
@@ -24,7 +24,7 @@ std::filesystem::path scratch() {
 
 class Smallest : public testing::TestWithParam<std::string> {};
 
-// Of those that both sides compile in about a second.
+// Only programs that both sides compile in about a second.
 TEST_P(Smallest, GivesWhatHalideGives) {
   const Toolchains toolchains{{bench::Side::Retrograde, BENCH_PROGRAMS, scratch()},
                               {bench::Side::Halide, BENCH_PROGRAMS, scratch()}};

@@ -1,5 +1,5 @@
-// stencil_chain.h -- a chain of stencils, every stage at root, vectorized and parallel; the same
-// text for both languages. Define BENCH_LANGUAGE as the namespace before including.
+// stencil_chain.h -- a chain of stencils, every stage at root, vectorized and parallel; the same source for both
+// languages. Define BENCH_LANGUAGE as the namespace before including it.
 #pragma once
 
 #include <string>

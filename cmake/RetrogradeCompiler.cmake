@@ -1,4 +1,4 @@
-# Language level, warnings, floating-point rules, sanitizers and ccache for all of our targets.
+# Settings for all of our targets: language level, warnings, floating-point rules, sanitizers and ccache.
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
@@ -7,7 +7,7 @@ set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
 endif()
-# -O2, not -O3: the compiler is not where its users' time goes, and it builds faster.
+# -O2 rather than -O3: users spend little time in the compiler itself, and it builds faster.
 set(CMAKE_CXX_FLAGS_RELEASE "-O2")
 set(CMAKE_C_FLAGS_RELEASE "-O2")
 set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O1 -g")
@@ -19,15 +19,15 @@ if(RETROGRADE_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_C_COMPILER_LAUNCHER ${RETROGRADE_CCACHE})
 endif()
 
-# The interpreter and the constant folder are oracles: they must compute what IEEE 754 says, the
-# same on every machine, so the host compiler may neither contract nor reassociate.
+# The interpreter and the constant folder are oracles: they must compute exactly what IEEE 754 specifies, the same on
+# every machine. So the host compiler must neither contract nor reassociate.
 add_compile_options(-ffp-contract=off -fno-fast-math)
 add_compile_options(-Wall -Wextra)
 if(RETROGRADE_WERROR)
   add_compile_options(-Werror)
 endif()
-# Calls inside the shared library bind to the library itself: faster, and a second compiler in the
-# process (the differential tests load Halide) cannot interpose on them.
+# Bind calls inside the shared library to the library itself. This is faster, and a second compiler in the process (the
+# differential tests load Halide) cannot interpose on them.
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   add_compile_options(-fno-semantic-interposition)
 endif()

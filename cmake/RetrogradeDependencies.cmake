@@ -1,20 +1,20 @@
-# What we build on, as targets. Packages: tools/packages.list.
-#   retrograde_dep_llvm            LLVM 19, shared; only compiler/codegen and compiler/jit may use it
+# Dependencies as targets. Their Debian packages are in tools/packages.list.
+#   retrograde_dep_llvm            LLVM 19, shared; only compiler/codegen, compiler/jit and compiler/aot may use it
 #   retrograde_dep_isl             integer relations
 #   retrograde_dep_tbb             parallel loops
 #   retrograde_dep_sleef           vector math
 #   retrograde_dep_halide_runtime  HalideRuntime.h and HalideBuffer.h, headers only
 #   retrograde_dep_halide          the Halide 14 compiler, for tests and benchmarks only
 #   retrograde_dep_image           OpenImageIO, for apps
-#   retrograde_dep_sqlite         for tools/tune
+#   retrograde_dep_sqlite          for tools/tune
 #   retrograde_dep_ceres           L-BFGS and conjugate gradients, for apps
 #   retrograde_dep_opencv          features and homographies of images, for apps
 #   retrograde_dep_cli, retrograde_dep_json   command lines and reports, for apps
 find_package(PkgConfig REQUIRED)
 find_package(Threads REQUIRED)
 
-# LLVM by its own config program: the CMake package wants development packages (terminfo, zstd,
-# libxml2 ...) that the shared library does not need.
+# LLVM is found by its llvm-config program: its CMake package requires development packages (terminfo, zstd, libxml2
+# ...) that the shared library does not need.
 find_program(RETROGRADE_LLVM_CONFIG NAMES llvm-config-19 PATHS /usr/lib/llvm-19/bin REQUIRED)
 execute_process(COMMAND ${RETROGRADE_LLVM_CONFIG} --includedir
   OUTPUT_VARIABLE llvm_include OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
@@ -45,7 +45,7 @@ find_library(RETROGRADE_SLEEF_LIBRARY sleef REQUIRED)
 add_library(retrograde_dep_sleef INTERFACE)
 target_link_libraries(retrograde_dep_sleef INTERFACE ${RETROGRADE_SLEEF_LIBRARY})
 
-# -idirafter: the folder holds Halide's own Halide.h too, which must never hide ours.
+# -idirafter: the folder also contains Halide's Halide.h, which must never hide ours.
 find_path(RETROGRADE_HALIDE_RUNTIME_INCLUDE HalideRuntime.h PATH_SUFFIXES halide14 REQUIRED)
 add_library(retrograde_dep_halide_runtime INTERFACE)
 target_compile_options(retrograde_dep_halide_runtime INTERFACE
@@ -56,19 +56,19 @@ find_path(RETROGRADE_JSON_INCLUDE nlohmann/json.hpp REQUIRED)
 add_library(retrograde_dep_json INTERFACE)
 target_include_directories(retrograde_dep_json SYSTEM INTERFACE ${RETROGRADE_JSON_INCLUDE})
 
-find_package(Boost REQUIRED COMPONENTS context)  # Boost::context, fibers of the simulated device
+find_package(Boost REQUIRED COMPONENTS context)  # Boost::context: fibers of the simulated device
 
-# What follows is for applications, tools, tests and benchmarks.
+# The rest is for applications, tools, tests and benchmarks.
 if(NOT RETROGRADE_PROGRAMS)
   return()
 endif()
-find_package(JPEG REQUIRED)  # JPEG::JPEG: whether pictures are whole
+find_package(JPEG REQUIRED)  # JPEG::JPEG: detects truncated pictures
 pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO)
 add_library(retrograde_dep_image INTERFACE)
 target_link_libraries(retrograde_dep_image INTERFACE PkgConfig::OIIO)
 
-# By hand: its CMake package wants the development packages of all that Ceres itself uses. The gradient
-# solver's headers need only those of glog and Eigen.
+# Found by hand: Ceres' CMake package requires the development packages of all its dependencies. The gradient solver's
+# headers need only those of glog and Eigen.
 find_path(RETROGRADE_CERES_INCLUDE ceres/gradient_problem_solver.h REQUIRED)
 find_path(RETROGRADE_EIGEN_INCLUDE Eigen/Core PATH_SUFFIXES eigen3 REQUIRED)
 find_library(RETROGRADE_CERES_LIBRARY ceres REQUIRED)
@@ -83,7 +83,7 @@ find_path(RETROGRADE_CLI_INCLUDE CLI/CLI.hpp REQUIRED)
 add_library(retrograde_dep_cli INTERFACE)
 target_include_directories(retrograde_dep_cli SYSTEM INTERFACE ${RETROGRADE_CLI_INCLUDE})
 
-# By hand: its CMake package comes only with the development packages of all of OpenCV.
+# Found by hand: OpenCV's CMake package comes only with the development packages of all of OpenCV.
 if(RETROGRADE_BUILD_APPS STREQUAL "all" OR "burst_superresolution" IN_LIST RETROGRADE_BUILD_APPS)
   find_path(RETROGRADE_OPENCV_INCLUDE opencv2/calib3d.hpp PATH_SUFFIXES opencv4 REQUIRED)
   add_library(retrograde_dep_opencv INTERFACE)
@@ -94,7 +94,7 @@ if(RETROGRADE_BUILD_APPS STREQUAL "all" OR "burst_superresolution" IN_LIST RETRO
   endforeach()
 endif()
 
-# What follows is for tools, tests and benchmarks, which come with all apps.
+# The rest is for tools, tests and benchmarks, which are only built with all apps.
 if(NOT RETROGRADE_BUILD_APPS STREQUAL "all")
   return()
 endif()

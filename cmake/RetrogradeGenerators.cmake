@@ -1,30 +1,30 @@
-# Generators as build rules, here and in projects that use the installed package.
+# CMake functions for generators, for this project and for projects that use the installed package.
 #
 #   add_retrograde_generator(<target> SOURCES <file>... [LINK_LIBRARIES <target>...])
-#     The program of the generators in these files: retrograde::generator gives it its main().
+#     Builds the program of the generators in these files; retrograde::generator provides its main().
 #
 #   add_retrograde_library(<target> FROM <generator-target> [GENERATOR <name>] [FUNCTION_NAME <name>]
 #     [NAMESPACE <ns>] [GRADIENT | SEPARATE_GRADIENTS] [PARAMS <param=value>...] [TARGETS <target>...]
 #     [FEATURES <feature>...] [USE_RUNTIME <target>] [AUTOSCHEDULER <name>] [PLUGINS <target>...]
 #     [SIMULATED_GPU] [HEADER <var>] [ASSEMBLY <var>] [BITCODE <var>] [LLVM_ASSEMBLY <var>] [STMT <var>]
 #     [STMT_HTML <var>] [REGISTRATION <var>] [FUNCTION_INFO_HEADER <var>])
-#     A library with the function that the generator makes, and <target>.h on its include path.
-#     GENERATOR and FUNCTION_NAME default to <target>; TARGETS to host, or to what the variable
-#     Retrograde_TARGET says. Of several TARGETS the machine decides at run time; the last one is what
-#     every machine can run. SIMULATED_GPU: kernels (FEATURES cuda) run on the simulated device, too, which
-#     RETROGRADE_GPU=simulated chooses at run time. GRADIENT: the function of the gradient;
-#     SEPARATE_GRADIENTS: one that gives the gradients by all images and numbers, and one for each of them
-#     (generator/gradient_module.cpp). The variables get names of extra files beside the header.
+#     Makes a library with the generator's function, and <target>.h on its include path.
+#     GENERATOR and FUNCTION_NAME default to <target>; TARGETS to host, or to the variable Retrograde_TARGET.
+#     With several TARGETS, the function selects one at run time; the last one must run on every machine.
+#     SIMULATED_GPU: kernels (FEATURES cuda) also run on the simulated device, which RETROGRADE_GPU=simulated
+#     selects at run time. GRADIENT: the function computes the gradient. SEPARATE_GRADIENTS: one function
+#     computes the gradients with respect to all images and numbers, and there is one for each of them
+#     (generator/gradient_module.cpp). The <var> arguments receive the names of extra files beside the header.
 #
 #   add_retrograde_runtime(<target> [FROM <generator-target>] [TARGETS <target>...])
-#     A runtime for USE_RUNTIME: retrograde::runtime, or for another platform one that the
-#     generator's program writes. Every library <lib> has one that is called <lib>.runtime.
+#     A runtime for USE_RUNTIME: retrograde::runtime or, for another platform, one that the generator's
+#     program writes. Every library <lib> also has one, named <lib>.runtime.
 #
-# A program that runs a library's function from the command line is its registration file (the file
-# that REGISTRATION names), linked with it and with retrograde::run_gen.
+# To run a library's function from the command line, link its registration file (the file that REGISTRATION names) with
+# the library and retrograde::run_gen.
 #
-# The library needs a runtime: retrograde::runtime, which is small and static, unless USE_RUNTIME
-# names another. No compiler is in a process that uses such a library.
+# The library needs a runtime: the small static retrograde::runtime, unless USE_RUNTIME names another. A process that
+# uses such a library does not contain the compiler.
 
 function(add_retrograde_generator target)
   cmake_parse_arguments(PARSE_ARGV 1 arg "PYSTUB" "PACKAGE_NAME;PACKAGE_NAMESPACE;EXPORT_FILE"
@@ -44,7 +44,7 @@ function(add_retrograde_generator target)
   target_link_libraries(${target} PRIVATE ${arg_LINK_LIBRARIES} retrograde::generator)
 endfunction()
 
-# <out>: TRUE when the text of a target names this build's own platform.
+# Sets <out> to TRUE if the target string names this build's platform.
 function(_retrograde_is_native out target)
   set(processor x86)
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
@@ -57,7 +57,7 @@ function(_retrograde_is_native out target)
   endif()
 endfunction()
 
-# A runtime for another platform than this build's, written by the generator's program.
+# A runtime for another platform, written by the generator's program.
 function(_retrograde_foreign_runtime name generator target)
   set(file ${CMAKE_CURRENT_BINARY_DIR}/${name}.a)
   add_custom_command(OUTPUT ${file}
@@ -116,7 +116,7 @@ function(add_retrograde_library target)
     message(FATAL_ERROR "${asked}: C_BACKEND asks for C source, which is not generated. Leave it out.")
   endif()
 
-  # ---- what the generator is told ----
+  # ---- the generator's arguments ----
   foreach(name GENERATOR FUNCTION_NAME)
     if(NOT arg_${name})
       set(arg_${name} ${target})
@@ -154,7 +154,7 @@ function(add_retrograde_library target)
     list(FILTER arg_PARAMS EXCLUDE REGEX "^(auto_schedule|autoscheduler)(=|\\.)")
   endif()
   if(arg_AUTOSCHEDULER)
-    # A::B is a plugin's target that holds the scheduler B.
+    # A::B names a plugin's target that contains the autoscheduler B.
     if(TARGET "${arg_AUTOSCHEDULER}")
       list(APPEND arg_PLUGINS ${arg_AUTOSCHEDULER})
     endif()
@@ -171,9 +171,9 @@ function(add_retrograde_library target)
     set(plugins -p ${plugins})
   endif()
 
-  # ---- what it writes ----
-  # One target of this platform: an object, so that the library is one like any other. Several, or
-  # another platform: the generator makes the library.
+  # ---- the generator's outputs ----
+  # For one target on this platform, the generator writes an object and the library is an ordinary one. For several
+  # targets, or another platform, the generator writes the library.
   _retrograde_is_native(native ${first_target})
   list(LENGTH arg_TARGETS target_count)
   set(folder ${CMAKE_CURRENT_BINARY_DIR})
@@ -194,7 +194,7 @@ function(add_retrograde_library target)
     if(arg_${type})
       string(TOLOWER ${type} type_name)
       list(APPEND emit ${type_name})
-      # Of several targets there is one such file for each; their names are the generator's business.
+      # With several targets there is one such file for each, named by the generator.
       if(target_count EQUAL 1)
         list(APPEND files ${folder}/${target}${${type}_extension})
       endif()

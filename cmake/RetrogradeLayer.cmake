@@ -1,15 +1,15 @@
 # retrograde_layer(<name> [INTERNAL] [COLD] SOURCES <file>... [ALONE <file>...] DEPENDS <layer>...
 #   [PRIVATE_DEPENDS <dep>...])
 #
-# Makes the target retrograde_<name> of one folder. DEPENDS names the layers below it, without the
-# prefix; PRIVATE_DEPENDS names outside libraries that no header of the folder shows. Headers are
-# installed under include/retrograde/<folder> unless the layer is INTERNAL. A folder without sources
-# yet is an INTERFACE library.
+# Makes the target retrograde_<name> for one folder. DEPENDS names the layers below it, without the prefix.
+# PRIVATE_DEPENDS names external libraries that do not appear in the folder's headers. Headers are installed under
+# include/retrograde/<folder> unless the layer is INTERNAL. A folder without sources is an INTERFACE library.
 #
-# With RETROGRADE_QUICK_BUILD, several SOURCES are compiled as one unit, those that are ALONE by
-# themselves: most of the time goes into headers. So no two files of a folder may give one name in
-# their unnamed namespaces to two things. Unlike CMake's own unity builds, the units name their files
-# relative to compiler/, and ccache shares them between checkouts. A layer that is COLD takes no time that its users
+# With RETROGRADE_QUICK_BUILD, several SOURCES are compiled as one unit, because headers take most of the time; files
+# that are ALONE are compiled by themselves. So two files of a folder must not define the same name in their unnamed
+# namespaces. Unlike CMake's unity builds, the units name their files relative to compiler/, so ccache can share them
+# between checkouts. A COLD layer takes no noticeable time at run time, so it is optimized less, which saves a third of
+# its compile time.
 # would notice: it is optimized less then, which saves a third of compiling it.
 option(RETROGRADE_QUICK_BUILD "Compile several sources as one unit" OFF)
 set(retrograde_files_per_unit 8)
@@ -33,7 +33,7 @@ function(retrograde_layer name)
     target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${include}>)
     target_link_libraries(${target} PUBLIC ${arg_DEPENDS} PRIVATE ${arg_PRIVATE_DEPENDS})
     if(RETROGRADE_QUICK_BUILD)
-      # It takes what a unit includes for headers.
+      # The compiler treats files that a unit includes as headers.
       target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
       if(arg_COLD)
         target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
@@ -54,8 +54,8 @@ function(retrograde_layer name)
   endif()
 endfunction()
 
-# retrograde_units(<result> <prefix> <file>...): units that include the files, each named after the
-# prefix, from a folder among those that are searched for headers.
+# retrograde_units(<result> <prefix> <file>...): makes units that include the files. Each is named after the prefix and
+# its files are in a folder of the include path.
 function(retrograde_units result prefix)
   set(units)
   list(LENGTH ARGN count)

@@ -1,10 +1,10 @@
-# libretrograde.so: every layer in one shared library, and its installation (CMake package,
-# pkg-config file, umbrella header, Halide.h of the compatibility folder).
+# libretrograde.so: all layers in one shared library, and its installation (CMake package, pkg-config file, umbrella
+# header, Halide.h of the compatibility folder).
 get_property(layers GLOBAL PROPERTY RETROGRADE_LAYERS)
 get_property(outside GLOBAL PROPERTY RETROGRADE_OUTSIDE)
 add_library(retrograde SHARED)
 add_library(retrograde::retrograde ALIAS retrograde)
-# All objects, not the archives: a layer may be reached only through a registration or by a test.
+# Objects rather than archives, because some layers are only reached by a registration or a test.
 foreach(layer IN LISTS layers)
   target_sources(retrograde PRIVATE $<TARGET_OBJECTS:${layer}>)
 endforeach()
@@ -27,7 +27,7 @@ target_link_libraries(retrograde INTERFACE Threads::Threads ${CMAKE_DL_LIBS})
 set_target_properties(retrograde PROPERTIES
   VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR})
 
-# retrograde::halide_compat: the same, with `#include "Halide.h"` meaning ours.
+# retrograde::halide_compat: the same library, with an include path on which `#include "Halide.h"` finds ours.
 add_library(retrograde_halide_compat INTERFACE)
 set_target_properties(retrograde_halide_compat PROPERTIES EXPORT_NAME halide_compat)
 add_library(retrograde::halide_compat ALIAS retrograde_halide_compat)
@@ -48,7 +48,7 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/retrogradeConfigVersion.cma
   COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/retrogradeConfig.cmake
   ${CMAKE_BINARY_DIR}/retrogradeConfigVersion.cmake DESTINATION ${package_dir})
-# The same for find_package(Retrograde).
+# For find_package(Retrograde).
 install(FILES ${CMAKE_BINARY_DIR}/retrogradeConfig.cmake DESTINATION ${package_dir}
   RENAME retrograde-config.cmake)
 install(FILES ${CMAKE_BINARY_DIR}/retrogradeConfigVersion.cmake DESTINATION ${package_dir}
@@ -66,7 +66,7 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/HalideConfigVersion.cmake
 install(FILES ${CMAKE_BINARY_DIR}/HalideConfig.cmake ${CMAKE_BINARY_DIR}/HalideConfigVersion.cmake
   DESTINATION ${halide_package_dir})
 
-# The same under the name of its package for builds that call generators only.
+# The same under its package's other name, for builds that only call generators.
 set(helpers_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/HalideHelpers)
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/halide/HalideConfig.cmake.in
   ${CMAKE_BINARY_DIR}/HalideHelpersConfig.cmake INSTALL_DESTINATION ${helpers_package_dir})

@@ -1,6 +1,7 @@
-# retrograde_portable: the library as wheels carry it. LLVM is inside, its symbols hidden, so that it lives beside any
-# other LLVM of the process; what Debian has no static libraries of that go into a shared one lies beside it.
-# Not made where a static library is missing: then wheels hold the shared library, and want Debian's packages.
+# retrograde_portable: the library for Python wheels. It contains LLVM with hidden symbols, so that it can coexist with
+# any other LLVM in the process. Libraries that Debian does not offer as static libraries are placed beside it. If a
+# static library is missing, this target is not made: wheels then contain the ordinary shared library and need Debian's
+# packages.
 execute_process(COMMAND ${RETROGRADE_LLVM_CONFIG} --link-static --libfiles
     x86 aarch64 nvptx orcjit passes bitwriter irreader linker
   OUTPUT_VARIABLE llvm_archives OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET RESULT_VARIABLE no_archives)
@@ -22,7 +23,7 @@ endforeach()
 target_link_libraries(retrograde_portable PRIVATE
   -Wl,--start-group ${llvm_archives} -Wl,--end-group ${other_archives}
   retrograde_dep_tbb retrograde_dep_sleef retrograde_dep_isl ${CMAKE_DL_LIBS} m
-  # Not as needed: isl finds it because this library has opened it before.
+  # Linked unconditionally: isl finds it because this library has already opened it.
   -Wl,--no-as-needed ${RETROGRADE_GMP_LIBRARY} -Wl,--as-needed)
 target_link_options(retrograde_portable PRIVATE
   -Wl,-Bsymbolic-functions -Wl,--no-undefined -Wl,--exclude-libs,ALL -Wl,--gc-sections -Wl,--as-needed)
@@ -30,7 +31,7 @@ set_target_properties(retrograde_portable PROPERTIES LINKER_LANGUAGE CXX OUTPUT_
   LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/portable INSTALL_RPATH "$ORIGIN"
   VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR})
 
-# Under the names that it is linked with: libtbb.so.12 of libtbb.so.12.8.
+# Files are copied under the names that the linker recorded: libtbb.so.12 for libtbb.so.12.8.
 find_library(RETROGRADE_TBB_LIBRARY tbb REQUIRED)
 foreach(library ${RETROGRADE_TBB_LIBRARY} ${RETROGRADE_SLEEF_LIBRARY} ${RETROGRADE_ISL_LIBRARY}
     ${RETROGRADE_GMP_LIBRARY})

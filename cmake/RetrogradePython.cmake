@@ -1,7 +1,7 @@
-# The interpreter that the Python package is for, and pybind11: RETROGRADE_PYTHON says whether both are there.
+# Finds pybind11 and the interpreter for the Python package; RETROGRADE_PYTHON says whether both exist.
 #
-# Debian's own interpreter unless Python_EXECUTABLE says another: a python3 that stands before it on the PATH has
-# neither its packages nor its headers.
+# The interpreter is Debian's unless Python_EXECUTABLE names another: another python3 earlier on the PATH has neither
+# Debian's packages nor its headers.
 if(NOT Python_EXECUTABLE AND EXISTS /usr/bin/python3)
   set(Python_EXECUTABLE /usr/bin/python3)
 endif()
@@ -16,9 +16,9 @@ if(RETROGRADE_PYTHON AND NOT pybind11_FOUND)
     "python3-dev and pybind11-dev of Debian. Or set it to OFF.")
 endif()
 
-# What an interpreter must be told that loads the package from the build: a sanitized module needs its sanitizer to be
-# there before it. What Python itself keeps to the end are no leaks of ours, and what is freed is not to count as memory
-# in use. Tests know by RETROGRADE_SANITIZER that the runtime of generated libraries needs the sanitizer to be linked.
+# Environment for interpreters that load the package from the build. A sanitized module needs its sanitizer loaded
+# first. Leak checks ignore what Python itself keeps until exit. Tests read RETROGRADE_SANITIZER to know that runtimes
+# of generated libraries must be linked with the sanitizer.
 set(RETROGRADE_PYTHON_ENVIRONMENT "")
 if(RETROGRADE_SANITIZER MATCHES "^(address|thread)$")
   string(SUBSTRING ${RETROGRADE_SANITIZER} 0 1 initial)

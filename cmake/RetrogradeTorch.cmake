@@ -1,24 +1,24 @@
-# Operators of PyTorch from generators, compiled ahead of time: no compiler and no Python of ours is where they run.
+# Builds PyTorch operators from generators, ahead of time. They run without the compiler and without our Python package.
 #
 #   retrograde_add_torch_op(<target> FROM <generator-target> GENERATOR <name> [GRADIENT] [NAMESPACE <ns>]
 #     [PYTHON <interpreter>] [CXX_STANDARD 17|20] [SHAPE <output>=<sizes>...] [PARAMS <param=value>...]
 #     [AUTOSCHEDULER <name>] [FEATURES <feature>...] [SIMULATED_GPU])
-#     A module <target>.so that torch.ops.load_library loads; then torch.ops.<ns>.<target>(...) takes the generator's
-#     inputs and gives its outputs. NAMESPACE defaults to "retrograde".
-#     GRADIENT: autograd differentiates it, once, by images and by floating-point numbers that are given as tensors
-#     without dimensions; what is computed are the gradients that are asked for (-d separate).
-#     FEATURES cuda: for tensors of CUDA, by kernels on the stream that is current; others are refused. What the
-#     generator does not schedule needs AUTOSCHEDULER. SIMULATED_GPU: the simulated device's, which is PyTorch's CPU.
-#     PYTHON: whose PyTorch it is compiled for, "/usr/bin/python3" by default; include and library paths come from it,
-#     so that no CUDA toolkit is needed where that PyTorch knows CUDA.
-#     SHAPE: the sizes of an output as PyTorch orders them, C++ over the inputs' names, as in
-#     "blur=image.sym_size(0), image.sym_size(1) - 2"; those of the first image with as many dimensions where none are
-#     given.
+#     Makes a module <target>.so for torch.ops.load_library. Then torch.ops.<ns>.<target>(...) takes the generator's
+#     inputs and returns its outputs. NAMESPACE defaults to "retrograde".
+#     GRADIENT: autograd can differentiate the operator once, with respect to images and to floating-point numbers
+#     that are passed as tensors without dimensions. Only the requested gradients are computed (-d separate).
+#     FEATURES cuda: the operator takes CUDA tensors only, and runs kernels on the current stream. Generators without
+#     a GPU schedule need AUTOSCHEDULER. SIMULATED_GPU: kernels run on the simulated device, for CPU tensors.
+#     PYTHON: the interpreter whose PyTorch it is compiled for, "/usr/bin/python3" by default. Include and library
+#     paths come from it, so no CUDA toolkit is needed if that PyTorch supports CUDA.
+#     SHAPE: the sizes of an output in PyTorch's order, as C++ over the inputs' names, for example
+#     "blur=image.sym_size(0), image.sym_size(1) - 2". Default: the sizes of the first image with as many dimensions.
 #
-# What the module is made of: the function and its gradient (add_retrograde_library), <target>.torch.cpp, which this
+# The module consists of the function and its gradient (add_retrograde_library), the header that the generator writes,
+# <target>_forward.pytorch.h, and <target>.torch.cpp, which this function writes.
 # writes, and what the generator wrote for it, <target>_forward.pytorch.h.
 
-# Include folders, libraries and the ABI of strings of an interpreter's PyTorch, each once for each interpreter.
+# Finds an interpreter's PyTorch (include folders, libraries, the ABI of strings), once for each interpreter.
 function(_retrograde_find_torch python)
   string(MAKE_C_IDENTIFIER ${python} id)
   if(DEFINED RETROGRADE_TORCH_LIBRARIES_${id})
@@ -105,7 +105,7 @@ function(retrograde_add_torch_op target)
   target_link_libraries(${target} PRIVATE ${parts} ${RETROGRADE_TORCH_LIBRARIES_${id}})
   target_include_directories(${target} SYSTEM PRIVATE ${RETROGRADE_TORCH_INCLUDES_${id}})
   target_compile_definitions(${target} PRIVATE _GLIBCXX_USE_CXX11_ABI=${RETROGRADE_TORCH_ABI_${id}})
-  # Our runtime is this module's own business: another module's may be of another version.
+  # Hide the runtime's symbols, because another module may contain another version of it.
   target_link_options(${target} PRIVATE -Wl,--exclude-libs,ALL)
   set_target_properties(${target} PROPERTIES PREFIX "" CXX_STANDARD ${arg_CXX_STANDARD} CXX_STANDARD_REQUIRED ON
     CXX_EXTENSIONS OFF CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON PRECOMPILE_HEADERS "")

@@ -1,8 +1,8 @@
-// Locks of elements that no instruction updates indivisibly: Tuples, and elements above 64 bits.
+// Locks for elements that no instruction updates atomically: Tuples, and elements above 64 bits.
 //
-// A fixed number of spin locks, chosen by a hash of the address: two elements may share a lock, one
-// element always has the same. A holder computes a few values and stores them, and waits for
-// nothing, so that spinning is right and no order of locks can be wrong.
+// There is a fixed number of spin locks, chosen by a hash of the address: two elements may share a lock, and one
+// element always has the same lock. A holder computes and stores a few values and waits for nothing. So spinning is
+// appropriate, and deadlocks are impossible.
 #include <atomic>
 #include <cstdint>
 #include <thread>

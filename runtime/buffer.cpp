@@ -1,6 +1,5 @@
-// What a generated function asks of its buffers before it runs. One call for all that is checked of a
-// buffer: in the function itself each check would be some twenty instructions, which take longer to
-// compile than a small kernel.
+// Checks that a generated function makes of its buffers before it runs. One call makes all checks of a buffer: inlined,
+// each check would be about twenty instructions, which take longer to compile than a small kernel.
 #include <HalideRuntime.h>
 
 #include <cstdlib>
@@ -10,7 +9,7 @@
 namespace retrograde::runtime {
 namespace {
 
-constexpr int64_t most_elements = 0x7fffffff;  // places are numbered in 31 bits
+constexpr int64_t most_elements = 0x7fffffff;  // offsets are 31-bit numbers
 
 const char* code_name(uint32_t type) {
   static constexpr const char* names[] = {"int", "uint", "float", "handle", "bfloat"};
@@ -99,7 +98,7 @@ int32_t check_memory(retrograde_context* context, const halide_buffer_t& buffer,
   return retrograde_error_success;
 }
 
-// Distances between elements, in elements: extents may be small and strides large.
+// Offsets, in elements: extents may be small and strides large.
 int32_t check_span(retrograde_context* context, const halide_buffer_t& buffer, const char* name) {
   int64_t span = 0;
   for (int32_t d = 0; d < buffer.dimensions; d++) {
@@ -136,7 +135,7 @@ int32_t check_box(retrograde_context* context, const halide_buffer_t& buffer, co
   return retrograde_error_success;
 }
 
-// The stride of a dimension with one element or none leads to no other element: it may be anything.
+// A dimension with at most one element may have any stride, because the stride is never used.
 int32_t check_dense(retrograde_context* context, const halide_buffer_t& buffer, const char* name) {
   const int64_t stride = buffer.dim[0].stride;
   if (stride == 1 || buffer.dim[0].extent <= 1) return retrograde_error_success;

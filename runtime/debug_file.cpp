@@ -1,6 +1,6 @@
-// Func::debug_to_file: what was computed, in a file.
+// Func::debug_to_file: writes computed values to a file.
 //
-//   .tmp   five int32 words, the first four extents and a type code, then the elements as they lie
+//   .tmp   five int32 words, the first four extents and a type code, then the elements in storage order
 //   .npy   NumPy's format, version 1.0, Fortran order
 #include <HalideRuntime.h>
 
@@ -16,7 +16,7 @@
 namespace retrograde::runtime {
 namespace {
 
-// The elements of a buffer without gaps, dimension 0 innermost.
+// The elements of a buffer without padding, dimension 0 innermost.
 std::vector<char> elements_of(const halide_buffer_t& b) {
   const auto bytes = static_cast<size_t>(b.type.bytes());
   size_t count = 1;

@@ -1,12 +1,11 @@
-// Two statements at the same time, and the semaphores between them.
+// Runs two statements in parallel, and provides the semaphores between them.
 //
-// The first runs on a thread of its own, the rest on the caller's. A thread of the parallel loops'
-// pool would do as long as one is free; but the two may wait for each other many times, and a pool
-// whose threads all wait runs nobody's loops. With a thread for each there is always one that can
-// go on.
+// The first runs on a thread of its own, the rest on the caller's thread. A thread of the parallel loops' pool would do
+// as long as one is free. But the two may wait for each other many times, and a pool whose threads all wait can run no
+// loops. With a thread for each statement, one of them can always make progress.
 //
-// When one of the two fails it closes the semaphores, so that the other finds out at its next wait,
-// leaves too, and the error of the one that failed by itself is what the call gives.
+// A statement that fails closes the semaphores, so the other one finds out at its next wait and exits too. The call
+// returns the error of the statement that failed by itself.
 #include <atomic>
 #include <new>
 
@@ -17,7 +16,7 @@ namespace retrograde::runtime {
 namespace {
 
 constexpr int32_t closed = INT32_MIN;
-// What a wait for a closed semaphore gives: told to nobody, and replaced by the error behind it.
+// Result of waiting for a closed semaphore. It is never reported; the original error replaces it.
 constexpr int32_t cancelled = -1000;
 
 using Count = std::atomic<int32_t>;

@@ -1,8 +1,8 @@
-// The cache behind memoize(): results by key, the least recently used go first.
+// The cache behind memoize(): results by key, with least-recently-used eviction.
 //
-// An entry never changes once it is in. A hit copies it to the caller's memory outside of the lock,
-// from a reference of its own, so that eviction at the same time takes nothing away from under it.
-// Entries come from the system's allocator: they outlive the call whose allocator would count them.
+// Entries are immutable. A hit holds a reference to the entry and copies it to the caller's memory without the lock, so
+// concurrent eviction is safe. Entries use the system's allocator, because they outlive the call whose allocator would
+// account for them.
 #include <cstring>
 #include <list>
 #include <memory>
@@ -21,7 +21,7 @@ namespace {
 
 struct Entry {
   std::string key;
-  std::vector<std::vector<uint8_t>> values;  // one for each value of a Tuple
+  std::vector<std::vector<uint8_t>> values;  // one per value of a Tuple
   std::optional<uint64_t> eviction_key;
   int64_t bytes = 0;
 };
@@ -80,7 +80,7 @@ class Cache {
 
  private:
   static constexpr int64_t default_limit = int64_t{1} << 20;
-  using Entries = std::list<EntryPtr>;  // the most recently used first
+  using Entries = std::list<EntryPtr>;  // most recently used first
 
   void remove(Entries::iterator it) {
     held_ -= (*it)->bytes;
@@ -145,7 +145,7 @@ int32_t retrograde_memoization_store(retrograde_context*, const uint8_t* key, in
       entry->bytes += bytes[i];
     }
     rt::cache().insert(std::move(entry));
-  } catch (const std::bad_alloc&) {  // then it is computed again next time
+  } catch (const std::bad_alloc&) {  // not cached; recomputed next time
   }
   return 0;
 }

@@ -1,9 +1,8 @@
-// Memory of intermediate results: a pool of large blocks above the system's allocator.
+// Memory for intermediate results: a pool of large blocks above the system's allocator.
 //
-// A pipeline asks for the same few large blocks on every call. The system would map and zero their
-// pages each time, which costs more than computing most stages. So released blocks stay in a list,
-// oldest first, and are given again to requests that they fit without much waste; the oldest go
-// when the list holds more than its limit.
+// A pipeline allocates the same few large blocks on every call. The system would map and zero their pages each time,
+// which costs more than computing most stages. So released blocks stay in a list, oldest first, and are reused for
+// requests that fit without much waste. The oldest are freed when the list exceeds its limit.
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -21,15 +20,16 @@ namespace retrograde::runtime {
 namespace {
 
 constexpr size_t alignment = retrograde_allocation_alignment;
-constexpr size_t small_bytes = size_t{64} << 10;     // below: the system's lists are fast
+constexpr size_t small_bytes = size_t{64}
+                               << 10;  // below this size the system's free lists are fast
 constexpr size_t huge_page_bytes = size_t{2} << 20;  // x86-64 and AArch64 Linux
 constexpr size_t page_bytes = 4096;
 constexpr size_t max_blocks = 256;
 
-// Stands in front of every block.
+// Precedes every block.
 struct Header {
-  size_t capacity;   // bytes behind the header
-  void* allocation;  // what the system gave
+  size_t capacity;   // bytes after the header
+  void* allocation;  // the pointer that the system returned
 };
 static_assert(sizeof(Header) <= alignment);
 
@@ -57,12 +57,11 @@ void* with_header(void* allocation, void* block, size_t capacity) {
   return block;
 }
 
-// malloc and room to align by hand: posix_memalign would cut a piece off the front each time, and
-// free would join it again, which takes longer than a stage computes a row. No more room than the
-// header needs: malloc has lists of its own for each thread for blocks of up to a kilobyte, such as
-// a row of a small picture, and takes several times as long for larger ones.
+// malloc plus manual alignment. posix_memalign would split off a piece each time, and free would merge it again, which
+// takes longer than a stage needs for a row. The padding is minimal: for blocks of up to one kilobyte, such as a row of
+// a small picture, malloc has per-thread lists; larger blocks take several times as long.
 void* small_malloc(size_t capacity) {
-  static_assert(alignof(std::max_align_t) == sizeof(Header));  // of which malloc gives multiples
+  static_assert(alignof(std::max_align_t) == sizeof(Header));  // malloc returns multiples of this
   void* allocation = std::malloc(capacity + alignment);
   if (!allocation) return nullptr;
   const uintptr_t behind = reinterpret_cast<uintptr_t>(allocation) + sizeof(Header);
@@ -71,8 +70,7 @@ void* small_malloc(size_t capacity) {
                      capacity);
 }
 
-// Systems that overcommit would map a block larger than the machine's memory, and kill the process
-// when it is filled.
+// Systems that overcommit would map a block larger than the machine's memory, and kill the process when it is filled.
 void* system_malloc(size_t capacity) {
   const size_t bytes = capacity + alignment;
   if (bytes < small_bytes) return small_malloc(capacity);
@@ -81,7 +79,7 @@ void* system_malloc(size_t capacity) {
   void* allocation = nullptr;
   if (posix_memalign(&allocation, huge ? huge_page_bytes : alignment, bytes) != 0) return nullptr;
 #ifdef MADV_HUGEPAGE
-  if (huge) madvise(allocation, bytes, MADV_HUGEPAGE);  // only advice: failure changes nothing
+  if (huge) madvise(allocation, bytes, MADV_HUGEPAGE);  // only a hint: failure changes nothing
 #endif
   return with_header(allocation, static_cast<char*>(allocation) + alignment, capacity);
 }
@@ -90,7 +88,7 @@ void system_free(void* block) { std::free(header_of(block)->allocation); }
 
 class Pool {
  public:
-  // A released block with room for `capacity`, at most a quarter larger; null when there is none.
+  // A released block with room for `capacity`, at most a quarter larger; null if there is none.
   void* take(size_t capacity) {
     const std::lock_guard lock(mutex_);
     auto best = blocks_.end();
@@ -158,7 +156,7 @@ Pool& pool() {
   return instance;
 }
 
-// False when the request is negative or does not fit the address space.
+// Returns false if the request is negative or does not fit the address space.
 bool allocation_bytes(int64_t elements, int64_t element_bytes, size_t* bytes) {
   constexpr int64_t largest = INT64_MAX - 4 * static_cast<int64_t>(page_bytes);
   int64_t product = 0;
@@ -179,7 +177,7 @@ void* retrograde_pool_malloc(size_t bytes) {
   if (capacity < rt::small_bytes - rt::alignment) return rt::system_malloc(capacity);
   if (void* block = rt::pool().take(capacity)) return block;
   if (void* block = rt::system_malloc(capacity)) return block;
-  rt::pool().release();  // what we hoard may be what is missing
+  rt::pool().release();  // free the pool's own blocks and try again
   return rt::system_malloc(capacity);
 }
 

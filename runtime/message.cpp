@@ -1,4 +1,4 @@
-// Error and print messages: a small formatter, and the route from generated code to the handlers.
+// Error and print messages: a small formatter, and their path from generated code to the handlers.
 #include <algorithm>
 #include <charconv>
 #include <cstdarg>
@@ -10,7 +10,7 @@
 namespace retrograde::runtime {
 namespace {
 
-// Appends to a fixed array and drops what does not fit.
+// Appends to a fixed-size array and drops text that does not fit.
 class Text {
  public:
   Text(char* text, size_t size) : begin_(text), next_(text), last_(text + size - 1) {}
@@ -35,7 +35,7 @@ class Text {
   char *begin_, *next_, *last_;
 };
 
-// One field of a format; false when the letter is unknown.
+// Formats one field; false if the letter is unknown.
 bool append_field(Text& text, char field, va_list& args) {
   switch (field) {
     case 'i':

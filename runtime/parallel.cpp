@@ -1,7 +1,7 @@
 // Parallel loops. The result is deterministic: the code of the lowest failing iteration.
 //
-// Why every lower iteration runs: an iteration is skipped only when one below it has failed, so the
-// lowest of all failing iterations is never skipped, and no other can take its place.
+// Proof: an iteration is skipped only if a lower one has failed. So the lowest of all failing iterations is never
+// skipped, and no other iteration can replace it.
 #include <atomic>
 #include <mutex>
 
@@ -25,7 +25,7 @@ class LowestFailure {
     code_ = code;
     failure_ = failure;
   }
-  // After the loop.
+  // Called after the loop.
   int32_t report_to(const ParallelLoop& loop) {
     const std::lock_guard lock(mutex_);
     if (code_ != 0 && failure_.message[0]) loop.report(loop.data, code_, failure_.message);
@@ -56,9 +56,8 @@ class Run {
  private:
   const ParallelLoop& loop_;
   LowestFailure failures_;
-  // What the caller wrote before the loop is seen by the iterations, and what they wrote is seen
-  // after it. The threads below order them as well; here it stands where a race detector can see
-  // it.
+  // Iterations see what the caller wrote before the loop, and the caller sees their writes after it. The threading
+  // library guarantees this already; the fence makes it visible to race detectors.
   std::atomic<int> fence_{0};
 
   void one(int64_t iteration) {
@@ -79,7 +78,7 @@ class Run {
   }
 };
 
-// The loop of one call of retrograde_parallel_for.
+// The arguments of one call of retrograde_parallel_for.
 struct Tasks {
   retrograde_context* context;
   retrograde_task task;

@@ -1,12 +1,11 @@
-// A sampling profiler: what Func each thread of a running pipeline is in, looked at every millisecond.
+// A sampling profiler: every millisecond it samples which Func each thread of a running pipeline computes.
 //
-// Running code only stores a number in its thread's place, so that it is hardly slower. One thread
-// looks at all runs; it starts with the first and ends with the last, so that nothing runs while nobody
-// is profiled. The times between two looks are random, exponentially distributed: then each moment of a
-// run is as likely as any other to be looked at, however short the run is and whatever it repeats
-// ("Poisson arrivals see time averages", R. Wolff, Operations Research 30, 1982). A look is shared by the
-// threads that are at work; the time of a pipeline is shared by its Funcs as the looks are. What was
-// found is kept by pipeline, in the structs of HalideRuntime.h.
+// Generated code only stores a number in its thread's place, so it is hardly slower. One sampling thread serves all
+// runs; it starts with the first and ends with the last. The intervals between samples are random and exponentially
+// distributed. Then every moment of a run is equally likely to be sampled, however short the run is and whatever it
+// repeats ("Poisson arrivals see time averages", R. Wolff, Operations Research 30, 1982). Each sample is divided among
+// the threads that are working, and a pipeline's time is divided among its Funcs in proportion to their samples.
+// Results are kept by pipeline, in the structs of HalideRuntime.h.
 #include <HalideRuntime.h>
 
 #include <algorithm>
@@ -35,12 +34,12 @@ uint64_t nanoseconds(Clock::duration d) {
   return static_cast<uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(d).count());
 }
 
-// What is known of one pipeline, over all of its runs.
+// Totals of one pipeline over all its runs.
 struct Pipeline {
   std::string name;
   std::vector<std::string> func_names;
   std::vector<halide_profiler_func_stats> funcs;
-  std::vector<double> looks;  // by Func
+  std::vector<double> looks;  // samples, by Func
   halide_profiler_pipeline_stats stats = {};
 
   void link(Pipeline* next) {
@@ -67,15 +66,15 @@ struct Memory {
   }
 };
 
-// Where one thread says what it computes, on a line of the cache that no other thread writes. A thread
-// that gets work inside of its work keeps what it was in before; it computes nothing there.
+// Where one thread publishes the Func that it computes, on a cache line that no other thread writes. A thread that
+// takes on nested work keeps its previous place and computes nothing there meanwhile.
 struct alignas(64) Place {
   static constexpr int32_t idle = -1;
   struct Outer {
     Place* place;
     int32_t func;
   };
-  int32_t current = idle;  // first: generated code knows the place by its address
+  int32_t current = idle;  // first: generated code has the place's address
   std::thread::id owner = std::this_thread::get_id();
   std::vector<Outer> outer;
 
@@ -93,7 +92,7 @@ struct Run {
   Run(Pipeline& pipeline, size_t count) : pipeline(pipeline), memory(count) {}
   Pipeline& pipeline;
   const uint64_t serial = next_serial();
-  std::mutex mutex;  // of the places
+  std::mutex mutex;  // protects `places`
   std::deque<Place> places;
   std::vector<Memory> memory;  // by Func
   Memory all;
@@ -108,13 +107,13 @@ struct Run {
   }
 };
 
-thread_local Place* innermost = nullptr;  // that the thread is in
-thread_local Place nowhere;               // of a run that is not profiled
+thread_local Place* innermost = nullptr;  // the place that the thread is in
+thread_local Place nowhere;               // for runs that are not profiled
 
-// A loop of many short tasks asks for the same place again and again: without a lock.
+// The thread's most recent place. A loop of many short tasks asks for the same place repeatedly; this avoids the lock.
 struct LatestPlace {
   uint64_t run = 0;
-  Place* place = nullptr;  // as long as that run lives
+  Place* place = nullptr;  // valid as long as that run lives
 };
 thread_local LatestPlace latest;
 
@@ -196,7 +195,7 @@ class Profiler {
   std::vector<std::unique_ptr<Pipeline>> pipelines_;  // the latest first
   std::vector<std::unique_ptr<Run>> runs_;
   std::thread thread_;
-  uint64_t generation_ = 0;  // of the sampling thread
+  uint64_t generation_ = 0;  // identifies the sampling thread
   uint64_t random_ = 1;
 
   static halide_profiler_state initial_state() {
@@ -235,7 +234,7 @@ class Profiler {
   void start() {
     try {
       thread_ = std::thread([this, generation = ++generation_] { look(generation); });
-    } catch (...) {  // no thread: the times of whole runs are still right
+    } catch (...) {  // no thread: the total times of runs are still right
     }
   }
 
@@ -254,10 +253,10 @@ class Profiler {
     }
   }
 
-  // Exponentially distributed, of mean sleep_time.
+  // Exponentially distributed with mean sleep_time.
   std::chrono::microseconds next_wait() {
     random_ = random_ * 6364136223846793005u + 1442695040888963407u;  // D. Knuth, MMIX
-    // -log2 of a number in (0, 1] with these bits, linear between powers of two: libm is not linked.
+    // -log2 of a number in (0, 1] with these bits, linear between powers of two, because libm is not linked.
     const int halvings = std::countl_zero(random_ | 1);
     const double rest = static_cast<double>(random_ << halvings << 1) * 0x1p-64;
     const double mean = 1000.0 * std::max(1, state_.sleep_time);
@@ -288,7 +287,7 @@ class Profiler {
     stats.samples++;
   }
 
-  // What was never looked at is overhead: nothing is known of it.
+  // The time of a pipeline that was never sampled is overhead, because nothing is known about it.
   static void share_time(Pipeline& pipeline) {
     const auto time = static_cast<double>(pipeline.stats.time);
     const int looks = pipeline.stats.samples;
@@ -363,7 +362,7 @@ class Profiler {
 
 Profiler& profiler() {
   static Profiler& instance =
-      *new Profiler;  // never destroyed: runs may end while the process does
+      *new Profiler;  // never destroyed: runs may end while the process exits
   return instance;
 }
 
@@ -375,7 +374,7 @@ namespace rt = retrograde::runtime;
 void* retrograde_profiler_begin(retrograde_context*, const char* pipeline, const char* funcs) {
   try {
     return rt::profiler().begin(pipeline, funcs);
-  } catch (const std::bad_alloc&) {  // then this run is not profiled
+  } catch (const std::bad_alloc&) {  // this run is not profiled
     return nullptr;
   }
 }
@@ -383,7 +382,7 @@ void* retrograde_profiler_begin(retrograde_context*, const char* pipeline, const
 int32_t* retrograde_profiler_thread(retrograde_context*, void* run, int32_t func) {
   try {
     return rt::enter_thread(static_cast<rt::Run*>(run), func);
-  } catch (const std::bad_alloc&) {  // then this thread is not seen
+  } catch (const std::bad_alloc&) {  // this thread is not sampled
     return rt::enter_thread(nullptr, func);
   }
 }

@@ -5,13 +5,12 @@
  *     int32_t name(retrograde_context *, <halide_buffer_t * or scalar>...);
  *     int32_t name_argv(retrograde_context *, void **args);
  *
- * where args[i] is the halide_buffer_t * itself, or points to the scalar. It returns 0 or a
- * negative code of retrograde_error_code. A null context stands for one whose fields are all zero.
+ * where args[i] is the halide_buffer_t * itself, or a pointer to the scalar. It returns 0 or a negative code of
+ * retrograde_error_code. A null context means one whose fields are all zero.
  *
- * Nothing here prints, aborts, exits or throws. Every function may be called from several threads
- * at once. Beyond the threads of the pool, the only state of the process is the pool of free memory
- * blocks (retrograde_pool_*), the cache of memoized results (retrograde_memoization_*), what the
- * profiler gathered (retrograde_profiler_*), and the arenas of thread limits. */
+ * Nothing here prints, aborts, exits or throws. Every function may be called from several threads at once. The
+ * process-wide state is: the thread pool, the pool of free memory blocks (retrograde_pool_*), the cache of memoized
+ * results (retrograde_memoization_*), the profiler's data (retrograde_profiler_*), and the arenas of thread limits. */
 #ifndef RETROGRADE_RUNTIME_H
 #define RETROGRADE_RUNTIME_H
 
@@ -22,7 +21,7 @@
 extern "C" {
 #endif
 
-/* The values that HalideRuntime.h gives these conditions, under our own names. */
+/* HalideRuntime.h's values for these conditions, under our own names. */
 enum retrograde_error_code {
   retrograde_error_success = 0,
   retrograde_error_generic = -1,
@@ -72,44 +71,44 @@ struct halide_trace_event_t; /* of HalideRuntime.h */
 /* One iteration of a parallel loop. */
 typedef int32_t (*retrograde_task)(struct retrograde_context*, int32_t index, uint8_t* closure);
 
-/* On which device and stream a call works; a null member is the default's. They give 0, or a code. */
+/* Selects the device and stream of a call; a null member means the default. They return 0 or an error code. */
 typedef struct retrograde_gpu_handlers {
-  /* The CUcontext. Default: that of the device that is asked for (halide_set_gpu_device,
-   * HL_GPU_DEVICE); else the thread's current one; else the primary one of the last device. */
+  /* The CUcontext. Default: that of the selected device (halide_set_gpu_device, HL_GPU_DEVICE); else the thread's
+   * current one; else the primary context of the last device. */
   int32_t (*acquire_context)(struct retrograde_context*, void** cuda_context, int32_t create);
   int32_t (*release_context)(struct retrograde_context*);
-  /* The CUstream: the only one used. Default: the context's default stream. */
+  /* The CUstream, which all work of the call uses. Default: the context's default stream. */
   int32_t (*get_stream)(struct retrograde_context*, void* cuda_context, void** stream);
 } retrograde_gpu_handlers;
 
-/* What one call, or a family of calls, of generated code may use. A field that is null or zero
- * means the default. The handlers get the context that the generated function was called with. */
+/* Settings of one call, or a family of calls, of generated code. A field that is null or zero means the default. The
+ * handlers get the context that the generated function was called with. */
 typedef struct retrograde_context {
-  /* Told of every error, just before its code is returned; of several errors in one parallel loop
-   * only the one with the lowest iteration is told, after the loop. Default: nobody is told. */
+  /* Called for every error, just before its code is returned. If several iterations of a parallel loop fail, it is
+   * called once after the loop, for the lowest iteration. Default: errors are not reported. */
   void (*error_handler)(struct retrograde_context*, int code, const char* message);
-  /* Gets the text of print() and print_when(), a line at a time and from any thread. Default: the
-   * text is thrown away. */
+  /* Gets the text of print() and print_when(), one line at a time and from any thread. Default: the text is
+   * discarded. */
   void (*print_handler)(struct retrograde_context*, const char* message);
-  /* Memory for intermediate results, aligned to retrograde_allocation_alignment; null when there is
-   * none. Set both or neither. Default: the process's pool, see retrograde_pool_malloc. */
+  /* Allocates memory for intermediate results, aligned to retrograde_allocation_alignment; returns null on failure.
+   * Set both or neither. Default: the process-wide pool, see retrograde_pool_malloc. */
   void* (*malloc_handler)(struct retrograde_context*, size_t bytes);
   void (*free_handler)(struct retrograde_context*, void* block);
-  /* Threads that parallel loops may use, the caller included. 0: as many as the pool has. */
+  /* Number of threads that parallel loops may use, including the caller's. 0: all threads of the pool. */
   int32_t thread_limit;
-  /* For the handlers; never looked at here. */
+  /* For the handlers; not used here. */
   void* user_data;
-  /* Runs a parallel loop in place of the thread pool: calls the task for every index of
-   * [min, min + extent) and gives 0, or the code of an iteration that failed. */
+  /* Runs a parallel loop in place of the thread pool: calls the task for every index of [min, min + extent) and
+   * returns 0, or the code of an iteration that failed. */
   int32_t (*parallel_handler)(struct retrograde_context*, retrograde_task, int32_t min,
                               int32_t extent, uint8_t* closure);
-  /* Runs one iteration of a parallel loop: calls the task and gives its code. Default: just that. */
+  /* Runs one iteration of a parallel loop: calls the task and returns its code. The default does only that. */
   int32_t (*task_handler)(struct retrograde_context*, retrograde_task, int32_t index,
                           uint8_t* closure);
-  /* Told of every event of a traced pipeline, from any thread; gives the event's number, which
-   * later events name as their parent. Default: retrograde_default_trace. */
+  /* Called for every event of a traced pipeline, from any thread; returns the event's number, which later events
+   * name as their parent. Default: retrograde_default_trace. */
   int32_t (*trace_handler)(struct retrograde_context*, const struct halide_trace_event_t*);
-  /* Default: null, as if all members were. */
+  /* Default: null, which means that all members are null. */
   const retrograde_gpu_handlers* gpu_handlers;
 } retrograde_context;
 
@@ -117,65 +116,63 @@ typedef struct retrograde_context {
 
 enum { retrograde_allocation_alignment = 128 };
 
-/* Runs task for every index of [min, min + extent), in any order and in parallel. When iterations
- * fail, those above the lowest failing one may be skipped; its code is the result. */
+/* Runs task for every index of [min, min + extent), in any order and in parallel. If iterations fail, the result is
+ * the code of the lowest failing one, and iterations above it may be skipped. */
 int32_t retrograde_parallel_for(retrograde_context*, retrograde_task task, int32_t min,
                                 int32_t extent, uint8_t* closure);
 
-/* While an element is locked nobody else has it locked. Its holder must not wait for anything. */
+/* Excludes other threads from updating the element. The holder must not wait for anything. */
 void retrograde_lock_element(retrograde_context*, const void* element);
 void retrograde_unlock_element(retrograde_context*, const void* element);
 
-/* Runs both tasks with index 0: `first` on a thread of its own, which no thread limit counts. When
- * one fails, the semaphores are closed; the code is that of a task that failed by itself, the
- * first's if both did. */
+/* Runs both tasks with index 0: `first` on a thread of its own, which does not count towards thread limits. If one
+ * fails, the semaphores are closed. Returns the code of a task that failed by itself; the first's if both did. */
 int32_t retrograde_fork(retrograde_context*, retrograde_task first, uint8_t* first_closure,
                         retrograde_task rest, uint8_t* rest_closure, void** semaphores,
                         int32_t semaphore_count);
-/* Counting semaphores in memory of the caller's, aligned to 8 bytes. Acquiring waits until the count
- * is at least `count` and takes it off; it gives 0, or an error code once the semaphore is closed. */
+/* Counting semaphores in the caller's memory, aligned to 8 bytes. Acquire waits until the semaphore's value is at
+ * least `count` and subtracts it. It returns 0, or an error code once the semaphore is closed. */
 enum { retrograde_semaphore_bytes = 8 };
 int32_t retrograde_semaphore_init(retrograde_context*, void* semaphore, int32_t count);
 int32_t retrograde_semaphore_acquire(retrograde_context*, void* semaphore, int32_t count);
 int32_t retrograde_semaphore_release(retrograde_context*, void* semaphore, int32_t count);
 
-/* Room for `elements` of `element_bytes` each, for one byte at least; null when the count is
- * negative, the size overflows, or there is no memory. */
+/* Allocates `elements` of `element_bytes` each, and at least one byte. Returns null if the count is negative, the
+ * size overflows, or there is no memory. */
 void* retrograde_allocate(retrograde_context*, int64_t elements, int64_t element_bytes);
-/* Tells the error handler why retrograde_allocate gave null, and returns the code for it. */
+/* Reports why retrograde_allocate returned null, and returns the error code. */
 int32_t retrograde_allocation_error(retrograde_context*, const char* name, int64_t elements,
                                     int64_t element_bytes);
 /* Null is allowed. */
 void retrograde_free(retrograde_context*, void* block);
-/* Frees those of the blocks that are not null, the last first. */
+/* Frees the blocks that are not null, the last one first. */
 void retrograde_free_all(retrograde_context*, void** blocks, int64_t count);
 
-/* Tells of an event and gives its number. Numbers are unique in the process. */
+/* Reports an event and returns its number, which is unique in the process. */
 int32_t retrograde_trace(retrograde_context*, const struct halide_trace_event_t* event);
-/* The same from its parts: `event` is a halide_trace_event_code_t, `tag` may be null. */
+/* The same from an event's parts: `event` is a halide_trace_event_code_t, `tag` may be null. */
 int32_t retrograde_trace_region(retrograde_context*, const char* func, int32_t event,
                                 int32_t parent, int32_t* coordinates, int32_t count,
                                 const char* tag);
-/* A tag whose text is `type` and the numbers of the region. */
+/* Reports a tag with the text `type` followed by the numbers of the region. */
 int32_t retrograde_trace_type(retrograde_context*, const char* func, int32_t parent,
                               const char* type, const int32_t* region, int32_t count);
-/* What retrograde_trace does without a handler: a line of text to the print handler; with
- * HL_TRACE_FILE in the environment, a halide_trace_packet_t to that file. */
+/* What retrograde_trace does without a handler: sends a line of text to the print handler or, if HL_TRACE_FILE is
+ * set in the environment, writes a halide_trace_packet_t to that file. */
 int32_t retrograde_default_trace(retrograde_context*, const struct halide_trace_event_t* event);
 
 /* Writes a buffer to a .npy or .tmp file; see Func::debug_to_file. */
 int32_t retrograde_debug_to_file(retrograde_context*, const char* path,
                                  const struct halide_buffer_t* buffer);
 
-/* What a function checks of its buffers; they tell the error handler what is wrong and give its code.
- * Of every buffer, before anything is read of its dimensions: it is not null, has elements of the type
- * (halide_type_t as a number: code | bits << 8 | lanes << 16) and the dimensions, and at most 2^31 - 1
- * elements. */
+/* Checks that a function makes of its buffers; they report what is wrong and return its code. This one comes first,
+ * for every buffer: it is not null, has elements of this type (halide_type_t as a number: code | bits << 8 | lanes
+ * << 16) and this number of dimensions, and at most 2^31 - 1 elements. */
 int32_t retrograde_check_shape(retrograde_context*, const struct halide_buffer_t* buffer,
                                const char* name, int32_t type, int32_t dimensions);
-/* Of each that is no query: its data are on the host, at a multiple of `alignment` bytes, their
- * distances fit 31 bits, and it holds what is used: for each dimension whose bit is set in
- * `dimensions`, `used` has the first and the last coordinate. */
+/* For each buffer that is not a bounds query: its data are on the host at a multiple of `alignment` bytes, its
+ * offsets fit 31 bits, and it contains the used region. `used` has the first and last coordinate of each dimension
+ * whose bit is set in `dimensions`. */
 enum {
   retrograde_region_is_written = 1, /* else it is read */
   retrograde_region_is_dense = 2,   /* the stride of dimension 0 must be 1 */
@@ -184,42 +181,41 @@ enum {
 int32_t retrograde_check_region(retrograde_context*, const struct halide_buffer_t* buffer,
                                 const char* name, int32_t rules, int32_t alignment,
                                 int32_t dimensions, const int32_t* used);
-/* The answer to a query: `sides` has min, extent and stride of each dimension. */
+/* Answers a bounds query: `sides` has min, extent and stride of each dimension. */
 int32_t retrograde_answer_query(retrograde_context*, struct halide_buffer_t* buffer,
                                 int32_t dimensions, const int32_t* sides);
 
-/* The profiler. A run begins with the names of Funcs, one a line; afterwards they are numbers. Null
- * stands for a run that is not profiled. Each thread that works for it gets a place, never null, in which
- * it keeps the number of what it computes: generated code stores there itself. A thread that gets
- * another place, for work inside of work, computes nothing in the one before until it has left the other. */
+/* The profiler. A run begins with the names of its Funcs, one per line; later calls refer to them by number. A null
+ * run is not profiled. Each thread that works for a run gets a place, never null, in which generated code stores the
+ * number of the current Func. A thread that gets another place for nested work does not compute in the earlier one
+ * until it leaves the nested one. */
 void* retrograde_profiler_begin(retrograde_context*, const char* pipeline, const char* funcs);
 int32_t* retrograde_profiler_thread(retrograde_context*, void* run, int32_t func);
 int32_t retrograde_profiler_leave(retrograde_context*, int32_t* place);
 int32_t retrograde_profiler_memory(retrograde_context*, void* run, int32_t func, int64_t change);
 int32_t retrograde_profiler_end(retrograde_context*, void* run);
 
-/* The cache of memoized Funcs. Looking up copies `count` values to `blocks` of the given sizes and
- * gives 0, or 1 when the cache has none such. Storing copies them; it may also store nothing. */
+/* The cache of memoized Funcs. Lookup copies `count` values to `blocks` of the given sizes and returns 0, or 1 if
+ * the cache has no such entry. Store copies the values; it may also store nothing. */
 int32_t retrograde_memoization_lookup(retrograde_context*, const uint8_t* key, int32_t key_bytes,
                                       int32_t count, void** blocks, const int64_t* bytes);
 int32_t retrograde_memoization_store(retrograde_context*, const uint8_t* key, int32_t key_bytes,
                                      int32_t count, void* const* blocks, const int64_t* bytes,
                                      int32_t has_eviction_key, uint64_t eviction_key);
 
-/* Reports an error and returns its code. The format is text with the fields of
- * retrograde_format_message. */
+/* Reports an error and returns its code. Format fields are those of retrograde_format_message. */
 int32_t retrograde_report_error(retrograde_context*, int32_t code, const char* format, ...);
 void retrograde_print(retrograde_context*, const char* format, ...);
 
-/* ---- in the static runtime alone ---- */
+/* ---- only in the static runtime ---- */
 
-/* Fills in the context of one call of a function that was compiled ahead of time: its handlers call
- * the functions of HalideRuntime.h with `user_context`. */
+/* Initialises the context for one call of an ahead-of-time compiled function: its handlers call the functions of
+ * HalideRuntime.h with `user_context`. */
 void retrograde_begin_call(retrograde_context*, void* user_context);
 
 /* ---- for hosts ---- */
 
-/* Writes at most `size` bytes, the final 0 included, and returns the length written. Fields:
+/* Writes at most `size` bytes, including the final 0, and returns the length written. Fields:
  *   %i int64_t   %u uint64_t   %f double, as the shortest text that reads back the same
  *   %F a float passed as double, with six decimals   %E double, scientific with six decimals
  *   %g as %f, for a float passed as double   %s const char *   %p const void *   %% a percent */
@@ -228,27 +224,27 @@ size_t retrograde_format_message(char* text, size_t size, const char* format, ..
 /* Name of an error code, or "unknown error". */
 const char* retrograde_error_name(int32_t code);
 
-/* The default allocator. Large blocks are kept after their release, because mapping and zeroing
- * pages afresh costs more than most stages of a pipeline. */
+/* The default allocator. Large blocks are kept after their release, because mapping and zeroing new pages costs more
+ * than most stages of a pipeline. */
 void* retrograde_pool_malloc(size_t bytes);
 void retrograde_pool_free(void* block);
-/* Bytes that released blocks may hold. Default: a quarter of the machine's memory. */
+/* Limit on the bytes that released blocks may hold. Default: a quarter of the machine's memory. */
 void retrograde_pool_set_limit(size_t bytes);
 size_t retrograde_pool_bytes(void); /* held now */
-void retrograde_pool_release(void); /* gives all of them back to the system */
+void retrograde_pool_release(void); /* gives them all back to the system */
 
-/* Bytes that the results of memoized Funcs may hold; 0: the default, 1 MiB. */
+/* Limit on the bytes of memoized results; 0: the default, 1 MiB. */
 void retrograde_memoization_set_size(int64_t bytes);
 int64_t retrograde_memoization_bytes(void); /* held now */
-/* Forgets what was stored with this eviction key. */
+/* Removes the entries that were stored with this eviction key. */
 void retrograde_memoization_evict(uint64_t eviction_key);
-void retrograde_memoization_cleanup(void); /* forgets everything */
+void retrograde_memoization_cleanup(void); /* removes all entries */
 
-/* A table of all profiled pipelines for the print handler: time, threads and peak memory by Func. */
+/* Sends a table of all profiled pipelines to the print handler: time, threads and peak memory by Func. */
 void retrograde_profiler_report(retrograde_context*);
-/* The same as numbers, or null. Not to be read while the pipeline runs. */
+/* The same as numbers, or null. Must not be read while the pipeline runs. */
 struct halide_profiler_pipeline_stats* retrograde_profiler_pipeline(const char* name);
-void retrograde_profiler_reset(void); /* forgets all times and sizes */
+void retrograde_profiler_reset(void); /* clears all times and sizes */
 
 #ifdef __cplusplus
 }

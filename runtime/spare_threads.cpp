@@ -1,10 +1,10 @@
-// A stack of parked threads. To start a thread takes longer than most of what a producer inside of
-// loops does, so that one that is done waits here for more.
+// A stack of parked threads. Starting a thread takes longer than most producers inside loops run, so finished threads
+// wait here for more work.
 //
-// Whoever borrows a thread takes it off the stack, or starts one, and puts it back: a thread on the
-// stack is idle for certain, and nobody ever waits for one. More than `max_parked` are not kept.
-// The stack is a global without constructor or destructor, whose threads are joined at the end of
-// the process or of the library; those still borrowed then are left alone.
+// A borrower pops a thread from the stack, or starts one, and pushes it back afterwards. So every thread on the stack
+// is idle, and nobody ever waits for one. At most `max_parked` are kept. The stack is a global without constructor or
+// destructor. Its threads are joined when the process exits or the library is unloaded; threads that are still borrowed
+// then are left running.
 #include "spare_threads.h"
 
 #include <pthread.h>
@@ -29,7 +29,7 @@ struct SpareThread {
     thread.join();
   }
 
-  SpareThread* next = nullptr;  // below on the stack
+  SpareThread* next = nullptr;  // the next one on the stack
 
  private:
   enum State : int { Idle, Busy, Ended };
@@ -37,7 +37,7 @@ struct SpareThread {
   std::atomic<int> state{Idle};
   void (*run)(void*) = nullptr;
   void* data = nullptr;
-  std::thread thread;  // the last member: it finds the others made
+  std::thread thread;  // last member: the thread starts after the others are initialised
 
   void set(State now) {
     state.store(now, std::memory_order_release);
@@ -77,7 +77,7 @@ class Stack {
     return true;
   }
 
-  // A child process has the stack, but not the threads.
+  // After fork(), a child process has the stack but not the threads.
   void before_process_fork() { mutex_.lock(); }
   void after_process_fork() { mutex_.unlock(); }
   void in_child_process() {

@@ -1,19 +1,18 @@
-// Threads that are lent for one piece of work each, and kept for the next.
+// Lends threads for one piece of work each, and keeps them for reuse.
 #pragma once
 
 namespace retrograde::runtime {
 
 struct SpareThread;
 
-// Begins run(data) on a thread that does nothing else until `finish_on`. Never waits for one to
-// come free: who nests forks, or runs many at once, gets a thread for each. Null: the system has no
-// thread left.
+// Starts run(data) on a thread that does nothing else until `finish_on`. It never waits for a thread to become free:
+// nested or concurrent forks get a thread each. Null if the system cannot create a thread.
 SpareThread* begin_on_spare_thread(void (*run)(void*), void* data);
 
-// Waits for the end of what `begin_on_spare_thread` began.
+// Waits for the work that `begin_on_spare_thread` started.
 void finish_on(SpareThread* thread);
 
-// Ends those that nobody has borrowed; also runs when the library is unloaded.
+// Ends the threads that are not borrowed; also runs when the library is unloaded.
 void end_spare_threads();
 
 }  // namespace retrograde::runtime

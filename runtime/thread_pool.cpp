@@ -1,20 +1,18 @@
-// The threads under the parallel loops where there is no oneTBB: a pool of our own, which the
-// static runtime uses so that programs need no library but the system's.
+// A thread pool for parallel loops. The static runtime uses it instead of oneTBB, so that programs need only the
+// system's libraries.
 //
-// A loop is an entry in a list, the newest last. Workers take pieces of the newest loop that has
-// any, so that inner loops finish first; whoever started a loop takes pieces of it too and then
-// waits for the workers that are still inside. Because the starter always works on its own loop,
-// every loop makes progress whatever the workers do, and nesting cannot deadlock. Pieces are a
-// share of what is left (guided self-scheduling, Polychronopoulos and Kuck 1987): large at first,
-// single iterations at the end.
+// A loop is an entry in a list, the newest last. Workers take pieces of the newest loop that has any, so inner loops
+// finish first. The thread that started a loop takes pieces of it too, and then waits for workers that are still
+// inside. Because the starter always works on its own loop, every loop makes progress whatever the workers do, and
+// nesting cannot deadlock. A piece is a fraction of the remaining iterations (guided self-scheduling, Polychronopoulos
+// and Kuck 1987): large at first, single iterations at the end.
 //
-// A starter that waits takes pieces of the loops that were started inside of its own: what it waits for
-// ends earlier, and nothing else can delay it (leapfrogging, Wagner and Calder 1993). Its stack holds
-// no more loops at once than are nested.
+// A waiting starter takes pieces of the loops that were started inside its own. So the loop that it waits for ends
+// earlier, and nothing unrelated can delay it (leapfrogging, Wagner and Calder 1993). Its stack holds at most as many
+// loops as are nested.
 //
-// Who waits spins for some microseconds before it sleeps (competitive spinning, Karlin, Li, Manasse
-// and Owicki 1991): to wake a thread costs more than many a loop takes, and loops follow one
-// another.
+// A waiting thread spins for some microseconds before it sleeps (competitive spinning, Karlin, Li, Manasse and Owicki
+// 1991): waking a thread costs more than many loops take, and one loop often follows another.
 #include "thread_pool.h"
 
 #include <algorithm>
@@ -35,8 +33,8 @@ namespace {
 
 using RunRange = void (*)(void*, int64_t, int64_t);
 
-// Spins until `ready()`, for about as long as it takes to put a thread to sleep and to wake it
-// again. False when it still is not. Gives the core away now and then: others may have work for it.
+// Spins until `ready()`, for about as long as it takes to put a thread to sleep and wake it again. Returns false if it
+// is still not ready. Yields the core now and then, because others may have work for it.
 template <typename Ready>
 bool spin_until(const Ready& ready) {
   constexpr int turns = 200, reads = 16;
@@ -50,7 +48,7 @@ bool spin_until(const Ready& ready) {
   return ready();
 }
 
-// The pool's mutex is held for some instructions only.
+// Spins first, because the pool's mutex is only held for a few instructions.
 std::unique_lock<std::mutex> lock_briefly(std::mutex& mutex) {
   if (spin_until([&] { return mutex.try_lock(); })) return {mutex, std::adopt_lock};
   return std::unique_lock(mutex);
@@ -58,11 +56,11 @@ std::unique_lock<std::mutex> lock_briefly(std::mutex& mutex) {
 
 class SharedLoop {
  public:
-  // Started by the piece that this thread runs, if any.
+  // `around_`: the loop whose piece this thread is running, if any.
   SharedLoop(int64_t extent, int threads, RunRange run, void* data)
       : extent_(extent), threads_(threads), run_(run), data_(data), around_(innermost) {}
 
-  // Runs one piece; false when none is left.
+  // Runs one piece; returns false if none is left.
   bool run_piece() {
     int64_t begin = next_.load(std::memory_order_relaxed), end = 0;
     do {
@@ -76,7 +74,7 @@ class SharedLoop {
   }
   bool takes_workers() const { return inside < threads_ - 1 && has_pieces(); }
 
-  // The loops around one that is listed outlive it.
+  // Loops around a listed loop outlive it.
   SharedLoop* around() const { return around_; }
   bool is_inside(const SharedLoop& other) const {
     for (const SharedLoop* loop = around_; loop; loop = loop->around_) {
@@ -85,14 +83,15 @@ class SharedLoop {
     return false;
   }
 
-  std::atomic<int> inside{0};   // workers; they enter under the pool's mutex, while it is listed
-  bool starter_sleeps = false;  // under the pool's mutex
+  std::atomic<int> inside{
+      0};  // workers inside; they enter under the pool's mutex while the loop is listed
+  bool starter_sleeps = false;  // protected by the pool's mutex
 
  private:
-  static thread_local SharedLoop* innermost;  // of which this thread runs a piece
+  static thread_local SharedLoop* innermost;  // the loop whose piece this thread runs
 
   const int64_t extent_;
-  const int threads_;  // that may run it, its starter included
+  const int threads_;  // that may run it, including its starter
   const RunRange run_;
   void* const data_;
   SharedLoop* const around_;
@@ -131,7 +130,7 @@ class Pool {
     return before;
   }
 
-  // Ends the workers; the next loop starts new ones. Not from inside a loop.
+  // Ends the workers; the next loop starts new ones. Must not be called inside a loop.
   void shut_down() {
     std::vector<std::thread> workers;
     {
@@ -149,13 +148,13 @@ class Pool {
  private:
   std::mutex mutex_;
   std::condition_variable wake_, done_;
-  std::vector<SharedLoop*> loops_;  // the newest last
+  std::vector<SharedLoop*> loops_;  // newest last
   std::vector<std::thread> workers_;
-  std::atomic<int> wanted_{0};  // threads; 0: not yet known
+  std::atomic<int> wanted_{0};  // number of threads; 0: not yet known
   bool stops_ = false;
-  int sleepers_ = 0;                       // workers that only wake_ wakes
-  std::atomic<int> sleeping_starters_{0};  // that only done_ wakes
-  std::atomic<uint64_t> changes_{0};       // counts what a worker that spins would like to know
+  int sleepers_ = 0;                       // workers that wait for wake_
+  std::atomic<int> sleeping_starters_{0};  // starters that wait for done_
+  std::atomic<uint64_t> changes_{0};       // counts events that a spinning worker waits for
 
   int threads_for(int32_t limit) {
     int wanted = wanted_.load(std::memory_order_relaxed);
@@ -179,7 +178,7 @@ class Pool {
     if (starter_sleeps) done_.notify_all();
   }
 
-  // A thread that cannot be had is done without.
+  // If the system cannot create a thread, the pool does without it.
   void grow(int workers) {
     try {
       while (static_cast<int>(workers_.size()) < workers && !stops_)
@@ -188,7 +187,7 @@ class Pool {
     }
   }
 
-  // The loop is gone when this returns: no worker touches it after it has counted itself out.
+  // When this returns the loop may be destroyed: a worker does not touch it after decrementing `inside`.
   void leave(SharedLoop& loop) {
     std::unique_lock lock = lock_briefly(mutex_);
     loops_.erase(std::find(loops_.begin(), loops_.end(), &loop));
@@ -200,7 +199,7 @@ class Pool {
     }
   }
 
-  // Until they have left the loop, or another one is there.
+  // Waits until the workers have left the loop, or another loop has started.
   void wait_for_workers(SharedLoop& loop, std::unique_lock<std::mutex>& lock) {
     const uint64_t seen = changes_.load(std::memory_order_relaxed);
     const auto is_over = [&] {
@@ -210,8 +209,7 @@ class Pool {
     const bool was_short = spin_until(is_over);
     lock = lock_briefly(mutex_);
     if (was_short) return;
-    sleeping_starters_++;  // before it looks again, as a worker counts itself out before it looks
-                           // here
+    sleeping_starters_++;  // set before checking again; a worker decrements `inside` before it checks this
     loop.starter_sleeps = true;
     done_.wait(lock, is_over);
     loop.starter_sleeps = false;
@@ -220,11 +218,11 @@ class Pool {
 
   void count_out(SharedLoop& loop) {
     if (loop.inside.fetch_sub(1) > 1 || sleeping_starters_.load() == 0) return;
-    const std::lock_guard lock(mutex_);  // whoever saw a worker inside waits by now
+    const std::lock_guard lock(mutex_);  // a starter that saw a worker inside is waiting by now
     done_.notify_all();
   }
 
-  // A loop that takes a worker, and has counted this one in; of those inside of `outer`, if given.
+  // Finds the newest loop that takes workers and counts this worker in; only among the loops inside `outer`, if given.
   SharedLoop* newest_with_work(const SharedLoop* outer = nullptr) const {
     for (auto it = loops_.rbegin(); it != loops_.rend(); ++it) {
       if (!(*it)->takes_workers() || (outer && !(*it)->is_inside(*outer))) continue;
@@ -234,7 +232,7 @@ class Pool {
     return nullptr;
   }
 
-  // The mutex is free meanwhile.
+  // Releases the mutex while working.
   void work_on(SharedLoop& loop, std::unique_lock<std::mutex>& lock) {
     lock.unlock();
     while (loop.run_piece()) {

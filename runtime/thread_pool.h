@@ -1,12 +1,12 @@
-// What can be told to our own thread pool.
+// Settings of our own thread pool.
 #pragma once
 
 namespace retrograde::runtime {
 
 constexpr int max_threads = 256;
 
-// Threads of later loops, the caller of each included; 0: as many as HL_NUM_THREADS says or the
-// machine has. Gives what was set before.
+// Sets the number of threads of later loops, including the caller of each. 0: the value of HL_NUM_THREADS, or the
+// machine's number of processors. Returns the previous setting.
 int set_thread_count(int count);
 int thread_count();
 // Joins the workers. A later loop starts them again. Must not be called from inside a loop.

@@ -1,6 +1,5 @@
-// oneTBB behind one function. This file is compiled without the race detector: TBB's library is not
-// built for it, so its templates would be reported; parallel.cpp shows the detector the order that
-// TBB guarantees.
+// Hides oneTBB behind one function. This file is compiled without the race detector: TBB's library is not built for it,
+// so its templates would give false reports. parallel.cpp makes the order that TBB guarantees visible to the detector.
 #include "threads.h"
 
 #include <oneapi/tbb/blocked_range.h>
@@ -17,14 +16,14 @@ namespace {
 using Run = void (*)(void*, int64_t, int64_t);
 
 void run_parallel(int64_t extent, Run run, void* data) {
-  // Grain 1 and TBB's auto partitioner: iterations are rows or tiles, each worth far more than a
-  // task; ranges split further only where a thread runs dry.
+  // Grain 1 and TBB's auto partitioner: iterations are rows or tiles, each worth far more than a task. Ranges are split
+  // further only when a thread runs out of work.
   tbb::parallel_for(
       tbb::blocked_range<int64_t>(0, extent),
       [=](const tbb::blocked_range<int64_t>& range) { run(data, range.begin(), range.end()); });
 }
 
-// An arena is too dear to make for each loop, so there is one for each limit ever asked for.
+// Creating an arena for each loop would be too expensive, so there is one for each limit ever used.
 tbb::task_arena& arena_of(int32_t thread_limit) {
   static std::mutex mutex;
   static auto& arenas = *new std::map<int32_t, std::unique_ptr<tbb::task_arena>>;  // outlives TBB

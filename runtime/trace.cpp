@@ -1,5 +1,5 @@
-// Events of traced pipelines: to the context's handler, or, as text, to where print() goes; with
-// HL_TRACE_FILE in the environment, as packets to that file.
+// Events of traced pipelines. They go to the context's handler or, as text, to the print handler. If HL_TRACE_FILE is
+// set in the environment, they go to that file as packets.
 #include "trace.h"
 
 #include <HalideRuntime.h>
@@ -169,7 +169,7 @@ std::vector<char> packet_of(const halide_trace_event_t& e, int32_t id) {
   return packet;
 }
 
-// Whole packets, one after the other, whichever threads they come from.
+// Writes packets completely, one after another, also from different threads.
 bool write_packet(int file, const std::vector<char>& packet) {
   static std::mutex mutex;
   const std::lock_guard lock(mutex);
@@ -189,12 +189,12 @@ void print(retrograde_context* context, const char* text) {
   if (context && context->print_handler) context->print_handler(context, text);
 }
 
-// What is to be written to: -1 before HL_TRACE_FILE was looked at. Guarded by `file_mutex`.
+// The file to write to; -1 until HL_TRACE_FILE has been read. Protected by `file_mutex`.
 int chosen_file = -1;
 bool is_own_file = false;
 std::mutex file_mutex;
 
-// A file that cannot be opened is one that cannot be written: the first event says so.
+// If the file cannot be opened, the first event reports that it cannot be written.
 int open_from_environment() {
   const char* path = std::getenv("HL_TRACE_FILE");
   if (!path || !*path) return 0;
@@ -238,7 +238,7 @@ int32_t rt::trace_to(int file, retrograde_context* context, const halide_trace_e
                !rt::has_complained.exchange(true)) {
       rt::print(context, "cannot write the trace: its file cannot be written\n");
     }
-  } catch (const std::bad_alloc&) {  // then this event goes untold
+  } catch (const std::bad_alloc&) {  // the event is lost
   }
   return id;
 }

@@ -1,4 +1,4 @@
-// Where the packets of traces go.
+// The destination of trace packets.
 #pragma once
 
 #include <cstdint>
@@ -7,13 +7,12 @@
 
 namespace retrograde::runtime {
 
-// The descriptor that was set, or that of the file that HL_TRACE_FILE names; 0: none, text is
-// printed.
+// The descriptor that was set, or of the file that HL_TRACE_FILE names; 0: none, so text is printed.
 int trace_file();
-// 0: none. The file that HL_TRACE_FILE named is closed; false when what was written to it is lost.
+// 0: none. Closes the file that HL_TRACE_FILE named; returns false if data written to it were lost.
 bool set_trace_file(int file);
 
-// Gives the event's number.
+// Returns the event's number.
 int32_t trace_to(int file, retrograde_context* context, const halide_trace_event_t* event);
 
 }  // namespace retrograde::runtime

@@ -1,18 +1,17 @@
-// opt -- the compiler's passes, one by one: the smallest way to look at a pass, to time it, or to
-// report what it does wrong.
+// opt -- runs the compiler's passes one by one: to examine a pass, to time it, or to reproduce a bug.
 //
 //   opt --pass=vectorize_loops program.ir           on IR text; "-" or nothing: standard input
-//   opt --pass=unroll_loops,simplify program.ir     several in this order
+//   opt --pass=unroll_loops,simplify program.ir     several passes in this order
 //   opt --pass=simplify --expr                      the text is one expression
 //   opt --graph [--pass=schedule_unscheduled] program.graph
 //                                                   the text is an algorithm (graph/graph.h), which
-//                                                   is checked; --stop-after=PASS lowers it so far
-//   opt --graph --log=FILE program.graph            under a schedule (graph/schedule_log.h), which
-//                                                   is given before the passes run
-//   opt --time-passes --dump-after=all ...          how long each took; what each gave
+//                                                   is checked; --stop-after=PASS also lowers it up to PASS
+//   opt --graph --log=FILE program.graph            applies a schedule (graph/schedule_log.h) before
+//                                                   the passes run
+//   opt --time-passes --dump-after=all ...          prints the time and the result of each pass
 //   opt --time-passes --dump-after=PASS,... -- PROGRAM ARGS...
-//                                                   of all that a program compiles while it runs
-//   opt --list, opt --list-pipeline                 names the passes for IR text; those of the
+//                                                   for everything that a program compiles while it runs
+//   opt --list, opt --list-pipeline                 lists the passes for IR text; those of the
 //                                                   compiler, in its order
 #include <sys/wait.h>
 #include <unistd.h>
@@ -49,7 +48,7 @@ using namespace retrograde;
 struct Options {
   std::vector<std::string> passes, dumped;
   std::string file = "-", stop_after, log;
-  std::vector<char*> program;  // what stands behind "--", null-terminated
+  std::vector<char*> program;  // the words after "--", null-terminated
   bool lists = false, lists_pipeline = false, is_expr = false, is_graph = false, times = false;
   bool dumps(const std::string& pass) const {
     return std::find(dumped.begin(), dumped.end(), pass) != dumped.end() ||
@@ -64,7 +63,7 @@ std::vector<std::string> split(const std::string& text, char separator) {
   return parts;
 }
 
-// The text behind "--name=".
+// The text after "--name=".
 std::optional<std::string> value_of(const std::string& arg, const std::string& name) {
   const std::string begin = "--" + name + "=";
   if (arg.rfind(begin, 0) != 0) return std::nullopt;
@@ -211,7 +210,7 @@ void run_passes(const Options& options) {
 
 // ---- a program ----
 
-// A file that goes when this goes.
+// A temporary file that is deleted on destruction.
 class LogFile {
  public:
   LogFile() {
@@ -245,7 +244,7 @@ int run_and_wait(const Options& options, const char* log) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
 }
 
-// Lines "pass NAME MS ms of PIPELINE" are times; everything else is dumps.
+// Lines "pass NAME MS ms of PIPELINE" are times; all other lines are dumps.
 void show_log(const Options& options, const char* log) {
   std::ifstream in(log);
   TimeTable times;

@@ -1,8 +1,8 @@
 // batch.cpp -- see batch.h.
 //
-// The loss of a step is that of one photo (stochastic gradients); Adam's moments run on over all of them.
-// A look for all photographs cannot depend on the place in one of them, so the grid has three nodes along each
-// side unless --grid says otherwise; what is left of the bilateral grid are its layers along the guide.
+// Each step uses the loss of one photo (stochastic gradients); Adam's moments carry over from photo to photo. A look
+// for all photographs must not depend on the position in one of them. So the grid has only three nodes along each side
+// unless --grid sets another number, and its layers along the guide do most of the work.
 #include "batch.h"
 
 #include <algorithm>
@@ -62,7 +62,7 @@ Photographs read_photographs(const Options& options) {
   return {pairs_of(division.train), pairs_of(division.held_out), division.words};
 }
 
-// All with the same channels: three where a photograph or the look to begin with has colours.
+// Gives all photographs the same channels: three if any photograph or the initial look has colours.
 void align_channels(const Options& options, const std::optional<Look>& start, Photographs& all) {
   bool colour = start && start->channels == 3;
   for (const auto* part : {&all.training, &all.held_out}) {
@@ -77,7 +77,7 @@ void align_channels(const Options& options, const std::optional<Look>& start, Ph
   }
 }
 
-// One size for all: the first photo's, its longer side shortened.
+// One size for all: that of the first photo, reduced so that its longer side fits.
 Shape training_shape(const Options& options, const std::optional<Look>& start, const Pair& first) {
   Shape shape = first.shape;
   const double factor =
@@ -88,7 +88,7 @@ Shape training_shape(const Options& options, const std::optional<Look>& start, c
   return start ? start->shape(shape.width, shape.height) : shape;
 }
 
-// The steps, one photograph each, and what --resume needs of them.
+// The training steps, one photograph each, and the state for --resume.
 class LookRun {
  public:
   LookRun(const Options& options, const std::optional<Look>& start, const Shape& shape,
@@ -121,7 +121,9 @@ class LookRun {
 
   long steps() const { return trainer_->steps(); }
   Look look() const { return look_of(trainer_->shape(), *trainer_); }
-  const std::vector<apps::LossSample>& series() const { return series_; }  // of each step's photo
+  const std::vector<apps::LossSample>& series() const {
+    return series_;
+  }  // per step, of that step's photo
 
   void save() const {
     apps::State state = state_of(*trainer_);
@@ -151,7 +153,7 @@ class LookRun {
     return trainer_->step(batch_first_rate * std::pow(batch_last_rate / batch_first_rate, share));
   }
 
-  // Read before anything is compiled, so that a bad one is told at once.
+  // Read before anything is compiled, so that a bad file is reported at once.
   apps::State read_own_state(const Shape& shape) const {
     apps::State state = apps::read_state(options_.output / "state.bin", state_program);
     require_same_run(state, shape, options_.moves);
@@ -178,7 +180,7 @@ class LookRun {
   std::mt19937_64 random_;
   std::string names_;  // of the photographs
   std::optional<Trainer> trainer_;
-  std::vector<size_t> order_;  // in which they are learned from, until all have been
+  std::vector<size_t> order_;  // random order of the photographs, redrawn once all were used
   std::vector<apps::LossSample> series_;
 };
 
@@ -186,7 +188,7 @@ double psnr_between(const Planes& a, const Pair& pair) {
   return psnr_db(mean_squared_difference(a, pair.target, pair.shape.samples()));
 }
 
-// Every photo through the look at its own size; a row for each, and the means.
+// Applies the look to every photo at its own size: a table row for each, and the means.
 struct Accuracy {
   double before = 0, after = 0;
 };

@@ -1,4 +1,4 @@
-// batch.h -- --pairs: one look for a folder of photographs, and how well it suits those it did not see.
+// batch.h -- --pairs: learns one look from a folder of photographs, and measures it on photographs held out.
 #pragma once
 
 #include <optional>
@@ -8,10 +8,10 @@
 
 namespace bilateral_slice {
 
-// Photographs are learned from at one small size, one a step, in random order; which are held out, division.h
-// says. All are taken in colour where one of them has colours. The output folder receives look.bin, state.bin,
-// report.json, its plot, and pictures of a photograph held out. Throws retrograde::UserError.
-// With --resume it goes on from state.bin there.
+// Training uses all photographs at one small size, one per step, in random order; division.h says which are held out.
+// All are in colour if any of them is. The output folder receives look.bin, state.bin, report.json, its plot, and
+// pictures of a held-out photograph. With --resume, training continues from the state.bin there. Throws
+// retrograde::UserError.
 void learn_from_pairs(const Options& options, const std::optional<Look>& start);
 
 }  // namespace bilateral_slice

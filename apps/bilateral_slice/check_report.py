@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Prints what a run of bilateral_slice reported, and fails when it is not what the demo promises.
+"""Prints the results of a run of bilateral_slice, and fails if they are not what the demo promises.
 
 usage: check_report.py report.json
 """
 import json
 import sys
 
-# key, how the value must compare, the limit
+# key, comparison, limit
 PROMISES = [
     ("psnr_final_db", ">=", 32.0),
     ("psnr_gain_db", ">=", 10.0),

@@ -1,4 +1,4 @@
-// explain.h -- what a run computes, and what it leaves out because nothing needs it.
+// explain.h -- explains what a run computes, and what it leaves out because nothing needs it.
 #pragma once
 
 #include <string>
@@ -9,10 +9,10 @@
 
 namespace bilateral_slice {
 
-// A line each.
+// One line for each thing left out.
 std::vector<std::string> left_out(const Shape& shape, const Groups& moves);
 
-// --explain: prints the grid, the gradient and what was left out.
+// --explain: prints the grid, the gradient and what is left out.
 void explain(const Shape& shape, const Groups& moves);
 
 }  // namespace bilateral_slice

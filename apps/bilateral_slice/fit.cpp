@@ -1,8 +1,7 @@
 // fit.cpp -- see fit.h.
 //
-// The two languages alternate in blocks of a few steps, so that whatever else the machine does
-// meets both alike. While one works, the other sleeps: the peer waits for its next request, and our
-// threads wait for the next loop.
+// The two languages alternate in blocks of a few steps, so that other load on the machine affects both alike. While one
+// runs, the other sleeps: the peer waits for its next request, and our threads wait for the next loop.
 #include "fit.h"
 
 #include <algorithm>
@@ -38,7 +37,7 @@ std::vector<float> rates_of(int first, int count, int steps) {
   return rates;
 }
 
-// The peer, until its time is over or it fails; its failure does not end our run.
+// Runs the peer until its time limit or its failure; a failure does not end our run.
 class PeerRun {
  public:
   PeerRun(const Shape& shape, const std::vector<float>& photo, const std::vector<float>& target,
@@ -103,7 +102,7 @@ double Series::total_seconds() const {
 }
 
 double Series::median_ms() const {
-  return 1e3 * apps::median(seconds);  // 0 for a run that was resumed at its end
+  return 1e3 * apps::median(seconds);  // 0 if a finished run was resumed
 }
 
 Fit fit(const Shape& shape, std::vector<float>& photo, std::vector<float>& target,

@@ -1,4 +1,4 @@
-// fit.h -- the run: both languages take the same steps, in turns, and every step is timed.
+// fit.h -- the training run: both languages take the same steps in turns, and every step is timed.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@
 
 namespace bilateral_slice {
 
-// What one language did: the loss before each step, and how long the step took.
+// The results of one language: the loss before each step, and the step's duration.
 struct Series {
   double compile_seconds = 0;
   std::vector<double> loss;
@@ -27,20 +27,20 @@ struct Series {
 struct FitOptions {
   int steps = 0;
   int threads = 0;
-  double peer_seconds = 0;  // no more blocks of the peer after this long; 0: no peer
-  double seconds = 0;       // of our steps; 0: no limit
+  double peer_seconds = 0;  // time limit for the peer; 0: no peer
+  double seconds = 0;       // time limit for our steps; 0: no limit
   Groups moves = {};
-  std::optional<Look> start = {};          // a look to begin with; without one, the identity
-  std::optional<apps::State> resume = {};  // of an earlier run, which this one goes on with
+  std::optional<Look> start = {};          // the initial look; without one, the identity
+  std::optional<apps::State> resume = {};  // state of an earlier run to continue
 };
 
 struct Fit {
-  Series ours, peer;          // peer is empty when it was left out
-  std::string why_no_peer;    // not empty: the peer was asked for and could not be measured
+  Series ours, peer;          // peer is empty if it did not run
+  std::string why_no_peer;    // not empty if the peer was requested but could not be measured
   std::vector<float> result;  // [channels, height, width], the photo through the learned look
   Look look;
-  apps::State state;     // for a run that goes on
-  bool stopped = false;  // by a signal: what was learned until then is in here
+  apps::State state;     // to continue the run later
+  bool stopped = false;  // by a signal; the result contains what was learned until then
 };
 
 // Photo and target are planes as for Trainer. `progress(step, loss)` is called after each of our

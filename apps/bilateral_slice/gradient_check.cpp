@@ -1,8 +1,8 @@
 // gradient_check.cpp -- see gradient_check.h.
 //
-// The loss is quadratic in the grid, so its central difference is exact for any step. In the
-// guide's parameters it has kinks (the hinges; a pixel that changes its layer): the step is so
-// small that hardly a pixel crosses one, and still large against rounding in double.
+// The loss is quadratic in the grid, so its central difference is exact for any step. In the guide's parameters it has
+// kinks (the hinges; a pixel that changes its layer). So the step is small enough that hardly any pixel crosses a kink,
+// yet large compared with rounding in double.
 #include "gradient_check.h"
 
 #include <algorithm>
@@ -47,7 +47,7 @@ Values crop_planes(const Shape& whole, const Shape& crop, const float* from, int
   return to;
 }
 
-// A parameter array: its values, the gradient that the adjoint gave, and the step for differences.
+// A parameter array: its values, the gradient by the adjoint, and the step for differences.
 struct Parameters {
   lang::ImageParam input;
   std::vector<int> sizes;
@@ -58,7 +58,7 @@ struct Parameters {
   lang::Buffer<double> buffer(Values& of) const { return lang::Buffer<double>(of.data(), sizes); }
 };
 
-// Where the gradient is checked: element `n` of each array but for a little noise. Away from the identity.
+// The point where the gradient is checked: element `n` of each array, without the added noise. It is not the identity.
 double start_of_grid(const Shape& shape, size_t n) {
   const size_t i = n % shape.coefficients(), o = n / shape.coefficients() % shape.channels;
   return i == o ? 1.0 : 0.0;
@@ -101,7 +101,7 @@ class Checker {
  private:
   using Buffer = lang::Buffer<double>;
 
-  // Plain and at root: what is checked is the mathematics, on few pixels.
+  // A plain schedule: the check tests the mathematics, on few pixels.
   void schedule() {
     for (lang::Func f :
          {model_.row_mixture, model_.row_slopes, model_.light, model_.guide, model_.depth,
@@ -165,7 +165,7 @@ class Checker {
     const double difference = central_difference(p, direction);
     const double scale = std::max({std::abs(adjoint), std::abs(difference), smallest});
     const double error = scale > 0 ? std::abs(adjoint - difference) / scale : 0.0;
-    // Not std::max: a NaN must win, and stay.
+    // Not std::max: a NaN must win and stay.
     double& worst = found_.max_relative_error;
     if (!std::isnan(worst) && !(error <= worst)) worst = error;
     ++found_.compared;
@@ -173,7 +173,7 @@ class Checker {
 
   void compare(Parameters& p) {
     const size_t size = p.values.size();
-    // Drawn also for what does not move, so that each group is always checked along the same.
+    // Drawn also for groups that do not move, so that each group is always checked along the same directions.
     std::normal_distribution<double> normal;
     std::vector<Values> random_directions(directions, Values(size));
     for (Values& direction : random_directions) {
@@ -186,7 +186,7 @@ class Checker {
     std::partial_sort(order.begin(), order.begin() + largest, order.end(), [&](size_t a, size_t b) {
       return std::abs(p.gradient[a]) > std::abs(p.gradient[b]);
     });
-    // Differences of a gradient this small are rounding errors of the loss.
+    // Differences for gradients this small are rounding errors of the loss.
     const double smallest = 1e-4 * std::abs(p.gradient[order[0]]);
     for (size_t n = 0; n < largest; ++n) {
       Values unit(size, 0.0);

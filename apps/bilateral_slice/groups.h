@@ -1,9 +1,9 @@
-// groups.h -- the groups of a look's parameters, and which of them a run moves.
+// groups.h -- the groups of a look's parameters, and which of them a run optimizes ("moves").
 #pragma once
 
 namespace bilateral_slice {
 
-// For a group that stays, no adjoint, no moments and no step of Adam are built.
+// A group that does not move has no adjoint, no moments and no Adam step in the pipeline.
 struct Groups {
   bool grid = true, mix = true, curve = true;
 

@@ -1,7 +1,7 @@
-// halide_peer_main.cpp -- the same optimization with Halide 14: its gradients, its Li2018 schedule.
+// halide_peer_main.cpp -- the same optimization in Halide 14, with Halide's gradients and its Li2018 schedule.
 //
-// A program of its own, so that bilateral_slice needs no Halide, and neither compiler's memory or
-// faults are the other's. It is started by bilateral_slice; see peer_protocol.h.
+// It is a separate program, so that bilateral_slice does not need Halide, and the two compilers share neither memory
+// nor crashes. bilateral_slice starts it; see peer_protocol.h.
 #include <unistd.h>
 
 #include <chrono>
@@ -25,8 +25,7 @@ bool receive(T* values, size_t count) {
   return std::fread(values, sizeof(T), count, stdin) == count;
 }
 
-// Results go to the descriptor that was standard output at the start: nothing that Halide prints
-// can come between them.
+// Results go to the original standard output, to which nothing that Halide prints can go any more.
 std::FILE* open_answers() {
   std::FILE* answers = ::fdopen(::dup(STDOUT_FILENO), "wb");
   ::dup2(STDERR_FILENO, STDOUT_FILENO);

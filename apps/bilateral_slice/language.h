@@ -1,7 +1,7 @@
-// language.h -- `lang` is the language that this translation unit is compiled with.
+// language.h -- defines `lang`, the language with which this translation unit is compiled.
 //
-// model.cpp and trainer.cpp are compiled twice from the same text: with Retrograde for the program,
-// and with Halide 14 for the peer that it is measured against. So both optimize the same function.
+// model.cpp and trainer.cpp are compiled twice from the same source: with Retrograde for the program, and with Halide
+// 14 for the peer against which it is measured. So both optimize the same function.
 #pragma once
 
 #ifdef BILATERAL_SLICE_WITH_HALIDE

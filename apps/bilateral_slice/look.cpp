@@ -98,7 +98,7 @@ Look read_look(const std::filesystem::path& path) {
   look.grid_y = static_cast<int>(sizes[1]);
   look.grid_z = static_cast<int>(sizes[2]);
   look.knots = static_cast<int>(sizes[3]);
-  // Looks of earlier versions do not say it: they are in colour.
+  // Looks of earlier versions have no such entry: they are in colour.
   if (state.arrays.contains("channels"))
     look.channels = static_cast<int>(state.array("channels", 1)[0]);
   look.grid = floats(state, "grid", look.shape(1, 1).grid_elems());

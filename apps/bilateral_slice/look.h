@@ -1,4 +1,4 @@
-// look.h -- a look that was learned, apart from any photo: kept in a file, and given to others.
+// look.h -- a learned look, independent of any photo; it can be saved to a file and applied to other photos.
 #pragma once
 
 #include <filesystem>
@@ -15,25 +15,26 @@ struct Look {
   int grid_x = 0, grid_y = 0, grid_z = 0, knots = 0, channels = 3;
   std::vector<float> grid, mix, curve;  // as Model has them
 
-  // The grid spread over a photo of this size.
+  // The sizes of the model for a photo of this size, over which the grid is spread.
   Shape shape(int width, int height) const;
 };
 
 Look look_of(const Shape& shape, const Trainer& trainer);
-// What the trainer goes on from. Its shape must be that of the look.
+// Sets the trainer's initial parameters. Its shape must be that of the look.
 void start_from(const Look& look, Trainer& trainer);
 
-// The photo, [coefficients, height, width], through the look: [channels, height, width]. Both have the same
+// Applies the look to the photo, [coefficients, height, width]; returns [channels, height, width]. Both have the same
 // channels.
 std::vector<float> through_look(const Look& look, const Shape& photo_shape,
                                 std::vector<float>& photo);
 
-// Throws retrograde::UserError for a photo with colours and a look for gray ones. The other way round, the
-// photo is taken in three equal channels.
+// Throws retrograde::UserError for a colour photo with a look for gray ones. The other way round, a gray photo is used
+// as three equal channels.
 void require_fits(const Look& look, const std::string& look_name, int photo_channels,
                   const std::string& photo_name);
 
-// A file of common/state.h. Throws retrograde::UserError when it cannot be written, or is no look.
+// The file format is that of common/state.h. Throws retrograde::UserError if the file cannot be written, or is not a
+// look.
 void write_look(const std::filesystem::path& path, const Look& look);
 Look read_look(const std::filesystem::path& path);
 

@@ -1,4 +1,4 @@
-// main.cpp -- bilateral_slice: learn a photographic look. See README.md beside this file.
+// main.cpp -- bilateral_slice: learns a photographic look. See README.md in this folder.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -34,7 +34,7 @@ using retrograde::text;
 
 namespace {
 
-// In colour where the look to begin with is.
+// Reads the pair; in colour if the initial look is.
 Pair read_given_pair(const Options& options, const std::optional<Look>& start) {
   Pair pair = read_pair(options.input, options.target);
   if (options.grid > 0) pair.shape.grid_x = pair.shape.grid_y = options.grid;

@@ -27,8 +27,8 @@ Model::Model(const Shape& shape, lang::Type scalar)
 Expr Model::number(double value) const { return lang::cast(scalar, Expr(value)); }
 Expr Model::as_scalar(Expr e) const { return lang::cast(scalar, e); }
 
-// Each row reads parameters of its own, copies of the learned ones. So their gradients are first
-// summed within every row, in parallel, and then over the rows.
+// Each row reads its own copy of the learned parameters. So their gradients are first summed within every row, in
+// parallel, and then over the rows.
 void Model::define_parameters() {
   affine(i, o, gz, gx, gy) = grid(i, o, gz, gx, gy);
   mixture(i) = mix(i);
@@ -57,7 +57,7 @@ void Model::define_slice(const Func& pixels) {
   row_grid(i, o, gz, gx, y) = (number(1) - along_y) * affine(i, o, gz, gx, y / height) +
                               along_y * affine(i, o, gz, gx, y / height + 1);
 
-  // What node r, the one before (0) or after (1) pixel x, adds to a coefficient.
+  // The contribution to a coefficient of node r: the node before (0) or after (1) pixel x.
   const Expr nearest = lang::unsafe_promise_clamped(layer(x, y) + k, 0, shape.grid_z - 1);
   const auto at_node = [&](const Expr& coefficient, const Expr& r) {
     return lang::select(r == 0, number(1) - along_x, along_x) *

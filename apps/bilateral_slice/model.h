@@ -1,4 +1,4 @@
-// model.h -- the look: a bilateral grid of affine colour transforms, sliced along a learned guide.
+// model.h -- the model of a look: a bilateral grid of affine colour transforms, sliced along a learned guide.
 //
 //   light(x, y)      = mix . (r, g, b, 1)                                    learned mix
 //   guide(x, y)      = sum over k of curve(k) * max(light(x, y) - k / knots, 0)    learned curve
@@ -9,11 +9,10 @@
 //   result(x, y, o)  = plane 0 and 1, linear in depth's fraction
 //   loss             = mean squared difference of result and target
 //
-// That is trilinear interpolation of the grid, done one axis at a time: the step along y is shared
-// by a whole pixel row, so that a pixel reads four transforms and not eight. Pixel coordinates
-// enter the grid's indices as x / cell_width and y / cell_height only, so the grid's gradient is a
-// gather over (gx, gy); gz depends on data. A gray photo has (v, 1) in place of (r, g, b, 1): two
-// coefficients and one output.
+// This is trilinear interpolation of the grid, one axis at a time. A whole pixel row shares the step along y, so a
+// pixel reads four transforms and not eight. Pixel coordinates appear in the grid's indices only as x / cell_width and
+// y / cell_height, so the grid's gradient is a gather over (gx, gy); gz is data-dependent. A gray photo has (v, 1) in
+// place of (r, g, b, 1): two coefficients and one output.
 #pragma once
 
 #include "groups.h"
@@ -23,13 +22,13 @@
 namespace bilateral_slice {
 
 struct Model {
-  // `scalar` is the type of everything: float to learn, double to check gradients.
+  // `scalar` is the type of all values: float for training, double for gradient checks.
   Model(const Shape& shape, lang::Type scalar);
 
   Shape shape;
   lang::Type scalar;
 
-  // Inputs. Homogeneous photo: its last plane holds ones.
+  // Inputs. The photo is homogeneous: its last plane holds ones.
   lang::ImageParam photo;   // [coefficients, height, width], width innermost
   lang::ImageParam target;  // [channels, height, width]
   lang::ImageParam grid;    // [grid_y, grid_x, grid_z, channels (o), coefficients (i)], i innermost
@@ -38,7 +37,7 @@ struct Model {
 
   lang::Var x{"x"}, y{"y"}, i{"i"}, o{"o"}, k{"k"}, gx{"gx"}, gy{"gy"}, gz{"gz"};
 
-  // The parameters as Funcs: what gradients are asked for.
+  // The parameters as Funcs, for which gradients are requested.
   lang::Func affine{"affine"}, mixture{"mixture"}, slopes{"slopes"};
 
   lang::Func row_mixture{"row_mixture"}, row_slopes{"row_slopes"};
@@ -46,7 +45,7 @@ struct Model {
   lang::Func row_grid{"row_grid"}, transform{"transform"}, plane{"plane"}, result{"result"};
   lang::Func row_loss{"row_loss"}, loss{"loss"};
 
-  // The gradients of the loss by what moves.
+  // The gradients of the loss with respect to the groups that move.
   lang::Derivative adjoints(const Groups& moves) const;
 
  private:

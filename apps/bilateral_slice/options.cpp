@@ -9,24 +9,23 @@ namespace bilateral_slice {
 
 namespace {
 
-// One photo, a folder of pairs, or a photo and a look: what is to be done must be one of them.
+// Checks that the options select exactly one task: one photo, a folder of pairs, or applying a look.
 void check_work(const Options& options) {
   if (options.pairs.empty() != options.input.empty() &&
       (options.apply.empty() || options.pairs.empty()))
     return;
-  retrograde::call_error("understand the command line",
-                         "--input is required, and --pairs takes its place",
+  retrograde::call_error("understand the command line", "either --input or --pairs is required",
                          options.input.empty() ? "neither is given" : "both are given",
                          "Run with --help for the options");
 }
 
 }  // namespace
 
-// The identity is the same in each layer of the grid: what the guide says then makes no difference.
+// If the grid stays the identity, all its layers are equal, and then the guide has no effect.
 void check_groups(const Options& options) {
   if (options.resume && !options.start.empty()) {
     retrograde::call_error("understand the command line",
-                           "a run goes on from a state or begins with a look",
+                           "a run either resumes from a state or starts from a look",
                            "both --resume and --start are given", "Leave out one of them");
   }
   const bool learns = options.apply.empty() && !options.check_gradients &&
@@ -34,9 +33,9 @@ void check_groups(const Options& options) {
   if (!learns || options.moves.grid || !options.start.empty() || options.resume) return;
   retrograde::call_error(
       "learn the guide alone",
-      "a guide matters where the layers of the grid differ, and the identity's are all alike",
-      "--optimize leaves out grid, and no look is given to begin with",
-      "Give --start LOOK, a look.bin that was learned, or add grid to --optimize");
+      "the guide has no effect if all layers of the grid are equal, as in the identity",
+      "--optimize does not contain grid, and there is no initial look",
+      "Give --start LOOK, a learned look.bin, or add grid to --optimize");
 }
 
 std::optional<Options> read_options(int argc, char** argv) {
@@ -57,18 +56,20 @@ std::optional<Options> read_options(int argc, char** argv) {
       "instead of --input: a folder of photographs, with a folder \"target\" in it of "
       "their edits under the same names (else the built-in one); one look for all of them");
   app.add_option("--apply", options.apply, "instead of learning: the look.bin for --input");
-  app.add_option("--start", options.start,
-                 "a look.bin to begin with, whose grid is taken; without it, the identity");
+  app.add_option(
+      "--start", options.start,
+      "the initial look, a look.bin, which also sets the grid's size; default: the identity");
   app.add_option("--grid", options.grid, "nodes along each side; 0: 64, or 3 with --pairs")
       ->capture_default_str();
   app.add_option("--halide-seconds", options.halide_seconds,
-                 "how long to measure the same with Halide 14; 0 to leave it out")
+                 "time limit for the comparison with Halide 14; 0: no comparison")
       ->capture_default_str();
   app.add_option("--check-side", options.check_side,
-                 "pixels along each side of the crop that --check-gradients takes; 0: 96 x 80")
+                 "pixels along each side of the crop for --check-gradients; 0: 96 x 80")
       ->capture_default_str();
-  app.add_flag("--time-steps", options.time_steps,
-               "instead of learning: how long a step takes, by what moves and of a gray photo");
+  app.add_flag(
+      "--time-steps", options.time_steps,
+      "instead of learning: the time of a step, by optimized groups, and for a gray photo");
   if (!apps::parse_command_line(app, argc, argv, options)) return std::nullopt;
   check_work(options);
   options.moves = {apps::optimizes(options, "grid"), apps::optimizes(options, "mix"),

@@ -37,7 +37,7 @@ apps::Image read_photo(const std::filesystem::path& path) {
 
 }  // namespace
 
-// One or two channels are gray and alpha; of more, the first three are the colours.
+// Images of one or two channels are gray (with alpha); of more channels, the first three are the colours.
 apps::Image read_gray_or_colour(const std::filesystem::path& path) {
   const apps::Image stored = apps::read_channels(path);
   apps::Image image{stored.width, stored.height, stored.bits, {}, stored.channels < 3 ? 1 : 3};

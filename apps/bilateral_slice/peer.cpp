@@ -15,7 +15,7 @@ void require(bool alive) {
   if (alive) return;
   retrograde::call_error("measure Halide 14",
                          "its peer program must answer until it is told to end",
-                         std::string(name) + " ended early; its own message stands above",
+                         std::string(name) + " ended early; its own message is above",
                          "Run again with --halide-seconds 0 to leave it out");
 }
 

@@ -1,4 +1,4 @@
-// peer.h -- the Halide peer, seen from the program.
+// peer.h -- the program's side of the Halide peer.
 #pragma once
 
 #include <memory>
@@ -12,14 +12,14 @@ namespace bilateral_slice {
 
 class Peer {
  public:
-  // Where the peer is installed, or empty when it is not.
+  // Path of the installed peer; empty if it is not installed.
   static std::filesystem::path find();
 
-  // Compiles there. Throws retrograde::UserError when the peer fails.
+  // Starts the peer and compiles its pipeline. Throws retrograde::UserError if the peer fails.
   Peer(const std::filesystem::path& program, const Shape& shape, const std::vector<float>& photo,
        const std::vector<float>& target, int threads);
 
-  // Takes one step for each rate. Throws retrograde::UserError when the peer fails.
+  // Takes one step for each rate. Throws retrograde::UserError if the peer fails.
   std::vector<PeerStep> run(const std::vector<float>& rates);
 
   double compile_seconds() const { return compile_seconds_; }

@@ -1,11 +1,12 @@
-// peer_protocol.h -- what the program and the Halide peer say to each other through pipes.
+// peer_protocol.h -- the messages between the program and the Halide peer, sent through pipes.
 //
 //   program -> peer   PeerJob, then the photo's and the target's planes (layout as for Trainer)
 //   peer -> program   PeerReady, when its pipeline is compiled
-//   program -> peer   int32 n, then n floats: the rates of the next n steps       any number of
-//   times peer -> program   n PeerSteps
+//   then repeatedly:
+//   program -> peer   int32 n, then n floats: the rates of the next n steps
+//   peer -> program   n PeerSteps
 //
-// The peer ends when its standard input does.
+// The peer exits when its standard input ends.
 #pragma once
 
 #include <cstdint>

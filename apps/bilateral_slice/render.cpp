@@ -7,9 +7,9 @@ namespace bilateral_slice {
 
 namespace {
 
-// Row by row: nothing the size of the photo is stored but the result.
+// Row by row, so that only the result is as large as the photo.
 void schedule(Model& m) {
-  const auto guarded = lang::TailStrategy::GuardWithIf;  // never reads beside the photo
+  const auto guarded = lang::TailStrategy::GuardWithIf;  // never reads outside the photo
   m.result.reorder(m.x, m.o, m.y).vectorize(m.x, 8, guarded).parallel(m.y);
   m.row_grid.compute_at(m.result, m.y).vectorize(m.i, m.shape.coefficients());
   for (lang::Func f : {m.light, m.guide, m.plane}) {

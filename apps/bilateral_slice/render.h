@@ -1,4 +1,4 @@
-// render.h -- the photo through a learned look.
+// render.h -- applies a learned look to a photo.
 #pragma once
 
 #include "language.h"

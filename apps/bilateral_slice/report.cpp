@@ -17,7 +17,7 @@ using retrograde::text;
 
 namespace {
 
-// Error against time: the loss before step n, at the time that the n steps before it took.
+// Error against time: the loss before step n, at the time after the first n steps.
 json curve_of(const Series& series) {
   json seconds = json::array(), psnr = json::array();
   double elapsed = 0;
@@ -29,7 +29,7 @@ json curve_of(const Series& series) {
   return {{"seconds", seconds}, {"psnr_db", psnr}, {"compile_seconds", series.compile_seconds}};
 }
 
-// What the page of all demos shows of it (common/make_index.py).
+// The pictures on the page of all demos (common/make_index.py).
 json pictures() {
   return {{{"file", "input.png"}, {"caption", "the photo"}},
           {{"file", "target.png"}, {"caption", "the look that it was given"}},

@@ -1,4 +1,4 @@
-// schedule_halide.cpp -- Halide 14's own schedule for its own gradients: Li2018. Everything moves.
+// schedule_halide.cpp -- the schedule of the Halide peer: Halide 14's Li2018 autoscheduler. All groups move.
 #include <string>
 
 #include "training_pipeline.h"
@@ -31,8 +31,8 @@ void estimate_sizes(TrainingPipeline& training) {
   training.v_scale.set_estimate(1.0f);
 }
 
-// The autoscheduler's view of this machine; the cache size and the cost of a load relative to an
-// operation are Halide's own generic ones.
+// The autoscheduler's machine parameters. Cache size and the cost of a load relative to an operation are Halide's
+// generic ones.
 Halide::MachineParams machine(int threads) {
   Halide::MachineParams params = Halide::MachineParams::generic();
   params.parallelism = threads;
@@ -44,7 +44,7 @@ Halide::MachineParams machine(int threads) {
 void schedule(TrainingPipeline& training, int threads) {
   estimate_sizes(training);
   Halide::load_plugin(BILATERAL_SLICE_LI2018);
-  // Halide 14 takes AMD's Zen 4 for a Sapphire Rapids, some of whose instructions it has not.
+  // Halide 14 mistakes AMD's Zen 4 for a Sapphire Rapids, some of whose instructions it lacks.
   const Halide::Target target =
       Halide::get_host_target().without_feature(Halide::Target::AVX512_SapphireRapids);
   training.pipeline.auto_schedule("Li2018", target, machine(threads));

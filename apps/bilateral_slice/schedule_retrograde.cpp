@@ -1,13 +1,12 @@
-// schedule_retrograde.cpp -- the hand schedule of a training step.
+// schedule_retrograde.cpp -- the manual schedule of a training step.
 //
-// Everything is done in parallel over pixel rows, except the grid's own gradient and step, which
-// are parallel over grid rows. What both directions need is stored once for the photo (the guide,
-// the two planes); transforms live in a buffer of 16 pixels. A group of parameters that stays has no
-// adjoints, and neither has what only leads to it. Directions of vectors:
-//   along x     everything that is one value a pixel
-//   along i     a transform's coefficients: four are adjacent in the grid (two of gray), and the
+// Everything is parallel over pixel rows, except the grid's own gradient and step, which are parallel over grid rows.
+// Values that both directions need (the guide, the two planes) are stored once for the photo; transforms live in a
+// buffer of 16 pixels. Parameters that do not move have no adjoints, nor do values that only lead to them. Vectors run
+//   along x     for everything with one value per pixel
+//   along i     for a transform's coefficients: four are adjacent in the grid (two for gray), and the
 //               pixels of a vector along x would come from different layers
-//   along k     the curve's knots
+//   along k     for the curve's knots
 #include <algorithm>
 #include <iterator>
 #include <vector>
@@ -24,16 +23,16 @@ using lang::VarOrRVar;
 namespace {
 
 constexpr int lanes = 16;
-constexpr auto guarded = lang::TailStrategy::GuardWithIf;  // never reads beside the photo
-constexpr int short_loop = 4;                              // up to so many iterations are unrolled
+constexpr auto guarded = lang::TailStrategy::GuardWithIf;  // never reads outside the photo
+constexpr int short_loop = 4;  // longest loop that is unrolled, in iterations
 
 bool is_short(const lang::RVar& r) {
   const auto extent = lang::ir::as_const_int(r.extent());
   return extent && *extent <= short_loop;
 }
 
-// The loops of update `u` innermost first: its reduction variables, last declared innermost, then
-// these.
+// The loop order of update `u`, innermost first: its reduction variables, the last declared one innermost, then
+// `outside`.
 std::vector<VarOrRVar> reductions_inside(const Func& f, int u, const std::vector<Var>& outside) {
   std::vector<VarOrRVar> order;
   for (const lang::RVar& r : f.rvars(u)) order.emplace_back(r);
@@ -41,7 +40,7 @@ std::vector<VarOrRVar> reductions_inside(const Func& f, int u, const std::vector
   return order;
 }
 
-// Vectors along `inner`, all definitions alike.
+// Vectorizes all definitions along `inner`.
 void vectorize_all(Func f, const Var& inner) {
   f.vectorize(inner, lanes, guarded);
   for (int u = 0; u < f.num_update_definitions(); ++u) f.update(u).vectorize(inner, lanes, guarded);
@@ -52,13 +51,13 @@ void parallelize_all(Func f, const Var& outer) {
   for (int u = 0; u < f.num_update_definitions(); ++u) f.update(u).parallel(outer);
 }
 
-// Updates with a short reduction, unrolled inside the vectors.
+// For updates with a short reduction: unrolls it inside the vectors.
 void unroll_reduction(Func f, int u, const std::vector<Var>& outside) {
   f.update(u).reorder(reductions_inside(f, u, outside));
   for (const lang::RVar& r : f.rvars(u)) f.update(u).unroll(r);
 }
 
-// Stored for the whole photo, row by row in parallel.
+// Stores the Func for the whole photo, computed row by row in parallel.
 void store_rows(Func f, const Var& x, const Var& y) {
   f.compute_root();
   vectorize_all(f, x);
@@ -102,14 +101,14 @@ Func& bound_transform(const Model& m, Func& f) {
   return f.bound(m.i, 0, m.shape.coefficients()).bound(m.o, 0, m.shape.channels);
 }
 
-// The inner loops of what gathers transforms of pixels. Of gray ones there is a single output, and no loop over it.
+// The inner loops of a Func that gathers the transforms of pixels. Gray has a single output and no loop over it.
 std::vector<VarOrRVar> coefficients_and_outputs(const Model& m) {
   if (m.shape.channels > 1) return {m.i, m.o};
   return {m.i};
 }
 
-// A pixel adds to four transforms: layers k = 0, 1 of the nodes before and after it. These short
-// loops are unrolled around the vector, and the loop over the pixels of a cell runs around them.
+// A pixel adds to four transforms: layers k = 0, 1 of the nodes before and after it. These short loops are unrolled
+// around the vector; the loop over a cell's pixels is outside them.
 void schedule_row_gradient(const Model& m, Func rows) {
   bound_transform(m, rows.compute_root()).vectorize(m.i).unroll(m.o).parallel(m.y);
   for (int u = 0; u < rows.num_update_definitions(); ++u) {
@@ -145,11 +144,11 @@ void schedule_guide_gradient(TrainingPipeline& t) {
   store_rows(guide, m.x, m.y);
   Func(depth).compute_at(guide, m.y);
   vectorize_all(depth, m.x);
-  // A sum over outputs; of gray there is one.
+  // A sum over outputs; gray has only one.
   if (depth.num_update_definitions() > 0) unroll_reduction(depth, 0, {m.x, m.y});
 }
 
-// Sums over a row's pixels are in double on wide photos.
+// Sums over a row's pixels are in double if the photo is wide.
 void schedule_curve_gradient(TrainingPipeline& t) {
   const Model& m = t.model;
   Func slopes = t.adjoints.accumulator(t.adjoints(m.row_slopes));

@@ -10,12 +10,12 @@ namespace bilateral_slice {
 
 namespace {
 
-// Small, so that a case takes milliseconds; 6 x 6 x 8 cells.
+// Small, so that a case takes milliseconds: 6 x 6 x 8 nodes.
 constexpr Shape stability_shape{.width = 60, .height = 48, .grid_x = 6, .grid_y = 6};
 constexpr int stability_steps = 40;
 constexpr double large_rate = 3;
 
-// The model in one precision, by one vector of all parameters.
+// The model in one precision, as a function of one vector of all parameters.
 template <typename T>
 class FlatModel {
  public:
@@ -66,7 +66,7 @@ class FlatModel {
   lang::Pipeline pipeline_;
 };
 
-// The identity, with the mean of the colours as guide, as Trainer begins.
+// The identity look, with the mean of the colours as guide: Trainer's initial parameters.
 std::vector<double> identity() {
   const Shape& s = stability_shape;
   std::vector<double> x(static_cast<size_t>(s.grid_elems()) + 4 + s.knots, 0.0);
@@ -81,7 +81,7 @@ struct PhotoCase {
   std::function<double(int x, int y)> value;
 };
 
-// Guides that fill one layer, or two, or lie beyond the last.
+// Photos whose guide fills one layer, or two, or lies beyond the last.
 const std::vector<PhotoCase>& photo_cases() {
   static const std::vector<PhotoCase> cases{
       {"a photograph's range",
@@ -111,7 +111,7 @@ std::vector<apps::StabilityRow> check_stability() {
     std::vector<double> photo(4 * pixels, 1.0), target(3 * pixels);
     for (long n = 0; n < 3 * pixels; ++n) {
       const int at = static_cast<int>(n % pixels);
-      // What float32 holds, for both.
+      // Rounded to float32, so that both precisions get the same input.
       photo[n] =
           static_cast<float>(one.value(at % stability_shape.width, at / stability_shape.width));
       target[n] = static_cast<float>(0.8 * photo[n] + 0.1);

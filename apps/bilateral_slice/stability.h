@@ -1,4 +1,4 @@
-// stability.h -- --check-stability: photographs that leave most of the grid empty, and other ends.
+// stability.h -- --check-stability: photographs that leave most of the grid empty, and other extreme inputs.
 #pragma once
 
 #include <vector>
@@ -7,8 +7,7 @@
 
 namespace bilateral_slice {
 
-// The loss and its gradient by grid, mix and curve, in float32 against double, and Adam on all three with a
-// large rate.
+// The loss and its gradient by grid, mix and curve, in float32 against double; and Adam on all three with a large rate.
 std::vector<apps::StabilityRow> check_stability();
 
 }  // namespace bilateral_slice

@@ -1,6 +1,6 @@
 // step_times.cpp -- see step_times.h.
 //
-// All are compiled first and then take steps in turns, so that whatever else the machine does meets all alike.
+// All variants are compiled first and then take steps in turns, so that other load on the machine affects all alike.
 #include "step_times.h"
 
 #include <chrono>

@@ -1,4 +1,4 @@
-// step_times.h -- --time-steps: how long a step takes, by what moves and by channels.
+// step_times.h -- --time-steps: the time of a step, by moving groups and by channels.
 #pragma once
 
 #include "common/report.h"
@@ -6,7 +6,7 @@
 
 namespace bilateral_slice {
 
-// On this pair, which must be in colour for the rows of all channels; gray rows are of its luminance.
+// The pair must be in colour; gray rows use its luminance.
 apps::Table time_steps(const Pair& pair, int threads);
 
 }  // namespace bilateral_slice

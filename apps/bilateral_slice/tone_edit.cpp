@@ -16,8 +16,8 @@ using lang::Var;
 namespace {
 
 constexpr float darkest = 0.01f;        // added to luminance before the logarithm
-constexpr float edge_variance = 0.25f;  // of log luminance: what varies more is an edge
-constexpr float key = -0.45f;           // log luminance that the base is drawn to
+constexpr float edge_variance = 0.25f;  // of log luminance: larger variance means an edge
+constexpr float key = -0.45f;           // log luminance towards which the base is pulled
 constexpr float base_contrast = 0.4f;
 constexpr float detail_contrast = 1.5f;
 constexpr float saturation = 1.15f;
@@ -38,7 +38,7 @@ Func luminance(const lang::ImageParam& photo, const Shape& shape) {
   return f;
 }
 
-constexpr auto guarded_tail = lang::TailStrategy::GuardWithIf;  // never reads beside the photo
+constexpr auto guarded_tail = lang::TailStrategy::GuardWithIf;  // never reads outside the photo
 
 void store(Func f) { f.compute_root().vectorize(x, 8, guarded_tail).parallel(y); }
 
@@ -54,7 +54,7 @@ Func box_mean(const Func& f, int radius, const std::string& name) {
   return mean;
 }
 
-// The base layer of `f`: smooth, but with its strong edges.
+// The base layer of `f`: smooth, but with strong edges preserved.
 Func guided_base(const Func& f, const Shape& shape) {
   const Func whole =
       lang::BoundaryConditions::repeat_edge(f, {{0, shape.width}, {0, shape.height}});

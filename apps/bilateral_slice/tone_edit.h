@@ -1,10 +1,9 @@
 // tone_edit.h -- the edit that the demo learns: local tone mapping.
 //
-// The photo's log luminance is split by a guided filter (He, Sun, Tang: "Guided image filtering",
-// 2013, with the image as its own guide) into a smooth base that keeps strong edges, and detail.
-// The base is compressed towards a bright key, the detail is amplified, and colours follow the new
-// luminance with more saturation in what was dark. What happens to a pixel depends on its
-// surroundings: no curve of colours alone does the same.
+// A guided filter splits the photo's log luminance (He, Sun, Tang: "Guided image filtering", 2013, with the image as
+// its own guide) into detail and a smooth base that keeps strong edges. The base is compressed towards a bright key and
+// the detail is amplified. Colours follow the new luminance, with more saturation in formerly dark areas. The result of
+// a pixel depends on its surroundings, so no colour curve alone can do the same.
 #pragma once
 
 #include "shape.h"

@@ -11,11 +11,11 @@ namespace bilateral_slice {
 
 class Trainer {
  public:
-  // photo: [coefficients, height, width], target: [channels, height, width]; both must outlive the
-  // trainer. The first look is the identity, with the mean of the colours as guide.
+  // photo: [coefficients, height, width], target: [channels, height, width]; both must outlive the trainer. The initial
+  // look is the identity, with the mean of the colours as guide.
   Trainer(const Shape& shape, float* photo, float* target, int threads, const Groups& moves = {});
 
-  // Goes on with another pair of the same shape.
+  // Replaces the pair by another one of the same shape.
   void set_pair(float* photo, float* target);
 
   // One step of Adam at this rate. Returns the loss before it.
@@ -30,8 +30,8 @@ class Trainer {
   const Buffer& mix() const { return mix_[now_].value; }
   const Buffer& curve() const { return curve_[now_].value; }
 
-  // All that the next step reads: grid, mix and curve, each with its two moments, which are undefined
-  // where it does not move. Who fills them in says how many steps led there.
+  // All inputs of the next step: grid, mix and curve, each with its two moments, which are undefined for groups that do
+  // not move. After filling them in, call set_steps with the number of steps that led there.
   std::vector<Buffer> state() const;
   int steps() const { return steps_; }
   void set_steps(int steps) { steps_ = steps; }
@@ -40,7 +40,7 @@ class Trainer {
   struct Moments {
     Buffer value, moment, square;
   };
-  // A step reads one copy and writes the other; of what does not move both are the same.
+  // A step reads one copy and writes the other; for groups that do not move, both are the same.
   using State = std::array<Moments, 2>;
 
   static State zeros(const std::vector<int>& sizes, bool moves);

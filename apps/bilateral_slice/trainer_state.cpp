@@ -12,7 +12,7 @@ namespace {
 
 std::string array_name(size_t n) { return text("array", n); }
 
-// States of earlier versions do not say it: all groups, in colour.
+// States of earlier versions lack this entry: all groups move, in colour.
 std::string word(const apps::State& state, const char* name, const std::string& otherwise) {
   const auto found = state.words.find(name);
   return found == state.words.end() ? otherwise : found->second;

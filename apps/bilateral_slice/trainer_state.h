@@ -1,4 +1,4 @@
-// trainer_state.h -- a trainer in the file behind --resume, and back.
+// trainer_state.h -- saves a trainer to the file behind --resume, and restores it.
 #pragma once
 
 #include <string>
@@ -8,14 +8,14 @@
 
 namespace bilateral_slice {
 
-// "grid,mix,curve", or fewer.
+// "grid,mix,curve", or a subset.
 std::string names_of(const Groups& groups);
 
-// What moves, with its moments, what does not, and the number of steps.
+// Contains the groups that move, with their moments, the others, and the number of steps.
 apps::State state_of(const Trainer& trainer);
 void restore(Trainer& trainer, const apps::State& state);
 
-// Throws retrograde::UserError where a run of other groups or channels wrote it. Other sizes are found by restore.
+// Throws retrograde::UserError if the state comes from a run with other groups or channels. `restore` checks the sizes.
 void require_same_run(const apps::State& state, const Shape& shape, const Groups& moves);
 
 }  // namespace bilateral_slice

@@ -9,10 +9,10 @@ namespace bilateral_slice {
 using lang::Expr;
 
 namespace {
-// Kingma and Ba's constants. `tiny` lies between the gradients (1e-7 to 1e-4 a grid node, for the
-// loss is a mean over all samples) and their rounding errors, which must not move anything.
+// Kingma and Ba's constants. `tiny` lies between the gradients (1e-7 to 1e-4 per grid node, because the loss is a mean
+// over all samples) and their rounding errors, which must not move anything.
 constexpr float b1 = 0.9f, b2 = 0.999f, tiny = 1e-8f;
-// The guide bends every pixel's depth at once: it learns more slowly than a grid node.
+// The guide shifts the depth of every pixel at once, so it learns more slowly than a grid node.
 constexpr float guide_rate = 0.1f;
 }  // namespace
 

@@ -4,8 +4,8 @@
 //   v'  = b2 v + (1 - b2) g^2
 //   p'  = p - rate m' m_scale / (sqrt(v' v_scale) + tiny)
 //
-// after Kingma and Ba, "Adam: a method for stochastic optimization" (2015), algorithm 1; m_scale
-// and v_scale are the bias corrections 1 / (1 - b^t), which the caller knows.
+// after Kingma and Ba, "Adam: a method for stochastic optimization" (2015), algorithm 1; the caller provides the bias
+// corrections m_scale and v_scale, 1 / (1 - b^t).
 #pragma once
 
 #include <optional>
@@ -15,8 +15,7 @@
 
 namespace bilateral_slice {
 
-// A parameter array with its two moments, read by a step, and the Func that computes all three
-// anew.
+// A parameter array with its two moments, which a step reads, and the Func that computes their next values.
 struct Learned {
   // `rate` is relative to the step's rate.
   Learned(const lang::ImageParam& value, const lang::Func& gradient, std::vector<lang::Var> at,
@@ -35,16 +34,16 @@ struct TrainingPipeline {
   Model model;
   lang::Derivative adjoints;
   lang::Param<float> rate{"rate"}, m_scale{"m_scale"}, v_scale{"v_scale"};
-  std::optional<Learned> grid, mix, curve;  // those that move
-  lang::Pipeline pipeline;                  // outputs: loss, then what is next of each of them
+  std::optional<Learned> grid, mix, curve;  // the groups that move
+  lang::Pipeline pipeline;                  // outputs: loss, then the next values of each group
 
  private:
   Learned learn(const lang::ImageParam& value, const lang::Func& parameter,
                 std::vector<lang::Var> variables, float rate_factor);
 };
 
-// Schedules and compiles it for `threads` threads. One file a language: schedule_retrograde.cpp by
-// hand, schedule_halide.cpp by Halide's Li2018 autoscheduler.
+// Schedules and compiles it for `threads` threads. Each language has its own file: schedule_retrograde.cpp is manual,
+// schedule_halide.cpp uses Halide's Li2018 autoscheduler.
 void schedule(TrainingPipeline& training, int threads);
 
 }  // namespace bilateral_slice

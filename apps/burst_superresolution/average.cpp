@@ -7,7 +7,7 @@ namespace burst {
 
 namespace {
 
-// Pixels; the inverse of the identity may miss a border by some bits.
+// In pixels; the inverse of the identity may miss a border by a few bits.
 constexpr double rounding = 1e-6;
 
 }  // namespace

@@ -1,5 +1,5 @@
-// average.h -- the plain way to use a burst, beside which ours is measured: every frame demosaicked by itself,
-// laid over the first by bicubic interpolation, and all of them averaged.
+// average.h -- a simple baseline for using a burst: demosaic every frame by itself, align it to the first frame by
+// bicubic interpolation, and average all frames.
 #pragma once
 
 #include <span>
@@ -13,9 +13,10 @@ class BicubicAverage {
  public:
   explicit BicubicAverage(const FrameSize& size);
 
-  // frame: planes [3, height, width]. The homography must be regular.
+  // frame: planes [3, height, width]. The homography must be invertible.
   void add(std::span<const float> frame, const Homography& homography);
-  // The mean of the frames that see a pixel, [3, height, width]; one of them must see all, as the first does.
+  // The mean over the frames that see a pixel, [3, height, width]. At least one frame, such as the first, must see
+  // every pixel.
   std::vector<float> take() const;
 
  private:

@@ -1,4 +1,4 @@
-// bicubic.h -- values between the pixels of a plane, by R. Keys, Cubic convolution interpolation for digital
+// bicubic.h -- interpolates between the pixels of a plane, by R. Keys, Cubic convolution interpolation for digital
 // image processing, IEEE Transactions on Acoustics, Speech, and Signal Processing 29 (6), 1981, eq. 15.
 #pragma once
 
@@ -10,13 +10,13 @@
 
 namespace burst {
 
-// The weights of the four samples at -1, 0, 1, 2 for a place at 0 <= f < 1.
+// The weights of the four samples at -1, 0, 1, 2 for a position 0 <= f < 1.
 inline std::array<double, 4> cubic_weights(double f) {
   return {((-0.5 * f + 1) * f - 0.5) * f, (1.5 * f - 2.5) * f * f + 1,
           ((-1.5 * f + 2) * f + 0.5) * f, (0.5 * f - 0.5) * f * f};
 }
 
-// plane: [height, width]; beyond its borders it repeats them.
+// plane: [height, width]; its edges are repeated beyond the borders.
 inline double bicubic(std::span<const float> plane, int width, int height, double x, double y) {
   const double x0 = std::floor(x), y0 = std::floor(y);
   const auto wx = cubic_weights(x - x0), wy = cubic_weights(y - y0);

@@ -16,14 +16,15 @@ using retrograde::text;
 
 namespace {
 
-// A sensor's samples from the first red one on, in an even number of rows and columns.
+// A sensor's samples from the first red one on, with an even number of rows and columns.
 struct Frame {
   FrameSize size;
   int bits = 16;
   std::vector<float> samples;
 };
 
-// `sensor` begins with red because a mirrored row or column was put before it; the next red one was measured.
+// `sensor` begins with red because a mirrored row or column was put before it; this frame begins with the next red
+// sample, which was measured.
 Frame measured(const demosaic::Sensor& sensor) {
   const int left = 2 * sensor.left, top = 2 * sensor.top;
   Frame frame{{(sensor.width - left) / 2 * 2, (sensor.height - top) / 2 * 2}, sensor.bits, {}};

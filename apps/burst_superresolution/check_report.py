@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Prints what a run of burst_superresolution on a photograph reported, and fails when it is not what is promised.
+"""Prints the results of a run of burst_superresolution on a photograph, and fails if they are not as promised.
 
 usage: check_report.py report.json
 
-The picture is 2 dB better than the best of AHD and the bicubic average, its homographies are nearer to the truth
-than where they started, and all of it took a minute at most.
+The picture is at least 2 dB better than the better of AHD and the bicubic average, its homographies are nearer to the
+truth than the initial ones, and everything takes at most a minute.
 """
 import json
 import sys

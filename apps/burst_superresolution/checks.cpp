@@ -20,7 +20,7 @@ Smoothness part_smoothness() {
   return smoothness;
 }
 
-// A point and the frames that it is measured by.
+// A point of the objective, and the frames to fit.
 struct Case {
   std::string name;
   std::vector<float> picture;            // [3, height, width]
@@ -46,7 +46,7 @@ Shape part_shape(const Burst& burst) {
   return {size, part_frames};
 }
 
-// From the middle of each of the first frames; the last one again where a burst has fewer.
+// Samples from the middle of the first frames; the last frame is repeated if the burst has too few.
 std::vector<float> part_samples(const Burst& burst, const Shape& shape) {
   const int left = (burst.size.width - shape.size.width) / 4 * 2;
   const int top = (burst.size.height - shape.size.height) / 4 * 2;
@@ -61,7 +61,7 @@ std::vector<float> part_samples(const Burst& burst, const Shape& shape) {
   return samples;
 }
 
-// Places between pixels, a picture that is near the samples and nowhere level.
+// Positions between pixels, and a picture that is near the samples and nowhere constant.
 Case ordinary(const Burst& burst, uint64_t seed) {
   const Shape shape = part_shape(burst);
   Numbers numbers(seed);
@@ -70,7 +70,7 @@ Case ordinary(const Burst& burst, uint64_t seed) {
     const double sample = result.samples[n % shape.size.pixels()];
     result.picture.push_back(static_cast<float>(sample + numbers.within(0.05)));
   }
-  // The first frame too: with the identity, all its places would be kinks.
+  // Also for the first frame: with the identity, all its positions would be kinks.
   result.homographies.clear();
   for (int n = 0; n < shape.frames; ++n) {
     Homography h{};
@@ -108,7 +108,7 @@ void bind(Objective& objective, const Shape& shape, const Case& at) {
   objective.frames.set(filled<T>({width, height, shape.frames}, at.samples));
 }
 
-// What each frame has of the picture, less what it saw.
+// The frames predicted from the picture, minus the samples.
 template <typename T>
 std::vector<double> residuals(Objective& objective, const Shape& shape, const Case& at) {
   bind<T>(objective, shape, at);
@@ -167,7 +167,7 @@ const std::vector<std::pair<const char*, Change>>& hard_cases() {
   return cases;
 }
 
-// The larger of the errors by the picture and by the homographies, each relative to its largest element.
+// The larger of the gradient errors by the picture and by the homographies, each relative to its largest element.
 double gradient_error(const Shape& shape, const std::vector<float>& own,
                       const std::vector<double>& exact) {
   const std::vector<double> wide(own.begin(), own.end());

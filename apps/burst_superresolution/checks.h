@@ -8,11 +8,11 @@
 
 namespace burst {
 
-// By the picture and by the homographies, with all features, away from kinks.
+// Checks the gradients by the picture and by the homographies, with all features, away from kinks.
 std::vector<apps::GradientRow> check_gradients(const Burst& burst, uint64_t seed);
 
-// Homographies that are nearly singular or look beyond the picture, identical frames, saturated and black ones:
-// float32 against double, and Adam with a large rate.
+// Cases: homographies that are nearly singular or look beyond the picture, identical frames, saturated and black
+// frames. Compares float32 with double, and runs Adam with a large rate.
 std::vector<apps::StabilityRow> check_stability(const Burst& burst, uint64_t seed, int threads);
 
 }  // namespace burst

@@ -23,9 +23,9 @@ std::vector<std::string> left_out(const Shape& shape, const Smoothness& smoothne
 
 namespace {
 
-// The sums of a homography's gradient read the same places, samples and adjoints: kept, each is computed once. That
-// is some ten numbers for each sample, more than the scheduler keeps unless it is told so. Where the picture moves,
-// too, it keeps them anyway, for its scatter has more than that.
+// The sums of a homography's gradient read the same positions, samples and adjoints; stored, each is computed once.
+// They take about ten numbers per sample, more than the scheduler stores by default. If the picture moves too, it
+// stores them anyway, because the picture's scatter needs more than that.
 template <typename T>
 lang::AutoscheduleOptions schedule_options(const Shape& shape, const Moves& moves) {
   constexpr int64_t kept_a_sample = 10 * sizeof(T), allowed = int64_t{1} << 30;

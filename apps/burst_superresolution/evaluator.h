@@ -1,4 +1,4 @@
-// evaluator.h -- the objective compiled: the loss and its gradient by what may move.
+// evaluator.h -- the compiled objective: the loss and its gradient by the variables that move.
 #pragma once
 
 #include <span>
@@ -9,12 +9,12 @@
 
 namespace burst {
 
-// What may move; what does not has no adjoint in what is compiled.
+// Which variables are optimized; the others have no adjoint in the compiled code.
 struct Moves {
   bool image = true, homographies = true;
 };
 
-// What of the whole method is not in the compiled code, and why; a line each.
+// The parts of the method that the compiled code leaves out, and why; one line each.
 std::vector<std::string> left_out(const Shape& shape, const Smoothness& smoothness,
                                   const Moves& moves);
 
@@ -22,18 +22,18 @@ std::vector<std::string> left_out(const Shape& shape, const Smoothness& smoothne
 template <typename T>
 class Evaluator {
  public:
-  // Compiled for what of the smoothness there is; its weights may change.
+  // Compiled for the given terms of the smoothness; their weights may change later.
   Evaluator(const Shape& shape, const Smoothness& smoothness, const Moves& moves, int threads);
 
   const Shape& shape() const { return shape_; }
   size_t size() const { return shape_.image_elems() + shape_.motion_elems(); }
 
   void set_frames(std::span<const float> samples);  // [frames, height, width]
-  // Other weights of the same axes.
+  // Changes the weights; the axes must stay the same.
   void set_smoothness(const Smoothness& smoothness);
 
-  // x: the picture [3, height, width], then the homographies [frames, 8]; the gradient alike. Of what does not
-  // move, and of the first homography, it is 0.
+  // x: the picture [3, height, width], then the homographies [frames, 8]; the gradient has the same layout. The
+  // gradient is 0 for variables that do not move, and for the first homography.
   double evaluate(std::span<T> x, std::span<T> gradient);
 
   std::string explain() const { return adjoints_.explain(); }

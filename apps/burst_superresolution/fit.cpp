@@ -23,10 +23,10 @@ using Clock = std::chrono::steady_clock;
 
 constexpr const char* program = "burst_superresolution";
 constexpr double save_every_seconds = 20;
-constexpr long looks = 60;  // at the truth, over the whole run
+constexpr long looks = 60;  // comparisons with the truth, over the whole run
 constexpr double explosion = 10;
 
-// What must be the same for a run to go on. The weights that the noise asks for follow from the rest.
+// A description of what must be the same to resume a run. Weights chosen from the noise follow from these.
 std::string problem_of(const Options& options, const Burst& burst) {
   return text(options.common.input.filename().string(), ", ", burst.frames(), " frames of ",
               burst.size.width, " x ", burst.size.height, ", noise ",
@@ -79,7 +79,7 @@ class Optimization {
            (limit > 0 && fit_.seconds >= limit);
   }
 
-  // The loss where the run is, and unless it is over, a step from there.
+  // Evaluates the loss at the current point and, unless the run is over, takes a step.
   bool step() {
     const auto start = Clock::now();
     const double loss = evaluator_.evaluate(x_, gradient_);
@@ -98,7 +98,7 @@ class Optimization {
     return true;
   }
 
-  // Its time does not count.
+  // The time of this comparison does not count.
   void look(double loss, bool over) {
     const auto start = Clock::now();
     Sample sample{fit_.steps, fit_.seconds, loss};
@@ -113,7 +113,7 @@ class Optimization {
             motion_error(now.homographies(shape), burst_.truth->homographies, shape.size).mean;
       }
     }
-    // Where a run went on, its first sample is the last one's.
+    // The first sample of a resumed run repeats the last sample of the earlier one.
     if (!fit_.series.empty() && fit_.series.back().step == sample.step) fit_.series.pop_back();
     fit_.series.push_back(sample);
     looking_ = apps::seconds_since(start);

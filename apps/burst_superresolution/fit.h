@@ -1,5 +1,5 @@
-// fit.h -- the optimization: steps of Adam on the picture and the homographies, from a start, until they are done,
-// the seconds are over or somebody stops it.
+// fit.h -- the optimization: Adam steps on the picture and the homographies, from an initial point, until the steps are
+// done, the time limit is reached or the user stops it.
 #pragma once
 
 #include <functional>
@@ -15,13 +15,13 @@
 
 namespace burst {
 
-// Of Adam, for the first step; they fall by a constant factor to `last_rate` of it.
+// Adam's rates for the first step; they fall by a constant factor to `last_rate` times that.
 inline constexpr double image_rate = 1e-2, motion_rate = 1e-4, last_rate = 0.1;
 
-// After so many steps; quality where the truth is known, else NaN.
+// The state after `step` steps; quality is NaN unless the truth is known.
 struct Sample {
   long step = 0;
-  double seconds = 0;  // of optimizing
+  double seconds = 0;  // of optimization
   double loss = 0;
   double psnr_db = std::numeric_limits<double>::quiet_NaN();
   double motion_error = std::numeric_limits<double>::quiet_NaN();  // pixels, mean
@@ -30,9 +30,9 @@ struct Sample {
 struct Fit {
   std::vector<float> x;  // the best point: the picture, then the homographies (evaluator.h)
   double loss = std::numeric_limits<double>::infinity();
-  std::vector<Sample> series;  // from the start on
+  std::vector<Sample> series;  // from the start
   long steps = 0, refused = 0;
-  double seconds = 0, ms_per_step = 0;  // the median
+  double seconds = 0, ms_per_step = 0;  // ms_per_step: the median
   bool stopped = false;
 
   std::span<const float> picture(const Shape& shape) const {
@@ -41,11 +41,11 @@ struct Fit {
   std::vector<Homography> homographies(const Shape& shape) const;
 };
 
-// x of a picture and homographies.
+// The vector x for a picture and homographies.
 std::vector<float> joined(std::span<const float> picture, std::span<const Homography> homographies);
 
-// Keeps options.common.output / "state.bin" as new as twenty seconds, and writes it at the end; --resume goes on
-// from it. `shown` gets each step's sample. Throws retrograde::Error.
+// Saves options.common.output / "state.bin" every twenty seconds and at the end; --resume continues from it. `shown` is
+// called with each step's sample. Throws retrograde::Error.
 Fit fit(const Options& options, const Burst& burst, const Prepared& prepared,
         Evaluator<float>& evaluator, const std::function<void(const Sample&)>& shown);
 

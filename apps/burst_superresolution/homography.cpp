@@ -20,14 +20,14 @@ Matrix product(const Matrix& a, const Matrix& b) {
   return out;
 }
 
-// By cofactors, without the determinant: a homography has no scale.
+// The inverse up to a factor, by cofactors without the determinant: homographies have no scale.
 Matrix adjugate(const Matrix& m) {
   return {m[4] * m[8] - m[5] * m[7], m[2] * m[7] - m[1] * m[8], m[1] * m[5] - m[2] * m[4],
           m[5] * m[6] - m[3] * m[8], m[0] * m[8] - m[2] * m[6], m[2] * m[3] - m[0] * m[5],
           m[3] * m[7] - m[4] * m[6], m[1] * m[6] - m[0] * m[7], m[0] * m[4] - m[1] * m[3]};
 }
 
-// From (u, v) to pixels.
+// The matrix from (u, v) to pixels.
 Matrix to_pixels(const FrameSize& size) {
   const double s = size.scale();
   return {s, 0, size.centre_x(), 0, s, size.centre_y(), 0, 0, 1};
@@ -47,7 +47,7 @@ std::array<Place, 4> corners(const FrameSize& size) {
   return {{{0, 0}, {right, 0}, {right, bottom}, {0, bottom}}};
 }
 
-// Of a polygon by its corners in order; below 0 when it is mirrored.
+// The area of a polygon given by its corners in order; negative if it is mirrored.
 double area(const std::array<Place, 4>& p) {
   double twice = 0;
   for (size_t n = 0; n < 4; ++n) {

@@ -1,4 +1,4 @@
-// main.cpp -- burst_superresolution: one picture of many frames. See README.md beside this file.
+// main.cpp -- burst_superresolution: computes one picture from many frames. See README.md in this folder.
 #include <cstdio>
 
 #include "checks.h"
@@ -21,7 +21,7 @@ Burst burst_of(const Options& options) {
   return simulate(demosaic::read_photograph(options.common.input), options.simulation);
 }
 
-// A table instead of the work.
+// For the checks: reports a table instead of a result.
 void write_table(const Options& options, const apps::Table& table) {
   apps::Report report(name, options.common);
   report.add_table(table);

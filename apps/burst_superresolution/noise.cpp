@@ -12,15 +12,15 @@ namespace burst {
 namespace {
 
 constexpr double least_weight = 1e-3;
-constexpr double least_difference = 1e-4;  // of a picture that shows nothing
+constexpr double least_difference = 1e-4;  // for pictures without any content
 constexpr int square_side = 16;
-// Of normal noise, the median magnitude over the standard deviation.
+// For normal noise: the median magnitude divided by the standard deviation.
 constexpr double median_of_normal = 0.6744897501960817;
 // The root of the sum of the squares of the nine weights below.
 constexpr double gain = 6;
 constexpr float dark_end = 1.0f / 255, light_end = 1 - dark_end;
 
-// The second difference about a place, of samples two apart; below 0 where one of them is cut off.
+// The magnitude of the second difference around a position, of samples two apart; negative if one of them is clipped.
 float magnitude_at(std::span<const float> frame, const FrameSize& size, int x, int y) {
   constexpr float weights[3] = {1, -2, 1};
   float sum = 0;
@@ -42,7 +42,7 @@ float quantile(std::vector<float>& values, double share) {
   return *place;
 }
 
-// The median magnitude of a square in all frames; nothing where most of it is cut off.
+// The median magnitude of a square over all frames; nothing if most of it is clipped.
 std::optional<float> median_of_square(const Burst& burst, int left, int top) {
   std::vector<float> magnitudes;
   for (int n = 0; n < burst.frames(); ++n) {
@@ -58,7 +58,7 @@ std::optional<float> median_of_square(const Burst& burst, int left, int top) {
   return quantile(magnitudes, 0.5);
 }
 
-// The picture at a place between its pixels, bilinear, in one colour.
+// Bilinear interpolation of the picture at a position, in one colour.
 double bilinear(std::span<const float> plane, const FrameSize& size, const Place& at) {
   const int left = std::clamp(static_cast<int>(at.x), 0, size.width - 2);
   const int top = std::clamp(static_cast<int>(at.y), 0, size.height - 2);

@@ -20,7 +20,7 @@ Objective::Objective(const Shape& shape, const Smoothness& smoothness, lang::Typ
 
 Expr Objective::number(double value) const { return lang::cast(scalar_, Expr(value)); }
 
-// Clamped to a pixel more than the picture's size, so that it fits an integer whatever the homography.
+// Clamped to a range one pixel larger than the picture, so that it fits an integer for any homography.
 void Objective::define_shift() {
   const FrameSize& size = shape_.size;
   const auto h = [&](int k) { return Expr(homographies(k, i_)); };
@@ -43,8 +43,8 @@ void Objective::define_sampled() {
     residual(x_, y_, i_) = sampled(x_, y_, i_) - frames(x_, y_, i_);
     return;
   }
-  // The pixel left of a place, and how far the place is to its right, from 0 to 1. Fractions are taken of the
-  // shift, which has more digits than the place.
+  // Splits a position into the pixel left of it and its distance to that pixel, from 0 to 1. The fraction comes from
+  // the shift, which has more significant digits than the position.
   const auto split = [&](const Expr& at, const Expr& shift, int side) {
     const Expr left = lang::clamp(at + lang::cast<int>(lang::floor(shift)), 0, side - 2);
     const Expr fraction = shift - lang::cast(scalar_, left - at);

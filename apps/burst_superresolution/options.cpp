@@ -15,16 +15,16 @@ constexpr const char* motion_group = "homographies";
 constexpr const char* both_groups = "both";
 
 void add_simulation_options(CLI::App& cli, Simulation& s) {
-  cli.add_option("--frames", s.frames, "of a photograph: how many frames are made of it")
+  cli.add_option("--frames", s.frames, "number of frames that are simulated from a photograph")
       ->capture_default_str();
-  cli.add_option("--shake", s.shake, "how far the camera moves between them, in pixels")
+  cli.add_option("--shake", s.shake, "movement of the camera between frames, in pixels")
       ->capture_default_str();
-  cli.add_option("--rotation", s.rotation, "and how far it turns, in degrees")
+  cli.add_option("--rotation", s.rotation, "rotation of the camera between frames, in degrees")
       ->capture_default_str();
   cli.add_option("--noise", s.noise, "standard deviation of each sample; 1 is white")
       ->capture_default_str();
   cli.add_option("--frame-size", s.frame_size,
-                 "frames have so many pixels along each side at most; 0: what the photograph gives")
+                 "largest number of pixels along each side of a frame; 0: as the photograph allows")
       ->capture_default_str();
 }
 
@@ -56,27 +56,28 @@ Moves moves_of(const apps::CommonOptions& common) {
 std::optional<Options> read_options(int argc, char** argv) {
   Options options;
   CLI::App cli(
-      "Makes one colour picture of a burst of mosaics that a shaken camera took: the picture and "
-      "every frame's homography are found together, by gradient descent.");
+      "Combines a burst of mosaics from a shaking camera to one colour picture: the picture and "
+      "every frame's homography are optimized together, by gradient descent.");
   apps::add_common_options(
       cli, options.common,
       {.input_text = "a folder of RAW frames (or images of one channel, with --mosaic), or a "
-                     "photograph, of which a burst is made whose truth is known",
+                     "photograph, from which a burst with known truth is simulated",
        .steps = usual_steps,
        .optimize = {image_group, motion_group, both_groups}});
   options.common.optimize = {both_groups};
   add_simulation_options(cli, options.simulation);
   cli.add_option(
       "--mosaic", options.pattern,
-      "the colours of the first two rows of a folder's frames, as RGGB; RAW files say it");
+      "the colours of the first two rows of the frames, as RGGB; RAW files contain them");
   cli.add_option("--lambda", options.lambda,
-                 "weight of the differences of neighbours; without it, by the noise of the frames");
+                 "weight of the differences of neighbours; default: chosen from the frames' noise");
   std::string colours = "rgb";
-  cli.add_option("--colours", colours,
-                 "whose differences: rgb, or opponent (light and two differences of colours)")
+  cli.add_option(
+         "--colours", colours,
+         "colour axes of these differences: rgb, or opponent (light and two colour differences)")
       ->capture_default_str();
   cli.add_flag("--write-frames", options.write_frames,
-               "the frames, too, as images of one channel, RGGB");
+               "also write the frames, as images of one channel, RGGB");
   if (!apps::parse_command_line(cli, argc, argv, options.common)) return std::nullopt;
   options.moves = moves_of(options.common);
   options.colours = colours_named(colours);

@@ -13,15 +13,15 @@ namespace burst {
 
 struct Options {
   apps::CommonOptions common;
-  Moves moves;            // as --optimize says
-  Simulation simulation;  // of a photograph; its seed is the common one
-  std::string pattern;    // of images of one channel in a folder
+  Moves moves;            // from --optimize
+  Simulation simulation;  // for a photograph as input; its seed is the common one
+  std::string pattern;    // mosaic pattern for one-channel images in a folder
   Colours colours = Colours::Rgb;
-  std::optional<double> lambda;  // weight of the first colour; else by the noise
+  std::optional<double> lambda;  // weight of the first colour; default: chosen from the noise
   bool write_frames = false;
 };
 
-// Nothing when only --help was asked for. Throws retrograde::UserError.
+// Nothing if only --help was requested. Throws retrograde::UserError.
 std::optional<Options> read_options(int argc, char** argv);
 
 }  // namespace burst

@@ -16,7 +16,7 @@ size_t at(const FrameSize& size, int x, int y, size_t c) {
          static_cast<size_t>(x);
 }
 
-// A square of planes, turned.
+// A square of the planes, turned upright.
 apps::Image square_of(std::span<const float> planes, const FrameSize& size, const Corner& corner,
                       int side, int orientation) {
   apps::Image square{side, side, 8, {}};

@@ -13,10 +13,10 @@ namespace {
 
 constexpr int pilot_steps = 30;
 constexpr double pilot_weight = 1e-3;
-// Three of a pixel's samples are followed, so that with fewer frames hardly any noise is left to see.
+// The fit absorbs the noise of three samples per pixel, so with fewer frames hardly any noise remains to be measured.
 constexpr int least_frames = 5;
 
-// Where some steps from the start lead.
+// The point that a few steps reach from the initial one.
 std::vector<float> explained(const Prepared& prepared, Evaluator<float>& evaluator) {
   std::vector<float> x = joined(prepared.first, prepared.homographies), gradient(x.size());
   apps::Adam adam({{evaluator.shape().image_elems(), image_rate},

@@ -1,4 +1,4 @@
-// pilot.h -- how much smoothness the noise asks for, by a short run of the optimization itself.
+// pilot.h -- chooses the smoothness from the noise, measured by a short run of the optimization itself.
 #pragma once
 
 #include "evaluator.h"
@@ -7,9 +7,9 @@
 
 namespace burst {
 
-// Sets the smoothness of what was prepared, and of the evaluator: some steps with little of it explain all of the
-// frames but their noise, which then says how much there should be. Nothing changes where there are too few
-// frames, the picture does not move, or --lambda is given. Its time is added to what was prepared.
+// Sets the smoothness of `prepared` and of the evaluator. A few steps with little smoothness explain everything in the
+// frames except their noise; the noise then determines the weights. Nothing changes if there are too few frames, the
+// picture does not move, or --lambda is given. Its time is added to that of `prepared`.
 void choose_smoothness(const Options& options, const Burst& burst, Prepared& prepared,
                        Evaluator<float>& evaluator);
 

@@ -23,7 +23,7 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// Two frames of the same differ by 1.13 times the noise in the mean; 8 bits add a little.
+// Two frames of the same scene differ by 1.13 times the noise on average; quantisation to 8 bits adds a little.
 bool are_alike(std::span<const float> a, std::span<const float> b, double noise) {
   double sum = 0;
   for (size_t n = 0; n < a.size(); ++n) sum += std::abs(a[n] - b[n]);

@@ -1,4 +1,4 @@
-// prepare.h -- from frames to where the optimization starts, and what it is measured beside.
+// prepare.h -- prepares the optimization from the frames: its initial point, and the baselines for comparison.
 #pragma once
 
 #include <optional>
@@ -16,12 +16,12 @@ struct Prepared {
   std::vector<Homography> homographies;  // of each frame
   double noise = 0;
   Smoothness smoothness;
-  // Since the frames were there.
+  // Measured from the time when the frames were read.
   double seconds_to_first = 0, seconds_to_average = 0, seconds = 0;
 };
 
-// Frames that cannot be aligned are left out of the burst, which then has a note of it; but where they are, up to
-// noise, what the first is, their motion is none. The weights of the smoothness are those of noise.h. Throws
+// Frames that cannot be aligned are removed from the burst, which gets a note about it. But if they equal the first
+// frame up to noise, they have no motion and stay. The smoothness' weights are those of noise.h. Throws
 // retrograde::Error.
 Prepared prepare(Burst& burst, Colours colours, std::optional<double> lambda, int threads);
 

@@ -11,7 +11,7 @@ namespace burst::reference {
 
 namespace {
 
-// The pixel left of a place (or above), and how far the place is from it.
+// The pixel left of (or above) a position, and the distance to it.
 struct Split {
   int left;
   double fraction;
@@ -83,7 +83,8 @@ class Sum {
     add_motion(motion(n), h, x, y, 2 * residual * by_x, 2 * residual * by_y);
   }
 
-  // In units: place = centre + s (a / w, b / w) with a = (1 + h0) u + h1 v + h2, b = h3 u + (1 + h4) v + h5.
+  // In the units of homography.h: position = centre + s (a / w, b / w) with a = (1 + h0) u + h1 v + h2, b = h3 u + (1 +
+  // h4) v + h5.
   void add_motion(size_t to, const Homography& h, int x, int y, double by_x, double by_y) {
     const double s = size_.scale();
     const double u = (x - size_.centre_x()) / s, v = (y - size_.centre_y()) / s;
@@ -96,7 +97,7 @@ class Sum {
     for (size_t k = 0; k < terms.size(); ++k) value_.gradient[to + k] += terms[k];
   }
 
-  // Between two pixels, by where their red is.
+  // The difference between two pixels, given by the indices of their red samples.
   void add_difference(const ColourAxis& axis, size_t from, size_t to) {
     double step = 0;
     for (size_t c = 0; c < 3; ++c)

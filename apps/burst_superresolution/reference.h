@@ -1,5 +1,5 @@
-// reference.h -- the objective and its gradient again in plain C++ and double, pixel by pixel, derived by hand:
-// what the pipeline is tested against.
+// reference.h -- a reference for tests: the objective and its gradient in plain C++ and double, pixel by pixel, with
+// derivatives derived by hand.
 #pragma once
 
 #include <span>
@@ -11,8 +11,8 @@ namespace burst::reference {
 
 struct Value {
   double loss = 0;
-  std::vector<double> sampled;   // [frames, height, width]; 0 where a pixel lies beyond the picture
-  std::vector<double> gradient;  // by x, of all homographies
+  std::vector<double> sampled;   // [frames, height, width]; 0 for pixels beyond the picture
+  std::vector<double> gradient;  // by x, including all homographies
 };
 
 // x: the picture [3, height, width], then the homographies [frames, 8]. samples: [frames, height, width].

@@ -1,4 +1,4 @@
-// registration.cpp -- see registration.h. The only file that knows OpenCV.
+// registration.cpp -- see registration.h. The only file that uses OpenCV.
 #include "registration.h"
 
 #include <algorithm>
@@ -18,11 +18,11 @@ struct Registration::Features {
 
 namespace {
 
-constexpr float best_over_second = 0.75f;  // Lowe, section 7.1, has 0.8
+constexpr float best_over_second = 0.75f;  // Lowe, section 7.1, uses 0.8
 constexpr double inlier_pixels = 1.5;
-constexpr int least_inliers = 12;  // three times what determines a homography
+constexpr int least_inliers = 12;  // three times the number that determines a homography
 
-// OpenCV's errors are ours.
+// Turns OpenCV's exceptions into ours.
 template <typename Work>
 auto with_opencv(const Work& work) {
   try {
@@ -33,7 +33,7 @@ auto with_opencv(const Work& work) {
   }
 }
 
-// Lightness with 8 bits, which SIFT wants.
+// Lightness with 8 bits, as SIFT requires.
 cv::Mat gray_of(std::span<const float> planes, const FrameSize& size) {
   cv::Mat gray(size.height, size.width, CV_8UC1);
   size_t at = 0;

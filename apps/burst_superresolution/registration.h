@@ -1,8 +1,8 @@
-// registration.h -- where the homographies start: features of a frame that are found again in the first one.
+// registration.h -- estimates the initial homographies from features of a frame that are also found in the first frame.
 //
-// SIFT (D. Lowe, Distinctive image features from scale-invariant keypoints, International Journal of Computer
-// Vision 60 (2), 2004), nearest neighbours by his ratio of distances, and RANSAC (M. Fischler, R. Bolles, Random
-// sample consensus, Communications of the ACM 24 (6), 1981), all as OpenCV has them.
+// Uses SIFT (D. Lowe, Distinctive image features from scale-invariant keypoints, International Journal of Computer
+// Vision 60 (2), 2004), nearest neighbours by Lowe's ratio of distances, and RANSAC (M. Fischler, R. Bolles, Random
+// sample consensus, Communications of the ACM 24 (6), 1981), all as implemented by OpenCV.
 #pragma once
 
 #include <memory>
@@ -21,8 +21,8 @@ class Registration {
   Registration(const Registration&) = delete;
   Registration& operator=(const Registration&) = delete;
 
-  // Of another frame, demosaicked; nothing where too few features are found again, or their motion is none of a
-  // shaken camera. The same for the same frames. Throws retrograde::UserError.
+  // The homography of another frame, demosaicked. Nothing if too few features match, or if the motion is implausible
+  // for a shaking camera. Deterministic for the same frames. Throws retrograde::UserError.
   std::optional<Homography> motion_of(std::span<const float> frame) const;
 
  private:

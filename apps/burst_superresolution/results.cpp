@@ -20,12 +20,12 @@ namespace {
 
 constexpr int enlarged_side = 80, enlarged_times = 4;
 
-// A picture, how it is called, and when it was there.
+// A picture with its method's name, and the time when it was complete.
 struct Method {
   const char* name;
   const char* file;
   std::span<const float> planes;
-  double seconds;  // since the frames were there
+  double seconds;  // since the frames were read
 };
 
 std::vector<Method> methods_of(const Run& run) {
@@ -114,7 +114,7 @@ void enter_motion(const Run& run, apps::Report& report) {
                                    {"end", {{"mean", after.mean}, {"worst", after.worst}}}};
 }
 
-// A curve of what samples have of a quality, from when the optimization began.
+// A quality as a curve over time, starting when the optimization began.
 apps::PlotSeries curve(const Run& run, const char* name, double Sample::*what) {
   apps::PlotSeries series{name, {}, {}};
   for (const Sample& s : run.fit.series) {

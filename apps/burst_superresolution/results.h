@@ -1,4 +1,4 @@
-// results.h -- what a run leaves behind: pictures, homographies, the report with its plots.
+// results.h -- writes the results of a run: pictures, homographies, the report with its plots.
 #pragma once
 
 #include "common/report.h"
@@ -14,15 +14,15 @@ struct Run {
   const Fit& fit;
   double compile_seconds = 0;  // of the objective and its gradient
 
-  // From the frames to the picture, compilers included.
+  // From the frames to the picture, including compile times.
   double total_seconds() const { return prepared.seconds + compile_seconds + fit.seconds; }
 };
 
-// result.png (and result.exr, linear light, where the frames were floats), what it is measured beside,
-// homographies.json, report.json and its plots, in the output folder. Throws retrograde::UserError.
+// Writes to the output folder: result.png (and result.exr, linear light, if the frames were floats), the baselines'
+// pictures, homographies.json, report.json and its plots. Throws retrograde::UserError.
 void write_results(const Run& run, apps::Report& report);
 
-// The outcome in a few lines, on standard output.
+// Prints the outcome in a few lines to standard output.
 void print_summary(const Run& run);
 
 }  // namespace burst

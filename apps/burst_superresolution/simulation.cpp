@@ -15,7 +15,7 @@ using retrograde::text;
 
 namespace {
 
-// Not the distributions of the standard library, whose numbers differ between libraries.
+// Used instead of the standard library's distributions, whose numbers differ between implementations.
 class Chance {
  public:
   explicit Chance(uint64_t seed) : random_(seed) {}
@@ -32,7 +32,7 @@ class Chance {
   std::mt19937_64 random_;
 };
 
-// More than any of its pixels moves, and the reach of the interpolation.
+// At least the largest displacement of any pixel, plus the reach of the interpolation.
 int border_of(const FrameSize& size, const Simulation& s) {
   const double diagonal = std::hypot(size.width, size.height) / 2;
   const double turned = 2 * std::sin(s.rotation * M_PI / 360) + s.zoom + 4 * s.tilt;
@@ -53,7 +53,7 @@ Homography random_motion(Chance& chance, const FrameSize& size, const Simulation
           chance.within(s.tilt)};
 }
 
-// The part of the photograph that the first frame sees: from an even place on.
+// The part of the photograph that the first frame sees; it begins at even coordinates.
 struct Cut {
   int left, top;
   FrameSize size;
@@ -115,7 +115,7 @@ Burst simulate(const demosaic::Photograph& photograph, const Simulation& simulat
   burst.truth.emplace();
   burst.truth->planes = cut_planes(photograph, cut);
   burst.truth->noise = simulation.noise;
-  // A picture as small as its border is counted where there is something to count.
+  // A picture no larger than its border is measured where that is possible.
   burst.truth->border = std::min(border, std::min(cut.size.width, cut.size.height) / 4);
   Chance chance(simulation.seed);
   for (int n = 0; n < simulation.frames; ++n) {

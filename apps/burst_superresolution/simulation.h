@@ -1,9 +1,9 @@
-// simulation.h -- a burst made of a photograph, so that picture and homographies are known.
+// simulation.h -- simulates a burst from a photograph, so that the true picture and homographies are known.
 //
 //   frame_n(x, y) = clamp(bicubic(photograph, H_n (x, y)) at the mosaic's colour + noise, 0, 1)
 //
-// H_n is a shift, a turn, a change of size and a tilt, each even at random within its bounds; H_0 is the
-// identity. Frames are cut so far within the photograph that none looks beyond it.
+// H_n is a shift, a rotation, a change of size and a tilt, each uniformly random within its bounds; H_0 is the
+// identity. Frames are cropped so that none looks beyond the photograph.
 #pragma once
 
 #include <cstdint>
@@ -20,12 +20,11 @@ struct Simulation {
   double zoom = 0.002;   // relative
   double tilt = 0.002;   // h6 and h7
   double noise = 0.005;  // standard deviation of each sample
-  int frame_size =
-      0;  // frames are cut to so many pixels along each side at most; 0: as large as may be
+  int frame_size = 0;    // largest size of frames along each side; 0: as large as possible
   uint64_t seed = 1;
 };
 
-// Throws retrograde::UserError where the photograph is too small.
+// Throws retrograde::UserError if the photograph is too small.
 Burst simulate(const demosaic::Photograph& photograph, const Simulation& simulation);
 
 }  // namespace burst

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Runs the bench script of every app, or of those that are named, and collects what they measured.
+"""Runs the bench script of every app, or of the named ones, and collects their reports.
 
 usage: bench_apps.py BIN --output=FILE [NAME...]
 
-apps/NAME/bench BIN FOLDER leaves FOLDER/report.json (common/report.h) and its plots; FILE gets the reports
-of all, and the FOLDERs lie beside it, in apps/.
+apps/NAME/bench BIN FOLDER writes FOLDER/report.json (common/report.h) and its plots. FILE receives all reports;
+the FOLDERs are beside it, in apps/.
 """
 import json
 import os
@@ -28,7 +28,7 @@ def processor():
 
 
 def measure(name, programs, folder):
-    """The app's report, or None where its script failed."""
+    """The app's report, or None if its script failed."""
     os.makedirs(folder, exist_ok=True)
     print(f"== {name}", flush=True)
     outcome = subprocess.run([os.path.join(APPS, name, "bench"), programs, folder], check=False)

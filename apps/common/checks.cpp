@@ -22,7 +22,7 @@ nlohmann::json step_cell(const std::optional<long>& step) {
   return step ? nlohmann::json(*step) : nlohmann::json("never");
 }
 
-// Not std::max: a NaN must win, and stay.
+// Not std::max: a NaN must win and stay.
 double worse(double a, double b) { return std::isnan(a) || a > b ? a : b; }
 
 }  // namespace
@@ -99,7 +99,7 @@ void measure_divergence(StabilityRow& row, const Problem& problem, std::span<con
   options.safeguard = false;
   row.diverges_plain = diverging_step(minimize(problem, start, options).series);
   options.safeguard = true;
-  // A refused step is taken back: what counts is where the run stands, not what it tried.
+  // Refused steps are undone, so only the points that the run kept count.
   std::vector<LossSample> kept;
   double lowest = INFINITY;
   for (const LossSample& sample : minimize(problem, start, options).series) {

@@ -1,4 +1,4 @@
-// division.h -- which photographs of a folder programs learn from, and which they are measured on.
+// division.h -- divides the photographs of a folder into training and held-out ones.
 #pragma once
 
 #include <filesystem>
@@ -9,12 +9,12 @@ namespace apps {
 
 struct Division {
   std::vector<std::filesystem::path> train = {}, held_out = {};
-  std::string words;  // who says so
+  std::string words;  // the source of the division, in words
 };
 
-// As the folder's photographs.txt says, whose lines are "train FILE" or "held_out FILE"; without one, every fourth by
-// name, and the last, are held out. Throws retrograde::UserError unless there is one of either kind at least, and for
-// a line that is none. Whether the files of a list are there shows when they are read.
+// Follows the folder's photographs.txt, with lines "train FILE" or "held_out FILE". Without that file, every fourth
+// photograph by name and the last one are held out. Throws retrograde::UserError if either set is empty or a line is
+// malformed. Whether the listed files exist is only checked when they are read.
 Division division_of(const std::filesystem::path& folder);
 
 }  // namespace apps

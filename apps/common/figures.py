@@ -1,4 +1,4 @@
-"""What scripts that draw share: matplotlib without a display, and figures that are written whole or not at all."""
+"""Helpers for scripts that draw: matplotlib without a display, and figures that are written atomically."""
 import os
 
 import matplotlib
@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt  # noqa: E402, F401
 
 
 def save(figure, path):
-    """As PNG: drawn beside the picture, then renamed. Closes the figure."""
+    """Saves as PNG: to a temporary file beside the destination, which is then renamed. Closes the figure."""
     temporary = f"{path}.{os.getpid()}.tmp"
     try:
         figure.savefig(temporary, format="png")

@@ -27,7 +27,7 @@ namespace {
                               : "Give a folder that you may write to");
 }
 
-// A file that disappears unless `keep` gave it its final name.
+// A temporary file that is deleted unless `keep` renames it to its final name.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::filesystem::path& target) : target_(target) {

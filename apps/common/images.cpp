@@ -28,14 +28,14 @@ namespace {
 
 [[noreturn]] void refuse_read(const std::filesystem::path& path, const std::string& rule,
                               std::string evidence, const std::string& instead) {
-  // One line, whatever the decoder says.
+  // Joins the decoder's message to one line.
   std::replace(evidence.begin(), evidence.end(), '\n', ' ');
   while (!evidence.empty() && (evidence.back() == ' ' || evidence.back() == '.'))
     evidence.pop_back();
   retrograde::call_error(text("read ", retrograde::quoted(path.string())), rule, evidence, instead);
 }
 
-// Decoders' libraries print to standard error what they also report: silent while this lives.
+// Decoders' libraries also print their errors to standard error; this silences them during its lifetime.
 class QuietErrors {
  public:
   QuietErrors() : kept_(::dup(STDERR_FILENO)) {
@@ -58,8 +58,8 @@ class QuietErrors {
 constexpr const char *whole_rule = "an input must be a whole image",
                      *fetch_again = "The file is damaged or truncated: fetch it again";
 
-// `raw_mosaic`: of a RAW file what the sensor saw, without demosaicing and not turned: OpenImageIO 2.4 would give it
-// another width and leave the samples where they are.
+// `raw_mosaic`: opens a RAW file as the sensor's samples, not demosaiced and not turned: OpenImageIO 2.4 would change
+// the width without moving the samples.
 std::unique_ptr<OIIO::ImageInput> open_image(const std::filesystem::path& path,
                                              bool raw_mosaic = false) {
   std::error_code failed;
@@ -104,7 +104,7 @@ int sample_bits(const OIIO::ImageSpec& spec) {
   return spec.format.basesize() > 1 ? 16 : 8;
 }
 
-// The first `channels` of the file, every sample finite.
+// Reads the first `channels` channels of the file; every sample must be finite.
 Image read_open(const std::filesystem::path& path, OIIO::ImageInput& input, int channels) {
   const OIIO::ImageSpec spec = input.spec();
   Image image{spec.width, spec.height, sample_bits(spec), {}, channels};
@@ -123,13 +123,14 @@ Image read_open(const std::filesystem::path& path, OIIO::ImageInput& input, int 
   return image;
 }
 
-// As EXIF numbers it (JEITA CP-3451, tag 274): 1 is upright. Of a RAW file it is 1, too, for what its decoder has
-// demosaiced it has turned.
+// The EXIF orientation (JEITA CP-3451, tag 274): 1 is upright. It is also 1 for RAW files, because their decoder turns
+// demosaiced images.
 int orientation_of(const OIIO::ImageInput& input) {
   return input.spec().get_int_attribute("Orientation", 1);
 }
 
-// What a RAW file's decoder would do, in LibRaw's numbers, which it says where nothing tells it to leave that.
+// The rotation that a RAW file's decoder would apply. It reports this number of LibRaw's only if it is not told to
+// leave the image unturned.
 int orientation_of_mosaic(const std::filesystem::path& path, const OIIO::ImageInput& input) {
   if (std::string(input.format_name()) != "raw") return orientation_of(input);
   const auto turned = OIIO::ImageInput::open(path.string());
@@ -137,8 +138,8 @@ int orientation_of_mosaic(const std::filesystem::path& path, const OIIO::ImageIn
   return flip == 3 ? 3 : flip == 5 ? 8 : flip == 6 ? 6 : 1;
 }
 
-// Row by row what OpenImageIO 2.4 names clockwise, and later ones row by row. Where LibRaw counts the two greens
-// apart, 2.4 takes their numbers for those of complementary colours, which sensors have not had since 2001.
+// OpenImageIO 2.4 names patterns clockwise; later versions name them row by row, as here. If LibRaw distinguishes the
+// two greens, 2.4 mistakes their numbers for complementary colours, which sensors have not had since 2001.
 std::string bayer_pattern(const std::string& named) {
   static const std::pair<const char*, const char*> names[] = {
       {"RGBG", "RGGB"}, {"GMCY", "RGGB"}, {"GRGB", "GRBG"}, {"BGRG", "BGGR"}, {"GBGR", "GBRG"},
@@ -162,16 +163,16 @@ std::string lower_suffix(const std::filesystem::path& path) {
   return suffix;
 }
 
-// What a file with this suffix stores.
+// The sample type that files with this suffix store.
 OIIO::TypeDesc stored_type(const std::filesystem::path& path, const std::string& suffix, int bits) {
   if (suffix == ".exr" || suffix == ".tif" || suffix == ".tiff" || suffix == ".hdr")
     return OIIO::TypeDesc::FLOAT;
   if (suffix == ".png") return bits > 8 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8;
   if (suffix == ".jpg" || suffix == ".jpeg") return OIIO::TypeDesc::UINT8;
-  retrograde::call_error(text("write ", retrograde::quoted(path.string())),
-                         "an image's suffix says how it is stored",
-                         suffix.empty() ? "it has none" : text("nothing is known of ", suffix),
-                         "Give .png, .exr, .tif, .hdr or .jpg");
+  retrograde::call_error(
+      text("write ", retrograde::quoted(path.string())), "an image's suffix selects its format",
+      suffix.empty() ? "it has none" : text("the format ", suffix, " is unknown"),
+      "Give .png, .exr, .tif, .hdr or .jpg");
 }
 
 [[noreturn]] void refuse_encoding(const std::filesystem::path& path, const std::string& suffix,
@@ -182,8 +183,8 @@ OIIO::TypeDesc stored_type(const std::filesystem::path& path, const std::string&
                          evidence, "Give another suffix, or install OpenImageIO with that plugin");
 }
 
-// Encoded in memory, so that only write_file, which checks every call, touches the disk; through a
-// scratch file where a plugin cannot do that.
+// Encodes in memory, so that only write_file, which checks every call, writes to disk. Plugins that cannot do that use
+// a scratch file.
 std::string encode(const std::filesystem::path& path, const std::string& suffix,
                    const Image& image) {
   const OIIO::ImageSpec spec(image.width, image.height, image.channels,
@@ -222,7 +223,7 @@ Image read_image(const std::filesystem::path& path) {
   const QuietErrors quiet;
   const auto input = open_image(path);
   check_size(path, input->spec());
-  // One or two channels are gray and alpha; of more, the first three are the colours.
+  // Images of one or two channels are gray (with alpha); of more channels, the first three are the colours.
   const bool gray = input->spec().nchannels < 3;
   const Image image = upright(read_open(path, *input, gray ? 1 : 3), orientation_of(*input));
   return gray ? spread_gray(image) : image;
@@ -257,17 +258,17 @@ std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder
       found.push_back(entry.path());
   }
   std::sort(found.begin(), found.end());
-  OIIO::geterror();  // what it says of other files is of no interest
+  OIIO::geterror();  // drop its messages about other files
   if (!found.empty()) return found;
   retrograde::call_error(text("read images of ", retrograde::quoted(folder.string())),
                          "it must be a folder with images in it",
-                         failed ? failed.message() : std::string("none of its files is one"),
+                         failed ? failed.message() : std::string("none of its files is an image"),
                          "Give a folder of photographs");
 }
 
 namespace {
 
-// What a pixel of the result takes from the pixels of a line, from `first` on; the weights sum to 1.
+// The weights of a result pixel for the pixels of a line from `first` on; they sum to 1.
 struct Tap {
   int first;
   std::vector<float> weights;
@@ -291,7 +292,7 @@ std::vector<Tap> taps_of(int from, int to) {
   return taps;
 }
 
-// Along x; the image comes out transposed, so that twice is along both.
+// Resizes along x and transposes, so that two calls resize along both axes.
 Image resized_and_transposed(const Image& image, int width) {
   Image out{image.height, width, image.bits, {}, image.channels};
   out.pixels.resize(out.elems());
@@ -313,7 +314,7 @@ Image resized_and_transposed(const Image& image, int width) {
 
 }  // namespace
 
-// From 5 on rows are stored as columns; x, y or both run backwards.
+// From orientation 5 on, rows are stored as columns; x, y or both may run backwards.
 Image upright(Image image, int orientation) {
   if (orientation < 2 || orientation > 8) return image;
   const bool swaps = orientation >= 5;

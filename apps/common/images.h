@@ -10,28 +10,28 @@ namespace apps {
 struct Image {
   int width = 0;
   int height = 0;
-  int bits = 8;               // what the file stored per sample: 8, 16 or 32 (float)
+  int bits = 8;               // bits per sample in the file: 8, 16 or 32 (float)
   std::vector<float> pixels;  // [height, width, channels]; 1.0 is the brightest integer sample
   int channels = 3;
 
   long elems() const { return static_cast<long>(channels) * width * height; }
 };
 
-// Images larger than this are refused: a step would need more memory than it is worth.
+// Larger images are rejected: a step would need too much memory.
 inline constexpr long max_pixels = 50'000'000;
 
-// Any format, sample type and channel count that OpenImageIO decodes, RAW photographs included, as
-// three channels. Gray is spread over them; alpha is left out. A photograph is turned upright, as its
-// EXIF orientation asks; what write_image writes has no orientation, and needs none. Throws retrograde::UserError when
-// the file is missing, unreadable, truncated, empty or too large, or when a sample is not finite.
+// Reads any format, sample type and channel count that OpenImageIO decodes, including RAW photographs, as three
+// channels. Gray is copied to all three; alpha is left out. Photographs are turned upright by their EXIF orientation;
+// files from write_image have none. Throws retrograde::UserError if the file is missing, unreadable, truncated, empty
+// or too large, or if a sample is not finite.
 Image read_image(const std::filesystem::path& path);
 
-// The same with the channels that the file has, alpha included.
+// The same with the file's own channels, including alpha.
 Image read_channels(const std::filesystem::path& path);
 
-// What a camera's sensor saw, one channel: a RAW file without demosaicing, or an image of one
-// channel as it is, not turned. `pattern` names the colours of the first two rows, as "RGGB"; empty: the
-// file does not say. `orientation`: how a picture made of it is to be turned, by upright().
+// The samples of a camera's sensor, one channel: a RAW file without demosaicing, or an image of one channel, not
+// turned. `pattern` names the colours of the first two rows, as "RGGB"; empty if the file does not say. `orientation`:
+// to be applied to the final picture by upright().
 struct Mosaic {
   Image image;
   std::string pattern;
@@ -39,23 +39,22 @@ struct Mosaic {
 };
 Mosaic read_mosaic(const std::filesystem::path& path);
 
-// An image as it is stored, turned and mirrored as an EXIF orientation of 1 to 8 says; others are none.
+// Turns and mirrors an image according to an EXIF orientation of 1 to 8; other values change nothing.
 Image upright(Image image, int orientation);
 
-// The images of a folder by their names' order; other files are left out. Throws
-// retrograde::UserError when it is no folder or holds none.
+// The images of a folder in the order of their names; other files are ignored. Throws retrograde::UserError if it is
+// not a folder or contains no images.
 std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder);
 
-// The image at another size: a triangle filter, as wide as a pixel of the coarser of the two (P. Heckbert,
-// Fundamentals of Texture Mapping and Image Warping, 1989, section 3.5), edges repeated.
+// Resizes the image by a triangle filter whose width is a pixel of the coarser image (P. Heckbert, Fundamentals of
+// Texture Mapping and Image Warping, 1989, section 3.5), with repeated edges.
 Image resized(const Image& image, int width, int height);
 
-// By the suffix: .png with 8 bits a sample, or 16 when the image came with more than 8 (clamped to
-// [0, 1]); .exr, .tif, .tiff and .hdr as floats, .jpg with 8 bits. Throws retrograde::UserError;
-// see write_file.
+// The suffix selects the format: .png with 8 bits per sample, or 16 if the image's source had more than 8 (clamped to
+// [0, 1]); .exr, .tif, .tiff and .hdr as floats; .jpg with 8 bits. Throws retrograde::UserError; see write_file.
 void write_image(const std::filesystem::path& path, const Image& image);
 
-// The same whatever the suffix. Kept for those who name their files themselves.
+// Writes PNG whatever the suffix.
 void write_png(const std::filesystem::path& path, const Image& image);
 
 }  // namespace apps

@@ -1,5 +1,5 @@
-// jpeg_check.cpp -- see jpeg_check.h. Errors of libjpeg come back by longjmp, through which no exception goes: between
-// setjmp and the jump no object with a destructor is made.
+// jpeg_check.cpp -- see jpeg_check.h. libjpeg reports errors by longjmp, because exceptions cannot pass through C:
+// between setjmp and the jump no object with a destructor is created.
 #include "common/jpeg_check.h"
 
 #include <csetjmp>
@@ -15,7 +15,7 @@ namespace apps {
 
 namespace {
 
-// Warnings after which samples are made up. Bytes between segments, for one, do no harm.
+// Warnings after which the decoder invents samples. Others, for example about bytes between segments, are harmless.
 bool is_damage(int warning) {
   return warning == JWRN_JPEG_EOF || warning == JWRN_HIT_MARKER || warning == JWRN_HUFF_BAD_CODE ||
          warning == JWRN_ARITH_BAD_CODE || warning == JWRN_MUST_RESYNC;
@@ -25,7 +25,7 @@ struct Decoder {
   jpeg_decompress_struct codec = {};
   jpeg_error_mgr manager = {};
   std::jmp_buf back;
-  char message[JMSG_LENGTH_MAX] = "";  // the first one
+  char message[JMSG_LENGTH_MAX] = "";  // the first message
   ~Decoder() { jpeg_destroy_decompress(&codec); }
 };
 
@@ -43,7 +43,7 @@ void note_damage(j_common_ptr codec, int level) {
   if (level < 0 && is_damage(codec->err->msg_code)) note(codec);
 }
 
-// Without conversions of colours. client_data outlives jpeg_create_*, which clears the rest.
+// Without colour conversion. client_data survives jpeg_create_*, which clears the other fields.
 bool start(Decoder& decoder, std::FILE* file) {
   jpeg_decompress_struct& codec = decoder.codec;
   codec.err = jpeg_std_error(&decoder.manager);

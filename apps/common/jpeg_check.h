@@ -1,7 +1,7 @@
-// jpeg_check.h -- whether the data of a JPEG file are whole.
+// jpeg_check.h -- detects truncated or damaged JPEG files.
 //
-// Decoders fill what a cut-off file lacks with grey and say so in a warning that OpenImageIO does not pass on. So the
-// file is read once more, at an eighth of its size, where nearly all there is to do is to follow its codes.
+// Decoders fill the missing part of a truncated file with grey, and report only a warning, which OpenImageIO does not
+// pass on. So the file is decoded once more at an eighth of its size, which costs little beyond parsing its codes.
 #pragma once
 
 #include <filesystem>
@@ -9,7 +9,7 @@
 
 namespace apps {
 
-// What the decoder says is wrong with the data of a JPEG file; empty where nothing is.
+// The decoder's message about damage in a JPEG file; empty if there is none.
 std::string jpeg_damage(const std::filesystem::path& path);
 
 }  // namespace apps

@@ -16,7 +16,7 @@ namespace {
 constexpr std::uintmax_t most_bytes = 64 << 20;
 constexpr size_t most_shown = 200;
 
-// Bytes of the character that begins there; 0: none does (RFC 3629, section 4).
+// Length in bytes of the character at this position; 0 if there is none (RFC 3629, section 4).
 size_t length_of_character(std::string_view bytes) {
   const auto at = [&](size_t n) {
     return n < bytes.size() ? static_cast<unsigned char>(bytes[n]) : 0u;
@@ -41,7 +41,7 @@ bool is_control(std::string_view character) {
   return first < 0x20 || first == 0x7f;
 }
 
-// The place of the first byte that is not text's, or the size.
+// The index of the first byte that is not text, or the size.
 size_t end_of_text(std::string_view bytes) {
   size_t n = 0;
   while (n < bytes.size()) {
@@ -52,7 +52,7 @@ size_t end_of_text(std::string_view bytes) {
   return n;
 }
 
-// Up to so many bytes, of which a file that grows for ever has more than it may.
+// Reads up to a limit, because some files (such as devices) never end.
 std::string bytes_of(std::ifstream& file) {
   std::string bytes;
   std::istreambuf_iterator<char> from(file), end;
@@ -72,7 +72,7 @@ std::string read_json(const std::filesystem::path& path, nlohmann::json& to) {
   const std::string bytes = bytes_of(file);
   if (bytes.size() > most_bytes) return text("it has more than ", most_bytes, " bytes");
   if (const size_t end = end_of_text(bytes); end < bytes.size())
-    return text("it is a binary file: byte ", end + 1, " of it is no part of a text");
+    return text("it is a binary file: byte ", end + 1, " is not text");
   try {
     to = nlohmann::json::parse(bytes);
   } catch (const nlohmann::json::exception& error) {

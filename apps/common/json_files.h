@@ -1,4 +1,4 @@
-// json_files.h -- files of JSON as users name them, which may be anything.
+// json_files.h -- reads JSON files that users name, which may contain anything.
 #pragma once
 
 #include <filesystem>
@@ -8,11 +8,11 @@
 
 namespace apps {
 
-// What is wrong with the file, to be shown to its user; empty where nothing is, and `to` is what it holds. Folders, files
-// that are no text and files too large for JSON are named as such, and nothing of them is shown.
+// Returns an error message for the user, or an empty text after storing the file's contents in `to`. Folders, files
+// that are not text and files too large for JSON are named as such; their contents are not shown.
 std::string read_json(const std::filesystem::path& path, nlohmann::json& to);
 
-// UTF-8 without control characters but those between words and lines: what a terminal can show.
+// Whether this is UTF-8 without control characters other than white space, so that a terminal can show it.
 bool is_text(std::string_view bytes);
 
 }  // namespace apps

@@ -15,7 +15,8 @@ namespace apps {
 namespace {
 
 constexpr const char* state_file = "state.bin";
-constexpr double kept_of_loss = 0.98;  // by the smoothed loss, at each step
+constexpr double kept_of_loss =
+    0.98;  // weight of the previous value in the smoothed loss, per step
 
 }  // namespace
 
@@ -66,7 +67,7 @@ void LearningRun::step(Learner& learner) {
   loss_.y.push_back(smooth);
 }
 
-// Whoever stops a run does not wait for looks; one that was stopped says nothing.
+// A stopped run evaluates and prints nothing more, so that the user does not wait.
 void LearningRun::look(Learner& learner) {
   if (stop_requested()) return;
   const double quality = learner.look(steps_);

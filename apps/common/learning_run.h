@@ -1,5 +1,5 @@
-// learning_run.h -- numbers learned from photographs: the steps, looks at photographs that are held out, state.bin, and
-// the curves of both.
+// learning_run.h -- trains parameters on photographs: steps, evaluations on held-out photographs, state.bin, and the
+// curves of loss and quality.
 //
 //   apps::LearningRun run("demosaic", options.common, {.looks = 40});  // reads the state of --resume, if it is wanted
 //   MyLearner learner(...);                                            // compiles
@@ -17,15 +17,15 @@
 
 namespace apps {
 
-// What is learned, and how.
+// The parameters to learn, and one training step.
 class Learner {
  public:
   virtual ~Learner() = default;
 
   virtual double step() = 0;  // returns the loss before it
-  // The quality on what is held out, in dB, after so many steps; any number once somebody stops it.
+  // The quality on the held-out photographs after `steps` steps, in dB. The result is ignored once the run is stopped.
   virtual double look(long steps) = 0;
-  // Into the state; files of its own, as of weights, are written beside it.
+  // Saves to the state. Files of its own, such as weights, are written beside it.
   virtual void save(State& state) = 0;
   virtual void restore(const State& state) = 0;
 };
@@ -33,22 +33,22 @@ class Learner {
 class LearningRun {
  public:
   struct Plan {
-    long looks = 20;         // over all steps; at each the state is saved, too
-    long least_between = 1;  // steps
+    long looks = 20;         // evaluations over all steps; each also saves the state
+    long least_between = 1;  // least number of steps between two
   };
   struct Titles {
     std::string loss_title, loss_label, quality_title, quality_label;
     bool log_loss = false;
   };
 
-  // The options must outlive it. Throws retrograde::UserError for a state that is none of `program`.
+  // `options` must outlive it. Throws retrograde::UserError if the state is not one of `program`.
   LearningRun(std::string program, const CommonOptions& options, const Plan& plan);
 
-  // Steps until they are done, --seconds are over or somebody stops it. What looks and files take does not count. The
-  // last look is at what is left in the learner, unless somebody stops it: then there is no more look.
+  // Steps until they are done, the time limit --seconds is reached or the user stops it. Time for evaluations and files
+  // does not count. The last evaluation is of the final parameters, unless the user stops the run.
   void learn(Learner& learner);
 
-  // Both curves, error_vs_time.png and psnr_vs_time.png, and the time of a step.
+  // Adds both curves, error_vs_time.png and psnr_vs_time.png, and the time of a step.
   void enter(Report& report, const Titles& titles) const;
 
   long steps() const { return steps_; }
@@ -64,7 +64,7 @@ class LearningRun {
   const std::string program_;
   const CommonOptions& options_;
   const Plan plan_;
-  std::optional<State> state_;  // to go on from
+  std::optional<State> state_;  // the state to continue from
   long steps_ = 0;
   double seconds_ = 0;
   std::vector<double> step_seconds_;

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes FOLDER/index.html: one page, with everything in it, of FOLDER/report.json and FOLDER/*/report.json.
+"""Writes FOLDER/index.html: one self-contained page about FOLDER/report.json and FOLDER/*/report.json.
 
 usage: make_index.py FOLDER
 
-Pictures before and after, plots, numbers and tables are those that each report lists. Pictures are shown
+It contains the pictures before and after, plots, numbers and tables that each report lists. Pictures are shown
 at most 1000 pixels wide; large ones are stored as JPEG.
 """
 import base64
@@ -27,7 +27,7 @@ td, th { border: 1px solid #ddd; padding: .2rem .6rem; text-align: left; } td.nu
 
 
 def picture_uri(path):
-    """The picture as a data URI, or None where it is missing or no picture."""
+    """The picture as a data URI; None if it is missing or not a picture."""
     from PIL import Image, UnidentifiedImageError
 
     Image.MAX_IMAGE_PIXELS = None
@@ -49,7 +49,7 @@ def picture_uri(path):
 def shrunk(image):
     from PIL import Image
 
-    if image.mode.startswith("I"):  # 16 bits a sample
+    if image.mode.startswith("I"):  # 16 bits per sample
         image = image.point(lambda v: v / 257)
     image = image.convert("RGB")
     if image.width > WIDEST:

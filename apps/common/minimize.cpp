@@ -44,7 +44,7 @@ Method method_named(const std::string& name) {
     all += (all.empty() ? "" : ", ") + std::string(its_name);
   }
   retrograde::call_error(text("optimize by ", quoted(name)), text("a method is one of ", all),
-                         "this is none of them", "Give one of these names");
+                         "this is not one of them", "Give one of these names");
 }
 
 bool all_finite(double number, std::span<const double> numbers) {

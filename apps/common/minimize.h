@@ -6,9 +6,9 @@
 //   newton_cg           truncated Newton: J. Nocedal, S. Wright, Numerical Optimization, 2nd edition,
 //                       algorithm 7.1, on Hessian-vector products
 //
-// All of them stop after so many steps or seconds, when the gradient is small, when the callback or a
-// signal says so (stop.h), and give the best point that was met. Of values that are not finite nothing is
-// learned: the step is shortened, and counted as refused.
+// All of them stop after a number of steps or seconds, when the gradient is small, or when the callback or a signal
+// says so (stop.h). They return the best point that was met. A step to values that are not finite is shortened and
+// counted as refused.
 #pragma once
 
 #include <functional>
@@ -22,9 +22,9 @@ namespace apps {
 
 struct Problem {
   size_t size = 0;
-  // The loss at x; where `gradient` is not empty, also its gradient.
+  // The loss at x, and also its gradient unless `gradient` is empty.
   std::function<double(std::span<const double> x, std::span<double> gradient)> evaluate = {};
-  // H(x) v, for newton_cg only.
+  // H(x) v; only needed for newton_cg.
   std::function<void(std::span<const double> x, std::span<const double> v,
                      std::span<double> product)>
       hessian_product = {};
@@ -39,13 +39,14 @@ struct MinimizeOptions {
   Method method = Method::Lbfgs;
   long steps = 100;
   double seconds = 0;                 // 0: no limit
-  double gradient_tolerance = 1e-10;  // of its largest element
-  double loss_tolerance = 0;          // relative change over a step; 0: go on
-  double rate = 1e-2;                 // of Adam
-  int memory = 20;                    // steps that L-BFGS remembers
+  double gradient_tolerance = 1e-10;  // for the gradient's largest element
+  double loss_tolerance = 0;          // relative change over a step; 0: no limit
+  double rate = 1e-2;                 // for Adam
+  int memory = 20;                    // number of steps that L-BFGS remembers
   AdamOptions adam = {};
-  bool safeguard = true;    // false only to show what it is for
-  Adam* moments = nullptr;  // Adam goes on with these, which the caller saves; its steps count
+  bool safeguard = true;  // false only for demonstrations without it
+  Adam* moments =
+      nullptr;  // Adam continues with these moments, which the caller saves; their steps count
 };
 
 // The loss after a step (0: at the start) and the seconds since the start.
@@ -58,17 +59,17 @@ struct LossSample {
 struct Minimum {
   std::vector<double> x;  // the best point, and its loss
   double loss = 0;
-  std::vector<LossSample> series;  // one for each step
+  std::vector<LossSample> series;  // one per step
   long steps = 0, evaluations = 0, products = 0, refused = 0;
   double seconds = 0;
   bool stopped = false;  // by a signal
-  std::string ended;     // why, in words
+  std::string ended;     // the reason, in words
 };
 
-// Called after each step with the best point so far; false ends the run.
+// Called after each step with the best point so far; returning false ends the run.
 using StepCallback = std::function<bool(const LossSample& sample, std::span<const double> best)>;
 
-// Throws retrograde::UserError when the loss is not finite at the start.
+// Throws retrograde::UserError if the loss is not finite at the start.
 Minimum minimize(const Problem& problem, std::span<const double> start,
                  const MinimizeOptions& options, const StepCallback& callback = {});
 

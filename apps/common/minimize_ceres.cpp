@@ -1,8 +1,8 @@
-// minimize_ceres.cpp -- L-BFGS and non-linear conjugate gradients of Ceres' gradient solver.
+// minimize_ceres.cpp -- L-BFGS and non-linear conjugate gradients, by Ceres' gradient solver.
 //
-// Its line search shortens a step whose value is not finite: that is the safeguard. Where a line search
-// fails though the run has come forward, the solver begins again from the best point, with an empty
-// memory: an approximation of the Hessian that no longer fits is the usual cause.
+// The safeguard is its line search, which shortens steps whose value is not finite. If a line search fails although the
+// run has made progress, the solver restarts from the best point with an empty memory: the usual cause is an outdated
+// approximation of the Hessian.
 #include <ceres/gradient_problem.h>
 #include <ceres/gradient_problem_solver.h>
 #include <glog/logging.h>
@@ -34,7 +34,7 @@ class CeresSteps : public ceres::IterationCallback {
   explicit CeresSteps(MinimizeRun& run) : run_(run) {}
 
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
-    // Iteration 0 is the start.
+    // Iteration 0 is the initial point.
     if (summary.iteration == 0) return ceres::SOLVER_CONTINUE;
     return run_.ends_after_step(summary.cost, {}) ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
                                                   : ceres::SOLVER_CONTINUE;
@@ -62,7 +62,7 @@ ceres::GradientProblemSolver::Options ceres_options(const MinimizeOptions& optio
 }  // namespace
 
 void run_ceres(MinimizeRun& run, std::vector<double> x) {
-  // What it logs about a failed line search is in our report; nothing goes to standard error.
+  // Suppress its log about failed line searches on standard error; our report contains it.
   FLAGS_minloglevel = google::GLOG_FATAL;
   const ceres::GradientProblem problem(new CeresLoss(run));
   CeresSteps steps(run);
@@ -74,7 +74,7 @@ void run_ceres(MinimizeRun& run, std::vector<double> x) {
     ceres::Solve(options, problem, x.data(), &summary);
     if (run.ended()) return;
     if (summary.termination_type == ceres::CONVERGENCE) return run.end("it converged");
-    if (!(run.found().loss < before)) return run.end("no step along the line is lower");
+    if (!(run.found().loss < before)) return run.end("the line search found no decrease");
     x = run.found().x;
   }
 }

@@ -1,4 +1,4 @@
-// minimize_run.h -- what all optimizers share while they run: counts, the best point, when to end.
+// minimize_run.h -- the state that all optimizers share during a run: counts, the best point, the stopping criteria.
 #pragma once
 
 #include <chrono>
@@ -9,20 +9,20 @@ namespace apps {
 
 class MinimizeRun {
  public:
-  // Throws retrograde::UserError when the loss or its gradient is not finite at the start.
+  // Throws retrograde::UserError if the loss or its gradient is not finite at the start.
   MinimizeRun(const Problem& problem, std::span<const double> start, const MinimizeOptions& options,
               const StepCallback& callback);
 
   const Problem& problem() const { return problem_; }
   const MinimizeOptions& options() const { return options_; }
 
-  // The loss at x, and its gradient unless that is empty. Not finite, it counts as refused.
+  // The loss at x, and its gradient unless `gradient` is empty. If they are not finite, they count as refused.
   double evaluate(std::span<const double> x, std::span<double> gradient);
   std::vector<double> product(std::span<const double> x, std::span<const double> v);
 
-  // After each step, with the loss that it came to: whether to end, and why.
+  // Called after each step with its loss: whether to end, and records why.
   bool ends_after_step(double loss, std::span<const double> gradient);
-  // Another reason to end.
+  // Ends the run for another reason.
   void end(const std::string& reason) { found_.ended = reason; }
   bool ended() const { return !found_.ended.empty(); }
 
@@ -42,10 +42,10 @@ class MinimizeRun {
   Minimum found_;
 };
 
-// Whether the number and all of the numbers are finite.
+// Whether `number` and all of `numbers` are finite.
 bool all_finite(double number, std::span<const double> numbers);
 
-// Each runs to its end; `x` is where it begins.
+// Each runs to its end, starting at `x`.
 void run_adam(MinimizeRun& run, std::vector<double> x);
 void run_ceres(MinimizeRun& run, std::vector<double> x);      // minimize_ceres.cpp
 void run_newton_cg(MinimizeRun& run, std::vector<double> x);  // newton_cg.cpp

@@ -1,10 +1,10 @@
-// newton_cg.cpp -- truncated Newton (J. Nocedal, S. Wright, Numerical Optimization, 2nd edition, 2006,
-// algorithm 7.1): each step solves H p = -g by conjugate gradients, only as far as it pays and no further
-// than where the curvature turns negative, then searches along p.
+// newton_cg.cpp -- truncated Newton (J. Nocedal, S. Wright, Numerical Optimization, 2nd edition, 2006, algorithm 7.1).
+// Each step solves H p = -g approximately by conjugate gradients, which stop early at negative curvature, and then
+// searches along p.
 //
-// Ours differs in two things: where the first direction already has negative curvature, the step
-// along -g is as long as the magnitude of the curvature says; and products that are not finite end the
-// inner iteration as negative curvature does.
+// Ours differs in two ways. If the first direction already has negative curvature, the length of the step along -g
+// comes from the magnitude of the curvature. Products that are not finite end the inner iteration like negative
+// curvature.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -25,7 +25,7 @@ void add_scaled(Vector& to, double factor, const Vector& what) {
   for (size_t n = 0; n < to.size(); ++n) to[n] += factor * what[n];
 }
 
-// Where the first direction is no direction of a minimum.
+// The step if the first direction has negative curvature.
 Vector downhill(const Vector& g, double curvature) {
   Vector p = g;
   const double size = inner_product(g, g);
@@ -35,7 +35,7 @@ Vector downhill(const Vector& g, double curvature) {
   return p;
 }
 
-// An approximate solution of H p = -g, always a direction of descent.
+// An approximate solution of H p = -g, always a descent direction.
 Vector newton_direction(MinimizeRun& run, const Vector& x, const Vector& g) {
   const double size = std::sqrt(inner_product(g, g));
   const double enough = std::min(0.5, std::sqrt(size)) * size;
@@ -56,7 +56,8 @@ Vector newton_direction(MinimizeRun& run, const Vector& x, const Vector& g) {
   return p;
 }
 
-// Moves x along p until the loss falls enough (Armijo); false when no step does. `loss` and `g` follow x.
+// Moves x along p until the loss falls enough (Armijo); returns false if no step is short enough. Updates `loss` and
+// `g`.
 bool search_along(MinimizeRun& run, Vector& x, double& loss, Vector& g, const Vector& p) {
   constexpr double enough = 1e-4, shortest = 1e-12;
   const double slope = inner_product(g, p);
@@ -70,7 +71,7 @@ bool search_along(MinimizeRun& run, Vector& x, double& loss, Vector& g, const Ve
   };
   double length = 1, value = evaluate(length);
   while (!(value <= loss + enough * length * slope)) {
-    // The lowest point of the parabola through what is known, kept within [0.1, 0.5].
+    // The vertex of the parabola through the known values, clamped to [0.1, 0.5].
     const double vertex =
         std::isfinite(value) ? -slope * length * length / (2 * (value - loss - slope * length)) : 0;
     length = std::clamp(vertex, 0.1 * length, 0.5 * length);
@@ -90,10 +91,10 @@ void run_newton_cg(MinimizeRun& run, Vector x) {
   double loss = run.problem().evaluate(x, g);
   do {
     if (!search_along(run, x, loss, g, newton_direction(run, x, g))) {
-      // The last hope: downhill.
+      // As a last resort, go downhill.
       const Vector product = run.product(x, g);
       if (!search_along(run, x, loss, g, downhill(g, inner_product(g, product))))
-        return run.end("no step along the line is lower");
+        return run.end("the line search found no decrease");
     }
   } while (!run.ends_after_step(loss, g));
 }

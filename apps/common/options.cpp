@@ -16,13 +16,13 @@ using retrograde::text;
 
 namespace {
 
-// The groups named on the command line are known to CLI only as free text: this is what may be.
+// CLI takes the group names as free text; this checks them.
 void add_optimize_option(CLI::App& cli, CommonOptions& options,
                          const std::vector<std::string>& groups) {
   options.optimize = groups;
   const std::string names =
       retrograde::listed(groups, [](const std::string& name) { return name; });
-  cli.add_option("--optimize", options.optimize, "what may move, of " + names)
+  cli.add_option("--optimize", options.optimize, "groups of variables to optimize, among " + names)
       ->delimiter(',')
       ->capture_default_str()
       ->check([groups, names](const std::string& name) {
@@ -34,7 +34,7 @@ void add_optimize_option(CLI::App& cli, CommonOptions& options,
 [[noreturn]] void refuse_command_line(std::string evidence) {
   std::replace(evidence.begin(), evidence.end(), '\n', ' ');
   retrograde::call_error("understand the command line",
-                         "each option takes what --help says, and some are needed", evidence,
+                         "options must be as --help describes, and required ones present", evidence,
                          "Run with --help for the options");
 }
 
@@ -56,19 +56,20 @@ void add_common_options(CLI::App& cli, CommonOptions& options, const CommonDefau
   cli.add_option("--input", options.input, defaults.input_text)->required(defaults.needs_input);
   cli.add_option("--output", options.output, "folder for the results")->required();
   cli.add_option("--steps", options.steps, "steps of the optimizer")->capture_default_str();
-  cli.add_option("--seconds", options.seconds, "stop optimizing after this long; 0: never")
+  cli.add_option("--seconds", options.seconds, "time limit for the optimization; 0: none")
       ->capture_default_str();
   cli.add_option("--threads", options.threads, "threads")->capture_default_str();
-  cli.add_option("--seed", options.seed, "of everything random")->capture_default_str();
+  cli.add_option("--seed", options.seed, "seed of all random numbers")->capture_default_str();
   cli.add_flag("--check-gradients", options.check_gradients,
-               "instead of the work: adjoints against differences and the complex step");
+               "instead of a run: check adjoints against differences and the complex step");
   cli.add_flag("--check-stability", options.check_stability,
-               "instead of the work: float32 against double in extreme cases");
+               "instead of a run: compare float32 with double in extreme cases");
   cli.add_flag("--explain", options.explain,
-               "says what was built, and what was left out because nothing needs it");
-  cli.add_flag("--resume", options.resume, "go on from the state in the output folder");
+               "print what is computed, and what is left out because nothing needs it");
+  cli.add_flag("--resume", options.resume, "continue from the state in the output folder");
   if (defaults.memory_mb > 0) {
-    cli.add_option("--memory", options.memory_mb, "MB that a run may take")->capture_default_str();
+    cli.add_option("--memory", options.memory_mb, "memory limit of a run in MB")
+        ->capture_default_str();
   }
   if (!defaults.optimize.empty()) add_optimize_option(cli, options, defaults.optimize);
 }

@@ -1,4 +1,4 @@
-// options.h -- the options that all apps share, added to an app's own command line by one call.
+// options.h -- command-line options that all apps share; one call adds them to an app's own options.
 //
 //   apps::CommonOptions common;
 //   CLI::App cli("Makes a lens shorter.");
@@ -20,35 +20,35 @@ class App;
 namespace apps {
 
 struct CommonOptions {
-  std::filesystem::path input, output;  // output: the folder of the results
+  std::filesystem::path input, output;  // output: the folder for results
   long steps = 0;
-  double seconds = 0;  // of optimizing; 0: as long as the steps take
+  double seconds = 0;  // of optimization; 0: no limit
   int threads = 1;
   uint64_t seed = 1;
-  double memory_mb = 0;               // 0: as much as it takes
-  std::vector<std::string> optimize;  // the groups of parameters that may move
+  double memory_mb = 0;               // 0: no limit
+  std::vector<std::string> optimize;  // the groups of parameters to optimize
   bool check_gradients = false, check_stability = false, explain = false;
   bool resume = false;
 };
 
-// What an app has of them.
+// Which of these options an app has, and their defaults.
 struct CommonDefaults {
   bool needs_input = true;
   std::string input_text = "the input";
   long steps = 100;
   double seconds = 0;
-  double memory_mb = 0;  // over 0: there is --memory, with this default
+  double memory_mb = 0;  // if positive, there is an option --memory with this default
   std::vector<std::string> optimize =
-      {};  // not empty: there is --optimize, all of these as default
+      {};  // if not empty, there is an option --optimize with all of these as default
 };
 
 void add_common_options(CLI::App& cli, CommonOptions& options, const CommonDefaults& defaults);
 
-// Parses and checks ranges and names. False when only --help was asked for, which is then printed.
-// Throws retrograde::UserError, in one line.
+// Parses the command line and checks ranges and names. Returns false after printing the help for --help. Throws
+// retrograde::UserError with a one-line message.
 bool parse_command_line(CLI::App& cli, int argc, char** argv, CommonOptions& options);
 
-// The rule of all numeric options. Throws retrograde::UserError unless low <= value <= high.
+// The check of all numeric options. Throws retrograde::UserError unless low <= value <= high.
 void require_in_range(const std::string& option, double value, double low, double high);
 
 // Whether --optimize names the group.

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws the plots that a report lists, each into its own PNG.
+"""Draws the plots that a report lists, each to its own PNG.
 
 usage: plot_series.py report.json FOLDER
 """
@@ -11,19 +11,19 @@ from figures import plt, save
 
 
 def drawable(series, plot):
-    """The points that have a place on these axes; null stands for what was not finite."""
+    """The points that these axes can show; null means a value that was not finite."""
     for n, (x, y) in enumerate(zip(series["x"], series["y"])):
         if x is None or y is None or (plot["log_x"] and x <= 0) or (plot["log_y"] and y <= 0):
             continue
         yield n, x, y
 
 
-# Where a label may stand beside its point, in points; the nearest place that is free is taken.
+# Candidate positions of a label relative to its point, in points; the nearest free one is used.
 PLACES = [(side * (5 + 3 * far), up * (5 + 9 * far) - 3) for far in range(5) for side in (1, -1) for up in (0, 1, -1)]
 
 
 def place_labels(figure, axes, labels):
-    """Each beside its point, over no other label and no other point, where there is such a place."""
+    """Places each label beside its point, overlapping no other label or point if possible."""
     renderer = figure.canvas.get_renderer()
     dots = [axes.transData.transform((x, y)) for _, x, y in labels]
     frame, taken = axes.get_window_extent(renderer), []
@@ -42,7 +42,7 @@ def place_labels(figure, axes, labels):
 
 
 def add_series(axes, series, plot, labels):
-    """Whether there was anything to draw; what is to be written beside its points goes into labels."""
+    """Draws a series and returns whether there was anything to draw; adds its labels to `labels`."""
     points = list(drawable(series, plot))
     xs, ys = [p[1] for p in points], [p[2] for p in points]
     if not series["labels"]:
@@ -55,7 +55,7 @@ def add_series(axes, series, plot, labels):
 
 def draw(plot, path):
     figure, axes = plt.subplots(figsize=(8, 5), dpi=120)
-    # Axes without a point cannot be logarithmic.
+    # Axes without points cannot be logarithmic.
     labels = []
     drawn = [add_series(axes, series, plot, labels) for series in plot["series"]]
     if plot["log_x"] and any(drawn):

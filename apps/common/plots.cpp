@@ -14,7 +14,7 @@ namespace {
 
 std::filesystem::path find_script(const std::string& script_name) {
   const auto here = program_folder();
-  // Of what is installed, and of the build's tests; and of the build's programs, apps/NAME/NAME.
+  // Looks relative to installed programs and the build's tests, and then to the build's programs, apps/NAME/NAME.
   for (const auto& above : {here / "..", here / ".." / ".."}) {
     const auto place = above / "share" / "retrograde" / script_name;
     if (std::filesystem::exists(place)) return place;
@@ -22,7 +22,7 @@ std::filesystem::path find_script(const std::string& script_name) {
   return script_name;
 }
 
-// Debian's Python has Debian's matplotlib; another one that comes first on the path may not.
+// Debian's Python has Debian's matplotlib; another one that is first on the path may not.
 std::string find_python() {
   if (const char* chosen = std::getenv("RETROGRADE_PYTHON")) return chosen;
   return std::filesystem::exists("/usr/bin/python3") ? "/usr/bin/python3" : "python3";

@@ -1,4 +1,4 @@
-// plots.h -- reports drawn as PNG by Python's matplotlib.
+// plots.h -- draws reports as PNG with Python's matplotlib.
 #pragma once
 
 #include <filesystem>
@@ -6,12 +6,12 @@
 
 namespace apps {
 
-// Runs `script report plot`. The script is found beside this program, or where it is installed.
-// Throws retrograde::UserError when it is not drawn.
+// Runs `script report plot`. The script is searched beside this program and where it is installed. Throws
+// retrograde::UserError on failure.
 void draw_plot(const std::string& script, const std::filesystem::path& report,
                const std::filesystem::path& plot);
 
-// Draws what report.json lists under "plots", each beside it, by plot_series.py.
+// Draws the plots that report.json lists under "plots", each beside the report, with plot_series.py.
 void draw_plots(const std::filesystem::path& report);
 
 }  // namespace apps

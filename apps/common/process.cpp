@@ -26,7 +26,7 @@ struct Pipe {
   int write = -1;
 };
 
-// Close-on-exec: a second child must not hold the first one's pipes open.
+// Close-on-exec, so that a second child does not keep the first one's pipes open.
 Pipe make_pipe(const std::string& purpose) {
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) {
@@ -44,7 +44,7 @@ std::vector<char*> pointers(const std::vector<std::string>& words) {
   return out;
 }
 
-// Runs in the forked process: only calls that are safe there.
+// Runs in the forked process, so it only makes async-signal-safe calls.
 [[noreturn]] void become(const std::vector<char*>& arguments, char* const* environment) {
   ::signal(SIGPIPE, SIG_DFL);
   ::execvpe(arguments[0], arguments.data(), environment);

@@ -1,4 +1,4 @@
-// process.h -- other programs, run beside this one and spoken to through pipes; what this one uses.
+// process.h -- runs other programs and communicates with them through pipes; measures this process.
 #pragma once
 
 #include <sys/types.h>
@@ -10,11 +10,11 @@
 
 namespace apps {
 
-// A program with its standard input and output in our hands; its standard error is ours. Ended with
-// this object, politely: it reads an end of file.
+// A running program whose standard input and output are connected to us; it shares our standard error. The destructor
+// ends it by closing its input.
 class Child {
  public:
-  // `environment` is added to ours. Throws retrograde::UserError when the program cannot start.
+  // `environment` is added to ours. Throws retrograde::UserError if the program cannot start.
   Child(const std::filesystem::path& program, const std::vector<std::string>& arguments,
         const std::vector<std::pair<std::string, std::string>>& environment);
   ~Child();
@@ -22,7 +22,7 @@ class Child {
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
-  // Whole blocks. False when the program has gone away.
+  // Transfer whole blocks; return false if the program has exited.
   bool send(const void* data, size_t bytes);
   bool receive(void* data, size_t bytes);
 
@@ -32,18 +32,18 @@ class Child {
   int from_ = -1;
 };
 
-// Runs a program to its end. `output` is what it wrote to standard output and standard error.
+// The result of running a program to its end. `output` is its standard output and standard error.
 struct Outcome {
   bool started = false;
-  int status = 0;  // exit status, or 128 + signal
+  int status = 0;  // exit status, or 128 + signal number
   std::string output;
 };
 Outcome run_program(const std::vector<std::string>& command);
 
-// The folder of the running program, for files that are installed relative to it.
+// The folder that contains the running program, for files installed relative to it.
 std::filesystem::path program_folder();
 
-// The largest resident size that this process ever had.
+// The largest resident set size of this process so far.
 double peak_memory_mb();
 
 }  // namespace apps

@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* report_version = "0.1.0";
 
-// JSON has no infinity and no NaN.
+// JSON has neither infinity nor NaN.
 json finite_or_null(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
 json numbers(const std::vector<double>& values) {

@@ -1,4 +1,4 @@
-// report.h -- report.json of an app: a head that all share, what to draw, what to show, and its own part.
+// report.h -- writes an app's report.json: a common head, plots, pictures, tables, and the app's own part.
 //
 //   apps::Report report("denoise", common);
 //   report.own["psnr_db"] = 31.2;
@@ -7,8 +7,8 @@
 //   report.add_plot({.file = "error_vs_time.png", .title = "...", .series = {...}});
 //   report.write(300, apps::stop_requested());                // report.json, then the plots
 //
-// The plots are drawn by one script, plot_report_series.py, for all apps; make_index.py shows pictures,
-// plots, numbers and tables of all reports on one page.
+// One script draws the plots of all apps, plot_series.py. make_index.py shows pictures, plots, numbers and tables of
+// all reports on one page.
 #pragma once
 
 #include <chrono>
@@ -23,11 +23,11 @@
 
 namespace apps {
 
-// One curve, or points with a label each.
+// One curve, or labelled points.
 struct PlotSeries {
   std::string name;
   std::vector<double> x, y;
-  std::vector<std::string> labels = {};  // of points; empty: a curve
+  std::vector<std::string> labels = {};  // one per point; empty: a curve
 };
 PlotSeries loss_series(const std::string& name, std::span<const LossSample> samples);
 
@@ -54,7 +54,7 @@ class Report {
 
   nlohmann::json own = nlohmann::json::object();  // the app's own part
 
-  // What a person wants to know first. `limit` is text such as "at least 36".
+  // A headline number. `limit` is text such as "at least 36".
   void add_number(const std::string& name, double value, const std::string& unit = "",
                   std::optional<double> before = {}, const std::string& limit = "");
   void add_picture(const std::string& file, const std::string& caption);
@@ -63,8 +63,7 @@ class Report {
   void add_note(const std::string& note) { notes_.push_back(note); }
 
   nlohmann::json to_json(long steps, bool stopped) const;
-  // report.json in the output folder, then every plot beside it.
-  // Throws retrograde::UserError.
+  // Writes report.json to the output folder, then draws every plot beside it. Throws retrograde::UserError.
   void write(long steps, bool stopped) const;
 
  private:

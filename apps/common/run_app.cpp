@@ -41,7 +41,7 @@ int run_app(const std::string& name, int argc, char** argv,
         "cannot go on: a run needs memory for its input and all that is computed from it; none was "
         "left. Make the input smaller.");
   } catch (const retrograde::InternalError& error) {
-    say(name, error.what());  // with all that a bug report needs
+    say(name, error.what());  // with everything that a bug report needs
   } catch (const std::exception& error) {
     say(name, one_line(error.what()));
   }

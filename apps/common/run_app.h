@@ -1,13 +1,12 @@
-// run_app.h -- what every app's main() does around its work.
+// run_app.h -- the common part of every app's main(): errors, signals, threads.
 //
 //   int main(int argc, char** argv) {
 //     return apps::run_app("lens", argc, argv, [](int c, char** v) { lens::run(c, v); });
 //   }
 //
-// Whatever the body throws becomes one line on standard error, "lens: cannot ...", and status 1; only
-// our own bugs (retrograde::InternalError) keep all the lines that a report of them needs. SIGINT and
-// SIGTERM ask it to stop (stop.h); a reader that went away and a file that grew too large are errors
-// of a call, not signals.
+// Exceptions from the body become one line on standard error, "lens: cannot ...", and status 1. Only our own bugs
+// (retrograde::InternalError) keep all lines, which a bug report needs. SIGINT and SIGTERM request a stop (stop.h). A
+// closed pipe and an exceeded file size are errors of calls, not signals.
 #pragma once
 
 #include <functional>
@@ -19,7 +18,7 @@ namespace apps {
 int run_app(const std::string& name, int argc, char** argv,
             const std::function<void(int argc, char** argv)>& body);
 
-// At most this many threads work in parallel loops while the object lives.
+// Limits the threads of parallel loops during its lifetime.
 class ThreadLimit {
  public:
   explicit ThreadLimit(int threads);

@@ -2,8 +2,8 @@
 //
 //   8 bytes magic | u32 version | u64 bytes of the body | body | u32 CRC-32 of all before
 //
-// The body: program, step, seconds, then words and arrays, each list after its length. Numbers are those of
-// the processor: a state goes on where it was made.
+// The body: program, step, seconds, then words and arrays, each list preceded by its length. Numbers are in the
+// processor's byte order, so a state can only be resumed on the same kind of machine.
 #include "common/state.h"
 
 #include <array>
@@ -26,7 +26,7 @@ constexpr char magic[8] = {'R', 'G', 'S', 'T', 'A', 'T', 'E', '\n'};
 constexpr uint32_t state_version = 1;
 constexpr size_t head_bytes = sizeof magic + sizeof(uint32_t) + sizeof(uint64_t);
 
-// The CRC of ISO 3309, as in zip and PNG; its table is that of the polynomial 0xedb88320.
+// The CRC of ISO 3309, as in zip and PNG, with the reversed polynomial 0xedb88320.
 uint32_t crc32(std::string_view bytes) {
   static const std::array<uint32_t, 256> table = [] {
     std::array<uint32_t, 256> rows{};
@@ -60,7 +60,7 @@ class StateWriter {
   std::string bytes;
 };
 
-// The checksum was right, so what is read was written by us; lengths are checked all the same.
+// The checksum was right, so the data are our own; lengths are checked nevertheless.
 class StateReader {
  public:
   StateReader(std::string_view bytes, std::function<void()> refuse)
@@ -110,7 +110,7 @@ std::string read_bytes(const std::filesystem::path& path) {
   return std::move(bytes).str();
 }
 
-// The body of a file whose head and checksum are right.
+// The body of a file, after checking its head and checksum.
 std::string_view checked_body(const std::filesystem::path& path, std::string_view bytes) {
   uint32_t version = 0, crc = 0;
   uint64_t body = 0;

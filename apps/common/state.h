@@ -1,13 +1,13 @@
-// state.h -- what a run needs to go on where it was: the file behind --resume.
+// state.h -- saves a run so that it can continue later: the file behind --resume.
 //
 //   apps::State state{.program = "lens", .step = 120};
 //   state.arrays["curvatures"] = values;      // doubles hold floats exactly
 //   adam.save(state, "adam");
 //   apps::write_state(folder / "state.bin", state);
 //
-// One binary file, written whole or not at all: magic, version, program, step, words, named arrays, and
-// a CRC-32 of all of it. A file that is damaged, truncated, of another program or no state at all is a
-// UserError in one line, and nothing of it is used.
+// One binary file, written atomically: magic, version, program, step, words, named arrays, and a CRC-32 of everything.
+// A file that is damaged, truncated, from another program or no state at all gives a one-line UserError and is not
+// used.
 #pragma once
 
 #include <cstdint>
@@ -23,11 +23,11 @@ namespace apps {
 struct State {
   std::string program;
   int64_t step = 0;
-  double seconds = 0;                             // that the steps have taken so far
+  double seconds = 0;                             // total time of the steps so far
   std::map<std::string, std::string> words = {};  // names of methods, random generators ...
   std::map<std::string, std::vector<double>> arrays = {};
 
-  // The array of that name and size. Throws retrograde::UserError when there is none.
+  // The array of that name and size. Throws retrograde::UserError if there is none.
   const std::vector<double>& array(const std::string& name, size_t size) const;
   void put(const std::string& name, std::span<const float> values);
   void get(const std::string& name, std::span<float> values) const;
@@ -38,7 +38,7 @@ struct State {
 
 void write_state(const std::filesystem::path& path, const State& state);
 
-// Throws retrograde::UserError unless the file is a whole state of this program.
+// Throws retrograde::UserError unless the file is a complete state of this program.
 State read_state(const std::filesystem::path& path, const std::string& program);
 
 }  // namespace apps

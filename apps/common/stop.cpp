@@ -10,11 +10,11 @@ namespace apps {
 
 namespace {
 
-// timeout(1) sends its signal to a program and then to the program's group: that is one wish, not two.
+// timeout(1) sends its signal to a program and then to the program's group; this counts as one request.
 constexpr int64_t same_wish_ns = 200'000'000;
 
-// A signal reaches a process, not an object: this is the one place for it.
-std::atomic<int64_t> stopped_at{0};  // by the monotonic clock, in ns; 0: go on
+// A signal is delivered to the process, so this state is global.
+std::atomic<int64_t> stopped_at{0};  // by the monotonic clock, in ns; 0: not stopped
 static_assert(std::atomic<int64_t>::is_always_lock_free);
 
 int64_t now_ns() {
@@ -27,7 +27,7 @@ void on_stop_signal(int signal) {
   int64_t first = 0;
   const int64_t now = now_ns();
   if (stopped_at.compare_exchange_strong(first, now) || now - first < same_wish_ns) return;
-  ::signal(signal, SIG_DFL);  // and ends the program once the handler returns
+  ::signal(signal, SIG_DFL);  // ends the program once the handler returns
   ::raise(signal);
 }
 

@@ -1,18 +1,18 @@
-// stop.h -- Ctrl-C ends a run in good order.
+// stop.h -- lets Ctrl-C end a run cleanly.
 //
-// The first SIGINT or SIGTERM only sets a flag: loops ask stop_requested() after each step, and the
-// program then writes its best result so far and its report, and ends with status 0. A second one, 0.2 s
-// later at least, ends the program at once, as if nobody had asked for signals.
+// The first SIGINT or SIGTERM only sets a flag. Loops check stop_requested() after each step; the program then writes
+// its best result so far and its report, and exits with status 0. A second signal, at least 0.2 s later, ends the
+// program at once, as if signals were not caught.
 #pragma once
 
 namespace apps {
 
-// Installed by run_app.
+// Called by run_app.
 void catch_stop_signals();
 
 bool stop_requested();
 
-// As a signal would, for tests and for programs that stop themselves; false takes it back.
+// Acts like a signal, for tests and for programs that stop themselves; false cancels it.
 void request_stop(bool stop = true);
 
 }  // namespace apps

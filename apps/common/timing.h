@@ -1,4 +1,4 @@
-// timing.h -- how long something took, and what it takes usually.
+// timing.h -- elapsed time and medians.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@ inline double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// The one in the middle, the upper of two; 0 of none.
+// The median; the upper one for an even count, 0 for no values.
 inline double median(std::vector<double> values) {
   if (values.empty()) return 0;
   const auto middle = values.begin() + static_cast<long>(values.size() / 2);

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Checks what a report of deconvolution promises, and says it in a line each.
+"""Checks what a report of deconvolution promises, and prints one line for each promise.
 
 usage: check_report.py report.json
 
-On the held-out photographs what was learned beats the original numbers by 0.8 dB, and the tuned ones by 0.5 dB; all of
-them beat the blurred photographs.
+On the held-out photographs, the learned weights beat the original numbers by 0.8 dB and the tuned ones by 0.5 dB; all
+of them beat the blurred photographs.
 """
 import json
 import sys

@@ -19,8 +19,9 @@ constexpr BatchShape small_batch{.side = 14, .pieces = 2, .psf = 5};
 constexpr Shape small_shape{.filters = 6, .size = 3, .bumps = 4};
 constexpr int small_stages = 2;
 
-// Away from the start, where parts of the gradient are 0, and with weights so large that conjugate gradients end at
-// the last digits: the smaller they are, the more iterations a minimum takes, and the less of it float32 can hold.
+// A point away from the initial one, at which parts of the gradient are 0. Its weights are large enough for conjugate
+// gradients to converge to the last digits: smaller weights need more iterations, and float32 holds less of the
+// minimum.
 Weights well_posed(uint64_t seed) {
   constexpr double shake = 0.2, log_weight = -1;
   Weights weights = learning_start(small_shape, small_stages);
@@ -37,7 +38,7 @@ std::vector<double> widened(const std::vector<float>& values) {
   return {values.begin(), values.end()};
 }
 
-// The loss and its gradient in one precision.
+// Evaluates the loss and its gradient in one precision.
 template <typename T>
 class Evaluator {
  public:
@@ -67,7 +68,7 @@ class Evaluator {
   Objective<T> objective_;
 };
 
-// Where the numbers of an array lie, stage by stage.
+// The positions of an array's numbers, stage by stage.
 std::vector<size_t> places_of(Array array) {
   std::vector<size_t> places;
   for (int stage = 0; stage < small_stages; ++stage) {
@@ -81,8 +82,8 @@ std::vector<size_t> places_of(Array array) {
   return places;
 }
 
-// Central differences of two steps, extrapolated (Richardson). Steps are small, as the cleaning has kinks where a
-// pixel's brightness passes a bin.
+// Central differences with two steps, extrapolated (Richardson). Steps are small, because the cleaning has kinks where
+// a pixel's brightness crosses a bin.
 double difference_along(Evaluator<double>& exact, const std::vector<double>& at,
                         const std::vector<double>& direction) {
   constexpr double step = 2e-6;
@@ -103,7 +104,8 @@ std::vector<double> part(const std::vector<double>& all, const std::vector<size_
   return result;
 }
 
-// Against what differences could tell: their error is relative to the largest derivative along a direction of ones.
+// The worst error relative to the resolution of differences, whose error is relative to the largest derivative along a
+// direction of ones.
 double worst_difference(Evaluator<double>& exact, const std::vector<double>& at,
                         const std::vector<double>& adjoint, const std::vector<size_t>& places,
                         Random& random) {
@@ -171,7 +173,7 @@ std::vector<apps::GradientRow> energy_gradients(
 
 namespace {
 
-// What is seen of two images, as a function of place.
+// Test content of two images, as a function of position.
 struct Frame {
   const char* name;
   std::function<double(int x, int y)> sample;
@@ -196,7 +198,7 @@ std::vector<Frame> frames() {
           {"noise", random}};
 }
 
-// The frame, and a truth that is another one, so that there is a gradient.
+// The frame, with another frame as truth so that there is a gradient.
 Simulated batch_of(const Frame& frame) {
   const Extent e = small_batch.extent();
   Simulated batch;
@@ -219,8 +221,9 @@ Simulated batch_of(const Frame& frame) {
 
 apps::StabilityRow stability_of(const Frame& frame, uint64_t seed, long steps,
                                 Evaluator<float>& own, Evaluator<double>& exact) {
-  constexpr double large_rate = 0.3;  // some sixty times what learning uses for filters
-  constexpr double nothing = 1e-6;    // dB for a number that moves by 1
+  constexpr double large_rate = 0.3;  // about sixty times the rate that learning uses for filters
+  constexpr double nothing =
+      1e-6;  // dB for a number that moves by 1; smaller gradients count as zero
   const Simulated batch = batch_of(frame);
   const std::vector<double> at = widened(well_posed(seed).values);
   own.set(batch);

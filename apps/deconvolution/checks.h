@@ -1,5 +1,4 @@
-// checks.h -- --check-gradients, --check-stability and --explain: a run that does one of them writes its
-// report and prints its table.
+// checks.h -- --check-gradients, --check-stability and --explain; each writes its report and prints its table.
 #pragma once
 
 #include <vector>
@@ -10,23 +9,24 @@
 
 namespace deconvolution {
 
-// A small batch, and weights that make the minimum of each energy exact to the last digits. Throw
-// retrograde::UserError for photographs that are too small.
+// Both use a small batch, and weights with which the minimum of each energy is exact to the last digits. They throw
+// retrograde::UserError if photographs are too small.
 //
-// The energy of a stage by its image, by the library's check: what the conjugate gradients start from.
+// The gradient of a stage's energy by its image, from which conjugate gradients start, by the library's check.
 std::vector<apps::GradientRow> energy_gradients(
     const std::vector<demosaic::Photograph>& photographs, uint64_t seed);
-// The loss behind two stages by their numbers: implicit, against differences of whole solutions.
+// The gradient of the loss after two stages by their numbers: implicit differentiation, against differences of complete
+// solutions.
 std::vector<apps::GradientRow> loss_gradients(const std::vector<demosaic::Photograph>& photographs,
                                               uint64_t seed, int threads);
-// Frames that are black, saturated, noise: image and gradient in float32 against double, and whether so many steps
-// of Adam diverge there.
+// Black, saturated and noisy frames: image and gradient in float32 against double, and whether `steps` steps of Adam
+// diverge.
 std::vector<apps::StabilityRow> stability_rows(uint64_t seed, int threads, long steps);
 
-// Throws retrograde::UserError where an error is larger than apps/common/checks.h allows.
+// Throws retrograde::UserError if an error exceeds the limits of apps/common/checks.h.
 void check_gradients(const Options& options);
 void check_stability(const Options& options);
-// What learning computes, and what it leaves out.
+// Explains what learning computes, and what it leaves out.
 void explain(const Options& options);
 
 }  // namespace deconvolution

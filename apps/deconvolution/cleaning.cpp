@@ -18,7 +18,7 @@ constexpr double bin = 0.033;  // of brightness
 constexpr double darkest =
     -0.25;  // what lies further out, as rings may, counts as this and as 1.25
 constexpr int bins = 47;
-// Pixels that a cell without any holds, of the image's own brightness: no division by 0.
+// Added to each cell: this many pixels of the image's own brightness, to avoid a division by 0 in empty cells.
 constexpr double prior = 1e-3;
 
 class Grid {
@@ -49,7 +49,7 @@ class Grid {
  private:
   Expr number(double value) const { return retrograde::cast(scalar_, Expr(value)); }
 
-  // The border's pixels again where a cell goes beyond it.
+  // The border's pixels are repeated where a cell extends beyond it.
   Func splat() {
     const RDom r(0, cell, 0, cell, 0, 2, "pixel");
     const Expr x = clamp(x_ * cell + r.x - cell / 2, 0, width_ - 1);
@@ -78,7 +78,7 @@ class Grid {
     return result;
   }
 
-  // Linear between the cells and bins around a pixel.
+  // Interpolates linearly between the cells and bins around a pixel.
   Tuple slice(const Func& grid) {
     const Expr below = floor(place_(x_, y_, n_)), above = place_(x_, y_, n_) - below;
     const Expr z = clamp(retrograde::cast<int>(below), 0, bins - 2);

@@ -19,7 +19,7 @@ std::vector<float> Deconvolver::run(const Problem& problem, const Watch& watch) 
   stopped_ = false;
   for (int stage = 0; stage < method_.weights.stages && !stopped_; ++stage) {
     solver_.set(std::as_const(method_.weights).of(stage));
-    // A stage may end early, and what is shown goes on from where it could have ended.
+    // A stage may end early; the iterations shown then continue from the count at which it could have ended.
     const int before = accuracy_.iterations * stage;
     images = solver_.solve(images, accuracy_, [&](const lang::Buffer<float>& now) {
       stopped_ = watch && !watch(before + solver_.iterations(), now);

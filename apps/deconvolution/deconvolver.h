@@ -1,4 +1,4 @@
-// deconvolver.h -- a method on a problem: all of its stages, which somebody may watch and stop.
+// deconvolver.h -- applies a method to a problem: runs all its stages, which the caller may watch and stop.
 #pragma once
 
 #include <functional>
@@ -16,7 +16,7 @@ struct Method {
   Weights weights;
 };
 
-// The original numbers, the tuned ones, and those that were learned, as they come with the program.
+// The methods that come with the program: with the original numbers, the tuned ones, and the learned ones.
 std::vector<Method> shipped_methods();
 
 inline constexpr Accuracy usual_accuracy{.iterations = 30, .tolerance = 1e-3};
@@ -29,18 +29,18 @@ class Deconvolver {
   const std::string& name() const { return method_.name; }
   int iterations() const { return accuracy_.iterations * method_.weights.stages; }  // at most
   const Shape& shape() const { return method_.weights.shape; }
-  // Another one whose weights have the same shape.
+  // Replaces the method by another one whose weights have the same shape.
   void use(Method method) { method_ = std::move(method); }
 
-  // Before a stage's first iteration and after each: how many there were, and the images [count, full height, full
-  // width]. False stops, and the images are the result.
+  // Called before a stage's first iteration and after each one, with the number of iterations so far and the images
+  // [count, full height, full width]. Returning false stops, and the images are the result.
   using Watch = std::function<bool(int iterations, const lang::Buffer<float>& images)>;
 
   // [count, height, width]
   std::vector<float> run(const Problem& problem, const Watch& watch = {});
-  // What each stage made of it, at the last run.
+  // The result of each stage in the last run.
   const std::vector<std::vector<float>>& stages() const { return stages_; }
-  bool stopped() const { return stopped_; }  // by its watch, at the last run
+  bool stopped() const { return stopped_; }  // by its watch, in the last run
 
  private:
   Method method_;

@@ -11,7 +11,7 @@ namespace deconvolution {
 namespace {
 
 constexpr BatchShape batch_shape{.side = 32, .pieces = 2, .psf = 9};
-constexpr int many_iterations = 1500;  // exact to ten digits
+constexpr int many_iterations = 1500;  // enough for ten exact digits
 constexpr int directions = 12;
 
 class Comparison {
@@ -34,9 +34,9 @@ class Comparison {
   }
 
  private:
-  using Slopes = std::vector<double>;  // of the loss along each direction
+  using Slopes = std::vector<double>;  // derivatives of the loss along each direction
 
-  // Numbers of one stage move, each by a part of its size or, near 0, of that of the others of its stage.
+  // Moves numbers of one stage, each by a fraction of its size or, near 0, of the size of the stage's other numbers.
   std::vector<double> direction(Random& random, int k) const {
     const size_t each = at_.size() / static_cast<size_t>(stages_);
     const size_t from = static_cast<size_t>(k % stages_) * each;

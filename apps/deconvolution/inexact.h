@@ -1,4 +1,4 @@
-// inexact.h -- what implicit differentiation costs where a solution is not exact.
+// inexact.h -- measures the error of implicit differentiation if solutions are inexact.
 #pragma once
 
 #include <vector>
@@ -9,9 +9,10 @@
 
 namespace deconvolution {
 
-// Of the loss behind all stages, along directions of each stage's numbers, in double: what is implicit against
-// differences of the loss with the same iterations, and against the exact gradient, as root mean squares relative
-// to those of the second. A row for each number of iterations. Throws retrograde::UserError for photographs that are too small.
+// Uses the loss after all stages, along directions of each stage's numbers, in double. The implicit derivative is
+// compared with differences of the loss with the same iterations, and with the exact gradient, as root mean squares
+// relative to those of the exact gradient. One row per number of iterations. Throws retrograde::UserError if
+// photographs are too small.
 apps::Table inexact_solutions(const std::vector<demosaic::Photograph>& photographs,
                               const Weights& weights, uint64_t seed, int threads);
 

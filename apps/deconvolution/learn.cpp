@@ -17,7 +17,7 @@ Weights start_of(const Options& options) {
                                  : read_weights(options.weights);
 }
 
-// Learned weights are of mixtures; those of the original method have thresholds, which have a gradient, too.
+// Learned weights use mixtures; those of the original method use thresholds, which have a gradient too.
 Trainer::Options trainer_options(const Options& options) {
   return {.steps = options.common.steps,
           .threads = options.common.threads,
@@ -26,7 +26,7 @@ Trainer::Options trainer_options(const Options& options) {
           .from_weights = !options.weights.empty()};
 }
 
-// The stages, and what they make of the held-out photographs.
+// The stages, and their results on the held-out photographs.
 class StagesLearner : public apps::Learner {
  public:
   StagesLearner(const Options& options, const demosaic::Dataset& dataset, const Gallery& held_out)
@@ -53,7 +53,7 @@ class StagesLearner : public apps::Learner {
   void restore(const apps::State& state) override { trainer_.restore(state); }
 
   const Trainer& trainer() const { return trainer_; }
-  // At the last look that nobody stopped.
+  // From the last evaluation that was not stopped.
   const Measured& measured() const { return measured_; }
 
  private:

@@ -1,4 +1,4 @@
-// learn.h -- the learning run: steps of Adam until they are done, the seconds are over or somebody stops it.
+// learn.h -- the learning run: Adam steps until they are done, the time limit is reached or the user stops it.
 #pragma once
 
 #include "common/report.h"
@@ -11,13 +11,13 @@ namespace deconvolution {
 
 struct Learned {
   Weights weights;
-  Measured held_out;  // at the last look; no photographs when it was stopped before
+  Measured held_out;  // at the last evaluation; no photographs if it was stopped before
   long steps = 0;
   bool stopped = false;
 };
 
-// Writes state.bin and weights.json into the output folder, also when it is stopped, and enters its
-// curves. --resume goes on from state.bin. Throws retrograde::Error.
+// Writes state.bin and weights.json to the output folder, also if it is stopped, and adds its curves to the report.
+// --resume continues from state.bin. Throws retrograde::Error.
 Learned learn(const Options& options, const demosaic::Dataset& dataset, const Gallery& held_out,
               apps::Report& report);
 

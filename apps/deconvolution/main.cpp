@@ -1,4 +1,4 @@
-// deconvolution -- see README.md. What a run does follows from what it is given: photographs to learn from
+// deconvolution: sharpens blurred photographs; see README.md. The inputs determine the task: photographs to learn from
 // (--dataset), a picture to deconvolve (--input), or a check.
 #include <cstdio>
 #include <optional>
@@ -39,7 +39,7 @@ std::vector<Method> methods_of(const Options& options) {
   return methods;
 }
 
-// Whoever stops a run does not wait for comparisons.
+// A stopped run makes no comparisons, so that the user does not wait.
 void enter_stopped(const std::optional<Learned>& learned, apps::Report& report) {
   report.add_note("stopped before any method was measured");
   if (!learned || learned->held_out.each_db.empty()) return;
@@ -48,7 +48,7 @@ void enter_stopped(const std::optional<Learned>& learned, apps::Report& report) 
   report.add_number("PSNR, held out", m.mean_db, "dB");
 }
 
-// Photographs: scan, learn or measure. Gives the steps taken.
+// The task with photographs: scan, learn or measure. Returns the number of steps.
 long use_dataset(const Options& options, std::vector<Method>& methods, apps::Report& report) {
   const auto dataset = demosaic::read_dataset(options.dataset);
   report.add_note("divided " + dataset.division);

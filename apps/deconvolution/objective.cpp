@@ -16,7 +16,8 @@ using lang::Func;
 
 namespace {
 
-// About that of a photograph: pieces count by their errors, as its pixels do, and the worst of them less than that.
+// About the error of a photograph. Pieces then count by their errors, as the photograph's pixels do, but the worst
+// pieces count less than that.
 constexpr double usual_error = 2e-3;
 
 const lang::Var x("x"), y("y"), n("n");

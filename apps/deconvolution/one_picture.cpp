@@ -21,9 +21,9 @@ using retrograde::text;
 namespace {
 
 constexpr int channels = 3;
-constexpr size_t watched = 1;  // green, whose quality is on the plot
+constexpr size_t watched = 1;  // green, whose quality is plotted
 
-// What is to be deconvolved, a problem for each channel.
+// The input as problems to deconvolve, one per channel.
 struct Picture {
   std::vector<Simulated> channels;  // without a truth if it came blurred
   int bits = 8;
@@ -93,7 +93,7 @@ void write_psf(const Options& options) {
   apps::write_image(options.common.output / "psf.png", image);
 }
 
-// The methods on one picture, their clock and their curves.
+// Runs the methods on one picture, with their times and curves.
 class Run {
  public:
   Run(const Options& options, const std::vector<Method>& methods, apps::Report& report,
@@ -152,7 +152,7 @@ class Run {
     return *deconvolver_;
   }
 
-  // False when it was stopped.
+  // Returns false if it was stopped.
   bool deconvolve(const Method& method, apps::Progress& progress) {
     Deconvolver& deconvolver = deconvolver_of(method);
     apps::PlotSeries series{method.name, {}, {}};
@@ -187,7 +187,7 @@ class Run {
     return whole;
   }
 
-  // The first stages of a method are worse than the whole of the one before it, but better than nothing.
+  // The first stages of a method are worse than the previous method's final result, but better than nothing.
   void keep_if_better(const Method& method, size_t c, std::vector<float> plane, bool whole) {
     if (!whole && is_deconvolved_[c]) return;
     best_[c] = std::move(plane);
@@ -214,7 +214,7 @@ class Run {
     if (picture_.has_truth) report_.add_number("PSNR of the picture", db, "dB", blurred_db_);
   }
 
-  // Gives the decibels of what is best now; 0 without a truth.
+  // Returns the PSNR of the best result so far; 0 without a truth.
   double keep_as(const std::string& file, const std::string& name) {
     write(file, best_);
     if (!picture_.has_truth) {
@@ -249,7 +249,7 @@ class Run {
   apps::Report& report_;
   const Heard& heard_;
   Picture picture_;
-  // The best so far of each channel, who made it, and whether that was a whole method.
+  // The best result so far of each channel, the method that made it, and whether that method was complete.
   Planes best_;
   std::array<std::string, channels> best_by_{"blurred", "blurred", "blurred"};
   std::array<bool, channels> is_deconvolved_{};

@@ -1,4 +1,4 @@
-// one_picture.h -- deconvolves the input: a photograph that is blurred first and compared, or a blurred one.
+// one_picture.h -- deconvolves the input: a photograph, which is blurred first and compared with, or a blurred one.
 #pragma once
 
 #include <functional>
@@ -11,15 +11,15 @@
 
 namespace deconvolution {
 
-// Hears of every look at the flag between two iterations: of a method, a channel, and how many there were.
+// Called whenever the stop flag is checked between iterations: with the method, channel and number of iterations.
 using Heard = std::function<void(const std::string& method, size_t channel, int iterations)>;
 
-// By each method in turn, a colour channel after the other; the last method's is result.png, and result.exr when
-// the input holds floats. Throws retrograde::Error. Gives the iterations.
+// Applies each method in turn, to one colour channel after another. The last method's result is result.png, and
+// result.exr if the input holds floats. Throws retrograde::Error. Returns the number of iterations.
 //
-// Stopped, it ends before the next iteration, and result.png is the best so far: each channel by the last method
-// that finished it, or, where none did, as far as the first one came, or blurred. (The first stages of a method are
-// worse than the whole of the one before it.)
+// If it is stopped, it ends before the next iteration, and result.png is the best result so far. For each channel that
+// is the result of the last method that finished it; otherwise the first method's partial result, or the blurred
+// channel. (The first stages of a method are worse than the previous method's final result.)
 long deconvolve_input(const Options& options, const std::vector<Method>& methods,
                       apps::Report& report, const Heard& heard = {});
 

@@ -24,7 +24,7 @@ void require_sources(const Options& options) {
            "neither --input nor --dataset was given", "Give one of them, or both");
   }
   if (no_dataset && (options.compare || options.tune || options.common.resume)) {
-    refuse("--compare, --tune and --resume are about photographs", "there is no --dataset",
+    refuse("--compare, --tune and --resume need a dataset", "there is no --dataset",
            "Give a folder of them");
   }
 }
@@ -46,18 +46,18 @@ void add_learning_options(CLI::App& cli, Options& options) {
   cli.add_option("--dataset", options.dataset,
                  "a folder of photographs: learns from most of them, measures on the others "
                  "(photographs.txt in it may say which)");
-  cli.add_option("--filters", options.shape.filters, "filters of a stage that is learned")
+  cli.add_option("--filters", options.shape.filters, "filters per learned stage")
       ->capture_default_str();
   cli.add_option("--size", options.shape.size, "samples along a filter")->capture_default_str();
-  cli.add_option("--bumps", options.shape.bumps, "of the mixture that shrinks derivatives")
+  cli.add_option("--bumps", options.shape.bumps, "terms of the mixture that shrinks derivatives")
       ->capture_default_str();
-  cli.add_option("--stages", options.stages, "how many are learned")->capture_default_str();
+  cli.add_option("--stages", options.stages, "number of learned stages")->capture_default_str();
   cli.add_flag("--compare", options.compare,
-               "measures what comes with the program on the dataset and learns nothing");
-  cli.add_flag("--brief", options.brief,
-               "leaves out what was tuned and learned before and comes with the program");
-  cli.add_flag("--tune", options.tune,
-               "scans the numbers of the original method on the dataset; writes tuned.json");
+               "measure the shipped methods on the dataset, learn nothing");
+  cli.add_flag("--brief", options.brief, "leave out the shipped tuned and learned methods");
+  cli.add_flag(
+      "--tune", options.tune,
+      "tune the numbers of the original method on the dataset by a scan; writes tuned.json");
 }
 
 }  // namespace
@@ -71,16 +71,17 @@ std::optional<Options> read_options(int argc, char** argv) {
   apps::add_common_options(
       cli, options.common,
       {.needs_input = false,
-       .input_text = "a photograph, which is blurred first, or with --blurred one that is",
+       .input_text = "a photograph, which is blurred first, or with --blurred a blurred one",
        .steps = usual_steps,
        .optimize = group_names});
   cli.add_option("--psf", options.psf,
                  "the point-spread function: disc:RADIUS, motion:SIZE[:SEED] or an image")
       ->capture_default_str();
-  cli.add_option("--noise", options.noise, "its standard deviation; 1 is white")
+  cli.add_option("--noise", options.noise, "standard deviation of the noise; 1 is white")
       ->capture_default_str();
-  cli.add_flag("--blurred", options.blurred, "the input is blurred already, by --psf");
-  cli.add_option("--iterations", options.iterations, "conjugate gradients of a stage, at most")
+  cli.add_flag("--blurred", options.blurred, "the input is already blurred by --psf");
+  cli.add_option("--iterations", options.iterations,
+                 "largest number of conjugate gradient iterations per stage")
       ->capture_default_str();
   cli.add_option("--weights", options.weights,
                  "that an earlier run wrote, instead of those that come with the program; "

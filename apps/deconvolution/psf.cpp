@@ -34,7 +34,7 @@ Psf normalised(std::string name, int size, const std::vector<double>& samples) {
   return psf;
 }
 
-// Uniform in [0, 1), and of a normal distribution; the standard library's differ between libraries.
+// Uniform numbers in [0, 1) and normal ones; the standard library's differ between implementations.
 class Numbers {
  public:
   explicit Numbers(uint64_t seed) : random_(seed) {}
@@ -70,7 +70,7 @@ std::vector<Point> shaken_path(uint64_t seed) {
   return path;
 }
 
-// About its mean, within [-reach, reach].
+// Centres the path on its mean and scales it to fit [-reach, reach].
 void fit(std::vector<Point>& path, double reach) {
   Point mean;
   for (const Point& p : path) {
@@ -95,7 +95,7 @@ std::optional<double> number_of(const std::string& word) {
   return std::nullopt;
 }
 
-// Of an image's brightness: the square about the box of what is not zero.
+// A function from an image's brightness: the square around the bounding box of nonzero pixels.
 Psf cut(const std::string& name, const apps::Image& image) {
   const auto value = [&](int x, int y) {
     const size_t from = 3 * static_cast<size_t>(y * image.width + x);
@@ -179,7 +179,7 @@ Psf psf_of(const std::string& description) {
   const std::string rest = description.substr(colon + 1);
   const size_t second = rest.find(':');
   const auto first = number_of(rest.substr(0, second));
-  if (!first) refuse(description, text(quoted(rest.substr(0, second)), " is no number"));
+  if (!first) refuse(description, text(quoted(rest.substr(0, second)), " is not a number"));
   if (kind == "disc") {
     if (!(*first > 0 && *first <= most_psf_size / 2))
       refuse(description, text("its radius is ", *first, " pixels"));
@@ -192,7 +192,7 @@ Psf psf_of(const std::string& description) {
   if (second == std::string::npos) return motion_path(size, 1);
   const auto seed = number_of(rest.substr(second + 1));
   if (!seed || *seed < 0 || *seed > 1e15 || *seed != std::floor(*seed))
-    refuse(description, text(quoted(rest.substr(second + 1)), " is no seed"));
+    refuse(description, text(quoted(rest.substr(second + 1)), " is not a seed"));
   return motion_path(size, static_cast<uint64_t>(*seed));
 }
 

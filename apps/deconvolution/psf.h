@@ -1,4 +1,4 @@
-// psf.h -- point-spread functions: what a camera makes of a point that shakes or is out of focus.
+// psf.h -- point-spread functions: the image of a point under a camera that shakes or is out of focus.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace deconvolution {
 
-// [size, size], size odd, nothing negative, of sum 1.
+// [size, size] with odd size; no negative elements, and sum 1.
 struct Psf {
   std::string name;
   int size = 1;
@@ -19,22 +19,22 @@ struct Psf {
 
 inline constexpr int most_psf_size = 101;
 
-// A disc of this radius in pixels, each sample as much as the disc covers of it.
+// A disc of this radius in pixels; each sample is the area that the disc covers of it.
 Psf defocus_disc(double radius);
 
-// The path of a shaken camera while its shutter is open, centred on its mean: a point whose velocity is pulled
-// back to rest and pushed at random, with now and then a jerk, scaled to fit `size` samples, and blurred
-// a little by the lens. The seed alone decides.
+// The path of a shaken camera during the exposure, centred on its mean. It is a point whose velocity is damped and
+// pushed at random, with occasional jerks; the path is scaled to fit `size` samples and blurred slightly by the lens.
+// The result depends only on size and seed.
 Psf motion_path(int size, uint64_t seed);
 
-// An image file's brightness. Even sizes get a row and a column of zeros more; of a larger one only the part
-// that is not zero is taken. Throws retrograde::UserError for what is no point-spread function.
+// The brightness of an image file. Even sizes get one more row and column of zeros; of larger images only the part that
+// is not zero is used. Throws retrograde::UserError if it is not a point-spread function.
 Psf read_psf(const std::filesystem::path& path);
 
 // "disc:RADIUS", "motion:SIZE" or "motion:SIZE:SEED", or a file. Throws retrograde::UserError.
 Psf psf_of(const std::string& description);
 
-// The same in the middle of a larger square, of odd size; as it is where it is as large.
+// The function centred in a larger square of odd size; unchanged if it has that size.
 Psf enlarged(const Psf& psf, int size);
 Psf mirrored(const Psf& psf, bool flip_x, bool flip_y, bool turned);
 

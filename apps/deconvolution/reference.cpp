@@ -185,7 +185,7 @@ std::vector<double> Reference::target(const Doubles& before) const {
   return result;
 }
 
-// k * x - b by the definition of a convolution, k's middle over the pixel.
+// k * x - b by the definition of a convolution, with the middle of k on the pixel.
 std::vector<double> Reference::residual(const Doubles& image) const {
   const int side = extent_.psf;
   Doubles result(problem_.blurred.begin(), problem_.blurred.end());
@@ -253,7 +253,7 @@ std::vector<double> Reference::gradient(const Doubles& image, const Doubles& bef
   return gradient_of(residual(image), miss);
 }
 
-// H p is the gradient at p less that at 0, where b and the targets are 0.
+// H p is the gradient at p minus that at 0, with b and the targets set to 0.
 std::vector<double> Reference::minimum(const Doubles& before) const {
   Doubles x = before, r = gradient(x, before);
   for (double& value : r) value = -value;

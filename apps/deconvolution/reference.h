@@ -1,4 +1,4 @@
-// reference.h -- a stage again, in plain C++ and double: what the pipelines are tested against. Slow.
+// reference.h -- a slow reference for tests: a stage in plain C++ and double.
 #pragma once
 
 #include <span>
@@ -14,13 +14,13 @@ struct Reference {
   Reference(const Shape& shape, const Problem& problem, std::span<const float> numbers);
 
   std::vector<double> cleaned(const std::vector<double>& before) const;
-  // [count, filters, rows, columns], where filters lie within the image.
+  // [count, filters, rows, columns], for positions at which the filters lie within the image.
   std::vector<double> target(const std::vector<double>& before) const;
   double energy(const std::vector<double>& image, const std::vector<double>& before) const;
-  // By the image, by hand.
+  // The gradient by the image, derived by hand.
   std::vector<double> gradient(const std::vector<double>& image,
                                const std::vector<double>& before) const;
-  // By conjugate gradients on the gradient above, until nothing is left.
+  // Conjugate gradients on the gradient above, until the residual vanishes.
   std::vector<double> minimum(const std::vector<double>& before) const;
 
  private:

@@ -9,7 +9,7 @@ namespace deconvolution {
 
 namespace {
 
-// Where k lies within the image: [height - size + 1, width - size + 1].
+// For positions at which k lies within the image: [height - size + 1, width - size + 1].
 std::vector<float> blurred(const Plane& sharp, const Psf& psf) {
   const int width = sharp.width - psf.size + 1, height = sharp.height - psf.size + 1;
   std::vector<float> result(static_cast<size_t>(width) * static_cast<size_t>(height), 0.0f);

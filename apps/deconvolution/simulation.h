@@ -1,8 +1,8 @@
-// simulation.h -- blurred and noisy images of photographs whose sharp pixels are known.
+// simulation.h -- simulates blurred and noisy images from photographs, so that the sharp pixels are known.
 //
-// Samples are in sRGB's encoding and in [0, 1], as the literature on deconvolution has them. What lies within
-// half a point-spread function of a photograph's border goes into its blurred image, but is not seen in it: no
-// border is assumed.
+// Samples are sRGB-encoded and in [0, 1], as in the literature on deconvolution. Pixels within half a point-spread
+// function of a photograph's border contribute to its blurred image but are not part of it, so no boundary condition is
+// assumed.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace deconvolution {
 
-// Numbers between 0 and 1 and of a normal distribution, the same with every standard library.
+// Uniform and normal random numbers that are the same with every standard library.
 class Random {
  public:
   explicit Random(uint64_t seed) : engine_(seed) {}
@@ -41,16 +41,16 @@ struct Plane {
   Plane part(int left, int top, int w, int h) const;
 };
 
-// Luma (ITU-R BT.601) of what is encoded, or one of the three channels.
+// Luma (ITU-R BT.601) of the encoded samples, or one of the three channels.
 Plane luma_of(const demosaic::Photograph& photograph);
 Plane channel_of(const demosaic::Photograph& photograph, int channel);
 
-// An image's problem and its truth. All are of one size, all functions of the same number of samples.
+// Problems with their truth. All images have one size, and all functions the same number of samples.
 struct Simulated {
   Problem problem;
-  std::vector<float> truth;  // [count, height, width]: what lies under the problem's samples
+  std::vector<float> truth;  // [count, height, width]: the sharp pixels at the problem's samples
 
-  // Takes one more: `sharp` has the margin; `noise` is a standard deviation.
+  // Adds an image: `sharp` includes the margin; `noise` is a standard deviation.
   void add(const Plane& sharp, const Psf& psf, double noise, Random& random);
 };
 

@@ -23,7 +23,7 @@ void compile(lang::Pipeline& pipeline, int threads) {
   pipeline.compile_jit(target);
 }
 
-// A quotient of sums, in the images' type; 0 where nothing is left to divide by.
+// A quotient of sums, in the images' type; 0 if the divisor is not positive.
 Expr quotient(lang::Type scalar, const Expr& a, const Expr& b) {
   return lang::cast(scalar, lang::select(b > 0.0, a / lang::select(b > 0.0, b, Expr(1.0)), 0.0));
 }

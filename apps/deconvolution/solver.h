@@ -1,15 +1,15 @@
-// solver.h -- the minimum of a stage's energy by conjugate gradients, compiled once for all stages of a shape.
+// solver.h -- minimizes a stage's energy by conjugate gradients, compiled once for all stages of a shape.
 //
-// The energy is quadratic in the image: its gradient g comes from propagate_adjoints, H p, its Hessian times a
-// direction, from propagate_tangents of that gradient. Two pipelines are compiled, whatever the number of
+// The energy is quadratic in the image. Its gradient g comes from propagate_adjoints; H p, its Hessian times a
+// direction, comes from propagate_tangents of that gradient. Two pipelines are compiled, whatever the number of
 // iterations:
 //
 //   start   r = -g(x) at a first image, and r.r
 //   step    x + a p,   r' = r - a H p,   r' + b p,   r'.r'   with a = r.r / p.Hp, b = r'.r' / r.r
 //
 // (M. Hestenes, E. Stiefel, Methods of conjugate gradients for solving linear systems, Journal of Research of the
-// National Bureau of Standards 49, 1952, section 3.) Each image of a batch has its own a and b; products of two
-// images are summed in double. The same step solves H lambda = q, which is what learning asks for.
+// National Bureau of Standards 49, 1952, section 3.) Each image of a batch has its own a and b; products of two images
+// are summed in double. The same step solves H lambda = q, which learning needs.
 #pragma once
 
 #include <functional>
@@ -20,7 +20,7 @@
 
 namespace deconvolution {
 
-// What was seen of some images, as floats whatever the solver computes in.
+// The observed images, always as floats.
 struct Problem {
   Extent extent;
   std::vector<float> blurred;  // [count, height, width]
@@ -28,14 +28,13 @@ struct Problem {
   std::vector<float> noises;   // [count], standard deviations
 };
 
-// When a solution is good enough: after so many iterations, or when the largest of the images' residuals has
-// fallen by this factor.
+// Stopping criterion: a number of iterations, or a factor by which the largest residual among the images has fallen.
 struct Accuracy {
   int iterations = 40;
   double tolerance = 1e-3;
 };
 
-// Copied into a buffer of these sizes, innermost first.
+// Copies values to a buffer of these sizes, innermost first.
 template <typename T, typename From>
 lang::Buffer<T> filled(const std::vector<int>& sizes, std::span<const From> values) {
   lang::Buffer<T> buffer(sizes);
@@ -43,7 +42,7 @@ lang::Buffer<T> filled(const std::vector<int>& sizes, std::span<const From> valu
   return buffer;
 }
 
-// Gives a stage's images what was seen, and its arrays their numbers, which lie in the order of Array.
+// Binds the observations to a stage's image inputs, and the numbers, in the order of Array, to its arrays.
 template <typename T>
 void bind_problem(Stage& stage, const Problem& problem);
 template <typename T>
@@ -61,17 +60,17 @@ class Solver {
   void set(const Problem& problem) { bind_problem<T>(stage_, problem); }
   void set(std::span<const T> numbers) { bind_numbers<T>(stage_, numbers); }
 
-  // Sees the image before the first iteration and after each; false ends them.
+  // Called with the image before the first iteration and after each one; returning false ends the iterations.
   using Watch = std::function<bool(const lang::Buffer<T>& image)>;
 
-  // A stage after the image `before`, from which it starts, too.
+  // Solves the stage that follows the image `before`, which is also the initial point.
   Image solve(const Image& before, const Accuracy& accuracy, const Watch& watch = {});
-  // H lambda = right_side, from lambda = 0.
+  // Solves H lambda = right_side, starting from lambda = 0.
   Image solve_linear(const Image& right_side, const Accuracy& accuracy);
 
   double energy(const Image& image, const Image& before);
   int iterations() const { return iterations_; }   // of the last solution
-  double reduction() const { return reduction_; }  // of its residual
+  double reduction() const { return reduction_; }  // factor by which its residual fell
   double compile_seconds() const { return compile_seconds_; }
 
  private:
@@ -93,10 +92,10 @@ class Solver {
   double reduction_ = 1, compile_seconds_ = 0;
 };
 
-// b with its border repeated over the margin: where the first stage starts.
+// b with its border repeated over the margin: the initial image of the first stage.
 template <typename T>
 std::vector<T> padded(const Problem& problem);
-// Without the margin.
+// Removes the margin.
 template <typename T>
 std::vector<float> cropped(const std::vector<T>& image, const Extent& extent);
 

@@ -14,7 +14,7 @@ using lang::RDom;
 
 namespace {
 
-constexpr double finest_bump = 0.004;  // a sample of eight bits
+constexpr double finest_bump = 0.004;  // one step of 8-bit samples
 
 std::vector<lang::ImageParam> parameters(const Shape& shape, lang::Type scalar) {
   constexpr std::array<const char*, all_arrays.size()> names{"filters", "log_weights", "shrinkage",
@@ -80,7 +80,7 @@ void Stage::define_kernel() {
   kernel(u_, v_, f_) = filters(u_, v_, f_) - sum(f_) * number(1.0 / (shape.size * shape.size));
 }
 
-// Of an image, where a filter lies within it; its place is that of the filter's first sample.
+// The filter response at positions where the filter lies within the image, indexed by the filter's first sample.
 Func Stage::response(const Func& of, const std::string& name) const {
   const RDom tap(0, shape.size, 0, shape.size, "tap");
   Func result(name);
@@ -94,7 +94,7 @@ Expr Stage::shrunk(const Expr& d) const {
   const Expr square = d * d;
   if (shape.bumps == 0) {
     const Expr t = numbers(0, f_) * numbers(0, f_), fourth = square * square;
-    // Without a pole where derivative and threshold are both 0.
+    // Avoids a pole if derivative and threshold are both 0.
     return d * fourth / (fourth + t * t + number(1e-30));
   }
   Expr factor = numbers(0, f_);

@@ -1,19 +1,19 @@
-// stage.h -- a stage of the method, in the language: what it minimizes over the sharp image x.
+// stage.h -- a stage of the method as a pipeline: the energy that it minimizes over the sharp image x.
 //
 //   energy(x) = 1/2 sum (k * x - b)^2 + 1/2 noise sum over filters f of w_f sum (f * x - target_f)^2
-//   target_f  = shrink_f(f * cleaned(before))        before: the image of the stage before
+//   target_f  = shrink_f(f * cleaned(before))        before: the image of the previous stage
 //
-// b is seen where the point-spread function k lies within x: x has a margin of half a k on each side, so that
-// nothing is assumed of what lies beyond the borders of b. Filters are free of their mean, their weights positive
-// (e to the power of what is learned), and multiplied by the image's noise, a variance relative to usual_noise.
+// b is observed at positions where the point-spread function k lies within x: x has a margin of half a k on each side,
+// so nothing is assumed about pixels beyond the borders of b. Filters have mean zero. Their weights are positive (e to
+// the power of the learned number) and are multiplied by the image's noise, a variance relative to usual_noise.
 //
-// shrink is that of sparse adaptive priors, d / (1 + (t / d)^4), which leaves large derivatives alone; or a
-// mixture that is learned, d (c_0 + sum over j of c_j exp(-d^2 / 2 tau_j^2)), with tau doubling from j to j + 1.
-// H. Fortunato, M. Oliveira: Fast high-quality non-blind deconvolution using sparse adaptive priors, The Visual
-// Computer 30, 2014, section 3, is the first with five filters and two stages, `before` of the first being of no
-// matter. That shrinkage by mixtures can be learned for deconvolution: U. Schmidt, S. Roth, Shrinkage fields for
-// effective image restoration, CVPR 2014, section 3. Their mixture is one of even steps and of any parity; ours
-// is odd, as derivatives of photographs are as often negative as positive, and finest about 0.
+// shrink is that of sparse adaptive priors, d / (1 + (t / d)^4), which keeps large derivatives; or a learned mixture, d
+// (c_0 + sum over j of c_j exp(-d^2 / 2 tau_j^2)), with tau doubling from j to j + 1. The first form, with five filters
+// and two stages, is the method of H. Fortunato, M. Oliveira: Fast high-quality non-blind deconvolution using sparse
+// adaptive priors, The Visual Computer 30, 2014, section 3; its first stage does not use `before`. Shrinkage by learned
+// mixtures for deconvolution comes from U. Schmidt, S. Roth, Shrinkage fields for effective image restoration, CVPR
+// 2014, section 3. Their mixture has even spacing and any parity. Ours is odd, because derivatives of photographs are
+// negative as often as positive, and finest around 0.
 #pragma once
 
 #include <retrograde/retrograde.h>
@@ -25,15 +25,15 @@ namespace deconvolution {
 
 namespace lang = retrograde;
 
-// What is learned of a stage.
+// The shape of a stage's learned numbers.
 struct Shape {
   int filters = 5;
-  int size = 3;   // samples along a filter, odd
-  int bumps = 0;  // of the mixture; 0: a threshold
+  int size = 3;   // samples along a filter; odd
+  int bumps = 0;  // terms of the mixture; 0: a threshold
   bool operator==(const Shape&) const = default;
 };
 
-// What is deconvolved together: `count` images of width x height, each with its own k of psf x psf samples, odd.
+// The images of a batch: `count` images of width x height, each with its own k of psf x psf samples; psf is odd.
 struct Extent {
   int width = 0, height = 0, count = 1, psf = 1;
   int margin() const { return psf / 2; }
@@ -52,7 +52,7 @@ struct Extent {
 inline constexpr double usual_noise = 0.01;  // standard deviation, of samples in [0, 1]
 double bump_width(int j);                    // tau_j
 
-// The learned arrays of a stage, in this order in a file and in the vector that Adam moves. Innermost first:
+// The learned arrays of a stage. Files and the vector that Adam optimizes have them in this order. Innermost first:
 //   Filters     [filters, size, size]
 //   LogWeights  [filters]
 //   Shrinkage   [filters, 1 + bumps], c_0 first; or [filters, 1], t

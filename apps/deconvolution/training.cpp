@@ -13,13 +13,13 @@ using retrograde::text;
 namespace {
 
 constexpr double last_rate_factor = 0.02;
-constexpr double apart_share = 0.25;  // of the steps, in which each stage is learned by itself
-// Of the noise of a piece, and of the functions that blur it.
+constexpr double apart_share = 0.25;  // share of the steps in which each stage is learned by itself
+// Ranges for a piece's noise, and for the functions that blur it.
 constexpr double least_noise = 0.005, most_noise = 0.02;
 constexpr double motion_share = 0.65, least_radius = 1.5;
 constexpr int least_path = 9;
 
-// Rates of Adam: weights are exponents, filters have a norm of about one.
+// Adam's rates: weights are exponents, filters have a norm of about one.
 double rate_of(Array array) {
   switch (array) {
     case Array::Filters:
@@ -134,7 +134,7 @@ Trainer::Trainer(const Weights& start, const std::vector<demosaic::Photograph>& 
   objective_->set(options.accuracy);
 }
 
-// A stage after the second starts as the one before it has been learned.
+// Each stage after the second is initialised with the learned numbers of the previous one.
 void Trainer::begin_stage(int stage) {
   if (stage < 2) return;
   const auto from = weights_.of(stage - 1), to = weights_.of(stage);

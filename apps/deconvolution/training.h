@@ -1,8 +1,8 @@
-// training.h -- what stages are learned from, and a step of it.
+// training.h -- the training data of the stages, and a training step.
 //
-// A batch is square pieces of photographs' luma at random places, mirrored and turned at random, each blurred by a
-// motion path or a disc of its own and with noise of its own strength. Stages are learned one after the other at
-// first, each from where the one before it ended, and then all together.
+// A batch consists of square pieces of photographs' luma at random positions, randomly mirrored and turned. Each piece
+// is blurred by its own motion path or disc, and has its own noise level. At first, stages are learned one after
+// another, each starting from the previous one; then they are learned together.
 #pragma once
 
 #include <memory>
@@ -15,9 +15,9 @@
 namespace deconvolution {
 
 struct BatchShape {
-  int side = 64;  // of what is seen of a piece
+  int side = 64;  // of the visible part of a piece
   int pieces = 8;
-  int psf = 15;  // samples of the largest function
+  int psf = 15;  // samples of the largest blur function
 
   Extent extent() const { return {side, side, pieces, psf}; }
   bool operator==(const BatchShape&) const = default;
@@ -25,7 +25,7 @@ struct BatchShape {
 
 class Sampler {
  public:
-  // Throws retrograde::UserError where a photograph is smaller than a piece with its margin.
+  // Throws retrograde::UserError if a photograph is smaller than a piece with its margin.
   Sampler(const std::vector<demosaic::Photograph>& photographs, uint64_t seed);
 
   Simulated draw(const BatchShape& shape);
@@ -40,8 +40,8 @@ class Sampler {
   Random random_;
 };
 
-// How many steps each stage is learned by itself, and which stages move at a step: the first, the second, ...,
-// each for so many steps, then all.
+// The number of steps in which each stage is learned by itself, and the stages that are learned at a step: first,
+// second, ... for that many steps each, then all.
 long steps_apart(long steps, int stages);
 Range learned_at(long step, long steps_apart, int stages);
 
@@ -52,7 +52,8 @@ class Trainer {
     int threads = 1;
     uint64_t seed = 1;
     std::vector<std::string> groups = group_names;
-    bool from_weights = false;  // that were learned: all stages move from the first step on
+    bool from_weights =
+        false;  // starting from learned weights: all stages are learned from the first step on
     BatchShape batch = {};
     Accuracy accuracy = {.iterations = 15, .tolerance = 1e-4};
   };

@@ -50,7 +50,7 @@ class Scan {
   double published_db() const { return published_db_; }
 
  private:
-  // Nothing when somebody stops it.
+  // Nothing if it is stopped.
   std::optional<double> measure(const Priors& priors) {
     method_.use({"tuned", original(priors)});
     const auto measured = gallery_.measure(method_);

@@ -1,4 +1,4 @@
-// tune.h -- the original method with better numbers: a scan over the training photographs, no gradient.
+// tune.h -- tunes the numbers of the original method by a scan over the training photographs, without gradients.
 #pragma once
 
 #include "common/report.h"
@@ -7,9 +7,9 @@
 
 namespace deconvolution {
 
-// From the published numbers on: one of them after the other is multiplied and divided by a step, as long as that
-// is better on the mean of decibels; then by the root of the step, twice. Writes tuned.json into the output folder,
-// and enters the numbers.
+// Starts from the published numbers. Multiplies and divides one number after another by a step while that improves the
+// mean PSNR; repeats twice with the square root of the step. Writes tuned.json to the output folder and adds the
+// numbers to the report.
 void tune(const Options& options, const demosaic::Dataset& dataset, apps::Report& report);
 
 }  // namespace deconvolution

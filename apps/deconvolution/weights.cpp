@@ -19,9 +19,9 @@ namespace {
 
 constexpr const char *learned_name = "learned.json", *tuned_name = "tuned.json";
 constexpr int derivatives = 5, first_derivatives = 2;
-// As a threshold no derivative of samples in [0, 1] comes near to: nothing is left of it.
+// A threshold far above all derivatives of samples in [0, 1], so that shrinkage removes them completely.
 constexpr double no_derivative = 1e4;
-// Cosines pull less than derivatives at first, which alone make a good start.
+// Initially, cosines have less weight than derivatives, which by themselves are a good start.
 constexpr double cosine_share = 0.1;
 constexpr double most_filters = 256, most_size = 15, most_bumps = 32, most_stages = 64;
 
@@ -49,7 +49,8 @@ void set_derivative(Weights& weights, int stage, int f) {
   }
 }
 
-// The n-th wave of the discrete cosine transform by the sum of its frequencies, without the constant one.
+// The n-th basis function of the discrete cosine transform, ordered by the sum of its frequencies, without the constant
+// one.
 std::pair<int, int> wave(int n, int size) {
   int sum = 1, along = 0;
   for (;; ++sum, along = 0) {
@@ -80,7 +81,7 @@ void set_smoothing(Weights& weights, int stage, double mix) {
   smoothing[1] = smoothing[2] = static_cast<float>(usual_blur);
 }
 
-// d (1 - exp(-d^2 / 2 tau^2)) with the width that is nearest to a threshold.
+// d (1 - exp(-d^2 / 2 tau^2)) with the width that best approximates a threshold.
 void set_mixture(Weights& weights, int stage, int f, double threshold) {
   const auto numbers = weights.of(stage, Array::Shrinkage);
   const int each = 1 + weights.shape.bumps;
@@ -217,7 +218,7 @@ void write_weights(const std::filesystem::path& path, const Weights& weights,
     nlohmann::json arrays;
     for (const Array array : all_arrays) {
       auto& list = arrays[name_of(array)] = nlohmann::json::array();
-      // Six digits: what a file holds is what is run, so nothing else is lost.
+      // Six digits; the values are used as the file stores them, so no further precision is lost.
       for (const float value : of.of(stage, array)) list.push_back(std::stod(text(value)));
     }
     json["stages"].push_back(arrays);

@@ -13,14 +13,14 @@ using lang::Func;
 namespace {
 
 constexpr int median_rounds = 3;
-constexpr int ball = 2;  // radius of the neighbourhood whose homogeneity is counted
+constexpr int ball = 2;  // radius of the neighbourhood in which homogeneity is counted
 
 Expr decoded(const Expr& v) {
   return lang::select(v <= 0.04045f, v / 12.92f,
                       lang::pow((lang::max(v, 0.0f) + 0.055f) / 1.055f, 2.4f));
 }
 
-// The function of CIE 1976 L*a*b*.
+// The nonlinear function of CIE 1976 L*a*b*.
 Expr lightness_of(const Expr& t) {
   constexpr float edge = 6.0f / 29.0f;
   return lang::select(t > edge * edge * edge, lang::pow(lang::max(t, edge * edge * edge), 1.0f / 3),
@@ -56,7 +56,7 @@ void Ahd::define_candidates() {
 }
 
 void Ahd::define_lab() {
-  // sRGB's primaries, each row divided by the white point's coordinate.
+  // sRGB's primaries, each row divided by the coordinate of the white point.
   constexpr float to_xyz[3][3] = {{0.433953f, 0.376219f, 0.189828f},
                                   {0.212671f, 0.715160f, 0.072169f},
                                   {0.017758f, 0.109477f, 0.872765f}};
@@ -74,7 +74,7 @@ void Ahd::define_lab() {
 }
 
 void Ahd::define_homogeneity() {
-  // How far the pixel at (dx, dy) is in lightness, and in colour (squared), in the image of direction k.
+  // The difference of the pixel at (dx, dy) in lightness, and in colour (squared), in the image of direction k.
   const auto lightness_step = [&](int dx, int dy, const Expr& k) {
     return lang::abs(lab(x + dx, y + dy, 0, k) - lab(x, y, 0, k));
   };
@@ -108,7 +108,7 @@ void Ahd::define_homogeneity() {
   chosen(x, y, c) = share * candidate(x, y, c, 0) + (1.0f - share) * candidate(x, y, c, 1);
 }
 
-// Red and blue first, each by its difference from green; then green, by its differences from both.
+// First red and blue, by their differences from green; then green, by its differences from both.
 Func Ahd::refined(const Func& before, int round) const {
   const auto name = [&](const char* what) { return what + std::to_string(round); };
   Func from_green(name("from_green")), coloured(name("coloured")), again(name("from_colours"));

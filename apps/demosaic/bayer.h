@@ -1,4 +1,4 @@
-// bayer.h -- which colour a sample of the mosaic R G over G B is.
+// bayer.h -- the colours of the samples in the mosaic R G over G B.
 #pragma once
 
 #include <retrograde/retrograde.h>
@@ -7,7 +7,7 @@ namespace demosaic {
 
 namespace lang = retrograde;
 
-// One of four, by where (x, y) lies in its cell of two by two samples.
+// Selects one of four expressions by the position of (x, y) in its cell of two by two samples.
 inline lang::Expr by_place(const lang::Expr& x, const lang::Expr& y, const lang::Expr& at_red,
                            const lang::Expr& beside_red, const lang::Expr& beside_blue,
                            const lang::Expr& at_blue) {

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Checks what a report of demosaic promises, and says it in a line.
+"""Checks what a report of demosaic promises, and prints the result in a line.
 
 usage: check_report.py report.json [--times]
 
-On the held-out photographs the shipped variant of nine filters beats AHD by 0.8 dB, and what two minutes
-learn from scratch by 0.6 dB. --times: it also takes less than 40 ms per megapixel, on two cores at rest.
+On the held-out photographs, the shipped variant with nine filters beats AHD by 0.8 dB, and weights learned from
+scratch in two minutes by 0.6 dB. --times: it also takes less than 40 ms per megapixel, on two idle cores.
 """
 import json
 import sys

@@ -20,7 +20,7 @@ namespace {
 constexpr BatchShape small_batch{.cells = 6, .pieces = 1};
 constexpr unsigned fixed_seed = 11;
 
-// Away from the start, where candidates are alike and parts of the gradient are zero by symmetry.
+// Weights away from the initial ones, at which candidates are equal and parts of the gradient vanish by symmetry.
 Weights shaken(const Shape& shape) {
   Weights weights(shape);
   std::mt19937 random(fixed_seed);
@@ -35,7 +35,7 @@ Photograph photograph_of(const Options& options) {
   return read_dataset(options.dataset).train.front();
 }
 
-// The objective in one precision, with its estimates and all of its gradient.
+// The objective in one precision, with its schedule's estimates and the gradient by all arrays.
 template <typename T>
 class Evaluator {
  public:
@@ -81,7 +81,7 @@ class Evaluator {
   std::vector<T> image_, gradient_;
 };
 
-// What a sensor sees at a place, and how it is called.
+// Test content of a sensor as a function of position, with its name.
 struct Frame {
   const char* name;
   std::function<float(int x, int y)> sample;
@@ -110,7 +110,7 @@ std::vector<Frame> frames() {
       {"noise", noise}};
 }
 
-// The frame, and colours to learn that are others than its own, so that there is a gradient.
+// The frame, with other colours as truth so that there is a gradient.
 Batch batch_of(const Shape& shape, const Frame& frame) {
   Batch batch(shape, small_batch);
   batch.mosaic.for_each_element(
@@ -124,7 +124,7 @@ Batch batch_of(const Shape& shape, const Frame& frame) {
 apps::StabilityRow stability_of(const Shape& shape, const Frame& frame, Evaluator<float>& own,
                                 Evaluator<double>& exact) {
   constexpr long steps = 60;
-  constexpr double large_rate = 0.3;  // some hundred times what learning uses
+  constexpr double large_rate = 0.3;  // about a hundred times the rate that learning uses
   const Batch batch = batch_of(shape, frame);
   const Weights weights = shaken(shape);
   const std::vector<double> at(weights.values.begin(), weights.values.end());
@@ -151,8 +151,8 @@ apps::StabilityRow stability_of(const Shape& shape, const Frame& frame, Evaluato
   return row;
 }
 
-// The derivative of the loss along a direction, by central differences of two steps, extrapolated (Richardson):
-// the loss is smooth everywhere, so what is left of their error is of the fourth order.
+// The derivative of the loss along a direction, by central differences with two steps, extrapolated (Richardson). The
+// loss is smooth everywhere, so the remaining error is of fourth order.
 double difference_along(const Shape& shape, Evaluator<double>& exact, const std::vector<double>& at,
                         const std::vector<double>& direction) {
   constexpr double step = 1e-4;
@@ -167,8 +167,8 @@ double difference_along(const Shape& shape, Evaluator<double>& exact, const std:
   return (4 * central(step / 2) - central(step)) / 3;
 }
 
-// Of each array: the adjoint in double against differences along random directions, worst; and the
-// adjoint in float32 against double. All by the two pipelines that the check of stability runs, too.
+// For each array: the worst error of the adjoint in double against differences along random directions, and the adjoint
+// in float32 against double. Uses the same two pipelines as the stability check.
 std::vector<apps::GradientRow> gradient_rows(const Shape& shape, Evaluator<float>& own,
                                              Evaluator<double>& exact) {
   constexpr int directions = 3;

@@ -10,7 +10,7 @@
 namespace demosaic {
 
 namespace {
-// Sizes that schedules are made for; they are right for all.
+// The sizes for which schedules are made; the compiled code handles all sizes.
 constexpr int usual_width = 1024, usual_height = 1024;
 constexpr uint64_t cache_bytes = 32 << 20;
 }  // namespace
@@ -81,7 +81,7 @@ double Demosaicker::ms_per_megapixel(std::vector<float>& mosaic, int width, int 
     run_into(mosaic, width, height, planes);
     const std::chrono::duration<double, std::milli> taken =
         std::chrono::steady_clock::now() - start;
-    if (run > 0) ms.push_back(taken.count());  // the first one finds cold caches
+    if (run > 0) ms.push_back(taken.count());  // the first run has cold caches
   }
   std::nth_element(ms.begin(), ms.begin() + static_cast<long>(ms.size() / 2), ms.end());
   return ms[ms.size() / 2] * 1e6 / static_cast<double>(mosaic.size());

@@ -1,4 +1,4 @@
-// demosaicker.h -- a method, compiled once for images of all sizes.
+// demosaicker.h -- a demosaicking method, compiled once for images of all sizes.
 #pragma once
 
 #include <retrograde/retrograde.h>
@@ -18,13 +18,13 @@ class Demosaicker {
   static Demosaicker relaxed(const Weights& weights, int threads);
 
   const std::string& name() const { return name_; }
-  // Other weights of the same shape, for `relaxed`.
+  // Sets other weights of the same shape, for the relaxed method.
   void use(const Weights& weights);
 
-  // [height, width], R G over G B, to planes [3, height, width]. The mosaic is mirrored at its borders.
-  // Throws retrograde::Error.
+  // Converts [height, width], R G over G B, to planes [3, height, width]. The mosaic is mirrored at its borders. Throws
+  // retrograde::Error.
   std::vector<float> run(std::vector<float>& mosaic, int width, int height);
-  // The median of some runs into the same memory, in milliseconds for a million pixels.
+  // The median time of several runs into the same memory, in milliseconds per million pixels.
   double ms_per_megapixel(std::vector<float>& mosaic, int width, int height, int runs);
 
  private:
@@ -40,7 +40,7 @@ class Demosaicker {
   lang::Pipeline pipeline_;
 };
 
-// Threads and caches of this machine, for the autoscheduler.
+// This machine's threads and caches, for the autoscheduler.
 lang::MachineParams machine_of(int threads);
 // "relaxed 9 5x5"
 std::string name_of(const Shape& shape);

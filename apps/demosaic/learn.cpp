@@ -11,7 +11,7 @@ namespace demosaic {
 
 namespace {
 
-// The weights, and what they do to the held-out photographs.
+// The weights, and their quality on the held-out photographs.
 class FilterLearner : public apps::Learner {
  public:
   FilterLearner(const Options& options, const Dataset& dataset, Gallery& held_out)

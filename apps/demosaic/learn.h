@@ -1,4 +1,4 @@
-// learn.h -- the learning run: steps of Adam until they are done, the seconds are over or somebody stops it.
+// learn.h -- the learning run: Adam steps until they are done, the time limit is reached or the user stops it.
 #pragma once
 
 #include "common/report.h"
@@ -15,12 +15,12 @@ struct Learned {
   bool stopped = false;
 };
 
-// Writes state.bin and weights.json into the output folder, also when it is stopped, and enters its
-// curves. --resume goes on from state.bin. Throws retrograde::Error.
+// Writes state.bin and weights.json to the output folder, also if it is stopped, and adds its curves to the report.
+// --resume continues from state.bin. Throws retrograde::Error.
 Learned learn(const Options& options, const Dataset& dataset, Gallery& held_out,
               apps::Report& report);
 
-// How long a step takes when all groups are learned, or one of them alone.
+// The time of a step when all groups are learned, and when only one is.
 apps::Table time_steps(const Options& options, const Dataset& dataset);
 
 }  // namespace demosaic

@@ -1,5 +1,5 @@
-// demosaic -- see README.md. What a run does follows from what it is given: photographs to learn from
-// (--dataset), a picture to demosaic (--input), or a check.
+// demosaic: learns to demosaic, and demosaics pictures; see README.md. The inputs determine the task: photographs to
+// learn from (--dataset), a picture to demosaic (--input), or a check.
 #include <cstdio>
 
 #include "checks.h"
@@ -40,7 +40,7 @@ void enter_methods(const std::vector<Measured>& methods, const Dataset& dataset,
   print(table);
 }
 
-// Bilinear and AHD come first in `methods`, the learned one last.
+// In `methods`, bilinear and AHD come first and the learned method last.
 void enter_gain(const std::vector<Measured>& methods, apps::Report& report) {
   const Measured &ahd = methods[1], &learned = methods.back();
   report.add_number("PSNR, held out", learned.mean.encoded_db, "dB", ahd.mean.encoded_db);

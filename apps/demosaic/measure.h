@@ -1,4 +1,4 @@
-// measure.h -- how good a method is on photographs, and how long it takes; all methods on one plot.
+// measure.h -- measures the quality of methods on photographs and their run time, and plots all methods.
 #pragma once
 
 #include <span>
@@ -13,26 +13,26 @@ namespace demosaic {
 
 struct Measured {
   std::string name;
-  Quality mean;  // of the photographs, in decibels
+  Quality mean;  // mean over the photographs, in decibels
   std::vector<Quality> each;
   double ms_per_megapixel = 0;
 };
 
-// What was published for the Kodak photographs, which are others than these.
+// Published values for the Kodak photographs, which are not the photographs used here.
 struct Published {
   const char* name;
   double encoded_db;
 };
 std::span<const Published> published();
 
-// Each with a mosaic, made once.
+// Photographs with their mosaics, which are made once.
 class Gallery {
  public:
   explicit Gallery(const std::vector<Photograph>& photographs);
 
-  // Without times.
+  // Measures quality only.
   Measured quality_of(Demosaicker& method);
-  // With the time for a mosaic of a megapixel, which repeats the photographs.
+  // Also measures the time for a mosaic of a megapixel, which repeats the photographs.
   Measured measure(Demosaicker& method);
 
  private:
@@ -41,7 +41,7 @@ class Gallery {
   std::vector<float> large_;
 };
 
-// Bilinear, AHD and, unless `brief`, every variant that comes with the program.
+// Measures bilinear, AHD and, unless `brief`, every variant that comes with the program.
 std::vector<Measured> measure_methods(Gallery& gallery, int threads, bool brief);
 
 apps::Table table_of(const std::vector<Measured>& methods);

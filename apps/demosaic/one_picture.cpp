@@ -22,14 +22,14 @@ apps::Image write_planes(const Options& options, const std::string& name, const 
   return image;
 }
 
-// A picture of floats holds linear light, as it came.
+// Float pictures are written as linear light, like the input.
 void write_light(const Options& options, const Sensor& size, std::vector<float> planes) {
   if (size.bits < 32) return;
   for (float& value : planes) value = decoded(value);
   write_planes(options, "result.exr", size, planes);
 }
 
-// Without what begin_with_red put before.
+// Writes the picture without the rows and columns that begin_with_red added.
 apps::Image write_result(const Options& options, const Sensor& sensor,
                          const std::vector<float>& planes) {
   Sensor size = sensor;
@@ -56,7 +56,7 @@ void demosaic_mosaic(const Options& options, const Weights& weights, apps::Repor
   report.own["height"] = result.height;
 }
 
-// The mosaic in its colours, as a picture.
+// The mosaic with each sample in its colour, as a picture.
 std::vector<float> coloured(const Photograph& photograph) {
   std::vector<float> planes(photograph.planes.size(), 0.0f);
   for (int y = 0; y < photograph.height; ++y) {

@@ -1,4 +1,4 @@
-// one_picture.h -- demosaics the input: a mosaic, or a picture that is sampled as one and compared.
+// one_picture.h -- demosaics the input: a mosaic, or a picture, which is sampled as a mosaic and compared with.
 #pragma once
 
 #include "common/report.h"
@@ -7,8 +7,8 @@
 
 namespace demosaic {
 
-// Writes result.png into the output folder, and result.exr when the input holds floats; of a picture also the
-// mosaic and what the other methods make of it, and enters all of it. Throws retrograde::Error.
+// Writes result.png to the output folder, and result.exr if the input holds floats. For a picture, also writes the
+// mosaic and the other methods' results. Adds everything to the report. Throws retrograde::Error.
 void demosaic_input(const Options& options, const Weights& weights, apps::Report& report);
 
 }  // namespace demosaic

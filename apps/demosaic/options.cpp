@@ -60,15 +60,13 @@ std::optional<Options> read_options(int argc, char** argv) {
   cli.add_option("--size", options.shape.size, "samples along a filter: 5 or 7")
       ->capture_default_str();
   cli.add_option("--weights", options.weights,
-                 "weights that an earlier run wrote, instead of those that come with the program");
+                 "weights written by an earlier run, instead of the shipped ones");
   cli.add_option("--mosaic", options.pattern,
                  "the input is one channel of samples that begin with these colours, as RGGB");
-  cli.add_flag("--compare", options.compare,
-               "measures every method on the dataset and learns nothing");
-  cli.add_flag(
-      "--time-steps", options.time_steps,
-      "with --compare: also how long a step of learning takes, as fewer groups are learned");
-  cli.add_flag("--brief", options.brief, "leaves the variants that come with the program out");
+  cli.add_flag("--compare", options.compare, "measure every method on the dataset, learn nothing");
+  cli.add_flag("--time-steps", options.time_steps,
+               "with --compare: also measure the time of a learning step with fewer groups");
+  cli.add_flag("--brief", options.brief, "leave out the shipped variants");
   if (!apps::parse_command_line(cli, argc, argv, options.common)) return std::nullopt;
   check(options);
   return options;

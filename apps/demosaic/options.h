@@ -12,16 +12,16 @@ namespace demosaic {
 
 struct Options {
   apps::CommonOptions common;
-  std::filesystem::path dataset;  // to learn from; empty: nothing is learned
-  std::filesystem::path weights;  // of the relaxed method; empty: those that are shipped
-  std::string pattern;  // not empty: the input is a mosaic, and these are its first colours
+  std::filesystem::path dataset;  // photographs to learn from; empty: nothing is learned
+  std::filesystem::path weights;  // of the relaxed method; empty: the shipped ones
+  std::string pattern;  // if not empty, the input is a mosaic whose first colours are these
   Shape shape;
   bool compare = false;     // measure all methods on the dataset, learn nothing
-  bool time_steps = false;  // with `compare`: how long a step of learning takes, by groups
-  bool brief = false;       // leave out the shipped variants where something is measured
+  bool time_steps = false;  // with `compare`: measure the time of a learning step, by groups
+  bool brief = false;       // leave out the shipped variants in measurements
 };
 
-// Nothing when only --help was asked for. Throws retrograde::UserError.
+// Nothing if only --help was requested. Throws retrograde::UserError.
 std::optional<Options> read_options(int argc, char** argv);
 
 }  // namespace demosaic

@@ -1,8 +1,7 @@
-// photographs.h -- pictures whose colours are known at every pixel, and the mosaics made of them.
+// photographs.h -- pictures whose colours are known at every pixel, and mosaics made from them.
 //
-// Samples are in sRGB's encoding and in [0, 1], as the literature on demosaicking has them: a mosaic is
-// the picture with two of three samples of each pixel taken away. Pictures of floats hold linear light and
-// are encoded first.
+// Samples are sRGB-encoded and in [0, 1], as in the literature on demosaicking: a mosaic is the picture with two of the
+// three samples of each pixel removed. Float pictures hold linear light and are encoded first.
 #pragma once
 
 #include <filesystem>
@@ -30,28 +29,28 @@ struct Photograph {
 float encoded(float light);
 float decoded(float value);
 
-// The colour that the mosaic R G over G B has at a place: 0, 1 or 2.
+// The colour of the mosaic R G over G B at a position: 0, 1 or 2.
 inline int colour_at(int x, int y) { return (x & 1) + (y & 1); }
 
-// The place in [0, n) that a mirror at the first and the last element shows at v: parity stays.
+// Mirrors v at the first and last element into [0, n), which preserves parity.
 int mirrored(int v, int n);
 
-// Throws retrograde::UserError for what apps::read_image refuses, and below 2 x 2 pixels.
+// Throws retrograde::UserError for files that apps::read_image rejects, and for fewer than 2 x 2 pixels.
 Photograph read_photograph(const std::filesystem::path& path);
 apps::Image image_of(int width, int height, int bits, std::span<const float> planes);
 
 // [height, width], R G over G B.
 std::vector<float> mosaic_of(const Photograph& photograph);
 
-// Photographs to learn from, and others to be measured on.
+// Photographs for learning, and others for measuring.
 struct Dataset {
   std::vector<Photograph> train = {}, held_out = {};
   std::string division;  // in words
 };
-// Divided as common/division.h says. Throws retrograde::UserError.
+// Divided by common/division.h. Throws retrograde::UserError.
 Dataset read_dataset(const std::filesystem::path& folder);
 
-// 10 log10(1 / mean squared error), all pixels and colours alike; in linear light, or as encoded.
+// 10 log10(1 / mean squared error) over all pixels and colours; in linear light, or encoded.
 struct Quality {
   double encoded_db = 0, linear_db = 0;
 };

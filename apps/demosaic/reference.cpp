@@ -11,8 +11,8 @@ namespace demosaic::reference {
 
 namespace {
 
-// An image that is mirrored beyond its borders before anything is computed from it: what is derived there
-// is derived from mirrored samples. So every stage is a function of any place, remembered.
+// An image that is mirrored beyond its borders before anything is computed from it, so derived values there come from
+// mirrored samples. Every stage is thus a function of any position; its values are cached.
 class Stage {
  public:
   using Rule = std::function<double(int x, int y)>;
@@ -51,7 +51,7 @@ double corner_mean(const Stage& f, int x, int y) {
   return (column_mean(f, x - 1, y) + column_mean(f, x + 1, y)) / 2;
 }
 
-// Red (c = 0) or blue (2) at a place, of a stage that has it where the mosaic has it.
+// Red (c = 0) or blue (2) at a position; the stage is defined where the mosaic has that colour.
 double colour_mean(const Stage& f, int x, int y, int c) {
   const int place = c == 0 ? place_of(x, y) : 3 - place_of(x, y);
   if (place == 0) return f(x, y);
@@ -71,7 +71,7 @@ std::vector<double> planes_of(const Mosaic& mosaic, const Rgb& image) {
   return planes;
 }
 
-// The candidate along rows (d = 0) or columns.
+// The candidate interpolated along rows (d = 0) or columns.
 Rgb candidate(const Mosaic& mosaic, const Stage& m, int d, int border) {
   const Stage green(mosaic, border + 1, [&](int x, int y) {
     const auto at = [&](int n) { return d == 0 ? m(x + n, y) : m(x, y + n); };
@@ -102,7 +102,7 @@ Lab lab_of(double r, double g, double b) {
   return {116 * y - 16, 500 * (x - y), 200 * (y - z)};
 }
 
-// How alike two places of one candidate are.
+// The difference between two positions of one candidate.
 struct Step {
   double light, colour;
 };
@@ -219,7 +219,7 @@ std::vector<double> ahd(const Mosaic& mosaic) {
 
 namespace {
 
-// The relaxed method's stages in cells; a site, candidate or missing sample is one of several stages.
+// The relaxed method's stages over cells; each site, candidate or missing sample has a stage of its own.
 class Cells {
  public:
   Cells(const Mosaic& mosaic, Weights& weights)
@@ -290,7 +290,7 @@ class Cells {
     return 1 / (1 + a * a + b * b);
   }
 
-  // For site q, what is seen of candidate i.
+  // The value of `seen` at site q, for candidate i.
   double seen(int q, int i, int d, int x, int y) const {
     const auto w = weights_.buffer(Array::Selection);
     double sum = 0;
@@ -369,7 +369,7 @@ class Cells {
 std::vector<double> relaxed(const Mosaic& mosaic, Weights weights) {
   const Cells cells(mosaic, weights);
   const Stage& m = cells.samples();
-  // Which missing sample of a cell is the colour c at a place; below 0: measured.
+  // The index of the missing sample of a cell for colour c at a position; negative if it is measured.
   constexpr int lost[3][4] = {{-1, 4, 6, 3}, {0, -1, -1, 1}, {2, 5, 7, -1}};
   const auto plane = [&](int c) {
     return Stage(mosaic, 0, [&](int x, int y) {

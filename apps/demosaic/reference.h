@@ -1,5 +1,4 @@
-// reference.h -- the methods again in plain C++ and double, pixel by pixel as their equations are: what the
-// pipelines are tested against. Slow.
+// reference.h -- slow references for tests: the methods in plain C++ and double, pixel by pixel, as in their equations.
 #pragma once
 
 #include <vector>

@@ -11,9 +11,9 @@ using lang::Func;
 using lang::RDom;
 
 namespace {
-// Samples lie in [0, 1]. With a learned scale of 1, a step of 1 / steepness counts half.
+// Samples lie in [0, 1]. With a learned scale of 1, a step of 1 / steepness has weight one half.
 constexpr double steepness = 40;
-// With this factor and weights of 1, scores differ by a few units where one candidate is rough.
+// With this factor and weights of 1, scores differ by a few units if one candidate is rough.
 constexpr double score_factor = 0.25;
 constexpr int window = 3, chroma_window = 5, near_window = 3, directions = 4;
 }  // namespace
@@ -67,8 +67,8 @@ Relaxed::Relaxed(const Shape& shape, const Func& mosaic, const std::vector<lang:
 }
 
 int Relaxed::reach(const Shape& shape) {
-  // Cells: the window of the step to the median, the chroma's, the selection's, and the neighbour before;
-  // then the filter.
+  // In cells: the windows of the step to the median, of chroma and of selection, and the previous neighbour; then the
+  // filter.
   const int cells = near_window / 2 + chroma_window / 2 + window / 2 + 1 + (shape.size / 2 + 1) / 2;
   return 2 * cells;
 }
@@ -78,7 +78,7 @@ Relaxed::Exprs Relaxed::at(Exprs place) const {
   return place;
 }
 
-// A site lies on the diagonal of its cell.
+// A site is on the diagonal of its cell.
 Expr Relaxed::own(const Expr& cell_x, const Expr& cell_y, const Expr& site) const {
   return mosaic(at({2 * cell_x + site, 2 * cell_y + site}));
 }
@@ -105,7 +105,7 @@ void Relaxed::define_candidates() {
 
 void Relaxed::define_homogeneity() {
   const Expr here = green(at({x, y, q, i}));
-  // To the site before, squared.
+  // The squared step to the previous site.
   const auto before = [&](int dx, int dy) {
     const Expr light = here - green(at({x - dx, y - dy, q, i}));
     const Expr ratio = light - (own(x, y, q) - own(x - dx, y - dy, q));
@@ -139,7 +139,7 @@ void Relaxed::define_mixture() {
   const RDom r(0, shape.filters, "candidate");
   top(at({x, y, q})) = score(at({x, y, q, 0}));
   top(at({x, y, q})) = lang::max(top(at({x, y, q})), score(at({x, y, q, r})));
-  // A softmax does not change with what is taken from all of its arguments, so neither do gradients.
+  // A softmax does not change if the same value is subtracted from all its arguments, and neither do its gradients.
   share(at({x, y, q, i})) =
       lang::exp(score(at({x, y, q, i})) - lang::stop_gradient(top(at({x, y, q}))));
   const Expr part = share(at({x, y, q, r}));
@@ -157,7 +157,7 @@ void Relaxed::define_colour_differences() {
   rough(at({x, y, t})) +=
       chroma(r.x, r.y, r.z, t) * difference(at({x + r.x - half, y + r.y - half, r.z}));
 
-  // Red's missing samples look at red sites, blue's at blue ones, and a missing green at those of its own.
+  // Red's missing samples use red sites, blue's use blue ones, and a missing green uses its own site.
   const Expr site = lang::select(t == 1 || t == 2 || t == 5 || t == 7, 1, 0);
   const RDom n(0, near_window, 0, near_window, "near");
   const Expr other = difference(at({x + n.x - near_window / 2, y + n.y - near_window / 2, site}));

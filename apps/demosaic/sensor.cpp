@@ -57,7 +57,7 @@ Sensor read_sensor(const std::filesystem::path& path, const std::string& pattern
                            text("it has ", mosaic.image.width, " x ", mosaic.image.height),
                            "Give a larger one");
   }
-  // What a sensor measures is linear in light.
+  // A sensor's measurements are linear in light.
   Sensor sensor = begin_with_red(mosaic.image, named, is_raw(path) || mosaic.image.bits == 32);
   sensor.orientation = mosaic.orientation;
   return sensor;

@@ -1,4 +1,4 @@
-// sensor.h -- what a camera's sensor measured, of a RAW file or an image of one channel.
+// sensor.h -- reads a camera sensor's samples from a RAW file or an image of one channel.
 #pragma once
 
 #include <filesystem>
@@ -7,20 +7,20 @@
 
 namespace demosaic {
 
-// By its suffix.
+// Decided by the suffix.
 bool is_raw(const std::filesystem::path& path);
 
-// A mosaic that begins with red: others get a mirrored column, row or both put before them.
+// A mosaic that begins with red: others are extended by a mirrored column, row or both in front.
 struct Sensor {
   int width = 0, height = 0, bits = 16;
-  int left = 0, top = 0;       // what was put before
+  int left = 0, top = 0;       // columns and rows that were added
   std::vector<float> samples;  // [height, width], in sRGB's encoding
-  int orientation = 1;         // how a picture made of it is to be turned: apps::upright
+  int orientation = 1;         // how to turn a picture made from it: apps::upright
 };
 
-// `pattern`: the colours of its first two rows, as "RGGB"; empty: as the file says. RAW files and images of
-// floats hold linear light, which is encoded. Throws retrograde::UserError for what apps::read_mosaic refuses,
-// an unknown pattern, and below 2 x 2 samples.
+// `pattern`: the colours of its first two rows, as "RGGB"; empty: as the file says. RAW files and float images hold
+// linear light, which is encoded. Throws retrograde::UserError for files that apps::read_mosaic rejects, for an unknown
+// pattern, and for fewer than 2 x 2 samples.
 Sensor read_sensor(const std::filesystem::path& path, const std::string& pattern);
 
 }  // namespace demosaic

@@ -1,4 +1,4 @@
-// shipped.h -- the weights that come with the program, as it learned them; README.md says how.
+// shipped.h -- the learned weights that come with the program; README.md says how they were learned.
 #pragma once
 
 #include <vector>
@@ -7,13 +7,13 @@
 
 namespace demosaic {
 
-// Of 2, 9 and 15 filters of 5 x 5 and 7 x 7 those that are there.
+// Those that are installed among 2, 9 and 15 filters of 5 x 5 and 7 x 7.
 std::vector<Shape> shipped_shapes();
 
 // "relaxed_9_5.json"
 std::string weights_file(const Shape& shape);
 
-// From beside the program, or where it is installed. Throws retrograde::UserError.
+// Read from the program's folder, or where they are installed. Throws retrograde::UserError.
 Weights shipped_weights(const Shape& shape);
 
 }  // namespace demosaic

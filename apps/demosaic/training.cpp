@@ -13,8 +13,8 @@ namespace {
 
 constexpr double last_rate_factor = 0.02;
 
-// Rates of Adam. Windows and biases are sums of many small influences on a score of a few units; filters
-// must sum to one within a thousandth.
+// Adam's rates. Windows and biases are sums of many small influences on a score of a few units; filters must sum to one
+// within a thousandth.
 double rate_of(Array array) {
   switch (array) {
     case Array::Green:
@@ -43,7 +43,7 @@ std::vector<Array> arrays_of(const std::vector<std::string>& groups) {
   return result;
 }
 
-// An array that is not learned has no rate, and a gradient that stays zero.
+// An array that is not learned has no rate, and its gradient stays zero.
 std::vector<apps::AdamGroup> adam_groups(const Shape& shape,
                                          const std::vector<std::string>& groups) {
   const auto learned = arrays_of(groups);
@@ -120,7 +120,7 @@ void TrainingPipeline::compile(int threads) {
   pipeline.compile_jit(target);
 }
 
-// Only by what is learned, so that explain() speaks of the program that runs.
+// Only by the learned arrays, so that explain() describes the program that runs.
 lang::Derivative TrainingPipeline::differentiate() const {
   lang::AdjointOptions options;
   for (Array array : learned) options.wrt.emplace_back(learned_func(objective.model, array));
@@ -133,7 +133,7 @@ size_t TrainingPipeline::stages() const {
   return count;
 }
 
-// A square of a photograph, seen in one of eight ways and in other colours.
+// A square of a photograph, in one of eight orientations and with changed colours.
 struct Sampler::Piece {
   const Photograph* photograph;
   int left, top, side;
@@ -158,7 +158,7 @@ struct Sampler::Piece {
 Sampler::Sampler(const std::vector<Photograph>& photographs, uint64_t seed)
     : photographs_(photographs), random_(seed) {}
 
-// Not a distribution of the standard library, whose numbers differ between libraries.
+// Used instead of the standard library's distributions, whose numbers differ between implementations.
 size_t Sampler::below(size_t n) { return random_() % n; }
 
 float Sampler::between(float least, float most) {
@@ -166,7 +166,7 @@ float Sampler::between(float least, float most) {
   return least + (most - least) * static_cast<float>(below(steps + 1)) / static_cast<float>(steps);
 }
 
-// Another light, more or less colour, and in half of all cases red for blue: the mosaic treats them alike.
+// Changes lighting and saturation and, in half of all cases, exchanges red and blue, which the mosaic treats alike.
 Sampler::ColourMatrix Sampler::other_colours() {
   constexpr float grey[3] = {0.299f, 0.587f, 0.114f};  // luma of ITU-R BT.601
   const float saturation = between(0.8f, 1.5f);

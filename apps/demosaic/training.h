@@ -1,9 +1,10 @@
-// training.h -- what is learned, from what, and one step of it.
+// training.h -- the training objective, its data, and one training step.
 //
 //   loss = mean over the pixels of a batch and their three colours of (image - truth)^2
 //
-// A batch is square pieces of photographs, each at a random place, mirrored, turned and its colours
-// changed at random, and only then sampled as a mosaic. Around the cells that count lies the margin that they read.
+// A batch consists of square pieces of photographs at random positions, randomly mirrored and turned and with randomly
+// changed colours; only then are they sampled as a mosaic. The cells that count are surrounded by the margin that they
+// read.
 #pragma once
 
 #include <retrograde/retrograde.h>
@@ -25,7 +26,7 @@ struct BatchShape {
   int pieces = 6;
 };
 
-// Pieces of photographs: what a sensor sees of them, with a margin, and what it does not.
+// Pieces of photographs: the samples that a sensor sees, with a margin, and the truth.
 struct Batch {
   Batch(const Shape& shape, const BatchShape& batch);
 
@@ -53,12 +54,12 @@ struct TrainingPipeline {
   TrainingPipeline(const Shape& shape, const BatchShape& batch,
                    const std::vector<std::string>& groups);
   void compile(int threads);
-  size_t stages() const;  // Funcs of the gradient
+  size_t stages() const;  // number of Funcs in the gradient
 
   std::vector<Array> learned;  // arrays of the groups
   Objective objective;
   lang::Derivative adjoints;
-  lang::Pipeline pipeline;  // loss, then the gradient by each of these
+  lang::Pipeline pipeline;  // loss, then the gradient by each of `learned`
 
  private:
   lang::Derivative differentiate() const;

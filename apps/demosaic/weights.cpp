@@ -17,7 +17,7 @@ namespace {
 constexpr std::array<const char*, all_arrays.size()> array_names{
     "green", "closeness", "selection", "cross", "bias", "chroma", "near", "steepness"};
 
-// A root of a twenty-fifth: nine neighbours together pull a third as much as the difference itself counts.
+// The square root of 1/25: nine neighbours together have about a third of the weight of the difference itself.
 constexpr float first_near = 0.2f;
 
 size_t start_of(const Shape& shape, Array array) {
@@ -29,13 +29,13 @@ size_t start_of(const Shape& shape, Array array) {
   return start;
 }
 
-// A filter around a red or blue sample: the green on one side, and half of the second difference of
-// the samples of its own colour on that side.
+// A filter around a red or blue sample: the green on one side, plus half of the second difference of the samples of its
+// own colour on that side.
 struct Side {
   int dx, dy;
 };
 
-// The sides that a candidate averages, and whether it looks at its own colour at all.
+// The sides that a candidate averages, and whether it uses its own colour.
 struct Start {
   std::vector<Side> sides;
   bool corrected = true;
@@ -118,15 +118,15 @@ void Weights::start_green() {
   }
 }
 
-// A candidate's score looks at what was seen of itself.
+// Initially, a candidate's score depends only on its own `seen`.
 void Weights::start_cross() {
   lang::Buffer<float> cross = buffer(Array::Cross);
   cross.for_each_element(
       [&](int of, int d, int i, int q) { cross(of, d, i, q) = of == i ? 1.0f : 0.0f; });
 }
 
-// The differences of the other colour at the nearest places: of lattice `from`, at the cells whose
-// offsets are given by ranges along x and y, ends included.
+// Averages the differences of the other colour at the nearest positions: of lattice `from`, at the cells in the given
+// ranges of offsets along x and y, inclusive.
 void Weights::start_chroma() {
   lang::Buffer<float> chroma = buffer(Array::Chroma);
   const auto average = [&](int t, int from, int x0, int x1, int y0, int y1) {
@@ -153,7 +153,7 @@ void write_weights(const std::filesystem::path& path, Weights& weights, const st
   for (Array array : all_arrays) {
     const auto values = weights.of(array);
     auto& list = json[name_of(array)] = nlohmann::json::array();
-    // Six digits: what a file holds is what is run, so nothing else is lost.
+    // Six digits; the values are used as the file stores them, so no further precision is lost.
     for (float value : values) list.push_back(std::stod(text(value)));
   }
   apps::write_file(path, json.dump() + "\n");

@@ -1,4 +1,4 @@
-// weights.h -- the learned numbers of relaxed.h as one vector, where they begin, and their file.
+// weights.h -- the learned numbers of relaxed.h as one vector: their initial values, and their file.
 #pragma once
 
 #include <retrograde/retrograde.h>
@@ -12,15 +12,15 @@
 
 namespace demosaic {
 
-// What --optimize names: the filters of green; what scores are made of; the filters of colour and the step
-// towards their median.
+// The groups for --optimize: green's filters; the parts of scores; the filters of colour with the step towards their
+// median.
 inline const std::vector<std::string> group_names{"green", "selection", "chroma"};
 std::string group_of(Array array);
 std::string name_of(Array array);  // in a file of weights
 
 struct Weights {
-  // Filters that interpolate along rows and columns as AHD's do, then one-sided, diagonal and plain
-  // ones; windows that weigh all alike; averages of colour differences.
+  // Initial values: filters that interpolate along rows and columns like AHD's, then one-sided, diagonal and plain
+  // ones; uniform windows; averages of colour differences.
   explicit Weights(const Shape& shape);
 
   std::span<float> of(Array array);
@@ -36,8 +36,8 @@ struct Weights {
   void start_chroma();
 };
 
-// A JSON file with the shape, who learned it from what, and each array. Throws retrograde::UserError
-// unless it is one, whole, of finite numbers.
+// A JSON file with the shape, the origin of the weights, and each array. Throws retrograde::UserError unless the file
+// is complete and its numbers are finite.
 void write_weights(const std::filesystem::path& path, Weights& weights, const std::string& origin);
 Weights read_weights(const std::filesystem::path& path);
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks that a report of fluid keeps what the demo promises: check_report.py report.json"""
+"""Checks that a report of fluid keeps the demo's promises: check_report.py report.json"""
 import json
 import sys
 

@@ -9,8 +9,8 @@ namespace {
 
 constexpr int64_t plenty = int64_t{1} << 40;
 
-// C(slots + repeats, slots): the longest run in which no frame is advanced more often than
-// `repeats` times; no more than `plenty`.
+// C(slots + repeats, slots): the longest run that needs to advance no frame more often than `repeats` times; at most
+// `plenty`.
 int64_t longest(int64_t slots, int64_t repeats) {
   if (slots < 0 || repeats < 0) return 0;
   int64_t product = 1;
@@ -27,8 +27,8 @@ int64_t repeats_needed(int64_t frames, int64_t slots) {
   return repeats;
 }
 
-// Where a run of `frames` >= 2 is cut: both parts then fit into one repeat less and one slot less,
-// and neither is so short that the other pays for it.
+// Where to split a run of `frames` >= 2. Both parts then need one repeat or one slot less, and neither is so short that
+// the other gets more expensive.
 int cut(int frames, int slots) {
   const int64_t repeats = repeats_needed(frames, slots);
   const int64_t at_most = longest(slots, repeats - 1);
@@ -41,10 +41,10 @@ class Backward {
  public:
   Backward(int slots, const std::function<void(const Action&)>& act) : slots_(slots), act_(act) {}
 
-  // Frames first, ..., end - 1; state `first` is the current one and in `slot`, those after it free.
+  // Handles frames first, ..., end - 1. State `first` is the current one and is in `slot`; later slots are free.
   void run(int first, int end, int slot) {
     while (end - first > 1) {
-      const int free = slots_ - slot;  // with the one that holds state `first`
+      const int free = slots_ - slot;  // including the slot that holds state `first`
       const int middle = free == 1 ? end - 1 : first + cut(end - first, free);
       for (int frame = first; frame < middle; ++frame) act_({Action::Kind::Advance, frame});
       if (free == 1) {

@@ -56,7 +56,7 @@ void Control<T>::take(std::span<const double> x) {
                  [](double f) { return static_cast<T>(f); });
 }
 
-// Of the force as it was taken, so that its gradient is that of what was computed.
+// Uses the force as rounded for the simulation, so that the gradient is that of the computed loss.
 template <typename T>
 double Control<T>::effort(std::span<double> gradient) const {
   const size_t size = variables_.force_size();
@@ -79,7 +79,7 @@ double Control<T>::loss(std::span<const double> x) {
   return distance.loss + effort({});
 }
 
-// The last frame: from the current state to the loss, and its adjoint.
+// The last frame: computes the loss from the current state, and the adjoint of that state.
 template <typename T>
 double Control<T>::turn_around(int frame) {
   simulation_.advance(physics_, now_, force_of(frame), next_);

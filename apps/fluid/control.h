@@ -2,8 +2,8 @@
 //
 //   loss(x) = Match of the last frame's density + effort * mean squared force
 //
-// Backward in time from checkpoints: the gradient is the same to the last bit for every number of
-// states that are kept (checkpoints.h).
+// The gradient runs backward in time from checkpoints. It is the same to the last bit for any number of kept states
+// (checkpoints.h).
 #pragma once
 
 #include <functional>
@@ -22,21 +22,21 @@ class Control {
   const Scene& scene() const { return scene_; }
   const Variables& variables() const { return variables_; }
   Simulation<T>& simulation() { return simulation_; }
-  // States that are kept, at most one a frame.
+  // Number of states that are kept; at most one per frame.
   int slots() const { return static_cast<int>(kept_.size()); }
   void keep_states(int slots);
-  // Compiles everything and runs it once, so that the memory that this takes is taken.
+  // Compiles everything and runs it once, so that all memory that it needs is allocated.
   void compile();
-  // Other starts of time step, viscosity and diffusion; `logarithms`: see Variables.
+  // Sets other initial values of time step, viscosity and diffusion; `logarithms`: see Variables.
   void start_from(const Physics& physics, bool logarithms);
 
   double loss(std::span<const double> x);
-  // `gradient` may be empty: then it is not computed.
+  // If `gradient` is empty, only the loss is computed.
   double loss(std::span<const double> x, std::span<double> gradient);
-  // The mean squared difference of the last density that was computed from the target.
+  // The mean squared difference between the last computed density and the target.
   double difference() const { return difference_; }
 
-  // Forward, with each state after a frame; state 0 first.
+  // Runs forward and calls `show` with each state after a frame; with state 0 first.
   void play(std::span<const double> x, const std::function<void(const State<T>&)>& show);
 
  private:
@@ -50,7 +50,7 @@ class Control {
   Simulation<T> simulation_;
   Physics physics_;
   std::vector<T> force_, by_force_;  // [frames, force_elems]; [force_elems]
-  std::vector<State<T>> kept_;       // kept_[0]: the start
+  std::vector<State<T>> kept_;       // kept_[0]: the initial state
   State<T> now_, next_, seed_, before_;
   double difference_ = 0;
 };

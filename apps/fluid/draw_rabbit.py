@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws rabbit.png, the picture that the demo's smoke becomes: nine ellipses.
+"""Draws rabbit.png, the demo's target picture for the smoke, from nine ellipses.
 
 usage: draw_rabbit.py rabbit.png [PIXELS]
 """
@@ -8,7 +8,7 @@ import sys
 import matplotlib.image
 import numpy as np
 
-# Middle, half axes, and the angle of the first axis, in hundredths of the picture's side and degrees.
+# Centre, half axes (both in hundredths of the picture's side), and angle of the first axis (degrees).
 ELLIPSES = [
     (56, 68, 24, 20, 0),    # body
     (72, 76, 13, 13, 0),    # haunch
@@ -24,7 +24,7 @@ SAMPLES = 8  # along a side of a pixel
 
 
 def coverage(pixels):
-    """How much of each pixel lies in some ellipse."""
+    """The share of each pixel that lies inside an ellipse."""
     at = (np.arange(pixels * SAMPLES) + 0.5) * 100 / (pixels * SAMPLES)
     x, y = np.meshgrid(at, at)
     inside = np.zeros(x.shape, bool)

@@ -26,7 +26,7 @@ double seconds_between(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-// What must be the same for a run to go on.
+// A description of what must be the same to resume a run.
 std::string problem_of(const Scene& s, const Options& o) {
   return text(o.common.input.filename().string(), " on ", s.shape.width, "x", s.shape.height,
               " cells, ", s.frames, " frames, ", s.shape.force_width, "x", s.shape.force_height,
@@ -36,7 +36,7 @@ std::string problem_of(const Scene& s, const Options& o) {
               ", reach ", s.reach, ", effort ", s.effort, ", swirl ", s.swirl);
 }
 
-// Beside the moments that Adam keeps under its own name.
+// In addition to Adam's moments, which Adam saves under its own name.
 std::string run_name(apps::Method method) { return "run." + apps::name_of(method); }
 
 void put_run(apps::State& state, const MethodRun& run) {
@@ -137,7 +137,7 @@ class Optimization {
     with.steps = left;
     with.seconds = options_.common.seconds;
     if (is_adam) with.moments = &*adam_;
-    // Adam goes on from where it was, the others, which forget their history, from the best point.
+    // Adam continues from its current point. The others lose their history and continue from the best point.
     const std::vector<double> from = is_adam ? now.x : now.best;
     const apps::Minimum found =
         apps::minimize(problem, from, with, [&](const apps::LossSample& s, auto) {
@@ -151,8 +151,8 @@ class Optimization {
     now.ended = found.ended;
   }
 
-  // The first step of a line search has the length of the gradient, which is that of a mean over all
-  // cells and frames: this factor makes its largest element 1.
+  // The first step of a line search has the length of the gradient. Because the loss is a mean over all cells and
+  // frames, that is small; this factor makes its largest element 1.
   double scale_of_loss() {
     std::vector<double> gradient(start_.size());
     control_.loss(start_, gradient);

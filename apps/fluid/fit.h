@@ -1,5 +1,4 @@
-// fit.h -- the optimization: one run of each method from the same start, which can be stopped and
-// gone on with.
+// fit.h -- the optimization: one run of each method from the same initial point. It can be stopped and resumed.
 #pragma once
 
 #include <functional>
@@ -15,10 +14,10 @@ namespace fluid {
 
 struct MethodRun {
   apps::Method method;
-  std::vector<double> x;     // where it is
-  std::vector<double> best;  // the best point that it met
+  std::vector<double> x;     // the current point
+  std::vector<double> best;  // the best point so far
   double best_loss = std::numeric_limits<double>::infinity();
-  std::vector<apps::LossSample> series = {};  // since the first start
+  std::vector<apps::LossSample> series = {};  // since the initial point
   long refused = 0;
   std::string ended = {};
 
@@ -28,20 +27,20 @@ struct MethodRun {
 
 struct Fit {
   std::vector<MethodRun> runs;
-  std::vector<double> gradient_seconds;  // of each loss with its gradient
+  std::vector<double> gradient_seconds;  // times of all evaluations of loss and gradient
   bool stopped = false;
 
   const MethodRun& best() const;
   double median_gradient_seconds() const;
 };
 
-// Runs every method for options.common.steps steps, those of earlier runs counted, from `start`.
-// `shown` gets the name of the method, its steps and its loss. Keeps options.common.output /
-// "state.bin" as new as twenty seconds, and writes it at the end.
+// Runs every method from `start` for options.common.steps steps, including those of earlier runs. `shown` is called
+// with the method's name, its steps and its loss. Saves options.common.output / "state.bin" every twenty seconds and at
+// the end.
 Fit optimize(const Options& options, Control<float>& control, const std::vector<double>& start,
              const std::function<void(const std::string&, long, double)>& shown);
 
-// The force that a run's state holds, of this many elements. Throws retrograde::UserError.
+// Reads the force from a run's state; it must have this many elements. Throws retrograde::UserError.
 std::vector<float> read_force(const std::filesystem::path& state, size_t size);
 
 }  // namespace fluid

@@ -16,7 +16,7 @@ using retrograde::Var;
 
 namespace {
 
-// The value of `field` between its samples, at a place inside of them.
+// Interpolates `field` at a position inside its samples.
 Expr between(const Func& field, const Axis& along_x, const Axis& along_y, const Expr& px,
              const Expr& py) {
   const auto cell = [](const Expr& p, const Axis& axis) {
@@ -32,8 +32,8 @@ Expr between(const Func& field, const Axis& along_x, const Axis& along_y, const 
   return above + wy * (below - above);
 }
 
-// How much of node `i` of `nodes` there is at `place`, both in units of the box's side: a hat, the
-// outermost nodes half a node's distance from the walls, and level beyond.
+// The weight of node `i` of `nodes` at `place`, both in units of the box's side: a hat function. The outermost nodes
+// are half a node's distance from the walls, and the weight is constant beyond them.
 Expr hat(const Expr& i, const Expr& place, int nodes, Type scalar) {
   const auto number = [&](double v) { return retrograde::cast(scalar, Expr(v)); };
   const Expr at =
@@ -64,7 +64,7 @@ Frame::Frame(const FrameShape& shape, Type scalar)
 
 Expr Frame::number(double value) const { return retrograde::cast(scalar, Expr(value)); }
 
-// Component 0 on the faces that x counts, component 1 on those that y counts.
+// Component 0 is defined on the faces along x, component 1 on those along y.
 Expr Frame::spread_force(const Var& x, const Var& y, int component) const {
   const Expr to_x = component == 0 ? number(0) : number(0.5),
              to_y = component == 1 ? number(0) : number(0.5);
@@ -103,12 +103,12 @@ void Frame::add_force() {
   now_y_(x, y) = retrograde::select(y == 0 || y == shape.height, number(0), driven(velocity_y, 1));
 }
 
-// Faces of one direction need the other direction's velocity, which is the mean of the four faces
-// around them.
+// Faces of one direction need the other direction's velocity: the mean of the four faces around them.
 void Frame::advect_velocity() {
   const Var &x = x_, &y = y_;
   const int width = shape.width, height = shape.height;
-  const Expr reach = time_step * number(shape.cells_per_unit());  // velocities to cells a frame
+  const Expr reach =
+      time_step * number(shape.cells_per_unit());  // from velocity to cells per frame
   const auto clamp = [&](const Expr& p, int last) {
     return retrograde::clamp(p, number(0), number(last));
   };

@@ -1,15 +1,15 @@
-// frame.h -- one frame of a fluid in a closed box, and its vector-Jacobian product.
+// frame.h -- one time step ("frame") of a fluid in a closed box, and its vector-Jacobian product.
 //
 //   velocity  += time_step force                                   force
-//   velocity   = velocity where time_step ago it was                advection, along itself
+//   velocity   = velocity at the position time_step ago             advection, along itself
 //   velocity   = (1 + time_step viscosity L)^-1 velocity            viscosity
-//   velocity  -= slope of the pressure that takes its divergence away  projection
-//   density    = density where time_step ago it was                 advection, along the new velocity
+//   velocity  -= gradient of the pressure that removes divergence   projection
+//   density    = density at the position time_step ago              advection, along the new velocity
 //   density    = (1 + time_step diffusion L)^-1 density             diffusion
 //
-// after J. Stam, Stable Fluids, SIGGRAPH 1999, section 2: unconditionally stable. The density is in
-// the middle of cells, the velocity on the faces between them (Harlow and Welch, Physics of Fluids
-// 8, 1965), so that the projection leaves no divergence at all. The box's longer side has length 1.
+// after J. Stam, Stable Fluids, SIGGRAPH 1999, section 2: unconditionally stable. The density is at the centres of
+// cells, and the velocity on the faces between them (Harlow and Welch, Physics of Fluids 8, 1965), so that the
+// projection removes divergence exactly. The box's longer side has length 1.
 #pragma once
 
 #include <retrograde/retrograde.h>
@@ -23,23 +23,23 @@ namespace fluid {
 
 class Frame {
  public:
-  // `scalar` is the type of everything: float to simulate, double to check.
+  // `scalar` is the type of all values: float to simulate, double to check.
   Frame(const FrameShape& shape, retrograde::Type scalar);
 
   FrameShape shape;
   retrograde::Type scalar;
 
-  // Before the frame.
+  // The state before the frame.
   retrograde::ImageParam velocity_x;  // [height, width + 1], width innermost
   retrograde::ImageParam velocity_y;  // [height + 1, width]
   retrograde::ImageParam density;     // [height, width]
   retrograde::ImageParam force;       // [2, force_height, force_width]
   retrograde::Param<> time_step, viscosity, diffusion;
 
-  // After it.
+  // The state after the frame.
   retrograde::Func next_x{"next_x"}, next_y{"next_y"}, next_density{"next_density"};
 
-  // What was left out, a line each.
+  // The stages that are left out, one line each.
   std::vector<std::string> left_out() const;
 
  private:
@@ -55,10 +55,10 @@ class Frame {
   void move_density();
 
   const retrograde::Var x_{"x"}, y_{"y"};
-  Func now_x_, now_y_;  // the velocity as far as it is computed
+  Func now_x_, now_y_;  // the velocity after the stages so far
 };
 
-// gradient of  seed . (next_x, next_y, next_density)  by what went into the frame.
+// The gradient of  seed . (next_x, next_y, next_density)  by the frame's inputs.
 class FrameAdjoint {
  public:
   struct Wanted {
@@ -68,9 +68,9 @@ class FrameAdjoint {
   FrameAdjoint(const FrameShape& shape, retrograde::Type scalar, const Wanted& wanted);
 
   Frame frame;
-  retrograde::ImageParam seed_x, seed_y, seed_density;  // as the state after the frame
+  retrograde::ImageParam seed_x, seed_y, seed_density;  // like the state after the frame
   retrograde::Derivative derivative;
-  // velocity_x, velocity_y, density, then what is wanted, in the order of Wanted.
+  // velocity_x, velocity_y, density, then the wanted ones in the order of Wanted.
   std::vector<retrograde::Func> gradients;
 };
 

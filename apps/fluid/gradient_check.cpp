@@ -1,10 +1,9 @@
 // gradient_check.cpp -- see gradient_check.h.
 //
-// The loss is smooth but for kinks where smoke or velocity is fetched from the border between two
-// cells or from a wall. A difference that steps over one is wrong, and one with a tiny step is
-// rounded, all the more where a variable moves hardly anything, as a small diffusion: so central
-// differences of fourth order with several steps are tried, and the one that agrees best counts.
-// None would agree with a wrong adjoint.
+// The loss is smooth except for kinks, where advection reads at the border between two cells or at a wall. A difference
+// across a kink is wrong, and a tiny step suffers from rounding, especially for variables with little influence, such
+// as a small diffusion. So central differences of fourth order are computed with several steps, and the best agreement
+// counts. A wrong adjoint would agree with none.
 #include "gradient_check.h"
 
 #include <algorithm>
@@ -21,7 +20,7 @@ namespace {
 
 constexpr int most_cells = 20, most_frames = 5, most_nodes = 5;
 constexpr int random_directions = 3;
-constexpr double force_size = 2.0;  // sides a second squared
+constexpr double force_size = 2.0;  // sides per second squared
 constexpr double steps[] = {1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
 
 struct Group {
@@ -56,7 +55,7 @@ class DirectionCheck {
                  std::span<const double> gradient)
       : control_(control), x_(x), group_(group), gradient_(gradient) {}
 
-  // Of the difference along `direction`, relative to what a direction of this length usually gives.
+  // The error of the difference along `direction`, relative to the typical derivative along a direction of this length.
   double error(std::span<const double> direction) const {
     double adjoint = 0;
     for (size_t n = 0; n < direction.size(); ++n) adjoint += direction[n] * gradient_[n];

@@ -1,4 +1,4 @@
-// main.cpp -- fluid: smoke that becomes a picture. See README.md beside this file.
+// main.cpp -- fluid: finds forces that turn smoke into a picture. See README.md in this folder.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -67,7 +67,7 @@ Scene make_scene(const Options& options) {
   scene.swirl = options.swirl;
   scene.reach = options.reach;
   scene.effort = options.effort;
-  // Before anything of that size is made.
+  // Checked before anything of that size is allocated.
   require_memory_for_a_frame(scene, options.common.memory_mb);
   const Smoke target = resample(picture, s.width, s.height);
   scene.target = target.density;
@@ -81,7 +81,7 @@ void read_force_of_scene(const Options& options, Scene& scene) {
       read_force(options.force_from, static_cast<size_t>(scene.frames) * scene.shape.force_elems());
 }
 
-// The force is where it was found, if it may move; the others are at their starts.
+// The force is the given one if it is optimized; the other variables have their initial values.
 std::vector<double> start_of(const Scene& scene, const Variables& variables) {
   std::vector<double> x = variables.start();
   if (variables.force_size() > 0) std::copy(scene.force.begin(), scene.force.end(), x.begin());

@@ -1,13 +1,12 @@
-// match.h -- how far a density is from the one that is wanted.
+// match.h -- the distance between a density and its target.
 //
 //   e(x, y) = density - target
 //   loss    = mean of  e (e + near e) / 2,    near = (1 + (reach cells)^2 L)^-1
 //
-// The mean squared difference alone says nothing of smoke that lies beside its place: nothing
-// overlaps. The second term sees differences as if they were spread over `reach` (in sides of the
-// box), so that its gradient tells smoke where to go from afar; a close relation of it is the
-// distance of optimal transport for small moves (R. Peyre, Comparison between W2 distance and H^-1
-// norm, and localization of Wasserstein distance, ESAIM: COCV 24(4), 2018).
+// The mean squared difference alone gives no useful gradient for smoke that does not overlap its target. The second
+// term compares as if differences were spread over `reach` (in sides of the box), so its gradient tells smoke from a
+// distance where to go. It is closely related to the optimal transport distance for small displacements (R. Peyre,
+// Comparison between W2 distance and H^-1 norm, and localization of Wasserstein distance, ESAIM: COCV 24(4), 2018).
 #pragma once
 
 #include <retrograde/retrograde.h>
@@ -21,8 +20,8 @@ class Match {
   Match(const FrameShape& shape, retrograde::Type scalar, double reach);
 
   retrograde::ImageParam density, target;
-  retrograde::Func loss{"loss"};              // of no variables
-  retrograde::Func difference{"difference"};  // the mean of e^2 alone
+  retrograde::Func loss{"loss"};              // without dimensions
+  retrograde::Func difference{"difference"};  // only the mean of e^2
   retrograde::Func gradient;                  // of the loss by the density
 };
 

@@ -20,37 +20,41 @@ struct Words {
 
 void add_scene_options(CLI::App& cli, Options& o) {
   cli.add_option("--start", o.start,
-                 "picture of the smoke at the start; without it, a disc with the input's amount");
+                 "picture of the initial smoke; default: a disc with as much smoke as the input");
   cli.add_option("--frames", o.frames, "frames from the start to the picture")
       ->capture_default_str();
   cli.add_option("--cells", o.cells, "cells along the longer side; 0: the picture's pixels")
       ->capture_default_str();
   cli.add_option("--force-nodes", o.force_nodes,
-                 "nodes of the force along the longer side; 0: one in each cell")
+                 "nodes of the force along the longer side; 0: one per cell")
       ->capture_default_str();
-  cli.add_option("--force-from", o.force_from, "state.bin of a run whose force is taken");
-  cli.add_option("--swirl", o.swirl, "speed of a vortex at the start, sides a second")
+  cli.add_option("--force-from", o.force_from, "state.bin of another run, whose force is used");
+  cli.add_option("--swirl", o.swirl, "speed of an initial vortex, in sides per second")
       ->capture_default_str();
-  cli.add_option("--time-step", o.physics.time_step, "seconds a frame")->capture_default_str();
-  cli.add_option("--viscosity", o.physics.viscosity, "sides squared a second; 0: none")
+  cli.add_option("--time-step", o.physics.time_step, "seconds per frame")->capture_default_str();
+  cli.add_option("--viscosity", o.physics.viscosity,
+                 "viscosity in sides squared per second; 0: none")
       ->capture_default_str();
-  cli.add_option("--diffusion", o.physics.diffusion, "of the smoke, alike; 0: none")
+  cli.add_option("--diffusion", o.physics.diffusion,
+                 "diffusion of the smoke in the same unit; 0: none")
       ->capture_default_str();
 }
 
 void add_solution_options(CLI::App& cli, Options& o, Words& words) {
-  cli.add_option("--reach", o.reach, "how far off smoke is told where to go, in sides")
+  cli.add_option("--reach", o.reach,
+                 "distance over which smoke is attracted to its target, in sides")
       ->capture_default_str();
   cli.add_option("--effort", o.effort, "weight of the mean squared force")->capture_default_str();
-  cli.add_option("--method", words.methods,
-                 "adam, lbfgs or conjugate_gradient; of several the best result counts")
+  cli.add_option(
+         "--method", words.methods,
+         "adam, lbfgs, conjugate_gradient, or several of these, of which the best result counts")
       ->delimiter(',')
       ->capture_default_str();
-  cli.add_option("--rate", o.rate, "of Adam: how far the force moves in a step")
+  cli.add_option("--rate", o.rate, "Adam's rate: change of the force per step")
       ->capture_default_str();
-  cli.add_option("--solver", words.solver, "of pressure and diffusion: direct or jacobi")
+  cli.add_option("--solver", words.solver, "solver for pressure and diffusion: direct or jacobi")
       ->capture_default_str();
-  cli.add_option("--iterations", o.iterations, "of jacobi")->capture_default_str();
+  cli.add_option("--iterations", o.iterations, "iterations of jacobi")->capture_default_str();
 }
 
 Solver solver_named(const std::string& name) {
@@ -60,14 +64,13 @@ Solver solver_named(const std::string& name) {
                          "this is neither", "Give one of these names");
 }
 
-// What is optimized as a logarithm needs a start over 0.
+// A variable that is optimized as a logarithm needs a positive initial value.
 void require_start(const Options& o, const char* group, const char* option, double value) {
   if (!apps::optimizes(o.common, group) || value > 0) return;
   retrograde::call_error(
       text("optimize the ", group, " from ", option, " ", value),
-      "it is changed by factors, so that it stays positive",
-      "there are no factors that lead away from 0",
-      text("Give ", option, " a small number over 0, or leave ", group, " out of --optimize"));
+      "it is optimized as a logarithm, so that it stays positive", "0 has no logarithm",
+      text("Give ", option, " a small positive number, or leave ", group, " out of --optimize"));
 }
 
 void check(const Options& o) {
@@ -86,7 +89,7 @@ void check(const Options& o) {
   require_start(o, "diffusion", "--diffusion", o.physics.diffusion);
   for (const apps::Method method : o.methods) {
     if (method != apps::Method::NewtonCg) continue;
-    retrograde::call_error("optimize by \"newton_cg\"", "it needs products with second derivatives",
+    retrograde::call_error("optimize by \"newton_cg\"", "it needs Hessian-vector products",
                            "a simulation gives first derivatives only",
                            "Give adam, lbfgs or conjugate_gradient");
   }
@@ -98,10 +101,10 @@ std::optional<Options> read_options(int argc, char** argv) {
   Options options;
   Words words;
   CLI::App cli(
-      "Finds the force, and what of viscosity, diffusion and time step may move, that brings smoke "
-      "in a closed box to the shape of a picture.");
+      "Finds the force, and optionally viscosity, diffusion and time step, that bring smoke in a "
+      "closed box to the shape of a picture.");
   apps::add_common_options(cli, options.common,
-                           {.input_text = "the picture that the smoke shall be at the end",
+                           {.input_text = "the target picture of the smoke",
                             .steps = 150,
                             .memory_mb = 1000,
                             .optimize = {"force", "viscosity", "diffusion", "time_step"}});

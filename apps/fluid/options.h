@@ -16,8 +16,8 @@ struct Options {
   std::filesystem::path start;       // empty: a disc
   std::filesystem::path force_from;  // the state of another run; empty: none
   int frames = 40;
-  int cells = 0;         // along the longer side; 0: as many as the picture has
-  int force_nodes = 16;  // along the longer side; 0: one in each cell
+  int cells = 0;         // along the longer side; 0: the picture's pixels
+  int force_nodes = 16;  // along the longer side; 0: one per cell
   Physics physics;
   double swirl = 0, reach = 0.2, effort = 1e-5, rate = 0.1;
   Solver solver = Solver::Direct;
@@ -25,8 +25,7 @@ struct Options {
   std::vector<apps::Method> methods;
 };
 
-// Nothing when the command line asked only for help, which is then printed. Throws
-// retrograde::UserError.
+// Nothing if the command line only requested help, which is then printed. Throws retrograde::UserError.
 std::optional<Options> read_options(int argc, char** argv);
 
 }  // namespace fluid

@@ -17,14 +17,14 @@ using nlohmann::json;
 
 namespace {
 
-constexpr int shown_side = 256;  // pixels that a small box is magnified to
+constexpr int shown_side = 256;  // pixels to which a small box is magnified
 constexpr int strip_pictures = 6;
 
 Smoke smoke_of(const Scene& scene, std::vector<float> density) {
   return {scene.shape.width, scene.shape.height, std::move(density)};
 }
 
-// Writes the pictures of a run, one after the other, so that few are in memory at once.
+// Writes the pictures of a run one after another, so that few are in memory at once.
 class Film {
  public:
   Film(const Scene& scene, const std::filesystem::path& folder)
@@ -60,7 +60,7 @@ class Film {
     return added_ * (strip_pictures - 1) >= static_cast<int>(chosen_.size()) * scene_.frames;
   }
 
-  // A longer run's frames would follow this one's.
+  // Frames of an earlier, longer run would otherwise follow this run's.
   void remove_old_frames() const {
     std::error_code ignored;
     for (const auto& entry : std::filesystem::directory_iterator(folder_ / "frames", ignored)) {

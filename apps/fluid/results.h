@@ -1,4 +1,4 @@
-// results.h -- what a run leaves in its folder: pictures, the animation, report.json.
+// results.h -- writes a run's results to its folder: pictures, the animation, report.json.
 #pragma once
 
 #include <string>
@@ -12,16 +12,16 @@
 
 namespace fluid {
 
-// What was measured before the optimization.
+// Measurements before the optimization.
 struct Setup {
   double compile_seconds = 0;
-  double difference = 0;  // of the smoke that nobody pushed from the picture, mean squared
+  double difference = 0;  // mean squared difference from the picture without any force
   MemoryPlan memory;
   std::vector<std::string> left_out;
 };
 
-// frames/0000.png ..., animation.gif, strip.png, start.png, target.png and result.png, then the
-// report, which began with the run, with its plot. Throws retrograde::UserError.
+// Writes frames/0000.png ..., animation.gif, strip.png, start.png, target.png and result.png, then the report, which
+// was begun with the run, and its plot. Throws retrograde::UserError.
 struct Results {
   double psnr_before_db, psnr_db, loss, seconds_a_frame, seconds_a_gradient;
 };

@@ -7,7 +7,7 @@ namespace fluid {
 
 namespace {
 
-// How far a step goes for the logarithms, beside the elements of the force.
+// Scale of a step for the logarithms, relative to the elements of the force.
 constexpr double scalar_scale = 0.1;
 
 std::array<double, 3> as_array(const Physics& p) { return {p.time_step, p.viscosity, p.diffusion}; }

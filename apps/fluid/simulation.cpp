@@ -36,8 +36,8 @@ void State<T>::fill(T value) {
   density.fill(value);
 }
 
-// The vortex is the curl of a stream function that is 0 on the walls, with differences between the
-// corners of cells: so it has no divergence, and nothing of it crosses a wall.
+// The vortex is the curl of a stream function that is 0 on the walls, by differences between the corners of cells. So
+// it has no divergence and does not flow through walls.
 template <typename T>
 State<T> start_state(const Scene& scene) {
   const int width = scene.shape.width, height = scene.shape.height,
@@ -46,7 +46,8 @@ State<T> start_state(const Scene& scene) {
   std::transform(scene.start.begin(), scene.start.end(), state.density.data(),
                  [](float d) { return static_cast<T>(d); });
   const auto stream = [&](int i, int j) {
-    if (i == 0 || i == width || j == 0 || j == height) return 0.0;  // not a rounded sine of pi
+    if (i == 0 || i == width || j == 0 || j == height)
+      return 0.0;  // exact, unlike a rounded sine of pi
     return scene.swirl / std::numbers::pi * std::sin(std::numbers::pi * i / width) *
            std::sin(std::numbers::pi * j / height) * side;
   };

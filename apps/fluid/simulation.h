@@ -1,4 +1,4 @@
-// simulation.h -- frames and their vector-Jacobian products, compiled, on states in memory.
+// simulation.h -- runs frames and their vector-Jacobian products, compiled, on states in memory.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace fluid {
 
-// Between two frames; the adjoint of it has the same shape.
+// The state between two frames; its adjoint has the same shape.
 template <typename T>
 struct State {
   explicit State(const FrameShape& shape);
@@ -20,7 +20,7 @@ struct State {
   retrograde::Buffer<T> x, y, density;
 };
 
-// The smoke and the vortex of a scene.
+// The smoke and the vortex at the beginning of a scene.
 template <typename T>
 State<T> start_state(const Scene& scene);
 
@@ -29,23 +29,23 @@ class Simulation {
  public:
   explicit Simulation(const Scene& scene);
 
-  // From one state to the next. `force`: the elements of this frame.
+  // Advances one state to the next. `force`: the elements for this frame.
   void advance(const Physics& physics, const State<T>& from, T* force, State<T>& to);
 
-  // The same backward: `seed` is the adjoint of the state after the frame, `result` becomes that of
-  // the state before it, and `by_force`, if the force is wanted, that of the force. Adds to
-  // `by_physics` what time step, viscosity and diffusion get.
+  // Runs a frame backward. `seed` is the adjoint of the state after the frame. `result` receives the adjoint of the
+  // state before it, and `by_force`, if the force is wanted, that of the force. The derivatives by time step, viscosity
+  // and diffusion are added to `by_physics`.
   void reverse(const Physics& physics, const State<T>& before, T* force, const State<T>& seed,
                State<T>& result, T* by_force, std::array<double, 3>& by_physics);
 
-  // How far it is from the target, and the derivative by the density.
+  // The distance from the target, and its derivative by the density.
   struct Distance {
     double loss, difference;
   };
   Distance compare(const State<T>& state);
   Distance compare(const State<T>& state, retrograde::Buffer<T>& gradient);
 
-  // What is not compiled yet; otherwise the first call of each pipeline does.
+  // Compiles the pipelines that are not compiled yet; otherwise the first call of each one does.
   void compile();
   const FrameAdjoint& adjoint() const { return adjoint_; }
 

@@ -42,7 +42,7 @@ void require_cells(const std::filesystem::path& path, int width, int height) {
                          "Give a larger picture, or more --cells");
 }
 
-// The mean over [from, to), in samples, along one row or column.
+// The mean over [from, to), in samples, along a row or column.
 float mean_between(const float* values, size_t stride, int size, double from, double to) {
   double sum = 0;
   for (int n = static_cast<int>(from); n < std::min<double>(size, std::ceil(to)); ++n) {
@@ -90,7 +90,7 @@ Cells cells_for(const Smoke& picture, int longer, const std::filesystem::path& p
 
 Smoke read_smoke_like(const std::filesystem::path& path, const Smoke& other) {
   const Smoke smoke = read_smoke(path);
-  // Of the same shape, up to a rounded side.
+  // Checks that the shapes are the same, up to rounding of a side.
   if (std::abs(smoke.width * static_cast<double>(other.height) / other.width - smoke.height) > 1) {
     retrograde::call_error(text("start from ", quoted(path.string())),
                            "the smoke at the start fills the same box as the picture of the end",

@@ -17,7 +17,7 @@ using retrograde::Var;
 
 namespace {
 
-// An array of any floating type, filled from a function in double.
+// A table of any floating-point type, filled from a function in double.
 template <typename Value>
 Buffer<> make_table(Type scalar, int width, int height, Value&& value) {
   const auto filled = [&](auto table) {
@@ -30,12 +30,12 @@ Buffer<> make_table(Type scalar, int width, int height, Value&& value) {
                              : filled(Buffer<float>(width, height));
 }
 
-// The eigenvectors of one axis' second difference, orthonormal, and its eigenvalues.
+// The orthonormal eigenvectors of an axis' second difference, with its eigenvalues.
 class Waves {
  public:
   explicit Waves(const Axis& axis) : axis_(axis) {}
 
-  // Wave `k` at sample n. Between walls of zeros wave 0 does not exist: it is 0.
+  // Wave `k` at sample n. Between walls of zeros, wave 0 does not exist and is 0.
   double value(int k, int n) const {
     if (axis_.ends == Ends::Zero) {
       return std::sqrt(2.0 / cells()) * std::sin(std::numbers::pi * k * n / cells());
@@ -43,7 +43,7 @@ class Waves {
     const double scale = std::sqrt((k == 0 ? 1.0 : 2.0) / cells());
     return scale * std::cos(std::numbers::pi * k * (n + 0.5) / cells());
   }
-  // 2 - 2 cos(pi k / cells), written so that small ones keep their digits.
+  // 2 - 2 cos(pi k / cells), in a form that keeps the digits of small values.
   double eigenvalue(int k) const {
     const double s = std::sin(std::numbers::pi * k / (2 * cells()));
     return 4 * s * s;
@@ -63,7 +63,7 @@ Expr neighbours(const Func& f, const System& s, const Var& x, const Var& y) {
   return e(x - 1, y) + e(x + 1, y) + e(x, y - 1) + e(x, y + 1);
 }
 
-// 0 on walls that hold zeros, `value` elsewhere.
+// 0 on walls where the solution is zero, `value` elsewhere.
 Expr zero_on_walls(const System& s, const Var& x, const Var& y, const Expr& value) {
   Expr result = value;
   const auto mask = [&](const Var& n, const Axis& axis) {
@@ -75,10 +75,10 @@ Expr zero_on_walls(const System& s, const Var& x, const Var& y, const Expr& valu
   return result;
 }
 
-// The factors of Golub and Varga's three-term recurrence, one an iteration.
+// The factors of Golub and Varga's three-term recurrence, one per iteration.
 std::vector<double> chebyshev_factors(const System& s, int iterations) {
   const double slowest = (1 + std::cos(std::numbers::pi / std::max(s.x.samples, s.y.samples))) / 2;
-  // What so many iterations reduce to a twentieth, and no longer waves than these.
+  // The spectral radius that this many iterations reduce to a twentieth; longer waves are not reduced.
   const double reachable = 1 / std::cosh(std::acosh(20.0) / iterations);
   const double radius = std::min(slowest, reachable);
   std::vector<double> factors{1.0};
@@ -95,7 +95,7 @@ Func solve_directly(const System& s) {
   const Var x("x"), y("y"), i("i"), j("j");
   const int width = s.x.samples, height = s.y.samples;
   const Waves along_x(s.x), along_y(s.y);
-  // Each product reads its matrix along rows: two orders of the waves along x.
+  // Each product reads its matrix along rows, so the waves along x are stored in both orders.
   const Buffer<> to_x =
       make_table(s.scalar, width, width, [&](int k, int n) { return along_x.value(k, n); });
   const Buffer<> from_x =
@@ -134,7 +134,7 @@ Func solve_by_iterations(const System& s, int iterations) {
   Func before, now = s.right_side;
   for (int n = 0; n < iterations; ++n) {
     Func next(s.name + "_" + std::to_string(n));
-    // From 0, where the shift is 0: its neighbours are 0.
+    // Starts from 0 if the shift is 0, so the neighbours are 0 in the first iteration.
     Expr step = s.right_side(x, y);
     if (s.shifted || n > 0) step += s.rate * neighbours(now, s, x, y);
     step = step / diagonal;

@@ -18,8 +18,8 @@ namespace {
 
 constexpr long optimizer_steps = 40;
 constexpr double force_rate = 0.1;
-constexpr double explosion = 10;   // as that of a run: see fit.cpp
-constexpr double scalar_rate = 7;  // times Variables' scale of 0.1: half, or double
+constexpr double explosion = 10;   // as in a run: see fit.cpp
+constexpr double scalar_rate = 7;  // times the variables' scale of 0.1: a factor of about two
 
 struct Case {
   std::string name;
@@ -41,7 +41,7 @@ std::vector<Case> cases(const Physics& usual) {
   return all;
 }
 
-// Both stages, and everything optimized, so that one compiled frame serves all cases.
+// Has both stages and optimizes everything, so that one compiled frame serves all cases.
 Scene scene_with_all(const Scene& scene) {
   Scene all = scene;
   all.wanted = {true, true, true, true};
@@ -58,7 +58,7 @@ class Cases {
         exact_(scene, scene.frames),
         own_(scene, scene.frames),
         x_(random_point(exact_.variables(), seed)) {
-    // At the values of the case itself.
+    // At the case's own values.
     std::fill(x_.begin() + static_cast<long>(exact_.variables().force_size()), x_.end(), 0.0);
   }
 
@@ -106,7 +106,7 @@ class Cases {
     apps::Adam adam({{force, force_rate}, {x_.size() - force, scalar_rate}},
                     {.safeguard = safeguard, .explosion = explosion});
     with.moments = &adam;
-    // A refused step is taken back: what counts is where the run stands, not what it tried.
+    // Refused steps are undone, so only the points that the run kept count.
     std::vector<apps::LossSample> kept;
     double lowest = INFINITY;
     for (const auto& s : apps::minimize(problem, x_, with).series) {

@@ -1,4 +1,4 @@
-"""The slicing layer, twice: as an operator made of a pipeline, and as plain PyTorch.
+"""The slicing layer in two versions: as an operator made from a pipeline, and in plain PyTorch.
 
     sliced[c](x, y) = sum over k of A[c, k](x, y, guide(x, y)) (image, 1)[k](x, y)
 
@@ -14,7 +14,7 @@ x, y, k, c = (rg.Var(name) for name in "xykc")
 
 
 def _pipeline(kind, shapes):
-    """Of one image; batches are the operator's business."""
+    """The pipeline for one image; the operator handles batches."""
     image, guide, grid = rg.ImageParam(kind, 3, "image"), rg.ImageParam(kind, 2, "guide"), rg.ImageParam(kind, 5, "grid")
     if shapes:
         (_, height, width), _, (_, _, levels, rows, columns) = shapes
@@ -26,7 +26,7 @@ def _pipeline(kind, shapes):
         return rg.cast(kind, value)
 
     def cells(place, count):
-        """The two beside a place, which stays inside, and how far it is from the first."""
+        """The two cells next to a position, clamped to the grid, and the distance from the first one."""
         place = rg.clamp(place, real(0), real(count) - 1)
         near = rg.clamp(rg.cast("int32", rg.floor(place)), 0, count - 1)
         return near, rg.min(near + 1, count - 1), place - real(near)

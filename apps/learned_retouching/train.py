@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""train.py -- a small network that retouches photographs, trained twice: its slicing layer is an operator made of a
-pipeline, or plain PyTorch. Both see the same data from the same start.
+"""train.py -- trains a small network that retouches photographs, with two versions of its slicing layer: an operator
+made from a pipeline, and plain PyTorch. Both versions get the same data and initial weights.
 
     train.py [--images FOLDER] [--output FOLDER] [--steps N] [--size PIXELS] [--batch N] [--threads N] [--seed N]
 
@@ -17,12 +17,12 @@ import torch.nn.functional as F
 
 from slicing import slice_by_pipeline, slice_by_pytorch
 
-LOW = 64  # pixels along a side of what the network sees
+LOW = 64  # pixels along each side of the network's input
 LEVELS, CELLS = 8, 16
 
 
 class Retoucher(torch.nn.Module):
-    """A grid of affine maps of a picture's small copy, a guide of its pixels, and the slicing layer."""
+    """Computes a grid of affine maps from a picture's small copy, and a guide from its pixels; then slices the grid."""
 
     def __init__(self, slicing):
         super().__init__()
@@ -34,7 +34,7 @@ class Retoucher(torch.nn.Module):
             torch.nn.Conv2d(64, 3 * 4 * LEVELS, 1))
         self.guide = torch.nn.Sequential(torch.nn.Conv2d(3, 8, 1), torch.nn.ReLU(), torch.nn.Conv2d(8, 1, 1),
                                          torch.nn.Sigmoid())
-        with torch.no_grad():  # begins as the picture itself
+        with torch.no_grad():  # initially the identity
             last = self.features[-1]
             last.weight.mul_(0.1)
             last.bias.copy_(torch.eye(3, 4)[..., None].expand(3, 4, LEVELS).flatten())
@@ -46,7 +46,7 @@ class Retoucher(torch.nn.Module):
 
 
 def retouched(images):
-    """What is to be learned: shadows brighter, and more contrast beside what lies around."""
+    """The target: brighter shadows, and more local contrast."""
     around = F.avg_pool2d(F.pad(images, [16] * 4, mode="replicate"), 33, 1)
     return (images.clamp(min=1e-3) ** 0.7 + 0.4 * (images - around)).clamp(0, 1)
 
@@ -73,7 +73,7 @@ def photographs(folder):
 
 
 def batches(pictures, options):
-    """Crops, the same in every run."""
+    """Random crops, the same in every run."""
     generator = torch.Generator().manual_seed(options.seed)
 
     def draw(most):
@@ -135,7 +135,7 @@ def plot(report, path):
 
 
 def options_of(program, output, **defaults):
-    """A parser of the options that training has."""
+    """A parser with the options of training."""
     parser = argparse.ArgumentParser(description=program, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--images", default=str(Path(__file__).resolve().parents[1] / "images"))
     parser.add_argument("--output", default=output)

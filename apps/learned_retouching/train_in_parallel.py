@@ -4,11 +4,11 @@
     torchrun --nproc_per_node N train_in_parallel.py [--reproducible] [--images FOLDER] [--output FOLDER] [--steps N]
                                                      [--size PIXELS] [--batch N] [--threads N] [--seed N]
 
-By DistributedDataParallel over gloo: each process differentiates the mean over its share, and gradients are averaged
-over processes, whose number shows in their last bits. With --reproducible each sample is differentiated alone, and every
-process sums the gradients of all samples in the order of samples: the weights are the same to the last bit on any number
-of processes that have the same number of threads each. Process 0 writes report.json: the losses, the time of a step, and
-a digest of the weights."""
+Uses DistributedDataParallel over gloo: each process differentiates the mean over its share, and gradients are averaged
+over processes, so their last bits depend on the number of processes. With --reproducible, each sample is differentiated
+separately, and every process sums the gradients of all samples in order. Then the weights are bit-identical for any
+number of processes with the same number of threads each. Process 0 writes report.json: the losses, the time of a step,
+and a digest of the weights."""
 import hashlib
 import json
 import os
@@ -25,7 +25,7 @@ from train import Training, large_enough, options_of, retouched
 
 
 def gathered(mine):
-    """A row for each sample of this process => one for each sample of the batch, in order."""
+    """Gathers a row for each sample of this process to one for each sample of the batch, in order."""
     parts = [torch.empty_like(mine) for _ in range(distributed.get_world_size())]
     distributed.all_gather(parts, mine)
     return torch.cat(parts)

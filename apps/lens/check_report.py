@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints what a run of lens reported, and fails when it is not what the demo promises.
+"""Prints the results of a run of lens, and fails if they are not what the demo promises.
 
 usage: check_report.py report.json
 """

@@ -25,7 +25,7 @@ bool has_group(const Lens& lens, const std::string& group) {
   return false;
 }
 
-// A lens that is hard to trace: what becomes of the start's numbers.
+// A lens that is hard to trace, as a change of the initial lens.
 struct HardCase {
   const char* name;
   std::function<void(const Scene&, Lens&)> change;
@@ -108,7 +108,7 @@ std::vector<apps::StabilityRow> check_stability(const Scene& scene) {
   for (const HardCase& hard : hard_cases()) {
     Lens lens = scene.lens;
     hard.change(scene, lens);
-    // What float32 holds, for both.
+    // Rounded to float32, so that both precisions get the same input.
     std::vector<double> x = numbers_of(scene, lens);
     for (double& v : x) v = static_cast<float>(v);
     std::vector<double> exact(x.size()), own(x.size());

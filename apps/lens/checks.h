@@ -8,11 +8,11 @@
 
 namespace lens {
 
-// By each group that the lens has, with all features that the scene has, beside a kink of the hinges.
+// Checks the gradient by each group that the lens has, with all features of the scene, away from the hinges' kinks.
 std::vector<apps::GradientRow> check_gradients(const Lens& lens, const SceneOptions& options);
 
-// Lenses at the ends of what can be traced: grazing incidence, rays that miss, total reflection, nearly
-// concentric surfaces, no power at all ...; float32 against double, and Adam with a large rate.
+// Lenses that can barely be traced: grazing incidence, rays that miss, total reflection, nearly concentric surfaces, no
+// optical power, and others. Compares float32 with double, and runs Adam with a large rate.
 std::vector<apps::StabilityRow> check_stability(const Scene& scene);
 
 }  // namespace lens

@@ -20,7 +20,7 @@ json profiles_of(const Scene& scene, const Lens& lens) {
   double vertex = 0;
   for (size_t k = 0; k < lens.surfaces.size(); ++k) {
     const Surface& surface = lens.surfaces[k];
-    // A lens without rims is drawn as high as its pupil, the stop as high as its light.
+    // Without a rim, a surface is drawn as high as the pupil; the stop is drawn as high as its light.
     double rim = surface.semi_aperture > 0 ? surface.semi_aperture : 1.2 * scene.pupil_radius;
     if (surface.stop) rim = std::abs(paraxial(lens).stop_per_pupil) * scene.pupil_radius;
     json z = json::array(), y = json::array();
@@ -47,7 +47,7 @@ json rays_of(const Scene& scene, const Lens& lens) {
       const TracedRay ray = trace_ray(lens, degrees, 0, 2.0 * n / (rays_per_field - 1) - 1,
                                       scene.pupil_radius, line_d);
       if (ray.fate != Fate::Arrived) continue;
-      // From a little before the lens.
+      // From slightly in front of the lens.
       const double before = 0.08 * scene.focal_length;
       json z = {ray.path[0][2] - before};
       json y = {ray.path[0][1] - before * std::tan(degrees * M_PI / 180)};

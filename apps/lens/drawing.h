@@ -1,4 +1,4 @@
-// drawing.h -- a lens as draw_lens.py wants it: outlines, rays, points of spots.
+// drawing.h -- the data that draw_lens.py needs to draw a lens: outlines, rays, points of spots.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// evaluator.h -- the model compiled: loss, gradient and Hessian-vector products at points in double.
+// evaluator.h -- the compiled model: loss, gradient and Hessian-vector products at points in double.
 #pragma once
 
 #include <span>
@@ -11,7 +11,7 @@ namespace lens {
 
 class Evaluator {
  public:
-  // `real`: Float(64), or Float(32), which all values are then rounded to.
+  // `real`: the type to compute in, Float(64) or Float(32), to which all values are then rounded.
   Evaluator(const Scene& scene, retrograde::Type real);
 
   void set_goal(double length_mm);
@@ -20,10 +20,10 @@ class Evaluator {
   void hessian_product(std::span<const double> x, std::span<const double> v,
                        std::span<double> product);
 
-  // Compiles the product, which hessian_product does when it is first asked for. Seconds.
+  // Compiles the Hessian-vector product, which hessian_product would otherwise do on its first call. Returns seconds.
   double compile_product();
 
-  // What the gradient is made of (Derivative::explain), and its operations over those of the loss.
+  // The gradient's stages (Derivative::explain), and its operations compared with those of the loss.
   std::string explain() const { return adjoints_.explain(); }
   retrograde::GradientOperations operations() const { return adjoints_.operations(); }
   double compile_seconds() const { return compile_seconds_; }

@@ -1,10 +1,10 @@
-// loss.cpp -- what the rays at the image are worth.
+// loss.cpp -- the loss, computed from the rays at the image.
 //
 //   loss = mean over the fields of spot^2, relative to the start
 //        + focal (f power - 1)^2                              the focal length, and so the F-number
 //        + length h(length / goal - 1)^2                      h: a hinge, max(0, .)
-//        + light mean h(light at the start - light)^2         rays that are lost must not pay
-//        + distortion mean h(|height / (f tan field) - 1| - 2 %)^2   the field of view
+//        + light mean h(light at the start - light)^2         losing rays must not reduce the loss
+//        + distortion mean h(|height / (f tan field) - 1| - 2 %)^2   keeps the field of view
 //        + thickness sum h(least - thickness, in the middle and at the rim)^2, in mm
 //        + index sum h(outside of [1.48, 1.80])^2
 #include <algorithm>
@@ -21,9 +21,9 @@ namespace {
 
 constexpr double distortion_free = 0.02;
 constexpr double lowest_index = 1.48, highest_index = 1.80;
-// Over the focal length: what glass and air must have, in the middle and at the rim.
+// Least thicknesses of glass and air, in the middle and at the rim, relative to the focal length.
 constexpr double glass_middle = 0.01, glass_rim = 0.005, air_middle = 0.002, air_rim = 0.0005;
-constexpr double equator = 0.1;  // of 1 - (1 + k) c^2 h^2 at the rim
+constexpr double equator = 0.1;  // least value of 1 - (1 + k) c^2 h^2 at the rim
 
 bool is_glass_gap(const Surface& s) { return s.index > 1.0001; }
 
@@ -64,7 +64,7 @@ Expr LensModel::sag_of(size_t k, double height) const {
   return c * h2 / (value(1) + sqrt(max(inside, value(equator))));
 }
 
-// What gap k lacks in the middle and at its rim, squared, and how far its surface bends beyond `equator`.
+// The squared shortfall of gap k in the middle and at its rim, and the violation of `equator` by its surface.
 Expr LensModel::thickness(size_t k) const {
   const auto& all = scene_.lens.surfaces;
   const auto short_by = [&](double least, const Expr& what) {
@@ -85,7 +85,7 @@ Expr LensModel::thickness(size_t k) const {
   if (k + 1 == all.size()) return sum;
   const double h = std::min(all[k].semi_aperture, all[k + 1].semi_aperture);
   if (h <= 0) return sum;
-  // Where the start itself is thinner, its own measure is the least.
+  // If the initial lens is thinner, its own thickness is the limit.
   const double there = all[k].spacing + sag(all[k + 1], h) - sag(all[k], h);
   const double rim = std::min((glass ? glass_rim : air_rim) * f, there);
   return sum + short_by(rim, number("spacings", k) + sag_of(k + 1, h) - sag_of(k, h));
@@ -110,7 +110,7 @@ Expr LensModel::constraints(const LossWeights& weights) const {
   sum += value(weights.thickness) * thin + value(weights.index) * indices;
 
   const int fields = static_cast<int>(scene_.fields_degrees.size());
-  std::vector<double> ideal;  // heights of an image without distortion
+  std::vector<double> ideal;  // image heights without distortion
   for (const double degrees : scene_.fields_degrees)
     ideal.push_back(f * std::tan(degrees * M_PI / 180));
   ideal[0] = 1;  // on the axis the centroid is at 0

@@ -1,4 +1,4 @@
-// main.cpp -- lens: make a lens shorter. See README.md beside this file.
+// main.cpp -- lens: makes a lens shorter. See README.md in this folder.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -29,7 +29,7 @@ SceneOptions scene_options(const Options& options) {
   return {options.common.optimize, options.fields, options.wavelengths};
 }
 
-// A run and what came out of it.
+// A run and its resulting lens.
 struct Result {
   Run run;
   Lens lens;
@@ -40,7 +40,7 @@ SpotReport judge(const Scene& scene, const Lens& lens) {
   return spots(lens, scene.fields_degrees, scene.wavelengths, scene.pupil_radius);
 }
 
-// The state of a run that can go on: the stage, and the best numbers in it.
+// The state for resuming a run: its stage, and the best numbers in that stage.
 class SavedRun {
  public:
   SavedRun(const Options& options, const Scene& scene)
@@ -78,7 +78,8 @@ Result run_method(const Options& options, const Scene& scene, Evaluator& evaluat
   how.seconds = options.common.seconds;
   how.stages = options.stages;
   saved.resume(how);
-  if (method == apps::Method::NewtonCg) evaluator.compile_product();  // not in its run time
+  if (method == apps::Method::NewtonCg)
+    evaluator.compile_product();  // so that it does not count as run time
   apps::Progress progress(stderr, static_cast<int>(how.steps));
   int last_stage = how.first_stage;
   Result result;
@@ -107,7 +108,7 @@ std::vector<apps::Method> methods_of(const Options& options) {
   return {apps::Method::Lbfgs, apps::Method::NewtonCg, apps::Method::Adam};
 }
 
-// The smallest spots by the reference's many rays, of those that did not pay for them with light.
+// The result with the smallest spots by the reference tracer's many rays, among those that did not lose light.
 const Result& best_of(const Scene& scene, const std::vector<Result>& results) {
   const double enough = 0.98 * judge(scene, scene.lens).mean_light;
   const auto price = [&](const Result& r) {
@@ -249,7 +250,7 @@ void print_explanation(const Scene& scene, const Evaluator& evaluator) {
   std::printf("%s\n", evaluator.explain().c_str());
 }
 
-// A table instead of the work.
+// For the checks: reports a table instead of a result.
 void write_table(const Options& options, const apps::Table& table) {
   apps::Report report("lens", options.common);
   report.add_table(table);

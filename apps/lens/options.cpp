@@ -20,7 +20,8 @@ std::optional<Options> read_options(int argc, char** argv) {
   options.common.optimize = {"curvatures", "spacings"};
   cli.add_option("--method", options.method, "adam, lbfgs, conjugate_gradient or newton_cg")
       ->capture_default_str();
-  cli.add_flag("--compare", options.compare, "by Adam, L-BFGS and Newton-CG, and the best of them");
+  cli.add_flag("--compare", options.compare,
+               "run Adam, L-BFGS and Newton-CG, and keep the best result");
   cli.add_option("--shorter", options.shorter_percent,
                  "percent of the length, from first vertex to image")
       ->capture_default_str();
@@ -28,9 +29,10 @@ std::optional<Options> read_options(int argc, char** argv) {
       ->capture_default_str();
   cli.add_option("--fields", options.fields, "directions, from the axis to half the field")
       ->capture_default_str();
-  cli.add_option("--stages", options.stages, "in which the length falls")->capture_default_str();
+  cli.add_option("--stages", options.stages, "number of stages in which the length is reduced")
+      ->capture_default_str();
   cli.add_option("--restarts", options.restarts,
-                 "more starts, moved at random: the loss has many minima")
+                 "additional random starts, because the loss has many minima")
       ->capture_default_str();
   if (!apps::parse_command_line(cli, argc, argv, options.common)) return std::nullopt;
   apps::method_named(options.method);

@@ -10,13 +10,12 @@ namespace lens {
 struct Options {
   apps::CommonOptions common;
   std::string method = "lbfgs";
-  bool compare = false;  // the other methods too, for the plot
+  bool compare = false;  // also run the other methods, for the plot
   double shorter_percent = 10;
   int wavelengths = 3, fields = 4, stages = 5, restarts = 0;
 };
 
-// Nothing when the command line asked only for help, which is then printed. Throws
-// retrograde::UserError.
+// Nothing if the command line only requested help, which is then printed. Throws retrograde::UserError.
 std::optional<Options> read_options(int argc, char** argv);
 
 }  // namespace lens

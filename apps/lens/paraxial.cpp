@@ -6,20 +6,20 @@ namespace lens {
 namespace {
 
 struct ParaxialRay {
-  double height, angle;  // angle: times the index
+  double height, angle;  // angle times the index
 };
 
 }  // namespace
 
 Paraxial paraxial(const Lens& lens, double wavelength) {
-  // Parallel to the axis, and through the first vertex.
+  // One ray parallel to the axis, and one through the first vertex.
   ParaxialRay along{1, 0}, through{0, 1};
   Paraxial out;
   double before = 1;
   for (size_t k = 0; k < lens.surfaces.size(); ++k) {
     const Surface& surface = lens.surfaces[k];
     if (surface.stop) {
-      // A ray through the middle of the stop: height along.height + angle through.height = 0.
+      // A ray through the middle of the stop satisfies: height along.height + angle through.height = 0.
       out.pupil_place = through.height / along.height;
       out.stop_per_pupil = along.height;
     }

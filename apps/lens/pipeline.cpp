@@ -1,4 +1,4 @@
-// pipeline.cpp -- see pipeline.h: the rays. loss.cpp has what is made of them.
+// pipeline.cpp -- see pipeline.h: traces the rays. loss.cpp computes the loss from them.
 #include "pipeline.h"
 
 #include <cmath>
@@ -11,12 +11,12 @@ using namespace retrograde;
 
 namespace {
 
-// Squares of cosines: below `gone` a ray does not count, from `whole` on it counts fully; 0.003 is an angle
-// of 87 degrees.
+// Limits on squared cosines: below `gone` a ray does not count, above `whole` it counts fully; 0.003 corresponds to an
+// angle of 87 degrees.
 constexpr double cosine_gone = 1e-3, cosine_whole = 5e-3;
-// Squared height over the rim's.
+// Width of the transition in squared height, relative to the rim's.
 constexpr double rim_soft = 0.04;
-// Rays far beyond a rim stay there, so that none runs away to infinity on the next surfaces.
+// Rays far beyond a rim are clamped to it, so that they do not diverge on the next surfaces.
 constexpr double farthest_in_rims = 4;
 
 std::string numbered(const char* name, size_t k) { return name + std::to_string(k + 1); }
@@ -114,7 +114,7 @@ void LensModel::trace_rays() {
   image(ray_) = Tuple(at[0], at[1], at[5]);
 }
 
-// From the entrance pupil to the plane of the first vertex.
+// Rays from the entrance pupil to the plane of the first vertex.
 Func LensModel::launched() const {
   std::vector<double> x, y, sines, cosines;
   for (const PupilPoint& point : pupil_points(scene_.rings, scene_.spokes)) {
@@ -139,7 +139,7 @@ Expr LensModel::step(const Expr& at, double low, double high) const {
   return t * t * (value(3) - value(2) * t);
 }
 
-// Through surface k, on to the plane of the next vertex (of the last one: to the image).
+// Traces rays through surface k to the plane of the next vertex (after the last surface: to the image).
 Func LensModel::through_surface(size_t k, const Func& before) const {
   const Surface& surface = scene_.lens.surfaces[k];
   const auto ray = before(std::vector<Expr>(ray_.begin(), ray_.end()));

@@ -1,8 +1,8 @@
-// pipeline.h -- the lens in the language: rays through all surfaces, and the loss.
+// pipeline.h -- the lens as a pipeline: traces rays through all surfaces and computes the loss.
 //
-// A ray is (x, y) on the plane of the next vertex, the cosines (L, M, N) of its direction, and a weight, by
-// which it counts at the image. At a surface of curvature c and conic constant k (G. Spencer, M. Murty,
-// General ray-tracing procedure, JOSA 52, 1962; W. Welford, Aberrations of Optical Systems, section 4)
+// A ray is (x, y) on the plane of the next vertex, the direction cosines (L, M, N), and a weight at the image. At a
+// surface of curvature c and conic constant k (G. Spencer, M. Murty, General ray-tracing procedure, JOSA 52, 1962; W.
+// Welford, Aberrations of Optical Systems, section 4)
 //
 //   F = c (x^2 + y^2),  G = N - c (L x + M y),  A = c (1 + k N^2),  H = sqrt(G^2 - A F)
 //   it travels F / (G + H) to the surface; H is the cosine of incidence times E, where
@@ -10,12 +10,12 @@
 //   with m = n / n', I = H / E:  J = sqrt(1 - m^2 (1 - I^2)),  g = J - m I
 //   (L, M, N) <- m (L, M, N) + g normal / E
 //
-// With k = 0: A = c, E = 1. What is plane in glass that does not move folds to constants.
+// With k = 0: A = c, E = 1. Terms of planes in glass that is not optimized fold to constants.
 //
-// Masks. Where H^2 or J^2 falls below a limit the ray misses the surface or is totally reflected; beyond the
-// rim it is vignetted. Roots are taken of what is at least the limit, so nothing is infinite or NaN, and the
-// weight goes to 0 before that, smoothly (a cubic step), so that the loss has a gradient. What is lost this
-// way is kept from paying: the loss asks for as much light in every field as there was at the start.
+// Masks. If H^2 or J^2 falls below a limit, the ray misses the surface or is totally reflected; beyond the rim it is
+// vignetted. Square roots are taken of values clamped to the limit, so nothing is infinite or NaN. The weight falls to
+// 0 smoothly before the limit (a cubic step), so that the loss has a gradient. Losing rays must not reduce the loss: it
+// requires as much light in every field as the initial lens has.
 #pragma once
 
 #include <retrograde/retrograde.h>
@@ -32,10 +32,10 @@ class LensModel {
  public:
   LensModel(const Scene& scene, retrograde::Type real, const LossWeights& weights = {});
 
-  retrograde::ImageParam variables;  // (n), in the units of the optimizer
+  retrograde::ImageParam variables;  // (n), in the optimizer's units
   retrograde::ImageParam goal;       // (1): the length, mm
   retrograde::Func image;            // (ray, field[, wavelength]): x, y, weight, at the image
-  retrograde::Func light;            // (field): of the rays, how many arrived
+  retrograde::Func light;            // (field): share of the rays that arrived
   retrograde::Func spot_square;      // (field): mm^2, about the centroid
   retrograde::Func loss;
 
@@ -45,10 +45,10 @@ class LensModel {
   using Func = retrograde::Func;
 
   Expr value(double number) const { return retrograde::cast(real_, Expr(number)); }
-  // A number of the lens: one that moves, or a constant.
+  // A number of the lens: a variable, or a constant if it is not optimized.
   Expr number(const std::string& group, size_t surface) const;
-  Expr index(size_t surface) const;  // behind it, at line d
-  // A Func of one dimension that holds these.
+  Expr index(size_t surface) const;  // of the medium behind it, at line d
+  // A one-dimensional Func with these values.
   Func table(const std::string& name, const std::vector<double>& values) const;
 
   void trace_paraxial();

@@ -23,7 +23,7 @@ namespace {
   retrograde::call_error(asked, rule, evidence, instead);
 }
 
-// A number of the JSON, which must be one when it is there.
+// A number of the JSON; if the key is present, its value must be a number.
 double number(const std::string& asked, const json& from, const char* key, double otherwise) {
   const auto found = from.find(key);
   if (found == from.end() || found->is_null()) return otherwise;
@@ -32,7 +32,7 @@ double number(const std::string& asked, const json& from, const char* key, doubl
   return found->get<double>();
 }
 
-// Of "n_D" with "n_F", as old patents print them, or of "n_d" with "V_d", as newer ones do.
+// Reads "n_D" with "n_F", as in old patents, or "n_d" with "V_d", as in newer ones.
 void read_medium(const std::string& asked, const json& from, Surface& to) {
   if (from.contains("n_D")) {
     const double n_D = number(asked, from, "n_D", 1), n_F = number(asked, from, "n_F", n_D);
@@ -50,7 +50,7 @@ Surface read_surface(const std::string& asked, const json& from, double scale) {
   if (!from.is_object())
     refuse_lens(asked, "a surface is an object with a radius, a spacing ...", from.dump());
   Surface to;
-  const double radius = number(asked, from, "radius", 0);  // null, 0 or none: a plane
+  const double radius = number(asked, from, "radius", 0);  // null, 0 or missing: a plane
   to.curvature = radius == 0 ? 0 : 1 / (scale * radius);
   to.conic = number(asked, from, "conic", 0);
   to.spacing = scale * number(asked, from, "spacing", NAN);
@@ -86,7 +86,7 @@ Lens lens_of(const std::string& asked, const json& from) {
   return lens;
 }
 
-// One surface and what lies behind it.
+// Checks one surface and the medium behind it.
 void check_surface(const Lens& lens, size_t k, const std::string& asked) {
   const Surface& s = lens.surfaces[k];
   const std::string which = text("surface ", k + 1);

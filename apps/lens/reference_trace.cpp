@@ -1,7 +1,7 @@
 // reference_trace.cpp -- see reference_trace.h.
 //
-// Another way than the pipeline's on purpose: surfaces are met by Newton's method on their equation, and
-// refraction is Snell's law with vectors.
+// It deliberately uses other methods than the pipeline: Newton's method finds the intersection with a surface from its
+// equation, and refraction is Snell's law on vectors.
 #include "reference_trace.h"
 
 #include <cmath>
@@ -30,19 +30,19 @@ Point surface_gradient(const Surface& s, const Point& p) {
           2 * s.curvature * (1 + s.conic) * p[2] - 2};
 }
 
-// Where the ray meets the sheet of the surface that has the vertex on it.
+// The intersection of the ray with the sheet of the surface that contains the vertex.
 std::optional<Point> meet(const Surface& s, const Point& from, const Point& along) {
   Point at = moved(from, -from[2] / along[2], along);
   for (int n = 0; n < 50; ++n) {
     const double value = surface_value(s, at), slope = dot(surface_gradient(s, at), along);
-    if (!(slope < 0)) return std::nullopt;  // it left the sheet
+    if (!(slope < 0)) return std::nullopt;  // the ray left the sheet
     at = moved(at, -value / slope, along);
     if (std::abs(value / slope) < 1e-13) return at;
   }
   return std::nullopt;
 }
 
-// Unit vectors; `normal` points against the light. Nothing: it is totally reflected.
+// Takes unit vectors; `normal` points against the light. Nothing if the ray is totally reflected.
 std::optional<Point> refracted(const Point& along, const Point& normal, double ratio) {
   const double cosine = -dot(along, normal);
   const double inside = 1 - ratio * ratio * (1 - cosine * cosine);
@@ -58,7 +58,7 @@ Point unit(Point p) {
   return p;
 }
 
-// Zeros of Legendre's polynomial over [-1, 1] by Newton's method from the usual guess, with the weights.
+// Zeros of Legendre's polynomial on [-1, 1], by Newton's method from the usual initial guess, with their weights.
 std::vector<std::pair<double, double>> gauss_rule(int points) {
   std::vector<std::pair<double, double>> rule;
   for (int n = 0; n < points; ++n) {
@@ -98,7 +98,7 @@ SpotField spot_of_field(const Lens& lens, double degrees, const std::vector<doub
   field.light = sums.weight / static_cast<double>(wavelengths.size());
   if (sums.weight == 0) return field;
   field.centroid = sums.y / sums.weight;
-  // The left half of the pupil mirrors the right: its mean x is 0.
+  // The left half of the pupil mirrors the right half, so the mean x is 0.
   field.rms = std::sqrt(std::max(sums.square / sums.weight - field.centroid * field.centroid, 0.0));
   return field;
 }
@@ -176,7 +176,7 @@ Lens refocused(const Lens& lens, const std::vector<double>& fields_degrees,
     back = place;
     return spots(at, fields_degrees, wavelengths, pupil_radius, 6, 12).mean_rms;
   };
-  // Golden section, over 5 % of the distance to both sides.
+  // Golden-section search, over 5 % of the distance on both sides.
   const double golden = (std::sqrt(5.0) - 1) / 2;
   double low = 0.95 * middle, high = 1.05 * middle;
   while (high - low > 1e-5 * middle) {

@@ -17,7 +17,7 @@ namespace {
 
 bool is_glass(const Surface& surface) { return surface.index > 1.0001; }
 
-// Curvatures and conics belong to surfaces that refract, indices to glass; every gap has a spacing.
+// Refracting surfaces have curvatures and conics, glass has indices; every gap has a spacing.
 bool has_number(const Surface& surface, const std::string& group) {
   if (group == "spacings") return true;
   if (group == "indices") return is_glass(surface);
@@ -42,7 +42,7 @@ void add_variables(Scene& scene, const std::string& group) {
   }
 }
 
-// Equal steps of the image's height.
+// Equal steps of image height.
 std::vector<double> fields_of(double half_field_degrees, int count) {
   const double largest = std::tan(half_field_degrees * M_PI / 180);
   std::vector<double> fields;

@@ -1,4 +1,4 @@
-// scene.h -- what is optimized: a lens, the light that it is judged by, and which of its numbers may move.
+// scene.h -- the optimization problem: a lens, the rays that judge it, and the numbers that are optimized.
 #pragma once
 
 #include <string>
@@ -8,11 +8,11 @@
 
 namespace lens {
 
-// What --optimize names.
+// The groups for --optimize.
 inline const std::vector<std::string> groups = {"curvatures", "spacings", "indices", "conics"};
 
-// One number of the lens. The optimizer sees it in units of `scale`, in which a step of 1 changes the
-// image about as much for all of them.
+// One number of the lens. The optimizer sees it in units of `scale`, chosen so that a step of 1 changes the image about
+// equally for all numbers.
 struct Variable {
   std::string group;
   size_t surface = 0;
@@ -20,18 +20,18 @@ struct Variable {
 };
 
 struct Scene {
-  Lens lens;                           // as it is at the start
+  Lens lens;                           // the initial lens
   std::vector<double> fields_degrees;  // three or four over the field
   std::vector<double> wavelengths;     // um
   std::vector<Variable> variables;
-  double focal_length = 0;    // mm, to be kept
+  double focal_length = 0;    // mm; must be kept
   double pupil_radius = 0;    // mm: focal length over twice the F-number
-  int rings = 4, spokes = 6;  // rays of a field and wavelength
-  // Of the start, by the rays of the pipeline: what the loss is relative to.
+  int rings = 4, spokes = 6;  // rays per field and wavelength
+  // Values of the initial lens by the pipeline's rays; the loss is relative to them.
   double spot_square = 1;     // mm^2, mean over the fields
-  std::vector<double> light;  // of each field
+  std::vector<double> light;  // per field
 
-  // What the compiled code has. What is false leaves no trace in it.
+  // Features of the compiled code; features that are absent add no code.
   bool has_dispersion() const { return wavelengths.size() > 1; }
   bool has_conic(size_t surface) const;
   bool has_rims() const;
@@ -43,17 +43,17 @@ struct SceneOptions {
   int wavelengths = 3;  // 1: d; 2: F, C; 3: F, d, C
 };
 
-// The lens at its best focus becomes the start. Throws retrograde::UserError when a group has nothing
-// to move or no light arrives.
+// Refocuses the lens and makes it the initial one. Throws retrograde::UserError if a group contains no number, or if no
+// light arrives.
 Scene make_scene(const Lens& lens, const SceneOptions& options);
 
-std::vector<double> start_of(const Scene& scene);  // in the units of the optimizer
+std::vector<double> start_of(const Scene& scene);  // in the optimizer's units
 Lens lens_at(const Scene& scene, const std::vector<double>& x);
 
-// The number that a variable stands for, in millimetres and the like.
+// The number that a variable refers to, in millimetres or other natural units.
 double& number_of(Lens& lens, const Variable& variable);
 
-// What the compiled code leaves out because the scene does not use it, a line each.
+// Features that the compiled code leaves out because the scene does not use them, one line each.
 std::vector<std::string> left_out(const Scene& scene);
 
 }  // namespace lens

@@ -11,7 +11,7 @@ namespace lens {
 
 namespace {
 
-// A penalty is never quite met: what is asked for is this much shorter than what is wanted.
+// A penalty is never met exactly, so the loss demands a length shorter by this fraction.
 constexpr double margin = 0.002;
 constexpr double adam_rate = 0.3, adam_last = 0.02;
 
@@ -27,7 +27,7 @@ apps::Problem problem_of(Evaluator& evaluator, const Scene& scene) {
   return problem;
 }
 
-// One stage's series after those before it; its sample 0 is where the last stage ended.
+// Appends a stage's series to those before it; its sample 0 is the end of the previous stage.
 void append(Run& run, const apps::Minimum& stage) {
   const double before = run.series.empty() ? 0 : run.series.back().seconds;
   for (const apps::LossSample& sample : stage.series)
@@ -41,7 +41,7 @@ void append(Run& run, const apps::Minimum& stage) {
   run.stopped |= stage.stopped;
 }
 
-// Around the start by about a fifth of the strongest curvatures and a millimetre at f = 100.
+// Random changes of the initial lens, of about a fifth of the strongest curvatures and a millimetre at f = 100.
 std::vector<double> moved_start(const Scene& scene, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   std::vector<double> x = start_of(scene);
@@ -67,7 +67,7 @@ Run shorten(Evaluator& evaluator, const Scene& scene, const ShortenOptions& opti
     apps::MinimizeOptions how{.method = options.method};
     how.steps = std::max((options.steps - run.steps) / left, 1L);
     const double spent = run.series.empty() ? 0 : run.series.back().seconds;
-    // A budget that is spent still gives each stage one step.
+    // Even if the time limit is used up, each stage gets one step.
     if (options.seconds > 0) how.seconds = std::max((options.seconds - spent) / left, 1e-6);
     how.rate = adam_rate;
     how.adam.schedule = apps::exponential_schedule(how.steps, adam_last);
@@ -88,7 +88,7 @@ Run shorten_from_many(Evaluator& evaluator, const Scene& scene, const ShortenOpt
                       const std::function<void(int restart, double best_loss)>& callback) {
   std::mt19937_64 random(seed);
   ShortenOptions from_elsewhere = options;
-  // A start elsewhere has no length to come down from: one stage.
+  // A random start has no length from which to shorten gradually, so there is only one stage.
   from_elsewhere.stages = 1;
   from_elsewhere.first_stage = 0;
   const auto begin = std::chrono::steady_clock::now();

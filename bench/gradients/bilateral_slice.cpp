@@ -1,6 +1,5 @@
-// bilateral_slice -- an affine grid, sliced by position and brightness: by grid and image.
-// Source: Gharbi et al., Deep Bilateral Learning for Real-Time Image Enhancement, SIGGRAPH 2017,
-// section 3.3.
+// bilateral_slice -- an affine grid, sliced by position and brightness. Gradients: grid and image. Source: Gharbi et
+// al., Deep Bilateral Learning for Real-Time Image Enhancement, SIGGRAPH 2017, section 3.3.
 #include "gradient.h"
 
 namespace kernels {

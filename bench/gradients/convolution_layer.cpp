@@ -1,4 +1,4 @@
-// convolution_layer -- 3 x 3, 16 channels in and out, bias, ReLU: by input, weights and bias.
+// convolution_layer -- 3 x 3, 16 channels in and out, bias, ReLU. Gradients: input, weights and bias.
 #include "gradient.h"
 
 namespace kernels {
@@ -17,7 +17,7 @@ Kernel convolution_layer(const Setup& setup) {
   layer(x, y, c) = bias(c);
   layer(x, y, c) += weights(r.x, r.y, r.z, c) * input(x + r.x, y + r.y, r.z);
   relu(x, y, c) = max(layer(x, y, c), 0.0f);
-  // The layer again, for the sign, and two sums of as many products.
+  // Counts the layer once more, for the sign, and two sums with as many products.
   const double products = 9.0 * channels * channels * width * height;
   return gradients_of(setup, relu, {width, height, channels}, {input, weights, bias},
                       3 * 2 * products);

@@ -1,4 +1,4 @@
-// cross_entropy -- of a softmax over 32 classes, as it is written where nothing overflows.
+// cross_entropy -- of a softmax over 32 classes, in a form that does not overflow.
 #include "gradient.h"
 
 namespace kernels {

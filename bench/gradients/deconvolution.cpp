@@ -1,4 +1,4 @@
-// deconvolution -- what an image and a blur kernel of 7 x 7 give: by both.
+// deconvolution -- an image convolved with a 7 x 7 blur kernel. Gradients: both.
 #include "gradient.h"
 
 namespace kernels {

@@ -1,5 +1,5 @@
-// denoising -- fidelity and smoothed total variation of every pixel: by the image.
-// Source: Rudin, Osher, Fatemi, Nonlinear total variation based noise removal, 1992.
+// denoising -- fidelity plus smoothed total variation of every pixel. Gradients: the image. Source: Rudin, Osher,
+// Fatemi, Nonlinear total variation based noise removal, 1992.
 #include "gradient.h"
 
 namespace kernels {

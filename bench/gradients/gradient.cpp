@@ -14,7 +14,7 @@ std::vector<int> sizes_of(const Buffer<real>& values) {
 }
 
 #ifdef BENCH_FLOAT64
-// An adjoint in memory is one of floats.
+// Adjoints are stored in floats.
 Derivative derivative_of(const Func& output, const Buffer<real>& seed) {
   Region bounds;
   for (int size : sizes_of(seed)) bounds.push_back({0, size});
@@ -29,7 +29,7 @@ Derivative derivative_of(const Func& output, const Buffer<real>& seed) {
 }
 #endif
 
-// An operator's sizes are known when it is compiled.
+// An operator's sizes are constants at compile time.
 void add_output(Kernel& kernel, std::vector<Func>& funcs, const Setup& setup, Func func,
                 const std::vector<int>& sizes) {
   Region all;

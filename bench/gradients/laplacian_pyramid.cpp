@@ -1,5 +1,5 @@
-// laplacian_pyramid -- an image taken apart into 4 levels, each with a gain, and put together: by
-// image and gains.
+// laplacian_pyramid -- splits an image into 4 levels, applies a gain to each, and recombines them. Gradients: image and
+// gains.
 #include "gradient.h"
 
 namespace kernels {

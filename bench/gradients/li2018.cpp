@@ -1,6 +1,5 @@
-// li2018.cpp -- how gradients are scheduled: by Halide 14 with Li2018, by Retrograde as they come;
-// and by its autoscheduler kernels without their schedules: "Retrograde", or its options
-// ("search=true").
+// li2018.cpp -- schedules gradients: Halide 14 uses Li2018, Retrograde its default schedule. For kernels without their
+// own schedule it uses Retrograde's autoscheduler: "Retrograde", or its options ("search=true").
 #include "gradient.h"
 
 namespace kernels {

@@ -1,4 +1,4 @@
-// normalisation -- each channel to mean 0 and variance 1, then scaled and shifted: by all inputs.
+// normalisation -- normalises each channel to mean 0 and variance 1, then scales and shifts it. Gradients: all inputs.
 // Source: Wu and He, Group Normalization, ECCV 2018, equations 1 to 4.
 #include "gradient.h"
 

@@ -1,15 +1,15 @@
 #!/usr/bin/python3
-"""pytorch_peers.py -- the gradients of this folder beside PyTorch's, in one run.
+"""pytorch_peers.py -- compares the gradients of this folder with PyTorch's, in one run.
 
     pytorch_peers.py WORKER [--program NAME] [--rounds N] [--threads N] [--small] [--output FILE]
 
-WORKER is bench_kernels_retrograde, asked as ../pairs/worker_protocol.h says; PyTorch runs in this
-process, that of the virtual environment of ../operators/operators.py, which is made when it is not
-there. All run in turn, on the same inputs and as many threads. PyTorch's programs are what its users
-write: the operators of torch.nn.functional where there is one, autograd for the gradients, as they
-are and through torch.compile. Its time is that of the forward and the backward pass (autograd needs
-both), ours that of the gradients with what they need of the program. Error: the largest
-|ours - theirs| / max(|theirs|, root mean square), as in ../README.md; theirs is the eager one.
+WORKER is bench_kernels_retrograde, which implements ../pairs/worker_protocol.h. PyTorch runs in this
+process, from the virtual environment of ../operators/operators.py, which is created if missing.
+All run in turn, on the same inputs and number of threads. PyTorch's programs are written as its users
+do: by the operators of torch.nn.functional where available, with autograd for the gradients, eagerly
+and through torch.compile. PyTorch's time covers the forward and the backward pass (autograd needs
+both); ours covers the gradients, including the values of the program that they need. Error: the
+largest |ours - theirs| / max(|theirs|, root mean square), as in ../README.md; theirs is the eager one.
 """
 import argparse
 import json
@@ -98,7 +98,7 @@ def deconvolution(size):
 
 
 def scan(rows):
-    """Along the first dimension."""
+    """A recursive filter along the first dimension."""
     state, result = None, []
     for row in rows.unbind(0):
         state = row if state is None else 0.4 * row + 0.6 * state
@@ -257,12 +257,11 @@ def largest_error(ours, theirs):
 
 
 def compiled_side(program, options):
-    """None where torch.compile has not the program within COMPILE_SECONDS: a scan is as many operators
-    as it has rows."""
+    """None if torch.compile takes longer than COMPILE_SECONDS; a scan becomes one operator per row."""
     def too_long(*_):
         raise TimeoutError(f"not compiled within {COMPILE_SECONDS} s")
 
-    logging.disable(logging.CRITICAL)  # of a compiler that is interrupted
+    logging.disable(logging.CRITICAL)  # silences the interrupted compiler
     before = signal.signal(signal.SIGALRM, too_long)
     signal.alarm(COMPILE_SECONDS)
     try:

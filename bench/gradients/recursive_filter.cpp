@@ -1,4 +1,4 @@
-// recursive_filter -- first order, along rows and then along columns: by the image.
+// recursive_filter -- a first-order filter along rows and then along columns. Gradients: the image.
 #include "gradient.h"
 
 namespace kernels {

@@ -20,7 +20,7 @@ float sign(uint32_t direction, size_t input, size_t element) {
   return scrambled(scrambled(n) + direction) & 1 ? 1.0f : -1.0f;
 }
 
-// Calls f(element, its sign) for each element of the inputs that gradients are by.
+// Calls f(element, its sign) for each element of the inputs that have gradients.
 template <typename F>
 void along(const std::vector<Halide::Buffer<>>& buffers, size_t count, uint32_t direction, F f) {
   for (size_t i = 0; i < count; i++) {

@@ -1,4 +1,4 @@
-// tone_curve -- an image through a curve of 64 knots, linear between them: by curve and image.
+// tone_curve -- maps an image through a curve with 64 knots, linear in between. Gradients: curve and image.
 #include "gradient.h"
 
 namespace kernels {

@@ -1,4 +1,4 @@
-// warp -- an image read between pixels, where a flow says: by image and flow.
+// warp -- reads an image between pixels, at positions given by a flow. Gradients: image and flow.
 #include "gradient.h"
 
 namespace kernels {

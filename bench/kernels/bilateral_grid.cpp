@@ -1,9 +1,9 @@
-// bilateral_grid -- Chen, Paris and Durand (2007), "Real-time edge-aware image processing with the
-// bilateral grid": pixels are added up in a coarse grid over brightness and place, the grid is
-// smoothed, and read back at each pixel's own brightness and place (sections 3.1 to 3.3).
+// bilateral_grid -- Chen, Paris and Durand (2007), "Real-time edge-aware image processing with the bilateral grid":
+// pixels are accumulated in a coarse grid over brightness and position, the grid is smoothed, and it is read back at
+// each pixel's own brightness and position (sections 3.1 to 3.3).
 //
-// Brightness is innermost in memory, so that one cell's pixels fall into one short vector; the grid
-// is a picture of such vectors.
+// Brightness is innermost in memory, so that the pixels of one cell fall into one short vector; the grid is a picture
+// of such vectors.
 #include "kernel.h"
 
 #include <cmath>
@@ -14,8 +14,8 @@ using namespace Halide;
 
 namespace {
 
-// Brightness of all pixels of a cell and bin together, and their number: the paper's homogeneous
-// value, whose quotient is the mean.
+// The sum of brightness over all pixels of a cell and bin, and their number: the paper's homogeneous value, whose
+// quotient is the mean.
 struct Homogeneous {
   Expr value, weight;
   Homogeneous(Expr v, Expr w) : value(v), weight(w) {}
@@ -29,8 +29,7 @@ Homogeneous between(const Homogeneous& a, const Homogeneous& b, Expr part) {
   return {lerp(a.value, b.value, part), lerp(a.weight, b.weight, part)};
 }
 
-// A Gaussian one cell wide, cut at two, along one axis of the grid. Its scale cancels in the
-// quotient.
+// A Gaussian one cell wide, truncated at two cells, along one axis of the grid. Its scale cancels in the quotient.
 Func smoothed(const Func& grid, int axis, const std::string& name) {
   const std::vector<Var> place = grid.args();
   auto tap = [&](int offset) {
@@ -52,7 +51,7 @@ Kernel bilateral_grid(const Setup& setup) {
   ImageParam input(Float(32), 2, "input");
   Var x("x"), y("y"), bin("bin"), column("column"), row("row"), strip("strip");
 
-  // Pixels go to the grid point that they are nearest to.
+  // Each pixel contributes to its nearest grid point.
   Func extended = BoundaryConditions::repeat_edge(input), splat("splat");
   RDom pixel(-cell / 2, cell, -cell / 2, cell);
   Expr brightness = clamp(extended(column * cell + pixel.x, row * cell + pixel.y), 0.0f, 1.0f);
@@ -64,7 +63,7 @@ Kernel bilateral_grid(const Setup& setup) {
   Func by_row = smoothed(splat, 2, "by_row");
   Func by_column = smoothed(by_row, 1, "by_column"), grid = smoothed(by_column, 0, "grid");
 
-  // Trilinear in the eight grid points around.
+  // Trilinear interpolation of the eight surrounding grid points.
   Func result("result");
   Expr own = clamp(input(x, y), 0.0f, 1.0f) * bins, low = cast<int>(own);
   Expr i = x / cell, j = y / cell;

@@ -1,6 +1,6 @@
 // box_blur -- the mean of 5 x 5 pixels, in 16-bit integers: sums along rows, then along columns.
 //
-// Each strip of rows slides down: a row of sums is made once and used by five rows of results.
+// Each strip of rows slides down: a row of sums is computed once and used by five rows of results.
 #include "kernel.h"
 
 namespace kernels {

@@ -1,8 +1,8 @@
-// camera_pipe -- from a raw Bayer mosaic of 10 bits to a colour picture of 8, in 16-bit integers:
-// hot pixels, demosaicking along the direction of the least slope (Hamilton and Adams 1997), colour
-// matrix, tone curve by a table, sharpening.
+// camera_pipe -- converts a raw Bayer mosaic of 10 bits to a colour picture of 8 bits, in 16-bit integers: hot pixels,
+// demosaicking along the direction of the smallest gradient (Hamilton and Adams 1997), colour matrix, tone curve by a
+// table, sharpening.
 //
-// Strips of rows slide down two at a time, as the mosaic repeats.
+// Strips of rows slide down two rows at a time, like the period of the mosaic.
 #include "kernel.h"
 
 namespace kernels {
@@ -20,7 +20,7 @@ Kernel camera_pipe(const Setup& setup) {
   ImageParam raw(UInt(16), 2, "raw");
   Var x("x"), y("y"), c("c"), yi("yi"), yii("yii");
 
-  // A pixel beyond all four neighbours of its colour is as bright as the nearest of them.
+  // A pixel brighter or darker than all four neighbours of its colour gets the value of the nearest of them.
   Func sound("sound");
   auto at = [&](int dx, int dy) { return cast<int16_t>(raw(x + border + dx, y + border + dy)); };
   Expr least = min(min(at(-2, 0), at(2, 0)), min(at(0, -2), at(0, 2)));
@@ -36,7 +36,7 @@ Kernel camera_pipe(const Setup& setup) {
   };
   auto g0 = plane(0), r = plane(1), b = plane(2), g1 = plane(3);
 
-  // Green where red or blue was measured: between the two neighbours that differ less.
+  // Green at red or blue samples: the mean of the two opposite neighbours that differ less.
   Func green_r("green_r"), green_b("green_b");
   auto steadier = [](Expr left, Expr right, Expr above, Expr below) {
     return select(absd(left, right) < absd(above, below), average(left, right),
@@ -94,7 +94,7 @@ Kernel camera_pipe(const Setup& setup) {
     sharp.bound(c, 0, 3).split(y, y, yi, 64).split(yi, yi, yii, 2);
     sharp.reorder(x, c, yii, yi, y).parallel(y).vectorize(x, lanes);
     curve.compute_root();
-    // Two rows a step, always an even one and the odd one after it.
+    // Two rows per step: an even one and the following odd one.
     toned.store_at(sharp, y).compute_at(sharp, yi).align_bounds(y, 2);
     toned.bound(c, 0, 3).reorder(c, x, y).unroll(c).vectorize(x, lanes);
     mosaic.compute_at(sharp, yi).align_bounds(x, 2).align_bounds(y, 2).bound(c, 0, 3);

@@ -1,8 +1,8 @@
-// conv_layer -- a layer of a convolutional network: 3 x 3 taps around each pixel, zeros beyond the
-// picture, 32 features in and 32 out, an offset for each, negative values cut; a batch of 4.
+// conv_layer -- a layer of a convolutional network: 3 x 3 taps, zero padding, 32 features in and 32 out, a bias for
+// each, ReLU; a batch of 4.
 //
-// Features lie innermost. A task makes one row of one picture; all features of 8 pixels next to
-// each other stay in registers over the whole sum.
+// Features are innermost. A task computes one row of one picture; all features of 8 adjacent pixels stay in registers
+// for the whole sum.
 #include "kernel.h"
 
 namespace kernels {
@@ -36,14 +36,14 @@ Kernel conv_layer(const Setup& setup) {
     sums.update().reorder(lane, out, x, in, dx, dy, y, which).unroll(out).unroll(x);
   }
 
-  // The picture lies in a frame of zeros.
+  // The picture is surrounded by zeros.
   Buffer<float> image = make_image<float>({features, width + 2, height + 2, batch});
   image.for_each_element([&](int f, int i, int j, int n) {
     if (i == 0 || j == 0 || i == width + 1 || j == height + 1) image(f, i, j, n) = 0.0f;
   });
   image.set_min(std::vector<int>{0, -reach, -reach, 0});
   Buffer<float> weights(features, features, taps, taps);
-  // Of both signs, so that about half of the sums are cut.
+  // Weights of both signs, so that ReLU clamps about half of the sums.
   for (uint32_t i = 0; i < weights.number_of_elements(); i++)
     weights.data()[i] = (static_cast<float>(scrambled(i) & 1023) / 1023 - 0.5f) * 0.2f;
   weights.set_min(std::vector<int>{0, 0, -reach, -reach});

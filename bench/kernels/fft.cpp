@@ -1,8 +1,8 @@
 // fft -- complex Fourier transforms of a batch of 256 x 256 pictures: four passes of radix 4
 // (Cooley and Tukey 1965) along y, then along x.
 //
-// A pass runs over vectors of neighbouring columns, so that no butterfly crosses lanes: a task
-// transforms a strip of columns in cache and stores it transposed for the other direction.
+// A pass runs over vectors of adjacent columns, so that no butterfly crosses lanes. A task transforms a strip of
+// columns in cache and stores it transposed for the other direction.
 #include "kernel.h"
 
 namespace kernels {
@@ -25,13 +25,12 @@ Complex times_minus_i(const Complex& a) { return {a.im, -a.re}; }
 
 constexpr int length = 256;
 
-// Transforms the columns of f(x, y, n); the result is transposed. twiddle(k) is exp(-2 pi i k /
-// 256).
+// Transforms the columns of f(x, y, n); the result is transposed. twiddle(k) is exp(-2 pi i k / 256).
 //
-// With y = 64 a + 16 b + 4 c + d in digits, the passes replace a, b, c and d in turn by digits of
-// the frequency (the order of Stockham's method). After s of them a point is (x, i, k, o, n): i
-// holds the s - 1 digits of the frequency that were there before, k the newest one, o the digits of
-// y that are left; kept in that order, it lies at (o * 4 + k) * 4^(s - 1) + i.
+// With y = 64 a + 16 b + 4 c + d in digits, the passes replace a, b, c and d in turn by digits of the frequency (the
+// order of Stockham's method). After s passes a point is (x, i, k, o, n): i holds the s - 1 earlier digits of the
+// frequency, k the newest one, and o the remaining digits of y. In that order, its position is (o * 4 + k) * 4^(s - 1)
+// + i.
 Func transform_columns(const Func& f, const Func& twiddle, const Setup& setup,
                        const std::string& name) {
   const int lanes = setup.lanes<float>();

@@ -1,7 +1,7 @@
 // harris_corners -- the corner response of Harris and Stephens (1988) over 3 x 3 windows of Sobel
 // gradients, from a colour image.
 //
-// In tiles: luminance and the gradients of a tile and its border, then the response.
+// In tiles: first luminance and gradients of a tile with its border, then the response.
 #include "kernel.h"
 
 namespace kernels {

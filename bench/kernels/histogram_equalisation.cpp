@@ -1,5 +1,5 @@
-// histogram_equalisation -- spreads the brightness of an 8-bit colour picture evenly: histogram of
-// the luminance, its running sum as a tone curve, the change added to each colour.
+// histogram_equalisation -- equalises the brightness of an 8-bit colour picture: the running sum of the luminance
+// histogram is the tone curve, and the change of luminance is added to each colour.
 //
 // Histograms of strips are counted in parallel, then added.
 #include "kernel.h"

@@ -1,5 +1,5 @@
-// iir_blur -- a wide blur by a recursive filter of the first order, run down and up all columns,
-// then along all rows: the picture is transposed in between.
+// iir_blur -- a wide blur by a first-order recursive filter, down and up all columns, then along all rows; the picture
+// is transposed in between.
 //
 // A task filters a few vectors of columns from top to bottom and back, and stores them transposed.
 #include "kernel.h"
@@ -10,7 +10,7 @@ using namespace Halide;
 
 namespace {
 
-// Filters the columns of f, which is `height` high; the result is transposed.
+// Filters the columns of f, which has `height` rows; the result is transposed.
 Func filter_columns(const Func& f, int height, float keep, const Setup& setup,
                     const std::string& name) {
   Var x("x"), y("y"), c("c"), xi("xi"), yo("yo"), yi("yi"), strip("strip");

@@ -1,9 +1,8 @@
-// kernel.h -- what one benchmark kernel is, in the dialect that Halide 14 and Retrograde share.
+// kernel.h -- the interface of benchmark kernels, in the common subset of Halide 14 and Retrograde.
 //
-// Every kernel is one source file: algorithm and schedule (of a gradient the algorithm), written
-// once, compiled once against Halide's header and once against ours. list.def names them all.
-// Inputs are made by a generator that depends on nothing but the point, so both sides compute from
-// the same numbers.
+// Every kernel is one source file with algorithm and schedule (for a gradient, only the algorithm). It is written once,
+// and compiled once with Halide's header and once with ours. list.def names all kernels. Inputs depend only on the
+// position, so both sides compute from the same numbers.
 #pragma once
 
 #include <Halide.h>
@@ -17,8 +16,8 @@
 
 namespace kernels {
 
-// Of the values of gradients. In double where a check needs more than float has: the same numbers as
-// inputs.
+// The type of values in gradients. It is double for checks that need more precision than float; the inputs are the same
+// numbers.
 #ifdef BENCH_FLOAT64
 using real = double;
 #else
@@ -27,11 +26,13 @@ using real = float;
 
 struct Setup {
   Halide::Target target;
-  bool small = false;  // sizes for a check of the results: odd, and quick
+  bool small = false;  // small, odd sizes for a quick check of the results
   int threads = 1;
-  bool primal = false;       // of a gradient: the program itself, without a schedule
-  bool is_operator = false;  // a gradient, and the program's output as the last
-  std::string schedule;      // whose; see ../operators/schedules.cpp. Of a kernel: or by hand
+  bool primal = false;       // for a gradient: the program itself, without a schedule
+  bool is_operator = false;  // a gradient with the program's output as last output
+  std::string
+      schedule;  // name of the schedule; see ../operators/schedules.cpp. For a kernel, it may also be by
+                 // hand
 
   // Lanes of a full vector register.
   template <typename T>
@@ -42,17 +43,19 @@ struct Setup {
   int size(int full, int quick) const { return small ? quick : full; }
 };
 
-// Ready to be compiled: the kernel has bound its inputs. The buffers count as the bytes that must
-// move; `operations` are those that the algorithm cannot do without, a multiply-add being two.
+// A kernel that is ready to be compiled: its inputs are bound. The buffers' sizes count as the bytes that must be
+// moved; `operations` counts those that the algorithm requires, a multiply-add as two.
 struct Kernel {
   Halide::Pipeline pipeline;
   std::vector<Halide::Buffer<>> inputs, outputs;
   double operations = 0;
-  size_t by = 0;  // of a gradient: so many outputs are gradients, by as many first inputs
-  double derive_seconds = 0, search_seconds = 0;  // of a gradient: making it, and its schedule
+  size_t by =
+      0;  // for a gradient: the number of outputs that are gradients, with respect to the first inputs
+  double derive_seconds = 0,
+         search_seconds = 0;  // for a gradient: times to derive and to schedule it
 };
 
-// What is measured of compilers.
+// Measures compile times.
 class Stopwatch {
  public:
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
@@ -68,7 +71,7 @@ class Stopwatch {
 #define OPERATOR(name) Kernel name(const Setup& setup);
 #include "../operators/list.def"
 
-// Reads `values`; an autoscheduler may count on their size.
+// Binds `values`; an autoscheduler may rely on their size.
 template <typename T>
 void bind(Halide::ImageParam& input, const Halide::Buffer<T>& values) {
   input.set(values);

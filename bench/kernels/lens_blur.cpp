@@ -1,8 +1,7 @@
-// lens_blur -- depth of field: every pixel spreads its light over a disc, as wide as its distance
-// from the plane in focus says, and each point gathers from all discs that reach it.
+// lens_blur -- depth of field: every pixel spreads its light over a disc whose size depends on its distance from the
+// plane in focus; each point gathers from all discs that reach it.
 //
-// What a pixel gives does not depend on who receives it and is computed once. Sums over the window
-// stay in registers.
+// A pixel's contribution does not depend on the receiver and is computed once. Sums over the window stay in registers.
 #include "kernel.h"
 
 namespace kernels {
@@ -20,7 +19,7 @@ Kernel lens_blur(const Setup& setup) {
   Func far = BoundaryConditions::repeat_edge(depth);
   Func disc("disc"), gathered("gathered"), result("result");
   Expr radius = clamp(aperture * abs(far(x, y) - focus), 0.5f, cast<float>(reach));
-  // Squared radius, then the share of each point of the disc.
+  // The squared radius, and the contribution to each point of the disc.
   disc(x, y) = Tuple(radius * radius, 1.0f / (radius * radius));
 
   RDom r(-reach, 2 * reach + 1, -reach, 2 * reach + 1);

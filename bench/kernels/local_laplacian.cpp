@@ -1,9 +1,8 @@
-// local_laplacian -- the local contrast enhancement of Paris, Hasinoff and Kautz (2011) in the fast
-// form of Aubry et al. (2014): Laplacian pyramids of 8 levels, of the picture remapped around each
-// of 8 brightnesses, from which each coefficient of the result is interpolated.
+// local_laplacian -- the local contrast enhancement of Paris, Hasinoff and Kautz (2011) in the fast form of Aubry et
+// al. (2014): Laplacian pyramids with 8 levels of the picture remapped around each of 8 brightnesses, between which
+// each coefficient of the result is interpolated.
 //
-// Every level of every pyramid is made once, in parallel strips; the Laplacians are made where they
-// are read.
+// Every level of every pyramid is stored, computed in parallel strips; the Laplacians are computed where they are used.
 #include "kernel.h"
 
 namespace kernels {
@@ -24,22 +23,22 @@ FuncRef at(const Func& f, Expr x, Expr y, const std::vector<Var>& rest) {
 struct Reduced {
   Func by_row, result;
 };
-// Half the size: each pixel the mean of five in both directions, weighted 1 4 6 4 1 (Burt and
-// Adelson 1983, "The Laplacian pyramid as a compact image code", a = 3/8).
+// Half the size: each pixel is the mean of five in both directions, with weights 1 4 6 4 1 (Burt and Adelson 1983, "The
+// Laplacian pyramid as a compact image code", a = 3/8).
 Reduced reduced(const Func& f, const std::vector<Var>& rest, const std::string& name) {
   Var x("x"), y("y");
   Reduced half{Func(name + "_by_row"), Func(name)};
   auto weighted = [](auto pixel) {
     return pixel(0) * 0.375f + (pixel(-1) + pixel(1)) * 0.25f + (pixel(-2) + pixel(2)) * 0.0625f;
   };
-  // Down the columns first, while rows of the finer level lie in the cache.
+  // Along columns first, while rows of the finer level are in the cache.
   at(half.by_row, x, y, rest) = weighted([&](int k) -> Expr { return at(f, x, 2 * y + k, rest); });
   at(half.result, x, y, rest) =
       weighted([&](int k) -> Expr { return at(half.by_row, 2 * x + k, y, rest); });
   return half;
 }
 
-// Twice the size: pixels of the coarser level, and the means of those next to each other.
+// Twice the size: pixels of the coarser level, and the means of adjacent ones.
 Func expanded(const Func& f, const std::vector<Var>& rest, const std::string& name) {
   Var x("x"), y("y");
   Func by_row(name + "_by_row"), result(name);
@@ -61,7 +60,7 @@ Kernel local_laplacian(const Setup& setup) {
   Func grey("grey");
   grey(x, y) = 0.299f * clamped(x, y, 0) + 0.587f * clamped(x, y, 1) + 0.114f * clamped(x, y, 2);
 
-  // Around brightness k: details, which differ little from it, are enlarged.
+  // Remaps around brightness k: details, which differ little from it, are amplified.
   Func remapped("remapped");
   Expr difference = grey(x, y) - k * (1.0f / (brightnesses - 1));
   Expr in_sigmas = difference * (1.0f / sigma);
@@ -89,8 +88,8 @@ Kernel local_laplacian(const Setup& setup) {
     p.by_row.compute_at(p.result, yi).vectorize(x, lanes);
   }
 
-  // A coefficient of the result: of the two pictures remapped around the brightnesses next to the
-  // pixel's own, a mixture.
+  // A coefficient of the result interpolates between the two pictures remapped around the brightnesses next to the
+  // pixel's own.
   const float just_below_last = brightnesses - 1 - 1e-4f;
   for (int j = levels - 1; j >= 0; j--) {
     const bool is_coarsest = j == levels - 1;
@@ -119,7 +118,7 @@ Kernel local_laplacian(const Setup& setup) {
   Buffer<float> image = make_image<float>({width, height, 3});
   bind(input, image);
   Buffer<float> output(width, height, 3);
-  // Levels add up to 4/3 of the first: remapping, reducing and expanding for each brightness.
+  // The levels add up to 4/3 of the first: remapping, reducing and expanding for each brightness.
   return {Pipeline(result),
           {image},
           {output},

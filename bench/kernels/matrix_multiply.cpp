@@ -1,7 +1,7 @@
 // matrix_multiply -- C = A B in single precision; element (i, j) is column i of row j.
 //
-// Blocks of C, 4 vectors wide and 6 rows high, stay in registers over all of k. B is packed into
-// panels of that width, which the inner loop reads front to back from the second-level cache.
+// Blocks of C, 4 vectors wide and 6 rows high, stay in registers for all of k. B is packed into panels of that width,
+// which the inner loop streams from the second-level cache.
 #include "kernel.h"
 
 namespace kernels {

@@ -1,8 +1,7 @@
-// max_filter -- the largest value in a window of 31 x 31 around each point, by doubling: maxima
-// over 2, 4, 8 and 16 points, and two of the last cover 31 (van Herk's idea, in the form that
-// vectorizes).
+// max_filter -- the maximum over a 31 x 31 window around each point, by doubling: maxima over 2, 4, 8 and 16 points, of
+// which two of the last cover 31 (van Herk's idea, in a form that vectorizes).
 //
-// In strips of rows; the maxima along y keep the rows that are still to be read.
+// In strips of rows; the maxima along y keep the rows that are still needed.
 #include "kernel.h"
 
 namespace kernels {

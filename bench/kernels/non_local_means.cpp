@@ -1,10 +1,9 @@
-// non_local_means -- denoising by Buades, Coll and Morel (2005), with the weights of their text of
-// 2011 (IPOL, "Non-local means denoising", section 2): each pixel becomes the mean of the pixels in
-// a window of 7 x 7, weighted by exp(-max(d - 2 sigma^2, 0) / h^2), where d is the mean of the
-// squared differences of the 5 x 5 patches around the two.
+// non_local_means -- denoising by Buades, Coll and Morel (2005), with the weights of their text of 2011 (IPOL,
+// "Non-local means denoising", section 2): each pixel becomes the mean of the pixels in a 7 x 7 window, weighted by
+// exp(-max(d - 2 sigma^2, 0) / h^2), where d is the mean squared difference of the 5 x 5 patches around the two.
 //
-// One offset of the window after the other, over tiles that stay in the cache: distances of all
-// pixels to their partners, their sums over patches, and the partners' contributions.
+// One offset of the window after another, over tiles that stay in the cache: distances of all pixels to their partners,
+// their sums over patches, and the partners' contributions.
 #include "kernel.h"
 
 namespace kernels {
@@ -13,7 +12,7 @@ using namespace Halide;
 
 Kernel non_local_means(const Setup& setup) {
   const int width = setup.size(960, 137), height = setup.size(640, 75);
-  const int reach = 3, patch_reach = 2;  // to either side
+  const int reach = 3, patch_reach = 2;  // on either side
   const float sigma = 0.05f, h = 0.3f;
   ImageParam noisy(Float(32), 3, "noisy");
   Var x("x"), y("y"), c("c"), u("u"), v("v"), px("px"), py("py");
@@ -40,7 +39,7 @@ Kernel non_local_means(const Setup& setup) {
   Expr beyond_noise = max(of_patch * (1.0f / compared) - 2 * sigma * sigma, 0.0f);
   likeness(x, y, u, v) = fast_exp(beyond_noise * (-1.0f / (h * h)));
 
-  // Red, green and blue of all partners together, and their weights.
+  // The sums of red, green and blue over all partners, and of their weights.
   Func mean("mean"), denoised("denoised");
   Expr weight = likeness(x, y, offset.x, offset.y);
   auto partner = [&](int channel) { return extended(x + offset.x, y + offset.y, channel); };

@@ -1,5 +1,4 @@
-// picture.h -- the numbers that benchmarks compute from: they depend on nothing but the point, so
-// that both sides have the same.
+// picture.h -- the input values of benchmarks. They depend only on the position, so both sides have the same.
 #pragma once
 
 #include <cstdint>

@@ -1,11 +1,11 @@
-// pyramid_interpolation -- fills the holes of a picture: pull and push (Gortler et al. 1996, "The
-// Lumigraph", section 3.4), with the filters of Strengert, Kraus and Ertl (2006).
+// pyramid_interpolation -- fills the holes of a picture: pull and push (Gortler et al. 1996, "The Lumigraph", section
+// 3.4), with the filters of Strengert, Kraus and Ertl (2006).
 //
-// A pixel is a colour and how much it is to be trusted, 0 to 1. Pull: each coarser pixel is the
-// mean of four, weighted by their trust; what they trust together is cut at 1. Push: from the
-// coarsest level on, a pixel takes from the coarser picture what its own trust leaves to 1.
+// A pixel is a colour and its trust, 0 to 1. Pull: each coarser pixel is the mean of four, weighted by their trust; the
+// sum of their trust is clamped to 1. Push: from the coarsest level on, a pixel adds the coarser picture, weighted by 1
+// minus its own trust.
 //
-// A level is one Func of four values, colours times trust, made once, in parallel strips of rows.
+// A level is one stored Func of four values, trust and colours times trust, computed in parallel strips of rows.
 #include "kernel.h"
 
 namespace kernels {
@@ -14,7 +14,7 @@ using namespace Halide;
 
 namespace {
 
-// What a pixel is: three colours, each times the trust, and the trust.
+// A pixel: three colours, each multiplied by the trust, and the trust.
 struct Pixel {
   Expr red, green, blue, trust;
   Pixel(FuncRef f) : red(f[0]), green(f[1]), blue(f[2]), trust(f[3]) {}
@@ -26,15 +26,15 @@ struct Pixel {
   Pixel operator*(Expr k) const { return {red * k, green * k, blue * k, trust * k}; }
 };
 
-// The sum of the four, scaled so that no pixel is trusted more than one that is known.
+// The sum of the four, scaled so that no trust exceeds 1.
 Pixel pulled(const Func& fine, Var x, Var y) {
   const Pixel sum = Pixel(fine(2 * x, 2 * y)) + Pixel(fine(2 * x + 1, 2 * y)) +
                     Pixel(fine(2 * x, 2 * y + 1)) + Pixel(fine(2 * x + 1, 2 * y + 1));
   return sum * (1.0f / max(sum.trust, 1.0f));
 }
 
-// Centres of coarse pixels lie between those of fine ones: of the two next to a fine one, the
-// nearer counts three times as much (biquadratic B-splines).
+// Centres of coarse pixels lie between those of fine ones. The nearer of the two centres next to a fine pixel counts
+// three times as much (biquadratic B-splines).
 Pixel mixed(const Pixel& nearer, const Pixel& farther) { return nearer * 0.75f + farther * 0.25f; }
 Expr farther(Var x) { return x / 2 + 2 * (x % 2) - 1; }
 
@@ -83,13 +83,13 @@ Kernel pyramid_interpolation(const Setup& setup) {
   }
 
   Buffer<float> image = make_image<float>({width, height, 4});
-  // Holes of all sizes: a pixel is trusted, or not.
+  // Holes of all sizes: a pixel's trust is 0 or 1.
   for (int j = 0; j < height; j++) {
     for (int i = 0; i < width; i++) image(i, j, 3) = image(i, j, 3) > 0.6f ? 1.0f : 0.0f;
   }
   bind(picture, image);
   Buffer<float> output(width, height, 3);
-  // Of each level: a quarter of a pull (18 operations), two mixtures and a blend (20).
+  // Per level: a quarter of a pull (18 operations), two mixtures and a blend (20).
   const double pixels = static_cast<double>(width) * height;
   return {Pipeline(result), {image}, {output}, (3 + 4.0 / 3 * (18 / 4.0 + 20 + 9) + 4) * pixels};
 }

@@ -1,8 +1,8 @@
-// resize -- a picture enlarged by 3/2 with three kernels: linear, cubic (Keys 1981) and Lanczos of
-// radius 3. The three pictures are the outputs of one pipeline.
+// resize -- enlarges a picture by 3/2 with three kernels: linear, cubic (Keys 1981) and Lanczos of radius 3. The three
+// pictures are the outputs of one pipeline.
 //
-// Where a pixel falls in the source is computed in integers. Rows first, into the strip that needs
-// them; then along the rows, where neighbours read sources that overlap.
+// Source positions are computed in integers. Rows are resized first, into the strip that needs them; then columns along
+// the rows, where neighbours read overlapping sources.
 #include "kernel.h"
 
 namespace kernels {
@@ -11,7 +11,7 @@ using namespace Halide;
 
 namespace {
 
-// Pixel p of the result lies at ((2p + 1) * 2 / 3 - 1) / 2 = (4p - 1) / 6 of the source.
+// Pixel p of the result is at position ((2p + 1) * 2 / 3 - 1) / 2 = (4p - 1) / 6 of the source.
 Expr source_floor(const Expr& p) { return (4 * p - 1) / 6; }
 Expr source_fraction(const Expr& p) { return cast<float>((4 * p - 1) % 6) * (1.0f / 6); }
 
@@ -34,7 +34,7 @@ Resized resized(const Func& source, Expr (*kernel)(const Expr&), int radius,
                 const std::string& name) {
   Var x("x"), y("y"), k("k");
   Func raw(name + "_raw"), weights(name + "_weights"), along_y(name + "_y"), result(name);
-  // weights(k, p): of source pixel floor + k - radius + 1, for pixel p.
+  // weights(k, p): the weight of source pixel floor + k - radius + 1 for pixel p.
   raw(k, x) = kernel(cast<float>(k - radius + 1) - source_fraction(x));
   Expr total = 0.0f, sum_y = 0.0f, sum_x = 0.0f;
   for (int i = 0; i < 2 * radius; i++) total = total + raw(i, x);

@@ -1,7 +1,7 @@
-// stencil_chain -- 40 stencils of 3 x 3 points, one after another.
+// stencil_chain -- 40 stencils of 3 x 3 points in sequence.
 //
-// In groups of 8: a group runs in strips of rows, and inside a strip each stage keeps the rows that
-// the next one still reads.
+// In groups of 8: a group runs in strips of rows, and within a strip each stage keeps the rows that the next one still
+// reads.
 #include "kernel.h"
 
 namespace kernels {

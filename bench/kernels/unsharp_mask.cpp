@@ -1,6 +1,6 @@
-// unsharp_mask -- sharpens a colour image by what a Gaussian blur takes from its luminance.
+// unsharp_mask -- sharpens a colour image by the difference between its luminance and a Gaussian blur.
 //
-// In strips of rows: luminance and its blur along y are made row by row, just before they are used.
+// In strips of rows: luminance and its blur along y are computed row by row, just before they are used.
 #include <cmath>
 
 #include "kernel.h"
@@ -33,7 +33,7 @@ Kernel unsharp_mask(const Setup& setup) {
   blur_y(x, y) = sum_y;
   for (int i = -radius; i <= radius; i++) sum_x = sum_x + weights[i + radius] * blur_y(x + i, y);
   blurred(x, y) = sum_x;
-  // The colours keep their proportions.
+  // Colours keep their proportions.
   gain(x, y) = 1.0f + strength * (luminance(x, y) - blurred(x, y)) / (luminance(x, y) + 0.01f);
   sharp(x, y, c) = clamp(gain(x, y) * input(x, y, c), 0.0f, 1.0f);
 

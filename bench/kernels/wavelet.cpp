@@ -1,8 +1,8 @@
-// wavelet -- denoising by the wavelets of Daubechies (1988) with 4 coefficients: 3 levels of the
-// 2-D transform, small coefficients shrunk to zero, and back.
+// wavelet -- denoising by the wavelets of Daubechies (1988) with 4 coefficients: 3 levels of the 2-D transform, small
+// coefficients shrunk to zero, and the inverse transform.
 //
-// Each direction of each level is made once, in parallel strips, but the transform along x of a row
-// is made where the transform along y reads it.
+// Each direction of each level is stored, computed in parallel strips. Only the transform along x is computed row by
+// row, where the transform along y reads it.
 #include "kernel.h"
 
 namespace kernels {
@@ -63,7 +63,7 @@ Kernel wavelet(const Setup& setup) {
     bands.push_back(level);
   }
 
-  Func better = source;  // the averages of the coarsest level, as they are
+  Func better = source;  // the unchanged averages of the coarsest level
   for (int j = levels - 1; j >= 0; j--) {
     const std::string number = std::to_string(j);
     const Func& level = bands[j];
@@ -87,7 +87,7 @@ Kernel wavelet(const Setup& setup) {
     columns(x, y, b) = mux(b, {column(0), column(1)});
     level_out(x, y) = inverse([&](const Expr& p) { return Expr(columns(p, y, 0)); },
                               [&](const Expr& p) { return Expr(columns(p, y, 1)); }, x / 2, x % 2);
-    // Even and odd points beside each other.
+    // Even and odd points side by side.
     if (setup.by_hand()) {
       level_out.compute_root().align_bounds(x, 2).align_bounds(y, 2);
       level_out.split(y, y, yi, 16).split(yi, yi, yii, 2).split(x, x, xi, 2);

@@ -1,6 +1,5 @@
-// attention -- causal, of several heads: each row of the value's weights by a softmax over the rows
-// before it: by query, key and value.
-// Source: Vaswani et al., Attention Is All You Need, NeurIPS 2017, section 3.2.
+// attention -- causal attention with several heads: each row mixes the value's previous rows, weighted by a softmax.
+// Gradients: query, key and value. Source: Vaswani et al., Attention Is All You Need, NeurIPS 2017, section 3.2.
 #include "operator.h"
 
 namespace kernels {
@@ -32,7 +31,7 @@ Kernel attention(const Setup& setup) {
   mixed(d, i, h) = real(0);
   mixed(d, i, h) += weight(k, i, h) * value(d, k, h);
   attended(d, i, h) = mixed(d, i, h) / sum(i, h);
-  const double products = 0.5 * rows * (rows + 1.0) * features * heads;  // of each matrix product
+  const double products = 0.5 * rows * (rows + 1.0) * features * heads;  // per matrix product
   return gradients_of(setup, attended, {features, rows, heads}, {query, key, value},
                       6 * 2 * products);
 }

@@ -1,6 +1,6 @@
-// bilateral_slice -- a grid of 12 affine coefficients, read at each pixel's place and guide, applied
-// to the pixel: by image, guide and grid.
-// Source: Gharbi et al., Deep Bilateral Learning for Real-Time Image Enhancement, SIGGRAPH 2017.
+// bilateral_slice -- reads a grid of 12 affine coefficients at each pixel's position and guide, and applies them to the
+// pixel. Gradients: image, guide and grid. Source: Gharbi et al., Deep Bilateral Learning for Real-Time Image
+// Enhancement, SIGGRAPH 2017.
 #include "operator.h"
 
 namespace kernels {
@@ -9,7 +9,7 @@ using namespace Halide;
 
 namespace {
 
-// The two cells beside a place of so many cells, the far one's weight.
+// The two cells next to a position, and the weight of the far one.
 struct Cells {
   Expr near, far, weight;
 };

@@ -1,6 +1,6 @@
-// bilateral_smoothing -- values in a bilateral grid, made smooth where they are not sure, by 30 steps
-// of Jacobi's method: by values, confidences and strength.
-// Source: the problem of Barron and Poole, The Fast Bilateral Solver, ECCV 2016, section 2.
+// bilateral_smoothing -- smooths values in a bilateral grid where confidence is low, by 30 steps of Jacobi's method.
+// Gradients: values, confidences and strength. Source: the problem of Barron and Poole, The Fast Bilateral Solver, ECCV
+// 2016, section 2.
 #include "operator.h"
 
 namespace kernels {

@@ -1,4 +1,4 @@
-// conv2d -- 3 x 3, 16 channels in and out, zeros around the image, bias: by input, weights and bias.
+// conv2d -- 3 x 3, 16 channels in and out, zero padding, bias. Gradients: input, weights and bias.
 #include "../gradients/gradient.h"
 
 namespace kernels {

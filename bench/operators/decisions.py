@@ -1,11 +1,10 @@
 #!/usr/bin/env python3
-"""decisions.py -- what each decision of our autoscheduler brings an operator: its time with all of them and without
-each, in one run.
+"""decisions.py -- ablation of our autoscheduler: times of each operator with all decisions, and without each one.
 
     decisions.py PROGRAMS [--operator NAME]... [--rounds N] [--threads N] --output FILE
 
-PROGRAMS is the folder of bench_operators_retrograde. The workers of an operator, one for each setting, run in turn, and
-stay apart: see operators.py. The table is Markdown, written to the standard output; FILE gets the times of all runs.
+PROGRAMS is the folder of bench_operators_retrograde. Each setting of an operator has its own worker; workers run in
+turn, with pauses: see operators.py. The table is Markdown on standard output; FILE receives the times of all runs.
 """
 import argparse
 import os
@@ -18,7 +17,7 @@ DECISIONS = ["scatter_strategy", "cut_reductions", "register_tiles", "layout_sta
 
 
 def measure(name, options):
-    """Times in milliseconds by what is left out; None where that fails."""
+    """Times in milliseconds by the decision that is left out; None for failures."""
     program = os.path.join(options.programs, "bench_operators_retrograde")
     settings = {"": "", **{each: "without=" + each for each in DECISIONS}, "all": "without=" + "+".join(DECISIONS)}
     workers = {key: operators.Worker(key, [program, name, "full", str(options.threads), setting], options.threads, 120)

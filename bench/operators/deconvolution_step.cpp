@@ -1,7 +1,6 @@
-// deconvolution_step -- how far a sharp image is from explaining a blurred one, and from what images
-// are like, by five weighted filters: by image, blur, weights and filters.
-// Source: the problem of Li et al., Differentiable Programming for Image Processing and Deep Learning
-// in Halide, SIGGRAPH 2018, section 6.
+// deconvolution_step -- the objective of a deconvolution: how well a sharp image explains a blurred one, plus a prior
+// of five weighted filters. Gradients: image, blur, weights and filters. Source: the problem of Li et al.,
+// Differentiable Programming for Image Processing and Deep Learning in Halide, SIGGRAPH 2018, section 6.
 #include "operator.h"
 
 namespace kernels {

@@ -1,4 +1,4 @@
-// flow_warp -- 64 channels read between pixels, where a flow says: by channels and flow.
+// flow_warp -- reads 64 channels between pixels, at positions given by a flow. Gradients: channels and flow.
 #include "operator.h"
 
 namespace kernels {

@@ -1,6 +1,5 @@
-// fluid_step -- a step of a fluid on a grid: force, diffusion, advection, projection, then density
-// moved along, and how far that is from a target: by velocity, force and density.
-// Source: J. Stam, Stable Fluids, SIGGRAPH 1999.
+// fluid_step -- a step of a fluid on a grid: force, diffusion, advection, projection, advection of density, and its
+// distance from a target. Gradients: velocity, force and density. Source: J. Stam, Stable Fluids, SIGGRAPH 1999.
 #include "operator.h"
 
 namespace kernels {
@@ -16,7 +15,7 @@ Func edge(const Func& f, int size) {
   return BoundaryConditions::repeat_edge(f, {{0, size}, {0, size}});
 }
 
-// Where what flows to (x, y) has been.
+// The position from which the fluid at (x, y) comes.
 struct Origin {
   Expr u, v;
 };
@@ -40,7 +39,7 @@ Func diffuse(const Func& velocity, int size) {
   return state;
 }
 
-// The pressure whose slope has that divergence, from zero.
+// The pressure whose Laplacian is that divergence, iterated from zero.
 Func pressure_of(const Func& divergence, int size) {
   Var x("x"), y("y");
   Func state("pressure");

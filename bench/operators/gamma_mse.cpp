@@ -1,4 +1,4 @@
-// gamma_mse -- the mean square error of an image after gamma correction: by image and exponent.
+// gamma_mse -- the mean squared error of an image after gamma correction. Gradients: image and exponent.
 #include "../gradients/gradient.h"
 
 namespace kernels {

@@ -1,7 +1,6 @@
-// laplacian_loss -- how far an image is from a target, in each of the bands of a Laplacian pyramid:
-// by image.
-// Source: the loss of Bojanowski et al., Optimizing the Latent Space of Generative Networks, ICML
-// 2018, section 3, with sqrt(d^2 + 1e-4) for |d|.
+// laplacian_loss -- the distance of an image from a target, in each band of a Laplacian pyramid. Gradients: the image.
+// Source: the loss of Bojanowski et al., Optimizing the Latent Space of Generative Networks, ICML 2018, section 3, with
+// sqrt(d^2 + 1e-4) for |d|.
 #include "operator.h"
 
 namespace kernels {
@@ -12,7 +11,7 @@ namespace {
 
 constexpr int levels = 8;
 
-// Of half the size: 1 3 3 1 along both dimensions; the edge goes on outside.
+// Half the size, by weights 1 3 3 1 along both dimensions, with repeated edges.
 Func smaller(const Func& image, int width, int height) {
   Var x("x"), y("y");
   Func f = BoundaryConditions::repeat_edge(image, {{0, width}, {0, height}});
@@ -24,7 +23,7 @@ Func smaller(const Func& image, int width, int height) {
   return down;
 }
 
-// Of twice the size, between the centres of pixels.
+// Twice the size, interpolated between the centres of pixels.
 Func larger(const Func& image, int width, int height) {
   Var x("x"), y("y");
   Func f = BoundaryConditions::repeat_edge(image, {{0, width}, {0, height}});

@@ -1,6 +1,6 @@
-// non_local_means -- each pixel from those in a window of 11 x 11, weighted by how like the patches
-// of 7 x 7 around both are: by image and strength.
-// Source: Buades, Coll and Morel, A Non-Local Algorithm for Image Denoising, CVPR 2005.
+// non_local_means -- each pixel is a mean over an 11 x 11 window, weighted by the similarity of the 7 x 7 patches
+// around both pixels. Gradients: image and strength. Source: Buades, Coll and Morel, A Non-Local Algorithm for Image
+// Denoising, CVPR 2005.
 #include "operator.h"
 
 namespace kernels {

@@ -1,4 +1,4 @@
-// operator.h -- what several operators have in common.
+// operator.h -- helpers that several operators share.
 #pragma once
 
 #include <cmath>
@@ -7,7 +7,7 @@
 
 namespace kernels {
 
-// Smooth along the first two dimensions: waves of about that length, in pixels, from low to high.
+// Smooth along the first two dimensions: waves of about `length` pixels, with values from low to high.
 inline Halide::Buffer<real> make_waves(const std::vector<int>& sizes, float low, float high,
                                        float length) {
   Halide::Buffer<real> waves(sizes);
@@ -22,14 +22,14 @@ inline Halide::Buffer<real> make_waves(const std::vector<int>& sizes, float low,
   return waves;
 }
 
-// Odd multiples of half a step of 1 / steps, of which float32 and float64 find the same neighbours:
-// at an integer the gradient by a place jumps.
+// Odd multiples of half a step of 1 / steps. float32 and float64 then find the same neighbours: at an integer, the
+// gradient with respect to a position jumps.
 inline Halide::Buffer<real> off_grid(Halide::Buffer<real> values, float steps) {
   values.for_each_value([=](real& v) { v = (std::floor(v * steps) + 0.5f) / steps; });
   return values;
 }
 
-// An image of so many pixels between its pixels at (u, v) within it; `rest` are its other indices.
+// Bilinear interpolation of an image at (u, v) inside it; `rest` are its other indices.
 template <typename Image>
 Halide::Expr bilinear(const Image& image, const Halide::Expr& u, const Halide::Expr& v, int width,
                       int height, const std::vector<Halide::Expr>& rest) {

@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
-"""operators.py -- operators with all their gradients beside the newest Halide and PyTorch, in one run.
+"""operators.py -- compares operators with all their gradients with the newest Halide and PyTorch, in one run.
 
     operators.py PROGRAMS [--operator NAME]... [--quick] [--rounds N] [--threads N]
                  [--peers none|halide|pytorch|all] [--output FILE] [--add] [--small] [--search]
 
-PROGRAMS is the folder of bench_operators_retrograde and bench_machine. The others come from the Python
-package index into a virtual environment, out/bench/peers, made when it is not there: the wheel of
-Halide, against which the worker of Halide is built from the same text as ours, and PyTorch. All
-workers of an operator are processes of their own, spoken to as ../pairs/worker_protocol.h says, and
-run in turn. What a peer cannot do is in the report, under `failures`, and ends nothing. See
-../README.md for the figures.
+PROGRAMS is the folder of bench_operators_retrograde and bench_machine. The peers are installed from the
+Python package index into a virtual environment, out/bench/peers, which is created if missing: Halide's
+wheel, with which the Halide worker is built from the same source as ours, and PyTorch. All workers of an
+operator are separate processes that implement ../pairs/worker_protocol.h, and run in turn. Failures of
+a peer are listed in the report under `failures` and do not end the run. ../README.md explains the
+figures.
 """
 import argparse
 import glob
@@ -31,13 +31,13 @@ from peers import PEERS, make_peers, site_packages, version
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 SCHEDULES = ["Adams2019", "Li2018", "Mullapudi2016", "root"]  # of Halide
-SEARCH_SECONDS = 60  # for a schedule of Halide's, compilation included
+SEARCH_SECONDS = 60  # for a schedule by Halide, including compilation
 SEARCHED = "retrograde_search"  # ours, with AutoscheduleOptions::search
 RUN_SECONDS = 240  # for one run of a worker, and for torch.compile
-PAUSE_SECONDS = 0.03  # before a turn: threads of OpenMP that have no work look for some for so long
-WARM_SECONDS = 0.02  # of untimed runs in a turn: after the pause caches and clocks are not as in use
-COLD_SECONDS = 0.2  # a run that takes this long needs none
-PEER_SECONDS = 8  # for all rounds of a worker that is slow; it runs at least once
+PAUSE_SECONDS = 0.03  # before a turn, because idle OpenMP threads spin for this long
+WARM_SECONDS = 0.02  # of untimed runs in a turn, because after the pause caches are cold and clocks are low
+COLD_SECONDS = 0.2  # a run of this length needs no warm-up
+PEER_SECONDS = 8  # for all rounds of a slow worker; it runs at least once
 
 
 def operator_names():
@@ -48,7 +48,7 @@ def operator_names():
 # ---- workers ----
 
 def last_of_turn(run):
-    """Seconds of one run as it is where run after run is made: `run` gives those of one."""
+    """The time of one run in a sequence of runs, in seconds; `run` returns the time of one run."""
     time.sleep(PAUSE_SECONDS)
     spent = 0
     while True:
@@ -60,7 +60,7 @@ def last_of_turn(run):
 
 
 def saved_arrays(path):
-    """Those in a file of OutputHeaders and elements."""
+    """The arrays in a file of OutputHeaders and elements."""
     with open(path, "rb") as file:
         data, at = file.read(), 0
     while at < len(data):
@@ -81,7 +81,7 @@ class Failed(Exception):
 
 
 class Worker:
-    """Its name is "retrograde", "pytorch", "pytorch_compiled", or that of a schedule of Halide's."""
+    """A worker named "retrograde", "pytorch", "pytorch_compiled", or after a schedule of Halide."""
 
     def __init__(self, name, command, threads, seconds):
         self.name, self.line, self.times, self.failure = name, b"", [], None
@@ -199,8 +199,8 @@ def start_workers(name, options, scratch):
 
 
 def run_in_turn(workers, rounds):
-    """The first run of a process makes its threads and touches its memory: it counts only when there
-    is no time for another."""
+    """The first run of a process creates its threads and touches its memory. It only counts if there is no
+    time for another run."""
     for at in range(-1, rounds):
         for i in range(len(workers)):
             worker = workers[(i + at) % len(workers)]
@@ -211,11 +211,11 @@ def run_in_turn(workers, rounds):
                 if at < 0 and not worker.has_enough():
                     worker.times.clear()
             except Failed:
-                pass  # it says why in the report
+                pass  # the report contains the reason
 
 
 def compare(workers, reference, options, scratch):
-    """Of each worker in C++ that has run, by name: errors against float64."""
+    """Errors against float64, by name, of each C++ worker that has run."""
     double = Worker("float64", reference, options.threads, 5 * RUN_SECONDS)
     if double.failure:
         return {"reference": double.failure}
@@ -235,7 +235,7 @@ def compare(workers, reference, options, scratch):
 
 
 def memory_of(worker, inputs_mb):
-    """What a run adds, and the inputs."""
+    """The memory that a run adds, plus the inputs."""
     try:
         return worker.ask("memory", "memory")[1] + inputs_mb
     except Failed:
@@ -306,7 +306,7 @@ def measure(name, options, machine):
 # ---- the report ----
 
 def is_wrong(row):
-    """A pipeline of ours that fails, or whose results are not those in float64."""
+    """Whether our pipeline fails, or its results differ from those in float64."""
     if row["retrograde_ms"] is None:
         return True
     searched = row["errors"].get(SEARCHED)
@@ -336,13 +336,13 @@ def read_options():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("programs")
     parser.add_argument("--operator", action="append", choices=operator_names(), dest="operators")
-    parser.add_argument("--quick", action="store_true", help="few rounds: numbers for guidance only")
-    parser.add_argument("--rounds", type=int, help="timed runs of each, 15 when not given")
+    parser.add_argument("--quick", action="store_true", help="few rounds; the numbers are only rough")
+    parser.add_argument("--rounds", type=int, help="timed runs of each; default: 15")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--peers", choices=["none", "halide", "pytorch", "all"], default="all")
-    parser.add_argument("--search", action="store_true", help="ours also by a search, beside the rules")
-    parser.add_argument("--small", action="store_true", help="sizes for a check of the results")
-    parser.add_argument("--add", action="store_true", help="keep other operators of an earlier report")
+    parser.add_argument("--search", action="store_true", help="also run our autoscheduler with its search")
+    parser.add_argument("--small", action="store_true", help="small sizes, to check the results")
+    parser.add_argument("--add", action="store_true", help="keep the other operators of an earlier report")
     parser.add_argument("--output", default="operators.json")
     options = parser.parse_args()
     options.rounds = options.rounds or (5 if options.quick else 15)

@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""peers.py -- the newest Halide and PyTorch, in a virtual environment: out/bench/peers, made when it is not there.
+"""peers.py -- installs the newest Halide and PyTorch into a virtual environment, out/bench/peers, created if missing.
 
     peers.py [halide] [pytorch]
 
-installs those from the Python package index. Benchmarks do so by themselves; tests use what is there.
+Packages come from the Python package index. Benchmarks run this by themselves; tests only use what is installed.
 """
 import glob
 import os
@@ -13,7 +13,7 @@ import sys
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 PEERS = os.path.join(ROOT, "out", "bench", "peers")
 PYTORCH = "torch==2.13.0"
-CPU_WHEELS = "torch==2.13.0+cpu"  # a tenth of the size, where the index has it
+CPU_WHEELS = "torch==2.13.0+cpu"  # a tenth of the size, if the index has it
 
 
 def site_packages():

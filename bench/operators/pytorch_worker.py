@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""pytorch_worker.py -- one operator and its gradients by PyTorch, run on request.
+"""pytorch_worker.py -- runs one operator and its gradients in PyTorch, on request.
 
     pytorch_worker.py OPERATOR eager|compiled|float64 THREADS INPUTS RANK SIZES... RANK SIZES...
 
-A worker as ../pairs/worker_protocol.h says, in PyTorch's eager mode or through torch.compile, on the
-inputs that a worker of the benchmark has saved. In float64 it is the reference. Programs are what users
-of PyTorch write: the operators of torch.nn.functional where there is one, autograd for the gradients; those that
-are also operators of ../torch stand in its formulations.py.
+It implements ../pairs/worker_protocol.h, in PyTorch's eager mode or through torch.compile, on inputs saved by
+a worker of the benchmark. In float64 it is the reference. Programs are written as PyTorch users do: by the
+operators of torch.nn.functional where available, with autograd for the gradients. Programs that are also
+operators of ../torch are in its formulations.py.
 """
 import ctypes
 import gc
@@ -26,7 +26,7 @@ PROGRAMS = {}
 
 
 def program(by):
-    """Gradients are by the first `by` of its arguments."""
+    """Registers a program with gradients with respect to its first `by` arguments."""
     def register(function):
         PROGRAMS[function.__name__] = function, by
         return function
@@ -58,7 +58,7 @@ def deconvolution_step(image, kernel, weights, bank, blurred):
 
 
 def neighbours(image):
-    """East, west, south and north of each pixel."""
+    """The east, west, south and north neighbours of each pixel."""
     padded = F.pad(image[None], [1, 1, 1, 1], mode="replicate")[0]
     return padded[:, 1:-1, 2:], padded[:, 1:-1, :-2], padded[:, 2:, 1:-1], padded[:, :-2, 1:-1]
 
@@ -125,7 +125,7 @@ def non_local_means(image, strength):
 # ---- the worker ----
 
 def arrays(path):
-    """Those in a file of OutputHeaders and elements."""
+    """The arrays in a file of OutputHeaders and elements."""
     with open(path, "rb") as file:
         data, at = file.read(), 0
     while at < len(data):
@@ -201,6 +201,6 @@ def main():
 if __name__ == "__main__":
     try:
         main()
-    except Exception as error:  # what the benchmark shall show, whatever it is
+    except Exception as error:  # reported by the benchmark, whatever it is
         print("failed", type(error).__name__, " ".join(str(error).split()), flush=True)
         sys.exit(1)

@@ -1,6 +1,6 @@
-// schedules.cpp -- how operators are scheduled, as the worker's last argument says: by Retrograde as
-// they come, or under options of its autoscheduler ("without=strips"); by Halide with one of its
-// autoschedulers or by hand: everything at root.
+// schedules.cpp -- schedules operators according to the worker's last argument. Retrograde uses its default schedule,
+// or options of its autoscheduler ("without=strips"). Halide uses one of its autoschedulers, or a schedule by hand with
+// everything at root.
 #include "../gradients/gradient.h"
 
 namespace kernels {
@@ -9,7 +9,7 @@ using namespace Halide;
 
 #ifdef BENCH_RETROGRADE
 
-// A search is made here, so that it is timed, and once more where it is compiled, with the same result.
+// A search runs here, so that it is timed, and again during compilation, with the same result.
 void schedule(Pipeline& pipeline, const Setup& setup) {
   const auto options = retrograde::AutoscheduleOptions::from_string(setup.schedule);
   pipeline.set_autoschedule(options);
@@ -20,7 +20,7 @@ void schedule(Pipeline& pipeline, const Setup& setup) {
 
 namespace {
 
-// Boundary conditions are left where they are read.
+// Boundary conditions stay inlined.
 bool is_boundary(const Func& f) {
   for (const char* each : {"repeat_edge", "constant_exterior", "repeat_image", "mirror"}) {
     if (f.name().rfind(each, 0) == 0 && !f.has_update_definition()) return true;
@@ -28,7 +28,7 @@ bool is_boundary(const Func& f) {
   return false;
 }
 
-// Calls `parallel` on all of them as one loop.
+// Calls `parallel` on the fusion of all of them.
 template <typename Stages>
 void parallel_all(Stages& stage, const std::vector<Var>& vars) {
   if (vars.empty()) return;
@@ -41,7 +41,7 @@ void parallel_all(Stages& stage, const std::vector<Var>& vars) {
   stage.parallel(all);
 }
 
-// The variables of the Func that an update leaves as they are, innermost first.
+// The Func's variables that an update does not change, innermost first.
 std::vector<Var> pure_vars(const Func& f, int update) {
   std::vector<Var> pure;
   const std::vector<Expr> args = f.update_args(update);
@@ -52,7 +52,7 @@ std::vector<Var> pure_vars(const Func& f, int update) {
   return pure;
 }
 
-// Of constant extents; what is not known counts as one.
+// The number of terms, from constant extents; unknown extents count as one.
 double terms_of(const Func& f, int update) {
   double terms = 1;
   for (const Internal::ReductionVariable& r : f.function().update(update).schedule().rvars()) {
@@ -63,11 +63,11 @@ double terms_of(const Func& f, int update) {
 }
 
 constexpr double many_terms =
-    16384;  // a sum of so many is a vector of sums along its first variable
+    16384;  // from this many terms on, a sum is a vector of partial sums along its first variable
 
 void schedule_sum(Func& f, int update, int lanes);
 
-// A long sum in one place: one sum for each slice of its last variable, in parallel.
+// Splits a long sum with one result: one partial sum for each slice of its last variable, in parallel.
 void schedule_slices(Func& f, int update, int lanes) {
   const std::vector<RVar> rvars = f.rvars(update);
   Var slice("slice");
@@ -99,7 +99,7 @@ void schedule_update(Func& f, int update, int lanes) {
   parallel_all(stage, pure);
 }
 
-// What a programmer does first: every Func at root, in vectors along its rows, rows in parallel.
+// A first schedule by hand: every Func at root, vectorized along its rows, with rows in parallel.
 void by_hand(Pipeline& pipeline, const Setup& setup) {
   const int lanes = setup.lanes<float>();
   std::vector<Internal::Function> outputs;
@@ -121,7 +121,7 @@ void by_hand(Pipeline& pipeline, const Setup& setup) {
 
 }  // namespace
 
-// The plugins are named after the autoschedulers, in small letters.
+// The plugins have the autoschedulers' names in lower case.
 void schedule(Pipeline& pipeline, const Setup& setup) {
   if (setup.schedule == "root") return by_hand(pipeline, setup);
   std::string plugin = setup.schedule;

@@ -1,6 +1,6 @@
-// separable_block -- a depthwise 3 x 3 convolution, then a pointwise one, each with bias and ReLU: by
-// input, both weights and both biases.
-// Source: Howard et al., MobileNets, arXiv:1704.04861, section 3.1 (without normalisation).
+// separable_block -- a depthwise 3 x 3 convolution, then a pointwise one, each with bias and ReLU. Gradients: input,
+// both weights and both biases. Source: Howard et al., MobileNets, arXiv:1704.04861, section 3.1 (without
+// normalisation).
 #include "operator.h"
 
 namespace kernels {

@@ -1,4 +1,4 @@
-// spatial_transformer -- images under affine transforms, zeros around them: by images and transforms.
+// spatial_transformer -- applies affine transforms to images, with zeros outside. Gradients: images and transforms.
 // Source: Jaderberg et al., Spatial Transformer Networks, NeurIPS 2015.
 #include "operator.h"
 

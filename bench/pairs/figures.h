@@ -1,4 +1,4 @@
-// figures.h -- what both reports compute and print in the same way.
+// figures.h -- computations and formatting that both reports share.
 #pragma once
 
 #include <cmath>
@@ -10,7 +10,7 @@
 
 namespace bench {
 
-// As printf, of at most 511 characters.
+// Like printf; at most 511 characters.
 template <typename... Args>
 std::string formatted(const char* format, Args... args) {
   char line[512];
@@ -20,7 +20,7 @@ std::string formatted(const char* format, Args... args) {
 
 inline double run_ratio(const PairResult& r) { return r.retrograde.median / r.halide.median; }
 
-// 1 of none.
+// 1 if there are none.
 template <typename T, typename F>
 double geometric_mean(const std::vector<T>& all, F value) {
   double sum = 0;
@@ -28,7 +28,7 @@ double geometric_mean(const std::vector<T>& all, F value) {
   return all.empty() ? 1 : std::exp(sum / static_cast<double>(all.size()));
 }
 
-// Those that ran on both sides.
+// The results of those that ran on both sides.
 template <typename T>
 std::vector<T> completed(const std::vector<T>& results) {
   std::vector<T> out;

@@ -18,7 +18,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// The least of several times of `work(thread)` on all of so many threads at once, in seconds.
+// The least of `times` measurements of `work(thread)` running on all threads at once, in seconds.
 double best_seconds(int threads, int times, const std::function<void(int)>& work) {
   double best = 1e30;
   for (int i = 0; i < times; i++) {
@@ -40,7 +40,7 @@ __attribute__((optimize("O3"), noinline)) void triad(float* __restrict a, const 
 }
 
 double measure_bandwidth(int threads) {
-  const size_t n = size_t{24} << 20;  // elements of each array: 96 MiB, beyond any cache here
+  const size_t n = size_t{24} << 20;  // elements of each array: 96 MiB, larger than any cache here
   std::unique_ptr<float[]> a(new float[n]), b(new float[n]), c(new float[n]);
   auto part = [&](int thread, auto&& f) {
     const size_t first = n * thread / threads, last = n * (thread + 1) / threads;
@@ -61,7 +61,7 @@ double measure_bandwidth(int threads) {
   return 3.0 * sizeof(float) * static_cast<double>(n) / seconds;
 }
 
-// ---- multiply-adds: as many independent chains as hide the latency ----
+// ---- multiply-adds: enough independent chains to hide the latency ----
 
 constexpr int chains = 16;
 constexpr int64_t steps = 4'000'000;

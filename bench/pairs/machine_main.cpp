@@ -1,4 +1,4 @@
-// machine_main.cpp -- what so many threads of this machine can do, for benchmarks in Python.
+// machine_main.cpp -- prints this machine's peak performance with a number of threads, for benchmarks in Python.
 #include <cstdio>
 #include <cstdlib>
 

@@ -54,8 +54,8 @@ std::optional<Options> read_options(int argc, char** argv) {
   bool gradients = false;
   app.add_option("--kernel", options.kernels, "run this kernel; may be given several times");
   app.add_flag("--gradients", gradients,
-               "gradients instead, which each compiler makes and schedules itself");
-  app.add_flag("--quick", options.quick, "few runs of each: numbers for guidance only");
+               "run gradients instead, which each compiler derives and schedules itself");
+  app.add_flag("--quick", options.quick, "few runs of each; the numbers are only rough");
   auto* rounds = app.add_option("--rounds", options.rounds, "timed runs of each side")
                      ->check(CLI::Range(1, 100000))
                      ->capture_default_str();

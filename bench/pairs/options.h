@@ -9,8 +9,8 @@
 namespace bench {
 
 struct Options {
-  std::vector<std::string> kernels;  // to run, gradients among them
-  bool quick = false;                // few runs of each: numbers for guidance only
+  std::vector<std::string> kernels;  // to run, including gradients
+  bool quick = false;                // few runs of each; the numbers are only rough
   int rounds = 31;
   std::filesystem::path output = "kernels.json";
 };
@@ -19,7 +19,7 @@ const std::vector<std::string>& kernel_names();    // of forward pipelines
 const std::vector<std::string>& gradient_names();  // of gradients
 bool is_gradient(const std::string& name);
 
-// Nothing when only help was asked for. Throws retrograde::UserError.
+// Nothing if only help was requested. Throws retrograde::UserError.
 std::optional<Options> read_options(int argc, char** argv);
 
 }  // namespace bench

@@ -31,7 +31,7 @@ double relative_error(double a, double b, double scale) {
   return std::isnan(error) ? std::numeric_limits<double>::infinity() : error;
 }
 
-// Threads of the side that has just run keep looking for work for a moment.
+// Threads of the side that has just run keep spinning for a moment.
 void let_threads_rest() { std::this_thread::sleep_for(std::chrono::microseconds(500)); }
 
 }  // namespace
@@ -87,7 +87,7 @@ Pair::Pair(const Job& job, const WorkerCommand& retrograde, const WorkerCommand&
   warm_up();
 }
 
-// The first run of a process makes its threads and touches its memory.
+// The first run of a process creates its threads and touches its memory.
 void Pair::warm_up() {
   retrograde_.run();
   halide_.run();

@@ -1,4 +1,4 @@
-// process_memory.h -- how much memory a worker's process holds and held (Linux).
+// process_memory.h -- the current and peak memory of a worker's process (Linux).
 #pragma once
 
 #include <fstream>
@@ -15,7 +15,7 @@ inline double status_mb(const std::string& field) {
   return 0;
 }
 
-// The peak from now on (Linux 4.0); where that is not allowed, RUN_MB counts from the old peak.
+// Resets the peak (Linux 4.0); if that is not permitted, RUN_MB counts from the old peak.
 inline void forget_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
 }  // namespace bench

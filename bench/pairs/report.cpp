@@ -19,7 +19,7 @@ double percent_of_peak(const PairResult& r, const Machine& machine) {
   return 100e3 * r.operations / machine.flops(r.threads) / r.retrograde.median;
 }
 
-// What follows the error in the table.
+// The remark after the error in the table.
 std::string remark(const PairResult& r) {
   if (r.max_relative_error <= tolerance(r)) return "";
   if (!r.halide_slope_error) return "  DIFFERS";

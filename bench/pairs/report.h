@@ -1,5 +1,4 @@
-// report.h -- what the benchmark says: a line for each kernel while it runs, then means and
-// targets, and the same as JSON.
+// report.h -- prints a line for each kernel while the benchmark runs, then means and targets; writes the same as JSON.
 #pragma once
 
 #include <filesystem>
@@ -24,8 +23,7 @@ struct Target {
 std::vector<Target> targets(const std::vector<PairResult>& results, const Machine& machine);
 std::string table_foot(const std::vector<PairResult>& results, const Machine& machine);
 
-// It failed, or the two sides differ; but not when differences say that ours is right and Halide's
-// is not.
+// Whether it failed or the two sides differ, unless differences show that our gradient is right and Halide's is wrong.
 bool is_wrong(const PairResult& result);
 
 void write_json(const std::filesystem::path& path, const std::vector<PairResult>& results,

@@ -84,7 +84,7 @@ std::vector<double> Worker::answer(const std::string& expected) {
   words >> word;
   if (word != expected) fail(line.substr(std::min(line.size(), word.size() + 1)));
   std::vector<double> numbers;
-  // Not read as a double: streams refuse "inf" and "nan", which a wrong gradient may give.
+  // Parsed by strtod, because streams reject "inf" and "nan", which a wrong gradient may contain.
   for (std::string number; words >> number;)
     numbers.push_back(std::strtod(number.c_str(), nullptr));
   return numbers;

@@ -1,5 +1,5 @@
-// worker.h -- the benchmark's handle on one worker: one kernel, compiled by one of the compilers,
-// in a process of its own, so that neither side's memory, threads or faults are the other's.
+// worker.h -- controls one worker: a kernel, compiled by one of the compilers, in a process of its own. So the two
+// sides share neither memory nor threads nor crashes.
 #pragma once
 
 #include <filesystem>
@@ -13,7 +13,7 @@ namespace bench {
 
 enum class Side { Retrograde, Halide };
 
-// The kernel does not compile or does not run, or the worker has ended: what it said.
+// The kernel does not compile or run, or the worker has ended; contains its message.
 struct WorkerError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -25,13 +25,13 @@ struct Job {
   bool is_gradient = false;
 };
 
-// How a worker is started.
+// The command that starts a worker.
 struct WorkerCommand {
   std::filesystem::path program;
   std::vector<std::string> arguments;
 };
 
-// The elements of one output, whatever their type was.
+// The elements of one output, converted from their type.
 struct Values {
   bool integers = false;
   std::vector<double> elements;
@@ -39,18 +39,17 @@ struct Values {
 
 class Worker {
  public:
-  // Compiles. `programs` is the folder of the two worker programs.
+  // Compiles the kernel. `programs` is the folder of the two worker programs.
   Worker(Side side, const Job& job, const std::filesystem::path& programs);
-  // Another that speaks worker_protocol.h.
+  // Any other program that implements worker_protocol.h.
   Worker(Side side, const WorkerCommand& command, int threads);
 
   double run();  // seconds
-  // Of the runs to come, as many as it was started for at most. Of ours only.
+  // For later runs; at most the number that it was started with. Only for our worker.
   void set_threads(int threads);
-  // By way of a file in `scratch`.
+  // Transferred through a file in `scratch`.
   std::vector<Values> outputs(const std::filesystem::path& scratch);
-  // Of a gradient: how far it is from differences of its own program (../gradients/slope.h), or of
-  // one in a library.
+  // For a gradient: its error against differences of its own program (../gradients/slope.h), or of one in a library.
   double slope_error(const std::filesystem::path& library = {});
   struct Memory {
     double peak_mb, run_mb;

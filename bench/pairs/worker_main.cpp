@@ -1,6 +1,5 @@
-// worker_main.cpp -- compiles one kernel and runs it on request. Built from the same text
-// with Halide and with Retrograde (BENCH_RETROGRADE), for kernels and for operators
-// (BENCH_OPERATORS). See worker_protocol.h.
+// worker_main.cpp -- compiles one kernel and runs it on request. The same source is built with Halide and with
+// Retrograde (BENCH_RETROGRADE), for kernels and for operators (BENCH_OPERATORS). See worker_protocol.h.
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,7 +21,7 @@ namespace {
 kernels::Kernel make_kernel(const std::string& name, const kernels::Setup& setup) {
 #define KERNEL(known) \
   if (name == #known) return kernels::known(setup);
-#ifndef BENCH_FORWARD  // which has no gradients
+#ifndef BENCH_FORWARD  // a list without gradients
 #define GRADIENT(known) KERNEL(known)
 #endif
 #define OPERATOR(known) KERNEL(known)
@@ -34,8 +33,8 @@ kernels::Kernel make_kernel(const std::string& name, const kernels::Setup& setup
   throw std::runtime_error("there is no kernel \"" + name + "\"");
 }
 
-// Halide 14 takes recent AMD processors for ones with AMX; its code would not run. So that both
-// sides see the same machine, ours goes without as well.
+// Halide 14 mistakes recent AMD processors for ones with AMX, and its code would not run. Ours leaves AMX out too, so
+// that both sides have the same target.
 Halide::Target target() {
   return Halide::get_jit_target_from_environment().without_feature(
       Halide::Target::AVX512_SapphireRapids);
@@ -104,7 +103,7 @@ class Worker {
   }
 
   void tell_slope() {
-    if (setup_.is_operator) {  // the program is computed beside its gradients
+    if (setup_.is_operator) {  // the program's output is computed together with its gradients
       std::cout << "slope " << kernels::slope_error(kernel_, kernel_, target_) << std::endl;
       return;
     }
@@ -114,7 +113,7 @@ class Worker {
   }
 
 #ifdef BENCH_RETROGRADE
-  // Predicted and measured time of every stage, as JSON.
+  // Writes the predicted and measured time of every stage as JSON.
   void explain(const std::string& path, double seconds) {
     retrograde::ExplainOptions options;
     options.measure = seconds > 0;

@@ -1,5 +1,5 @@
-// alpha_over -- one interleaved RGBA picture over another (Porter and Duff 1984), 8 bits, colours
-// premultiplied.
+// alpha_over -- composites one interleaved RGBA picture over another (Porter and Duff 1984), 8 bits, premultiplied
+// colours.
 #include "program.h"
 
 namespace {

@@ -1,12 +1,12 @@
-// bilateral_grid -- edges kept while the rest is smoothed: a coarse histogram of position and
-// brightness, blurred, and read back by interpolation (Chen, Paris and Durand 2007).
+// bilateral_grid -- edge-preserving smoothing: a coarse histogram of position and brightness, blurred, and read back by
+// interpolation (Chen, Paris and Durand 2007).
 #include "program.h"
 
 namespace {
 
 class BilateralGrid : public Halide::Generator<BilateralGrid> {
  public:
-  GeneratorParam<int> cell{"cell", 8};  // pixels a side
+  GeneratorParam<int> cell{"cell", 8};  // pixels per side
   Input<Buffer<float>> input{"input", 2};
   Input<float> range{"range"};  // brightness of a cell
   Output<Buffer<float>> output{"output", 2};

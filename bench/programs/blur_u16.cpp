@@ -13,7 +13,7 @@ class Blur : public Halide::Generator<Blur> {
     output(x, y) = (rows(x, y) + rows(x, y + 1) + rows(x, y + 2)) / 3;
   }
 
-  // Strips slide down; each row of them is made once.
+  // Strips slide down; each row of a strip is computed once.
   void schedule() {
     Var yi("yi");
     const int lanes = natural_vector_size<uint16_t>();

@@ -1,5 +1,5 @@
-// box_running -- the mean over a window of any radius, with as many operations whatever the radius:
-// running sums along columns, then along rows, lanes over the other axis.
+// box_running -- the mean over a window, with a cost independent of the radius: running sums along columns, then along
+// rows, with lanes over the other axis.
 #include "program.h"
 
 namespace {

@@ -1,13 +1,13 @@
-// builder_main.cpp -- compiles one program ahead of time. Built twice from the same text, with
-// Halide 14 and with Retrograde, together with all programs.
+// builder_main.cpp -- compiles one program ahead of time. The same source is built with Halide 14 and with Retrograde,
+// together with all programs.
 //
 //   builder NAME FOLDER [PARAM=VALUE...]
 //       writes FOLDER/NAME.o and NAME.cases, and prints "compiled SECONDS PEAK_MB"
 //   builder -r FOLDER
 //       writes FOLDER/runtime.o, the compiler's own runtime
 //
-// SECONDS: from the command line of a generator to its object file, after a trivial generator has
-// made the compiler set up what it needs once in a process. A failure is said on standard error.
+// SECONDS: from the command line of a generator to its object file, after a trivial generator has made the compiler do
+// its one-time initialisation. Failures are reported on standard error.
 #include <sys/resource.h>
 
 #include <chrono>
@@ -33,8 +33,8 @@ class Trivial : public Halide::Generator<Trivial> {
   }
 };
 
-// Halide 14 takes recent AMD processors for ones with AMX; its code would not run. So that both
-// sides see the same machine, ours goes without as well.
+// Halide 14 mistakes recent AMD processors for ones with AMX, and its code would not run. Ours leaves AMX out too, so
+// that both sides have the same target.
 std::string target() {
   return Halide::get_host_target()
       .without_feature(Halide::Target::AVX512_SapphireRapids)

@@ -1,5 +1,5 @@
-// canny_edges -- the thin edges of a grey picture (Canny 1986): blur, Sobel's gradient, what is not
-// the largest across the edge dropped, two thresholds, weak edges kept beside strong ones.
+// canny_edges -- the thin edges of a grey picture (Canny 1986): blur, Sobel gradient, non-maximum suppression across
+// the edge, two thresholds, weak edges kept next to strong ones.
 #include "program.h"
 
 namespace {

@@ -1,15 +1,15 @@
-// cases.h -- what a compiled program is called with: the arguments of its function at several
-// sizes, as a text that the programs' builders write and their workers read:
+// cases.h -- the test cases of a compiled program: the arguments of its function at several sizes, as a text that the
+// programs' builders write and their workers read:
 //
 //   program NAME TOLERANCE
-//   gradients COUNT                                     of so many inputs, the first ones; their
-//                                                         outputs follow a scalar one, the sum
+//   gradients COUNT                                     the number of first inputs that have gradients;
+//                                                         the gradients follow a scalar output, the sum
 //   case LABEL THREADS                                  threads: 0 means all
 //   in   TYPE LAYOUT FILL LOW HIGH MIN:EXTENT...        an array; LAYOUT planar or interleaved,
 //   out  TYPE LAYOUT MIN:EXTENT...                        FILL picture or noise
 //   value TYPE NUMBER                                   a scalar
 //
-// Arguments in the function's order, TYPE as in "uint8", "float32".
+// Arguments are in the function's order, TYPE is "uint8", "float32" and so on.
 #pragma once
 
 #include <filesystem>
@@ -31,7 +31,7 @@ struct Argument {
   std::vector<int> extents, mins;  // mins: empty, or one for each extent
   bool is_interleaved = false;     // the third dimension is innermost
   bool is_noise = false;           // else a picture
-  double low = 0, high = 1;        // of inputs; a scalar is `low`
+  double low = 0, high = 1;        // range of inputs; a scalar is `low`
 
   Argument interleaved() const;
   Argument noise() const;
@@ -46,8 +46,8 @@ struct Case {
 
 struct Program {
   std::string name;
-  int gradients = 0;     // of so many inputs; none: not a gradient
-  double tolerance = 0;  // largest relative error; 0: none for integers, 1e-4 otherwise
+  int gradients = 0;     // number of inputs with gradients; 0: not a gradient
+  double tolerance = 0;  // largest relative error; 0: exact for integers, 1e-4 otherwise
   std::vector<Case> cases;
 };
 
@@ -55,7 +55,7 @@ void write_cases(const std::filesystem::path& path, const Program& program);
 // Throws std::runtime_error.
 Program read_cases(const std::filesystem::path& path);
 
-// ---- how programs write them ----
+// ---- helpers for programs to write them ----
 
 template <typename T>
 constexpr Type type_of() {

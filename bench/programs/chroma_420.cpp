@@ -1,5 +1,5 @@
-// chroma_420 -- planes of brightness and, at half the size, of colour from interleaved RGB, as
-// video encoders take them: three outputs.
+// chroma_420 -- converts interleaved RGB to planes of luma and half-size chroma, as video encoders take them: three
+// outputs.
 #include "program.h"
 
 namespace {

@@ -10,7 +10,7 @@ namespace programs {
 
 namespace {
 
-// Runs until the time is used; a round is one run of each side.
+// Runs until the time limit; a round is one run of each side.
 void run_rounds(bench::Pair& pair, const Limits& limits) {
   const auto start = std::chrono::steady_clock::now();
   const auto used = [&] {

@@ -1,6 +1,5 @@
-// conv_layer_x86 -- a 3 x 3 convolution of many channels, bias, and what is negative cut off.
-// Channels are innermost; tiles of 2 vectors of them by 5 pixels stay in registers, weights and
-// pixels are loaded once for all that need them.
+// conv_layer_x86 -- a 3 x 3 convolution with many channels, bias and ReLU. Channels are innermost. Tiles of 2 vectors
+// of them by 5 pixels stay in registers; weights and pixels are loaded once for all their uses.
 #include "program.h"
 
 namespace {

@@ -1,5 +1,5 @@
-// demosaic -- colours from a Bayer mosaic of 16 bits (R G / G B), bilinear with green corrected by
-// the slope of red or blue (Malvar, He and Cutler 2004), interleaved output, white balance.
+// demosaic -- colours from a Bayer mosaic of 16 bits (R G / G B), bilinear with green corrected by the gradient of red
+// or blue (Malvar, He and Cutler 2004), interleaved output, white balance.
 #include "program.h"
 
 namespace {

@@ -1,5 +1,4 @@
-// depthwise_conv -- each channel by a 3 x 3 filter of its own, then all channels mixed at each
-// pixel.
+// depthwise_conv -- filters each channel by its own 3 x 3 filter, then mixes all channels at each pixel.
 #include "program.h"
 
 namespace {

@@ -1,4 +1,4 @@
-// dot_product -- of two long vectors, and their squares: each thread adds up a part in vectors.
+// dot_product -- of two long vectors, and their squares: each thread sums a part, in vectors.
 #include "program.h"
 
 namespace {

@@ -1,5 +1,4 @@
-// erode_dilate -- an opening and a closing of a mask by 5 x 5 squares: separable minima and maxima
-// of bytes.
+// erode_dilate -- an opening and a closing of a mask by 5 x 5 squares: separable minima and maxima of bytes.
 #include "program.h"
 
 namespace {

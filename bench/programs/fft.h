@@ -1,5 +1,5 @@
-// fft.h -- many complex FFTs of one small length, fully unrolled: radix-2 steps by decimation in
-// frequency (Gentleman and Sande 1966), values in Tuples, a transform in each lane.
+// fft.h -- many complex FFTs of one small length, fully unrolled: radix-2 steps by decimation in frequency (Gentleman
+// and Sande 1966), values in Tuples, one transform per lane.
 #pragma once
 
 #include "program.h"
@@ -9,7 +9,7 @@ namespace programs {
 class SmallFft : public Halide::Generator<SmallFft> {
  public:
   GeneratorParam<int> length{"length", 16};
-  // (transform, point, part): real parts and imaginary ones.
+  // (transform, point, part): part 0 is real, part 1 imaginary.
   Input<Buffer<float>> signal{"signal", 3};
   Output<Buffer<float>> spectrum{"spectrum", 3};
 
@@ -37,7 +37,7 @@ class SmallFft : public Halide::Generator<SmallFft> {
   }
 
  private:
-  // Blocks of 2 * half points: sums in the first half, turned differences in the second.
+  // Blocks of 2 * half points: sums in the first half, twiddled differences in the second.
   void add_stage(int half) {
     Func source = stages.back();
     Func stage("stage_" + std::to_string(length / half));

@@ -1,12 +1,12 @@
-// gemm_u8 -- a product of 8-bit matrices in 32 bits, as quantised networks have it. B is packed by
-// fours of rows, so that each lane adds up four products at a time.
+// gemm_u8 -- a product of 8-bit matrices in 32 bits, as in quantised networks. B is packed in groups of four rows, so
+// that each lane adds four products at a time.
 #include "program.h"
 
 namespace {
 
 class GemmU8 : public Halide::Generator<GemmU8> {
  public:
-  Input<Buffer<uint8_t>> a{"a", 2};   // (k, i), a multiple of four k
+  Input<Buffer<uint8_t>> a{"a", 2};   // (k, i); the extent of k is a multiple of four
   Input<Buffer<int8_t>> b{"b", 2};    // (j, k)
   Output<Buffer<int32_t>> c{"c", 2};  // (j, i)
 

@@ -1,5 +1,5 @@
-// gemv -- y = a A x + b y: each row of the matrix by a vector, in as many partial sums as there are
-// lanes. Rows may lie in memory with any stride between elements; dense ones are what is usual.
+// gemv -- y = a A x + b y: each row of the matrix times a vector, in one partial sum per lane. Elements of a row may
+// have any stride; usually they are dense.
 #include "program.h"
 
 namespace {

@@ -1,5 +1,4 @@
-// gemv_columns -- a transposed matrix by a vector: columns are added up, blocks of rows of the
-// result in registers.
+// gemv_columns -- a transposed matrix times a vector: adds columns, with blocks of the result's rows in registers.
 #include "program.h"
 
 namespace {

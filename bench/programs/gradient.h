@@ -1,14 +1,14 @@
-// gradient.h -- gradients as programs: a generator that makes them of a pipeline that it has
-// written as users do, without a schedule. Halide's autoscheduler for gradients, Li2018, schedules
-// them there; here they are as they come. With primal=true the same function gives the sum that the
-// gradients are of, and zeros for them, so that differences can check them.
+// gradient.h -- gradients as programs: a generator derives them from a pipeline written as users do, without a
+// schedule. Halide schedules them with Li2018, its autoscheduler for gradients; Retrograde uses its default schedule.
+// With primal=true, the same function gives the sum whose gradients are taken, and zeros for the gradients, so that
+// differences can check them.
 #pragma once
 
 #include "program.h"
 
 namespace programs {
 
-// What gradients are by: the values of an input.
+// The values of an input, as a Func with respect to which gradients are taken.
 template <typename Image>
 Halide::Func values_of(Image& image, const std::string& name, const std::vector<int>& extents) {
   std::vector<Halide::Var> vars;
@@ -20,7 +20,7 @@ Halide::Func values_of(Image& image, const std::string& name, const std::vector<
   return f;
 }
 
-// f at a place, or at the nearest one inside.
+// f at a position, clamped to its extents.
 inline Halide::Expr nearest(const Halide::Func& f, const std::vector<int>& extents,
                             std::vector<Halide::Expr> at) {
   for (size_t d = 0; d < extents.size(); d++) at[d] = clamp(at[d], 0, extents[d] - 1);
@@ -60,7 +60,7 @@ class Weighed {
   std::shared_ptr<Halide::Derivative> gradients_;
 };
 
-// For the autoscheduler: the sizes that are usual.
+// The usual sizes, for the autoscheduler.
 template <typename Image>
 void estimate(Image& image, const std::vector<int>& extents) {
   Halide::Region region;
@@ -68,8 +68,7 @@ void estimate(Image& image, const std::vector<int>& extents) {
   image.set_estimates(region);
 }
 
-// Without a schedule a program is computed within its output: the primal, which only checks, is
-// not.
+// Without a schedule a program would be inlined into its output. Only the primal, which is for checks, is stored.
 inline void store(std::vector<Halide::Func> stages, bool is_primal) {
   for (Halide::Func& f : stages) {
     if (is_primal) f.compute_root();

@@ -1,6 +1,5 @@
-// gradient_bilateral_grid -- a picture splatted into a coarse grid by place and by a guide's
-// brightness, blurred there, and read back by interpolation (Chen, Paris and Durand 2007): by
-// picture and guide.
+// gradient_bilateral_grid -- splats a picture into a coarse grid by position and by a guide's brightness, blurs the
+// grid, and reads it back by interpolation (Chen, Paris and Durand 2007). Gradients: picture and guide.
 #include "gradient.h"
 
 namespace {

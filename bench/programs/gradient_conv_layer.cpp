@@ -1,5 +1,4 @@
-// gradient_conv_layer -- a 3 x 3 convolution of 16 channels to 16, cut off below zero: by picture,
-// filters, offsets.
+// gradient_conv_layer -- a 3 x 3 convolution of 16 channels to 16 with ReLU. Gradients: picture, filters, biases.
 #include "gradient.h"
 
 namespace {

@@ -1,6 +1,5 @@
-// gradient_interpolation -- missing pixels filled by a pyramid of 10 levels: alpha-weighted means
-// downwards, each level shining through where the finer one has nothing: by the picture and its
-// alpha.
+// gradient_interpolation -- fills missing pixels by a pyramid of 10 levels: alpha-weighted means downwards; each level
+// shows through where the finer one is transparent. Gradients: the picture and its alpha.
 #include "pyramid.h"
 
 namespace {

@@ -1,5 +1,5 @@
-// gradient_local_laplacian -- local Laplacian filters of 8 levels and 4 greys (Paris, Hasinoff and
-// Kautz 2011), each level with a gain: by picture and gains.
+// gradient_local_laplacian -- local Laplacian filters with 8 levels and 4 greys (Paris, Hasinoff and Kautz 2011), each
+// level with a gain. Gradients: picture and gains.
 #include "pyramid.h"
 
 namespace {

@@ -1,4 +1,4 @@
-// gradient_matrix_product -- the product of two matrices: by both.
+// gradient_matrix_product -- the product of two matrices. Gradients: both.
 #include "gradient.h"
 
 namespace {

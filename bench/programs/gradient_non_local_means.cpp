@@ -1,5 +1,5 @@
-// gradient_non_local_means -- means over windows of 7 x 7 weighted by how alike patches of 7 x 7
-// are (Buades, Coll and Morel 2005): by picture and strength.
+// gradient_non_local_means -- means over 7 x 7 windows, weighted by the similarity of 7 x 7 patches (Buades, Coll and
+// Morel 2005). Gradients: picture and strength.
 #include "gradient.h"
 
 namespace {

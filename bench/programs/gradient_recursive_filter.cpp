@@ -1,5 +1,5 @@
-// gradient_recursive_filter -- a running mean forwards along each column, and back: by the picture.
-// Not by the rate, whose gradient Halide refuses: it depends on values in between.
+// gradient_recursive_filter -- a running mean forwards along each column, and back. Gradients: the picture. There is no
+// gradient with respect to the rate, which depends on intermediate values and which Halide rejects.
 #include "gradient.h"
 
 namespace {

@@ -1,5 +1,5 @@
-// gradient_resample -- a picture made smaller by a tent as wide as the scale wants, weights made
-// once for each row and column: by the picture.
+// gradient_resample -- shrinks a picture by a tent filter whose width follows from the scale; weights are computed once
+// for each row and column. Gradients: the picture.
 #include "gradient.h"
 
 namespace {

@@ -1,5 +1,5 @@
-// gradient_tone_curve -- each channel through a curve of 64 knots, read by interpolation: by
-// picture and curves.
+// gradient_tone_curve -- maps each channel through a curve with 64 knots, by interpolation. Gradients: picture and
+// curves.
 #include "gradient.h"
 
 namespace {

@@ -1,5 +1,5 @@
-// gradient_unsharp -- a grey picture less its blur, added back to the ratio of the colours: by
-// picture and amount.
+// gradient_unsharp -- a grey picture minus its blur, added back in the ratio of the colours. Gradients: picture and
+// amount.
 #include "gradient.h"
 
 namespace {

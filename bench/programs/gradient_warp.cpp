@@ -1,4 +1,4 @@
-// gradient_warp -- a picture sampled where a flow says, bilinearly: by picture and flow.
+// gradient_warp -- samples a picture bilinearly at positions given by a flow. Gradients: picture and flow.
 #include "gradient.h"
 
 namespace {

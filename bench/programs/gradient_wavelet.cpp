@@ -1,5 +1,5 @@
-// gradient_wavelet -- a level of Daubechies' transform along x, details shrunk towards zero, and
-// back: by picture and threshold.
+// gradient_wavelet -- a level of Daubechies' transform along x, with details shrunk towards zero, and its inverse.
+// Gradients: picture and threshold.
 #include "gradient.h"
 
 namespace {

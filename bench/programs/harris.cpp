@@ -1,4 +1,4 @@
-// harris -- how much of a corner each pixel is (Harris and Stephens 1988), from a colour picture.
+// harris -- the corner response of each pixel (Harris and Stephens 1988), from a colour picture.
 #include "program.h"
 
 namespace {

@@ -1,5 +1,5 @@
-// heat_steps -- four explicit steps of the heat equation whose conductivity varies, by tiles that
-// compute their overlaps again.
+// heat_steps -- four explicit steps of the heat equation with varying conductivity, in tiles that recompute their
+// overlaps.
 #include "program.h"
 
 namespace {

@@ -1,5 +1,5 @@
-// histogram_equalise -- grey values spread out evenly: a histogram per strip, added up, its running
-// sum as the curve of a look-up.
+// histogram_equalise -- equalises grey values: a histogram per strip, summed; its running sum is the curve for a
+// gather.
 #include "program.h"
 
 namespace {

@@ -1,4 +1,4 @@
-// iir_blur -- a recursive blur, forwards and backwards along y, then along x by way of a transpose.
+// iir_blur -- a recursive blur, forwards and backwards along y, then along x through a transpose.
 #include "program.h"
 
 namespace {
@@ -6,7 +6,7 @@ namespace {
 class IirBlur : public Halide::Generator<IirBlur> {
  public:
   Input<Buffer<float>> input{"input", 3};
-  Input<float> share{"share"};  // of the new value
+  Input<float> share{"share"};  // weight of the new value
   Output<Buffer<float>> output{"output", 3};
 
   void generate() {

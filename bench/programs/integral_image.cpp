@@ -1,5 +1,5 @@
-// integral_image -- sums of all pixels above and to the left, and from them the mean and the
-// deviation in a square of 15 pixels: what local contrast is normalised by.
+// integral_image -- sums of all pixels above and to the left, and from them the mean and deviation in a 15 x 15 square,
+// as used for local contrast normalisation.
 #include "program.h"
 
 namespace {

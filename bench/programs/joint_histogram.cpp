@@ -1,5 +1,5 @@
-// joint_histogram -- how often two pictures have two values at the same pixel: scattered counts in
-// one table for each strip, then their sum, and the table's sums along each axis.
+// joint_histogram -- counts pairs of values of two pictures at the same pixel: scattered counts in one table per strip,
+// then their sum, and the table's sums along each axis.
 #include "program.h"
 
 namespace {

@@ -1,5 +1,5 @@
-// kmeans_assign -- for each pixel the nearest of some colours and how far it is (the first half of
-// a step of k-means).
+// kmeans_assign -- the nearest of several colours for each pixel, and its distance (the first half of a step of
+// k-means).
 #include "program.h"
 
 namespace {

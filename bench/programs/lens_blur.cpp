@@ -1,5 +1,5 @@
-// lens_blur -- as out of focus as a depth says: each pixel is the mean over the disc of those whose
-// own circle of confusion covers it, colours weighted by how small their circles are.
+// lens_blur -- depth of field from a depth map: each pixel is the mean over the disc of the pixels whose own circle of
+// confusion covers it; colours are weighted by the inverse size of their circles.
 #include "program.h"
 
 namespace {

@@ -10,7 +10,7 @@ namespace programs {
 
 namespace {
 
-// What a command wrote; BuildError when it fails.
+// The output of a command; throws BuildError if it fails.
 std::string output_of(const std::vector<std::string>& command) {
   const apps::Outcome outcome = apps::run_program(command);
   if (!outcome.started) throw BuildError("cannot run " + command[0]);
@@ -34,7 +34,7 @@ Toolchain::Toolchain(bench::Side side, const std::filesystem::path& programs,
     output_of({builder_, "-r", folder_});
 }
 
-// The builder's last line, kept beside the library, has the figures.
+// The builder's last line, which is kept beside the library, contains the times.
 Library Toolchain::read(const std::string& name) const {
   Library library{file(name, ".so"), file(name, ".cases")};
   std::ifstream log(file(name, ".log"));

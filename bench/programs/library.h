@@ -9,7 +9,7 @@
 
 namespace programs {
 
-// The program does not compile: what the compiler said.
+// The program does not compile; contains the compiler's message.
 struct BuildError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -19,16 +19,16 @@ struct Library {
   double compile_ms = 0, compile_peak_mb = 0;
 };
 
-// Where a side's files are: its builder, its runtime, the folder of its libraries.
+// The files of one side: its builder, its runtime, the folder of its libraries.
 class Toolchain {
  public:
-  // `programs`: the folder of the builders. `folder` is made.
+  // `programs`: the folder of the builders. `folder` is created.
   Toolchain(bench::Side side, const std::filesystem::path& programs,
             const std::filesystem::path& folder);
 
-  // With `reuse`, what an earlier run has left, where there is something. Throws BuildError.
+  // With `reuse`, uses the library of an earlier run if there is one. Throws BuildError.
   Library build(const std::string& name, bool reuse) const;
-  // Of gradients: what they are of, by the same function.
+  // For gradients: the program itself, with the same function name.
   Library build_primal(const std::string& name, bool reuse) const;
 
  private:

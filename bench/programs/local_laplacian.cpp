@@ -1,6 +1,5 @@
-// local_laplacian -- contrast of detail raised without halos: pyramids of the picture remapped
-// about eight greys, from which each level takes what its own grey says (Paris, Hasinoff and Kautz
-// 2011).
+// local_laplacian -- enhances details without halos: pyramids of the picture remapped around eight greys, between which
+// each level interpolates by its own grey (Paris, Hasinoff and Kautz 2011).
 #include "program.h"
 
 namespace {

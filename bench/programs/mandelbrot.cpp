@@ -1,4 +1,4 @@
-// mandelbrot -- after how many of 64 steps each point leaves the circle of radius 2, or none.
+// mandelbrot -- the step, of 64, at which each point leaves the circle of radius 2, if any.
 #include "program.h"
 
 namespace {

@@ -1,6 +1,5 @@
-// matrix_product.h -- C = A B in a floating type, column index first: tiles of 4 rows by 3 vectors
-// stay in registers while k runs. Sizes are whatever they are: tiles at the edges are guarded, and
-// where there are none the code has no guards.
+// matrix_product.h -- C = A B in a floating-point type, column index first. Tiles of 4 rows by 3 vectors stay in
+// registers while k runs. Sizes are arbitrary: tiles at the edges are guarded; interior tiles have no guards.
 #pragma once
 
 #include "program.h"

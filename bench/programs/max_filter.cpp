@@ -1,5 +1,5 @@
-// max_filter -- the largest value in a square of 25 x 25 pixels: maxima of spans whose lengths
-// are powers of two, two of which cover the square's side.
+// max_filter -- the maximum over a 25 x 25 window: maxima over spans whose lengths are powers of two; two of them cover
+// the window's side.
 #include "program.h"
 
 namespace {

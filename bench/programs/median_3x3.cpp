@@ -1,5 +1,5 @@
-// median_3x3 -- the median of 3 x 3 pixels of 8 bits by comparisons: columns sorted first, then the
-// largest of the least, the median of the middles, the least of the largest (Smith 1996).
+// median_3x3 -- the median of 3 x 3 pixels of 8 bits by comparisons: columns are sorted first; then the largest of the
+// minima, the median of the medians, and the smallest of the maxima (Smith 1996).
 #include "program.h"
 
 namespace {

@@ -1,6 +1,6 @@
-// non_local_means -- each pixel is the mean of those around it, weighted by how alike their 7 x 7
-// neighbourhoods are, over a window of 7 x 7 (Buades, Coll and Morel 2005). Distances of
-// neighbourhoods are box sums, one axis after the other, that slide down within a tile.
+// non_local_means -- each pixel is a mean over a 7 x 7 window, weighted by the similarity of 7 x 7 neighbourhoods
+// (Buades, Coll and Morel 2005). Distances of neighbourhoods are box sums, one axis after the other, that slide down
+// within a tile.
 #include "program.h"
 
 namespace {

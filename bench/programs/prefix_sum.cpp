@@ -1,5 +1,5 @@
-// prefix_sum -- running sums of many signals in blocks: within a block one after the other, lanes
-// over signals; then the blocks' sums; then both together.
+// prefix_sum -- running sums of one long signal in blocks: within blocks sequentially, with lanes over blocks; then
+// over the blocks' sums; then both combined.
 #include "program.h"
 
 namespace {

@@ -1,6 +1,6 @@
-// program.h -- what one benchmark program is: a generator as users of Halide write it, and what its
-// function is called with, in one source file that is compiled once against Halide 14's header and
-// once against ours. list.def names them all.
+// program.h -- the interface of benchmark programs: a generator as users of Halide write it, and the arguments of its
+// function, in one source file that is compiled once with Halide 14's header and once with ours. list.def names all
+// programs.
 #pragma once
 
 #include <Halide.h>
@@ -13,7 +13,7 @@
 
 namespace programs {
 
-// A program with what its generator is told.
+// A program with its generator parameters.
 struct Registered {
   Program program;
   std::vector<std::string> params;  // "name=value"
@@ -26,7 +26,7 @@ struct Registered {
     program.tolerance = most;
     return *this;
   }
-  // The first inputs' gradients, each with an output, after the sum's.
+  // The first inputs have gradients, whose outputs follow the sum.
   Registered& gradients(int count) {
     program.gradients = count;
     return *this;
@@ -37,7 +37,7 @@ struct Registered {
   }
 };
 
-// A case for each of the sizes, of which there are one to three: small, medium, large.
+// One case for each size; there are one to three: small, medium, large.
 using Sizes = std::vector<int>;
 inline Registered at_sizes(const std::vector<Sizes>& sizes,
                            const std::function<std::vector<Argument>(const Sizes&)>& arguments) {

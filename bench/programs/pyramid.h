@@ -1,4 +1,5 @@
-// pyramid.h -- half the size, and twice: 1 3 3 1 along both axes, and what undoes it best.
+// pyramid.h -- halves and doubles the size of a picture: weights 1 3 3 1 along both axes, and the interpolation that
+// best inverts them.
 #pragma once
 
 #include "gradient.h"

@@ -1,5 +1,5 @@
-// pyramid_blend -- two pictures joined along a mask without a seam: their Laplacian pyramids of
-// five levels are mixed by the mask's Gaussian pyramid (Burt and Adelson 1983).
+// pyramid_blend -- joins two pictures seamlessly along a mask: their Laplacian pyramids of five levels are mixed by the
+// mask's Gaussian pyramid (Burt and Adelson 1983).
 #include "program.h"
 
 namespace {
@@ -42,7 +42,7 @@ class PyramidBlend : public Halide::Generator<PyramidBlend> {
  private:
   static constexpr int levels = 5;
 
-  // Half the size: 1 3 3 1 along both axes.
+  // Half the size: weights 1 3 3 1 along both axes.
   Func down(Func f, const std::string& name) {
     auto smooth = [](Expr a, Expr b, Expr c, Expr d) { return (a + 3 * (b + c) + d) / 8; };
     Func rows(name + "_rows"), small(name);
@@ -55,7 +55,7 @@ class PyramidBlend : public Halide::Generator<PyramidBlend> {
     return small;
   }
 
-  // Twice the size: the nearest counts three times as much as its neighbour.
+  // Twice the size: the nearest pixel counts three times as much as its neighbour.
   Func up(Func f) {
     Func rows, large;
     rows(x, y, Halide::_) =

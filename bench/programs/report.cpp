@@ -15,7 +15,7 @@ using bench::completed;
 using bench::formatted;
 using bench::geometric_mean;
 
-// Where gradients disagree, differences say whether ours is right.
+// If gradients disagree, differences decide whether ours is right.
 bool differs(const Result& result, const bench::PairResult& r) {
   const double most = result.tolerance > 0 ? result.tolerance : bench::tolerance(r);
   if (r.max_relative_error <= most) return false;

@@ -1,5 +1,5 @@
-// report.h -- what `programs` says: a line for each program at each size while it runs, a line for
-// the program, then means; and the same as JSON.
+// report.h -- prints a line for each program at each size while `programs` runs, a line for the program, then means;
+// writes the same as JSON.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@ namespace programs {
 
 // A program on both sides: one pair for each size that ran.
 struct Result {
-  std::string name, failure;  // empty: all that follows is there
+  std::string name, failure;  // if empty, all other fields are valid
   std::vector<bench::PairResult> cases;
   std::vector<std::string> labels;
   double tolerance = 0;
@@ -22,7 +22,7 @@ struct Result {
 
 double run_ratio(const Result& result);  // geometric mean over the sizes
 double compile_ratio(const Result& result);
-bool is_wrong(const Result& result);  // it failed, or the two sides differ
+bool is_wrong(const Result& result);  // whether it failed or the two sides differ
 
 std::string table_head();
 std::string case_row(const Result& result, size_t which);

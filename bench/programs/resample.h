@@ -1,6 +1,5 @@
-// resample.h -- a picture at another size: each pixel is a sum of those under a kernel whose width
-// and place follow from the scale, which is an argument. Weights are made once for each row and
-// column.
+// resample.h -- resizes a picture: each pixel is a sum under a kernel whose width and position follow from the scale,
+// which is an argument. Weights are computed once for each row and column.
 #pragma once
 
 #include "program.h"
@@ -11,7 +10,7 @@ class Resample : public Halide::Generator<Resample> {
  public:
   GeneratorParam<bool> interleaved{"interleaved", false};
   Input<Buffer<>> input{"input", 3};
-  Input<float> scale{"scale"};  // of the output over the input
+  Input<float> scale{"scale"};  // output size divided by input size
   Output<Buffer<>> output{"output", 3};
 
   void generate() {
@@ -49,11 +48,11 @@ class Resample : public Halide::Generator<Resample> {
   }
 
  private:
-  // Where point `at` of the output lies in the input, and the first pixel under its kernel.
+  // The position of output point `at` in the input, and the first pixel under its kernel.
   Expr place(Expr at) { return (cast<float>(at) + 0.5f) / scale - 0.5f; }
   Expr first(Expr at) { return cast<int>(ceil(place(at) - stretch)); }
 
-  // A tent, as wide as `stretch` to either side; weights of a point add up to 1.
+  // A tent that extends `stretch` on either side; the weights of a point add up to 1.
   void weights_of(Func& weights, Func& total, RDom& r) {
     auto tent = [&](Expr tap) {
       return max(0.0f, 1.0f - abs(cast<float>(first(n) + tap) - place(n)) / stretch);
@@ -68,7 +67,7 @@ class Resample : public Halide::Generator<Resample> {
   Func tall{"tall"};
 };
 
-// Of T: smaller, larger, much smaller.
+// Cases for T: smaller, larger, much smaller.
 template <typename T>
 Registered resampled(double limit, bool is_interleaved) {
   const auto arguments = [=](const Sizes& n) {

@@ -1,5 +1,5 @@
-// rgb_gain -- interleaved RGB, of which only the values count, not whose they are: pixel and
-// channel are one dimension, and that is vectorized.
+// rgb_gain -- a pointwise operation on interleaved RGB that is the same for all channels: pixel and channel are fused
+// to one dimension, which is vectorized.
 #include "program.h"
 
 namespace {

@@ -1,5 +1,4 @@
-// rotate_bicubic -- a picture turned about its middle, by Catmull and Rom's cubic (1974) over 4 x 4
-// pixels.
+// rotate_bicubic -- rotates a picture about its centre, by Catmull and Rom's cubic (1974) over 4 x 4 pixels.
 #include "program.h"
 
 namespace {
@@ -40,7 +39,7 @@ class RotateBicubic : public Halide::Generator<RotateBicubic> {
   }
 
  private:
-  // The weight of the pixel i places after the one before t.
+  // The weight of the pixel i positions after the one before t.
   static Expr cubic(Expr t, int i) {
     if (i == -1) return 0.5f * t * (-1.0f + t * (2.0f - t));
     if (i == 0) return 1.0f + 0.5f * t * t * (-5.0f + 3.0f * t);

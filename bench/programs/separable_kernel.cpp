@@ -1,5 +1,4 @@
-// separable_kernel -- a picture convolved along both axes with a kernel that is an input, of any
-// odd length, by tiles.
+// separable_kernel -- convolves a picture along both axes, in tiles, with a kernel of any odd length that is an input.
 #include "program.h"
 
 namespace {

@@ -1,4 +1,4 @@
-// sobel_u8 -- the size of the slope of a grey picture of 8 bits (Sobel's operator), in 16 bits.
+// sobel_u8 -- the gradient magnitude of a grey picture of 8 bits (Sobel's operator), in 16 bits.
 #include "program.h"
 
 namespace {

@@ -32,7 +32,7 @@ class SoftmaxRows : public Halide::Generator<SoftmaxRows> {
   }
 
  private:
-  // A part for each lane, then the parts together.
+  // One partial result per lane, then the reduction of the lanes.
   void reduce_in_lanes(Func f, int lanes) {
     RVar ro("ro"), ri("ri");
     Var lane("lane");

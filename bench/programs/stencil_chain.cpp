@@ -1,5 +1,5 @@
-// stencil_chain -- twelve 5 x 5 stencils of 16 bits after each other, in overlapping tiles: every
-// third is stored whole, those between within the tiles of the next one.
+// stencil_chain -- twelve 5 x 5 stencils of 16 bits in sequence, in overlapping tiles: every third is stored
+// completely, those between within the tiles of the next one.
 #include "program.h"
 
 namespace {

@@ -1,5 +1,5 @@
-// stereo_match -- how far each pixel has moved between two pictures of 8 bits: sums of absolute
-// differences over 9 x 9 pixels for 32 shifts, the least of which counts.
+// stereo_match -- the disparity of each pixel between two pictures of 8 bits: the shift, of 32, with the least sum of
+// absolute differences over 9 x 9 pixels.
 #include "program.h"
 
 namespace {

@@ -1,5 +1,5 @@
-// template_sad -- how much a small picture differs from each part of a large one: the sum of
-// absolute differences over a window whose size is known at run time only.
+// template_sad -- compares a small picture with each part of a large one: the sum of absolute differences over a window
+// whose size is only known at run time.
 #include "program.h"
 
 namespace {

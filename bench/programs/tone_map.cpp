@@ -1,4 +1,4 @@
-// tone_map -- a picture of high contrast for a screen: exposure, a filmic curve per channel, gamma.
+// tone_map -- maps a high-contrast picture to a screen: exposure, a filmic curve per channel, gamma.
 #include "program.h"
 
 namespace {

@@ -1,4 +1,4 @@
-// transpose -- of a matrix of any stride, by square tiles that are loaded whole and stored turned.
+// transpose -- transposes a matrix of any stride, in square tiles that are loaded completely and stored transposed.
 #include "program.h"
 
 namespace {

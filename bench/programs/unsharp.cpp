@@ -1,4 +1,4 @@
-// unsharp -- a grey picture less its blur, added back to the colours' ratio.
+// unsharp -- a grey picture minus its blur, added back in the ratio of the colours.
 #include "program.h"
 
 namespace {

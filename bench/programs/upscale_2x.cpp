@@ -1,5 +1,5 @@
-// upscale_2x -- twice as large in both directions: new pixels between the old by four taps
-// (-1 9 9 -1) / 16, in 16-bit arithmetic, rows first.
+// upscale_2x -- doubles both sides: new pixels are interpolated by four taps (-1 9 9 -1) / 16, in 16-bit arithmetic,
+// rows first.
 #include "program.h"
 
 namespace {

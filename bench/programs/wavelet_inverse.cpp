@@ -1,5 +1,5 @@
-// wavelet_inverse -- one level of Daubechies' transform along x undone: even and odd pixels are
-// different sums of averages and details, chosen by the parity of x. Widths are even.
+// wavelet_inverse -- inverts one level of Daubechies' transform along x: even and odd pixels are different sums of
+// averages and details, selected by the parity of x. Widths are even.
 #include "wavelets.h"
 
 namespace {

@@ -1,4 +1,4 @@
-// wavelets.h -- Daubechies' wavelets with 4 coefficients (1988), the orthogonal ones.
+// wavelets.h -- Daubechies' orthogonal wavelets with 4 coefficients (1988).
 #pragma once
 
 #include "program.h"

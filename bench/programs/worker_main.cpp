@@ -1,10 +1,9 @@
-// worker_main.cpp -- calls the function of one compiled program on request, and has no compiler in
-// it:
+// worker_main.cpp -- calls the function of one compiled program on request; it contains no compiler:
 //
 //   worker LIBRARY CASES CASE_INDEX
 //
-// It speaks ../pairs/worker_protocol.h. A run that is too short to be timed is repeated: the time
-// is that of one call, among others right before it.
+// It implements ../pairs/worker_protocol.h. A run that is too short to be timed is repeated; the time is that of one
+// call among others directly before it.
 #include <HalideRuntime.h>
 #include <dlfcn.h>
 #include <unistd.h>
@@ -64,7 +63,7 @@ class Value {
     void operator()(char* at) const { ::operator delete[](at, std::align_val_t{128}); }
   };
 
-  // Dense, innermost first, but interleaved arrays have their third dimension innermost.
+  // Dense, innermost first; interleaved arrays have their third dimension innermost.
   void lay_out() {
     const size_t rank = argument_.extents.size();
     dims_.resize(rank);
@@ -82,7 +81,7 @@ class Value {
     buffer_.dim = dims_.data();
   }
 
-  // Of the point whose coordinates, counted from zero in the order of the dimensions, make `index`.
+  // The value at the point whose coordinates, counted from zero in the order of the dimensions, give `index`.
   double number(int64_t index, uint32_t which) const {
     const Argument& a = argument_;
     if (is_scalar()) return a.low;
@@ -226,7 +225,7 @@ class Worker {
     return reinterpret_cast<Function>(function);
   }
 
-  // Along one direction of signs: the gradients' product with it against a central difference.
+  // Along one sign vector: the gradients' product with it against a central difference.
   template <typename Sum>
   static double slope_error(const std::vector<Value*>& inputs, const std::vector<Value*>& gradients,
                             uint32_t direction, const Sum& sum) {
@@ -256,7 +255,7 @@ class Worker {
     return std::abs(product - slope) / std::sqrt(squares);
   }
 
-  // Seconds of so many calls.
+  // Seconds for this number of calls.
   double timed(int calls) {
     const auto start = std::chrono::steady_clock::now();
     for (int i = 0; i < calls; i++) {

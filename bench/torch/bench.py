@@ -1,20 +1,19 @@
 #!/usr/bin/python3
-"""bench.py -- eight operators of PyTorch made of pipelines beside PyTorch's own, in one run.
+"""bench.py -- compares eight PyTorch operators made from pipelines with PyTorch's own, in one run.
 
     bench.py PACKAGE [--operator NAME]... [--rounds N] [--threads N] [--small] [--output FILE] [--plot FILE]
              [--device cuda]
 
-PACKAGE is the folder that holds the Python package. PyTorch is that of the virtual environment of
-../operators/peers.py, which is made when it is not there. What PyTorch has for the same (formulations.py) runs as it
-is and through torch.compile; all run in turn, on the same tensors and as many threads: forward alone, and forward
-with backward by all inputs. Errors are the largest |a - b| / max(|b|, root mean square of b) over the result and all
-gradients, b being PyTorch's own in float64. `ratio` is that of the better of PyTorch's two to ours. At the end stands
-what a call costs where there is nothing to compute (overhead.py). malloc keeps what is freed: whether it does so by
-itself, and whether half of the time of a large result is that of page faults, would be luck from run to run, on all
-sides.
+PACKAGE is the folder that contains the Python package. PyTorch comes from the virtual environment of
+../operators/peers.py, which is created if missing. PyTorch's formulations (formulations.py) run eagerly and through
+torch.compile. All run in turn, on the same tensors and number of threads: forward only, and forward with backward
+with respect to all inputs. Errors are the largest |a - b| / max(|b|, root mean square of b) over the result and all
+gradients, where b is PyTorch's result in float64. `ratio` is the time of PyTorch's faster variant divided by ours.
+The last rows are the overhead of a call without work (overhead.py). malloc is set to keep freed memory on all sides:
+otherwise page faults would take up to half of the time of large results, at random from run to run.
 
---device cuda: all of it on the GPU, with the PyTorch of the interpreter that runs this; a turn is CUDA_CALLS calls and
-the end of the last.
+--device cuda: everything runs on the GPU, with the PyTorch of the interpreter that runs this. A turn is CUDA_CALLS
+calls and the end of the last one.
 """
 import argparse
 import ctypes
@@ -33,11 +32,11 @@ import overhead
 import peers
 
 SIDES = ("retrograde", "eager", "compiled")
-PAUSE_SECONDS = 0.03  # before a turn: threads of OpenMP that have no work look for some for so long
-WARM_SECONDS = 0.02  # of untimed runs in a turn: after the pause caches and clocks are not as in use
-MOST_SECONDS = 3  # of all rounds of one that is slow
-KEPT_BYTES = str(1 << 33)  # by malloc
-CUDA_CALLS = 20  # of a turn on a GPU, which works while the next is called
+PAUSE_SECONDS = 0.03  # before a turn, because idle OpenMP threads spin for this long
+WARM_SECONDS = 0.02  # of untimed runs in a turn, because after the pause caches are cold and clocks are low
+MOST_SECONDS = 3  # for all rounds of a slow variant
+KEPT_BYTES = str(1 << 33)  # memory that malloc keeps
+CUDA_CALLS = 20  # per turn on a GPU, which works while the next call is issued
 
 
 def sized(small):
@@ -108,8 +107,8 @@ class Side:
 
 
 def show_functions_to_compiled_code():
-    """What torch.compile makes of exp, pow and their like calls functions of libtorch_cpu.so that PyTorch 2.13's wheel
-    does not link it with."""
+    """Code that torch.compile makes for exp, pow and similar calls uses functions of libtorch_cpu.so with which
+    PyTorch 2.13's wheel does not link it."""
     import torch
 
     ctypes.CDLL(os.path.join(os.path.dirname(torch.__file__), "lib", "libtorch_cpu.so"), mode=ctypes.RTLD_GLOBAL)
@@ -133,7 +132,7 @@ def measure(name, options):
     exact = FORMULATIONS[name](*exact_inputs)
     seed = 2 * torch.rand(exact.shape, generator=torch.Generator().manual_seed(3), dtype=torch.float64) - 1
     exact = [exact.detach(), *torch.autograd.grad(exact, exact_inputs, seed)]
-    # Numbers are the host's.
+    # Numbers stay on the host.
     tensors = [(t.detach().float().to(options.device) if t.dim() else t.detach().float()).requires_grad_()
                for t in exact_inputs]
     functions = {"retrograde": operator(f"bench::{name}", OPERATORS[name]), "eager": FORMULATIONS[name],
@@ -147,7 +146,7 @@ def measure(name, options):
             row[f"{side.name}_error"] = largest_error(side.both(), exact)
             side.forward()
             row[f"{side.name}_first_s"] = time.perf_counter() - start
-        except Exception as problem:  # what a peer cannot do is in the report
+        except Exception as problem:  # the report contains what a peer cannot do
             failures[side.name] = " ".join(str(problem).split())[:400]
             sides.remove(side)
     for at in range(options.rounds):

@@ -1,9 +1,8 @@
-"""definitions.py -- eight operators of PyTorch as pipelines, for tests and for `tools/bench torch`.
+"""definitions.py -- eight PyTorch operators as pipelines, for tests and for `tools/bench torch`.
 
-Each is a function of an element type, and of the shapes of the tensors where they are known, that gives what
-retrograde.torch.operator takes: the output, its inputs, and the output's sizes from the tensors. Dimensions are in the
-order of Funcs here, innermost first; what PyTorch has for the same stands in formulations.py, with the dimensions in
-reverse.
+Each is a function of an element type, and of the tensors' shapes if they are known. It returns what
+retrograde.torch.operator takes: the output, its inputs, and the output's sizes computed from the tensors. Dimensions
+are in the order of Funcs, innermost first. formulations.py has PyTorch's versions, with dimensions in reverse order.
 """
 import retrograde as rg
 from formulations import BINS, PATCH, SEARCH
@@ -26,13 +25,13 @@ def _of(kind, value):
 
 
 def _cell(kind, place, count):
-    """The two knots beside a place from 0 to count - 1, and how far it is from the first."""
+    """The two knots next to a position from 0 to count - 1, and its distance from the first one."""
     near = rg.clamp(rg.cast("int32", rg.floor(place)), 0, count - 1)
     return near, rg.min(near + 1, count - 1), place - _of(kind, near)
 
 
 def _bilinear(kind, image, sizes, u, v, rest):
-    """image(u, v, rest...) between its pixels; places lie inside of it."""
+    """image(u, v, rest...) interpolated between its pixels; positions must lie inside the image."""
     i, right, wx = _cell(kind, u, sizes[0])
     j, below, wy = _cell(kind, v, sizes[1])
     above = image[(i, j, *rest)] + wx * (image[(right, j, *rest)] - image[(i, j, *rest)])
@@ -71,7 +70,7 @@ def bilateral_slice(kind, shapes=None):
 
 
 def flow_warp(kind, shapes=None):
-    """An image read where each pixel's flow says, at most at its edge."""
+    """Reads an image at each pixel's position plus flow, clamped to the image."""
     of_image, of_flow = _known(shapes, 2)
     (image, sizes), (flow, _) = _image(kind, 3, "image", of_image), _image(kind, 3, "flow", of_flow)
     u, v, warped = rg.Func("u"), rg.Func("v"), rg.Func("warped")
@@ -83,7 +82,7 @@ def flow_warp(kind, shapes=None):
 
 
 def spatial_transformer(kind, shapes=None):
-    """Images under affine maps, zeros around them.
+    """Images under affine maps, with zeros outside.
     Source: Jaderberg et al., Spatial Transformer Networks, NeurIPS 2015."""
     of_images, of_transforms = _known(shapes, 2)
     images, (width, height, _, _) = _image(kind, 4, "images", of_images)
@@ -107,7 +106,7 @@ def spatial_transformer(kind, shapes=None):
 
 
 def convolution(kind, shapes=None):
-    """3 x 3, with bias, zeros around the image."""
+    """3 x 3 convolution with bias and zero padding."""
     of_image, of_weights, of_bias = _known(shapes, 3)
     image, sizes = _image(kind, 4, "image", of_image)
     (weights, _), (bias, _) = _image(kind, 4, "weights", of_weights), _image(kind, 1, "bias", of_bias)
@@ -120,7 +119,7 @@ def convolution(kind, shapes=None):
 
 
 def tone_curve(kind, shapes=None):
-    """A curve through knots at equal distances from 0 to 1, at each pixel's value."""
+    """Maps each pixel's value through a curve with equidistant knots from 0 to 1."""
     of_image, of_curve = _known(shapes, 2)
     (image, _), (curve, (knots,)) = _image(kind, 2, "image", of_image), _image(kind, 1, "curve", of_curve)
     toned = rg.Func("toned")
@@ -130,7 +129,7 @@ def tone_curve(kind, shapes=None):
 
 
 def recursive_filter(kind, shapes=None):
-    """Each row mixed with what came before it, in both directions of an image; by how much is a number."""
+    """A recursive filter along both directions of an image; the mixing weight is a number."""
     image, sizes = _image(kind, 2, "image", _known(shapes, 1)[0])
     mix, filtered = rg.Param(kind, "mix"), rg.Func("filtered")
     across, down = (rg.RDom([(1, size - 1)]) for size in sizes)
@@ -143,7 +142,7 @@ def recursive_filter(kind, shapes=None):
 
 
 def non_local_means(kind, shapes=None):
-    """Each pixel from those in a window, weighted by how like the patches around both are.
+    """Each pixel is a mean over a window, weighted by the similarity of the patches around both pixels.
     Source: Buades, Coll and Morel, A Non-Local Algorithm for Image Denoising, CVPR 2005."""
     (image, sizes), strength = _image(kind, 2, "image", _known(shapes, 1)[0]), rg.Param(kind, "strength")
     dx, dy, f = rg.Var("dx"), rg.Var("dy"), rg.BoundaryConditions.repeat_edge(image, [(0, size) for size in sizes])
@@ -166,7 +165,7 @@ def non_local_means(kind, shapes=None):
 
 
 def soft_histogram(kind, shapes=None):
-    """How many pixels lie near each of some values from 0 to 1: each counts for the two beside it."""
+    """A soft histogram of values from 0 to 1: each pixel counts for its two nearest bins."""
     (image, sizes), histogram = _image(kind, 2, "image", _known(shapes, 1)[0]), rg.Func("histogram")
     r = rg.RDom([(0, sizes[0]), (0, sizes[1])])
     i, after, w = _cell(kind, rg.clamp(image[r.x, r.y], _of(kind, 0), _of(kind, 1)) * (BINS - 1), BINS)

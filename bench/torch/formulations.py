@@ -1,15 +1,15 @@
-"""formulations.py -- the eight operators of definitions.py as users of PyTorch write them: the operators of
-torch.nn.functional where there is one, which compute many elements at a time where there is none. Those that
-../operators has at other sizes are its programs of PyTorch, too."""
+"""formulations.py -- the eight operators of definitions.py as PyTorch users write them: by the operators of
+torch.nn.functional where available, otherwise by operations on many elements at a time. Those that ../operators
+has at other sizes are also its PyTorch programs."""
 import torch
 import torch.nn.functional as F
 
-PATCH, SEARCH = 3, 5  # of non_local_means
-BINS = 8  # of soft_histogram
+PATCH, SEARCH = 3, 5  # for non_local_means
+BINS = 8  # for soft_histogram
 
 
 def _centres(size, like):
-    """Of pixels from -1 to 1, as grid_sample counts them."""
+    """Positions of pixel centres from -1 to 1, as grid_sample counts them."""
     return (torch.arange(size, dtype=like.dtype, device=like.device) + 0.5) * (2 / size) - 1
 
 
@@ -24,7 +24,7 @@ def bilateral_slice(image, guide, grid):
 
 
 def flow_warp(image, flow):
-    """What stands where each pixel's flow says, at most at the edge."""
+    """Reads the image at each pixel's position plus flow, clamped to the image."""
     _, height, width = image.shape
     x = torch.arange(width, dtype=image.dtype, device=image.device) + flow[0]
     y = torch.arange(height, dtype=image.dtype, device=image.device)[:, None] + flow[1]
@@ -49,8 +49,7 @@ def tone_curve(image, curve):
 
 
 def recursive_filter(image, mix):
-    """Along the rows, then along the columns: a lower triangular matrix of powers, which is what there is to be had
-    in one call."""
+    """Filters along rows, then along columns, by a lower triangular matrix of powers, which needs only one call."""
     def matrix(size):
         i = torch.arange(size, dtype=image.dtype, device=image.device)
         apart = i[:, None] - i
@@ -65,7 +64,7 @@ def recursive_filter(image, mix):
 def non_local_means(image, strength, patch=PATCH, search=SEARCH):
     height, width = image.shape
     margin, half = patch // 2, search // 2
-    # Patches repeat what the search sees: the edge of the image, at both of their places.
+    # Patches repeat the same pixels as the search: the edge of the image, at both positions.
     padded = F.pad(image[None, None], [margin + half] * 4, mode="replicate")[0, 0]
     centre = padded[half:padded.shape[0] - half, half:padded.shape[1] - half]
     weights = values = 0

@@ -1,13 +1,13 @@
 #!/usr/bin/python3
-"""overhead.py -- what a call of one of our operators costs beside one of PyTorch's own, on tensors of one element.
+"""overhead.py -- the overhead of calling one of our operators compared with PyTorch's own, on tensors of one element.
 
     overhead.py PACKAGE [--from-cpp PREFIX] [--output FILE]
 
-PACKAGE is the folder that holds the Python package, PREFIX where Retrograde is installed: an operator made of a generator
-is called from C++, too (from_cpp/, built in out/bench/from_cpp). Runs with the interpreter's own PyTorch, one thread.
-Microseconds, the least of many rounds, in which all take turns. Both add two tensors. Beside them stands what PyTorch
-itself asks for an operator that does nothing but make its result: as a function of Python that torch.library has
-registered, and as an autograd.Function that keeps its inputs.
+PACKAGE is the folder that contains the Python package. PREFIX is where Retrograde is installed: an operator made from
+a generator is then also called from C++ (from_cpp/, built in out/bench/from_cpp). Runs with the interpreter's own
+PyTorch, on one thread. Prints microseconds, the least of many rounds, in which all take turns. All operators add two
+tensors. For comparison, it also measures PyTorch's cost of an operator that only allocates its result: as a Python
+function registered with torch.library, and as an autograd.Function that saves its inputs.
 """
 import argparse
 import json
@@ -67,7 +67,7 @@ def _empty_operator():
 
 
 def measure():
-    """{what is called: {how: us}}."""
+    """{called function: {variant: us}}."""
     import torch
 
     registered, function = _empty_operator()
@@ -97,7 +97,7 @@ def measure():
 
 
 def measure_from_cpp(prefix):
-    """The same of calls from C++, with the PyTorch of this interpreter."""
+    """The same for calls from C++, with the PyTorch of this interpreter."""
     source = Path(__file__).resolve().parent / "from_cpp"
     build = source.parents[2] / "out/bench/from_cpp"
     for command in (["cmake", "-S", source, "-B", build, "-G", "Ninja", f"-DPYTHON={sys.executable}",

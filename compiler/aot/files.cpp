@@ -19,7 +19,7 @@ namespace {
              "Give a path that can be written");
 }
 
-// A file beside `path` that vanishes unless it is moved there.
+// A temporary file beside `path`. It is deleted unless it is moved to its final name.
 class Temporary {
  public:
   explicit Temporary(const File& file) : path_(file.path), name_(file.path + ".XXXXXX") {
@@ -54,7 +54,8 @@ class Temporary {
     name_.clear();
   }
 
-  // The error of the system, or 0. Whoever may make files here may read this one.
+  // Returns 0 or the system's error code. The file gets the permissions of a normally created file, because mkstemp
+  // makes it private.
   static int fill(int descriptor, const std::string& contents) {
     const mode_t mask = umask(0);
     umask(mask);

@@ -1,4 +1,4 @@
-// Files that are written whole or not at all.
+// Writes files atomically: each is written completely or not at all.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@ struct File {
   std::string path, contents;
 };
 
-// Writes all of them under temporary names beside their places first, then moves each to its
-// place. CompileError when one cannot be written: then no place has changed and nothing is left.
+// First writes all files under temporary names beside their destinations, then renames each to its destination. If a
+// file cannot be written, throws CompileError; no destination has changed and no temporary file is left.
 void write_files(const std::vector<File>& files);
 
 }  // namespace retrograde::aot

@@ -1,4 +1,4 @@
-// function_info.cpp -- a constexpr function for each compiled one:
+// function_info.cpp -- generates a constexpr function for each compiled one:
 //
 //   inline constexpr std::array<::HalideFunctionInfo::ArgumentInfo, 2> blur_argument_info() {
 //     return {{
@@ -14,8 +14,8 @@
 namespace retrograde::aot {
 namespace {
 
-// HalideRuntime.h declares the types since a release that tells its version. Before, they come from
-// here, by a directive: names that the namespace itself declares win over those.
+// Recent HalideRuntime.h files declare these types and also define their version. For older ones, the generated text
+// declares them through a using-directive, so that any declarations in the namespace itself take precedence.
 const char* const info_preamble =
     R"(#if __cplusplus < 201703L && !(defined(_MSVC_LANG) && _MSVC_LANG >= 201703L)
 #error "function_info headers need C++17"

@@ -1,5 +1,5 @@
-// The header that describes the arguments of compiled functions as constants of C++17, for code that
-// asks while it compiles: wrappers of calls, checks by static_assert.
+// Generates a C++17 header that describes the arguments of compiled functions as constants. Callers use it at compile
+// time: for call wrappers, or checks by static_assert.
 #pragma once
 
 #include <string>

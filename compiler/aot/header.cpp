@@ -42,7 +42,7 @@ std::string parameters(const codegen::Signature& signature) {
   return text;
 }
 
-// "is the pixels of ..." would be guesses; what is known is type and dimensions.
+// Describes only facts: type and dimensions. The meaning of an argument would be a guess.
 std::string description(const codegen::ExportArgument& argument) {
   if (argument.name == "__user_context") return "handed to the functions of HalideRuntime.h";
   const char* const kinds[] = {"scalar", "input", "output"};
@@ -87,9 +87,9 @@ const char* const preamble = R"(#include <stdint.h>
 struct halide_buffer_t;
 struct halide_filter_metadata_t;
 
-// Each function gives 0, or a code of HalideRuntime.h after it has called halide_error, which prints
-// the message and aborts unless halide_set_error_handler was given a handler. A call in which a
-// buffer has neither host nor device memory computes nothing: it fills in the bounds of such buffers.
+// Each function returns 0 on success. On an error it calls halide_error and then returns a code of HalideRuntime.h. By
+// default halide_error prints the message and aborts; halide_set_error_handler replaces it. If any buffer has neither
+// host nor device memory, the call is a bounds query: it computes nothing and fills in the bounds of such buffers.
 
 )";
 

@@ -1,6 +1,6 @@
-// Three columns: schedule, statement, assembly. Lines of the statement that have others below them,
-// by indentation, can be folded. Basic blocks of the assembly carry the name of the loop that they
-// came from (a comment that LLVM writes behind their labels): the page joins them by that name.
+// Generates a page with three columns: schedule, statement, assembly. Lines of the statement that have indented lines
+// below them can be folded. Basic blocks of the assembly are named after the loop that they came from (LLVM writes a
+// comment after their labels); the page links loops and blocks by that name.
 #include "aot/html.h"
 
 #include <cctype>
@@ -64,7 +64,7 @@ class StatementColumn {
   std::vector<std::string> lines_;
   std::string out_;
 
-  // The line after the last that was rendered.
+  // Returns the index of the line after the last rendered one.
   size_t render_line(size_t i) {
     const std::string& line = lines_[i];
     const std::string loop = loop_of(line);
@@ -83,7 +83,7 @@ class StatementColumn {
   }
 };
 
-// The body of a parallel loop is a function "f.pipeline.parallel0.f.s0.y".
+// The body of a parallel loop is a function named like "f.pipeline.parallel0.f.s0.y".
 std::string parallel_loop_of(const std::string& function) {
   const std::string mark = ".parallel";
   const size_t begin = function.find(mark);
@@ -92,7 +92,7 @@ std::string parallel_loop_of(const std::string& function) {
   return dot == std::string::npos ? "" : function.substr(dot + 1);
 }
 
-// The loop that a label begins: .LBB0_3:   # %f.s0.x   or   # %"f.s0.x.$1"; empty for others.
+// The loop that a label begins: .LBB0_3:   # %f.s0.x   or   # %"f.s0.x.$1"; empty for other lines.
 std::string block_of(const std::string& line) {
   const size_t colon = line.find(':');
   if (colon == std::string::npos) return "";
@@ -107,7 +107,7 @@ std::string block_of(const std::string& line) {
   return name;
 }
 
-// LLVM numbers blocks whose name is taken: "f.s0.x12" is a copy of "f.s0.x".
+// LLVM appends a number to a block name that is already used: "f.s0.x12" is a copy of "f.s0.x".
 std::string without_number(std::string name) {
   while (!name.empty() && std::isdigit(static_cast<unsigned char>(name.back()))) name.pop_back();
   return name;

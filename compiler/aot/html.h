@@ -1,4 +1,4 @@
-// A page that shows what became of a schedule.
+// Generates a page that shows a schedule, the lowered code and the machine code side by side.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@ struct PageFunction {
   std::string name, schedule, statement;  // the loop nest; the lowered statement
 };
 
-// One self-contained file. The loops of the statement lead to the machine code that they became.
+// Returns one self-contained HTML file. Loops of the statement link to their machine code.
 std::string html_page(const std::string& title, const std::vector<PageFunction>& functions,
                       const std::string& assembly);
 

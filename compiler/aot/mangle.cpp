@@ -1,5 +1,5 @@
-// C++ symbols by the Itanium C++ ABI, section 5.1: a nested name, then the parameters' types, in
-// which whatever occurred before is written as a reference (S_, S0_, S1_ ...).
+// C++ symbols by the Itanium C++ ABI, section 5.1: a nested name, then the parameter types. Anything that occurred
+// before is abbreviated by a substitution (S_, S0_, S1_ ...).
 #include "aot/mangle.h"
 
 #include <algorithm>
@@ -27,14 +27,14 @@ class Mangler {
     text += "E";
   }
 
-  // `type` is a pointer, const or a struct's name, outermost first: {"P", "15halide_buffer_t"}.
+  // `layers`: pointer, const or a struct's name, outermost first: {"P", "15halide_buffer_t"}.
   void add_compound(const std::vector<std::string>& layers) {
     std::string key;
     std::vector<std::string> keys(layers.size());
     for (size_t i = layers.size(); i-- > 0;) keys[i] = key = layers[i] + key;
     size_t i = 0;
     while (i < layers.size() && !refer(keys[i])) text += layers[i++];
-    // Inner types were complete first.
+    // Inner types come first in the substitution table.
     for (size_t j = i; j-- > 0;) {
       const bool is_builtin = j + 1 == layers.size() && layers[j].size() == 1;
       if (!is_builtin) seen_.push_back(keys[j]);
@@ -87,7 +87,7 @@ std::string c_type(const codegen::ExportArgument& argument) {
   if (type.is_bool()) return "bool";
   if (type.is_float() && type.bits() == 64) return "double";
   if (type.is_float() && type.bits() == 32) return "float";
-  // 16-bit floats travel as their bits.
+  // 16-bit floats are passed as their bits.
   return std::string(type.is_int() ? "int" : "uint") + std::to_string(type.bits()) + "_t";
 }
 

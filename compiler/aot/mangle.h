@@ -1,4 +1,4 @@
-// Names of functions as the linker sees them, and types as C writes them.
+// Names of functions as linker symbols, and argument types as C source.
 #pragma once
 
 #include <string>
@@ -8,13 +8,13 @@
 
 namespace retrograde::aot {
 
-// Parts between "::".
+// The parts of a name between "::".
 std::vector<std::string> name_parts(const std::string& name);
 // "uint8_t", "struct halide_buffer_t *".
 std::string c_type(const codegen::ExportArgument& argument);
 // The symbol of `int name(arguments...)` in C++.
 std::string mangled(const std::string& name, const std::vector<codegen::ExportArgument>& arguments);
-// Of `int name(void **)` and of `const halide_filter_metadata_t *name()`.
+// The symbols of `int name(void **)` and of `const halide_filter_metadata_t *name()`.
 std::string mangled_argv(const std::string& name);
 std::string mangled_metadata(const std::string& name);
 

@@ -1,11 +1,10 @@
-// merge_objects -- several relocatable ELF objects as one, without a linker.
+// merge_objects -- merges relocatable ELF objects into one, without a linker.
 //
-// Sections are kept apart, also those of one name: a linker joins them later. What changes is
-// numbers: each section and each symbol gets a new one, and whatever refers to it by number
-// (relocations, groups, headers) is rewritten. Global symbols of one name become one; those that
-// are hidden between the parts of one program become local.
+// Sections stay separate, even if they have the same name: a linker merges them later. Sections and symbols are
+// renumbered, and everything that refers to them by number (relocations, groups, headers) is rewritten. Global symbols
+// with the same name become one; symbols that are hidden between the parts of one program become local.
 //
-// Source: System V ABI, chapter 4; only 64-bit little-endian objects, as x86-64 and AArch64 have.
+// Source: System V ABI, chapter 4. Only 64-bit little-endian objects are supported, as x86-64 and AArch64 have.
 #include "aot/merge_objects.h"
 
 #include <elf.h>
@@ -19,7 +18,7 @@
 namespace retrograde::aot {
 namespace {
 
-// Holds symbol numbers for linkers that fold identical code; they do without.
+// This section holds symbol numbers for linkers that fold identical code. It is optional and is dropped.
 constexpr uint32_t llvm_address_significance = 0x6fff4c03;
 
 struct Section {
@@ -50,12 +49,13 @@ void append(std::string& bytes, const T& value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
 }
 
-// An object taken apart.
+// A parsed object.
 struct Object {
   Elf64_Ehdr header;
   std::vector<Section> sections;
   std::vector<NamedSymbol> symbols;
-  std::vector<bool> is_kept;  // of sections: all but the tables, which are made anew
+  std::vector<bool>
+      is_kept;  // of sections: false for the symbol and string tables, which are rebuilt
 
   explicit Object(const std::string& bytes) : header(read_at<Elf64_Ehdr>(bytes, 0)) {
     RETROGRADE_ASSERT(std::memcmp(header.e_ident, ELFMAG, SELFMAG) == 0 &&
@@ -124,7 +124,7 @@ class Merger {
   std::vector<Section> sections_;
   std::vector<NamedSymbol> symbols_;
   std::vector<Numbers> numbers_;
-  std::map<std::string, uint32_t> globals_;  // and those that were: shared by parts
+  std::map<std::string, uint32_t> globals_;  // global symbols, and former ones that the parts share
   size_t first_global_ = 0;
   uint32_t symbol_table_ = 0;
 
@@ -152,7 +152,7 @@ class Merger {
     }
   }
 
-  // What a part defines for the others only.
+  // Adds the symbols that a part defines only for other parts, as local symbols.
   void add_shared(const Object& part, Numbers& numbers) {
     for (size_t i = 1; i < part.symbols.size(); i++) {
       NamedSymbol symbol = renumbered(part.symbols[i], numbers);
@@ -183,7 +183,7 @@ class Merger {
     return b.is_weak() && !a.is_weak();
   }
 
-  // Headers that name other sections, and contents that name sections or symbols.
+  // Rewrites headers that refer to other sections, and contents that refer to sections or symbols.
   void rewrite_references(const Object& part, const Numbers& numbers) {
     for (size_t i = 0; i < part.sections.size(); i++) {
       if (!part.is_kept[i]) continue;

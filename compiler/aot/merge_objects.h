@@ -1,4 +1,4 @@
-// One relocatable object made of several.
+// Merges relocatable objects into one.
 #pragma once
 
 #include <string>
@@ -6,12 +6,12 @@
 
 namespace retrograde::aot {
 
-// An ELF object with the sections and symbols of both. What `library` defines becomes weak, so that
-// several objects that carry the same library can be linked into one program.
+// An ELF object with the sections and symbols of both. Symbols that `library` defines become weak, so that several
+// objects that embed the same library can be linked into one program.
 std::string merge_objects(const std::string& object, const std::string& library);
 
-// The object of which these are parts (at least one): hidden symbols, by which the parts refer to
-// each other, are no longer seen outside of it.
+// Joins the parts of one program (at least one) into one object. The hidden symbols by which parts refer to each other
+// become invisible outside.
 std::string join_parts(const std::vector<std::string>& parts);
 
 }  // namespace retrograde::aot

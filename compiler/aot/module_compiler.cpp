@@ -1,5 +1,5 @@
-// module_compiler.cpp -- what the front end's Modules reach. Everything that is to be written is
-// made first; then all files are written at once.
+// module_compiler.cpp -- compiles the front end's Modules to files. All outputs are generated first; then all files are
+// written together.
 #include <algorithm>
 #include <chrono>
 #include <sstream>
@@ -36,7 +36,7 @@ using Files = std::map<OutputFileType, std::string>;
 codegen::Options options_for(const Target& target) {
   codegen::Options options;
   options.target = target;
-  options.tune_for_host = false;  // the code runs elsewhere
+  options.tune_for_host = false;  // the code runs on another machine
   return options;
 }
 
@@ -92,13 +92,13 @@ std::string page_text(const Module& module, const std::string& assembly) {
 
 bool has_runtime(const Target& target) { return !target.has_feature(Target::NoRuntime); }
 
-// These objects, and the runtime unless the target says no_runtime.
+// An archive of these objects, and of the runtime unless the target has no_runtime.
 std::string library_of(std::vector<codegen::Member> members, const Target& target) {
   if (has_runtime(target)) members.push_back({"retrograde_runtime.o", aot::runtime_object(target)});
   return codegen::archive(members);
 }
 
-// The texts and bytes of one module, machine code as far as some output needs it.
+// The outputs of one module. Machine code is only generated if a requested output needs it.
 class Outputs {
  public:
   Outputs(const Module& module, const Files& wanted) : module_(module) {
@@ -165,7 +165,7 @@ class Outputs {
   std::string object_;
   std::map<Format, std::string> texts_;
 
-  // Where this build has no runtime for the target, an object leaves it to its user.
+  // If this build has no runtime for the target, the object's user has to link one.
   std::string object_with_runtime() const {
     if (!has_runtime(module_.target()) || !aot::has_runtime_object(module_.target()))
       return object();
@@ -182,7 +182,7 @@ std::string with_suffix(const std::string& path, const std::string& suffix,
   return stem + suffix + (ends ? extension : "");
 }
 
-// Several targets: variants, the function that chooses, and the runtime.
+// Outputs for several targets: the variants, the function that dispatches among them, and the runtime.
 class MultitargetOutputs {
  public:
   MultitargetOutputs(const std::string& function_name, const std::vector<Module>& modules,
@@ -222,7 +222,7 @@ class MultitargetOutputs {
       const Outputs outputs(modules_[i], wanted);
       for (const auto& [type, path] : multi) {
         const std::string place = with_suffix(path, suffixes_[i], info.at(type).extension);
-        // One runtime for all of them: an object of its own.
+        // All variants share one runtime, in an object of its own.
         result.push_back(
             {place, type == OutputFileType::object ? outputs.object() : outputs.contents(type)});
       }
@@ -277,7 +277,7 @@ class AheadOfTime : public ModuleCompiler {
   ir::LoweredFunction lower(const PipelineSpec& pipeline,
                             const std::vector<ir::LoweredArgument>& inputs,
                             const Target& target) override {
-    codegen::machine_for(target, false);  // says what cannot be compiled for before any work
+    codegen::machine_for(target, false);  // throws for unsupported targets before any work
     lower::LowerOptions options;
     options.target = pipeline.traced(target);
     ir::LoweredFunction function = lower::lower(

@@ -15,13 +15,13 @@ namespace {
 using codegen::ExportArgument;
 using codegen::Signature;
 
-// Masks of features travel at Halide's positions.
+// Feature masks use Halide's bit positions.
 static_assert(static_cast<int>(Target::AVX512_SapphireRapids) ==
               static_cast<int>(halide_target_feature_avx512_sapphirerapids));
 static_assert(static_cast<int>(Target::ProfileByTimer) ==
               static_cast<int>(halide_target_feature_profile_by_timer));
 
-// Limits that are no constants stay out of metadata.
+// Metadata only contains limits that are constants.
 std::optional<ir::Scalar> constant_of(const Expr& e, Type type) {
   if (!e.defined() || type.is_handle()) return std::nullopt;
   const std::optional<ir::Scalar> value = ir::as_scalar(e);
@@ -99,10 +99,10 @@ codegen::Export export_of(const internal::LoweredFunc& function, const Module& m
   return result;
 }
 
-// Of `module`, which is `whole` or inside of it.
-void collect(const Module& module, const Module& whole,
+// Collects the functions of `module`, which is `root` or one of its submodules.
+void collect(const Module& module, const Module& root,
              std::vector<std::pair<internal::LoweredFunc, Module>>& found) {
-  const std::string asked = "compile the module " + quoted(whole.name());
+  const std::string asked = "compile the module " + quoted(root.name());
   for (const internal::LoweredFunc& function : module.functions()) {
     if (function.linkage == LinkageType::Internal) continue;
     for (const auto& [other, where] : found) {
@@ -114,7 +114,7 @@ void collect(const Module& module, const Module& whole,
   }
   for (const Module& submodule : module.submodules()) {
     if (submodule.target() == module.target()) {
-      collect(submodule, whole, found);
+      collect(submodule, root, found);
       continue;
     }
     unsupported(asked, "a module and its submodules are made for one target",

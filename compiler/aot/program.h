@@ -1,4 +1,4 @@
-// From a Module to what codegen compiles: its functions and how callers reach them.
+// Translates a Module to codegen's input: its functions, and the entry points through which callers reach them.
 #pragma once
 
 #include <string>
@@ -9,15 +9,15 @@
 
 namespace retrograde::aot {
 
-// Functions of the module and of its submodules that callers can reach.
+// The functions of the module and its submodules that callers can reach.
 std::vector<internal::LoweredFunc> exported_functions(const Module& module);
 
 codegen::Signature signature_of(const internal::LoweredFunc& function, const Module& module);
 codegen::Program program_of(const Module& module);
 
-// The function that chooses among modules[i], which were made for their own targets.
+// The function that dispatches among modules[i], each of which was compiled for its own target.
 codegen::Program dispatcher(const std::string& function_name, const std::vector<Module>& modules);
-// As `dispatcher` presents it.
+// The signature of the function that `dispatcher` makes.
 codegen::Signature dispatcher_signature(const std::string& function_name, const Module& baseline);
 
 }  // namespace retrograde::aot

@@ -1,5 +1,5 @@
-// python_extension.cpp -- see python_extension.h. What depends on the functions is put together at the end, from texts
-// that do not.
+// python_extension.cpp -- see python_extension.h. The text consists of fixed parts and, at the end, the parts that
+// depend on the functions.
 #include "aot/python_extension.h"
 
 #include "aot/mangle.h"
@@ -27,7 +27,7 @@ const char* const includes = R"(
 const char* const buffers = R"(
 namespace {
 
-// The struct module's letter, in the machine's own sizes or in standard ones, as an element type.
+// The element type for a format letter of the struct module, in native or standard sizes.
 inline bool element_type_of(const Py_buffer &view, halide_type_t *type) {
   const char *format = view.format ? view.format : "B";
   if (*format == '@' || *format == '=' || *format == '<') ++format;
@@ -47,7 +47,7 @@ inline bool element_type_of(const Py_buffer &view, halide_type_t *type) {
   return true;
 }
 
-// An argument as the function takes it, for the time of a call.
+// An argument in the form that the function takes, for the duration of a call.
 class BufferArgument {
  public:
   BufferArgument() = default;
@@ -57,14 +57,14 @@ class BufferArgument {
     if (is_viewed_) PyBuffer_Release(&view_);
   }
 
-  // False with an error of Python set.
+  // Returns false with a Python error set.
   bool take(PyObject *object, const char *name, bool is_written, bool is_bfloat) {
     if (PyObject_HasAttrString(object, "_get_raw_halide_buffer_t")) return take_raw(object, name);
     if (PyObject_GetBuffer(object, &view_, PyBUF_FORMAT | PyBUF_STRIDES | (is_written ? PyBUF_WRITABLE : 0)) < 0)
       return false;
     is_viewed_ = true;
     if (!element_type_of(view_, &own_.type)) {
-      PyErr_Format(PyExc_TypeError, "%s holds elements of format \"%s\", which are no numbers of the machine", name,
+      PyErr_Format(PyExc_TypeError, "%s holds elements of format \"%s\", which is not a supported element type", name,
                    view_.format);
       return false;
     }
@@ -95,7 +95,7 @@ class BufferArgument {
   void is_new_on_host() {
     if (!raw_) own_.set_host_dirty(true);
   }
-  // What an array was given on a device goes with the call.
+  // Copies a written array back from the device, and frees the device memory that the call allocated for it.
   int back_to_host(bool is_written) {
     const int result = is_written ? halide_copy_to_host(nullptr, get()) : 0;
     if (!raw_) halide_device_free(nullptr, get());
@@ -121,7 +121,7 @@ class BufferArgument {
 )";
 
 const char* const scalars = R"(
-// Numbers, by the type of the parameter. False with an error of Python set: OverflowError where it does not fit.
+// Converts a number to the parameter's type. Returns false with a Python error set: OverflowError if it does not fit.
 template <typename T>
 inline bool take_number(PyObject *object, const char *name, T *value) {
   if constexpr (std::is_same_v<T, bool>) {
@@ -155,11 +155,11 @@ inline bool take_number(PyObject *object, const char *name, T *value) {
 )";
 
 const char* const errors = R"(#ifndef HALIDE_PYTHON_EXTENSION_OMIT_ERROR_AND_PRINT_HANDLERS
-// Of the call that runs on this thread.
+// Text of the error that the current thread's call reported.
 inline thread_local std::string error_text;
 #endif
 
-// Sets the error of Python that a code stands for.
+// Sets the Python error for an error code.
 inline void raise_error(int code) {
   char message[64];
   PyOS_snprintf(message, sizeof message, "Halide Runtime Error: %d", code);
@@ -168,7 +168,7 @@ inline void raise_error(int code) {
 #ifndef HALIDE_PYTHON_EXTENSION_OMIT_ERROR_AND_PRINT_HANDLERS
   PyObject *text = PyUnicode_DecodeUTF8(error_text.data(), static_cast<Py_ssize_t>(error_text.size()), "replace");
   if (text) PyObject_SetAttrString(error, "text", text);
-  // A traceback shows it, as of Python 3.11.
+  // Tracebacks show the note, since Python 3.11.
   PyObject *note = text ? PyObject_CallMethod(error, "add_note", "O", text) : nullptr;
   PyErr_Clear();
   Py_XDECREF(note);
@@ -231,7 +231,7 @@ void check_scalar(const DeclaredFunction& function, const ExportArgument& argume
               "Take a float32 and cast it");
 }
 
-// What `PyObject *function(module, args, kwargs)` does.
+// The body of `PyObject *function(module, args, kwargs)`.
 std::string body_of(const DeclaredFunction& function, const Target& target) {
   const std::vector<ExportArgument>& arguments = function.signature.arguments;
   std::string names, objects, places, format, taken, passed, dirty, back;
@@ -246,7 +246,7 @@ std::string body_of(const DeclaredFunction& function, const Target& target) {
     format += "O";
     passed += (i ? ", " : "") + value + (argument.is_buffer() ? ".get()" : "");
     if (!argument.is_buffer()) {
-      // The address of a context is handed on, whatever it is of.
+      // A handle is passed on as an address, whatever it points to.
       const std::string type = argument.type.is_handle() ? "void *" : c_type(argument);
       taken += "  " + type + (type.back() == '*' ? "" : " ") + value +
                " = {};\n  if (!take_number(object_" + at + ", names[" + at + "], &" + value +

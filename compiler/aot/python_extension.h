@@ -1,17 +1,17 @@
-// python_extension.h -- compiled functions as functions of a Python module: C++17 over Python's C API, in one file that
-// holds their declarations, too.
+// python_extension.h -- generates a Python extension module from compiled functions: one file of C++17 on Python's C
+// API, which also contains the functions' declarations.
 //
 //   g++ -shared -fPIC $(python3-config --includes) name.py.cpp name.a -o name$(python3-config --extension-suffix)
 //
-// A function takes its arguments in order or by name. Buffers are what has the buffer protocol, of the function's
-// element type and as many dimensions, and are not copied: a[y, x] is f(x, y), and a[x, y] of arrays in Fortran's order
-// (contiguous in that one alone). Objects with `_get_raw_halide_buffer_t`, as Buffers of Python have it, are taken as
-// they are. The GIL is free during a call. An error is a RuntimeError "Halide Runtime Error: <code>" whose `text` says
-// what was wrong. What the function prints goes to sys.stdout.
+// A function takes its arguments by position or name. A buffer is any object with the buffer protocol that has the
+// function's element type and number of dimensions; it is not copied. a[y, x] is f(x, y); for arrays that are
+// contiguous only in Fortran order, a[x, y] is. Objects with `_get_raw_halide_buffer_t`, such as retrograde's Python
+// Buffers, are passed as they are. A call releases the GIL. An error raises RuntimeError "Halide Runtime Error: <code>"
+// with the message in its `text`. Prints of the function go to sys.stdout.
 //
-// Macros, when the file is compiled: HALIDE_PYTHON_EXTENSION_MODULE_NAME and _FUNCTIONS, as in X(f) X(g), name another
-// module and the functions of several files; with _OMIT_MODULE_DEFINITION the file has functions alone, for a module
-// that another file defines; with _OMIT_ERROR_AND_PRINT_HANDLERS errors and prints go where the runtime sends them.
+// Macros when compiling the file: HALIDE_PYTHON_EXTENSION_MODULE_NAME and _FUNCTIONS, as in X(f) X(g), select another
+// module name and list the functions of several files. _OMIT_MODULE_DEFINITION leaves out the module, which another
+// file then defines. _OMIT_ERROR_AND_PRINT_HANDLERS leaves errors and prints to the runtime's handlers.
 #pragma once
 
 #include <string>
@@ -21,7 +21,7 @@
 
 namespace retrograde::aot {
 
-// Without functions: the definition of a module whose functions other files have.
+// Without functions: defines a module whose functions are in other files.
 // Requires: Python has numbers for the scalars (Unsupported).
 std::string python_extension_text(const std::string& module_name, const Target& target,
                                   const std::vector<DeclaredFunction>& functions);

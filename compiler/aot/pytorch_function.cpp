@@ -9,7 +9,7 @@
 
 namespace retrograde::aot {
 
-std::string word(const std::string& name) {
+std::string cpp_identifier(const std::string& name) {
   std::string result;
   for (char c : name) result += std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
   return result;
@@ -81,10 +81,10 @@ std::string listed(const std::vector<ExportArgument>& arguments,
 
 std::string parameter(const ExportArgument& argument) {
   return (argument.is_buffer() ? "const at::Tensor& " : number_type(argument) + " ") +
-         word(argument.name);
+         cpp_identifier(argument.name);
 }
 
-std::string name_of(const ExportArgument& argument) { return word(argument.name); }
+std::string name_of(const ExportArgument& argument) { return cpp_identifier(argument.name); }
 
 std::string joined(const std::vector<std::string>& parts, const std::string& between) {
   std::string result;

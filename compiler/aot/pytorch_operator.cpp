@@ -13,7 +13,7 @@ bool is_float_number(const ExportArgument& input) {
   return !input.is_buffer() && input.type.is_float();
 }
 
-// What is a tensor where floating-point numbers are tensors, too.
+// Whether the input is a tensor if floating-point numbers are passed as tensors.
 bool is_tensor(const ExportArgument& input) { return input.is_buffer() || is_float_number(input); }
 
 bool is_differentiable(const ExportArgument& input) {
@@ -50,10 +50,10 @@ std::string shape_function(const TorchFunction& function, const ExportArgument& 
   std::string ranks;
   for (const ExportArgument& image : function.images) {
     ranks += text("  retrograde_torch::check_rank(\"", function.name, "\", \"", image.name, "\", ",
-                  word(image.name), ", ", image.dimensions, ");\n");
+                  cpp_identifier(image.name), ", ", image.dimensions, ");\n");
   }
   const std::string otherwise =
-      like ? "  const auto sizes = " + word(like->name) +
+      like ? "  const auto sizes = " + cpp_identifier(like->name) +
                  ".sym_sizes();\n  return {sizes.begin(), sizes.end()};"
            : "#error no input has the dimensions of the output: say its SHAPE";
   return filled(R"(
@@ -65,7 +65,7 @@ $otherwise$
 #endif
 }
 )",
-                {{"output", word(output.name)},
+                {{"output", cpp_identifier(output.name)},
                  {"parameters", listed(function.inputs, parameter)},
                  {"ranks", ranks},
                  {"otherwise", otherwise}});
@@ -81,7 +81,7 @@ std::string results_schema(size_t count) {
   return count == 1 ? types[0] : "(" + joined(types) + ")";
 }
 
-// What the results and their sizes are made of.
+// Values for the results and their sizes.
 void add_results(const TorchFunction& function, TextValues& values) {
   const std::string arguments = listed(function.inputs, name_of);
   const std::string options = name_of(function.images[0]) + ".options()";
@@ -107,7 +107,7 @@ void add_results(const TorchFunction& function, TextValues& values) {
 
 // ---- arguments ----
 
-// With floating-point numbers as numbers, and with tensors for them.
+// Values for the arguments, in two forms: floating-point numbers as numbers, and as tensors.
 void add_arguments(const TorchFunction& function, TextValues& values) {
   std::vector<std::string> tensors, wanting, images_wanting;
   for (const ExportArgument& input : function.inputs) {
@@ -176,7 +176,7 @@ void add_seeds(const TorchFunction& function, TextValues& values) {
                  {"any_seed_requires_grad", joined(wanting, " || ")}});
 }
 
-// A bit of `wanted` for each differentiable input, in their order.
+// `wanted` has one bit for each differentiable input, in order.
 void add_gradients(const TorchFunction& function, TextValues& values) {
   std::vector<std::string> variables, outputs, results;
   std::string made, alone;
@@ -207,7 +207,7 @@ void add_gradients(const TorchFunction& function, TextValues& values) {
                  {"gradient_results", joined(results)}});
 }
 
-// What autograd keeps of a call, and what it gets for each argument.
+// What autograd saves during a call, and the gradient that it returns for each argument.
 void add_backward_pass(const TorchFunction& function, TextValues& values) {
   std::vector<std::string> restored, gradients;
   std::string save_numbers, find_wanted;

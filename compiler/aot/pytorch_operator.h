@@ -1,4 +1,4 @@
-// pytorch_operator.h -- a compiled function as an operator of PyTorch, with its gradients.
+// pytorch_operator.h -- registers a compiled function as a PyTorch operator with gradients.
 #pragma once
 
 #include <string>
@@ -7,7 +7,8 @@
 
 namespace retrograde::aot {
 
-// Its registration, where the program defines RETROGRADE_TORCH_OP: see the text's own beginning (pytorch_text.cpp).
+// Generates the registration, which is active if the program defines RETROGRADE_TORCH_OP; the text's first comment
+// describes it (pytorch_text.cpp).
 std::string torch_operator_text(const TorchFunction& function);
 
 }  // namespace retrograde::aot

@@ -9,12 +9,13 @@ const char* const pytorch_operator_text = R"(
 #include <torch/csrc/autograd/custom_function.h>
 #include <ATen/core/dispatch/Dispatcher.h>
 
-// The operator RETROGRADE_TORCH_NAMESPACE::RETROGRADE_TORCH_OP. The program also defines
-//   RETROGRADE_TORCH_SHAPE_<output>   the sizes of an output, as in: image.sym_size(0), image.sym_size(1) - 2;
-//                                     those of the first image with as many dimensions where it does not
-//   RETROGRADE_TORCH_GRADIENT(of)     the wrappers of the gradient's functions, whose header it has included: `of` is
-//                                     nothing for all gradients, _by_<input> for one of several
-// Floating-point numbers are numbers, or tensors without dimensions, which are differentiated like images.
+// Registers the operator RETROGRADE_TORCH_NAMESPACE::RETROGRADE_TORCH_OP. The program also defines
+//   RETROGRADE_TORCH_SHAPE_<output>   optional: the sizes of an output, as in
+//                                       image.sym_size(0), image.sym_size(1) - 2;
+//                                     default: the sizes of the first image with as many dimensions
+//   RETROGRADE_TORCH_GRADIENT(of)     the wrappers of the gradient's functions, whose header it has included. `of` is
+//                                     empty for all gradients, _by_<input> for a single one
+// Floating-point numbers are numbers, or tensors without dimensions; such tensors are differentiated like images.
 namespace retrograde_torch {
 namespace RETROGRADE_TORCH_OP {
 
@@ -49,7 +50,7 @@ inline std::vector<at::Tensor> backward_made($backward_parameters$) {
 $gradients_made$  return results;
 }
 
-// Those whose bits are in `wanted`, and no others are computed.
+// Computes only the gradients whose bits are set in `wanted`.
 inline std::vector<at::Tensor> backward_run($backward_parameters$) {
   std::vector<at::Tensor> results;
   if (wanted == all_gradients) {
@@ -158,7 +159,8 @@ inline Results autograd_of_numbers(c10::DispatchKeySet keys, $parameters$) {
 inline Results refuse_device_of_numbers($parameters$) { refuse_elsewhere(name, $place$); }
 )";
 
-// After that of tensors: a caller's tensor would become a number here, without a gradient.
+// Registered after the overload for tensors: otherwise this one would convert a caller's tensor to a number and lose
+// its gradient.
 const char* const pytorch_register_numbers_text =
     R"(  library.def(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP) "($schema$) -> $results_schema$");
   library.impl(RETROGRADE_TORCH_TEXT(RETROGRADE_TORCH_OP), key_of($place$), TORCH_FN(run));
@@ -175,8 +177,8 @@ const char* const pytorch_helpers = R"(
 
 namespace retrograde_torch {
 
-// What the code is compiled for: the CPU, or kernels of a device of RETROGRADE_TORCH_DEVICE. Where the simulated device
-// runs these (RETROGRADE_GPU=simulated), that is at::kCPU, for its memory is the host's.
+// Where the code runs: on the CPU, or as kernels on RETROGRADE_TORCH_DEVICE. With the simulated device
+// (RETROGRADE_GPU=simulated), RETROGRADE_TORCH_DEVICE is at::kCPU, because its memory is the host's.
 enum class Place { host, device };
 #ifndef RETROGRADE_TORCH_DEVICE
 #define RETROGRADE_TORCH_DEVICE at::kCUDA
@@ -203,7 +205,8 @@ inline void succeed(const char* name, int code) {
   TORCH_CHECK(false, why);
 }
 
-// A tensor as a buffer, its axes in reverse; not copied, but where an input's last axis is not dense.
+// A tensor as a buffer, with its axes in reverse order. It is copied only if it is an input whose last axis is not
+// dense.
 template <int Rank>
 struct View {
   View(const char* function, const char* argument, const at::Tensor& tensor, halide_type_t type,
@@ -220,14 +223,14 @@ struct View {
       kept = tensor.contiguous();
     }
     for (int axis = 0; axis < Rank; axis++) {
-      // An axis of one element or none has any stride, as it leads nowhere.
+      // An axis with at most one element may have any stride, because the stride is never used.
       const int64_t size = kept.size(axis), stride = size > 1 ? kept.stride(axis) : 1;
       TORCH_CHECK(size <= INT32_MAX && stride <= INT32_MAX, "cannot call \"", function,
                   "\": extents and strides fit int32; \"", argument, "\" has sizes ", kept.sizes(),
                   ". Split the tensor.");
       dimensions[Rank - 1 - axis] = halide_dimension_t(0, static_cast<int32_t>(size), static_cast<int32_t>(stride));
     }
-    static char nothing[64];  // without an address a buffer asks which region is needed
+    static char nothing[64];  // a buffer without an address would be a bounds query
     raw.host = static_cast<uint8_t*>(kept.numel() > 0 ? kept.data_ptr() : nothing);
     raw.type = type;
     raw.dimensions = Rank;
@@ -244,7 +247,7 @@ inline void check_rank(const char* function, const char* argument, const at::Ten
               " dimensions; given is one with sizes ", tensor.sizes(), ". Give a tensor of that many dimensions.");
 }
 
-// Of a number that is a tensor; 0 where it has no value yet: sizes do not depend on it.
+// The value of a number passed as a tensor; 0 if the tensor has no value yet (sizes do not depend on it).
 inline double number_of(const char* function, const char* argument, const at::Tensor& number) {
   TORCH_CHECK(number.dim() == 0 && at::isFloatingType(number.scalar_type()), "cannot call \"", function, "\": \"",
               argument, "\" is a floating-point number, or a tensor of one without dimensions; given is one of ",
@@ -259,12 +262,12 @@ inline double number_of(const char* function, const char* argument, const at::Te
 }
 [[noreturn]] inline void refuse_elsewhere(const char* name, Place place) {
   if (place == Place::host) {
-    TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot call \"", name, "\" on tensors of CUDA: its code is the CPU's; it was "
-                                "compiled for no GPU. Move the tensors with tensor.cpu(), or compile it with "
+    TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot call \"", name, "\" on CUDA tensors: it was compiled for the CPU "
+                                "only. Move the tensors with tensor.cpu(), or compile it with "
                                 "FEATURES cuda.");
   }
-  TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot call \"", name, "\" on tensors of the CPU: its code is a GPU's; it was "
-                              "compiled with FEATURES cuda. Move the tensors with tensor.cuda().");
+  TORCH_CHECK_NOT_IMPLEMENTED(false, "cannot call \"", name, "\" on CPU tensors: it was compiled for GPUs, with "
+                              "FEATURES cuda. Move the tensors with tensor.cuda().");
   throw std::logic_error("not reached");
 }
 
@@ -289,7 +292,7 @@ extern "C" int (*halide_set_cuda_get_stream(int (*)(void*, void*, void**)))(void
 
 namespace retrograde_torch {
 
-// One in a device's memory, where it stays.
+// A tensor that stays in device memory.
 template <int Rank>
 struct DeviceView : View<Rank> {
   DeviceView(const char* function, const char* argument, const at::Tensor& tensor, halide_type_t type,
@@ -306,7 +309,7 @@ struct DeviceView : View<Rank> {
   }
 };
 
-// The driver's stream behind one of PyTorch's; before PyTorch 2 only the default one is known.
+// The driver's stream behind a PyTorch stream; before PyTorch 2 only the default stream is accessible.
 template <class Stream>
 auto handle_of(const char*, const Stream& stream, int) -> decltype(static_cast<void*>(stream.native_handle())) {
   return stream.native_handle();
@@ -318,7 +321,7 @@ void* handle_of(const char* function, const Stream& stream, long) {
   return nullptr;
 }
 
-// While it lives, the device of a tensor is current, and kernels go into the stream that is current there.
+// During its lifetime, the tensor's device is current, and kernels run on that device's current stream.
 class OnDevice {
  public:
   OnDevice(const char* function, const at::Tensor& tensor) : guard_(tensor.device()), before_(stream()) {

@@ -1,5 +1,5 @@
-// pytorch_wrapper.cpp -- see pytorch_wrapper.h. What depends on the function's arguments is put together here, into
-// texts that do not.
+// pytorch_wrapper.cpp -- see pytorch_wrapper.h. Inserts the parts that depend on the function's arguments into fixed
+// texts.
 #include "aot/pytorch_wrapper.h"
 
 #include "aot/mangle.h"
@@ -15,10 +15,10 @@ std::string wrapper(const TorchFunction& function) {
   std::string views, call = function.user_context ? "nullptr" : "", parameters;
   if (function.on_device && !function.images.empty()) {
     views = "  const retrograde_torch::OnDevice on_device(\"" + function.name + "\", " +
-            word(function.images[0].name) + ");\n";
+            cpp_identifier(function.images[0].name) + ");\n";
   }
   const auto add = [&](const ExportArgument& argument) {
-    const std::string name = word(argument.name);
+    const std::string name = cpp_identifier(argument.name);
     const bool is_output = argument.kind == ExportArgument::Kind::OutputBuffer;
     parameters += (parameters.empty() ? "" : ", ") +
                   (is_output ? "at::Tensor& " + name : parameter(argument));
@@ -37,7 +37,7 @@ std::string wrapper(const TorchFunction& function) {
   for (const ExportArgument& argument : function.outputs) add(argument);
   return filled(
       R"(
-// The function's code: 0, or that of an error. c10::Error for tensors that it cannot take.
+// Returns the function's code: 0 or an error code. Throws c10::Error for unsuitable tensors.
 inline int $name$_th_($parameters$) {
 $views$  return ::$name$($call$);
 }
@@ -49,14 +49,14 @@ $views$  return ::$name$($call$);
 
 std::string pytorch_wrapper_text(const std::string& module_name, const Target& target,
                                  const std::vector<DeclaredFunction>& functions) {
-  const std::string guard = "RETROGRADE_PYTORCH_" + word(module_name) + "_H";
+  const std::string guard = "RETROGRADE_PYTORCH_" + cpp_identifier(module_name) + "_H";
   std::string result =
       "// " + module_name +
       ": its functions on tensors of PyTorch, and their registration as an operator.\n#ifndef " +
       guard + "\n#define " + guard +
       "\n\n#include <ATen/ATen.h>\n#include <HalideRuntime.h>\n\n#include <stdexcept>\n"
       "#include <string>\n#include <tuple>\n#include <vector>\n\n#include \"" +
-      word(module_name) + ".h\"\n" + pytorch_helpers;
+      cpp_identifier(module_name) + ".h\"\n" + pytorch_helpers;
   if (target.has_gpu_feature()) result += pytorch_device_helpers;
   for (const DeclaredFunction& declared : functions) {
     const TorchFunction function = torch_function_of(declared, target);

@@ -1,4 +1,4 @@
-// The linker's input is embedded by the assembler, so that the compiler needs no file at run time.
+// Embeds the static runtime through the assembler, so that the compiler needs no files at run time.
 #include "aot/runtime_object.h"
 
 #include "diagnostics/error.h"
@@ -18,7 +18,7 @@ namespace retrograde::aot {
 
 namespace {
 
-// Empty when there is none.
+// Empty if there is none for the target.
 std::string embedded_object(const Target& target) {
   const Target host = get_host_target();
   if (target.os != host.os || target.bits != host.bits) return {};

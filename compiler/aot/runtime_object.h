@@ -1,4 +1,4 @@
-// The static runtime, as bytes.
+// The static runtime as an object file in memory.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 namespace retrograde::aot {
 
 bool has_runtime_object(const Target& target);
-// An object file. Unsupported when this build has none for the target.
+// Returns an object file. Unsupported if this build has none for the target.
 std::string runtime_object(const Target& target);
 
 }  // namespace retrograde::aot

@@ -17,7 +17,7 @@ std::optional<LinearIndex> as_linear(const Frame& frame, const Expr& index) {
     if (!stride) return std::nullopt;
     if (ramp->base.type().is_scalar()) return LinearIndex{ramp->base, *stride};
     const auto inner = as_linear(frame, ramp->base);
-    // A ramp of ramps, each going on where the one before ends.
+    // A ramp of ramps is one ramp if each inner ramp continues where the previous one ends.
     const bool goes_on = inner && inner->stride * ramp->base.type().lanes() == *stride;
     return goes_on ? inner : std::nullopt;
   }
@@ -72,8 +72,8 @@ std::vector<Expr> pieces_of(const Expr& index) {
   return pieces;
 }
 
-// Coordinates held inside of an image, and nothing that depends on data: what loop partitioning
-// leaves to the borders, which run seldom.
+// Whether the index is a coordinate clamped to an image's bounds and free of data-dependent values. Loop partitioning
+// leaves such indices to border iterations, which run rarely.
 Coordinate coordinate_of(const Frame& frame, const Expr& index) {
   Coordinate result{true, false, index};
   walk(index, [&](const Expr& e) {
@@ -81,13 +81,13 @@ Coordinate coordinate_of(const Frame& frame, const Expr& index) {
     const auto* name = e.as<Variable>();
     const auto known = name ? frame.coordinates.find(name->name) : frame.coordinates.end();
     if (known != frame.coordinates.end()) {
-      result.is_held |= known->second.is_held;
+      result.is_clamped |= known->second.is_clamped;
       return false;
     }
     const bool is_bound = e.kind() == Kind::Min || e.kind() == Kind::Max;
     const bool is_sum = e.kind() == Kind::Add || e.kind() == Kind::Sub || e.kind() == Kind::Mul;
     const bool is_leaf = e.kind() == Kind::Ramp || e.kind() == Kind::Broadcast;
-    result.is_held |= is_bound;
+    result.is_clamped |= is_bound;
     result.is_plain = is_bound || is_sum || is_leaf;
     return !is_leaf;
   });
@@ -110,7 +110,7 @@ uint64_t access_bytes(Type type) {
   return static_cast<uint64_t>(type.bytes()) * static_cast<uint64_t>(type.lanes());
 }
 
-// Of private memory no address is taken: its vectors become registers.
+// Private memory is excluded: taking its address would keep its vectors out of registers.
 bool can_be_one_access(const Emitter& e, const Storage& storage, Type type) {
   return e.machine.is_device() && !storage.is_private && !type.is_scalar() &&
          std::has_single_bit(access_bytes(type)) &&
@@ -124,9 +124,9 @@ Value* is_aligned(FunctionContext& c, Value* pointer, Type type) {
   return c.b.CreateIsNull(rest);
 }
 
-// Lanes of one register. Wider vectors are read and written register by register: LLVM keeps an array
-// in registers only where its loads are as wide as its stores, and else cuts whole vectors as one
-// integer of thousands of bits.
+// Number of lanes in one register. Wider vectors are loaded and stored register by register: LLVM keeps an array in
+// registers only if its loads are as wide as its stores. Otherwise it splits whole vectors as one integer of thousands
+// of bits.
 int native_lanes(const Machine& machine, Type type) {
   return std::max(1, machine.vector_bits / 8 / type.bytes());
 }

@@ -1,4 +1,4 @@
-// Object files together in one: static libraries, and the parts of a program that the JIT links.
+// Packs object files into an archive: for static libraries, and for a program's parts that the JIT links.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@ namespace retrograde::codegen {
 struct Member {
   std::string name, contents;  // an object file
 };
-// An archive with an index of symbols. Same members, same bytes.
+// Builds an archive with a symbol index. The same members always give the same bytes.
 std::string archive(const std::vector<Member>& members);
 
 }  // namespace retrograde::codegen

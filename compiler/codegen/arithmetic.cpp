@@ -1,4 +1,4 @@
-// Binary operators and conversions.
+// Code for binary operators and conversions.
 #include <llvm/IR/Intrinsics.h>
 #include <llvm/IR/IntrinsicsX86.h>
 
@@ -32,7 +32,7 @@ Value* float_binary(Emitter& e, Kind kind, Value* a, Value* b) {
       return e.b.CreateFDiv(a, b);
     case Kind::Mod:
       return float_mod(e, a, b);
-    // The very form of x86's minps and maxps: the second operand where unordered or equal.
+    // The exact semantics of x86's minps and maxps: the second operand if unordered or equal.
     case Kind::Min:
       return e.b.CreateSelect(e.b.CreateFCmpOLT(a, b), a, b);
     case Kind::Max:
@@ -102,7 +102,7 @@ Value* int_binary(Emitter& e, Kind kind, Type type, Value* a, Value* b) {
   }
 }
 
-// A multiplication rounded to half before the subtraction, as for the wider types.
+// The product is rounded to half before the subtraction, as in the wider types.
 Value* half_mod(Emitter& e, Type type, Value* a, Value* b) {
   const auto step = [&](Value* number) {
     return half_to_float(e, type, float_to_half(e, type, number));
@@ -124,8 +124,8 @@ Value* half_binary(Emitter& e, Kind kind, Type type, Value* a, Value* b) {
   return kind >= Kind::EQ ? result : float_to_half(e, type, result);
 }
 
-// What PTX's cvt makes of numbers out of range (PTX ISA, cvt): the nearest end. Of NaN it makes 0, but
-// where either type has 64 bits the sign's bit alone.
+// Converts as PTX's cvt does (PTX ISA, cvt): numbers out of range become the nearest bound. NaN becomes 0, except that
+// with a 64-bit source or result only the sign bit is set.
 Value* as_a_device_converts(Emitter& e, bool as_unsigned, llvm::Type* wide, Value* number) {
   Value* integer =
       e.b.CreateIntrinsic(as_unsigned ? llvm::Intrinsic::fptoui_sat : llvm::Intrinsic::fptosi_sat,
@@ -137,8 +137,8 @@ Value* as_a_device_converts(Emitter& e, bool as_unsigned, llvm::Type* wide, Valu
 }
 
 Value* float_to_integer(Emitter& e, Type to, Value* number) {
-  // Out of range LLVM gives poison, which would spread to whatever depends on the lane; frozen, it
-  // is only a number.
+  // LLVM's result for a number out of range is poison, which would spread to every use of the lane. Freezing makes it
+  // an arbitrary but fixed number.
   const int bits = std::max(to.bits(), 32);
   auto* wide = with_lanes(e.b.getIntNTy(static_cast<unsigned>(bits)), to.lanes());
   const bool as_unsigned = to.is_uint() && to.bits() >= 32;
@@ -154,7 +154,7 @@ Value* integer_to_float(Emitter& e, Type to, Type from, Value* value) {
   return from.is_int() ? e.b.CreateSIToFP(value, type) : e.b.CreateUIToFP(value, type);
 }
 
-// Through double, which holds every integer of up to 32 bits and rounds the others as the IR says.
+// Converts through double, which holds every integer of up to 32 bits; for other types it rounds as the IR specifies.
 Value* convert_to_half(Emitter& e, Type to, Type from, Value* value) {
   const Type wide = Float(64, to.lanes());
   if (from.is_float() && from.bits() == 64) return double_to_half(e, to, value);
@@ -194,7 +194,7 @@ Value* reinterpret(Emitter& e, Type to, Type from, Value* value) {
   return to.is_handle() ? e.b.CreateIntToPtr(value, type) : e.b.CreatePtrToInt(value, type);
 }
 
-// In registers of the widest kind that a and b fill; the last one may be filled in part.
+// Uses the widest registers that a and b fill; the last register may be partly filled.
 Value* add_products_in_pairs(Emitter& e, Value* a, Value* b) {
   const int lanes = lanes_of(a), widest = e.machine.has_avx512_words() ? 32
                                           : e.machine.has_avx2()       ? 16
@@ -213,7 +213,8 @@ Value* add_products_in_pairs(Emitter& e, Value* a, Value* b) {
 
 // ---- saturating_cast ----
 
-// To float16, whose range ends at 65504; NaNs stay. The ranges of wider floats end at infinity.
+// To float16, whose largest finite value is 65504; NaN stays NaN. Wider float types need no clamp: their range ends at
+// infinity.
 static Value* saturated_float16(Emitter& e, Type to, Type from, Value* value) {
   Value* bits = convert(e, to, from, value);
   constexpr int64_t without_sign = 0x7fff, infinity = 0x7c00;
@@ -223,7 +224,7 @@ static Value* saturated_float16(Emitter& e, Type to, Type from, Value* value) {
 }
 
 static Value* clamp_integer(Emitter& e, Type to, Type from, Value* value) {
-  // A bound of the target type matters only where the source can pass it.
+  // Clamp to a bound of the target type only if the source type can exceed it.
   if (from.is_int() && !to.can_represent(from.min_int())) {
     value = e.b.CreateBinaryIntrinsic(llvm::Intrinsic::smax, value,
                                       int_constant(value, to.is_uint() ? 0 : to.min_int()));
@@ -236,9 +237,9 @@ static Value* clamp_integer(Emitter& e, Type to, Type from, Value* value) {
   return e.b.CreateIntCast(value, llvm_type(e, to), from.is_int());
 }
 
-// Vectors on x86, where LLVM takes its own intrinsics apart: five instructions for each lane. NaN gives
-// 0. The clamp is one of floats, so that it needs no wider integers; an upper end 2^n - 1 that floats
-// do not have is chosen after the conversion.
+// For vectors on x86, where LLVM scalarises its own saturating intrinsics into five instructions per lane. NaN becomes
+// 0. The clamp is on floats, so no wider integers are needed. If the upper bound 2^n - 1 is not a float, it is selected
+// after the conversion.
 static Value* saturate_vector(Emitter& e, Type to, Value* number) {
   const auto real = [&](double value) { return float_constant(number, value); };
   const double end = std::ldexp(1.0, to.is_int() ? to.bits() - 1 : to.bits());
@@ -248,7 +249,7 @@ static Value* saturate_vector(Emitter& e, Type to, Value* number) {
                high = is_exact ? end - 1 : end - std::ldexp(end, -digits);
   Value* ordered = number;
   if (to.is_int()) ordered = e.b.CreateSelect(e.b.CreateFCmpORD(number, number), number, real(0));
-  // NaN gives the lower end, which is 0 for the types that come here.
+  // NaN becomes the lower bound, which is 0 for the types that reach this line.
   Value* clamped = e.b.CreateSelect(e.b.CreateFCmpOGT(ordered, real(low)), ordered, real(low));
   clamped = e.b.CreateSelect(e.b.CreateFCmpOLT(clamped, real(high)), clamped, real(high));
   Value* integer = float_to_integer(e, to, clamped);
@@ -269,7 +270,7 @@ Value* convert_saturating(Emitter& e, Type to, Type from, Value* value) {
   }
   if (!from.is_float()) return clamp_integer(e, to, from, value);
   Value* number = is_half(from) ? half_to_float(e, from, value) : value;
-  // Only AVX-512 has conversions to vectors of 64-bit integers.
+  // Only AVX-512 has vector conversions to 64-bit integers.
   const bool has_conversion = to.bits() < 64 || e.machine.has_avx512_words();
   if (to.is_vector() && e.machine.is_x86() && has_conversion) return saturate_vector(e, to, number);
   const auto id = to.is_int() ? llvm::Intrinsic::fptosi_sat : llvm::Intrinsic::fptoui_sat;

@@ -1,15 +1,14 @@
-// Updates of one element from several iterations at once.
+// Atomic updates: several parallel iterations may update the same element.
 //
-//   one value of at most 64 bits   an instruction where there is one (integers: + - min max & | ^;
-//                                  floats: + -), else compare-and-swap until nobody came between
+//   one value of at most 64 bits   an instruction if there is one (integers: + - min max & | ^;
+//                                  floats: + -), else a compare-and-swap loop
 //   a Tuple                        a lock of the runtime, chosen by its first element's address
 //
-// All updates of one element go the same way: instructions and compare-and-swap exclude each other,
-// and whether locks are needed depends on the Func alone. A vector is updated lane by lane, so that
-// lanes may hit one element.
+// All updates of one element use compatible methods: instructions and compare-and-swap exclude each other, and whether
+// locks are needed depends only on the Func. Vectors are updated lane by lane, because lanes may hit the same element.
 //
-// Relaxed ordering is enough: what an update publishes is the element itself, and the end of the
-// parallel loop orders everything else.
+// Relaxed ordering is enough: an update publishes only the element itself, and the end of the parallel loop orders
+// everything else.
 #include <unordered_set>
 
 #include "codegen/access.h"
@@ -50,7 +49,7 @@ BinOp instruction_for(const AtomicUpdate& update, Type type) {
   }
 }
 
-// Stores updated(old) where old was, as often as it takes until it still is there.
+// Replaces the stored value by updated(old), and retries until no other thread has changed it in between.
 void compare_and_swap(FunctionContext& c, Type type, Value* pointer, const Storage& to,
                       const std::function<Value*(Value*)>& updated) {
   auto* memory = memory_type(c.e, type);
@@ -74,7 +73,7 @@ void compare_and_swap(FunctionContext& c, Type type, Value* pointer, const Stora
   c.b.SetInsertPoint(after);
 }
 
-// Nodes on a way from an expression down to a load of the stored element.
+// The nodes on a path from an expression down to a load of the element being updated.
 struct OwnLoads {
   explicit OwnLoads(const Store& store) : store_(store) { depends(store.value); }
   std::vector<Expr> nodes;
@@ -94,7 +93,7 @@ struct OwnLoads {
   std::unordered_map<const ExprNode*, bool> known_;
 };
 
-// The largest parts that do not depend on the element and are computed whatever it holds.
+// The largest subexpressions that do not depend on the element and are evaluated whatever its value.
 void independent_parts(const Expr& e, OwnLoads& own, std::unordered_set<const ExprNode*>& seen,
                        std::vector<Expr>& parts) {
   if (!seen.insert(e.get()).second) return;
@@ -148,7 +147,7 @@ void atomic_store(Values& values, const Store& s) {
   Value* indices = lanes == 1 ? values.index64(s.index) : values.index_vector(s.index);
   const Storage& to = c.storage(s.name);
   BinOp op = instruction_for(*update, element);
-  if (op == BinOp::FSub && c.e.machine.is_device()) {  // no device subtracts
+  if (op == BinOp::FSub && c.e.machine.is_device()) {  // devices have no atomic subtraction
     op = BinOp::FAdd;
     operand = c.b.CreateFNeg(operand);
   }
@@ -177,17 +176,17 @@ void FunctionGenerator::make(const Atomic& s) {
   any_stmt(s.body, [&](const Stmt& part) { return (first = part.as<Store>()) != nullptr; });
   if (!first) return;
   if (device_) {
-    unsupported(
-        "update " + quoted(s.name) + " atomically on a GPU",
-        "a kernel updates one value of at most 64 bits at a time",
-        "the values of a Tuple, and several points, are updated together, which takes a lock",
-        "Reduce with rfactor, or update a Func for each value");
+    unsupported("update " + quoted(s.name) + " atomically on a GPU",
+                "a kernel updates one value of at most 64 bits at a time",
+                "updating a Tuple or several points together needs a lock",
+                "Reduce with rfactor, or update a Func for each value");
   }
   locked(s, *first);
 }
 
-// The address is known before the lock: what the index is made of is bound inside. Several elements
-// have the lock of the buffer's first: of all updates that may meet it is the same.
+// The address is computed before the lock is taken, so the bindings of its variables inside the Atomic are substituted.
+// An update of several elements takes the lock of the buffer's first element: all updates that may meet it take the
+// same lock.
 void FunctionGenerator::locked(const Atomic& s, const Store& first) {
   Substitution lets;
   for (const auto* let = s.body.as<LetStmt>(); let; let = let->body.as<LetStmt>())

@@ -1,4 +1,4 @@
-// Fields of halide_buffer_t.
+// Loads and stores of the fields of halide_buffer_t.
 #include <HalideRuntime.h>
 
 #include "codegen/calls.h"
@@ -13,7 +13,7 @@ static_assert(sizeof(halide_type_t) == 4 && sizeof(halide_dimension_t) == 16);
 
 bool is_buffer_operator(Op op) { return op >= Op::buffer_host && op <= Op::buffer_is_query; }
 
-// Pixels never overlap the descriptors, so their stores do not force these loads to be repeated.
+// Stores to pixels never alias the descriptors, so they do not force LLVM to reload these fields.
 static Value* load_field(FunctionContext& c, llvm::Type* type, Value* pointer,
                          const char* name = "") {
   auto* load = c.b.CreateLoad(type, pointer, name);
@@ -34,7 +34,7 @@ static Value* dimension_pointer(FunctionContext& c, Value* buffer, Value* dimens
   return c.b.CreateGEP(c.b.getInt8Ty(), dims, bytes);
 }
 
-// Null for a null buffer, without a branch: the address that is read is then that of a constant.
+// Null for a null buffer. This takes no branch: for a null buffer it loads from a constant that holds null.
 Value* host_pointer(FunctionContext& c, Value* buffer) {
   auto* type = c.b.getPtrTy();
   auto* zero = c.e.module.getGlobalVariable("no_host", true);

@@ -1,4 +1,4 @@
-// Calls: operators whose arguments are not simply evaluated, and C functions.
+// Calls of C functions, and of operators that do not simply evaluate their arguments.
 #include "codegen/calls.h"
 
 #include "codegen/access.h"
@@ -11,7 +11,7 @@ namespace retrograde::codegen {
 
 using namespace ir;
 
-// Lane by lane: the C function knows no vectors.
+// Calls the C function once for each lane, because it takes scalars.
 static Value* extern_call(Values& values, const Call& e) {
   FunctionContext& c = values.c;
   std::vector<Value*> args;
@@ -43,7 +43,7 @@ static Value* branch_value(Values& values, const Expr& condition, const Expr& th
       test, [&] { return values.of(then_value); }, [&] { return values.of(else_value); });
 }
 
-// (condition, value, message...). All lanes must hold.
+// Arguments: (condition, value, message...). The condition must hold in all lanes.
 static Value* require(Values& values, const Call& e) {
   FunctionContext& c = values.c;
   Value* condition = values.of(e.args[0]);
@@ -51,7 +51,7 @@ static Value* require(Values& values, const Call& e) {
   c.fail_unless(condition, [&] {
     const auto* error = e.args.size() == 3 ? e.args[2].as<Call>() : nullptr;
     if (error && error->is_op(Op::error))
-      return values.of(e.args[2]);  // lowering's, with its own code
+      return values.of(e.args[2]);  // lowering's own error call, which has its own code
     return report_error(values,
                         c.b.getInt32(static_cast<uint32_t>(retrograde_error_requirement_failed)),
                         e.args, 2, " ");
@@ -59,7 +59,7 @@ static Value* require(Values& values, const Call& e) {
   return values.of(e.args[1]);
 }
 
-// ir/random.h in vectors.
+// The generator of ir/random.h, in vectors.
 static Value* random(Values& values, const Call& e) {
   FunctionContext& c = values.c;
   const Type word = UInt(32, e.type.lanes());
@@ -99,7 +99,8 @@ static Value* operator_call(Values& values, const Call& e) {
       return values.of(e.args[0]);
     case Op::strict_float: {
       const Contraction off(c.e, false);
-      const MemoScope scope(c.frame, false);  // values that may be contracted stay outside
+      const MemoScope scope(
+          c.frame, false);  // code that may contract must not share values with code that may not
       return values.of(e.args[0]);
     }
     case Op::undef:

@@ -1,4 +1,4 @@
-// Calls of operators that need more than their arguments' values, and of C functions.
+// Calls of C functions, and of operators that need more than the values of their arguments.
 #pragma once
 
 #include <string>
@@ -16,7 +16,7 @@ Value* pack(Values& values, const std::vector<Expr>& parts);
 Value* prefetch(Values& values, const ir::Call& e);
 Value* trace(Values& values, const ir::Call& e);
 
-// ---- messages.cpp: `separator` stands between parts ----
+// ---- messages.cpp: `separator` is printed between parts ----
 Value* report_error(Values& values, Value* code, const std::vector<Expr>& parts, size_t first,
                     const std::string& separator);
 Value* print_call(Values& values, const ir::Call& e);

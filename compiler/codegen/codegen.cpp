@@ -1,6 +1,6 @@
-// The way through LLVM: generate, optimize, emit. Machine code is split after the first step, and
-// its parts go on at the same time; a text is one module from start to end. No step looks from one
-// function into another, so that both have the same code.
+// Drives LLVM through its three steps: generate, optimize, emit. For machine code, the module is split after the first
+// step and its parts are compiled in parallel; text output keeps one module throughout. No step looks from one function
+// into another, so both ways give the same code.
 #include "codegen/codegen.h"
 
 #include <llvm/IR/Verifier.h>
@@ -34,8 +34,8 @@ void verify(const llvm::Module& module) {
   throw InternalError("LLVM rejects the generated code: " + problem, "codegen", text_of(module));
 }
 
-// The function itself is called through its export; its argv form is not needed. Nobody looks for its
-// kernels: functions of other files may have the same name.
+// Makes the exported entry points. The function itself is only called through its export, so its argv form is erased.
+// Its kernel image becomes private: functions of other files may have the same name.
 void add_exports(Emitter& emitter, const Program& program) {
   for (const Export& e : program.exports) {
     const std::string& name = program.functions[e.function].name;
@@ -58,7 +58,7 @@ void generate(const Program& program, const Machine& machine, Unit& unit) {
   unit.times.generate_seconds = watch.lap();
 }
 
-// Generates on a deep stack and gives what `use` makes of it there.
+// Generates code on a large stack, passes it to `use` there, and returns the result of `use`.
 template <typename Use>
 auto with_generated(const Program& program, const Options& options, bool keep_names,
                     const Use& use) {
@@ -83,7 +83,7 @@ auto with_optimized(const Program& program, const Options& options, const Use& u
   });
 }
 
-// ---- the parts of a program at the same time ----
+// ---- compiling the parts of a program in parallel ----
 
 struct Part {
   std::string object;
@@ -109,7 +109,7 @@ void compile_part(const std::string& name, const std::string& bitcode, const Mac
   }
 }
 
-// Each part begins while the next is cut off.
+// Starts to compile each part while the next one is being split off.
 std::vector<Part> compile_at_once(Unit& unit, unsigned count, const Machine& machine,
                                   const Options& options) {
   const std::string& name = unit.module().getModuleIdentifier();
@@ -124,7 +124,7 @@ std::vector<Part> compile_at_once(Unit& unit, unsigned count, const Machine& mac
       if (part + 1 == count) return run();
       try {
         threads.emplace_back(run);
-      } catch (const std::system_error&) {  // no more threads to be had
+      } catch (const std::system_error&) {  // no more threads available
         run();
       }
     });
@@ -141,7 +141,7 @@ std::string archive_of(const std::vector<Part>& parts) {
   return archive(members);
 }
 
-// The parts run at the same time: what is told is how long the slowest took.
+// The parts run in parallel, so the reported time of a step is that of the slowest part.
 void join_times(const std::vector<Part>& parts, Times& times) {
   for (const Part& part : parts) {
     times.optimize_seconds = std::max(times.optimize_seconds, part.times.optimize_seconds);
@@ -149,7 +149,7 @@ void join_times(const std::vector<Part>& parts, Times& times) {
   }
 }
 
-// In at most `most` parts, where the options do not say.
+// Compiles in options.parts parts if the options name a count, else in at most `most`.
 std::vector<Part> compile_unit(Unit& unit, const Machine& machine, const Options& options,
                                unsigned most) {
   const unsigned count = options.parts ? possible_parts(unit.module(), options.parts)

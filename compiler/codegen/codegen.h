@@ -1,7 +1,7 @@
-// Machine code from a lowered function. Nothing of LLVM shows here.
+// Compiles lowered functions to machine code or text. No type of LLVM appears in this interface.
 //
-// A module holds `int32 name(context, args...)` and `int32 name_argv(context, void **args)`, as the
-// runtime's header describes. Compilations share nothing and may run at once on several threads.
+// A module holds `int32 name(context, args...)` and `int32 name_argv(context, void **args)`, as retrograde_runtime.h
+// describes. Compilations share no state and may run in parallel threads.
 #pragma once
 
 #include <cstdint>
@@ -15,19 +15,19 @@
 
 namespace retrograde::codegen {
 
-// Whether RETROGRADE_GPU is "simulated".
+// Whether the environment variable RETROGRADE_GPU is "simulated".
 bool is_gpu_simulated();
 
 struct Options {
   Target target = get_host_target();
-  // Choose instructions for the processor that this runs on, within the target's features.
+  // Tune for the processor of this machine, using only the target's features.
   bool tune_for_host = true;
-  // 0: straight from the IR; 1: what the passes of optimize.cpp make of it.
+  // 0: LLVM runs no optimization passes; 1: the passes of optimize.cpp.
   int optimization_level = 1;
-  // Kernels for the executor, too, which RETROGRADE_GPU=simulated asks for.
+  // Also compile kernels for the simulated device, which RETROGRADE_GPU=simulated selects.
   bool kernels_for_executor = is_gpu_simulated();
-  // Into how many parts a program is cut, which are compiled at the same time. 0: what its size
-  // suggests; of compile_object, at most the machine's cores.
+  // Number of parts into which a program is split, to be compiled in parallel. 0: chosen by its size; compile_object
+  // uses at most one part per core.
   unsigned parts = 0;
 };
 
@@ -38,23 +38,23 @@ struct Times {
 };
 
 struct Module {
-  std::vector<uint8_t> object;         // ELF, relocatable; of several parts an archive of such
-  std::vector<std::string> externals;  // symbols that it needs, sorted
+  std::vector<uint8_t> object;  // a relocatable ELF file; with several parts, an archive of them
+  std::vector<std::string> externals;  // symbols that it imports, sorted
   Times times;
 };
 
-// InternalError when the function is not what lowering promises; Unsupported for a target without a
-// code generator.
+// Throws InternalError if the function breaks a promise of lowering, and Unsupported for a target without a code
+// generator.
 Module compile_object(const ir::LoweredFunction& function, const Options& options);
 
-// Ahead of time: functions that the exports refer to are reached through these alone.
+// A program for ahead-of-time compilation. Functions that the exports name can only be called through these.
 struct Program {
   std::vector<ir::LoweredFunction> functions;
   std::vector<Export> exports;
   std::vector<Dispatch> dispatches;
 };
-// The parts of one object file, which refer to each other by hidden symbols. The same whatever the
-// machine that it runs on.
+// The parts of one object file, which refer to each other by hidden symbols. The result does not depend on the machine
+// that compiles.
 std::vector<std::string> compile_parts(const Program& program, const Options& options);
 
 enum class Format { Assembly, LlvmIr, Bitcode };

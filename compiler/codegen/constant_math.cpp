@@ -1,7 +1,7 @@
-// Twiddle factors, window functions and the like are math of constants once loops are unrolled. The
-// function that is called here is the scalar one of the family that the generated code would call,
-// whose bits do not depend on the width (math_table.h). Where the generated code calls the C
-// library of another machine, nothing is computed.
+// Evaluates vector math of constants at compile time. Unrolled loops contain much of it, for example twiddle factors
+// and window functions. The result comes from the scalar function of the family that the generated code would call,
+// whose bits do not depend on the vector width (math_table.h). If the generated code calls the C library of another
+// machine, nothing is evaluated.
 #include "codegen/constant_math.h"
 
 #include <llvm/ADT/APFloat.h>
@@ -12,7 +12,7 @@
 namespace retrograde::codegen {
 namespace {
 
-// Functions of the FMA family run on this processor, too.
+// Whether this processor can run the functions that the target would call: those of the FMA family need FMA.
 bool runs_here(const Machine& machine) {
 #if defined(__x86_64__)
   return !machine.has_fma() || (__builtin_cpu_supports("fma") && __builtin_cpu_supports("avx2"));
@@ -26,7 +26,7 @@ void* find_function(const Machine& machine, const MathFunction& function, int bi
   return find_in_sleef(machine.math_symbol(function.stem, function.precision, bits, 1).c_str());
 }
 
-// One lane of each argument; empty when one is no number.
+// One lane of each argument; empty if an argument's lane is not a number.
 template <class T>
 std::vector<T> numbers(const std::vector<Value*>& args, unsigned lane) {
   std::vector<T> result;

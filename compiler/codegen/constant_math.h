@@ -1,4 +1,4 @@
-// constant_math.h -- vector math of constants, computed while compiling.
+// constant_math.h -- evaluates vector math of constants at compile time.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace retrograde::codegen {
 
-// What the generated code would compute, to the bit; null when an argument is no constant, or this
-// process has no function that computes the same.
+// Returns exactly the bits that the generated code would compute. Null if an argument is not a constant, or if this
+// process has no function that computes the same bits.
 Value* constant_result(Emitter& e, const MathFunction& function, const std::vector<Value*>& args);
 
 }  // namespace retrograde::codegen

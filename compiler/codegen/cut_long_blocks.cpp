@@ -23,8 +23,8 @@ bool stays(const Instruction& one) {
   return llvm::isa<llvm::PHINode, llvm::AllocaInst>(one) || one.isTerminator();
 }
 
-// Instructions that mean something in their own function alone.
-bool ties(const Instruction& one) {
+// Instructions that cannot move to another function.
+bool must_stay_in_function(const Instruction& one) {
   if (const auto* memory = llvm::dyn_cast<llvm::AllocaInst>(&one))
     return !llvm::isa<llvm::ConstantInt>(memory->getArraySize());
   const auto* call = llvm::dyn_cast<llvm::IntrinsicInst>(&one);
@@ -33,7 +33,7 @@ bool ties(const Instruction& one) {
 }
 
 bool can_cut(const llvm::BasicBlock& block) {
-  return block.size() > most_instructions && llvm::none_of(block, ties);
+  return block.size() > most_instructions && llvm::none_of(block, must_stay_in_function);
 }
 
 Instructions movable(llvm::BasicBlock& block) {
@@ -44,20 +44,21 @@ Instructions movable(llvm::BasicBlock& block) {
   return all;
 }
 
-// Masks of vectors.
+// Vector masks, which are recomputed in each piece.
 bool is_recomputed(const Instruction& one) {
   return one.getType()->isVectorTy() && one.getType()->getScalarType()->isIntegerTy(1) &&
          llvm::isa<llvm::CmpInst, llvm::BinaryOperator, llvm::FreezeInst>(one);
 }
 
-// What the code generator fuses into the only reader, when both are in one block.
+// Instructions that the code generator fuses into their only user if both are in the same block.
 bool may_fuse(const Instruction& one) {
   const unsigned opcode = one.getOpcode();
   return one.hasOneUse() && (opcode == Instruction::FMul || opcode == Instruction::FNeg ||
                              opcode == Instruction::FPExt || opcode == Instruction::FPTrunc);
 }
 
-// Says to which piece each instruction of a block belongs, and takes to a piece what must be there.
+// Assigns each instruction of a block to a piece, and moves or copies instructions that must be in the piece of their
+// user.
 class Division {
  public:
   explicit Division(llvm::BasicBlock& block) : block_(block) {
@@ -65,8 +66,8 @@ class Division {
     count_ = std::max<size_t>(all.size() / piece_length, 1);
     const size_t length = (all.size() + count_ - 1) / count_;
     for (size_t i = 0; i < all.size(); i++) places_[all[i]] = {i / length, {i, 0}, all[i]};
-    // Readers before what they read: what is taken along may have to take something along, too.
-    for (Instruction* one : llvm::reverse(all)) take_along(*one);
+    // Users before their operands: an instruction that moves along may need its own operands to move too.
+    for (Instruction* one : llvm::reverse(all)) move_with_user(*one);
   }
 
   std::vector<Instructions> pieces() {
@@ -80,16 +81,16 @@ class Division {
   struct Place {
     size_t piece;
     Order order;
-    Instruction* anchor;  // an instruction of the block as it was, before which it stands
+    Instruction* anchor;  // an instruction of the original block; this one is placed before it
   };
 
-  void take_along(Instruction& one) {
+  void move_with_user(Instruction& one) {
     if (!may_fuse(one) && !is_recomputed(one)) return;
     for (const auto& [piece, reader] : first_readers(one)) {
       if (piece == places_[&one].piece) continue;
-      if (may_fuse(one)) return put_before(*reader, one);
+      if (may_fuse(one)) return place_before(*reader, one);
       Instruction* copy = one.clone();
-      put_before(*reader, *copy);
+      place_before(*reader, *copy);
       one.replaceUsesWithIf(copy, [&, piece = piece](const llvm::Use& use) {
         const auto place = places_.find(use.getUser());
         return place != places_.end() && place->second.piece == piece;
@@ -109,8 +110,8 @@ class Division {
     return first;
   }
 
-  // Before everything that was put before the same anchor: some of that may read it.
-  void put_before(Instruction& reader, Instruction& one) {
+  // Placed before everything that was already placed before the same anchor, since some of that may read it.
+  void place_before(Instruction& reader, Instruction& one) {
     const Place there = places_[&reader];
     Instruction*& head = heads_[there.anchor];
     Instruction* const before = head ? head : there.anchor;
@@ -140,17 +141,17 @@ class BlockCutter {
   }
 
   std::vector<llvm::Function*> cut() {
-    find_crossing();
+    find_values_in_frame();
     llvm::IRBuilder<> entry(&*function_.getEntryBlock().getFirstInsertionPt());
     frame_ = entry.CreateAlloca(frame_type_, nullptr, "frame");
     for (const Instructions& piece : pieces_) move_to_function(piece);
-    load_what_is_read_after();
-    return std::move(made_);
+    load_values_used_after();
+    return std::move(new_functions_);
   }
 
  private:
-  // What is read outside of its piece has a slot in the frame.
-  void find_crossing() {
+  // Gives a slot in the frame to each value that another piece reads.
+  void find_values_in_frame() {
     llvm::SmallVector<llvm::Type*> types;
     for (size_t piece = 0; piece < pieces_.size(); piece++) {
       for (Instruction* one : pieces_[piece]) {
@@ -177,11 +178,11 @@ class BlockCutter {
   }
 
   void move_to_function(const Instructions& instructions) {
-    std::vector<llvm::Value*> given{frame_};
-    given.insert(given.end(), elsewhere_.begin(), elsewhere_.end());
-    llvm::Function* draft = make_function(given);
+    std::vector<llvm::Value*> arguments{frame_};
+    arguments.insert(arguments.end(), elsewhere_.begin(), elsewhere_.end());
+    llvm::Function* draft = make_function(arguments);
     inside_.clear();
-    for (unsigned i = 1; i < given.size(); i++) inside_[given[i]] = draft->getArg(i);
+    for (unsigned i = 1; i < arguments.size(); i++) inside_[arguments[i]] = draft->getArg(i);
     auto* body = llvm::BasicBlock::Create(function_.getContext(), "entry", draft);
     Instruction* const end = llvm::ReturnInst::Create(function_.getContext(), body);
     for (Instruction* one : instructions) {
@@ -191,12 +192,12 @@ class BlockCutter {
     for (Instruction* one : instructions) {
       if (slots_.contains(one)) store(*one, draft->getArg(0));
     }
-    llvm::Function* piece = without_unread(draft, given);
-    llvm::IRBuilder<>(block_.getTerminator()).CreateCall(piece, given);
-    made_.push_back(piece);
+    llvm::Function* piece = without_unused_arguments(draft, arguments);
+    llvm::IRBuilder<>(block_.getTerminator()).CreateCall(piece, arguments);
+    new_functions_.push_back(piece);
   }
 
-  // Operands from outside of the piece become arguments and loads.
+  // Replaces operands from outside the piece by arguments and loads.
   void read_inside(Instruction& one, llvm::Value* frame) {
     for (llvm::Use& use : one.operands()) {
       auto* computed = llvm::dyn_cast<Instruction>(use.get());
@@ -207,38 +208,39 @@ class BlockCutter {
     }
   }
 
-  llvm::Function* make_function(const std::vector<llvm::Value*>& given) {
+  llvm::Function* make_function(const std::vector<llvm::Value*>& arguments) {
     std::vector<llvm::Type*> types;
-    for (const llvm::Value* value : given) types.push_back(value->getType());
+    for (const llvm::Value* value : arguments) types.push_back(value->getType());
     auto* type =
         llvm::FunctionType::get(llvm::Type::getVoidTy(function_.getContext()), types, false);
-    llvm::Function* made =
+    llvm::Function* result =
         llvm::Function::Create(type, llvm::GlobalValue::InternalLinkage,
                                function_.getName() + ".piece", function_.getParent());
-    made->addFnAttrs(
+    result->addFnAttrs(
         llvm::AttrBuilder(function_.getContext(), function_.getAttributes().getFnAttrs()));
-    return made;
+    return result;
   }
 
-  // The same function without the arguments that it does not read, which `given` then lacks, too.
-  llvm::Function* without_unread(llvm::Function* draft, std::vector<llvm::Value*>& given) {
+  // The same function without its unused arguments, which are removed from `arguments` too.
+  llvm::Function* without_unused_arguments(llvm::Function* draft,
+                                           std::vector<llvm::Value*>& arguments) {
     std::vector<llvm::Value*> read;
     std::vector<llvm::Argument*> from;
     for (llvm::Argument& argument : draft->args()) {
       if (argument.use_empty()) continue;
-      read.push_back(given[argument.getArgNo()]);
+      read.push_back(arguments[argument.getArgNo()]);
       from.push_back(&argument);
     }
-    llvm::Function* made = make_function(read);
-    made->splice(made->begin(), draft);
-    for (unsigned i = 0; i < from.size(); i++) from[i]->replaceAllUsesWith(made->getArg(i));
-    made->takeName(draft);
+    llvm::Function* result = make_function(read);
+    result->splice(result->begin(), draft);
+    for (unsigned i = 0; i < from.size(); i++) from[i]->replaceAllUsesWith(result->getArg(i));
+    result->takeName(draft);
     draft->eraseFromParent();
-    given = std::move(read);
-    return made;
+    arguments = std::move(read);
+    return result;
   }
 
-  void load_what_is_read_after() {
+  void load_values_used_after() {
     Instruction* const end = block_.getTerminator();
     for (Instruction* one : crossing_) {
       llvm::Value* loaded = nullptr;
@@ -269,21 +271,22 @@ class BlockCutter {
   llvm::DenseMap<const llvm::Value*, unsigned> slots_;
   Instructions crossing_;
   llvm::SetVector<llvm::Value*> elsewhere_;
-  llvm::DenseMap<llvm::Value*, llvm::Value*> inside_;  // what the piece at hand reads instead
+  llvm::DenseMap<llvm::Value*, llvm::Value*>
+      inside_;  // replacements for operands in the current piece
   llvm::StructType* frame_type_ = nullptr;
   llvm::AllocaInst* frame_ = nullptr;
-  std::vector<llvm::Function*> made_;
+  std::vector<llvm::Function*> new_functions_;
 };
 
 }  // namespace
 
 std::vector<llvm::Function*> cut_long_blocks(llvm::Function& function) {
-  std::vector<llvm::Function*> made;
+  std::vector<llvm::Function*> pieces;
   for (llvm::BasicBlock& block : function) {
     if (!can_cut(block)) continue;
-    for (llvm::Function* piece : BlockCutter(block).cut()) made.push_back(piece);
+    for (llvm::Function* piece : BlockCutter(block).cut()) pieces.push_back(piece);
   }
-  return made;
+  return pieces;
 }
 
 }  // namespace retrograde::codegen

@@ -17,18 +17,18 @@
 namespace retrograde::codegen {
 namespace {
 
-// In instructions. Shorter functions are not worth a thread each; shorter pieces are no gain.
+// In instructions. Splitting shorter functions is not worth a thread each; shorter pieces gain nothing.
 constexpr unsigned long_function = 400, least_piece = 100;
-// What a loop must do each time. A call, its arguments and what is no longer hoisted, such as the parts
-// of addresses that a loop around it does not change, are twenty to some hundred instructions, and
-// loops of which little is known may run once: matrix products whose innermost loops were cut at
-// 4,000 took half as long again, depthwise convolutions a quarter when unknown extents were 16.
+// Least work per execution of a loop, in instructions. A cut costs 20 to some 100 instructions: a call, its arguments,
+// and code that LLVM can no longer hoist, such as address parts that are invariant in an enclosing loop. Loops with
+// unknown bounds may run only once. Matrix products whose innermost loops were cut at 4,000 took 1.5 times as long;
+// depthwise convolutions took 1.25 times as long when unknown extents counted as 16.
 constexpr uint64_t least_work = 16000;
 constexpr uint64_t unknown_iterations = 4;
-// As many bytes as a processor has in vector registers.
+// Capacity of a processor's vector registers, in bytes.
 constexpr uint64_t register_bytes = 2048;
-// Of one allocation, as far as they are looked at. Unrolled tiles use their accumulators hundreds of
-// times, and LLVM looks at a hundred by default.
+// Limit on the uses of one allocation that are examined. Unrolled tiles use their accumulators hundreds of times, and
+// LLVM's default is 100.
 constexpr unsigned most_uses = 10000;
 
 using Blocks = std::vector<llvm::BasicBlock*>;
@@ -39,7 +39,8 @@ unsigned length_of(const llvm::Loop& loop) {
   return static_cast<unsigned>(length);
 }
 
-// Of a loop as serial_loop makes it, which counts from `first` while the next is less than `end`.
+// Iteration count of a loop that serial_loop made, which counts up from `first` while the next value is less than
+// `end`.
 uint64_t iterations_of(const llvm::Loop& loop) {
   using namespace llvm::PatternMatch;
   namespace pattern = llvm::PatternMatch;  // ir has a match, too
@@ -66,14 +67,14 @@ uint64_t iterations_of(const llvm::Loop& loop) {
   return unknown_iterations;
 }
 
-// Instructions that one execution of the loop runs through, about.
+// Instructions that one execution of the loop runs, approximately.
 uint64_t work_of(const llvm::Loop& loop) {
   uint64_t work = length_of(loop);
   for (const llvm::Loop* inner : loop) work += work_of(*inner) - length_of(*inner);
   return work * iterations_of(loop);
 }
 
-// The blocks of the loop and those that leave it to end the function.
+// The blocks of the loop, and the exit blocks that end the function.
 Blocks blocks_of(const llvm::Loop& loop) {
   Blocks blocks(loop.block_begin(), loop.block_end());
   llvm::SmallVector<llvm::BasicBlock*> exits;
@@ -97,7 +98,7 @@ bool may_be_registers(const llvm::AllocaInst& block) {
 
 bool is_scratch(const llvm::AllocaInst& block) { return block.hasMetadata(scratch_mark); }
 
-// The marker of a block of memory that has one.
+// The lifetime marker of a stack allocation, if it has one.
 llvm::Instruction* beginning_of(const llvm::AllocaInst& block) {
   for (const llvm::User* user : block.users()) {
     auto* one = const_cast<llvm::Instruction*>(llvm::cast<llvm::Instruction>(user));
@@ -106,7 +107,7 @@ llvm::Instruction* beginning_of(const llvm::AllocaInst& block) {
   return nullptr;
 }
 
-// Memory on the stack that only a loop uses, and begins anew each time.
+// A stack allocation that only one loop uses and whose lifetime begins anew in each iteration.
 struct OwnMemory {
   llvm::AllocaInst* block;
   llvm::Instruction* begins_before;
@@ -117,7 +118,7 @@ class Cutter {
   explicit Cutter(llvm::Function& function)
       : function_(function), dominators_(function), loops_(dominators_) {}
 
-  // The new function, or null.
+  // Returns the new function, or null if no loop is worth a cut.
   llvm::Function* cut(const std::string& name) {
     const llvm::Loop* loop = best_loop();
     if (!loop) return nullptr;
@@ -167,7 +168,7 @@ class Cutter {
            llvm::none_of(inputs, [&](const llvm::Value* v) { return is_shared(v, blocks); });
   }
 
-  // Whether it may be a register on both sides of the cut.
+  // Whether the value may live in a register on both sides of the cut.
   static bool is_shared(const llvm::Value* input, const Blocks& blocks) {
     if (input->getType()->isVectorTy()) return true;
     const auto* block = llvm::dyn_cast<llvm::AllocaInst>(input);
@@ -180,7 +181,7 @@ class Cutter {
            });
   }
 
-  // Without its markers, which the extractor would put around the call.
+  // Removes the lifetime markers, which the extractor would otherwise put around the call.
   static std::vector<OwnMemory> take_own_memory(const Blocks& blocks) {
     std::vector<OwnMemory> own;
     for (llvm::BasicBlock* where : blocks) {
@@ -197,7 +198,7 @@ class Cutter {
     return own;
   }
 
-  // The piece has its own memory, and scratch memory of its own.
+  // Moves the loop's own memory into the piece, and gives the piece its own scratch memory.
   static void move_memory(llvm::Function& piece, const std::vector<OwnMemory>& own) {
     auto* call = llvm::cast<llvm::CallInst>(*piece.user_begin());
     llvm::Instruction* const begin = &*piece.getEntryBlock().getFirstInsertionPt();
@@ -237,8 +238,8 @@ void cut(llvm::Function& function, unsigned longest) {
   }
 }
 
-// LLVM's passes work without them.
-void drop_marks(llvm::Module& module) {
+// LLVM's passes do not need them.
+void drop_lifetime_markers(llvm::Module& module) {
   for (llvm::Function& function : module) {
     for (llvm::Instruction& one : llvm::make_early_inc_range(llvm::instructions(function))) {
       if (one.isLifetimeStartOrEnd()) one.eraseFromParent();
@@ -255,7 +256,7 @@ void cut_loops(llvm::Module& module) {
     if (!function.isDeclaration()) functions.push_back(&function);
   }
   for (llvm::Function* function : functions) cut(*function, longest);
-  drop_marks(module);
+  drop_lifetime_markers(module);
 }
 
 }  // namespace retrograde::codegen

@@ -1,13 +1,14 @@
-// cut_loops -- loops of long functions become functions of their own, so that several threads can
-// compile what was one function (split_module.h).
-// In:  a module as generated. Out: one that does the same; no function has much more than a third
-//      of it, where loops can be cut off that are worth a call.
+// cut_loops -- splits loops off long functions, so that several threads can compile the pieces (split_module.h).
+// In:  a module as generated.
+// Out: an equivalent module. No function has much more than a third of its instructions, as long as
+//      there are loops worth a call.
 //
 //   f: for y { produce a; consume a }   =>   f:   for y { f.loop0(...); f.loop1(...) }
 //
-// Which: the loop that leaves the two most equal pieces, as long as there is one. Not a loop
-//   1. that does so little each time that a call and what LLVM hoists out of loops would be felt;
-//   2. that shares with the rest what may become registers: vectors, small allocations;
+// Repeatedly picks the loop that gives the two most equal pieces. Excluded are loops
+//   1. that do so little per execution that the call and lost hoisting would be noticeable;
+//   2. that share values with the rest that may become registers: vectors, small allocations;
+//   3. whose values are used afterwards, except error codes.
 //   3. of which values are used afterwards, error codes apart.
 #pragma once
 
@@ -17,11 +18,10 @@ class Module;
 
 namespace retrograde::codegen {
 
-// On an alloca: what is stored there is loaded again by the same statement.
+// Marks an alloca whose contents are only reloaded by the statement that stores them.
 constexpr const char* scratch_mark = "retrograde.scratch";
 
-// Markers of lifetimes tell which memory on the stack a loop begins with anew each time. They are
-// gone afterwards.
+// Uses lifetime markers to find stack memory that a loop begins anew in each iteration, and removes the markers.
 void cut_loops(llvm::Module& module);
 
 }  // namespace retrograde::codegen

@@ -9,7 +9,7 @@
 #include "codegen/fuse_products.h"
 #include "diagnostics/error.h"
 
-// cmake/RetrogradeDeviceMath.cmake
+// Defined by cmake/RetrogradeDeviceMath.cmake.
 extern "C" const char retrograde_device_math_begin[], retrograde_device_math_end[];
 
 namespace retrograde::codegen {
@@ -46,7 +46,8 @@ void link_device_math(Emitter& e) {
                                     value.setLinkage(llvm::GlobalValue::InternalLinkage);
                                     auto* function = llvm::dyn_cast<llvm::Function>(&value);
                                     if (!function) continue;
-                                    // What they were compiled for is not what they are compiled for now.
+                                    // The library's attributes name the target that it was built for; these functions
+                                    // get the module's.
                                     function->removeFnAttr("target-cpu");
                                     function->removeFnAttr("target-features");
                                     function->removeFnAttr("tune-cpu");

@@ -1,5 +1,5 @@
-// device_math.h -- the mathematical functions of kernels: libclc's, made for NVPTX, which are nothing but
-// correctly rounded arithmetic, so that the executor's have the same bits as a device's.
+// device_math.h -- mathematical functions for kernels. They come from libclc built for NVPTX and consist only of
+// correctly rounded arithmetic, so the simulated device gives the same bits as a GPU.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ namespace retrograde::codegen {
 // "_Z3powff" for ("pow", 32, 2).
 std::string device_math_symbol(const std::string& stem, int bits, int arity);
 
-// Adds the definitions of those that the module calls, and of what they call.
+// Links in the definitions of those functions that the module calls, and their callees.
 void link_device_math(Emitter& e);
 
 }  // namespace retrograde::codegen

@@ -1,6 +1,6 @@
-// device_target.h -- what a kernel's code asks of the device that it runs on. Two implementations: a
-// GPU that understands PTX (nvptx_target.cpp), and this machine under the executor of kernels
-// (simt_target.cpp), whose code is the same but for these.
+// device_target.h -- the operations of a kernel that depend on the device. There are two implementations: GPUs that run
+// PTX (nvptx_target.cpp), and the simulated device, which runs kernels on this machine (simt_target.cpp). All other
+// kernel code is the same for both.
 #pragma once
 
 #include <memory>
@@ -12,7 +12,7 @@
 
 namespace retrograde::codegen {
 
-// What a kernel is given: variables and the first elements of memory of its surroundings.
+// A parameter of a kernel: a variable, or the address of memory allocated outside it.
 struct KernelParameter {
   std::string name;
   bool is_storage = false;
@@ -24,20 +24,20 @@ struct KernelParameter {
 class DeviceTarget {
  public:
   virtual ~DeviceTarget() = default;
-  // The function and its parameters' values, in order. The insertion point is not moved.
+  // Declares the function. The insertion point does not move.
   virtual llvm::Function* declare(Emitter& e, const std::string& name,
                                   const std::vector<KernelParameter>& parameters,
                                   const ir::Launch& launch) = 0;
-  // At the beginning of the function.
+  // The parameters' values, in order; called at the start of the function.
   virtual std::vector<Value*> arguments(Emitter& e, llvm::Function* function,
                                         const std::vector<KernelParameter>& parameters) = 0;
   virtual Value* thread_index(Emitter& e, llvm::Function* function, int dimension) = 0;
   virtual Value* block_index(Emitter& e, llvm::Function* function, int dimension) = 0;
-  // The block's memory from `offset` (int32, bytes) on.
+  // The block's shared memory, starting at `offset` (int32, bytes).
   virtual Value* shared(Emitter& e, llvm::Function* function, Value* offset) = 0;
   virtual void barrier(Emitter& e, llvm::Function* function, int site) = 0;
   virtual void warp_barrier(Emitter& e, llvm::Function* function, int site) = 0;
-  // When the code is there. `sites`: the metadata that names each instruction's statement.
+  // Called when the code is complete. `sites`: the metadata kind that names each instruction's statement.
   virtual void finish(Emitter& e, llvm::Function* function, unsigned sites) = 0;
 };
 

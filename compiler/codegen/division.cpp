@@ -1,13 +1,13 @@
-// Division and modulus of integers, rounding so that the remainder is never negative.
+// Division and modulus of integers, rounded so that the remainder is never negative.
 //
 // By a positive constant c, signed:  sign = a < 0 ? -1 : 0;  q = ((a ^ sign) /u c) ^ sign
 //   For a < 0, a ^ sign = -a - 1 >= 0 and  -1 - (-a - 1) / c = floor(a / c). LLVM turns the
 //   unsigned division into a multiplication, in vectors too.
 // By a negative constant:  q = -(a / |c|), since a = q c + r with the same r.
-// By a variable, vectors of up to 32 bits: in floats that hold both operands, float32 for up to 16
-//   bits, else double. Their quotient truncates exactly: a / b differs from the next integer by at
+// By a variable, vectors of up to 32 bits: in a float type that holds both operands, float32 for up to
+//   16 bits, else double. The truncated quotient is exact: a / b differs from the next integer by at
 //   least 1 / |b|; the rounding error is at most |a / b| 2^-24, or 2^-53, less than 1 / |b|.
-// By a variable otherwise: LLVM's division with the two cases that it leaves undefined taken out.
+// By a variable otherwise: LLVM's division, with its two undefined cases handled apart.
 #include <llvm/IR/Constants.h>
 
 #include "codegen/emitter.h"
@@ -30,7 +30,8 @@ Value* sign_mask(Emitter& e, Type type, Value* a) {
 Value* divide_by_constant(Emitter& e, Type type, Value* a, const llvm::APInt& divisor) {
   if (divisor.isZero()) return int_constant(a, 0);
   if (!type.is_int()) return e.b.CreateUDiv(a, llvm::ConstantInt::get(a->getType(), divisor));
-  const llvm::APInt magnitude = divisor.abs();  // as unsigned, also for the most negative number
+  const llvm::APInt magnitude =
+      divisor.abs();  // unsigned, so that it also holds for the most negative number
   Value* quotient;
   if (magnitude.isPowerOf2() && !magnitude.isMinSignedValue()) {
     quotient = e.b.CreateAShr(a, int_constant(a, magnitude.logBase2()));
@@ -54,13 +55,13 @@ Value* truncating_in_floats(Emitter& e, Type type, Value* a, Value* b) {
   Value* quotient = e.b.CreateFDiv(widened(a), widened(b));
   if (is_narrow) return e.b.CreateTrunc(e.b.CreateFPToSI(quotient, integer), a->getType());
   if (!is_signed) return e.b.CreateFPToUI(quotient, integer);
-  // The quotient of the most negative number and -1 alone does not fit.
+  // Only the quotient of the most negative number by -1 does not fit.
   Value* is_minus_one = e.b.CreateICmpEQ(b, int_constant(b, -1));
   Value* fitting = e.b.CreateFreeze(e.b.CreateFPToSI(quotient, integer));
   return e.b.CreateSelect(is_minus_one, e.b.CreateNeg(a), fitting);
 }
 
-// Rounding toward zero; b is not 0.
+// Rounds toward zero; b is not 0.
 Value* truncating(Emitter& e, Type type, Value* a, Value* b) {
   if (type.is_vector() && type.bits() >= 8 && type.bits() <= 32)
     return truncating_in_floats(e, type, a, b);
@@ -80,7 +81,7 @@ Divided divide_by_variable(Emitter& e, Type type, Value* a, Value* b) {
   Value* quotient = truncating(e, type, a, divisor);
   Value* remainder = e.b.CreateSub(a, e.b.CreateMul(quotient, divisor));
   if (type.is_int()) {
-    // A negative remainder moves up by |b|, and the quotient one step away from b's sign.
+    // If the remainder is negative, add |b| to it, and move the quotient one step away from b's sign.
     Value* is_low = sign_mask(e, type, remainder);
     Value* b_sign = sign_mask(e, type, divisor);
     Value* step = e.b.CreateOr(b_sign, int_constant(b, 1));  // -1 or 1

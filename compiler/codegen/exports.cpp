@@ -12,7 +12,7 @@ namespace {
 
 using namespace ir;
 
-// Of the context on the caller's stack: more than today's, so that a later runtime's fits too.
+// Size of the context on the caller's stack. It is larger than today's context so that a later runtime's fits.
 constexpr uint64_t context_bytes = 256;
 static_assert(sizeof(retrograde_context) <= context_bytes);
 
@@ -63,7 +63,7 @@ class Exporter {
   Emitter& e_;
   llvm::IRBuilder<>& b_;
 
-  // How C passes it: bool as a byte, 16-bit floats as their bits.
+  // The C ABI's type: bool is a byte, 16-bit floats are their bits.
   llvm::Type* parameter_type(const ExportArgument& argument) {
     if (argument.is_buffer() || argument.type.is_handle()) return b_.getPtrTy();
     return memory_type(e_, argument.type);
@@ -75,7 +75,7 @@ class Exporter {
     return llvm::FunctionType::get(b_.getInt32Ty(), params, false);
   }
 
-  // Small integers are extended by the caller where the platform wants it.
+  // The caller extends small integers if the platform's ABI requires it.
   void mark_extensions(const Signature& signature, llvm::Function* function) {
     for (unsigned i = 0; i < signature.arguments.size(); i++) {
       const ExportArgument& a = signature.arguments[i];
@@ -180,7 +180,7 @@ class Exporter {
     return value ? constant(b_.getInt64(bits_of(*value))) : null();
   }
 
-  // An array of pointers: min, extent of each dimension.
+  // An array of pointers to the min and extent of each dimension.
   llvm::Constant* buffer_estimates(const ExportArgument& a) {
     if (!a.is_buffer() || a.buffer_estimates.empty()) return null();
     std::vector<llvm::Constant*> pointers;

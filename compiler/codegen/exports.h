@@ -1,12 +1,11 @@
-// How callers outside reach functions that were compiled ahead of time: exactly as HalideRuntime.h
-// says.
+// Entry points of ahead-of-time compiled functions, exactly as HalideRuntime.h specifies them.
 //
 //   int name([void *user_context,] arguments...)    buffers as halide_buffer_t *, scalars by value
 //   int name_argv(void **arguments)                  as the generated function's argv: pointers
 //   const halide_filter_metadata_t *name_metadata()
 //
-// The lowered function behind it becomes internal; what stands here makes the context of the call
-// (retrograde_begin_call) and hands on the arguments.
+// The lowered function becomes internal; its entry point creates the call's context (retrograde_begin_call) and passes
+// on the arguments.
 #pragma once
 
 #include <cstdint>
@@ -41,7 +40,7 @@ struct Signature {
   std::vector<ExportArgument> arguments;
 };
 
-// Where an argument of the lowered function comes from: the caller, or the code itself.
+// Where an argument of the lowered function comes from: the caller, or data embedded in the code.
 struct Source {
   int argument = -1;                          // of the signature
   const halide_buffer_t* embedded = nullptr;  // its contents are copied into the code
@@ -49,12 +48,11 @@ struct Source {
 
 struct Export {
   Signature signature;
-  size_t function = 0;          // which of the program's
+  size_t function = 0;          // index into the program's functions
   std::vector<Source> sources;  // one for each argument of the lowered function
 };
 
-// A function that calls the first of several whose features the processor has. The last is called
-// when no other can be.
+// A function that calls the first variant whose features the processor has. The last variant is the fallback.
 struct Dispatch {
   struct Variant {
     std::string name;

@@ -1,4 +1,4 @@
-// Every expression kind. A node that several expressions share gets one value.
+// Code for every expression kind. A node that several expressions share is evaluated once.
 #include <algorithm>
 
 #include "codegen/access.h"
@@ -22,15 +22,14 @@ Value* Values::known(Memo MemoFrame::*memo, const Expr& e) const {
   return nullptr;
 }
 
-Value* Values::remembered(Memo MemoFrame::*memo, const Expr& e,
-                          Value* (Values::*make)(const Expr&)) {
+Value* Values::memoised(Memo MemoFrame::*memo, const Expr& e, Value* (Values::*make)(const Expr&)) {
   if (Value* value = known(memo, e)) return value;
   Value* result = (this->*make)(e);
   if (e.kind() != Kind::Variable) (c.frame.memo.back().*memo)[e.get()] = {e, result};
   return result;
 }
 
-Value* Values::of(const Expr& e) { return remembered(&MemoFrame::values, e, &Values::make_value); }
+Value* Values::of(const Expr& e) { return memoised(&MemoFrame::values, e, &Values::make_value); }
 
 Value* Values::alone(const Expr& e) {
   const MemoScope scope(c.frame, false);
@@ -98,7 +97,7 @@ void Values::bind(const std::string& name, const Expr& bound) {
   if (wide) c.frame.indices[name] = wide;
 }
 
-// Accesses see through the name.
+// Lets accesses recognise the bound ramp through its name.
 void Values::bind_ramp(const std::string& name, const Expr& bound) {
   c.frame.ramps.erase(name);
   const auto linear = as_linear(c.frame, bound);
@@ -108,9 +107,8 @@ void Values::bind_ramp(const std::string& name, const Expr& bound) {
   c.frame.ramps[name] = {variable(first, linear->base.type()), linear->stride};
 }
 
-// The names of lets are unique, so a binding may stay when its body ends. Only copies of a let
-// (unrolled code) bind a name anew within a statement; nodes that the bodies share must then not be
-// looked up.
+// Names of lets are unique, so a binding may outlive its body. Only copies of a let (unrolled code) rebind a name
+// within a statement; then the memo must not be used for nodes that the bodies share.
 bool Values::rebinds(const std::string& name, const Expr& bound) const {
   for (size_t i = c.frame.memo.size(); i-- > 0;) {
     const auto found = c.frame.memo[i].lets.find(name);
@@ -124,7 +122,7 @@ Value* Values::make(const Let& e) {
   const bool is_copy = rebinds(e.name, e.value);
   bind(e.name, e.value);
   if (!is_copy) {
-    // No scope: what the body computes is straight-line code, and stays good after it.
+    // No scope: the body is straight-line code, so its values stay valid after it.
     c.frame.memo.back().lets[e.name] = e.value.get();
     return of(e.body);
   }
@@ -133,7 +131,7 @@ Value* Values::make(const Let& e) {
   return of(e.body);
 }
 
-// base + stride * k for k in [0, lanes), each a vector when base is one.
+// base + stride * k for k in [0, lanes); each is a vector if base is one.
 Value* Values::make(const Ramp& e) {
   const Type element = e.base.type().element_of();
   const int inner = e.base.type().lanes();
@@ -155,7 +153,7 @@ Value* Values::make(const Ramp& e) {
   return binary(c.e, Kind::Add, e.type, base, binary(c.e, Kind::Mul, e.type, stride, steps));
 }
 
-// Lane i of the result is lane i / k of the i % k-th of k vectors.
+// Whether lane i of the result is lane i / k of vector i % k, with k vectors.
 static bool is_interleave(const Shuffle& e) {
   const int count = static_cast<int>(e.vectors.size()), lanes = e.vectors[0].type().lanes();
   if (count < 2 || static_cast<int>(e.indices.size()) != count * lanes) return false;
@@ -172,8 +170,7 @@ Value* Values::make(const Shuffle& e) {
   std::vector<Value*> vectors;
   for (const Expr& vector : e.vectors) vectors.push_back(of(vector));
   if (is_interleave(e)) return interleave(c.e, vectors);
-  // Vectors of one width give a shuffle of LLVM's each, put over those before; others are put
-  // together first.
+  // Vectors of one width are combined by successive LLVM shuffles. Vectors of different widths are concatenated first.
   const bool is_uniform = std::all_of(e.vectors.begin(), e.vectors.end(), [&](const Expr& vector) {
     return vector.type() == e.vectors[0].type();
   });
@@ -188,7 +185,7 @@ Value* Values::make(const VectorReduce& e) {
   if (e.type.is_bool() && e.type.is_scalar() && e.op == Kind::Or) return any_lane(c.e, of(e.value));
   if (e.type.is_bool() && e.type.is_scalar() && e.op == Kind::And)
     return c.b.CreateNot(any_lane(c.e, c.b.CreateNot(of(e.value))));
-  return reduce_groups(c.e, reduced_in_part(*this, e), e.type.lanes(), [&](Value* a, Value* b) {
+  return reduce_groups(c.e, partly_reduced(*this, e), e.type.lanes(), [&](Value* a, Value* b) {
     return binary(c.e, e.op, element.with_lanes(lanes_of(a)), a, b);
   });
 }
@@ -196,7 +193,7 @@ Value* Values::make(const VectorReduce& e) {
 // ---- indices ----
 
 Value* Values::index64(const Expr& e) {
-  return remembered(&MemoFrame::indices, e, &Values::make_index64);
+  return memoised(&MemoFrame::indices, e, &Values::make_index64);
 }
 
 Value* Values::make_index64(const Expr& e) {
@@ -211,7 +208,7 @@ Value* Values::make_index64(const Expr& e) {
     if (const auto* difference = e.as<Sub>())
       return c.b.CreateSub(index64(difference->a), index64(difference->b));
     if (const auto* product = e.as<Mul>()) {
-      // Factors are coordinates and strides, of 32 bits; a device has one instruction for their product.
+      // Factors are 32-bit coordinates and strides; a device multiplies two of them into 64 bits with one instruction.
       const auto factor = [&](const Expr& f) {
         return c.e.machine.is_device() ? c.b.CreateSExt(of(f), c.b.getInt64Ty()) : index64(f);
       };

@@ -1,10 +1,8 @@
-// The fast_ forms of float32: range reduction and a polynomial, inlined, without calls. Errors
-// stand in math_table.h.
+// The fast_ functions of float32, inlined: range reduction and a polynomial. math_table.h lists their errors.
 //
-// Polynomials: least maximum relative error (of cos: absolute), fitted over the reduced range by
-// Lawson's reweighted least squares with the leading terms of the Taylor series held fixed. Their
-// own errors are below 4e-9; what the table promises is float32's rounding. log uses the odd series
-// of log((1 + s) / (1 - s)), |s| <= 0.172.
+// The polynomials have minimal maximum relative error (cos: absolute) over the reduced range. They are fitted by
+// Lawson's iteratively reweighted least squares, with the leading Taylor terms fixed. Their own errors are below 4e-9;
+// the errors in the table come from float32 rounding. log uses the odd series of log((1 + s) / (1 - s)), |s| <= 0.172.
 #include <llvm/IR/Intrinsics.h>
 
 #include <algorithm>
@@ -18,7 +16,7 @@ namespace {
 using ir::Op;
 using Args = std::vector<Value*>;
 
-// Arithmetic on float vectors with constants, to read like the formulas.
+// Float vector arithmetic with constants, so that code reads like the formulas.
 struct Formula {
   Emitter& e;
   llvm::Type* type;
@@ -46,8 +44,8 @@ struct Formula {
   }
 };
 
-// ln2 in two parts (Cody and Waite 1980, "Software manual for the elementary functions", chapter
-// 6): products of the first, 16 bits long, with exponents are exact.
+// ln2 split in two (Cody and Waite 1980, "Software manual for the elementary functions", chapter 6). The first part has
+// 16 bits, so its products with exponents are exact.
 constexpr double ln2_high = 0x1.62e4p-1, ln2_low = 1.42860682030941723e-6;
 
 // x = n ln2 + r, |r| <= ln2 / 2;  exp(x) = 2^n exp(r).
@@ -61,7 +59,7 @@ Value* fast_exp(Emitter& e, Value* x) {
                               0.00836879689272, 1.38144311046e-3});
   Value* power = e.b.CreateShl(f.to_int(n), int_constant(f.to_int(n), 23));
   Value* bits = e.b.CreateAdd(bits_as_integer(e, p), power);
-  // n of a NaN is any number; its bits must not make a finite result.
+  // For a NaN, n is arbitrary; its bits must not produce a finite result.
   return f.select(e.b.CreateFCmpUNO(x, x), x, bits_as_float(e, bits));
 }
 
@@ -81,7 +79,7 @@ Value* fast_log(Emitter& e, Value* x) {
   Value* infinity = llvm::ConstantFP::getInfinity(f.type);
   result = f.select(f.less(x, 0x1p-126), llvm::ConstantFP::getInfinity(f.type, true), result);
   result = f.select(f.less(x, 0.0), llvm::ConstantFP::getNaN(f.type), result);
-  // Infinity and NaN: x itself.
+  // Infinity and NaN return x itself.
   return f.select(e.b.CreateFCmpULT(x, infinity), f.select(e.b.CreateFCmpUNO(x, x), x, result), x);
 }
 
@@ -94,12 +92,12 @@ Value* fast_pow(Emitter& e, Value* x, Value* y) {
   return f.select(y_is_zero, f.constant(1.0), f.select(is_zero, at_zero, result));
 }
 
-// x = q pi/2 + r, |r| <= pi/4; the quadrant q says which of sin(r), cos(r), negated or not.
+// x = q pi/2 + r, |r| <= pi/4; the quadrant q selects sin(r) or cos(r), and the sign.
 Value* fast_sin_cos(Emitter& e, Value* x, bool is_cos) {
   Formula f{e, x->getType()};
   Value* n = f.nearest(f.mul(x, 0.63661977236758134308));
-  // pi/2 in three parts (Cody and Waite 1980, chapter 8), the products with the first two exact for
-  // |n| < 2^13. The first two are twice those of pi/4 in S. Moshier's Cephes (sinf.c).
+  // pi/2 split in three (Cody and Waite 1980, chapter 8); products with the first two parts are exact for |n| < 2^13.
+  // These two are twice those of pi/4 in S. Moshier's Cephes (sinf.c).
   Value* r = f.sub(x, f.mul(n, 1.5703125));
   r = f.sub(r, f.mul(n, 4.837512969970703125e-4));
   r = f.sub(r, f.mul(n, 7.549789948768648e-8));
@@ -119,9 +117,8 @@ Value* fast_sin_cos(Emitter& e, Value* x, bool is_cos) {
 
 Value* fast_inverse(Emitter& e, Value* x) { return e.b.CreateFDiv(float_constant(x, 1.0), x); }
 
-// A first guess from the exponent, with the constant of C. Lomont (2003, "Fast inverse square
-// root"), then three of Newton's steps y (1.5 - x y^2 / 2). The processors' own estimates differ
-// between makers; this is the same everywhere.
+// A first guess from the exponent, with the constant of C. Lomont (2003, "Fast inverse square root"), then three Newton
+// steps y (1.5 - x y^2 / 2). Processors' own estimates differ between vendors; this is the same everywhere.
 Value* fast_inverse_sqrt(Emitter& e, Value* x) {
   Formula f{e, x->getType()};
   Value* bits = bits_as_integer(e, x);

@@ -1,11 +1,11 @@
-// pow of float32, inlined: log2, product and exp2 in double, rounded once at the end, so that the
-// error is that of the two polynomials (below 3e-9) beside half a unit of the last place. Doubles
-// hold 2^u for every u that float32 can tell from infinity or 0, so that nothing is scaled twice.
-// No case has a branch, which would keep LLVM from moving what depends on y alone out of loops.
+// pow of float32, inlined. log2, product and exp2 are in double and rounded once at the end, so the error is that of
+// the two polynomials (below 3e-9) plus half a unit in the last place. Doubles hold 2^u for every u whose power float32
+// can tell from infinity or 0, so no second scaling is needed. No case takes a branch: branches would keep LLVM from
+// hoisting what depends only on y out of loops.
 //
-// Method: W. J. Cody and W. Waite, Software Manual for the Elementary Functions (1980), chapters
-// 5 to 7, without their tables; polynomials of least maximum relative error (Remez).
-// Rejected: log2 in two floats, about as many instructions and in need of FMA for its bits.
+// Method: W. J. Cody and W. Waite, Software Manual for the Elementary Functions (1980), chapters 5 to 7, without their
+// tables; polynomials of minimal maximum relative error (Remez).
+// Rejected: log2 as a sum of two floats, which takes about as many instructions and needs FMA for its accuracy.
 #include <llvm/Analysis/VectorUtils.h>
 #include <llvm/IR/Intrinsics.h>
 
@@ -16,8 +16,8 @@
 namespace retrograde::codegen {
 namespace {
 
-// Arithmetic whose bits are the same in every width: FMA is written out where there is one, and
-// nothing else may fuse.
+// Arithmetic whose bits are the same in every vector width: FMA is emitted explicitly where available, and nothing else
+// may fuse.
 class Doubles {
  public:
   explicit Doubles(Emitter& e) : e_(e), contraction_(e, false) {}
@@ -25,9 +25,9 @@ class Doubles {
     if (!e_.machine.has_fma()) return e_.b.CreateFAdd(e_.b.CreateFMul(a, b), c);
     return e_.b.CreateIntrinsic(llvm::Intrinsic::fma, {a->getType()}, {a, b, c});
   }
-  // c[0] + c[1] x + ..., an odd number of terms: Horner's rule over pairs, half as long a chain as
-  // over terms. Rejected: two such rules side by side, shorter by a step for one more
-  // multiplication; slower by 4 % where the multipliers are what is busy.
+  // c[0] + c[1] x + ..., an odd number of terms, by Horner's rule over pairs: its dependency chain is half as long as
+  // over single terms. Rejected: two such rules in parallel, one step shorter for one more multiplication; 4 % slower
+  // where multipliers are the bottleneck.
   Value* polynomial(Value* x, const std::vector<double>& c) {
     const auto constant = [&](size_t i) { return float_constant(x, c[i]); };
     Value *square = e_.b.CreateFMul(x, x), *result = constant(c.size() - 1);
@@ -41,8 +41,8 @@ class Doubles {
   Contraction contraction_;
 };
 
-// x = 2^k m, m in [sqrt(1/2), sqrt(2)), of a finite x > 0, which as a double is no denormal; of 0,
-// k is -1023 and m is 1.
+// x = 2^k m, m in [sqrt(1/2), sqrt(2)), for finite x > 0, which is not denormal as a double. For x = 0, k is -1023 and
+// m is 1.
 struct Parts {
   Value *k, *m;
 };
@@ -54,13 +54,13 @@ Parts split(Emitter& e, Value* x) {
   const auto integer = [&](int64_t value) { return int_constant(bits, value); };
   Value* moved = e.b.CreateAdd(bits, integer(one - sqrt_half));
   Value* mantissa = e.b.CreateAnd(moved, integer(mantissa_mask));
-  // The biased exponent as the last bits of 2^52 + it: AVX2 converts no integers of 64 bits.
+  // Puts the biased exponent into the low bits of 2^52: AVX2 has no conversion of 64-bit integers.
   Value* biased = e.b.CreateOr(e.b.CreateLShr(moved, integer(52)), integer(two_to_52));
   return {e.b.CreateFSub(bits_as_float(e, biased), float_constant(x, 0x1p52 + 1023)),
           bits_as_float(e, e.b.CreateAdd(mantissa, integer(sqrt_half)))};
 }
 
-// y log2(x) = y k + y s P(s^2), s = (m - 1) / (m + 1), |s| <= 0.172; 0 only of 1.
+// y log2(x) = y k + y s P(s^2), s = (m - 1) / (m + 1), |s| <= 0.172; it is 0 only for x = 1.
 Value* times_log2(Emitter& e, Value* y, Value* x) {
   Doubles d(e);
   const auto [k, m] = split(e, x);
@@ -72,11 +72,11 @@ Value* times_log2(Emitter& e, Value* y, Value* x) {
   return d.fma(e.b.CreateFMul(y, s), p, e.b.CreateFMul(y, k));
 }
 
-// u = n + f, |f| <= 1/2;  2^u = 2^n (1 + f Q(f)), of |u| < 1022; of others any number. A NaN that
-// was a float stays one: n's bits are the last 12 of its payload, which are 0.
+// u = n + f, |f| <= 1/2;  2^u = 2^n (1 + f Q(f)), for |u| < 1022; otherwise an arbitrary number. A NaN converted from
+// float stays NaN: n's bits are the last 12 of its payload, which are 0.
 Value* exp2_of_double(Emitter& e, Value* u) {
   Doubles d(e);
-  // The sum's last place is 1: it rounds u to n, which stands in its last bits.
+  // The sum's last place has value 1, so the addition rounds u to n, which is in the low bits.
   Value *shift = float_constant(u, 0x1.8p52), *sum = e.b.CreateFAdd(u, shift);
   Value* n = e.machine.has_rounding() ? e.b.CreateUnaryIntrinsic(llvm::Intrinsic::roundeven, u)
                                       : e.b.CreateFSub(sum, shift);
@@ -88,17 +88,16 @@ Value* exp2_of_double(Emitter& e, Value* u) {
   return bits_as_float(e, e.b.CreateAdd(bits_as_integer(e, p), power));
 }
 
-// The sizes |x| between which a power is computed: those below have the power of 0, those above that
-// of infinity.
+// The bounds on |x| between which a power is computed. A smaller |x| has the power of 0, a larger one that of infinity.
 struct Ends {
   Value *low, *high;
 };
 
 constexpr int64_t least_float = 1, largest_float = 0x7f7fffff;  // as bits
 
-// About 2^-t and 2^t, t = 400 / |y|: their bits are t 2^23 from those of 1. That makes t to 1.45 t
-// in log2(x) upward, 0.7 t to t downward. So |y log2(x)| is below 600 between the two, and above 280
-// beyond them, but where the range of float32 ends first. There |y| is below 4.
+// About 2^-t and 2^t, t = 400 / |y|: their bits are t 2^23 away from those of 1. In log2(x) that is t to 1.45 t upward
+// and 0.7 t to t downward. So |y log2(x)| is below 600 inside the bounds and above 280 outside, unless the range of
+// float32 ends first; there |y| is below 4.
 Ends ends_of(Emitter& e, Value* y) {
   constexpr int64_t one = 0x3f800000;
   Value* most = float_constant(y, 0x1p30);
@@ -114,8 +113,7 @@ Ends ends_of(Emitter& e, Value* y) {
           end(llvm::Intrinsic::smin, e.b.CreateAdd(bits, steps), largest_float)};
 }
 
-// What depends on y alone; LLVM moves it out of loops that do not change y. The powers of 0,
-// infinity and NaN.
+// The powers of 0, infinity and NaN. They depend only on y, so LLVM hoists them out of loops in which y is invariant.
 struct Exponent {
   Value *is_integer, *is_odd, *of_zero, *of_infinity, *of_nan;
 };
@@ -127,7 +125,7 @@ Exponent exponent(Emitter& e, Value* y) {
   Value* is_integer = is_whole(y);
   Value* is_even = is_whole(e.b.CreateFMul(y, float_constant(y, 0.5)));
   Value *zero = float_constant(y, 0.0), *infinity = llvm::ConstantFP::getInfinity(y->getType());
-  // What is neither below nor above 0: 1 at 0, else the NaN itself.
+  // The value if y is neither below nor above 0: 1 for y = 0, else the NaN itself.
   Value* of_nan = e.b.CreateSelect(e.b.CreateFCmpOEQ(y, zero), float_constant(y, 1.0),
                                    llvm::ConstantFP::getNaN(y->getType()));
   const auto by_sign = [&](Value* below, Value* above) {
@@ -138,8 +136,8 @@ Exponent exponent(Emitter& e, Value* y) {
           by_sign(zero, infinity), of_nan};
 }
 
-// C99 Annex F, 9.4.4, in the order in which later lines overrule earlier ones; but for 1,
-// whose powers are all 1.
+// C99 Annex F, 9.4.4, in an order in which later lines override earlier ones. The case x = 1, whose powers are all 1,
+// is handled elsewhere.
 Value* with_special_cases(Emitter& e, Value* x, Value* y, Value* size, const Ends& ends,
                           Value* result) {
   const Exponent of_y = exponent(e, y);
@@ -160,8 +158,7 @@ Value* with_special_cases(Emitter& e, Value* x, Value* y, Value* size, const End
   return result;
 }
 
-// Beyond 2^100 all powers are 0, 1 or infinite; infinity itself, times the 0 of log2(1), would be
-// NaN.
+// Clamp for |y|: beyond 2^100 all powers are 0, 1 or infinite. An infinite y times log2(1) = 0 would be NaN.
 constexpr double large_exponent = 0x1p100;
 
 // y log2(size) in double.
@@ -170,15 +167,15 @@ Value* y_log2(Emitter& e, Value* y, Value* size) {
   return times_log2(e, e.b.CreateFPExt(y, wide), e.b.CreateFPExt(size, wide));
 }
 
-// NaN stays.
+// Clamps to [-most, most]; NaN stays NaN.
 Value* clamped(Emitter& e, Value* value, double most) {
   Value *low = float_constant(value, -most), *high = float_constant(value, most);
   value = e.b.CreateSelect(e.b.CreateFCmpOGT(low, value), low, value);
   return e.b.CreateSelect(e.b.CreateFCmpOLT(high, value), high, value);
 }
 
-// log2(1) is 0, so that all of its powers are 1 by themselves: with y = NaN, too, which becomes so
-// large a number that both ends are 1.
+// log2(1) is 0, so every power of 1 is 1 without a special case. This includes y = NaN, which becomes so large that
+// both bounds are 1.
 Value* pow_of_any(Emitter& e, Value* x, Value* y, Value* size) {
   Value *low = float_constant(y, -large_exponent), *high = float_constant(y, large_exponent);
   Value* finite = e.b.CreateSelect(e.b.CreateFCmpOGT(y, low), y, low);
@@ -187,7 +184,7 @@ Value* pow_of_any(Emitter& e, Value* x, Value* y, Value* size) {
   return with_special_cases(e, x, y, size, ends_of(e, finite), power);
 }
 
-// The same bits, for one x of many y: their ends are more work than to clamp y log2(x).
+// The same bits, for one x and many y: computing the bounds would cost more than clamping y log2(x).
 Value* pow_of_uniform(Emitter& e, Value* x, Value* y, Value* size) {
   Value* u = clamped(e, y_log2(e, clamped(e, y, large_exponent), size), 1000.0);
   Value* power = e.b.CreateFPTrunc(exp2_of_double(e, u), y->getType());
@@ -206,9 +203,9 @@ bool is_uniform(const Value* value) {
 
 }  // namespace
 
-// In pieces of two registers of floats, four of doubles: steps of four chains stand side by side,
-// overlap in time and share the loads of coefficients. One register's chain is as long as what a
-// processor looks ahead, so that chains of different pieces would hardly meet.
+// Vectors are split into pieces of two float registers, i.e. four double registers. The four dependency chains
+// interleave, overlap in time, and share loads of coefficients. With one register per piece, one chain fills the
+// processor's instruction window, so chains of different pieces would hardly overlap.
 Value* float_pow(Emitter& e, Value* x, Value* y) {
   const Contraction contraction(e, false);
   const int lanes = lanes_of(x), most = std::max(4, e.machine.vector_bits / 16);

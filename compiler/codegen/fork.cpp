@@ -1,12 +1,11 @@
-// Fork: both statements become tasks, as bodies of parallel loops do; the runtime runs the first on
-// a thread of its own.
+// Fork: both statements become tasks, like bodies of parallel loops. The runtime runs the first on a thread of its own.
 //
 //   fork { first } { rest }  =>  code = retrograde_fork(context, task1, &closure1,
 //                                                       task2, &closure2, semaphores, count)
 //                                if (code) fail(code)
 //
-// The semaphores are those that the two statements name and that live around the Fork: when a
-// statement fails, the runtime closes them, so that the other one does not wait for ever.
+// The semaphores are those that either statement names and that are allocated outside the Fork. If a statement fails,
+// the runtime closes them, so the other one does not wait forever.
 #include <set>
 
 #include "codegen/access.h"
@@ -20,7 +19,7 @@ using namespace ir;
 
 namespace {
 
-// Addresses that are handed to retrograde_semaphore_acquire, without repetition.
+// The distinct addresses that are passed to retrograde_semaphore_acquire.
 std::vector<const Load*> semaphores_in(const Fork& s) {
   std::vector<const Load*> found;
   std::set<std::pair<std::string, int64_t>> seen;
@@ -49,7 +48,7 @@ void FunctionGenerator::make(const Fork& s) {
     const MemoScope scope(c_.frame, false);
     for (const Load* load : semaphores_in(s)) {
       const auto found = c_.frame.storages.find(load->name);
-      if (found == c_.frame.storages.end()) continue;  // lives inside of a branch
+      if (found == c_.frame.storages.end()) continue;  // allocated inside a branch
       semaphores.push_back(
           element_pointer(e_, found->second, load->type, values_.index64(load->index)));
     }

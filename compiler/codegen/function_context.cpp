@@ -1,7 +1,6 @@
-// Leaving early: every failure jumps to one block of its function, which frees the heap blocks that
-// are still held and returns the code. Each Allocate keeps its block in a slot of an array on the
-// stack, null before and after. The array is memory for good, because the runtime gets its address:
-// in registers, n slots that are alive at n failures would be n^2 copies.
+// Early exits: every failure jumps to one block of its function, which frees the heap blocks still held and returns the
+// code. Each Allocate keeps its block in a slot of a stack array; the slot is null before and after. The array stays in
+// memory because the runtime gets its address: in registers, n slots alive at n failures would need n^2 copies.
 #include "codegen/function_context.h"
 
 #include <llvm/IR/MDBuilder.h>
@@ -29,7 +28,7 @@ void FunctionContext::finish(Value* code) {
   Value* count = int64(frame.owned_count);
   if (frame.error_exit) {
     b.SetInsertPoint(frame.error_exit);
-    for (auto due = frame.farewells.rbegin(); due != frame.farewells.rend(); ++due)
+    for (auto due = frame.exit_calls.rbegin(); due != frame.exit_calls.rend(); ++due)
       call_runtime(due->function, b.getInt32Ty(), {b.CreateLoad(b.getPtrTy(), due->argument)});
     if (frame.owned_slots)
       call_runtime("retrograde_free_all", b.getVoidTy(), {frame.owned_slots, count});
@@ -41,7 +40,7 @@ void FunctionContext::finish(Value* code) {
     b.CreateMemSet(frame.owned_slots, b.getInt8(0), static_cast<uint64_t>(8 * frame.owned_count),
                    llvm::Align(8));
   }
-  for (const auto& due : frame.farewells) b.CreateStore(null_pointer(), due.argument);
+  for (const auto& due : frame.exit_calls) b.CreateStore(null_pointer(), due.argument);
   b.CreateBr(&*std::next(frame.function->begin()));
 }
 
@@ -75,8 +74,8 @@ llvm::AllocaInst* FunctionContext::entry_alloca(llvm::Type* type, int64_t count,
   return b.CreateAlloca(type, int64(count), name);
 }
 
-// Tags are types of LLVM's type-based alias analysis: siblings in its tree never overlap.
-// Allocations have names of their own, so the tags hold across functions too.
+// Tags are types of LLVM's type-based alias analysis: siblings in its tree never alias. Allocations have unique names,
+// so the tags hold across functions too.
 llvm::MDNode* alias_tag(Emitter& e, const std::string& name) {
   llvm::MDBuilder md(e.context());
   llvm::MDNode* root = md.createTBAARoot("retrograde");
@@ -170,7 +169,7 @@ Value* FunctionContext::string_constant(const std::string& text) {
   if (!constant) {
     auto* global = b.CreateGlobalString(text, "text");
     global->setAlignment(
-        llvm::Align(8));  // as memory that holds more than bytes: low bits are free
+        llvm::Align(8));  // aligned as memory that holds more than bytes: the low bits are free
     constant = global;
   }
   return constant;

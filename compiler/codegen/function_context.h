@@ -1,5 +1,5 @@
-// What the parts of the code generator share: the LLVM function that is being written, the names and
-// nodes that have values in it, blocks and branches, and how it is left early.
+// State that the parts of the code generator share while they emit one LLVM function: values of names and nodes,
+// blocks, branches and early exits.
 #pragma once
 
 #include <array>
@@ -11,17 +11,18 @@
 
 namespace retrograde::codegen {
 
-// Memory that loads and stores name.
+// Memory that loads and stores refer to by name.
 struct Storage {
-  Value* base = nullptr;  // of element 0
+  Value* base = nullptr;  // address of element 0
   Value* owned =
       nullptr;  // slot of a heap block to free, null once freed; null when not ours to free
-  llvm::MDNode* alias = nullptr;  // what else it may overlap: only memory of the same tag
-  bool is_private = false;  // a thread's own of a kernel: registers, if its places are constants
+  llvm::MDNode* alias = nullptr;  // alias tag: only memory with the same tag may overlap
+  bool is_private =
+      false;  // private to a kernel's thread; kept in registers if all its indices are constant
 };
 
-// Values of nodes, as far as they hold at the insertion point. The handle keeps the node's
-// address its own.
+// Values of nodes that are valid at the insertion point. Keeping the handle prevents another node from reusing the
+// node's address.
 struct MemoEntry {
   Expr key;
   Value* value;
@@ -33,9 +34,9 @@ struct MemoFrame {
   std::unordered_map<std::string, const ir::ExprNode*> lets = {};  // name to bound value
 };
 
-// What an index vector is made of: only sums, minima and maxima of ramps; some held by a bound.
+// The form of an index vector. Plain: only sums, minima and maxima of ramps. Held: some of them are clamped to a bound.
 struct Coordinate {
-  bool is_plain, is_held;
+  bool is_plain, is_clamped;
   Expr index;
 };
 struct LinearIndex {  // lane i is base + i * stride, the base a scalar
@@ -43,36 +44,36 @@ struct LinearIndex {  // lane i is base + i * stride, the base a scalar
   int64_t stride;
 };
 
-// What belongs to one LLVM function: the lowered function itself or the body of a parallel loop.
+// State of one LLVM function: the lowered function itself, or the body of a parallel loop.
 struct Frame {
   llvm::Function* function = nullptr;
   Value* context = nullptr;
   llvm::BasicBlock* entry = nullptr;       // allocas go here
-  llvm::BasicBlock* error_exit = nullptr;  // frees what is owned, returns the code
+  llvm::BasicBlock* error_exit = nullptr;  // frees owned blocks, returns the code
   llvm::PHINode* error_code = nullptr;
-  llvm::AllocaInst* owned_slots = nullptr;  // an array of pointers, as long as the function needs
+  llvm::AllocaInst* owned_slots =
+      nullptr;  // an array of pointers, one per owned block of the function
   int64_t owned_count = 0;
-  // What is to be told to the profiler when the function leaves early: a function of the runtime, and
-  // where its argument is while that is due, else null.
-  struct Farewell {
+  // A runtime function to call if the function exits early, so that the profiler learns of it. `argument` holds the
+  // call's argument while the call is due, else null.
+  struct ExitCall {
     std::string function;
     llvm::AllocaInst* argument;
   };
-  std::vector<Farewell> farewells;
-  int64_t stack_bytes = 0;  // of allocations
+  std::vector<ExitCall> exit_calls;
+  int64_t stack_bytes = 0;  // used by allocations
   std::array<llvm::AllocaInst*, 2> scratch = {};
   std::vector<MemoFrame> memo;
   std::unordered_map<std::string, Value*> variables;
   std::unordered_map<std::string, Value*>
       indices;  // int32 variables as 64-bit integers, see Values::index64
   std::unordered_map<std::string, Storage> storages;
-  std::unordered_map<std::string, Coordinate> coordinates;  // names of plain ones
-  std::unordered_map<std::string, LinearIndex> ramps;       // names of vectors that are linear
+  std::unordered_map<std::string, Coordinate> coordinates;  // plain coordinates, by name
+  std::unordered_map<std::string, LinearIndex> ramps;       // linear vectors, by name
 };
 
-// A region of code whose values end with it. A statement sees no values of the one before (stores
-// may have changed what its nodes load); the arm of a branch sees those computed before the
-// branch.
+// A region of code whose values are forgotten at its end. A statement sees no values of earlier statements, because
+// stores may have changed what its nodes load. The arm of a branch sees the values computed before the branch.
 class MemoScope {
  public:
   MemoScope(Frame& frame, bool sees_outer) : frame_(frame) {
@@ -90,27 +91,27 @@ struct FunctionContext {
 
   Emitter& e;
   llvm::IRBuilder<>& b;
-  const std::string& function_name;  // of the lowered one
+  const std::string& function_name;  // name of the lowered function
   Frame frame;
 
   void begin(llvm::Function* function);
-  void finish(Value* code);  // that it returns at the end; null: nothing
+  void finish(Value* code);  // the return value; null: the function returns nothing
   llvm::BasicBlock* new_block(const std::string& name);
   llvm::AllocaInst* entry_alloca(llvm::Type* type, int64_t count, const std::string& name);
   void fail(Value* code);  // leaves the function; the insertion point is a dead end afterwards
   void fail_unless(Value* condition, const std::function<Value*()>& code);
-  // Runs `body` only where the scalar condition holds.
+  // Runs `body` only if the scalar condition holds.
   void if_true(Value* condition, const std::function<void()>& body);
-  // What `body` gives where the condition holds, elsewhere `otherwise`, or 0.
+  // The value of `body` if the condition holds; otherwise `otherwise`, or 0.
   Value* value_if(Value* condition, const std::function<Value*()>& body,
                   Value* otherwise = nullptr);
-  // One of two values, computed where it is chosen.
+  // Evaluates only the alternative that the condition selects.
   Value* chosen(Value* condition, const std::function<Value*()>& then,
                 const std::function<Value*()>& otherwise);
 
   Storage& storage(const std::string& name);
   Value* string_constant(const std::string& text);
-  // Calls a function of the runtime with the context and `args`, and `more` where it is variadic.
+  // Calls a function of the runtime with the context and `args`; `more` are its variadic arguments.
   llvm::CallInst* call_runtime(const std::string& name, llvm::Type* result,
                                const std::vector<Value*>& args,
                                const std::vector<Value*>* more = nullptr);
@@ -121,7 +122,7 @@ struct FunctionContext {
   std::unordered_map<std::string, Value*> strings_;
 };
 
-// What memory of the name may overlap.
+// The alias tag of the memory with this name.
 llvm::MDNode* alias_tag(Emitter& e, const std::string& name);
 
 }  // namespace retrograde::codegen

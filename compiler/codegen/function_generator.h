@@ -1,10 +1,10 @@
-// From the statements of one lowered function to LLVM IR.
+// Generates LLVM IR from the statements of one lowered function.
 //
-//   function_context.h  the LLVM function that is being written: names, branches, leaving early
-//   values.h            expressions; each shared node once
-//   access.h            loads and stores: which vectors of addresses are dense, strided, or neither
-//   kernels.h           kernels, which the same statements make for devices
-//   calls.h             operators that need more than their arguments' values; the runtime
+//   function_context.h  the LLVM function being emitted: names, branches, early exits
+//   values.h            expressions; each shared node is evaluated once
+//   access.h            loads and stores: whether index vectors are dense, strided or arbitrary
+//   kernels.h           GPU kernels, generated from the same statements
+//   calls.h             operators that need more than the values of their arguments; runtime calls
 #pragma once
 
 #include <string>
@@ -17,13 +17,13 @@ namespace retrograde::codegen {
 
 class FunctionGenerator {
  public:
-  // `device`: for kernels of the function alone.
+  // `device`: set to generate kernels only.
   FunctionGenerator(Emitter& emitter, const ir::LoweredFunction& function,
                     DeviceTarget* device = nullptr);
   // Adds `name` and `name_argv` to the module.
   void generate();
   llvm::Function* generate_kernel(KernelUse& kernel);
-  // Of the function, once it is generated.
+  // The function's kernels, once generate() has run.
   const KernelSet& kernels() const { return kernels_; }
 
  private:
@@ -42,29 +42,29 @@ class FunctionGenerator {
   Storage allocate_on_heap(const ir::Allocate& s);
   void free_owned(Storage& storage);
 
-  // parallel.cpp: bodies of parallel loops as functions of their own
+  // parallel.cpp: bodies of parallel loops as separate functions
   struct Task {
     llvm::Function* function;
     Value* closure;
   };
-  // The statement as a function; `index` names its number, when it has one. `what` it is becomes part
-  // of the function's name.
+  // Emits the statement as a function. `index` names the variable that holds the iteration number, if any. `what`
+  // becomes part of the function's name.
   Task outline(const Stmt& body, const std::string& what, const std::string& name,
                const std::string& index = "", Type index_type = Int(32));
   void parallel_loop(const ir::For& s);
 
-  // long_functions.cpp: outermost loops as functions of their own
+  // long_functions.cpp: outermost loops as separate functions
   bool is_worth_a_function(const ir::For& s) const;
   void called_loop(const ir::For& s);
 
-  // fork.cpp: statements that run at the same time
+  // fork.cpp: statements that run in parallel
   void make(const ir::Fork& s);
 
-  // atomics.cpp: updates of one element from several iterations at once
+  // atomics.cpp: atomic updates
   void make(const ir::Atomic& s);
   void locked(const ir::Atomic& s, const ir::Store& first);
 
-  // launch.cpp: kernels as the host sees them
+  // launch.cpp: kernel launches, on the host's side
   void make(const ir::Launch& s);
   void run(const KernelUse& kernel, const std::vector<Value*>& blocks, Value* shared_bytes);
   void check_call(const std::string& function, const std::vector<Value*>& args);
@@ -80,7 +80,7 @@ class FunctionGenerator {
   Emitter& e_;
   llvm::IRBuilder<>& b_;
   const ir::LoweredFunction& source_;
-  DeviceTarget* const device_;  // of a kernel, else null
+  DeviceTarget* const device_;  // null unless this generates kernels
   KernelUse* kernel_ = nullptr;
   KernelSet kernels_;
   FunctionContext c_;

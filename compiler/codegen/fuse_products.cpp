@@ -1,9 +1,8 @@
 //   fadd (fmul a, b), c  =>  fma(a, b, c)          fsub (fmul a, b), c  =>  fma(a, b, -c)
 //   fadd c, (fmul a, b)  =>  fma(a, b, c)          fsub c, (fmul a, b)  =>  fma(-a, b, c)
 //
-// Of a sum of two products the first fuses. LLVM's back ends would decide as late as they select
-// instructions: that for NVPTX also fuses products of several users, and those for processors without
-// FMA nothing.
+// In a sum of two products, the first one fuses. LLVM's back ends would decide this only during instruction selection,
+// and differently: NVPTX also fuses products with several users, and processors without FMA fuse nothing.
 #include "codegen/fuse_products.h"
 
 #include <llvm/IR/IRBuilder.h>
@@ -27,7 +26,7 @@ llvm::Value* fma(llvm::IRBuilder<>& b, llvm::Value* x, llvm::Value* y, llvm::Val
   return b.CreateIntrinsic(llvm::Intrinsic::fma, {x->getType()}, {x, y, z});
 }
 
-// What stands for the sum; null: it stays. `product`: the one that is fused with it.
+// The replacement of the sum, or null if nothing fuses. `product`: set to the product that fuses.
 llvm::Value* fused(llvm::Instruction& sum, llvm::BinaryOperator*& product) {
   const bool is_difference = sum.getOpcode() == llvm::Instruction::FSub;
   if (!is_difference && sum.getOpcode() != llvm::Instruction::FAdd) return nullptr;
@@ -44,7 +43,7 @@ llvm::Value* fused(llvm::Instruction& sum, llvm::BinaryOperator*& product) {
   return fma(build, first, product->getOperand(1), a);
 }
 
-llvm::Value* whole(llvm::Instruction& one) {
+llvm::Value* expanded_fmuladd(llvm::Instruction& one) {
   const auto* call = llvm::dyn_cast<llvm::IntrinsicInst>(&one);
   if (!call || call->getIntrinsicID() != llvm::Intrinsic::fmuladd) return nullptr;
   llvm::IRBuilder<> build(&one);
@@ -57,7 +56,7 @@ void fuse_products(llvm::Function& function) {
   for (llvm::Instruction& one : llvm::make_early_inc_range(llvm::instructions(function))) {
     llvm::BinaryOperator* product = nullptr;
     llvm::Value* instead = fused(one, product);
-    if (!instead) instead = whole(one);
+    if (!instead) instead = expanded_fmuladd(one);
     if (!instead) continue;
     one.replaceAllUsesWith(instead);
     one.eraseFromParent();

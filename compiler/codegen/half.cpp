@@ -1,8 +1,7 @@
 // float16 and bfloat16: conversion of bit patterns to and from float, rounding to nearest even.
 //
-// bfloat16 never uses the processor's conversion: x86's treats denormals as zero. float16 uses F16C
-// or NEON where they exist, else integer arithmetic, so that code for old machines has vectors too
-// and needs no library.
+// bfloat16 never uses the processor's conversion: x86's treats denormals as zero. float16 uses F16C or NEON if
+// available, else integer arithmetic. So old machines get vector code too and need no library.
 #include <llvm/IR/Intrinsics.h>
 
 #include "codegen/emitter.h"
@@ -19,7 +18,7 @@ Value* bfloat_to_float(Emitter& e, Value* bits) {
   return bits_as_float(e, e.b.CreateShl(wide, int_constant(wide, 16)));
 }
 
-// Rounding the low `drop` bits of x away, ties to even: (x + half - 1 + lowest kept bit) >> drop.
+// Rounds away the low `drop` bits of x, ties to even: (x + half - 1 + lowest kept bit) >> drop.
 Value* round_shift(Emitter& e, Value* x, int drop) {
   Value* lowest = e.b.CreateAnd(e.b.CreateLShr(x, int_constant(x, drop)), int_constant(x, 1));
   Value* sum =
@@ -36,9 +35,9 @@ Value* float_to_bfloat(Emitter& e, Value* number) {
   return e.b.CreateTrunc(e.b.CreateSelect(is_nan, quiet, rounded), lanes_of_int(e, x, 16));
 }
 
-// The significand and exponent shift into place; multiplying by 2^112 corrects the exponent's bias
-// and normalizes denormals, exactly. Infinity and NaN have the largest exponent, which the
-// multiplication cannot reach.
+// Shifts significand and exponent into place. Multiplying by 2^112 corrects the exponent's bias and normalizes
+// denormals, exactly. Infinity and NaN have the largest exponent and are selected separately, because the
+// multiplication cannot produce them.
 Value* half_to_float_by_bits(Emitter& e, Value* bits) {
   Contraction off(e, false);
   Value* x = e.b.CreateZExt(bits, lanes_of_int(e, bits, 32));
@@ -52,9 +51,8 @@ Value* half_to_float_by_bits(Emitter& e, Value* bits) {
   return bits_as_float(e, e.b.CreateOr(result, sign));
 }
 
-// Normal results: rebias the exponent and round 13 bits away; a carry runs into the exponent as it
-// should, up to infinity. Results below 2^-14: adding 0.5 puts the half's last bit at the float's,
-// so the addition rounds.
+// Normal results: rebias the exponent and round 13 bits away; a carry correctly runs into the exponent, up to infinity.
+// Results below 2^-14: adding 0.5 aligns the half's last bit with the float's, so the addition does the rounding.
 Value* float_to_half_by_bits(Emitter& e, Value* number) {
   Contraction off(e, false);
   Value* x = bits_as_integer(e, number);
@@ -73,15 +71,14 @@ Value* float_to_half_by_bits(Emitter& e, Value* number) {
   return e.b.CreateTrunc(e.b.CreateOr(result, sign), lanes_of_int(e, x, 16));
 }
 
-// Rounding to odd: truncation whose last bit remembers that something was cut off. Rounding that to
-// nearest in a format at least two bits narrower gives what rounding the double would (Boldo and
-// Melquiond, 2008).
+// Rounding to odd: truncation that sets the last bit if anything was cut off. Rounding the result to nearest in a
+// format at least two bits narrower equals rounding the double directly (Boldo and Melquiond, 2008).
 Value* double_to_float_odd(Emitter& e, Value* number) {
   auto* single = with_lanes(e.b.getFloatTy(), lanes_of(number));
   Value* nearest = e.b.CreateFPTrunc(number, single);
   Value* back = e.b.CreateFPExt(nearest, number->getType());
   Value* x = bits_as_integer(e, nearest);
-  Value* is_inexact = e.b.CreateFCmpUNE(back, number);  // NaN: setting its last bit does no harm
+  Value* is_inexact = e.b.CreateFCmpUNE(back, number);  // NaN: setting its last bit is harmless
   Value* is_above = e.b.CreateFCmpOGT(e.b.CreateUnaryIntrinsic(llvm::Intrinsic::fabs, back),
                                       e.b.CreateUnaryIntrinsic(llvm::Intrinsic::fabs, number));
   Value* truncated = e.b.CreateSub(x, e.b.CreateZExt(is_above, x->getType()));

@@ -1,5 +1,5 @@
-// The body of a kernel: the statements of a launch as a function of one thread. What is computed in it is
-// the same for every device; what a device does differently, its DeviceTarget does.
+// The body of a kernel: the statements of a launch, as the function of one thread. The computations are the same on
+// every device; DeviceTarget provides the operations that differ.
 #include "codegen/access.h"
 #include "codegen/function_generator.h"
 #include "codegen/kernels.h"
@@ -40,7 +40,7 @@ llvm::Function* FunctionGenerator::generate_kernel(KernelUse& kernel) {
   statement(launch.body);
   if (c_.frame.error_exit) {
     unsupported("run " + quoted(launch.name) + " on a GPU", "a kernel cannot fail",
-                "a check stands in it", "Compute what is checked on the host");
+                "it contains a check", "Compute the checked values on the host");
   }
   c_.finish(nullptr);
   device_->finish(e_, function, site_metadata());
@@ -49,7 +49,7 @@ llvm::Function* FunctionGenerator::generate_kernel(KernelUse& kernel) {
 
 unsigned FunctionGenerator::site_metadata() { return e_.context().getMDKindID("retrograde.site"); }
 
-// From here on instructions belong to the statement.
+// Marks the instructions that follow as belonging to the statement.
 void FunctionGenerator::enter_site(const Stmt& s) {
   if (!kernel_) return;
   if (s.kind() != Kind::Store && s.kind() != Kind::Evaluate && s.kind() != Kind::LetStmt) return;
@@ -60,7 +60,7 @@ void FunctionGenerator::enter_site(const Stmt& s) {
   const auto site = static_cast<uint32_t>(kernel_->sites.size());
   kernel_->sites.push_back(std::move(text));
   auto* number = llvm::ConstantAsMetadata::get(b_.getInt32(site));
-  // The builder copies the mark from an instruction.
+  // The builder can only copy metadata from an instruction, so this creates one for a moment.
   llvm::Instruction* marked = new llvm::UnreachableInst(e_.context());
   marked->setMetadata(site_metadata(), llvm::MDNode::get(e_.context(), {number}));
   b_.CollectMetadataToCopy(marked, {site_metadata()});
@@ -79,7 +79,7 @@ Storage FunctionGenerator::allocate_in_kernel(const Allocate& s) {
   if (s.memory == MemoryType::GPUShared) {
     const MemoScope scope(c_.frame, false);
     Value* place = device_->shared(e_, c_.frame.function, values_.of(s.offset));
-    return {place, nullptr, nullptr};  // its bytes may be others', too
+    return {place, nullptr, nullptr};  // other allocations may share its bytes
   }
   const auto elements = as_const_int(s.elements);
   RETROGRADE_ASSERT(elements.has_value(), "a thread's own storage of unknown size: ", s.name);

@@ -13,7 +13,7 @@
 namespace retrograde::codegen {
 namespace {
 
-// ---- a text of PTX ----
+// ---- PTX text ----
 //
 //   .visible .entry kernel_f_0(        or   .func (.param .b32 func_retval0) name(
 //     ...
@@ -27,7 +27,7 @@ struct Function {
   std::string name;
   bool is_kernel = false;
   int64_t local_bytes = 0;
-  std::string_view body;  // to the next one
+  std::string_view body;  // up to the next function
 };
 
 bool is_of_name(char c) {
@@ -44,7 +44,7 @@ bool has(std::string_view line, std::string_view part) {
   return line.find(part) != std::string_view::npos;
 }
 
-// Of a line that begins a function: what stands before the bracket that opens its parameters.
+// The name in a line that begins a function: the word before the bracket that opens its parameters.
 std::string name_in(std::string_view line) {
   size_t end = line.find_last_of('(');
   if (end == std::string_view::npos) end = line.size();
@@ -80,7 +80,7 @@ std::vector<Function> functions_of(std::string_view ptx) {
   return functions;
 }
 
-// Functions that kernels call are leaves.
+// Includes the functions that the kernel calls. They are leaves, so one level is enough.
 int64_t bytes_with_called(const Function& kernel, const std::vector<Function>& functions) {
   int64_t bytes = kernel.local_bytes;
   for (const Function& other : functions) {
@@ -104,11 +104,11 @@ std::map<std::string, int64_t> local_bytes_by_kernel(std::string_view ptx) {
 }
 
 std::string local_memory_note(const std::string& kernel, int64_t bytes) {
-  return text("performance note: each thread of the kernel ", quoted(kernel), " keeps ", bytes,
-              " bytes in local memory, which is a part of the device's: places in arrays that are "
-              "known only when it runs have no registers. Unroll the loops over these arrays, make "
-              "them smaller, or compute the Func at a loop over blocks, which keeps it in shared "
-              "memory.");
+  return text(
+      "performance note: each thread of the kernel ", quoted(kernel), " keeps ", bytes,
+      " bytes in local memory, which is slow device memory: arrays cannot be in registers if "
+      "their indices are unknown at compile time. Unroll the loops over these arrays, make them "
+      "smaller, or compute the Func at a loop over blocks, which keeps it in shared memory.");
 }
 
 KernelCode compile_kernels(const ir::LoweredFunction& function, const Options& options) {

@@ -5,7 +5,7 @@
 #include "codegen/device_math.h"
 #include "codegen/function_generator.h"
 #include "codegen/fuse_products.h"
-#include "codegen/part_minima.h"
+#include "codegen/nested_minima.h"
 #include "codegen/selectable.h"
 #include "codegen/unit.h"
 #include "diagnostics/error.h"
@@ -16,7 +16,7 @@ namespace retrograde::codegen {
 
 KernelUse& KernelSet::add(const Stmt& launch, std::vector<KernelUse::Argument> arguments) {
   auto kernel = std::make_unique<KernelUse>();
-  // Names that PTX takes.
+  // Keep only characters that PTX allows in names.
   kernel->name = source_.name + "_" + std::to_string(kernels_.size());
   for (char& c : kernel->name) {
     if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
@@ -47,10 +47,10 @@ std::string KernelSet::ptx() {
   const std::string unselectable = find_unselectable(unit.module());
   if (!unselectable.empty()) {
     unsupported("run a part of " + quoted(source_.name) + " on a GPU",
-                "kernels consist of what LLVM translates for NVPTX", unselectable,
+                "kernels contain only operations that LLVM can translate to PTX", unselectable,
                 "Compute that part on the host: leave out its gpu_ directives");
   }
-  return part_minima(unit.emit_last(llvm::CodeGenFileType::AssemblyFile));
+  return rewrite_nested_minima(unit.emit_last(llvm::CodeGenFileType::AssemblyFile));
 }
 
 void KernelSet::compile_for_executor(std::vector<llvm::Function*>& functions) {
@@ -70,7 +70,7 @@ void KernelSet::compile_for_executor(std::vector<llvm::Function*>& functions) {
 std::string kernel_image_name(const std::string& function) { return function + ".kernels.image"; }
 
 llvm::GlobalVariable* KernelSet::own_global(llvm::Type* type, const char* what) {
-  // No constant: parts of a module that is compiled in several share one.
+  // Not constant: when a module is compiled in several parts, they share this one.
   return new llvm::GlobalVariable(host_.module, type, false, llvm::GlobalValue::InternalLinkage,
                                   llvm::Constant::getNullValue(type),
                                   source_.name + ".kernels." + what);
@@ -85,7 +85,7 @@ llvm::StructType* KernelSet::image_type() const {
 llvm::GlobalVariable* KernelSet::image() {
   if (image_) return image_;
   image_ = own_global(image_type(), "image");
-  image_->setLinkage(llvm::GlobalValue::ExternalLinkage);  // who unloads the code looks for it
+  image_->setLinkage(llvm::GlobalValue::ExternalLinkage);  // whoever unloads the code looks for it
   return image_;
 }
 llvm::GlobalVariable* KernelSet::state() {

@@ -1,5 +1,5 @@
-// kernels.h -- the kernels of one lowered function, as its launches ask for them: their code for devices
-// and, where asked for, for the executor; and the image that holds both (runtime/gpu/gpu_image.h).
+// kernels.h -- the kernels of one lowered function: their code for GPUs and, if requested, for the simulated device,
+// and the image that holds both (runtime/gpu/gpu_image.h).
 #pragma once
 
 #include <memory>
@@ -13,21 +13,22 @@
 namespace retrograde::codegen {
 
 struct KernelUse {
-  // What the kernel is given: a variable, or the first element of storage.
+  // An argument of the kernel: a variable, or the address of storage.
   struct Argument {
     std::string name;
-    Type type;  // of storage: of anything
+    Type type;  // for storage: any type
     bool is_storage = false, is_written = false;
     int32_t bytes() const { return is_storage ? 8 : type.bytes(); }
   };
   std::string name;  // in the image
   Stmt launch;
   std::vector<Argument> arguments;
-  std::vector<std::string> sites;  // statements as text, told of by the executor; found on the way
-  bool suspends = false;           // it has barriers
+  std::vector<std::string>
+      sites;  // statements as text, which the simulated device reports; filled while generating
+  bool suspends = false;  // whether it has barriers
 };
 
-// The image's symbol.
+// The symbol of the image.
 std::string kernel_image_name(const std::string& function);
 
 class KernelSet {
@@ -35,13 +36,13 @@ class KernelSet {
   KernelSet(Emitter& host, const ir::LoweredFunction& function) : host_(host), source_(function) {}
   bool empty() const { return kernels_.empty(); }
   KernelUse& add(const Stmt& launch, std::vector<KernelUse::Argument> arguments);
-  // The image, and the word that its loaded form hangs on.
+  // The image, and the global variable through which the runtime finds its loaded form.
   llvm::GlobalVariable* image();
   llvm::GlobalVariable* state();
   int64_t image_bytes() const;
-  // Gives the image its contents.
+  // Fills in the image's contents.
   void finish();
-  // Afterwards: the code for devices.
+  // The code for GPUs; call it after finish().
   KernelCode described_code() const;
 
  private:

@@ -1,8 +1,8 @@
-// A launch on the host's side: what the kernel uses of its surroundings are its arguments.
+// The host's side of a launch: names that the kernel uses but does not define become its arguments.
 //
 //   launch k blocks(n, 1, 1) threads(32, 1, 1) shared(0) { out[..] = in[..] * gain }
 //      =>
-//   code = retrograde_to_device(context, in.buffer), the same for out, which may be given memory alone
+//   code = retrograde_to_device(context, in.buffer); the same for out, which may only be allocated
 //   code = retrograde_gpu_initialize_kernels(context, &state, &image, bytes)
 //   code = retrograde_gpu_run(context, state, "k", n, 1, 1, 32, 1, 1, 0, sizes, {in.buffer, out.buffer,
 //                             &gain}, are_buffers)
@@ -22,7 +22,7 @@ using namespace ir;
 
 namespace {
 
-// Facts of buffers become variables: a kernel has no buffers.
+// Turns the facts of buffers that a kernel reads into variables, because a kernel has no buffer descriptors.
 class FactsHoister : public Rewriter {
  public:
   std::vector<std::pair<std::string, Expr>> facts;
@@ -38,8 +38,8 @@ class FactsHoister : public Rewriter {
 };
 
 struct Used {
-  std::map<std::string, Type> variables;  // sorted: arguments are in this order
-  std::map<std::string, bool> storages;   // whether they are written
+  std::map<std::string, Type> variables;  // sorted, which is the order of the arguments
+  std::map<std::string, bool> storages;   // value: whether it is written
 };
 
 Used used_in(const Stmt& s) {

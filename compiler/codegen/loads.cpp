@@ -9,10 +9,10 @@ namespace retrograde::codegen {
 
 using namespace ir;
 
-// Fewer lanes are not worth a loop.
+// A loop is not worth it for fewer lanes.
 constexpr int min_loop_lanes = 8;
 
-// A kernel's accesses under a mask, lane by lane: the executor is told of those that happen.
+// A kernel's masked load, lane by lane, so that the simulated device sees only accesses that happen.
 static Value* load_lanes_under(FunctionContext& c, const Storage& from, Type type, Value* first,
                                Value* predicate) {
   std::vector<Value*> lanes;
@@ -26,8 +26,8 @@ static Value* load_lanes_under(FunctionContext& c, const Storage& from, Type typ
   return from_memory(c.e, type, from_lanes(c.e, lanes));
 }
 
-// A kernel's vector in one access where its address is a multiple of its size, which buffers decide when it
-// runs; else lane by lane.
+// A kernel's vector load: one access if the address is a multiple of its size, else lane by lane. Alignment is only
+// known at run time, because it depends on the buffers.
 static Value* load_if_aligned(FunctionContext& c, const Storage& from, Type type, Value* pointer) {
   auto* element = memory_type(c.e, type);
   return c.chosen(
@@ -85,9 +85,8 @@ Value* load_scalar(FunctionContext& c, const Storage& from, Type type, Value* in
   return from_memory(c.e, type, predicate ? c.value_if(predicate, load) : load());
 }
 
-// n lanes at distance s: s dense loads of n, the last moved back to end with the last lane, and
-// each lane picked from the load that has it. The picks of later loads are put over those of
-// earlier ones.
+// n lanes with stride s: s dense loads of n lanes, the last one shifted back so that it ends at the last lane. Shuffles
+// pick each lane from the load that contains it, overlaying later loads on earlier ones.
 Value* load_strided(FunctionContext& c, const Storage& from, Type type, Value* first,
                     int64_t stride) {
   const int n = type.lanes(), s = static_cast<int>(stride), last_start = (n - 1) * s - (n - 1);
@@ -116,10 +115,10 @@ Value* load_apart(FunctionContext& c, const Storage& from, Type type, Value* fir
   return from_lanes(c.e, lanes);
 }
 
-// Lanes that are off take the index of the first that is on, so that each may load: one branch instead
-// of one a lane.
-Value* where_any(FunctionContext& c, Type type, Value* indices, Value* predicate,
-                 const std::function<Value*(Value* safe)>& load) {
+// Gives inactive lanes the index of the first active one, so that every lane may load. This takes one branch instead of
+// one per lane.
+Value* load_if_any_lane(FunctionContext& c, Type type, Value* indices, Value* predicate,
+                        const std::function<Value*(Value* safe)>& load) {
   return c.value_if(any_lane(c.e, predicate), [&] {
     Value* bits = c.b.CreateBitCast(predicate, c.b.getIntNTy(static_cast<unsigned>(type.lanes())));
     Value* first = c.b.CreateBinaryIntrinsic(llvm::Intrinsic::cttz, bits, c.b.getTrue());
@@ -131,11 +130,10 @@ Value* where_any(FunctionContext& c, Type type, Value* indices, Value* predicate
 
 Value* gather(FunctionContext& c, const Storage& from, Type type, Value* indices, Value* predicate);
 
-// LLVM fills up a gather of an odd width with undefined indices, and may then give them the
-// register of the result, which the machine forbids. Here the lanes that fill it up are off and
-// have the index of the first.
-Value* gather_filled_up(FunctionContext& c, const Storage& from, Type type, Value* indices,
-                        Value* mask) {
+// Pads a gather of an odd width. LLVM would pad it with undefined indices, and may then assign them the register of the
+// result, which the machine forbids. Here the padding lanes are inactive and have the index of the first lane.
+Value* gather_padded(FunctionContext& c, const Storage& from, Type type, Value* indices,
+                     Value* mask) {
   const int lanes = type.lanes(), full = static_cast<int>(std::bit_ceil(unsigned(lanes)));
   std::vector<int> index_picks, mask_picks;
   for (int i = 0; i < full; i++) {
@@ -152,13 +150,13 @@ Value* gather_filled_up(FunctionContext& c, const Storage& from, Type type, Valu
 Value* gather(FunctionContext& c, const Storage& from, Type type, Value* indices,
               Value* predicate) {
   if (predicate && !c.e.machine.gathers(type)) {
-    return where_any(c, type, indices, predicate,
-                     [&](Value* safe) { return gather(c, from, type, safe, nullptr); });
+    return load_if_any_lane(c, type, indices, predicate,
+                            [&](Value* safe) { return gather(c, from, type, safe, nullptr); });
   }
   if (predicate || (c.e.machine.gathers(type) && c.e.machine.gathers_fast)) {
     if (!std::has_single_bit(unsigned(type.lanes()))) {
       Value* all = splat(c.e, c.b.getTrue(), type.lanes());
-      return gather_filled_up(c, from, type, indices, predicate ? predicate : all);
+      return gather_padded(c, from, type, indices, predicate ? predicate : all);
     }
     auto* vector = with_lanes(memory_type(c.e, type), type.lanes());
     Value* pointers = element_pointer(c.e, from, type, indices);
@@ -169,14 +167,14 @@ Value* gather(FunctionContext& c, const Storage& from, Type type, Value* indices
   }
   std::vector<Value*> lanes;
   for (int i = 0; i < type.lanes(); i++) {
-    // Extended one by one: a vector of them would be twice as many registers to take apart.
+    // Extended one by one: a vector of 64-bit indices would need twice as many registers to unpack.
     Value* index = c.b.CreateSExt(lane(c.e, indices, i), c.b.getInt64Ty());
     lanes.push_back(load_scalar(c, from, type.element_of(), index, nullptr));
   }
   return from_lanes(c.e, lanes);
 }
 
-// Memory of the function for values that live in it for a moment; as large as the largest.
+// Stack memory for short-lived values; as large as the largest of them.
 Value* scratch(FunctionContext& c, size_t slot, llvm::Type* type) {
   llvm::AllocaInst*& block = c.frame.scratch[slot];
   const auto size = [&](llvm::Type* t) { return c.e.module.getDataLayout().getTypeAllocSize(t); };
@@ -190,7 +188,7 @@ Value* scratch(FunctionContext& c, size_t slot, llvm::Type* type) {
   return block;
 }
 
-// As gather, in a tenth of the code: the lanes go through memory.
+// The same as a gather, in a tenth of the code: the lanes go through memory.
 //   spilled = indices;  for i: picked[i] = from[spilled[i]];  result = picked
 Value* gather_in_loop(FunctionContext& c, const Storage& from, Type type, Value* indices) {
   llvm::Type *element = memory_type(c.e, type), *number = indices->getType()->getScalarType();
@@ -222,8 +220,8 @@ Value* gather_in_loop(FunctionContext& c, const Storage& from, Type type, Value*
 Value* gather_compactly(FunctionContext& c, const Storage& from, Type type, Value* indices,
                         Value* predicate) {
   if (!predicate) return gather_in_loop(c, from, type, indices);
-  return where_any(c, type, indices, predicate,
-                   [&](Value* safe) { return gather_in_loop(c, from, type, safe); });
+  return load_if_any_lane(c, type, indices, predicate,
+                          [&](Value* safe) { return gather_in_loop(c, from, type, safe); });
 }
 
 namespace {
@@ -247,8 +245,7 @@ Value* load_linear(Values& values, const Storage& from, Type type, const LinearI
     return reverse(c.e, upward);
   }
   if (predicate) {
-    // A scalar base and small constant distances: 32-bit lanes where they do, for the machine's
-    // wider gathers.
+    // A scalar base and small constant offsets: 32-bit lane offsets if they fit, because gathers with those are wider.
     const bool is_short = std::abs(stride) < (INT32_MAX / lanes);
     llvm::Type* distance = is_short ? c.b.getInt32Ty() : c.b.getInt64Ty();
     Value* step = llvm::ConstantInt::get(distance, static_cast<uint64_t>(stride), true);
@@ -270,8 +267,8 @@ Value* load_vector(Values& values, const Storage& from, Type type, const Expr& i
     return load_apart(c, from, type, values.index64(ramp->base), values.index64(ramp->stride));
   const std::vector<Expr> pieces = pieces_of(index);
   const Coordinate at = coordinate_of(c.frame, index);
-  if (pieces.empty() && at.is_plain && at.is_held && type.lanes() >= min_loop_lanes) {
-    if (Value* loaded = load_held(values, from, type, index, predicate)) return loaded;
+  if (pieces.empty() && at.is_plain && at.is_clamped && type.lanes() >= min_loop_lanes) {
+    if (Value* loaded = load_clamped(values, from, type, index, predicate)) return loaded;
     if (!c.e.machine.gathers(type))
       return gather_compactly(c, from, type, values.index_vector(index), predicate);
   }

@@ -9,16 +9,16 @@ using namespace ir;
 
 namespace {
 
-// In nodes of the lowered statement.
+// Measured in nodes of the lowered statement.
 constexpr int long_body = 5000, least_loop = 100;
 
 }  // namespace
 
 bool is_long(const Stmt& body) { return body.defined() && !has_at_most_nodes(body, long_body); }
 
-// The profiler is told of what runs by the function that it runs in.
+// A loop inside a profiled region stays, because the profiler is notified by the function that contains it.
 bool FunctionGenerator::is_worth_a_function(const For& s) const {
-  return is_long_ && loops_around_ == 0 && !device_ && c_.frame.farewells.empty() &&
+  return is_long_ && loops_around_ == 0 && !device_ && c_.frame.exit_calls.empty() &&
          !has_at_most_nodes(Stmt(&s), least_loop);
 }
 

@@ -1,10 +1,10 @@
-// long_functions -- the outermost loops of a long function become functions of their own.
+// long_functions -- the outermost loops of a long function become separate functions.
 //
 //   f: for y { a }; for y { b }   =>   f: f.loop0(&closure0); f.loop1(&closure1)
 //
-// Some of LLVM's passes take time quadratic in the length of a function: Loop Strength Reduction of the
-// gradient of forty steps of a wave equation took four of eight seconds. An outermost loop runs once
-// a call of the function, so that another call for it is not felt.
+// Some LLVM passes take time quadratic in the length of a function: Loop Strength Reduction took four of eight seconds
+// for the gradient of forty steps of a wave equation. An outermost loop runs once per call of the function, so the
+// additional call does not matter.
 #pragma once
 
 #include "ir/expr.h"

@@ -1,4 +1,4 @@
-// Targets: x86-64 from SSE2 to AVX-512, and AArch64 with NEON; Linux.
+// Maps targets to LLVM's machines: x86-64 from SSE2 to AVX-512, and AArch64 with NEON, on Linux.
 #include "codegen/machine.h"
 
 #include <llvm/ADT/StringMap.h>
@@ -72,11 +72,11 @@ void initialize_llvm() {
     LLVMInitializeNVPTXTarget();
     LLVMInitializeNVPTXTargetMC();
     LLVMInitializeNVPTXAsmPrinter();
-    // LLVM has no other way to ask for these.
+    // LLVM offers these only as command-line options.
     set_option("nvptx-short-ptr",
-               true);  // pointers of 32 bits to shared, constant and local memory
-    // It moves integers to mask registers, takes time quadratic in the length of a function (half of
-    // that for the gradient of forty steps of a wave), and is worth nothing here.
+               true);  // 32-bit pointers to shared, constant and local memory
+    // This pass moves integers to mask registers and gains nothing here. It takes time quadratic in the length of a
+    // function, and took half of the time for the gradient of forty steps of a wave.
     set_option("disable-x86-domain-reassignment", true);
   });
 }
@@ -134,34 +134,34 @@ std::string Machine::math_symbol(const std::string& stem, const std::string& pre
 
 namespace {
 
-// ASAN asks for checks of every access, which lowering makes (check_accesses).
+// ASAN is accepted: lowering itself emits a check for every access (check_accesses).
 void refuse_sanitizers(const Target& target) {
   for (const F sanitizer : {F::MSAN, F::TSAN, F::SanitizerCoverage}) {
     if (!target.has_feature(sanitizer)) continue;
     const std::string name = quoted(Target::feature_to_name(sanitizer));
     unsupported("generate code for target \"" + target.to_string() + "\"",
-                "generated code carries no checks of a sanitizer", "the target asks for " + name,
+                "generated code cannot contain this sanitizer's checks",
+                "the target asks for " + name,
                 "Leave out " + name +
-                    ": code without it links with programs that a sanitizer checks, and bounds "
-                    "are checked at every call");
+                    ": code without it can be linked with sanitized programs, and bounds are "
+                    "checked at every call");
   }
 }
 
-// Places in buffers are numbered by int32 throughout, from the linear forms of indices to lanes of gathers.
+// Offsets into buffers are int32 throughout, from the linear forms of indices to the lanes of gathers.
 void refuse_large_buffers(const Target& target) {
   if (!target.has_feature(F::LargeBuffers)) return;
   unsupported("generate code for target \"" + target.to_string() + "\"",
-              "the elements of a buffer are numbered in 31 bits",
-              "the target asks for \"large_buffers\", whose buffers have more",
+              "a buffer has at most 2147483647 elements",
+              "the target has the feature \"large_buffers\", which allows more",
               "Leave out \"large_buffers\", and process an image of 2147483648 elements or more in "
               "tiles, each a cropped() part of it");
 }
 
 }  // namespace
 
-// LLVM's order of instructions follows a model of latencies and ports. That of the oldest
-// processors keeps more values alive than registers hold, so ask for the oldest that has the
-// instructions.
+// LLVM schedules instructions by a processor's latencies and ports. The generic tuning models the oldest processors and
+// keeps more values alive than registers hold. So tune for the oldest processor that has the target's instructions.
 static std::string tuning_for(const Machine& machine) {
   if (!machine.is_x86() || !machine.has_avx2()) return "";
   return machine.has_avx512_words() ? "x86-64-v4" : "x86-64-v3";
@@ -175,8 +175,8 @@ static const llvm::Target& llvm_target(const Machine& machine) {
   return *target;
 }
 
-// Whether a gather instruction is faster than one load for each lane. LLVM's tuning says so for some
-// processors; on the AMD EPYC (Zen 5) that was measured a gather of 16 floats takes twice as long.
+// Whether a gather instruction is faster than one load per lane. LLVM's tuning decides this for some processors. On the
+// AMD EPYC (Zen 5) on which it was measured, a gather of 16 floats takes twice as long as single loads.
 static bool gathers_fast(const Machine& machine) {
   const bool is_for_any = machine.tune_cpu.empty() || machine.tune_cpu.starts_with("x86-64");
   if (!machine.has_avx2() || is_for_any) return false;
@@ -216,7 +216,7 @@ Machine machine_for(const Target& target, bool tune_for_host) {
   return machine;
 }
 
-// PTX of version 7.8 is what drivers from CUDA 11.8 on take.
+// PTX 7.8 is accepted by drivers from CUDA 11.8 on.
 Machine device_machine(const Machine& host, Machine::Device device) {
   Machine machine = host;
   machine.device = device;
@@ -233,10 +233,11 @@ Machine device_machine(const Machine& host, Machine::Device device) {
 
 std::unique_ptr<llvm::TargetMachine> make_target_machine(const Machine& machine) {
   llvm::TargetOptions options;
-  options.AllowFPOpFusion = llvm::FPOpFusion::Standard;  // fuses what carries the contract flag
+  options.AllowFPOpFusion =
+      llvm::FPOpFusion::Standard;  // fuses only operations with the contract flag
   options.TrapUnreachable = true;
-  // Code that checks its accesses is to find errors: it compiles more than twice as fast without LLVM's
-  // search for good instructions, and runs slower.
+  // Code with checked accesses serves to find errors. Without LLVM's optimal instruction selection it compiles more
+  // than twice as fast, and runs slower.
   const bool is_quick = !machine.is_device() && machine.target.has_feature(Target::CheckedAccesses);
   const auto level = is_quick ? llvm::CodeGenOptLevel::None : llvm::CodeGenOptLevel::Default;
   return std::unique_ptr<llvm::TargetMachine>(llvm_target(machine).createTargetMachine(

@@ -1,4 +1,4 @@
-// Emits what exports.h describes.
+// Emits the entry points that exports.h describes.
 #pragma once
 
 #include "codegen/emitter.h"

@@ -1,4 +1,4 @@
-// Calls of vector math: any number of lanes is cut into the widths that SLEEF has, the last padded.
+// Calls of vector math functions. Vectors are split into the widths that SLEEF has; the last piece is padded.
 #include <llvm/IR/Intrinsics.h>
 
 #include <algorithm>
@@ -21,8 +21,7 @@ const MathFunction* find_math_function(Op op) {
   return found == std::end(math_functions) ? nullptr : found;
 }
 
-// The declaration of a function that only reads its arguments, so that LLVM may move, merge and
-// drop its calls.
+// Declares a function that depends only on its arguments, so that LLVM may move, merge and delete its calls.
 llvm::FunctionCallee declare_pure(Emitter& e, const std::string& name, llvm::Type* type,
                                   size_t arity) {
   const std::vector<llvm::Type*> params(arity, type);
@@ -34,7 +33,7 @@ llvm::FunctionCallee declare_pure(Emitter& e, const std::string& name, llvm::Typ
   return callee;
 }
 
-// The narrowest width that holds `lanes`, or the widest there is.
+// The narrowest width that holds `lanes`, or the widest available.
 int call_lanes(const Machine& machine, int bits, int lanes) {
   if (lanes == 1 || !machine.has_sleef) return 1;
   int width = machine.min_math_lanes(bits);
@@ -42,7 +41,7 @@ int call_lanes(const Machine& machine, int bits, int lanes) {
   return width;
 }
 
-// `lanes` lanes from `start` on; lanes beyond the end repeat the first, so that they cost no slow
+// `lanes` lanes, beginning at `start`. Lanes past the end repeat the first one, so that padding never takes a slow
 // path.
 Value* padded_slice(Emitter& e, Value* vector, int start, int lanes) {
   const int has = lanes_of(vector);
@@ -53,7 +52,7 @@ Value* padded_slice(Emitter& e, Value* vector, int start, int lanes) {
   return shuffle(e, vector, vector, indices);
 }
 
-// One function over all lanes of float or double vectors.
+// Applies one function to all lanes of float or double vectors.
 Value* call_by_pieces(Emitter& e, const MathFunction& function, const Args& args) {
   if (Value* known = constant_result(e, function, args)) return known;
   const int total = lanes_of(args[0]);
@@ -85,14 +84,14 @@ Value* copy_sign(Emitter& e, Value* size, Value* sign) {
   return e.b.CreateBinaryIntrinsic(llvm::Intrinsic::copysign, size, sign);
 }
 
-// sinh and cosh where exp(x) overflows but half of it need not.
+// sinh and cosh for x whose exp(x) overflows although half of it may not.
 Value* near_overflow(Emitter& e, Op op, Value* x, Value* size) {
   Value* root = full_precision(e, Op::exp, {e.b.CreateFMul(size, float_constant(x, 0.5))});
   Value* result = e.b.CreateFMul(e.b.CreateFMul(root, float_constant(x, 0.5)), root);
   return op == Op::sinh ? copy_sign(e, result, x) : result;
 }
 
-// asinh and acosh where x * x overflows.
+// asinh and acosh for x whose square overflows.
 Value* logarithmic(Emitter& e, Op op, Value* x, Value* size) {
   Value* result =
       e.b.CreateFAdd(full_precision(e, Op::log, {size}), float_constant(x, 0.69314718055994530942));
@@ -102,16 +101,17 @@ Value* logarithmic(Emitter& e, Op op, Value* x, Value* size) {
 Value* with_limit(Emitter& e, const MathFunction& function, Value* x, Value* inside, double limit) {
   Value* size = e.b.CreateUnaryIntrinsic(llvm::Intrinsic::fabs, x);
   const bool is_exponential = function.op == Op::sinh || function.op == Op::cosh;
-  // acosh is not defined far below 0.
+  // For acosh the sign counts: it is undefined for large negative numbers.
   Value* is_far = e.b.CreateFCmpOGT(function.op == Op::acosh ? x : size, float_constant(x, limit));
   Value* outside = is_exponential ? near_overflow(e, function.op, x, size)
                                   : logarithmic(e, function.op, x, size);
   return e.b.CreateSelect(is_far, outside, inside);
 }
 
-// ---- on devices, where libclc's functions leave something to do ----
+// ---- on devices, whose libclc functions need some corrections ----
 
-// Where exp(x) is a denormal, that of float32 gives 0: exp(x + 64) exp(-64), the sum of which is exact.
+// If exp(x) is a denormal, libclc's float32 version gives 0. So compute exp(x + 64) exp(-64), in which the sum is
+// exact.
 Value* device_exp(Emitter& e, const MathFunction& function, Value* x) {
   constexpr double least = -0x1.5d589ep+6, distance = 64, rest = 0x1.969d47321e4ccp-93;
   Value* is_small = e.b.CreateFCmpOLT(x, float_constant(x, least));
@@ -120,10 +120,12 @@ Value* device_exp(Emitter& e, const MathFunction& function, Value* x) {
   return e.b.CreateSelect(is_small, e.b.CreateFMul(result, float_constant(x, rest)), result);
 }
 
-// Those of float64 look into their tables beyond the ends, whatever is then done with what they find.
+// libclc's float64 versions index their tables out of bounds for large x, even if the result is then discarded. So
+// large x never reach them.
 Value* device_sinh_cosh(Emitter& e, const MathFunction& function, Value* x) {
   Value* size = e.b.CreateUnaryIntrinsic(llvm::Intrinsic::fabs, x);
-  Value* is_near = e.b.CreateFCmpOLE(size, float_constant(x, function.float64_limit));  // no NaN is
+  Value* is_near =
+      e.b.CreateFCmpOLE(size, float_constant(x, function.float64_limit));  // false for NaN
   Value* near = e.b.CreateSelect(is_near, x, float_constant(x, 0.0));
   return e.b.CreateSelect(is_near, call_by_pieces(e, function, {near}),
                           near_overflow(e, function.op, x, size));

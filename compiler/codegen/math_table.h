@@ -1,9 +1,9 @@
-// The vector math functions: operator and SLEEF's name. The largest error that we promise, over the
-// whole domain and for every width, stands in the operator's row (ir/operators.def); the unit test
-// holds every function to it. All but pow of float32, which is inlined, come from SLEEF's families
-// whose bits do not depend on the width, so a scalar tail agrees with the vector body.
-// Special values follow C99 Annex F. Code that is compiled ahead of time for AArch64 calls the C
-// library instead of SLEEF; its errors are its own (2 ULP with the GNU C library).
+// The vector math functions: operator, name in SLEEF and limits. The largest error that we promise, over the whole
+// domain and for every width, is in the operator's row (ir/operators.def); the unit test holds every function to it.
+//
+// All functions except float32 pow, which is inlined, come from SLEEF's families whose bits do not depend on the width,
+// so a scalar tail agrees with the vector body. Special values follow C99 Annex F. Code compiled ahead of time for
+// AArch64 calls the C library instead of SLEEF and has its errors (2 ULP with the GNU C library).
 //
 // Half types compute in float32 and round once more.
 #pragma once
@@ -18,7 +18,7 @@ struct MathFunction {
   const char* precision;
   // Beyond this magnitude SLEEF overflows early, and math.cpp uses another formula; 0: never.
   double float32_limit, float64_limit;
-  // The largest errors of what kernels use, in ULP, found by test/unit/device_math_test.cpp.
+  // Largest errors of the functions that kernels use, in ULP, found by test/unit/device_math_test.cpp.
   double device_float32_ulp, device_float64_ulp;
 };
 
@@ -43,21 +43,20 @@ inline constexpr MathFunction math_functions[] = {
     {ir::Op::erf, "erf", "u10", 0, 0, 0.9, 0.9},
 };
 
-// The fast forms of float32, inlined. Doubles use the full functions (and 1 / x, 1 / sqrt(x)).
+// The fast float32 forms, inlined. Doubles use the full-precision functions (and 1 / x, 1 / sqrt(x)).
 struct FastFunction {
   ir::Op op;
-  double low, high;  // the domain in which the error holds
+  double low, high;  // the error bound holds in this domain
   double max_relative_error;
-  double max_absolute_error;  // the error is within one of the two
+  double max_absolute_error;  // the error is within one of the two bounds
 };
 
 inline constexpr FastFunction fast_functions[] = {
-    // Saturates outside of the domain instead of overflowing to infinity or underflowing to 0. NaN
-    // stays NaN.
+    // Saturates outside the domain instead of overflowing to infinity or underflowing to 0. NaN stays NaN.
     {ir::Op::fast_exp, -87.0, 88.0, 3e-7, 0},
-    // Zero gives -infinity, infinity itself, negative numbers NaN; denormals count as zero.
+    // Zero gives -infinity, infinity gives infinity, negative numbers give NaN; denormals count as zero.
     {ir::Op::fast_log, 0x1p-126, 0x1.fffffep127, 3e-7, 1e-7},
-    // exp(y * log(x)): the error grows with |y log(x)|; the bound holds where that is at most 8.
+    // exp(y * log(x)): the error grows with |y log(x)|; the bound holds if that is at most 8.
     {ir::Op::fast_pow, 0x1p-126, 0x1.fffffep127, 4e-6, 0},
     {ir::Op::fast_sin, -8192.0, 8192.0, 1e-6, 3e-7},
     {ir::Op::fast_cos, -8192.0, 8192.0, 1e-6, 3e-7},

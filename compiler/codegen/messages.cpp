@@ -1,4 +1,4 @@
-// Errors and prints: a constant format and the values that it shows go to the runtime in one call.
+// Error messages and prints: one runtime call gets a constant format and the values to show.
 #include "codegen/calls.h"
 #include "diagnostics/error.h"
 
@@ -19,7 +19,7 @@ std::string escaped(const std::string& text) {
   return result;
 }
 
-// `which`: lane of vectors to show.
+// `which`: the lane to show if the part is a vector.
 void add_part(Values& values, MessageFormat& format, const Expr& part, int which, bool printed) {
   FunctionContext& c = values.c;
   if (const auto* literal = part.as<StringImm>()) {
@@ -34,7 +34,7 @@ void add_part(Values& values, MessageFormat& format, const Expr& part, int which
     format.text += "%s";
     v = c.b.CreateSelect(v, c.string_constant("true"), c.string_constant("false"));
   } else if (type.is_float()) {
-    // Printed as Halide prints them; in errors as short as they can be.
+    // Prints use Halide's format; errors use the shortest form.
     if (printed)
       format.text += type.bits() == 64 ? "%E" : "%F";
     else
@@ -74,14 +74,14 @@ Value* report_error(Values& values, Value* code, const std::vector<Expr>& parts,
                         {code, c.string_constant(format.text)}, &format.args);
 }
 
-// print(value, parts...) or print_when(condition, value, parts...): a line for each lane.
+// print(value, parts...) or print_when(condition, value, parts...): prints one line per lane.
 Value* print_call(Values& values, const Call& e) {
   FunctionContext& c = values.c;
   const size_t first = e.op == Op::print_when ? 1 : 0;
   Value* condition = first ? values.of(e.args[0]) : nullptr;
   int lanes = 1;
   for (const Expr& arg : e.args) {
-    values.of(arg);  // here, so that no value is first computed under a condition
+    values.of(arg);  // evaluated here, so that no value is first computed under a condition
     lanes = std::max(lanes, arg.type().lanes());
   }
   for (int i = 0; i < lanes; i++) {

@@ -1,10 +1,9 @@
-// Sums of products of 16-bit numbers in 32-bit lanes. x86 multiplies twice as many of them in one
-// instruction and adds each two neighbours (pmaddwd):
+// Sums of 16-bit products in 32-bit lanes. One x86 instruction (pmaddwd) multiplies twice as many of them and adds
+// neighbouring products:
 //
-//   reduce(add, int32(a) * int32(b))     pairs that are neighbours as they stand
+//   reduce(add, int32(a) * int32(b))     pairs that already are neighbours
 //   int32(a) * k + int32(b) * l          neighbours in the interleaved vectors a0 b0 a1 b1 ... and
-//                                        k l k l ...; worth it where k and l are the same in all
-//                                        lanes
+//                                        k l k l ...; worth it if k and l are uniform
 #include "codegen/values.h"
 #include "ir/build.h"
 #include "ir/narrow_product.h"
@@ -13,12 +12,12 @@ namespace retrograde::codegen {
 
 using namespace ir;
 
-// Fewer lanes leave the shuffles as dear as the products.
+// With fewer lanes the shuffles cost as much as the products save.
 constexpr int min_lanes = 8;
-// Longer sums are taken as they stand; so a sum of shared sums costs no more than this.
+// Longer sums are left alone. So a sum of shared sums costs no more than this to analyse.
 constexpr size_t max_terms = 64;
 
-Value* reduced_in_part(Values& values, const VectorReduce& e) {
+Value* partly_reduced(Values& values, const VectorReduce& e) {
   const bool has_pairs = e.value.type().lanes() / e.type.lanes() % 2 == 0;
   if (e.op == Kind::Add && has_pairs && values.c.e.machine.is_x86()) {
     if (const auto product = as_narrow_product(e.value))
@@ -35,13 +34,13 @@ static bool split_sum(const Expr& e, std::vector<Expr>& terms) {
   return true;
 }
 
-// Of a vector and a number.
+// A product of a vector and a scalar.
 static bool is_scaled(const Expr& e) {
   const auto* product = e.as<Mul>();
   return product && (product->a.as<Broadcast>() || product->b.as<Broadcast>());
 }
 
-// The terms of the sum may be added in any order: what overflows is undefined, and wraps.
+// The terms may be added in any order, because signed overflow is undefined in the language and wraps here.
 Value* sum_of_products(Values& values, const Expr& e) {
   const Type type = e.type();
   const bool may_have_pairs = e.kind() == Kind::Add && type.element_of() == Int(32) &&

@@ -1,5 +1,5 @@
-// Kernels as PTX has them: parameters are pointers to global memory, read-only and apart from each
-// other where that is known, so that loads take the read-only path; the block's memory is one array.
+// Kernels for PTX. Parameters are pointers to global memory; they are marked read-only and noalias where that is known,
+// so that loads use the read-only path. The block's shared memory is one array.
 #include <llvm/IR/IntrinsicsNVPTX.h>
 #include <llvm/IR/MDBuilder.h>
 
@@ -53,7 +53,7 @@ class NvptxTarget : public DeviceTarget {
     return e.b.CreateIntrinsic(reads[dimension], {}, {});
   }
 
-  // Its size is the launch's.
+  // The launch determines its size.
   Value* shared(Emitter& e, llvm::Function*, Value* offset) override {
     auto* bytes = llvm::ArrayType::get(e.b.getInt8Ty(), 0);
     llvm::GlobalVariable* memory = e.module.getGlobalVariable(shared_name);

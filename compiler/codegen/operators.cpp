@@ -1,4 +1,4 @@
-// The Pure operators that are a few instructions: bits, shifts, absolute values, lerp, rounding,
+// The pure operators that take a few instructions: bit operations, shifts, absolute values, lerp, rounding,
 // classification.
 #include <llvm/IR/Intrinsics.h>
 
@@ -13,7 +13,7 @@ using llvm::Intrinsic::ID;
 
 // ---- shifts ----
 
-// By an amount in [0, infinity), as an unsigned number of the value's type.
+// `amount` is in [0, infinity), unsigned, and has the value's width.
 Value* shift_by_unsigned(Emitter& e, Type type, Value* value, Value* amount, bool left) {
   Value* limit = int_constant(amount, type.bits() - 1);
   Value* safe = e.b.CreateBinaryIntrinsic(llvm::Intrinsic::umin, amount, limit);
@@ -54,7 +54,7 @@ Value* absolute_difference(Emitter& e, Type type, Value* a, Value* b) {
 
 // ---- lerp ----
 
-// The weight as a float of `type`: integers count their largest value as 1.
+// The weight as a float of `type`. The largest value of an integer weight counts as 1.
 Value* unit_weight(Emitter& e, Type type, Type weight_type, Value* weight) {
   Value* number = convert(e, type, weight_type, weight);
   if (weight_type.is_float()) return number;
@@ -83,7 +83,7 @@ Value* lerp_bools(Emitter& e, Type weight_type, Value* a, Value* b, Value* weigh
   return e.b.CreateSelect(is_above, b, a);
 }
 
-// A weight in fixed point of the values' width, rounding down (ir/operators.cpp has the rule).
+// A weight in fixed point of the values' width, rounded down (ir/operators.cpp states the rule).
 Value* fixed_point_weight(Emitter& e, Type fixed, Type weight_type, Value* weight) {
   if (!weight_type.is_float()) {
     const uint64_t ratio = weight_type.max_uint() / fixed.max_uint();
@@ -97,8 +97,8 @@ Value* fixed_point_weight(Emitter& e, Type fixed, Type weight_type, Value* weigh
   return convert_saturating(e, fixed, wide, w);
 }
 
-// a +- round(|b - a| * w / max). The product fits the sum of both widths, its half of max included,
-// and there are no ties because max is odd.
+// a +- round(|b - a| * w / max). The product, plus half of max, fits the sum of both widths. There are no ties because
+// max is odd.
 Value* lerp_integers(Emitter& e, Type type, Type weight_type, Value* a, Value* b, Value* weight) {
   if (weight_type.is_float() || weight_type.bits() > type.bits()) {
     const Type fixed = UInt(type.bits(), type.lanes());
@@ -141,7 +141,7 @@ Value* classify(Emitter& e, Op op, Type type, Value* value) {
   return op == Op::is_inf ? e.b.CreateFCmpOEQ(size, infinity) : e.b.CreateFCmpOLT(size, infinity);
 }
 
-// A select of zero is a masked multiplication or division in machine code.
+// Machine code implements a select of zero as a masked multiplication or division.
 Value* strong(Emitter& e, llvm::Instruction::BinaryOps op, Type type, Value* adjoint,
               Value* partial) {
   const Type wide = is_half(type) ? Float(32, type.lanes()) : type;
@@ -153,7 +153,7 @@ Value* strong(Emitter& e, llvm::Instruction::BinaryOps op, Type type, Value* adj
 
 // ---- fma ----
 
-// ir/operators.cpp in vectors: a sum in double that remembers in its last bit what was cut off.
+// The vector form of the one in ir/operators.cpp: a sum in double whose last bit records that something was cut off.
 Value* sum_rounded_to_odd(Emitter& e, Value* product, Value* c) {
   Value* sum = e.b.CreateFAdd(product, c);
   Value* taken = e.b.CreateFSub(sum, product);
@@ -171,8 +171,7 @@ Value* sum_rounded_to_odd(Emitter& e, Value* product, Value* c) {
   return e.b.CreateSelect(e.b.CreateAnd(is_inexact, is_even), odd, sum);
 }
 
-// Where the processor has no instruction for it, or none of the width, in double: a product of
-// narrower numbers is exact there.
+// If the processor has no FMA of this width, computes in double, in which products of narrower numbers are exact.
 Value* fused(Emitter& e, Type type, Value* a, Value* b, Value* c) {
   if (type.bits() == 64 || (type == Float(32, type.lanes()) && e.machine.has_fma()))
     return e.b.CreateIntrinsic(llvm::Intrinsic::fma, {a->getType()}, {a, b, c});

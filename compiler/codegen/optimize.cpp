@@ -1,26 +1,26 @@
-// A short pipeline, because the schedule has decided what LLVM's standard one would guess at:
-// vector widths, unrolling and inlining are done. What is left is scalar: per function, in this
-// order,
+// LLVM's passes over generated code. The pipeline is short because the schedule has already decided vector widths,
+// unrolling and inlining, at which LLVM's standard pipeline would guess. Scalar optimization remains; each function
+// goes through, in this order,
 //
 //   SROA           slots of owned blocks and small allocations become registers
 //   EarlyCSE       the same subexpression in several statements; loads of closures and descriptors
-//   SimplifyCFG    blocks of asserts and scopes that turned out empty
+//   SimplifyCFG    blocks of asserts and scopes that turned out to be empty
 //   InstCombine    address arithmetic, comparisons with constants, shuffles of shuffles
 //   LICM           loop-invariant loads and address parts, past unrelated stores
-//   SplitAddresses what a loop does not change of an address is added before it
+//   SplitAddresses loop-invariant parts of addresses are added before the loop
 //   GVN            loads that an earlier iteration's tail or another block already did, where
 //                  EarlyCSE is too local
-//   LoopLoadElim   what a scan stored in the iteration before stays in a register
-//   DSE            stores that a later one replaces: the steps of an unrolled sum, of which GVN has
-//                  taken the loads
-//   LoopUnroll     loops of few iterations altogether, other small innermost ones two or four times,
-//                  unless short iterations wait for a sum of floats
-//   SROA, EarlyCSE allocations of which only such a loop hid the places; what it loaded twice
+//   LoopLoadElim   a value that a scan stored in the previous iteration stays in a register
+//   DSE            stores that a later one overwrites: the steps of an unrolled sum, whose loads GVN
+//                  has removed
+//   LoopUnroll     fully unrolls loops of few iterations; unrolls other small innermost loops by two
+//                  or four, unless short iterations wait for a sum of floats
+//   SROA, EarlyCSE allocations whose indices only such a loop hid; repeated loads in its copies
 //   InstCombine, SimplifyCFG, ADCE to clean up
 //   cut_long_blocks and FenceLongBlocks, so that LLVM's code generator takes linear time
 //
-// Left out: loop and SLP vectorization, inlining, loop idioms (a memset call is slower on the short
-// rows that schedules produce). Strength reduction of addresses is part of LLVM's code generator.
+// Left out: loop and SLP vectorization, inlining, and loop idioms (a memset call is slower on the short rows that
+// schedules produce). LLVM's code generator does strength reduction of addresses.
 #include "codegen/optimize.h"
 
 #include <llvm/ADT/STLExtras.h>
@@ -54,8 +54,8 @@
 
 namespace retrograde::codegen {
 
-// About how many instructions of the machine a block is: addresses and conversions of indices fold
-// into what uses them, vectors wider than a register count as often as they have registers.
+// Approximate number of machine instructions of a block. Addresses and index conversions fold into their users. A
+// vector wider than a register counts once per register.
 static unsigned cost_of(const llvm::BasicBlock& block) {
   constexpr unsigned register_bits = 256;
   unsigned cost = 0;
@@ -69,11 +69,11 @@ static unsigned cost_of(const llvm::BasicBlock& block) {
   return cost;
 }
 
-// What a loop adds to its counter, compares and jumps.
+// Cost of a loop's increment, compare and jump.
 constexpr unsigned counting = 3;
-// The most that a loop without a loop in it, copied as often as it runs, may grow to. Loops over
-// the lanes of a vector of bytes, as borders have them, stay compact; those that store nothing, as
-// sums over the lanes of partial sums, may run as often: their operands become registers.
+// Largest cost to which full unrolling may grow a loop nest. Loops over the lanes of a byte vector, as border
+// iterations have them, stay compact. Loops without stores, such as sums over the lanes of partial sums, may have more
+// iterations, because their operands become registers.
 constexpr unsigned most_unrolled = 160, few_iterations = 16, few_without_stores = 64;
 
 static bool stores(const llvm::Loop& loop) {
@@ -82,8 +82,8 @@ static bool stores(const llvm::Loop& loop) {
   });
 }
 
-// A loop of few iterations, whose number is known, is copied for each; the loops in it first. Its
-// cost as straight code, or nothing where it stays a loop.
+// The cost of the loop as straight-line code, if it is to be fully unrolled; inner loops count as unrolled first.
+// Nothing if it stays a loop.
 static std::optional<unsigned> unrolled_cost(const llvm::Loop& loop,
                                              llvm::ScalarEvolution& evolution) {
   const unsigned count = evolution.getSmallConstantTripCount(&loop);
@@ -104,7 +104,7 @@ static std::optional<unsigned> unrolled_cost(const llvm::Loop& loop,
   return cost * count <= most_unrolled ? std::optional<unsigned>(cost * count) : std::nullopt;
 }
 
-// Whether e is computed from the phi, in floating point, within the block.
+// Whether e is computed from the phi by floating-point operations within the block.
 static bool follows_from(const llvm::Value* e, const llvm::PHINode& phi) {
   llvm::SmallPtrSet<const llvm::Value*, 32> follow = {&phi};
   for (const llvm::Instruction& one : *phi.getParent()) {
@@ -116,8 +116,8 @@ static bool follows_from(const llvm::Value* e, const llvm::PHINode& phi) {
   return follow.contains(e);
 }
 
-// Whether iterations wait for what the one before adds up in floating point. Beside that, counting takes no
-// time where the body is short.
+// Whether each iteration waits for a floating-point sum of the previous one. Then counting is free if the body is
+// short.
 static bool adds_up_floats(const llvm::BasicBlock& body) {
   return llvm::any_of(body.phis(), [&](const llvm::PHINode& phi) {
     const int latch = phi.getBasicBlockIndex(&body);
@@ -127,9 +127,8 @@ static bool adds_up_floats(const llvm::BasicBlock& body) {
   });
 }
 
-// Copies of the body of a small innermost loop, where counting costs a good part of the work. Iterations
-// that are left over run in a loop of their own, whose addresses are computed apart: loops that run
-// a few times would spend as much on that.
+// Unroll factor of a small innermost loop, in which counting is a good part of the work. Remainder iterations run in an
+// epilogue loop that computes its own addresses; loops with few iterations would lose as much on that.
 static unsigned unroll_count(const llvm::Loop& loop, llvm::ScalarEvolution& evolution) {
   constexpr unsigned room = 48, least_iterations = 8;
   constexpr size_t during_a_sum = 20;  // instructions that take no longer than one addition
@@ -145,7 +144,7 @@ static unsigned unroll_count(const llvm::Loop& loop, llvm::ScalarEvolution& evol
   return calls || cost * 2 > room ? 1 : cost * 4 > room ? 2 : 4;
 }
 
-// Tells LoopUnroll what to do: it follows nothing but these marks.
+// Marks the loops that LoopUnroll is to unroll: it obeys only these marks.
 class MarkSmallLoops : public llvm::PassInfoMixin<MarkSmallLoops> {
  public:
   llvm::PreservedAnalyses run(llvm::Function& function, llvm::FunctionAnalysisManager& analyses) {
@@ -210,7 +209,7 @@ void optimize(llvm::Module& module, llvm::TargetMachine& machine) {
   }
   for (llvm::Function* function : defined) {
     passes.run(*function, functions);
-    // Kernels of devices are short, and have no fences of the own thread.
+    // GPU kernels are short, and NVPTX cannot select single-thread fences.
     if (!machine.getTargetTriple().isNVPTX()) shorten_blocks(*function, functions);
   }
 }

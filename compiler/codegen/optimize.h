@@ -1,4 +1,4 @@
-// The optimization of generated code. See optimize.cpp for the choice of passes.
+// Optimizes generated code; optimize.cpp explains the choice of passes.
 #pragma once
 
 namespace llvm {

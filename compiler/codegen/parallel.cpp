@@ -1,5 +1,5 @@
-// A parallel loop: its body becomes a function of its own, which gets the values that it uses from
-// around the loop in a struct on the caller's stack.
+// Parallel loops: the body becomes a separate function. A struct on the caller's stack (the closure) passes it the
+// values that it uses from outside the loop.
 //
 //   parallel x in [min, min + extent): body
 //      =>
@@ -20,10 +20,11 @@ using namespace ir;
 namespace {
 
 struct Uses {
-  std::set<std::string> variables, storages;  // sorted: the layout must not depend on chance
+  std::set<std::string> variables,
+      storages;  // sorted, so that the closure's layout is deterministic
 };
 
-// Every name that the statement mentions, its own bindings included.
+// Every name in the statement, including those that it binds itself.
 Uses names_in(const Stmt& s) {
   Uses uses;
   walk(

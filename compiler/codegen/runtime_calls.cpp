@@ -1,4 +1,4 @@
-// Calls of the runtime that lowering puts in: functions by name, values packed into memory, events.
+// Runtime calls that lowering inserts: functions by name, values packed into memory, trace events.
 #include <HalideRuntime.h>
 
 #include "codegen/calls.h"
@@ -21,16 +21,16 @@ constexpr PairedCall paired_calls[] = {
     {"retrograde_overwrite_begin", "retrograde_overwrite_end"},
 };
 
-// What was begun is ended by a function that leaves early, too.
-void keep_farewell(FunctionContext& c, const std::string& name, Value* result) {
+// Ensures that an early exit also ends what a paired call has begun.
+void record_exit_call(FunctionContext& c, const std::string& name, Value* result) {
   for (const PairedCall& call : paired_calls) {
     if (name == call.begins) {
-      c.frame.farewells.push_back({call.ends, c.entry_alloca(c.b.getPtrTy(), 1, "due")});
-      c.b.CreateStore(result, c.frame.farewells.back().argument);
+      c.frame.exit_calls.push_back({call.ends, c.entry_alloca(c.b.getPtrTy(), 1, "due")});
+      c.b.CreateStore(result, c.frame.exit_calls.back().argument);
     }
     if (name != call.ends) continue;
-    // Calls are nested: the latest of the kind that is still due ends.
-    for (auto due = c.frame.farewells.rbegin(); due != c.frame.farewells.rend(); ++due) {
+    // Calls are nested, so this ends the latest one that is still due.
+    for (auto due = c.frame.exit_calls.rbegin(); due != c.frame.exit_calls.rend(); ++due) {
       if (due->function != name) continue;
       c.b.CreateStore(c.null_pointer(), due->argument);
       break;
@@ -38,7 +38,8 @@ void keep_farewell(FunctionContext& c, const std::string& name, Value* result) {
   }
 }
 
-// (place, func): one store, which no other access waits for and which stays where it is.
+// Arguments: (place, func). One volatile store that aliases nothing else, so it stays in place and delays no other
+// access.
 Value* enter(Values& values, const Call& e) {
   FunctionContext& c = values.c;
   llvm::StoreInst* store =
@@ -49,7 +50,7 @@ Value* enter(Values& values, const Call& e) {
 
 }  // namespace
 
-// (function, args...): function(context, args...).
+// (function, args...): calls function(context, args...).
 Value* runtime_call(Values& values, const Call& e) {
   FunctionContext& c = values.c;
   const auto* name = e.args[0].as<StringImm>();
@@ -61,11 +62,11 @@ Value* runtime_call(Values& values, const Call& e) {
     args.push_back(values.of(e.args[i]));
   }
   Value* result = c.call_runtime(name->value, llvm_type(c.e, e.type), args);
-  keep_farewell(c, name->value, result);
+  record_exit_call(c, name->value, result);
   return result;
 }
 
-// The bytes of the values as they lie in memory, without gaps.
+// Stores the values one after another, without padding, and returns their address.
 Value* pack(Values& values, const std::vector<Expr>& parts) {
   FunctionContext& c = values.c;
   int64_t bytes = 0;
@@ -82,8 +83,8 @@ Value* pack(Values& values, const std::vector<Expr>& parts) {
   return block;
 }
 
-// (address): a hint, and no access: the address may be anything.
-// A hint, which devices do without: others of their threads run while one waits for memory.
+// (address): a prefetch hint. It is not an access, so any address is valid. Devices ignore it: other threads run while
+// one waits for memory.
 Value* prefetch(Values& values, const Call& e) {
   FunctionContext& c = values.c;
   if (c.e.machine.is_device()) return c.b.getInt32(0);
@@ -92,7 +93,7 @@ Value* prefetch(Values& values, const Call& e) {
   return c.b.getInt32(0);
 }
 
-// (value, event, func, value index, parent, coordinates...): a halide_trace_event_t on the stack.
+// (value, event, func, value index, parent, coordinates...): builds a halide_trace_event_t on the stack.
 Value* trace(Values& values, const Call& e) {
   FunctionContext& c = values.c;
   constexpr size_t first_coordinate = 5;

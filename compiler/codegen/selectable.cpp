@@ -111,7 +111,7 @@ const std::vector<llvm::Intrinsic::ID>& selectable_intrinsics() {
 
 std::string find_unselectable(const llvm::Module& module) {
   for (const llvm::GlobalVariable& variable : module.globals()) {
-    // The block's memory comes with the launch.
+    // Shared memory is provided by the launch.
     const bool is_shared = variable.getAddressSpace() == 3;
     if (variable.isDeclaration() && !is_shared)
       return "a variable of the host: " + variable.getName().str();

@@ -1,5 +1,5 @@
-// selectable.h -- what LLVM's back end for NVPTX has instructions for. What it lacks ends the process
-// while instructions are selected, so modules are looked at before.
+// selectable.h -- lists what LLVM's NVPTX back end can select. Unsupported operations would abort the process during
+// instruction selection, so modules are checked first.
 #pragma once
 
 #include <llvm/IR/Intrinsics.h>
@@ -10,12 +10,12 @@
 
 namespace retrograde::codegen {
 
-// Intrinsics of any types that kernels use; test/unit/selectable_test.cpp compiles each of them.
+// Intrinsics that kernels may use, with any types; test/unit/selectable_test.cpp compiles each of them.
 const std::vector<llvm::Intrinsic::ID>& selectable_intrinsics();
 
-// The first thing in `module` that NVPTX does not select, or selects and gets wrong: fences, calls of what
-// the module has no code for, remainders of floats (quotients beyond 2^24 are rounded), atomics that are more
-// than relaxed (they become relaxed), floats of 16 bytes, variables of the host. Empty: there is none.
+// Describes the first thing in `module` that NVPTX cannot select or selects wrongly; empty if there is none. These are
+// fences, calls of functions that the module does not define, float remainders (wrong for quotients beyond 2^24),
+// atomics stronger than relaxed (they become relaxed), 16-byte floats, and the host's variables.
 std::string find_unselectable(const llvm::Module& module);
 
 }  // namespace retrograde::codegen

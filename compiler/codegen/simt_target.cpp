@@ -1,5 +1,5 @@
-// Kernels for the executor (runtime/gpu/gpu_image.h): a function of a thread and the memory of
-// arguments. Barriers are calls, and before each access stands one that tells of it.
+// Kernels for the simulated device (runtime/gpu/gpu_image.h). A kernel is a function that takes a thread and the memory
+// of its arguments. Barriers are calls, and a call before each access reports it.
 #include <llvm/Analysis/ValueTracking.h>
 #include <llvm/IR/IntrinsicInst.h>
 
@@ -21,7 +21,7 @@ class SimtTarget : public DeviceTarget {
                                   e.module);
   }
 
-  // Each at its natural alignment, in order.
+  // The arguments are packed in order, each at its natural alignment.
   std::vector<Value*> arguments(Emitter& e, llvm::Function* function,
                                 const std::vector<KernelParameter>& parameters) override {
     std::vector<Value*> values;
@@ -108,7 +108,7 @@ class SimtTarget : public DeviceTarget {
   void tell(Emitter& e, llvm::Function* function, llvm::Instruction& one, unsigned sites) {
     Value* pointer = pointer_of(one);
     const Value* memory = llvm::getUnderlyingObject(pointer, 0);
-    if (llvm::isa<llvm::AllocaInst>(memory)) return;  // a thread's own
+    if (llvm::isa<llvm::AllocaInst>(memory)) return;  // private to the thread
     const llvm::MDNode* site = one.getMetadata(sites);
     const auto number_of_site = [&] {
       return site ? static_cast<int>(llvm::mdconst::extract<llvm::ConstantInt>(site->getOperand(0))
@@ -116,7 +116,7 @@ class SimtTarget : public DeviceTarget {
                   : -1;
     };
     const auto* store = llvm::dyn_cast<llvm::StoreInst>(&one);
-    // The first look of a compare-and-swap is atomic, too.
+    // The first load of a compare-and-swap loop is atomic, too.
     const bool is_load = llvm::isa<llvm::LoadInst>(one) && !one.isAtomic();
     llvm::Type* type = store ? store->getValueOperand()->getType() : one.getType();
     if (const auto* update = llvm::dyn_cast<llvm::AtomicCmpXchgInst>(&one))
@@ -133,7 +133,7 @@ class SimtTarget : public DeviceTarget {
           number(e, number_of_site())});
   }
 
-  std::set<const Value*> own_, shared_;  // loads of what the executor hands over
+  std::set<const Value*> own_, shared_;  // loads of values that the simulated device passes in
 };
 
 }  // namespace

@@ -2,15 +2,15 @@
 
 #include <dlfcn.h>
 
-// A function of SLEEF, to keep the library loaded and to find it by.
+// Any function of SLEEF: the reference keeps the library loaded, and its address identifies the library.
 extern "C" float Sleef_expf_u10(float);
 
 namespace retrograde::codegen {
 namespace {
 
-// By the file that holds a known function: the process may have loaded us and SLEEF privately,
-// where a search of the whole process does not look. (Where the address is that of a jump inside a
-// program, that search does find it.)
+// Finds SLEEF by the file that contains a known function. The process may have loaded us and SLEEF with local scope,
+// which a global symbol search does not cover. If the address is that of a PLT entry in the program, the global search
+// does find it.
 void* sleef_library() {
   static void* const library = [] {
     Dl_info info;

@@ -17,10 +17,10 @@ struct Term {
   bool is_negative;
 };
 
-// Indices have a term or two for each dimension. What is beyond is one term.
+// Indices have one or two terms per dimension. Everything beyond this count is one term.
 constexpr size_t most_terms = 24;
 
-// An index as a sum, by what changes in a loop.
+// An index as a sum of terms, split by whether the loop changes them.
 struct Sum {
   std::vector<Term> fixed, changing;
   uint64_t constant = 0;
@@ -64,8 +64,8 @@ struct Address {
   Sum index;  // in elements
 };
 
-// A constant that LLVM has added to the start, and taken out of the loop with it, is one of the index
-// again: accesses side by side share their start.
+// LLVM may have added a constant to the start address and hoisted the addition out of the loop. This moves it back into
+// the index, so that adjacent accesses share their start.
 void move_constants(const llvm::DataLayout& layout, uint64_t element_bytes, Address& address) {
   for (;;) {
     const auto* outer = llvm::dyn_cast<llvm::GetElementPtrInst>(address.start);
@@ -88,8 +88,8 @@ Address parts_of(const llvm::GetElementPtrInst& access, const llvm::Loop& loop) 
   return address;
 }
 
-// Addresses in the loop whose index is a sum of what it changes, not by the same every time, and of
-// what it does not.
+// Finds addresses in the loop whose index sums loop-invariant terms and terms that the loop changes, but not by a
+// constant step.
 std::vector<llvm::GetElementPtrInst*> find_split(const llvm::Loop& loop,
                                                  llvm::ScalarEvolution& evolution) {
   std::vector<llvm::GetElementPtrInst*> found;

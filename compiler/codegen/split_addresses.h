@@ -1,17 +1,16 @@
-// split_addresses -- what a loop does not change of an address is added before the loop.
-// In:  IR after LICM: values that an innermost loop does not change stand outside of it.
+// split_addresses -- adds the loop-invariant parts of an address before the loop.
+// In:  IR after LICM: loop-invariant values of innermost loops are outside of them.
 // Out: the same addresses.
 //
 //   loop:  x = min(8 i + a, e)                  q = p + (b - c)
 //          load p[((x + b) - c) + 1]     =>     loop:  x = min(8 i + a, e)
 //                                                      load q[x + 1]
 //
-// Why: an index is a sum over dimensions, in their order. LLVM's code generator takes apart sums that
-// grow by the same in each iteration. Others stay as they were emitted, with an addition or two for
-// each access: those of a vector that ShiftInwards moves, and those that depend on data.
-// Source: folklore (reassociation by loop depth), for addresses alone: LLVM's own pass reorders all
-// integer arithmetic, and with it the sums and products that are instructions of the machine.
-#pragma once
+// Why: an index sums terms in the order of its dimensions. LLVM's code generator splits only sums that grow by a
+// constant step per iteration. Other sums stay as emitted and cost one or two additions per access: indices of vectors
+// that ShiftInwards moves, and data-dependent indices.
+// Source: folklore (reassociation by loop depth), restricted to addresses. LLVM's own pass reorders all integer
+// arithmetic and so breaks sums and products that match machine instructions.
 
 #include <llvm/IR/PassManager.h>
 

@@ -11,10 +11,10 @@
 namespace retrograde::codegen {
 namespace {
 
-// Instructions that take LLVM several times as long as starting a thread, handing them over and
-// setting LLVM up for them.
+// So many instructions take LLVM several times as long as starting a thread, transferring them and initialising LLVM
+// for them.
 constexpr unsigned worth_a_thread = 300;
-// Less of them is no part by itself.
+// Fewer instructions do not make a part on their own.
 constexpr unsigned small_function = 100;
 
 using PartOf = std::map<const llvm::GlobalValue*, unsigned>;
@@ -46,8 +46,8 @@ bool is_local_constant(const llvm::GlobalValue& value) {
   return variable && variable->isConstant() && variable->hasLocalLinkage();
 }
 
-// Other parts must find it, and nobody else. Numbers that LLVM would give what has no name differ
-// from part to part.
+// Makes the value visible to the other parts, and only to them. Unnamed values get a name here, because LLVM would
+// number them differently in each part.
 void share(llvm::GlobalValue& value) {
   if (!value.hasLocalLinkage()) return;
   if (!value.hasName()) value.setName("shared");
@@ -61,7 +61,7 @@ void erase_unused_constants(llvm::Module& module) {
   }
 }
 
-// With at least so many instructions.
+// Number of functions with at least `least` instructions.
 unsigned functions_of(const llvm::Module& module, unsigned least) {
   return static_cast<unsigned>(std::count_if(module.begin(), module.end(), [&](const auto& f) {
     return !f.isDeclaration() && f.getInstructionCount() >= least;

@@ -1,4 +1,4 @@
-// split_module.h -- one module as several, to be compiled at the same time.
+// split_module.h -- splits a module into several, which are compiled in parallel.
 #pragma once
 
 #include <functional>
@@ -10,16 +10,16 @@ class Module;
 
 namespace retrograde::codegen {
 
-// At most one a function.
+// At most one part per function.
 unsigned possible_parts(const llvm::Module& module, unsigned asked);
-// How many parts of this module are worth a thread each: at most `most`, and one for a small
-// module or one function among small ones.
+// Number of parts of this module that are worth a thread each, at most `most`. It is one for a small module, and for a
+// module with only one large function.
 unsigned worthwhile_parts(const llvm::Module& module, unsigned most);
 
-// Gives the bitcode of `parts` modules, at most one a function, which together are this one, each as
-// soon as it is made. Functions go where the least is, the largest first, so the same module always
-// splits in the same way. What was local becomes hidden; local constants are copied to where they
-// are used. The module's functions keep their bodies.
+// Splits the module into `parts` modules, at most one per function, and passes the bitcode of each to `use` as soon as
+// it is ready. The largest function goes first, each to the smallest part so far, so the same module always splits in
+// the same way. Local symbols become hidden; local constants are copied to their users. The module keeps its function
+// bodies.
 using UsePart = std::function<void(unsigned part, std::string bitcode)>;
 void split_into_bitcode(llvm::Module& module, unsigned parts, const UsePart& use);
 

@@ -1,4 +1,4 @@
-// Functions, loops, branches, allocations, assertions.
+// Code for functions, loops, branches, allocations and assertions.
 #include "codegen/access.h"
 #include "codegen/calls.h"
 #include "codegen/function_generator.h"
@@ -13,12 +13,12 @@ namespace retrograde::codegen {
 using namespace ir;
 
 namespace {
-// Threads of the pool have stacks of a few MB, and an iteration may wait on top of another.
+// Threads of the pool have stacks of a few MB, and a waiting iteration may run another one on top of its stack.
 struct StackLimit {
   int64_t block_bytes, function_bytes;
 };
-constexpr StackLimit free_choice{16 << 10, 128 << 10};  // of allocations that may go anywhere
-constexpr StackLimit asked_for{256 << 10, 512 << 10};   // of those that ask for the stack
+constexpr StackLimit free_choice{16 << 10, 128 << 10};  // allocations with MemoryType::Auto
+constexpr StackLimit asked_for{256 << 10, 512 << 10};   // allocations with MemoryType::Stack
 }  // namespace
 
 FunctionGenerator::FunctionGenerator(Emitter& emitter, const LoweredFunction& function,
@@ -54,8 +54,8 @@ void FunctionGenerator::generate() {
   auto* type = llvm::FunctionType::get(b_.getInt32Ty(), params, false);
   auto* function =
       llvm::Function::Create(type, llvm::GlobalValue::ExternalLinkage, source_.name, e_.module);
-  // Checks keep LLVM from fusing some products and sums, in one copy of a definition and not in another:
-  // threads that compute the same element would give different last bits.
+  // Access checks prevent LLVM from fusing products and sums in one copy of a definition but not in another. Threads
+  // that compute the same element would then differ in the last bits.
   const bool contracts = !e_.machine.target.has_feature(Target::StrictFloat) &&
                          !e_.machine.target.has_feature(Target::CheckedAccesses);
   const Contraction contraction(e_, contracts);
@@ -68,7 +68,7 @@ void FunctionGenerator::generate() {
   kernels_.finish();
 }
 
-// args[i] is the buffer, or points to the scalar.
+// args[i] is the buffer, or a pointer to the scalar.
 void FunctionGenerator::make_argv_wrapper(llvm::Function* function) {
   auto* type = llvm::FunctionType::get(b_.getInt32Ty(), {b_.getPtrTy(), b_.getPtrTy()}, false);
   auto* wrapper = llvm::Function::Create(type, llvm::GlobalValue::ExternalLinkage,
@@ -88,7 +88,7 @@ void FunctionGenerator::make_argv_wrapper(llvm::Function* function) {
 }
 
 void FunctionGenerator::make(const Assert& s) {
-  if (is_undef(s.error)) return;  // known to hold
+  if (is_undef(s.error)) return;  // proved to hold
   const MemoScope scope(c_.frame, false);
   Value* condition = values_.of(s.condition);
   c_.fail_unless(condition, [&] { return values_.of(s.error); });
@@ -137,7 +137,7 @@ void FunctionGenerator::statement(const Stmt& s) {
 }
 
 void FunctionGenerator::make(const LetStmt& s) {
-  // Chains of lets are long where bounds are computed: no recursion along them.
+  // No recursion along a chain of lets: bounds computations make long ones.
   const LetStmt* let = &s;
   for (;;) {
     {
@@ -164,7 +164,7 @@ void FunctionGenerator::make(const For& s) {
   }
 }
 
-// Counts in 64 bits, where nothing wraps; the body sees the variable in its own width.
+// Counts in 64 bits, in which nothing overflows; the body sees the variable in its own width.
 void FunctionGenerator::serial_loop(const For& s) {
   Value *min, *extent;
   {

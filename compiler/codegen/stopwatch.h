@@ -4,7 +4,7 @@
 
 namespace retrograde::codegen {
 
-// Seconds since the last reading.
+// Measures the seconds between calls of lap().
 class Stopwatch {
  public:
   double lap() {

@@ -53,7 +53,7 @@ void store_dense(FunctionContext& c, const Storage& to, Type type, Value* first,
   }
 }
 
-// In the order of the lanes, so that of equal indices the last lane stays.
+// Stores in lane order: if indices are equal, the last lane wins.
 void scatter(FunctionContext& c, const Storage& to, Type type, Value* indices, Value* stored,
              Value* predicate) {
   if (c.e.machine.has_avx512() && c.e.machine.gathers(type)) {

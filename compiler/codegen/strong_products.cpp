@@ -1,16 +1,15 @@
-// Sums with strong products, whose first factor decides: 0 * anything is 0. As they stand they take
-// a multiplication, a mask and an addition, for the mask keeps the two from fusing. Here they fuse:
+// Sums with strong products, in which a first factor of 0 makes the product 0 whatever the second is. Naively they take
+// a multiplication, a mask and an addition, because the mask keeps the other two from fusing. Here they fuse:
 //
-//   acc + strong_mul(a, b)  =  a != 0 ? fma(a, b, acc) : acc      one instruction under a mask
-//                           =  fma(a, a != 0 ? b : 0, acc)        where there are no masks
+//   acc + strong_mul(a, b)  =  a != 0 ? fma(a, b, acc) : acc      one masked instruction
+//                           =  fma(a, a != 0 ? b : 0, acc)        on machines without masks
 //
-// A factor that several products share is compared once. As for other products that fuse, the last
-// bit of the sum and the sign of a zero depend on the machine.
+// A factor that several products share is compared once. As for other products that fuse, the last bit of the sum and
+// the sign of a zero depend on the machine.
 //
-// Only what is added to a stored value fuses. A difference of two products of the same size, such as
-// the partials of a normalised vector, has to come out as an exact 0 where the two are equal: with one
-// of them unrounded, its rounding error would be left (Higham, Accuracy and Stability of Numerical
-// Algorithms, 2nd ed., section 2.6).
+// Only products that are added to a stored value fuse. A difference of two products of equal size, such as the partials
+// of a normalised vector, must be exactly 0 if the products are equal. If one of them were unrounded, its rounding
+// error would remain (Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., section 2.6).
 #include <llvm/IR/Intrinsics.h>
 
 #include "codegen/values.h"
@@ -21,7 +20,7 @@ using namespace ir;
 
 static const Call* as_strong_product(const Expr& e) { return as_op(e, Op::strong_mul); }
 
-// Whether `e` is a stored value, or a sum of one and strong products.
+// Whether `e` is a stored value, or the sum of one and strong products.
 static bool is_running_sum(const Expr& e) {
   if (e.as<Load>()) return true;
   const auto* sum = e.as<Binary>();

@@ -1,4 +1,4 @@
-// Our types in LLVM, and constants of them.
+// Maps our types to LLVM's, and makes constants of them.
 #include "codegen/emitter.h"
 #include "diagnostics/error.h"
 
@@ -9,7 +9,7 @@ void set_target(Emitter& e, llvm::Function* function) {
   function->addFnAttr("target-cpu", e.machine.cpu);
   function->addFnAttr("target-features", e.machine.features);
   if (!e.machine.tune_cpu.empty()) function->addFnAttr("tune-cpu", e.machine.tune_cpu);
-  // Vectors are as wide as the schedule says, whatever width the processor would prefer.
+  // Vectors are as wide as the schedule says, whatever width the processor prefers.
   const std::string bits = std::to_string(e.machine.vector_bits);
   function->addFnAttr("min-legal-vector-width", bits);
   function->addFnAttr("prefer-vector-width", bits);

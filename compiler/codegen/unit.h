@@ -1,4 +1,4 @@
-// unit.h -- a module on its way through LLVM: optimized, then written as bytes or text.
+// unit.h -- a module on its way through LLVM: it is optimized, then emitted as bytes or text.
 #pragma once
 
 #include <llvm/IR/LLVMContext.h>
@@ -17,19 +17,19 @@ namespace retrograde::codegen {
 std::string bitcode_of(const llvm::Module& module);
 std::string text_of(const llvm::Module& module);
 
-// Nothing in it is shared with another: units are worked on by different threads at once.
+// Units share no state, so different threads can work on different units.
 class Unit {
  public:
-  // Names of values cost time, and only people read them.
+  // Keeping value names costs time; they only help human readers of the IR.
   Unit(const Machine& machine, const std::string& name, bool keep_names);
   Unit(const Machine& machine, const std::string& name, const std::string& bitcode);
   llvm::Module& module() { return *module_; }
-  // To be called when the module is complete: how it is compiled depends on its length, also in parts.
+  // Call this when the module is complete, before it is split: its length decides how all its parts are compiled.
   void note_length();
 
   void optimize();
   std::string emit(Format format);
-  // Emitting changes the module: this must be the last that is asked for, and costs no copy.
+  // Emitting changes the module. This saves the copy, and must be the last call.
   std::string emit_last(llvm::CodeGenFileType type) { return emit(type, *module_); }
   std::vector<std::string> externals() const;  // sorted
 

@@ -1,4 +1,4 @@
-// Vectors of any number of lanes: slices, concatenations, shuffles, reductions.
+// Vectors with any number of lanes: slices, concatenations, shuffles, reductions.
 #include <algorithm>
 
 #include "codegen/emitter.h"
@@ -15,14 +15,14 @@ std::vector<int> sequence(int start, int count, int stride = 1) {
 
 bool is_power_of_two(int n) { return n > 0 && (n & (n - 1)) == 0; }
 
-// A scalar as a vector of one lane; vectors stay.
+// Turns a scalar into a vector of one lane; vectors are returned unchanged.
 Value* as_vector(Emitter& e, Value* value) {
   if (value->getType()->isVectorTy()) return value;
   auto* type = llvm::FixedVectorType::get(value->getType(), 1);
   return e.b.CreateInsertElement(llvm::PoisonValue::get(type), value, uint64_t{0});
 }
 
-// A vector of one lane as a scalar; others stay.
+// Turns a vector of one lane into a scalar; other vectors are returned unchanged.
 Value* as_scalar_if_single(Emitter& e, Value* value) {
   const auto* type = llvm::dyn_cast<llvm::FixedVectorType>(value->getType());
   return type && type->getNumElements() == 1 ? e.b.CreateExtractElement(value, uint64_t{0}) : value;
@@ -67,7 +67,7 @@ Value* slice(Emitter& e, Value* vector, int start, int lanes) {
 
 Value* concat(Emitter& e, std::vector<Value*> parts) {
   RETROGRADE_ASSERT(!parts.empty(), "concatenation of nothing");
-  // Pairwise, so that n parts take n - 1 shuffles of lengths that add up to n log n.
+  // Pairwise, so that n parts take n - 1 shuffles whose lengths add up to n log n.
   while (parts.size() > 1) {
     std::vector<Value*> joined;
     for (size_t i = 0; i + 1 < parts.size(); i += 2) {
@@ -111,9 +111,9 @@ Value* pick_lanes(Emitter& e, const std::vector<Value*>& vectors, const std::vec
 
 namespace {
 
-constexpr int chunk_bits = 128;  // instructions that unpack lanes do not look across this many
+constexpr int chunk_bits = 128;  // x86's unpack instructions work within chunks of this size
 
-// The lanes of two vectors by turns, within each chunk: of its lower half, or of its upper half.
+// Interleaves two vectors within each chunk, taking either the lower or the upper halves of the chunks.
 Value* unpack(Emitter& e, Value* a, Value* b, int chunk, bool upper) {
   const int lanes = lanes_of(a);
   const auto indices = ir::numbered(lanes, [&](int i) {
@@ -123,8 +123,8 @@ Value* unpack(Emitter& e, Value* a, Value* b, int chunk, bool upper) {
   return shuffle(e, a, b, indices);
 }
 
-// `rows` has a power of two many vectors, at most the lanes of a chunk. Lane by lane, chunk by chunk:
-// part k of n has in each chunk lanes k * chunk / n and on of that chunk of all rows, interleaved.
+// `rows` has a power of two of vectors, at most as many as a chunk has lanes. Result k of n holds, in each chunk, lanes
+// from k * chunk / n on of that chunk of all rows, interleaved.
 std::vector<Value*> interleave_chunks(Emitter& e, const std::vector<Value*>& rows, int chunk) {
   if (rows.size() == 1) return rows;
   std::vector<Value*> even, odd, result;
@@ -136,8 +136,8 @@ std::vector<Value*> interleave_chunks(Emitter& e, const std::vector<Value*>& row
   return result;
 }
 
-// The chunks of all vectors in a row, as a matrix with a row for each vector, transposed: as often as
-// a vector's chunks can be halved, the even chunks of all come before the odd ones.
+// Transposes the matrix whose rows are the vectors and whose elements are chunks. Each step halves the vectors: the
+// even chunks of all vectors come before the odd ones.
 std::vector<Value*> transpose_chunks(Emitter& e, std::vector<Value*> vectors, int chunk) {
   const int lanes = lanes_of(vectors[0]);
   for (int step = chunk; step < lanes && vectors.size() > 1; step *= 2) {
@@ -154,9 +154,8 @@ std::vector<Value*> transpose_chunks(Emitter& e, std::vector<Value*> vectors, in
   return vectors;
 }
 
-// Rows that are at least as many as their lanes, both powers of two: a matrix is transposed within
-// the chunks of registers first and by whole chunks then. Each step has an instruction without a
-// table of indices, where lanes that cross chunks would need one.
+// Whether to transpose first within chunks and then by whole chunks. There must be at least as many rows as lanes, both
+// powers of two. Each step then has an instruction without an index table, which lanes that cross chunks would need.
 bool is_transposed_by_chunks(int rows, int lanes, int chunk) {
   return chunk > 1 && is_power_of_two(rows) && is_power_of_two(lanes) && lanes >= chunk &&
          rows >= lanes;
@@ -184,7 +183,7 @@ Value* interleave_by_chunks(Emitter& e, const std::vector<Value*>& rows, int chu
 
 }  // namespace
 
-// By halves while their number is even: unpack instructions do pairs, and nothing does more.
+// Splits into halves while their number is even: unpack instructions take pairs, and no instruction takes more.
 Value* interleave(Emitter& e, const std::vector<Value*>& vectors) {
   const int count = static_cast<int>(vectors.size()), lanes = lanes_of(vectors[0]);
   if (count == 1) return vectors[0];
@@ -232,8 +231,8 @@ Value* from_lanes(Emitter& e, const std::vector<Value*>& scalars) {
   return result;
 }
 
-// While a group has an even size, its lanes combine in pairs: to one group by halves of the vector,
-// to several by even and odd lanes. An odd rest combines lane by lane.
+// While a group has an even size, its lanes combine in pairs: halves of the vector if one group results, even and odd
+// lanes if several. The remaining odd size combines lane by lane.
 Value* reduce_groups(Emitter& e, Value* vector, int lanes, const Combine& combine) {
   int total = lanes_of(vector);
   RETROGRADE_ASSERT(lanes >= 1 && total % lanes == 0, "reduction of ", total, " lanes to ", lanes);

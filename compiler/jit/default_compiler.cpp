@@ -1,5 +1,4 @@
-// default_compiler.cpp -- what the front end's realize() reaches: lowering, then machine code in
-// this process.
+// default_compiler.cpp -- implements the front end's realize(): lowers the pipeline and compiles it in this process.
 #include <HalideRuntime.h>
 
 #include "autoschedule/choose_schedule.h"
@@ -13,7 +12,7 @@
 namespace retrograde {
 namespace {
 
-// The runtime's handlers get the context back: it stands first in this.
+// The state of a call. The runtime's handlers get the context, which is its first member, and find the rest from it.
 struct CallState {
   retrograde_context context = {};
   CallContext* caller = nullptr;
@@ -22,7 +21,7 @@ struct CallState {
 CallState& state_of(retrograde_context* context) { return *reinterpret_cast<CallState*>(context); }
 CallContext& caller_of(retrograde_context* context) { return *state_of(context).caller; }
 
-// The first one of a call: it is the cause of the others.
+// Keeps a call's first error: it causes the others.
 void keep_error(retrograde_context* context, int, const char* message) {
   if (std::string& error = caller_of(context).error; error.empty()) error = message;
 }
@@ -46,7 +45,7 @@ int32_t hand_on_trace(retrograde_context* context, const halide_trace_event_t* e
   return caller.handlers.custom_trace(caller.user_context, event);
 }
 
-// A task of the runtime's in the form of a handler's: what it needs stands in its closure.
+// Adapts a task of the runtime to the form that user handlers take.
 struct WrappedTask {
   retrograde_context* context;
   retrograde_task task;
@@ -139,7 +138,7 @@ class JitPipeline : public CompiledPipeline {
   }
 
  private:
-  // For copies to a device.
+  // Marks the host copies of outputs as dirty, so that a later use on a device copies them.
   void mark_written(void* const* argv) const {
     for (size_t i = 0; i < arguments_.size(); i++) {
       if (arguments_[i].kind != ir::LoweredArgument::Kind::OutputBuffer) continue;
@@ -149,9 +148,9 @@ class JitPipeline : public CompiledPipeline {
   }
 
   const std::vector<ir::LoweredArgument> arguments_;
-  const jit::ExternPipelines called_;  // by the code
+  const jit::ExternPipelines called_;  // called by the code
   const std::shared_ptr<const jit::CompiledFunction> code_;
-  const bool is_profiled_;  // then every call tells of its profile
+  const bool is_profiled_;  // if set, every call reports its profile
   const bool writes_on_host_;
 };
 

@@ -49,12 +49,12 @@ Bytes hmac(const Bytes& key, const Bytes& data) {
 
 Bytes number(uint64_t value) { return {reinterpret_cast<const char*>(&value), sizeof value}; }
 
-// The key of the folder's MACs, made by whoever comes first.
+// The key of the folder's MACs. The first process to use the folder creates it.
 Bytes folder_key(const PrivateFolder& folder) {
   for (int attempt = 0; attempt < 3; attempt++) {
     const std::optional<Bytes> found = folder.read("key", max_entry_bytes);
     if (found && found->size() == digest_bytes) return *found;
-    if (folder.contains("key")) folder.remove("key");  // not as it was written
+    if (folder.contains("key")) folder.remove("key");  // damaged
     Bytes fresh(digest_bytes, 0);
     if (getrandom(fresh.data(), fresh.size(), 0) != static_cast<ssize_t>(fresh.size())) break;
     folder.write("key", fresh, false);
@@ -63,7 +63,7 @@ Bytes folder_key(const PrivateFolder& folder) {
              "the key of its entries cannot be written there", "Name another folder");
 }
 
-// ---- entries: magic, key, name, object, MAC of all that ----
+// ---- entries: magic, key, name, object, and a MAC over all of these ----
 
 Bytes pack(const std::string& key, const CachedObject& entry) {
   return magic + key + number(entry.function.size()) + entry.function +
@@ -149,7 +149,7 @@ class FolderCache : public DiskCache {
   }
 
  private:
-  // Other processes may add and remove at the same time: the folder itself says what there is.
+  // Reads the folder, because other processes may add and remove files at the same time.
   std::vector<FileInFolder> list() const {
     return folder_.list([](const std::string& name) {
       const bool is_left_over = name.compare(0, 4, "tmp.") == 0;
@@ -157,7 +157,7 @@ class FolderCache : public DiskCache {
     });
   }
 
-  // Removes those that were not used for longest, down to nine tenths, so that it is rare.
+  // Removes the least recently used entries, down to nine tenths of the limit, so that it happens rarely.
   void shrink() {
     std::vector<FileInFolder> files = list();
     std::sort(files.begin(), files.end(), [](const FileInFolder& a, const FileInFolder& b) {
@@ -176,13 +176,13 @@ class FolderCache : public DiskCache {
   const Bytes mac_key_;
   const int64_t max_bytes_;
   std::mutex mutex_;
-  int64_t held_;  // by what is known here
+  int64_t held_;  // according to this process
   std::atomic<size_t> hits_{0}, misses_{0}, rejected_{0}, written_{0}, removed_{0};
 };
 
-// ---- what machine code depends on ----
+// ---- inputs of the key ----
 
-// Another build of the compiler is another file.
+// Another build of the compiler is a different file, so the file's identity is part of the key.
 Bytes compiler_build() {
   static const Bytes build = [] {
     Dl_info info;
@@ -195,7 +195,7 @@ Bytes compiler_build() {
   return build;
 }
 
-// Millions of bytes.
+// In millions of bytes.
 int64_t bytes_from_environment() {
   const char* text = std::getenv("RETROGRADE_CACHE_MB");
   if (!text || !*text) return default_compile_cache_bytes;

@@ -26,7 +26,7 @@ bool is_literal(const LoweredArgument& arg) {
   return parameter && parameter->is_literal;
 }
 
-// Images, then Params, then literal Buffers, each by name.
+// Sorts images first, then Params, then literal Buffers, each by name.
 std::vector<LoweredArgument> in_order(std::vector<LoweredArgument> args) {
   const auto key = [](const LoweredArgument& arg) {
     return std::make_tuple(is_literal(arg), !arg.is_buffer(), arg.name);
@@ -81,8 +81,8 @@ class CallRewriter : public ir::Rewriter {
         Handle(), ir::make_uint_const(UInt(64), reinterpret_cast<uint64_t>(literal.buffer)));
   }
 
-  // What the caller gives stands for all arguments but the literal Buffers, and may leave out the
-  // user context.
+  // The caller's arguments are all of the pipeline's arguments except literal Buffers. They may leave out the user
+  // context.
   static Expr with_context(const ir::Call& call, const ExternPipeline& pipeline) {
     const size_t taken =
         static_cast<size_t>(std::ranges::count_if(pipeline.arguments, std::not_fn(is_literal)));

@@ -1,6 +1,6 @@
-// The function as a stream of numbers: every expression node gets a number when its children have
-// theirs, and is written once as its kind, contents and the children's numbers, so shared nodes
-// cost nothing. Names are numbered by first appearance.
+// Writes the function as a stream of numbers. Every expression node gets a number after its children and is written
+// once, as its kind, its contents and its children's numbers; so shared nodes cost nothing. Names are numbered by first
+// appearance.
 #include "jit/fingerprint.h"
 
 #include <bit>
@@ -36,7 +36,7 @@ struct Words {
   }
 };
 
-// Into a Fingerprint or into Words.
+// Writes into a Fingerprint or into Words.
 template <typename Result>
 class Writer {
  public:

@@ -1,5 +1,5 @@
-// A 128-bit key of what a lowered function computes. Equal keys mean the same program up to the
-// names of variables and the number at the end of allocations' names.
+// A 128-bit key of what a lowered function computes. Functions with equal keys differ at most in names of variables and
+// in the number at the end of allocation names.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ struct Fingerprint {
 };
 
 Fingerprint fingerprint(const ir::LoweredFunction& function);
-// All that the fingerprint is made of, for a stronger hash.
+// The complete input of the fingerprint, for use with a stronger hash.
 std::string fingerprint_text(const ir::LoweredFunction& function);
 
 }  // namespace retrograde::jit

@@ -1,4 +1,4 @@
-// Compile, link, remember.
+// Compiles, links and caches lowered functions.
 #include "jit/jit.h"
 
 #include <chrono>
@@ -23,7 +23,7 @@
 namespace retrograde::jit {
 namespace {
 
-// The names of its launches, in the order of their kernels.
+// The names of its launches, in the order of its kernels.
 std::vector<std::string> launches_of(const ir::LoweredFunction& function) {
   std::vector<std::string> names;
   ir::walk(function.body, [&](const ir::Launch& n) { names.push_back(n.name); });
@@ -61,7 +61,7 @@ class Compiled : public CompiledFunction {
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     tell_pass_observers({function.name, "link", times_.link_seconds, {}});
   }
-  // What devices hold of it goes before its code does.
+  // Devices drop what they have loaded of the function before its code is unmapped.
   ~Compiled() override {
     if (kernels_) retrograde_gpu_forget_kernels(kernels_);
   }
@@ -108,7 +108,7 @@ struct KeyHash {
   size_t operator()(const Fingerprint& key) const { return key.low; }
 };
 
-// The most recently used function stands first.
+// A least-recently-used cache; the most recent function is first.
 class Cache {
  public:
   Handle find(const Fingerprint& key) {
@@ -123,7 +123,7 @@ class Cache {
     return found->second->second;
   }
 
-  // The function that is kept: another thread may have been faster.
+  // Returns the function that the cache keeps: another thread may have compiled it first.
   Handle insert(const Fingerprint& key, Handle function) {
     const std::lock_guard lock(mutex_);
     if (const auto* found = ir::find_or_null(index_, key)) return (*found)->second;
@@ -182,7 +182,7 @@ Fingerprint key_of(const ir::LoweredFunction& function, const codegen::Options& 
   return key;
 }
 
-// What one call reports, and where its prints go.
+// Where one call reports its error and its prints.
 struct CallState {
   std::string error;
   const CallOptions& options;

@@ -15,7 +15,7 @@ void offer(const retrograde_assembler_request* request,
     const std::optional<std::string> image = kernel_image(
         {request->ptx, request->ptx_bytes}, request->capability, request->driver_version);
     if (image) use(closure, image->data(), image->size());
-  } catch (...) {  // a folder that is no cache, no memory: the driver compiles
+  } catch (...) {  // no usable cache folder, or no memory: the driver compiles the kernel
   }
 }
 

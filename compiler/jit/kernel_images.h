@@ -1,6 +1,5 @@
-// kernel_images.h -- machine code of kernels, kept in the compile cache from one run of a program to the
-// next: what ptxas makes of PTX for a chip. Without a cache folder or without ptxas there is none, and the
-// driver compiles.
+// kernel_images.h -- keeps machine code of kernels in the compile cache between runs of a program. ptxas makes it from
+// PTX for one chip. Without a cache folder or without ptxas there is none, and the driver compiles the PTX.
 #pragma once
 
 #include <optional>
@@ -8,11 +7,11 @@
 
 namespace retrograde::jit {
 
-// Of the cache's entry for this text, chip (90: compute capability 9.0) and version of the driver; else
-// assembled now, and kept.
+// Returns the cached image for this text, chip (90 means compute capability 9.0) and driver version, or assembles and
+// caches it. Nothing if there is no cache or no ptxas.
 std::optional<std::string> kernel_image(const std::string& ptx, int capability, int driver_version);
 
-// The runtime asks for such images before it loads kernels of functions that were compiled here.
+// Makes the runtime ask for such images before it loads kernels of functions compiled here.
 void offer_kernel_images();
 
 }  // namespace retrograde::jit

@@ -1,6 +1,6 @@
-// One execution session an object: nothing is shared between functions, and destroying a function
-// is destroying its session. JITLink's memory manager maps pages for writing, then protects them;
-// no page is ever both.
+// Links each object in an execution session of its own, so that functions share nothing and destroying a session
+// destroys its function. JITLink's memory manager maps pages writable and then protects them; no page is writable and
+// executable at once.
 #include "jit/linker.h"
 
 #include <llvm/ExecutionEngine/JITLink/JITLinkMemoryManager.h>
@@ -29,7 +29,7 @@ void checked(llvm::Error error, const char* what) {
   if (error) internal_error(std::string(what) + ": " + llvm::toString(std::move(error)));
 }
 
-// The object itself, or the members of an archive.
+// The object itself, or the members if it is an archive.
 std::vector<llvm::MemoryBufferRef> objects_in(llvm::MemoryBufferRef bytes) {
   if (!bytes.getBuffer().starts_with("!<arch>")) return {bytes};
   const auto archive = checked(llvm::object::Archive::create(bytes), "reading an archive");
@@ -114,7 +114,7 @@ class Linked : public LinkedObject {
     }
   }
 
-  // What no part defines.
+  // Defines the symbols that no part defines.
   void define_externals(const Symbols& symbols, const std::string& name, const Externs& externs) {
     llvm::orc::SymbolMap addresses;
     for (const std::string& symbol : symbols.undefined) {

@@ -1,4 +1,4 @@
-// An object file, or an archive of several, brought into executable memory by LLVM's JITLink.
+// Loads an object file, or an archive of object files, into executable memory through LLVM's JITLink.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
-// A folder of files that belongs to the user alone (mode 0700), and everything in it too.
+// A folder that, with all its files, belongs to the user alone (mode 0700).
 //
-// Everything happens relative to the folder that was checked, whatever its path means later. Links
-// are not followed.
+// All operations are relative to the open folder that was checked, even if its path later names another one. Symbolic
+// links are not followed.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace retrograde::jit {
 
-// An open file, closed at the end.
+// An open file descriptor, closed on destruction.
 class Descriptor {
  public:
   explicit Descriptor(int fd) : fd_(fd) {}
@@ -29,23 +29,23 @@ class Descriptor {
 struct FileInFolder {
   std::string name;
   int64_t bytes = 0;
-  int64_t used = 0;  // when it was last written or touched: nanoseconds since 1970
+  int64_t used = 0;  // last written or touched, in nanoseconds since 1970
 };
 
 class PrivateFolder {
  public:
-  // Makes it when it is missing. CompileError, saying that `asked` cannot be done in it, when it
-  // cannot be made or is not the user's own and nobody else's.
+  // Creates the folder if it is missing. If that fails, or the folder is not private to the user, throws CompileError
+  // that says `asked` cannot be done.
   PrivateFolder(const std::string& path, const std::string& asked);
 
-  // Nothing when it is not there, larger than `max_bytes`, or no plain file of this user's alone.
+  // Nothing if the file is missing, larger than `max_bytes`, or not a plain file that only this user owns.
   std::optional<std::string> read(const std::string& name, int64_t max_bytes) const;
   bool contains(const std::string& name) const;
   void remove(const std::string& name) const;
-  // Says that the file was used now.
+  // Sets the file's time of last use to now.
   void touch(const std::string& name) const;
-  // `replaces`: takes the place of a file of that name; else it loses to one. Others see all of it
-  // or nothing. Until then it is a file "tmp....".
+  // `replaces`: whether to overwrite an existing file of that name; if not, the existing file stays. Other processes
+  // see the complete file or none; until then it is named "tmp....".
   bool write(const std::string& name, const std::string& data, bool replaces) const;
 
   std::vector<FileInFolder> list(const std::function<bool(const std::string&)>& takes) const;

@@ -26,7 +26,7 @@ bool is_program(const fs::path& path) {
   return access(path.c_str(), X_OK) == 0 && !fs::is_directory(path);
 }
 
-// A folder that vanishes with what is in it. Empty path: there is none.
+// A folder that is deleted with its contents on destruction. Its path is empty if it could not be made.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -60,10 +60,10 @@ std::string read_to_end(int fd) {
 
 struct Run {
   bool succeeded = false;
-  std::string told;  // on both streams
+  std::string told;  // output on both streams
 };
 
-// No shell: names may hold anything.
+// Runs without a shell, because names may contain any character.
 Run run(std::vector<std::string> words) {
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0) return {false, "no pipe could be made"};

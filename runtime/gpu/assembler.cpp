@@ -24,7 +24,7 @@ void load(void* closure, const void* code, size_t) {
 
 }  // namespace
 
-// Whatever fails on the way, the PTX is still there.
+// If any step fails, the driver still has the PTX to compile.
 bool load_assembled(const Session& session, const char* ptx, uint64_t bytes, Module& module) {
   const retrograde_assembler assemble = assembler.load();
   const Driver& driver = session.driver();

@@ -1,8 +1,8 @@
-// Buffers on devices: memory, and copies where the dirty bits ask for them.
+// Buffers on devices: their memory, and the copies that their dirty bits require.
 //
-// `device` of a buffer is the address of the element of the smallest coordinates, as `host` is, so that
-// strides mean the same in both. A buffer keeps its device memory and its dirty bits when a call fails,
-// unless the call was to free it: what is newest stays where it is.
+// A buffer's `device` is the address of the element with the smallest coordinates, like `host`, so strides mean the
+// same in both. If a call fails, the buffer keeps its device memory and dirty bits, except in calls that free it: the
+// newest data stay where they are.
 #include <array>
 
 #include "gpu/copies.h"
@@ -13,13 +13,13 @@
 namespace retrograde::runtime {
 namespace {
 
-// Threads that share a buffer copy it once: its locks, by its address.
+// A lock for each buffer, chosen by its address, so that threads that share a buffer copy it once.
 std::mutex& lock_of(const halide_buffer_t* buffer) {
   static std::array<std::mutex, 64>& locks = *new std::array<std::mutex, 64>;
   return locks[(reinterpret_cast<uintptr_t>(buffer) >> 4) % locks.size()];
 }
 
-// ---- what must hold of a buffer ----
+// ---- requirements on a buffer ----
 
 int32_t check_there(const Request& request, const halide_buffer_t* buffer) {
   return buffer ? 0
@@ -76,7 +76,7 @@ int32_t allocate(const Request& request, halide_buffer_t& buffer) {
   return 0;
 }
 
-// Base of the block that the address is in; 0: none.
+// Base of the block that contains the address; 0 if there is none.
 Address base_of(Address address) {
   Devices& known = devices();
   const std::lock_guard lock(known.mutex);
@@ -84,7 +84,7 @@ Address base_of(Address address) {
   return block ? block->base : 0;
 }
 
-// Whatever the buffer's shape has become: its strides may be other ones than when it was allocated.
+// Ignores the buffer's shape: its strides may have changed since the allocation.
 int32_t free_memory(const Request& request, halide_buffer_t& buffer) {
   if (buffer.device == 0 && !buffer.device_interface) return 0;
   if (const int32_t code = check_ours(request, buffer)) return code;
@@ -116,10 +116,10 @@ int32_t refuse_in_capture(const Session& session) {
       "Copy inputs to the device before the capture, and results to the host after launches");
 }
 
-// The driver has read pageable memory when it returns; memory that is locked to its pages it reads
-// later, when the caller may have changed it.
+// The driver has read pageable memory when a copy call returns. It reads page-locked memory later, when the caller may
+// have changed it; so wait for it.
 int32_t wait_for_locked_memory(const Session& session, const void* host) {
-  // The form for several attributes: memory that the driver does not know is no error for it.
+  // This form for several attributes does not fail for memory that the driver does not know.
   unsigned type = 0;
   const int attribute = pointer_memory_type;
   void* value = &type;
@@ -179,7 +179,7 @@ int32_t copy_to_host(const Request& request, halide_buffer_t& buffer) {
   return code;
 }
 
-// One of the functions above, under the buffer's lock.
+// Runs one of the functions above under the buffer's lock.
 template <typename Work>
 int32_t locked(const Request& request, halide_buffer_t* buffer, Work work) {
   if (const int32_t code = check_there(request, buffer)) return code;

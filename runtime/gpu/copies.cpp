@@ -1,5 +1,5 @@
-// From boxes of elements to calls of the driver: dense parts are joined, the next dimension goes to the
-// driver's two-dimensional copy, those outside of it are loops.
+// Translates box copies to calls of the driver: contiguous dimensions are merged, the next dimension goes to the
+// driver's two-dimensional copy, and outer dimensions become loops.
 #include "gpu/copies.h"
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace {
 
 constexpr int64_t max_pitch = 0x7fffffff;
 
-// Counts up in both sides, and every element once.
+// Reverses a dimension whose destination stride is negative.
 void normalize(Copy& copy, Copy::Dimension& dim) {
   if (dim.to_stride >= 0) return;
   copy.from += (dim.extent - 1) * dim.from_stride;
@@ -157,7 +157,7 @@ bool plan_copy(const halide_buffer_t& from, Place from_place, const halide_buffe
   for (int d = 0; d < to.dimensions; d++) {
     const halide_dimension_t &source = from.dim[d], &target = to.dim[d];
     if (target.extent <= 0) return false;
-    // All elements of a dimension without a stride are one.
+    // All elements of a dimension with stride 0 on both sides are the same element.
     if (target.extent == 1 || (source.stride == 0 && target.stride == 0)) continue;
     Copy::Dimension dim = {target.extent, source.stride * element, target.stride * element};
     normalize(copy, dim);

@@ -13,7 +13,8 @@ namespace {
 
 constexpr size_t smallest_bytes = 512;
 
-// Eight sizes for each power of two: requests that differ little share blocks, an eighth is wasted.
+// There are eight sizes between consecutive powers of two: similar requests share blocks, and at most an eighth is
+// wasted.
 size_t size_class(size_t bytes) {
   if (bytes <= smallest_bytes) return smallest_bytes;
   size_t step = smallest_bytes;
@@ -28,15 +29,15 @@ void* user_context_of(const Request& request) {
   return request.caller ? request.caller->user_data : nullptr;
 }
 
-// ---- blocks that are kept ----
+// ---- unused blocks of the pool ----
 
 bool is_ready_for(const Block& block, Stream stream) {
   return block.uses == Block::Uses::none ||
          (block.uses == Block::Uses::one_stream && block.stream == stream);
 }
 
-// The newest one that needs no waiting, for its memory is likeliest to be in a cache; else one that
-// does, unless a capture forbids it.
+// Prefers the newest block that can be used without waiting, because its memory is most likely cached. Otherwise
+// returns one that requires waiting, unless the stream is being captured.
 std::vector<Block>::iterator find_unused(DeviceState& device, size_t bytes, Stream stream,
                                          uint64_t capture) {
   auto found = device.unused.end();
@@ -59,7 +60,8 @@ void keep(Devices& known, const Block& block) {
   known.live.erase(block.base);
 }
 
-// A block of the pool becomes live; base 0: there is none. `must_wait`: for the device, before use.
+// Makes a block of the pool live; base 0 if there is none. `must_wait`: whether the device must be waited for before
+// use.
 Block reuse(DeviceState& device, size_t bytes, Stream stream, uint64_t capture, bool& must_wait) {
   Devices& known = devices();
   const std::lock_guard lock(known.mutex);
@@ -74,7 +76,7 @@ Block reuse(DeviceState& device, size_t bytes, Stream stream, uint64_t capture, 
   return block;
 }
 
-// After the device was waited for.
+// Call this after waiting for the device.
 void forget_uses(Address base) {
   Devices& known = devices();
   const std::lock_guard lock(known.mutex);
@@ -100,9 +102,9 @@ int32_t reuse_block(const Session& session, size_t bytes, uint64_t capture, Addr
   return 0;
 }
 
-// ---- blocks of the driver's ----
+// ---- blocks from the driver ----
 
-// Which unused blocks are given back. Those of graphs are in use whenever the graph is launched.
+// Selects unused blocks to free. Blocks of a graph are in use whenever the graph is launched.
 enum class Which { not_of_graphs, all };
 
 bool pop_unused(DeviceState& device, size_t keep_bytes, Which which, Block& block) {
@@ -123,13 +125,12 @@ void push_unused(const Block& block) {
   block.device->unused_bytes += block.bytes;
 }
 
-// Frees the oldest until no more than `keep_bytes` are unused. cuMemFree waits for work that uses the
-// memory.
+// Frees the oldest blocks until at most `keep_bytes` are unused. cuMemFree waits for work that uses the memory.
 int32_t shrink_unused(const Session& session, size_t keep_bytes, Which which) {
   Block block;
   while (pop_unused(session.device(), keep_bytes, which, block)) {
     const Result result = session.driver().cuMemFree_v2(block.base);
-    if (loses_context(result)) continue;  // and with it its memory
+    if (loses_context(result)) continue;  // its memory is lost too
     if (result != success) {
       push_unused(block);
       return session.failed("cuMemFree_v2", result);
@@ -138,8 +139,8 @@ int32_t shrink_unused(const Session& session, size_t keep_bytes, Which which) {
   return 0;
 }
 
-// While it lives, the calling thread may call what a capture of a graph forbids otherwise, for fear that
-// the graph would want it again: memory that stays is there for each launch.
+// During its lifetime, the calling thread may make calls that a graph capture otherwise forbids because the graph would
+// have to repeat them. Allocations are safe: the memory stays for every launch.
 class RelaxedCapture {
  public:
   RelaxedCapture(const Session& session, bool is_wanted) : session_(session) {
@@ -165,7 +166,7 @@ int32_t new_block(const Session& session, size_t bytes, uint64_t capture, Addres
   if (relaxed.result() != success)
     return session.failed("cuThreadExchangeStreamCaptureMode", relaxed.result());
   Result result = session.driver().cuMemAlloc_v2(&base, bytes);
-  // To free memory would wait for work on it, and a capture may not wait.
+  // Freeing memory would wait for work on it, and a capture may not wait.
   if (result == out_of_memory && session.device().unused_bytes > 0 && capture == 0) {
     if (const int32_t code = shrink_unused(session, 0, Which::not_of_graphs)) return code;
     result = session.driver().cuMemAlloc_v2(&base, bytes);
@@ -183,7 +184,7 @@ int32_t make_live(const Session& session, const Block& block) {
   const std::lock_guard lock(known.mutex);
   try {
     known.live.emplace(block.base, block);
-    // Room for all that is live, so that a release never fails.
+    // Reserve space for all live blocks, so that releasing a block never fails.
     session.device().unused.reserve(known.live.size() + session.device().unused.size());
     return 0;
   } catch (const std::bad_alloc&) {
@@ -232,7 +233,7 @@ int32_t allocate_of_caller(const Session& session, size_t bytes,
   return make_live(session, block);
 }
 
-// ---- the end of a block's life ----
+// ---- releasing blocks ----
 
 int32_t free_now(const Request& request, const Block& block) {
   Session session(request);
@@ -243,7 +244,7 @@ int32_t free_now(const Request& request, const Block& block) {
   }
   const bool is_freed = code == 0;
   code = session.close(code);
-  // What could not be freed is tried again with the next allocation.
+  // A block that could not be freed returns to the pool; the next allocation tries again.
   if (!is_freed) push_unused(block);
   return code;
 }
@@ -316,7 +317,7 @@ Context context_of_memory(Address address) {
 
 namespace {
 
-// True when the device must be waited for before the stream uses the block.
+// Returns true if the device must be waited for before the stream uses the block.
 bool add_use(Address address, Stream stream, bool waited, bool& is_elsewhere,
              const DeviceState& device) {
   Devices& known = devices();

@@ -43,7 +43,7 @@ int32_t device_of_number(const Request& request, const Driver& driver, int numbe
 
 }  // namespace
 
-// Never destroyed: threads may still be in here when the process ends.
+// Never destroyed: threads may still use it when the process exits.
 Devices& devices() {
   static Devices& known = *new Devices;
   return known;
@@ -64,7 +64,7 @@ int32_t primary_context(const Request& request, const Driver& driver, int number
     context = retained->context;
     return 0;
   }
-  known.all.emplace_back();  // first, so that nothing can fail once the context is retained
+  known.all.emplace_back();  // first, so that nothing can fail after the context is retained
   DeviceState& state = known.all.back();
   int32_t code = look_at_device(request, driver, device, state);
   if (code == 0) {

@@ -1,4 +1,4 @@
-// Opening the driver.
+// Opens the CUDA driver library.
 #include "gpu/driver.h"
 
 #include <dlfcn.h>
@@ -22,7 +22,7 @@ struct Library {
   }
 };
 
-// The folder of the file that holds this code, with a slash behind it.
+// The folder of the file that contains this code, with a trailing slash.
 std::string own_folder() {
   Dl_info info;
   if (!dladdr(reinterpret_cast<void*>(&open_driver), &info) || !info.dli_fname) return "";
@@ -39,7 +39,7 @@ void* load_simulated() {
   return dlopen(name, RTLD_NOW);
 }
 
-// False after an error that was told.
+// Returns false after reporting an error.
 bool load(const Request& request, Library& library) {
   const char* chosen = std::getenv("RETROGRADE_GPU");
   if (!chosen || !*chosen || std::strcmp(chosen, "cuda") == 0) {
@@ -69,7 +69,7 @@ void look_up(const Library& library, const char* name, F*& function, const char*
   if (!function) missing = name;
 }
 
-// The name of a function that the library lacks, or null.
+// The name of a function that the library lacks; null if it has all.
 const char* fill(const Library& library, Driver& driver) {
   const char* missing = nullptr;
 #define RETROGRADE_DRIVER(symbol, parameters) look_up(library, #symbol, driver.symbol, missing);

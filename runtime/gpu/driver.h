@@ -1,6 +1,6 @@
-// CUDA's driver, opened at run time: the real one, or with RETROGRADE_GPU=simulated in the environment
-// the simulated one (simt_driver.h), which has the same functions. Which one is chosen, never guessed:
-// where the real one is missing, calls fail and say so.
+// The CUDA driver, opened at run time. RETROGRADE_GPU=simulated in the environment selects the simulated device
+// (simt_driver.h), which has the same functions. The choice is never guessed: if the real driver is missing, calls fail
+// and say so.
 #pragma once
 
 #include "gpu/driver_types.h"
@@ -17,9 +17,9 @@ struct Driver {
   bool is_simulated = false;
 };
 
-// Opened and initialized with the first call that succeeds; null after an error, which was told.
+// Opens and initialises the driver on the first call that succeeds; null after an error, which is reported.
 const Driver* open_driver(const Request&);
-// The same if it is open, else null.
+// The driver if it is open, else null.
 const Driver* driver_if_open();
 
 }  // namespace retrograde::runtime

@@ -1,5 +1,5 @@
-// The types and numbers of CUDA's driver API that the runtime uses, by its published ABI: nothing of
-// CUDA's headers is wanted to build.
+// Types and constants of CUDA's driver API, according to its published ABI. So building the runtime needs no CUDA
+// headers.
 #pragma once
 
 #include <cstddef>
@@ -44,12 +44,12 @@ enum : Result {
   unknown_error = 999
 };
 
-// Errors of work on a device after which its context can do nothing more.
+// Errors of asynchronous work after which the context is unusable.
 inline bool loses_context(Result result) {
   return result == illegal_address || (result >= 709 && result <= 719) || result == 214;
 }
 
-enum : int {  // of devices
+enum : int {  // device attributes
   attribute_max_threads = 1,
   attribute_warp_size = 10,
   attribute_max_pitch = 11,

@@ -1,4 +1,4 @@
-// The device interface of CUDA: what buffers point to, and what HalideRuntime.h's functions call.
+// The device interface of CUDA: buffers point to it, and the functions of HalideRuntime.h call it.
 #include <HalideRuntime.h>
 
 #include "gpu/copies.h"
@@ -10,7 +10,7 @@
 namespace retrograde::runtime {
 namespace {
 
-// The context of a call by its user context.
+// Makes the context of a call from its user context.
 struct CallerOf {
   explicit CallerOf(void* user_context) { begin_device_call(&context, user_context); }
   operator retrograde_context*() { return &context; }
@@ -52,7 +52,7 @@ int copy_to_device(void* user_context, halide_buffer_t* buffer, const halide_dev
   return retrograde_gpu_copy_to_device(caller, buffer);
 }
 
-// Memory on both sides, of the same layout. On the host it comes from the caller's handlers.
+// Allocates host and device memory with the same layout. The host memory comes from the caller's handlers.
 int device_and_host_malloc(void* user_context, halide_buffer_t* buffer,
                            const halide_device_interface_t*) {
   CallerOf caller(user_context);

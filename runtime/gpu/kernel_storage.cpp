@@ -8,9 +8,9 @@
 
 namespace {
 
-// What a pipeline stores for itself is empty at first, unlike the buffers that it is given.
+// Marks a pipeline's internal storage, which is empty at first, unlike buffers passed by the caller.
 constexpr uint64_t is_own_storage = uint64_t{1} << 32;
-// Between retrograde_overwrite_begin and its end.
+// Set between retrograde_overwrite_begin and retrograde_overwrite_end.
 constexpr uint64_t is_overwritten = uint64_t{1} << 33;
 
 struct OwnBuffer {
@@ -58,8 +58,8 @@ int32_t retrograde_overwrite_end(retrograde_context*, halide_buffer_t* buffer) {
   return 0;
 }
 
-// A buffer that is only given memory stays dirty until a kernel has been started that stores into it: should
-// that fail, the host has its elements.
+// A buffer that only gets memory stays marked as host-dirty until a kernel that writes it has been launched: if the
+// launch fails, the elements on the host are still valid.
 int32_t retrograde_to_device(retrograde_context* context, halide_buffer_t* buffer) {
   const bool is_given = !(buffer->flags & is_own_storage);
   if (is_given && !buffer->device && buffer->host) buffer->set_host_dirty(true);

@@ -1,4 +1,4 @@
-// Kernels as generated code asks for them: loading, launching, unloading.
+// Loads, launches and unloads kernels for generated code.
 #include <HalideRuntime.h>
 
 #include <array>
@@ -40,7 +40,7 @@ int32_t check_extents(const Request& request, const Launch& launch) {
                                    "Pass a region that is not negative");
 }
 
-// What a kernel gets: the values themselves, and for buffers their device addresses.
+// A launch's argument array: values, and the device addresses of buffers.
 class Arguments {
  public:
   int32_t gather(const Session& session, const Launch& launch) {
@@ -73,7 +73,7 @@ class Arguments {
                           "Copy it to the device first");
   }
 
-  std::array<Address, few> addresses_;  // unset: most calls have few arguments
+  std::array<Address, few> addresses_;  // uninitialised, and enough for most calls
   std::array<void*, few> pointers_;
   std::vector<Address> more_addresses_;
   std::vector<void*> more_pointers_;
@@ -126,8 +126,8 @@ int32_t run(const Session& session, const void* source, const Launch& launch) {
 
 // ---- unloading ----
 
-// Of a program that nobody will run: everything that is loaded of it. What the driver would not unload
-// goes back, to be tried again.
+// Unloads everything loaded of a program that will not run again. Modules that the driver fails to unload are put back,
+// to be tried again.
 int32_t unload(const Request& request, Program& program) {
   while (true) {
     LoadedProgram loaded = program.take(nullptr);
@@ -162,7 +162,7 @@ int32_t initialize(const Request& request, void** state, const void* source, int
   Session session(request);
   if (const int32_t code = session.open()) return session.close(code);
   auto program = find_program(source);
-  // A state that is still null: the code may be new, at the place of code that went away.
+  // If the state is still null, the code may be new code at the address of unloaded code.
   if (program && !__atomic_load_n(state, __ATOMIC_ACQUIRE) && !program->is_of(bytes)) {
     if (const int32_t code = forget(request, source)) return session.close(code);
     program = nullptr;

@@ -1,5 +1,4 @@
-// Devices inside of the compiler's library: handlers come with the context of a call, and nothing is
-// replaced by a function's name.
+// Device settings in the compiler's library: handlers come with a call's context; no function is replaced by its name.
 #include <dlfcn.h>
 
 #include "gpu/host.h"

@@ -1,4 +1,4 @@
-// Loading kernels.
+// Loads programs of kernels.
 #include "gpu/programs.h"
 
 #include <algorithm>
@@ -26,7 +26,7 @@ const retrograde_gpu_image* Program::image() const {
                                              : nullptr;
 }
 
-// Of the text, and of where the kernels for the simulated device are.
+// Hashes the PTX, and the addresses of the kernels for the simulated device.
 uint64_t Program::fingerprint() const {
   constexpr uint64_t seed = 0xcbf29ce484222325u;
   const retrograde_gpu_image* given = image();
@@ -54,7 +54,7 @@ LoadedProgram* Program::on(const DeviceState& device) {
   return nullptr;
 }
 
-// Whether the simulated device has all of its kernels.
+// Whether the image has all its kernels for the simulated device.
 bool Program::is_simulated() const {
   const retrograde_gpu_image* given = image();
   for (int32_t i = 0; given && i < given->num_kernels; i++) {
@@ -121,7 +121,7 @@ int32_t Program::find(const Session& session, const char* name, int32_t shared_b
   return allow_shared(session, found->second, shared_bytes);
 }
 
-// A kernel may use little shared memory unless the driver is told otherwise; it is told once.
+// A kernel may use only little shared memory unless the driver is told otherwise; this does so once per limit.
 int32_t Program::allow_shared(const Session& session, LoadedKernel& kernel, int32_t bytes) const {
   constexpr int always_allowed = 48 << 10;
   if (bytes <= always_allowed || bytes <= kernel.shared_bytes) return 0;

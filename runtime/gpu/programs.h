@@ -1,4 +1,4 @@
-// Programs: the kernels of one source, loaded once for each device that runs them.
+// Programs: the kernels of one source, loaded once on each device that runs them.
 #pragma once
 
 #include <string>
@@ -10,10 +10,10 @@ namespace retrograde::runtime {
 
 struct LoadedKernel {
   Function function = nullptr;
-  int shared_bytes = 0;  // what it may use at most, as the driver was told
+  int shared_bytes = 0;  // the shared-memory limit that the driver was given
 };
 
-// What one device has of a program.
+// The part of a program that is loaded on one device.
 struct LoadedProgram {
   DeviceState* device = nullptr;
   Module module = nullptr;
@@ -23,15 +23,16 @@ struct LoadedProgram {
 class Program {
  public:
   Program(const void* source, int64_t bytes);
-  // Still what it was made of: other code may have come to the same place.
+  // Whether it still matches its source: other code may have been loaded at the same address.
   bool is_of(int64_t bytes) const { return bytes == bytes_ && fingerprint_ == fingerprint(); }
 
-  // Loads it on the session's device unless it is there.
+  // Loads it on the session's device unless it is loaded.
   int32_t load(const Session&);
   int32_t find(const Session&, const char* name, int32_t shared_bytes, Function&);
-  // What the image says of a kernel; null where the source is PTX, or has no such kernel.
+  // The image's description of a kernel; null if the source is PTX, or has no such kernel.
   const retrograde_gpu_kernel* description(const char* name) const;
-  // Takes what a device has of it, or any device for null; the caller unloads it. Module null: nothing.
+  // Removes and returns what is loaded on a device, or on any device for null; the caller unloads it. A null module
+  // means nothing is loaded.
   LoadedProgram take(const DeviceState*);
   void put_back(LoadedProgram);
 
@@ -46,15 +47,15 @@ class Program {
   const void* const source_;
   const int64_t bytes_;
   const uint64_t fingerprint_;
-  std::mutex mutex_;  // of what is loaded; held while the driver compiles
+  std::mutex mutex_;  // protects `loaded_`; held while the driver compiles
   std::list<LoadedProgram> loaded_;
 };
 
-// assembler.cpp: what the program's assembler makes of PTX, loaded; false: nothing is.
+// assembler.cpp: loads the code that the program's assembler makes from PTX; false if there is none.
 bool load_assembled(const Session&, const char* ptx, uint64_t bytes, Module&);
 
 std::shared_ptr<Program> find_program(const void* source);
-// Made unless there is one.
+// Returns the existing program, or makes one.
 std::shared_ptr<Program> make_program(const void* source, int64_t bytes);
 std::shared_ptr<Program> forget_program(const void* source);
 

@@ -1,4 +1,4 @@
-// Giving back what is kept: unused memory, kernels, primary contexts.
+// Releases everything that is kept: unused memory, kernels, primary contexts.
 #include "gpu/device_memory.h"
 #include "gpu/gpu_calls.h"
 #include "gpu/views.h"
@@ -29,7 +29,7 @@ bool is_in_use(const Devices& known, const DeviceState& device) {
   return false;
 }
 
-// Forgets a device that nothing is left on; its primary context goes with it.
+// Removes a device that nothing uses, with its primary context.
 int32_t forget_device(const Request& request, const Driver& driver, const DeviceState* device) {
   Devices& known = devices();
   const std::lock_guard lock(known.mutex);

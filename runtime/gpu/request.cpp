@@ -1,4 +1,4 @@
-// Messages of failed device calls.
+// Error messages of device calls.
 #include "gpu/request.h"
 
 #include "gpu/driver.h"

@@ -1,5 +1,5 @@
-// What a call was asked for and who is told when it fails: the first of a message's four parts, and the
-// code that the call then gives.
+// A device call for error reporting: its action (the first of a message's four parts), its caller, and the code that it
+// returns on failure.
 #pragma once
 
 #include <new>
@@ -10,7 +10,7 @@ namespace retrograde::runtime {
 
 struct Driver;
 
-// A line of text with the fields of retrograde_format_message.
+// A line of text, formatted by retrograde_format_message.
 class Line {
  public:
   template <typename... Args>
@@ -25,18 +25,18 @@ class Line {
 
 class Request {
  public:
-  // `asked` goes on after "cannot ".
+  // `asked`: the action, which completes "cannot ...".
   template <typename... Args>
   Request(retrograde_context* caller, int32_t code, const char* asked, Args... args)
       : caller(caller), code(code), asked_(asked, args...) {}
 
-  // They tell why and give the code.
+  // Reports the error and returns its code.
   int32_t refuse(const char* rule, const char* evidence, const char* advice) const {
     return refuse(code, rule, evidence, advice);
   }
   int32_t refuse(int32_t other_code, const char* rule, const char* evidence,
                  const char* advice) const;
-  // After a function of the driver gave `result`; `evidence` may be empty.
+  // Reports that a driver function returned `result`; `evidence` may be empty.
   int32_t driver_failed(const Driver&, const char* function, int result,
                         const char* evidence = "") const;
 
@@ -47,7 +47,7 @@ class Request {
   const Line asked_;
 };
 
-// What `work` gives; where it ran out of memory for its own bookkeeping, the code for that.
+// Returns the result of `work`, or the error code for out of memory if `work` throws std::bad_alloc.
 template <typename Work>
 int32_t guarded(const Request& request, Work work) {
   try {

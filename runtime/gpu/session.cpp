@@ -1,4 +1,4 @@
-// Sessions: from the caller's context to the driver's.
+// Sessions: make the caller's CUDA context current.
 #include "gpu/session.h"
 
 #include "gpu/host.h"
@@ -73,7 +73,7 @@ int32_t Session::get_stream() {
   return code == 0 ? 0 : handler_failed(request, "get_stream", code);
 }
 
-// Tried twice: a thread that is left in a foreign context would use the wrong device from then on.
+// Tries twice: a thread left in another context would use the wrong device from then on.
 int32_t Session::restore() {
   int32_t code = 0;
   if (is_changed_) {

@@ -1,5 +1,5 @@
-// The device and stream of one call: its CUDA context is the thread's current one while a session is
-// open, and what was current before is so again afterwards.
+// The device and stream of one call. While a session is open, its CUDA context is the thread's current one; closing it
+// restores the previous context.
 #pragma once
 
 #include "gpu/devices.h"
@@ -13,17 +13,17 @@ class Session {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  // By the caller's handlers and settings, or of the given context, with its default stream.
+  // Opens the context and stream of the caller's handlers and settings, or the given context with its default stream.
   int32_t open();
   int32_t open(Context context);
-  // Gives `code`, or where that is 0, what went wrong in restoring. An open session must be closed for
-  // its errors to be seen.
+  // Returns `code`, or if that is 0, any error of restoring the context. An open session must be closed, or its errors
+  // are lost.
   int32_t close(int32_t code);
 
   const Driver& driver() const { return *driver_; }
   DeviceState& device() const { return *device_; }
   Stream stream() const { return stream_; }
-  // The number of the graph that the stream is being captured for; 0: none.
+  // The number of the graph that the stream is being captured into; 0: none.
   int32_t capture(uint64_t& id) const;
   int32_t failed(const char* function, Result result, const char* evidence = "") const {
     return request.driver_failed(*driver_, function, result, evidence);
@@ -44,8 +44,8 @@ class Session {
   bool is_changed_ = false, is_acquired_ = false;
 };
 
-// The context of a call whose caller names none: that of the wanted device; else `current`, unless it is
-// null; else the primary one of the last device.
+// The context of a call whose caller names none: that of the selected device; else `current` unless it is null; else
+// the primary context of the last device.
 int32_t default_context(const Request&, const Driver&, Context current, Context&);
 
 }  // namespace retrograde::runtime

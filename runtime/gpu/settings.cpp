@@ -1,4 +1,4 @@
-// Settings of the process for devices.
+// Process-wide settings for devices.
 #include <atomic>
 #include <cstdlib>
 

@@ -1,4 +1,4 @@
-// Views of device memory, memory of the caller's, and copies between buffers.
+// Crops and slices of device memory, wrapped memory, and copies between buffers.
 #include <mutex>
 
 #include "gpu/copies.h"
@@ -30,7 +30,7 @@ void set_view(const halide_buffer_t& whole, int64_t offset_bytes, halide_buffer_
   view.set_device_dirty(whole.device_dirty());
 }
 
-// The same dimensions but the sliced one, -1: none.
+// Checks that the view has the same dimensions except the sliced one (-1: none), and lies inside.
 int32_t check_inside(const Request& request, const halide_buffer_t& whole, int sliced,
                      const halide_buffer_t& view) {
   const int dropped = sliced < 0 ? 0 : 1;
@@ -100,7 +100,7 @@ int32_t check_copy(const Request& request, const halide_buffer_t& from, const ha
   return 0;
 }
 
-// Where the newest elements are; the host, if both have them.
+// The side with the newest elements; the host if both have them.
 Place newest_place(const halide_buffer_t& from) {
   return from.host && !from.device_dirty() ? Place::host : Place::device;
 }
@@ -132,7 +132,7 @@ Context context_of(Place place, const uint8_t* pointer) {
   return place == Place::device ? context_of_memory(reinterpret_cast<Address>(pointer)) : nullptr;
 }
 
-// Work of another device that writes what is read is over.
+// Waits for work of another device that may still write the source.
 int32_t finish_elsewhere(const Request& request, Context context) {
   Session session(request);
   int32_t code = session.open(context);
@@ -140,7 +140,7 @@ int32_t finish_elsewhere(const Request& request, Context context) {
   return session.close(code);
 }
 
-// On the device whose memory is written, else on the one that is read.
+// Opens the device whose memory is written; if none is, the one whose memory is read.
 int32_t open_for_copy(Session& session, Copy& copy) {
   const bool is_written = copy.to_place == Place::device;
   const uint8_t* place = is_written ? copy.to : copy.from;
@@ -154,7 +154,8 @@ int32_t open_for_copy(Session& session, Copy& copy) {
   return finish_elsewhere(session.request, copy.from_context);
 }
 
-// With the host the copy waits for everything; on the device, other streams are the caller's affair.
+// A copy that involves the host waits for all streams. On the device, ordering other streams is the caller's
+// responsibility.
 int32_t note_uses(const Session& session, const Copy& copy, bool touches_host) {
   for (const auto& [place, pointer] : {std::pair(copy.from_place, copy.from),
                                        std::pair<Place, const uint8_t*>(copy.to_place, copy.to)}) {
@@ -177,7 +178,7 @@ int32_t copy_on_stream(const Session& session, const Copy& copy) {
                                   "Copy before the capture, or after launches");
   if (const int32_t code = note_uses(session, copy, touches_host)) return code;
   if (const int32_t code = start_copy(session, copy)) return code;
-  // Another device's stream may go on to change what is read; memory of the host may be.
+  // Wait, because a stream of another device, or the host, may change the source afterwards.
   if (!touches_host && copy.from_context == copy.to_context) return 0;
   const Result result = session.driver().cuStreamSynchronize(session.stream());
   return result == success ? 0 : session.failed("cuStreamSynchronize", result);
@@ -268,7 +269,7 @@ int32_t copy_buffer(const Request& request, halide_buffer_t& from, Place to_plac
       if (code != 0) return code;
     }
   }
-  // The other side of the destination is as old as it was, and no longer the newest.
+  // The other side of the destination keeps its old elements and is no longer the newest.
   to.set_host_dirty(to_place == Place::host);
   to.set_device_dirty(to_place == Place::device);
   return 0;

@@ -1,4 +1,4 @@
-// Views of device memory and memory of the caller's.
+// Crops and slices of device memory, and wrapped memory.
 #pragma once
 
 #include <HalideRuntime.h>
@@ -7,17 +7,17 @@
 
 namespace retrograde::runtime {
 
-// `view` has its shape already; nothing is done where the whole has no device memory.
+// `view` already has its shape. Does nothing if `whole` has no device memory.
 int32_t crop_device(const Request&, const halide_buffer_t& whole, halide_buffer_t& view);
 int32_t slice_device(const Request&, const halide_buffer_t& whole, int sliced, int position,
                      halide_buffer_t& view);
-// `address` becomes the buffer's device memory; it stays the caller's.
+// Makes `address` the buffer's device memory; it still belongs to the caller.
 int32_t wrap_memory(const Request&, halide_buffer_t&, uint64_t address);
 int32_t detach_memory(const Request&, halide_buffer_t&);
-// The buffer is on the host alone from now on.
+// Removes the buffer from its device, so that it is only on the host.
 void leave_device(halide_buffer_t&);
 
-// Of retrograde_gpu_release: of all programs.
+// For retrograde_gpu_release: unloads all programs.
 int32_t unload_all(const Request&);
 
 }  // namespace retrograde::runtime

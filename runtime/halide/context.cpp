@@ -1,5 +1,5 @@
-// From generated code to HalideRuntime.h: the context of one call, whose handlers call the halide_
-// functions with the caller's user context.
+// Adapts generated code to HalideRuntime.h: makes a call's context, whose handlers call the halide_ functions with the
+// caller's user context.
 #include <cstdint>
 #include <cstring>
 
@@ -17,8 +17,8 @@ void print(retrograde_context* context, const char* text) {
   halide_print(context->user_data, text);
 }
 
-// A program's own halide_malloc may align less than generated code wants: blocks are aligned here,
-// and the pointer to free stands in front of them.
+// A program's own halide_malloc may align less than generated code needs. So blocks are aligned here, and the pointer
+// to free is stored in front of them.
 void* allocate(retrograde_context* context, size_t bytes) {
   constexpr size_t alignment = retrograde_allocation_alignment;
   if (bytes > SIZE_MAX - 2 * alignment) return nullptr;

@@ -1,5 +1,4 @@
-// Which of a target's features this processor has: what the wrapper of a function compiled for
-// several targets asks.
+// Tests which of a target's features this processor has, for functions compiled for several targets.
 #include <atomic>
 
 #include "halide/weak.h"
@@ -13,7 +12,7 @@ namespace {
 
 constexpr int words = (halide_target_feature_end + 63) / 64;
 
-// `known`: features that a processor can have or lack; everything else is no question to it.
+// `known`: features that a processor may or may not have; all others are ignored.
 struct Features {
   uint64_t known[words] = {}, available[words] = {};
   void add(halide_target_feature_t feature, bool has) {

@@ -1,6 +1,5 @@
-// The functions of HalideRuntimeCuda.h, and the handlers of a call that came by HalideRuntime.h: a
-// program says with which context and stream it works by setting a handler, or by a function of its own
-// of the handler's name.
+// The functions of HalideRuntimeCuda.h, and the device handlers of calls through HalideRuntime.h. A program selects the
+// context and stream by setting a handler, or by defining a function with the handler's name.
 #include <HalideRuntimeCuda.h>
 
 #include <atomic>
@@ -68,7 +67,7 @@ RETROGRADE_WEAK const halide_device_interface_t* halide_cuda_device_interface() 
   return retrograde_gpu_interface();
 }
 
-// ---- which context and stream ----
+// ---- selecting context and stream ----
 
 RETROGRADE_WEAK int halide_cuda_acquire_context(void* user_context, void** context, bool create) {
   if (const auto handler = rt::acquire_handler.load())

@@ -1,5 +1,5 @@
-// The device functions of HalideRuntime.h. A buffer's own device interface is asked; one that is not on
-// a device yet goes to the interface that is named. CUDA's is in gpu/.
+// The device functions of HalideRuntime.h. They forward to the buffer's device interface; for a buffer that is not on a
+// device yet, to the interface passed by the caller. CUDA's interface is in gpu/.
 #include "gpu/gpu_calls.h"
 #include "gpu/host.h"
 #include "gpu/request.h"
@@ -28,7 +28,7 @@ int null_buffer(void* user_context, const char* asked) {
       .refuse("there must be a buffer", "the pointer is null", "Pass a halide_buffer_t");
 }
 
-// The interface of a buffer that is on a device; null, and a code in `code`, when nothing is to do.
+// The interface of a buffer that is on a device. Null if there is nothing to do or on an error; `code` tells which.
 const halide_device_interface_t* interface_of(void* user_context, const halide_buffer_t* buffer,
                                               const char* asked, int& code) {
   code = buffer ? 0 : null_buffer(user_context, asked);
@@ -37,7 +37,7 @@ const halide_device_interface_t* interface_of(void* user_context, const halide_b
   return nullptr;
 }
 
-// Of all interfaces that keep memory; halide_register_device_allocation_pool adds to them.
+// Pools of interfaces that keep memory; halide_register_device_allocation_pool adds to them.
 halide_device_allocation_pool* pools = nullptr;
 
 int release_pools(void* user_context) {
@@ -89,7 +89,7 @@ RETROGRADE_WEAK void halide_device_release(void* user_context,
   if (interface) interface->device_release(user_context, interface);
 }
 
-// ---- views of device memory, and memory of the program's ----
+// ---- views of device memory, and the program's own memory ----
 
 RETROGRADE_WEAK int halide_device_crop(void* user_context, const halide_buffer_t* src,
                                        halide_buffer_t* dst) {
@@ -124,7 +124,7 @@ RETROGRADE_WEAK int halide_device_detach_native(void* user_context, halide_buffe
   return interface ? interface->detach_native(user_context, buffer) : code;
 }
 
-// Copies within the host are CUDA's too: it knows how to.
+// CUDA's interface also copies within the host.
 RETROGRADE_WEAK int halide_buffer_copy(void* user_context, halide_buffer_t* src,
                                        const halide_device_interface_t* interface,
                                        halide_buffer_t* dst) {

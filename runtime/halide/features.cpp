@@ -1,4 +1,4 @@
-// Traces and the profiler by their names in HalideRuntime.h.
+// Tracing and profiling functions of HalideRuntime.h.
 #include <cstdint>
 
 #include "halide/weak.h"
@@ -34,7 +34,7 @@ RETROGRADE_WEAK halide_trace_t halide_set_custom_trace(halide_trace_t trace) {
   return before ? before : halide_default_trace;
 }
 
-// 0 stands for text, whatever HL_TRACE_FILE says.
+// 0 selects text output, whatever HL_TRACE_FILE says.
 RETROGRADE_WEAK void halide_set_trace_file(int file) { retrograde::runtime::set_trace_file(file); }
 RETROGRADE_WEAK int halide_get_trace_file(void*) { return retrograde::runtime::trace_file(); }
 // Every packet is written when it happens. Events that come later are printed.

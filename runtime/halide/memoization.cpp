@@ -1,8 +1,8 @@
 // The cache of memoized Funcs by HalideRuntime.h.
 //
-// A lookup gives each buffer memory of its own, which the caller gives back with release: filled
-// with what the cache holds, or to be filled. What the cache holds is a copy, so that evicting it
-// takes nothing away. Regions are part of an entry's key: keys of Halide's say nothing of them.
+// A lookup allocates memory for each buffer, which the caller frees by release. It is either filled from the cache or
+// to be filled by the caller. The cache holds copies, so evicting an entry invalidates nothing. Regions are part of an
+// entry's key, because Halide's keys do not contain them.
 #include <cstring>
 #include <string>
 #include <vector>
@@ -24,7 +24,7 @@ void add(std::string& key, const halide_buffer_t& buffer) {
   }
 }
 
-// What our cache is asked for.
+// A request to our cache.
 struct Request {
   std::string key;
   std::vector<void*> blocks;
@@ -45,7 +45,7 @@ struct Request {
   auto count() const { return static_cast<int32_t>(blocks.size()); }
 };
 
-// Memory for all of them, or for none.
+// Allocates memory for all buffers, or for none.
 bool allocate(void* user_context, Request& request, halide_buffer_t** buffers) {
   for (int32_t i = 0; i < request.count(); i++) {
     void* block = halide_malloc(user_context, static_cast<size_t>(request.bytes[i]));
@@ -89,7 +89,7 @@ RETROGRADE_WEAK int halide_memoization_cache_store(void*, const uint8_t* cache_k
     return retrograde_memoization_store(nullptr, request.key_data(), request.key_bytes(),
                                         request.count(), request.blocks.data(),
                                         request.bytes.data(), has_eviction_key, eviction_key);
-  } catch (const std::bad_alloc&) {  // then it is computed again next time
+  } catch (const std::bad_alloc&) {  // not cached; recomputed next time
     return 0;
   }
 }

@@ -1,9 +1,9 @@
-// Tasks that run at the same time and wait for each other, by HalideRuntime.h.
+// Tasks that run in parallel and wait for each other, by HalideRuntime.h.
 //
-// Each has a thread of its own, as the branches of a fork do, so that tasks that wait leave room
-// for those they wait for, whatever `min_threads` says. A task with semaphores takes them before
-// each of its iterations and runs these in order; without, its iterations are a parallel loop, or
-// one call when they are to be serial. When a task fails, those that wait for a semaphore end.
+// Each task has a thread of its own, like the branches of a fork. So waiting tasks never block those that they wait
+// for, whatever `min_threads` says. A task with semaphores acquires them before each iteration and runs its iterations
+// in order. Without semaphores, its iterations are a parallel loop, or one call if the task is serial. If a task fails,
+// waits for semaphores end.
 #include <atomic>
 #include <new>
 #include <vector>
@@ -21,7 +21,7 @@ namespace rt = retrograde::runtime;
 std::atomic<halide_do_loop_task_t> loop_task_handler{halide_default_do_loop_task};
 std::atomic<halide_do_parallel_tasks_t> tasks_handler{halide_default_do_parallel_tasks};
 
-// Counts what may end a wait: signals and failures.
+// Counts events that may end a wait: signals and failures.
 std::atomic<uint32_t> news{0};
 
 struct TaskRun {
@@ -142,7 +142,7 @@ RETROGRADE_WEAK int halide_do_parallel_tasks(void* user_context, int num_tasks,
   return tasks_handler.load()(user_context, num_tasks, tasks, task_parent);
 }
 
-// Null stands for the default.
+// Null restores the default.
 RETROGRADE_WEAK void halide_set_custom_parallel_runtime(
     halide_do_par_for_t par_for, halide_do_task_t task, halide_do_loop_task_t loop_task,
     halide_do_parallel_tasks_t tasks, halide_semaphore_init_t semaphore_init,

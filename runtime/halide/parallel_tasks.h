@@ -1,14 +1,14 @@
-// Between the tasks that wait for semaphores and the semaphores.
+// Interface between semaphores and the tasks that wait for them.
 #pragma once
 
 #include <HalideRuntime.h>
 
 namespace retrograde::runtime {
 
-// Wakes the tasks that wait.
+// Wakes the waiting tasks.
 void note_semaphore_release();
 
-// Null stands for the default.
+// Null restores the default.
 void set_semaphore_handlers(halide_semaphore_init_t init,
                             halide_semaphore_try_acquire_t try_acquire,
                             halide_semaphore_release_t release);

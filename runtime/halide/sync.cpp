@@ -1,4 +1,4 @@
-// Mutexes, conditions and semaphores by HalideRuntime.h: words that are zero at first.
+// Mutexes, condition variables and semaphores by HalideRuntime.h; all are zero-initialised words.
 #include <atomic>
 #include <new>
 
@@ -8,7 +8,7 @@
 namespace {
 
 using Word = std::atomic_ref<uintptr_t>;
-// A mutex is free, held, or held with threads asleep on it (Drepper, "Futexes are tricky", 2011).
+// A mutex is free, held, or held with sleeping waiters (Drepper, "Futexes are tricky", 2011).
 constexpr uintptr_t is_free = 0, is_held = 1, is_awaited = 2;
 
 Word word(halide_mutex* mutex) { return Word(mutex->_private[0]); }
@@ -35,7 +35,7 @@ RETROGRADE_WEAK void halide_mutex_unlock(halide_mutex* mutex) {
     word(mutex).notify_one();
 }
 
-// A condition counts its signals: a waiter sleeps while the count is what it saw under the mutex.
+// A condition variable counts its signals: a waiter sleeps while the count equals the one that it read under the mutex.
 RETROGRADE_WEAK void halide_cond_signal(halide_cond* cond) {
   word(cond).fetch_add(1, std::memory_order_release);
   word(cond).notify_one();

@@ -31,7 +31,7 @@ void tell_error(void* data, int32_t, const char* message) {
   halide_error(static_cast<Loop*>(data)->user_context, message);
 }
 
-// At the end of the process, or of the library that holds this code.
+// Runs when the process exits, or when the library that holds this code is unloaded.
 __attribute__((destructor)) void end_threads() { halide_shutdown_thread_pool(); }
 
 }  // namespace
@@ -61,7 +61,7 @@ RETROGRADE_WEAK halide_do_par_for_t halide_set_custom_do_par_for(halide_do_par_f
   return par_for_handler.exchange(handler ? handler : halide_default_do_par_for);
 }
 
-// Declared by later releases alone.
+// Only later Halide releases declare these.
 RETROGRADE_WEAK int halide_get_num_threads() { return retrograde::runtime::thread_count(); }
 RETROGRADE_WEAK int halide_set_num_threads(int count) {
   if (count < 0) {

@@ -1,4 +1,4 @@
-// Functions of HalideRuntime.h are weak: a program that defines one itself has its own called.
+// The functions of HalideRuntime.h are weak, so that a program can replace them by its own.
 #pragma once
 
 #include <HalideRuntime.h>

@@ -35,7 +35,7 @@ halide_scalar_value_t read_scalar(halide_type_t type, const std::string& text) {
   halide_scalar_value_t result = {};
   with_type(type, [&](auto value) {
     if (!read(text, value))
-      throw Problem("\"" + text + "\" is no value of type " + type_name(type));
+      throw Problem("\"" + text + "\" is not a value of type " + type_name(type));
     std::memcpy(static_cast<void*>(&result), &value, sizeof value);
   });
   return result;

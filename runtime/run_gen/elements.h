@@ -17,7 +17,7 @@ using Image = Halide::Runtime::Buffer<void>;
 // "uint8", "float32", "bool", "handle"
 std::string type_name(halide_type_t type);
 
-// Calls f(T{}) with the C++ type of these elements; Problem for those of 16-bit floats and handles.
+// Calls f(T{}) with the C++ type of these elements. Throws Problem for 16-bit floats and handles.
 template <typename F>
 void with_type(halide_type_t type, F&& f) {
   const auto is = [&](halide_type_code_t code, int bits) {
@@ -34,10 +34,10 @@ void with_type(halide_type_t type, F&& f) {
   if (is(halide_type_uint, 64)) return f(uint64_t{});
   if (is(halide_type_float, 32)) return f(float{});
   if (is(halide_type_float, 64)) return f(double{});
-  throw Problem("values of type " + type_name(type) + " cannot be made here");
+  throw Problem("values of type " + type_name(type) + " are not supported");
 }
 
-// The text as a value of the type, to its last character; Problem when it is none.
+// Parses the whole text as a value of the type. Throws Problem if that fails.
 halide_scalar_value_t read_scalar(halide_type_t type, const std::string& text);
 
 }  // namespace retrograde::run_gen

@@ -1,6 +1,6 @@
-// Shapes: files and [..] say theirs, outputs are guessed from the largest input, and a bounds query
-// says what the function reads for that. Outputs shrink until it reads no more than is there; what
-// is left open then gets the region that is read.
+// Finds the shapes of all buffers. Files and [..] on the command line give shapes. Output shapes are first guessed from
+// the largest input, and a bounds query tells which regions the function reads for them. Outputs shrink until no input
+// is too small. Buffers without a shape then get the region that is read.
 #include "run_gen/filter.h"
 
 #include <algorithm>
@@ -84,7 +84,7 @@ std::string Call::value_of(const Argument& argument,
 
 void Call::set_scalar(Argument& argument) {
   const halide_filter_argument_t& about = *argument.about;
-  if (about.type.code == halide_type_handle) return;  // null: the user context, for one
+  if (about.type.code == halide_type_handle) return;  // null; the user context is such an argument
   const std::string text = value_of(argument, options_.default_scalars);
   for (const std::string& word : split(text, ',')) {
     const halide_scalar_value_t* said = word == "default"    ? about.scalar_def
@@ -98,10 +98,10 @@ void Call::set_scalar(Argument& argument) {
     argument.scalar = read_scalar(about.type, word);
     return;
   }
-  throw Problem("the generator says no " + text + " of \"" + about.name + "\"");
+  throw Problem("the generator sets no " + text + " for \"" + about.name + "\"");
 }
 
-// Functions number elements in 31 bits, and HalideBuffer.h multiplies extents in 32.
+// Generated functions use 31-bit element offsets, and HalideBuffer.h multiplies extents in 32 bits.
 void check_elements(const std::string& name, const std::vector<int>& extents) {
   int64_t elements = 1;
   for (const int extent : extents) {
@@ -114,7 +114,7 @@ void check_elements(const std::string& name, const std::vector<int>& extents) {
   }
 }
 
-Image made_up(const halide_filter_argument_t& about, const Shape& shape) {
+Image generated_image(const halide_filter_argument_t& about, const Shape& shape) {
   if (static_cast<int>(shape.extents.size()) != about.dimensions) {
     throw Problem(std::string("\"") + about.name + "\" has " + std::to_string(about.dimensions) +
                   " dimensions; " + std::to_string(shape.extents.size()) + " extents were given");
@@ -142,8 +142,8 @@ void Call::set_input(Argument& argument) {
     return;
   }
   if (argument.spec.from_estimate && !has_estimate)
-    throw Problem(std::string("the generator says no estimate of \"") + about.name + "\"");
-  argument.image = made_up(about, shape);
+    throw Problem(std::string("the generator sets no estimate for \"") + about.name + "\"");
+  argument.image = generated_image(about, shape);
 }
 
 void Call::set_output(Argument& argument) {
@@ -156,7 +156,7 @@ void Call::set_output(Argument& argument) {
   else
     shape.extents = read_extents(*options_.output_extents);
   argument.is_wanted = *options_.output_extents != "estimate" || !shape.extents.empty();
-  if (argument.is_wanted) argument.image = made_up(about, shape);
+  if (argument.is_wanted) argument.image = generated_image(about, shape);
 }
 
 // ---- shapes ----
@@ -176,11 +176,11 @@ void Call::guess_outputs() {
       shape.mins.push_back(is_there ? largest->dim(d).min() : 0);
       shape.extents.push_back(is_there ? largest->dim(d).extent() : largest ? 1 : plain);
     }
-    a.image = made_up(*a.about, shape);
+    a.image = generated_image(*a.about, shape);
   }
 }
 
-// What the function reads and writes: the shape of every buffer, those of scalars empty.
+// Runs a bounds query: the shape of every buffer; empty for scalars.
 std::vector<Image> Call::query() {
   std::vector<Image> asked;
   std::vector<void*> argv;
@@ -199,12 +199,12 @@ std::vector<Image> Call::query() {
                                             : static_cast<void*>(&arguments_[i].scalar));
   }
   if (const int code = filter_.call(argv.data()))
-    throw Problem("asked for its sizes, the function returned the error code " +
+    throw Problem("the bounds query of the function returned the error code " +
                   std::to_string(code));
   return asked;
 }
 
-// Whether an output was made smaller, because an input is.
+// Whether an output was made smaller because an input is too small.
 bool Call::shrink_outputs() {
   const std::vector<Image> required = query();
   std::map<int, int> excess;  // by dimension
@@ -227,7 +227,7 @@ bool Call::shrink_outputs() {
   return shrunk;
 }
 
-// Memory for a shape, its dimensions in the order of the strides.
+// Allocates memory for a shape, with dimensions in the order of its strides.
 Image allocated(const std::string& name, Image shape) {
   std::vector<int> order, extents;
   for (int d = 0; d < shape.dimensions(); d++) {
@@ -258,7 +258,7 @@ void Call::settle(const std::vector<Image>& required) {
       if (!is_output(a)) fill(a.image, a.spec);
       continue;
     }
-    // A known image: moved to where it is read, and laid out as it is wanted.
+    // A known image: moves it to the coordinates that are read, and gives it the required layout.
     for (int d = 0; d < shape.dimensions; d++) {
       const int min = a.image.dim(d).min(), extent = a.image.dim(d).extent();
       const bool fits = shape.dim[d].min >= min &&

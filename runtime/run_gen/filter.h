@@ -1,5 +1,5 @@
-// filter.h -- one compiled function by its metadata: its arguments get values and shapes that fit
-// each other, then it is called.
+// filter.h -- calls one compiled function, using its metadata: gives its arguments values and consistent shapes, then
+// calls it.
 #pragma once
 
 #include <map>
@@ -16,27 +16,27 @@ struct Filter {
   const halide_filter_metadata_t* metadata = nullptr;
 };
 
-// The functions that registration files told of.
+// The functions that registration files have registered.
 std::vector<Filter>& registered_filters();
-// The one of that name, or the only one. Problem when there is none.
+// The function of that name, or the only one. Throws Problem if there is none.
 Filter find_filter(const std::string& name);
 std::string description(const Filter& filter);
 
-// A call with all of its arguments.
+// A call with all its arguments.
 class Call {
  public:
-  // Problem where a value is missing or does not fit.
+  // Throws Problem if a value is missing or unsuitable.
   Call(const Filter& filter, const Options& options);
-  // Its error code. What it left on a device stays there.
+  // Calls the function and returns its error code. Results on a device stay there.
   int run();
   // Waits for devices.
   int wait();
-  // Copies results from devices.
+  // Copies results from devices to the host.
   int bring_results();
-  // Those that --output files were named for.
+  // Writes the outputs for which files were named.
   void write_outputs() const;
   double output_elements() const;  // of the largest output
-  std::string shapes() const;      // a line for each buffer
+  std::string shapes() const;      // one line per buffer
 
  private:
   struct Argument {
@@ -44,9 +44,9 @@ class Call {
     halide_scalar_value_t scalar = {};
     BufferSpec spec;
     Image image;
-    std::string path;        // of an output
-    bool is_known = false;   // its shape is
-    bool is_wanted = false;  // the user said the shape
+    std::string path;        // output file
+    bool is_known = false;   // its shape is known
+    bool is_wanted = false;  // the user specified the shape
   };
   const Filter filter_;
   const Options& options_;

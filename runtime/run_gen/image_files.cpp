@@ -41,7 +41,7 @@ Image dense(const std::string& path, halide_type_t type, const std::vector<int>&
             const std::string& bytes, size_t first) {
   Image image(type, extents);
   if (bytes.size() < first || bytes.size() - first < image.size_in_bytes())
-    refuse(path, "ends too early");
+    refuse(path, "is truncated");
   if (image.size_in_bytes() > 0)
     std::memcpy(image.data(), bytes.data() + first, image.size_in_bytes());
   return image;
@@ -60,7 +60,7 @@ halide_type_t type_of_code(const std::string& path, int32_t code) {
 Image read_tmp(const std::string& path) {
   const std::string bytes = contents_of(path);
   int32_t words[5];
-  if (bytes.size() < sizeof words) refuse(path, "ends too early");
+  if (bytes.size() < sizeof words) refuse(path, "is truncated");
   std::memcpy(words, bytes.data(), sizeof words);
   for (int d = 0; d < 4; d++) {
     if (words[d] < 1) refuse(path, "has an extent below 1");
@@ -71,7 +71,7 @@ Image read_tmp(const std::string& path) {
 
 // ---- .npy: version 1, as NumPy and debug_to_file write it ----
 
-// What stands behind 'key': in the header.
+// The value after 'key': in the header.
 std::string npy_field(const std::string& path, const std::string& header, const std::string& key) {
   const size_t at = header.find("'" + key + "':");
   if (at == std::string::npos) refuse(path, "has no " + key);
@@ -96,11 +96,12 @@ halide_type_t npy_type(const std::string& path, const std::string& descr) {
 
 Image read_npy(const std::string& path) {
   const std::string bytes = contents_of(path);
-  if (bytes.size() < 10 || bytes.compare(0, 6, "\x93NUMPY") != 0) refuse(path, "is no .npy file");
+  if (bytes.size() < 10 || bytes.compare(0, 6, "\x93NUMPY") != 0)
+    refuse(path, "is not a .npy file");
   const bool is_long = bytes[6] >= 2;
   const size_t length = static_cast<uint8_t>(bytes[8]) + 256u * static_cast<uint8_t>(bytes[9]);
   const size_t first = (is_long ? 12 : 10) + length;
-  if (bytes.size() < first) refuse(path, "ends too early");
+  if (bytes.size() < first) refuse(path, "is truncated");
   const std::string header = bytes.substr(0, first);
   std::vector<int> extents;
   for (const std::string& word : split(npy_field(path, header, "shape").substr(1), ',')) {
@@ -124,7 +125,7 @@ Image read_pnm(const std::string& path) {
     if (!(in >> value) || value < 1) refuse(path, "has no sizes");
     return value;
   };
-  if (magic != "P5" && magic != "P6") refuse(path, "is no binary .pgm or .ppm file");
+  if (magic != "P5" && magic != "P6") refuse(path, "is not a binary .pgm or .ppm file");
   const int width = number(), height = number(), largest = number(),
             channels = magic == "P6" ? 3 : 1;
   in.get();
@@ -133,7 +134,7 @@ Image read_pnm(const std::string& path) {
               std::vector<int>{width, height, channels});
   const auto next = [&] {
     const int high = is_wide ? in.get() : 0, low = in.get();
-    if (!in) refuse(path, "ends too early");
+    if (!in) refuse(path, "is truncated");
     return 256 * high + low;
   };
   for (int y = 0; y < height; y++) {
@@ -180,7 +181,7 @@ void write_pnm(const std::string& path, const Image& image) {
   if (!out.flush()) refuse(path, "cannot be written");
 }
 
-// ---- .png, of 8 bits ----
+// ---- .png, 8 bits ----
 
 #ifdef RETROGRADE_RUN_GEN_PNG
 struct PngImage {
@@ -238,7 +239,7 @@ void write_as_jpeg(const std::string& path, const Image& image) {
 
 // ---- types and dimensions ----
 
-// As fractions of the largest value, which floats hold as they are.
+// Converts as fractions of the type's largest value; floats already hold the fraction.
 template <typename To, typename From>
 To rescaled(From value) {
   double fraction = static_cast<double>(value);
@@ -272,7 +273,7 @@ Image converted(const Image& image, halide_type_t type, bool is_picture) {
   return result;
 }
 
-// Dimensions of extent 1 come and go at the end.
+// Adds or removes trailing dimensions of extent 1.
 Image with_dimensions(const std::string& path, Image image, int dimensions) {
   while (image.dimensions() > dimensions) {
     const int last = image.dimensions() - 1;
@@ -294,7 +295,7 @@ bool is_picture(const std::string& path) {
 }
 
 [[noreturn]] void refuse_kind(const std::string& path) {
-  refuse(path, "is of no known kind: these are .npy, .tmp, .pgm, .ppm, .png and .jpg");
+  refuse(path, "has an unknown format; known formats are .npy, .tmp, .pgm, .ppm, .png and .jpg");
 }
 
 }  // namespace

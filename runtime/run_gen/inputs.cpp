@@ -31,7 +31,7 @@ T random_value(std::mt19937_64& random) {
   return static_cast<T>(std::is_same_v<T, bool> ? random() & 1 : random());
 }
 
-// Elements whose first two coordinates are equal are one.
+// 1 for elements whose first two coordinates are equal, else 0.
 template <typename T>
 void fill_identity(Halide::Runtime::Buffer<T>& image) {
   image.for_each_element([&](const int* at) {
@@ -47,7 +47,7 @@ BufferSpec read_buffer_spec(const std::string& text) {
   using Kind = BufferSpec::Kind;
   BufferSpec spec;
   const std::vector<std::string> parts = split(text, ':');
-  const Problem problem("\"" + text + "\" is no input: see --help");
+  const Problem problem("\"" + text + "\" is not an input; see --help");
   if (parts.size() == 1 && (text.front() == '[' || text == "auto" || text == "estimate" ||
                             text == "estimate_then_auto")) {
     spec.kind = Kind::Random;

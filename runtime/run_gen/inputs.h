@@ -1,4 +1,4 @@
-// inputs.h -- what stands for a buffer on the command line: a file, or values that are made up.
+// inputs.h -- buffer arguments on the command line: a file, or generated values.
 #pragma once
 
 #include <string>
@@ -17,14 +17,14 @@ struct BufferSpec {
   std::string path;      // File
   std::string constant;  // Constant
   uint64_t seed = 0;     // Random
-  // Of made-up values: tried in this order. Exactly one of them for [3,4].
+  // Sources of the shape of generated values, in the order in which they are tried. [3,4] sets exactly one.
   bool from_estimate = false, from_query = false;
   std::vector<int> extents;
 };
 
-// "zero:[3,4]", "random:7:auto", "photo.png". Problem when it cannot be read.
+// Parses "zero:[3,4]", "random:7:auto", "photo.png". Throws Problem if that fails.
 BufferSpec read_buffer_spec(const std::string& text);
-// The estimates of the argument; an empty shape when the generator says none.
+// The argument's estimates; an empty shape if the generator gives none.
 Shape estimated_shape(const halide_filter_argument_t& argument);
 void fill(Image& image, const BufferSpec& spec);
 

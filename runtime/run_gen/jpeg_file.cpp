@@ -1,5 +1,5 @@
-// Errors of libjpeg come back by longjmp: it is C, through which no exception goes. Between setjmp
-// and the jump no object with a destructor is made, and what is used after it is not changed.
+// libjpeg reports errors by longjmp, because exceptions cannot pass through C. Between setjmp and the jump no object
+// with a destructor is created, and nothing that is used afterwards is changed.
 #include "run_gen/jpeg_file.h"
 
 #include <csetjmp>
@@ -15,15 +15,15 @@ namespace retrograde::run_gen {
 
 namespace {
 
-constexpr int quality = 98;  // as good as those who compare pictures want them
+constexpr int quality = 98;  // high enough for comparing pictures
 
 struct Errors {
   jpeg_error_mgr manager;
   std::jmp_buf back;
-  char message[JMSG_LENGTH_MAX] = "";  // the first one
+  char message[JMSG_LENGTH_MAX] = "";  // the first message
 };
 
-// Warnings after which the decoder makes samples up, as of a file that is cut off.
+// Warnings after which the decoder invents samples, as for a truncated file.
 bool is_damage(int warning) {
   return warning == JWRN_JPEG_EOF || warning == JWRN_HIT_MARKER || warning == JWRN_HUFF_BAD_CODE ||
          warning == JWRN_ARITH_BAD_CODE || warning == JWRN_MUST_RESYNC;
@@ -69,7 +69,7 @@ File open(const std::string& path, const char* mode) {
   return file;
 }
 
-// False: see errors.message. client_data outlives jpeg_create_*, which clears the rest.
+// On false, errors.message says why. client_data survives jpeg_create_*, which clears the other fields.
 bool start(Decoder& decoder, std::FILE* file) {
   report_to(decoder.errors, decoder.codec);
   if (setjmp(decoder.errors.back)) return false;
@@ -82,7 +82,7 @@ bool start(Decoder& decoder, std::FILE* file) {
   return true;
 }
 
-// False also where samples are made up.
+// Also returns false if the decoder invented samples.
 bool read_lines(Decoder& decoder, uint8_t* samples, size_t bytes_of_line) {
   if (setjmp(decoder.errors.back)) return false;
   while (decoder.codec.output_scanline < decoder.codec.output_height) {

@@ -1,4 +1,4 @@
-// jpeg_file.h -- .jpg and .jpeg: grey or RGB, 8 bits. Only where libjpeg is.
+// jpeg_file.h -- .jpg and .jpeg: grey or RGB, 8 bits. Only built with libjpeg.
 #pragma once
 
 #include <string>
@@ -7,9 +7,9 @@
 
 namespace retrograde::run_gen {
 
-// Problem when the file cannot be read, or is no JPEG.
+// Throws Problem if the file cannot be read or is not a JPEG.
 Image read_jpeg(const std::string& path);
-// Of 1 or 3 channels of 8 bits, their samples as the file wants them: channels innermost.
+// Writes 1 or 3 channels of 8 bits; the samples are interleaved (channels innermost).
 void write_jpeg(const std::string& path, int width, int height, int channels,
                 const std::string& samples);
 

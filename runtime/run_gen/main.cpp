@@ -1,5 +1,5 @@
-// main() of a program that runs one compiled function: linked behind its library and the
-// registration file that the generator writes beside it.
+// main() of a program that runs one compiled function from the command line. It is linked with the function's library
+// and with the registration file that the generator writes beside it.
 #include <unistd.h>
 
 #include <atomic>
@@ -9,7 +9,7 @@
 
 #include "run_gen/filter.h"
 
-// Registration files call it before main() runs.
+// Called by registration files before main() runs.
 extern "C" void halide_register_argv_and_metadata(int (*filter_argv_call)(void**),
                                                   const halide_filter_metadata_t* metadata,
                                                   const char* const*) {
@@ -21,7 +21,7 @@ namespace {
 
 // ---- memory ----
 
-// The size of a block stands in front of it.
+// Each block is preceded by its size.
 constexpr size_t header_bytes = 128;
 std::atomic<int64_t> bytes_now{0}, bytes_most{0};
 
@@ -67,7 +67,7 @@ struct Timing {
   int samples, iterations;
 };
 
-// The best of several samples, each long enough for the clock to be exact.
+// The best time of several samples, each long enough for the clock's resolution.
 Timing benchmark(Call& call, double min_seconds) {
   constexpr int min_samples = 3, max_iterations = 1 << 24;
   int iterations = 1;
@@ -96,9 +96,9 @@ void tell_timing(const Options& options, const std::string& name, const Timing& 
               << name << "  THROUGHPUT_MPIX_PER_SEC  " << rate << "\n";
     return;
   }
-  std::cout << "Benchmark for " << name << " gives as its best " << timing.best << " sec/iter (of "
+  std::cout << "Benchmark for " << name << ": best time " << timing.best << " sec/iter (of "
             << timing.samples << " samples of " << timing.iterations << " iterations)\n"
-            << "That is " << rate << " megapixels of output a second\n";
+            << "Throughput: " << rate << " megapixels of output per second\n";
 }
 
 void tell_memory(const Options& options, const std::string& name) {

@@ -9,7 +9,7 @@ namespace {
 bool read_switch(const std::string& flag, const std::string& value) {
   if (value.empty() || value == "true" || value == "1") return true;
   if (value == "false" || value == "0") return false;
-  throw Problem("--" + flag + " is true or false, not \"" + value + "\"");
+  throw Problem("--" + flag + " must be true or false, not \"" + value + "\"");
 }
 
 double read_seconds(const std::string& value) {
@@ -17,7 +17,7 @@ double read_seconds(const std::string& value) {
     size_t used = 0;
     const double seconds = std::stod(value, &used);
     if (used == value.size() && seconds > 0) return seconds;
-  } catch (const std::exception&) {  // the same message
+  } catch (const std::exception&) {  // falls through to the same message
   }
   throw Problem("--benchmark_min_time takes a number of seconds, not \"" + value + "\"");
 }
@@ -68,7 +68,7 @@ std::vector<std::string> split(const std::string& text, char separator) {
 }
 
 std::vector<int> read_extents(const std::string& text) {
-  const Problem problem("extents are numbers like [640,480,3], not \"" + text + "\"");
+  const Problem problem("extents must be numbers like [640,480,3], not \"" + text + "\"");
   if (text.size() < 2 || text.front() != '[' || text.back() != ']') throw problem;
   const std::string list = text.substr(1, text.size() - 2);
   std::vector<int> extents;
@@ -106,29 +106,30 @@ std::string usage(const std::string& program) {
   return "usage: " + program + R"( name=value ... [flags]
 
   Runs a compiled function once, with a value for each of its arguments:
-    scalars   gain=1.5, or default or estimate: what the generator says; with a comma, the first
-              that it says
-    inputs    a file, or made up: zero:SHAPE  constant:VALUE:SHAPE  identity:SHAPE  random:SEED:SHAPE
-              SHAPE is [640,480,3], auto: what the output needs, estimate: what the generator says,
-              or estimate_then_auto. A shape alone is random
-    outputs   a file to be written; an output that is not named is computed and dropped
+    scalars   gain=1.5, or the words default or estimate for values that the generator sets; in a
+              list with commas, the first one that is set
+    inputs    a file, or generated values: zero:SHAPE  constant:VALUE:SHAPE  identity:SHAPE
+              random:SEED:SHAPE
+              SHAPE is [640,480,3], auto: the size that the output requires, estimate: the generator's
+              estimate, or estimate_then_auto. A shape alone means random values
+    outputs   a file to be written; outputs without a file are computed and discarded
   Files: .npy and .tmp of any type; .pgm, .ppm, .png and .jpg of 8 and 16 bits, whose values
-  become fractions of 1 for functions of floats.
+  become fractions of 1 if the function takes floats.
 
   --help                       this text
   --describe                   the function's arguments and their types
-  --name=NAME                  which function, where several are linked into the program
-  --output_extents=[W,H,...]   the size of every output, or estimate; by default what the inputs
-                               suffice for
-  --default_input_buffers=V    for inputs that are not named; without =V zero:auto
-  --default_input_scalars=V    for scalars that are not named; without =V estimate,default
-  --estimate_all               all inputs and the size of the outputs as the generator estimates
-  --benchmarks=all             runs it many times and tells the best time
-  --benchmark_min_time=S       for at least so many seconds; by default 0.1
-  --track_memory               tells how much memory its intermediate results took
-  --parsable_output            tells results one a line: NAME KEY VALUE
-  --quiet                      drops what the function prints
-  --verbose                    tells shapes and steps
+  --name=NAME                  the function to run, if the program contains several
+  --output_extents=[W,H,...]   the size of every output, or estimate; default: the largest for which
+                               the inputs suffice
+  --default_input_buffers=V    value of unnamed inputs; without =V: zero:auto
+  --default_input_scalars=V    value of unnamed scalars; without =V: estimate,default
+  --estimate_all               use the generator's estimates for all inputs and output sizes
+  --benchmarks=all             run it many times and print the best time
+  --benchmark_min_time=S       benchmark for at least S seconds; default: 0.1
+  --track_memory               print the peak memory of intermediate results
+  --parsable_output            print one result per line: NAME KEY VALUE
+  --quiet                      discard what the function prints
+  --verbose                    print shapes and steps
 )";
 }
 

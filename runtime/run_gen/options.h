@@ -1,5 +1,5 @@
-// options.h -- the command line of a program that runs one compiled function: name=value for its
-// arguments, and flags. Words and meanings are those of Halide's RunGenMain.
+// options.h -- the command line of a program that runs one compiled function: name=value for its arguments, and flags.
+// Names and meanings are those of Halide's RunGenMain.
 #pragma once
 
 #include <map>
@@ -10,7 +10,7 @@
 
 namespace retrograde::run_gen {
 
-// What the user is told; the program then ends with status 1.
+// An error message for the user; the program then exits with status 1.
 class Problem : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -20,9 +20,9 @@ struct Options {
   bool help = false, describe = false, quiet = false, verbose = false;
   bool parsable = false, track_memory = false, benchmark = false;
   double min_seconds = 0.1;  // of a benchmark
-  std::string filter;        // --name: which of several registered functions
+  std::string filter;        // --name: selects one of several registered functions
   std::optional<std::string> output_extents, default_buffers, default_scalars;
-  std::map<std::string, std::string> values;  // of arguments, by name
+  std::map<std::string, std::string> values;  // values of arguments, by name
 };
 
 Options read_options(int argc, const char* const* argv);

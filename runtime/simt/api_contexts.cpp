@@ -1,4 +1,4 @@
-// The simulated driver: devices, contexts, errors.
+// The simulated driver's functions for devices, contexts and errors.
 #include <cstring>
 
 #include "simt/call.h"
@@ -31,7 +31,7 @@ ContextState* primary_of(Device device) {
   return nullptr;
 }
 
-// Figures of a device of compute capability 9.0.
+// Attributes of a device of compute capability 9.0.
 Result attribute_of(int attribute, int& value) {
   switch (attribute) {
     case attribute_max_threads:
@@ -102,7 +102,7 @@ const ErrorText* find_error(Result result) {
   return nullptr;
 }
 
-// The text of an error of a kernel says what was found in it.
+// For a kernel's error, adds what the simulated device found in it.
 const char* text_of(const ErrorText& error) {
   thread_local std::string text;
   const bool is_kernels = error.result == illegal_address || error.result == launch_failed;
@@ -262,7 +262,7 @@ RETROGRADE_SIMT_EXPORT Result cuCtxSynchronize() {
   });
 }
 
-// ---- what a test asks ----
+// ---- queries and controls for tests ----
 
 void retrograde_simt_lose_device(int32_t number) {
   const std::lock_guard lock(driver_mutex());

@@ -1,4 +1,4 @@
-// The simulated driver: modules, functions, launches.
+// The simulated driver's functions for modules, functions and launches.
 #include <cstring>
 
 #include "simt/call.h"
@@ -11,7 +11,7 @@ using Function_ = ModuleState::FunctionState;
 
 constexpr int shared_by_default = 48 << 10, shared_at_most = 227 << 10;
 
-// Into the buffer that the caller gave for errors of the driver's compiler.
+// Writes to the caller's buffer for errors of the driver's compiler.
 void write_log(unsigned count, const int* options, void* const* values, const char* text) {
   char* log = nullptr;
   size_t bytes = 0;
@@ -46,7 +46,7 @@ Function_* find_function(ContextState& context, Function handle) {
   return nullptr;
 }
 
-// Values one behind the other, each at its natural alignment.
+// Packs the arguments in order, each at its natural alignment.
 std::vector<uint64_t> pack(const retrograde_gpu_kernel& kernel, void** args) {
   std::vector<uint64_t> packed;
   size_t end = 0;
@@ -100,7 +100,7 @@ RETROGRADE_SIMT_EXPORT Result cuModuleLoadDataEx(Module* module, const void* cod
   });
 }
 
-// Waits for its kernels.
+// Waits for the module's kernels.
 RETROGRADE_SIMT_EXPORT Result cuModuleUnload(Module module) {
   return call_in_context("cuModuleUnload", [&](ContextState& context) -> Result {
     if (const Result refused = refuse_in_capture(); refused != success) return refused;

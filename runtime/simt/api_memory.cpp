@@ -1,5 +1,5 @@
-// The simulated driver: memory and copies. A copy from memory of the host that is not locked reads it
-// at once, as the driver does when it stages it; one to such memory waits until it has arrived.
+// The simulated driver's functions for memory and copies. A copy from pageable host memory reads it at once, as the
+// real driver does by staging it. A copy to pageable host memory is complete on return.
 #include <cstring>
 
 #include "simt/call.h"
@@ -7,7 +7,7 @@
 namespace retrograde::simt {
 namespace {
 
-// The device whose range an address of live memory is in; null: none.
+// The device whose live memory contains the address; null if none does.
 DeviceMemory* find_memory(Address address, size_t bytes) {
   for (auto& [device, memory] : state().memory) {
     if (memory.find(address, bytes)) return &memory;
@@ -105,7 +105,7 @@ bool is_legal(const Copy2D& c) {
          c.target_pitch >= c.width_bytes && c.source_pitch <= most && c.target_pitch <= most;
 }
 
-// False: there is none of that kind.
+// Returns false if the address has no attribute of that kind.
 bool attribute_of(Address address, int attribute, void* value) {
   DeviceMemory* memory = find_memory(address, 1);
   if (attribute == pointer_memory_type) {
@@ -118,7 +118,7 @@ bool attribute_of(Address address, int attribute, void* value) {
   return true;
 }
 
-// Work that may not be on a captured stream's default stream, and so on.
+// Runs `work` on a stream. Rejects the call if it would involve a stream that is being captured in this context.
 template <typename Work>
 Result copy_on(const char* function, Stream handle, Work work) {
   return call_on_stream(function, handle, [&](StreamState& stream) -> Result {
@@ -141,7 +141,7 @@ RETROGRADE_SIMT_EXPORT Result cuMemAlloc_v2(Address* address, size_t bytes) {
   });
 }
 
-// Waits for all work of the context, which may use the memory.
+// Waits for all work of the context, because it may use the memory.
 RETROGRADE_SIMT_EXPORT Result cuMemFree_v2(Address address) {
   return call_in_context("cuMemFree_v2", [&](ContextState& context) -> Result {
     if (const Result refused = refuse_in_capture(); refused != success) return refused;
@@ -179,7 +179,7 @@ RETROGRADE_SIMT_EXPORT Result cuPointerGetAttribute(void* value, int attribute, 
   });
 }
 
-// What is not known is 0, and no error.
+// Unknown attributes are 0 and not an error.
 RETROGRADE_SIMT_EXPORT Result cuPointerGetAttributes(unsigned count, const int* attributes,
                                                      void** values, Address address) {
   return call_in_context("cuPointerGetAttributes", [&](ContextState&) -> Result {

@@ -1,5 +1,5 @@
-// The simulated driver: streams, events, graphs. A capture is of one stream: work that another stream
-// would join by events is refused.
+// The simulated driver's functions for streams, events and graphs. A capture is of one stream: work that another stream
+// would join by events is rejected.
 #include <utility>
 
 #include "simt/call.h"
@@ -128,7 +128,7 @@ RETROGRADE_SIMT_EXPORT Result cuStreamGetCaptureInfo_v2(Stream handle, int* stat
   });
 }
 
-// With these modes of threads and of captures say what may be called: see refuse_in_capture().
+// The modes of threads and captures together decide which calls are allowed: see refuse_in_capture().
 RETROGRADE_SIMT_EXPORT Result cuThreadExchangeStreamCaptureMode(int* mode) {
   return call("cuThreadExchangeStreamCaptureMode", [&]() -> Result {
     if (*mode < capture_mode_global || *mode > capture_mode_relaxed) return invalid_value;

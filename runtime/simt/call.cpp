@@ -27,7 +27,7 @@ struct Calls {
   std::list<Failure> failures;
 };
 
-// function:nth:result,function:nth:result
+// Format: function:nth:result,function:nth:result
 void Calls::read_environment() {
   const char* text = std::getenv("RETROGRADE_SIMT_FAIL");
   std::istringstream entries(text ? text : "");
@@ -77,7 +77,7 @@ void add_failure(const char* function, int64_t nth, Result result) {
   calls().failures.push_back({function ? function : "", nth, result});
 }
 
-int32_t call_off_failures() {
+int32_t cancel_failures() {
   const auto count = static_cast<int32_t>(calls().failures.size());
   calls().failures.clear();
   return count;
@@ -101,5 +101,5 @@ void retrograde_simt_fail_call(const char* function, int64_t nth, int32_t result
 
 int32_t retrograde_simt_call_off(void) {
   const std::lock_guard lock(driver_mutex());
-  return call_off_failures();
+  return cancel_failures();
 }

@@ -1,5 +1,5 @@
-// How every function of the simulated driver begins: under the lock, counted, and failing where a test
-// wants it to.
+// The prologue of every function of the simulated driver: takes the lock, counts the call, and makes it fail if a test
+// asked for that.
 #pragma once
 
 #include <new>
@@ -8,12 +8,12 @@
 
 namespace retrograde::simt {
 
-// Counts a call and says what it shall give instead of working; success: work.
+// Counts a call. Returns success, or the error that the call must return without doing anything.
 Result begin_call(const char* function);
 int64_t call_count(const char* function);
 const char* function_name(int32_t index);
 void add_failure(const char* function, int64_t nth, Result);
-int32_t call_off_failures();
+int32_t cancel_failures();
 
 template <typename Work>
 Result call(const char* function, Work work) {
@@ -28,7 +28,7 @@ Result call(const char* function, Work work) {
   }
 }
 
-// With the thread's current context, which must be there and not be lost.
+// Runs `work` with the thread's current context, which must exist and not be lost.
 template <typename Work>
 Result call_in_context(const char* function, Work work) {
   return call(function, [&]() -> Result {
@@ -39,7 +39,7 @@ Result call_in_context(const char* function, Work work) {
   });
 }
 
-// On a stream of the current context.
+// Runs `work` on a stream of the current context.
 template <typename Work>
 Result call_on_stream(const char* function, Stream handle, Work work) {
   return call_in_context(function, [&](ContextState& context) -> Result {

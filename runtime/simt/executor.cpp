@@ -1,4 +1,4 @@
-// Threads, barriers and shuffles.
+// Executes a kernel's threads, barriers and shuffles.
 #include "simt/executor.h"
 
 #include <algorithm>
@@ -141,7 +141,7 @@ void Executor::run_plain_block() {
   for (const uint32_t t : order_) begin_thread(threads_[t]);
 }
 
-// ---- threads that wait ----
+// ---- waiting threads ----
 
 void Executor::run_thread_of(void* thread) {
   auto& self = *static_cast<ThreadState*>(thread);
@@ -156,7 +156,7 @@ void Executor::run_waiting_block() {
     if (options_.order == retrograde_simt_warp_ahead) run_ahead();
     run_round(0, count_);
     if (!is_running()) return;
-    if (!let_go()) explain_waiting();
+    if (!let_go()) report_deadlock();
   }
 }
 
@@ -170,7 +170,7 @@ void Executor::run_round(uint32_t first, uint32_t count) {
   }
 }
 
-// One warp goes as far as it can alone.
+// Lets one warp run as far as it can alone.
 void Executor::run_ahead() {
   const auto warp = static_cast<uint32_t>(chance_() % parts_.size());
   const uint32_t first = warp * warp_threads;

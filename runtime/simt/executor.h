@@ -1,9 +1,8 @@
-// Runs the threads of a kernel, block after block.
+// Runs the threads of a kernel, one block after another.
 //
-// In a kernel whose threads wait for one another each is a fiber: it goes on until it arrives at a
-// barrier or a shuffle, and the next one has its turn. When none can go on, those that all threads of a
-// warp, or of the block, have arrived at let them go; if there is none such, that is the error. In other
-// kernels the threads are calls in a loop.
+// If threads wait for one another, each thread is a fiber: it runs until it reaches a barrier or a shuffle, and then
+// another thread runs. When no thread can continue, barriers that all threads of a warp or block have reached are
+// released. If there are none, the kernel is in error. In other kernels, threads are calls in a loop.
 #pragma once
 
 #include <memory>
@@ -22,15 +21,15 @@ enum class Wait { nothing, barrier, warp_barrier, shuffle, ended };
 
 class Executor;
 
-// What the executor keeps of a thread, behind what the kernel sees.
+// The executor's data for a thread, placed after the fields that the kernel sees.
 struct ThreadState : retrograde_simt_thread {
   Executor* executor = nullptr;
   uint32_t number = 0;  // in the block
   Wait wait = Wait::nothing;
   int32_t site = -1;   // where it waits
-  uint32_t value = 0;  // of a shuffle: given, then got
+  uint32_t value = 0;  // of a shuffle: first its operand, then its result
   int32_t lane = 0, kind = 0;
-  // A store over another thread's store, which is an error unless it changes nothing.
+  // A store over another thread's store. It is an error unless the value stays the same.
   struct Overwrite {
     const uint8_t* address;
     int32_t bytes, site, space;
@@ -46,7 +45,7 @@ class Executor {
   explicit Executor(const Launch&);
   Result run();
 
-  // What kernels call, by the table of retrograde_simt_calls.
+  // Functions that kernels call through the table of retrograde_simt_calls.
   void arrive(ThreadState&, Wait, int32_t site);
   uint32_t shuffle(ThreadState&, uint32_t value, int32_t lane, int32_t kind, int32_t site);
   void access(ThreadState&, const void* address, int32_t bytes, int32_t kind, int32_t space,
@@ -74,7 +73,7 @@ class Executor {
   // ---- errors ----
   void fail(Result, const std::string& text);
   void fail_in_kernel(Result, const std::string& text);
-  void explain_waiting();
+  void report_deadlock();
   std::string statement(int32_t site) const;
   std::string name_of(const Moment&) const;
   std::string name_of(const ThreadState&) const;
@@ -91,12 +90,12 @@ class Executor {
 
   const Launch& launch_;
   const retrograde_simt_options options_;
-  const uint32_t count_;  // threads of a block
+  const uint32_t count_;  // threads per block
   Result result_ = success;
   std::mt19937_64 chance_;
 
   std::unique_ptr<ThreadState[]> threads_;
-  std::unique_ptr<Fiber[]> fibers_;  // one each, or one for all
+  std::unique_ptr<Fiber[]> fibers_;  // one per thread, or one for all threads
   Fiber* running_ = nullptr;
   std::vector<uint32_t> order_;
   uint32_t ended_ = 0, block_ = 0, interval_ = 1;

@@ -9,10 +9,10 @@ namespace {
 
 namespace context = boost::context::detail;
 
-constexpr size_t stack_bytes = 256 << 10;  // touched as far as it is used
+constexpr size_t stack_bytes = 256 << 10;  // the system commits only pages that are used
 constexpr size_t guard_bytes = 4096;
 
-// Stacks of fibers that are gone; making one takes longer than running a short kernel.
+// Stacks of finished fibers, for reuse; allocating one takes longer than running a short kernel.
 std::vector<void*>& free_stacks() {
   static std::vector<void*>& stacks = *new std::vector<void*>;
   return stacks;
@@ -27,7 +27,7 @@ void* new_stack() {
   void* stack = mmap(nullptr, stack_bytes, PROT_READ | PROT_WRITE,
                      MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
   if (stack == MAP_FAILED) throw std::bad_alloc();
-  mprotect(stack, guard_bytes, PROT_NONE);  // where it would overflow
+  mprotect(stack, guard_bytes, PROT_NONE);  // catches overflow
   return stack;
 }
 

@@ -1,5 +1,5 @@
-// Fibers: where a kernel's thread waits for others, another one goes on. A fiber that is abandoned is
-// never unwound, for compiled kernels cannot be; its stack is used again.
+// Fibers: when a kernel's thread waits for others, another one runs. An abandoned fiber is never unwound, because
+// compiled kernels have no unwind tables; its stack is reused.
 #pragma once
 
 #include <boost/context/detail/fcontext.hpp>
@@ -10,11 +10,11 @@ namespace retrograde::simt {
 
 class Fiber {
  public:
-  // `run` gets `argument`; when it returns, the fiber has ended.
+  // Runs `run(argument)` in the fiber, which ends when it returns.
   void start(void (*run)(void*), void* argument);
-  // From outside: until it suspends itself or ends.
+  // Called from outside: runs the fiber until it suspends itself or ends.
   void resume();
-  // From inside.
+  // Called from inside.
   void suspend();
   bool has_ended() const { return has_ended_; }
   ~Fiber();

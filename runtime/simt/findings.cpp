@@ -1,4 +1,4 @@
-// What the executor finds wrong, and how it says so.
+// The errors that the executor detects, and their messages.
 #include <algorithm>
 #include <cstring>
 
@@ -71,14 +71,15 @@ void Executor::fail(Result result, const std::string& text) {
   set_finding(std::string("kernel ") + launch_.kernel->name + ": " + text);
 }
 
-// Of the fiber that runs: it never goes on.
+// Called in a fiber, which never resumes.
 void Executor::fail_in_kernel(Result result, const std::string& text) {
   fail(result, text);
   running_->suspend();
 }
 
-// No thread can go on. The first that waits, and one that should wait for the same and does not.
-void Executor::explain_waiting() {
+// Reports a deadlock: the first thread that waits, and another thread that should wait for the same barrier and does
+// not.
+void Executor::report_deadlock() {
   const ThreadState *all = threads_.get(), *all_end = all + count_;
   const auto* first =
       std::find_if(all, all_end, [](const ThreadState& t) { return t.wait != Wait::ended; });
@@ -164,7 +165,7 @@ void Executor::check_race(ThreadState& thread, const uint8_t* address, int32_t b
   report_race(thread, address, space, site, verb_of(access), conflict.other, conflict.other_did);
 }
 
-// The store has happened by now.
+// Called once the store has happened.
 void Executor::check_overwrite(ThreadState& thread) {
   if (!thread.overwrite) return;
   const ThreadState::Overwrite store = *thread.overwrite;

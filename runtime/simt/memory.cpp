@@ -1,4 +1,4 @@
-// Device memory of the simulated device.
+// Memory of the simulated device.
 #include <sys/mman.h>
 
 #include <cstring>
@@ -25,7 +25,7 @@ bool DeviceMemory::reserve() {
   return true;
 }
 
-// Behind each allocation is a page that nobody may touch. 0: there is no gap.
+// Finds space for an allocation and an inaccessible page behind it. 0 if there is none.
 Address DeviceMemory::find_gap(size_t bytes) const {
   const size_t wanted = in_pages(bytes) + page_bytes;
   Address at = begin_;

@@ -1,4 +1,4 @@
-// Settings of the simulated device, from the environment until a program sets them.
+// Options of the simulated device. They come from the environment until a program sets them.
 #pragma once
 
 #include "simt/simt_driver.h"

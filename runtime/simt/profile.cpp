@@ -17,7 +17,7 @@ std::map<std::string, retrograde_simt_profile>& profiles() {
   return all;
 }
 
-// All fields are int64_t.
+// Works because all fields are int64_t.
 void add_to(retrograde_simt_profile& sum, const retrograde_simt_profile& one) {
   constexpr size_t fields = sizeof one / sizeof(int64_t);
   std::array<int64_t, fields> a, b;
@@ -85,8 +85,8 @@ void Profile::end_global(const Request& request) {
                                      : sums.atomic_sectors) += count;
 }
 
-// Accesses of eight bytes are served for half a warp at a time, of sixteen for a quarter; each pass
-// serves one word of each bank, to whoever wants it.
+// Shared memory serves accesses of eight bytes for half a warp at a time, and of sixteen bytes for a quarter. In each
+// pass every bank serves one word, to all threads that access it.
 void Profile::end_shared(const Request& request) {
   const int32_t widest =
       std::max_element(request.pieces.begin(), request.pieces.end(),

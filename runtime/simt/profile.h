@@ -1,5 +1,5 @@
-// Counts of what a kernel's accesses would ask of a device's memory, by warp request: what the 32
-// threads of a warp access by one statement at one time.
+// Counts a kernel's memory transactions by warp request: the accesses that the 32 threads of a warp make by one
+// statement at one time.
 #pragma once
 
 #include <map>
@@ -15,7 +15,7 @@ namespace retrograde::simt {
 class Profile {
  public:
   explicit Profile(int32_t sites) : sites_(static_cast<size_t>(sites) + 1) {}
-  // Threads of a block come one after the other, each thread's accesses in their order.
+  // Threads of a block are added one after another, each with its accesses in order.
   void add(uint32_t thread, int32_t site, uint64_t address, int32_t bytes, Access, bool is_shared);
   void end_block();
   retrograde_simt_profile sums = {};
@@ -36,12 +36,12 @@ class Profile {
   void end_shared(const Request&);
 
   const size_t sites_;
-  // How often each thread came by each site, and the requests by warp, site and time.
+  // How often each thread has reached each site, and the requests by warp, site and time.
   std::unordered_map<uint64_t, uint32_t> times_;
   std::unordered_map<uint64_t, Request> requests_[32];  // by warp
 };
 
-// Of all launches so far.
+// Adds to the totals of all launches.
 void add_profile(const std::string& kernel, const retrograde_simt_profile&);
 
 }  // namespace retrograde::simt

@@ -8,7 +8,7 @@ namespace {
 constexpr uint8_t other_threads = 1, other_warps = 2, other_blocks = 4;
 uint32_t warp_of(const Moment& moment) { return moment.thread / 32u; }
 
-// Whether all that `before` stands for came before `now`.
+// Whether all accesses that `before` represents happened before `now`.
 bool is_ordered(const Moment& before, const Moment& now) {
   if (before.interval == 0) return true;
   if ((before.spread & other_blocks) || before.block != now.block) return false;
@@ -18,7 +18,7 @@ bool is_ordered(const Moment& before, const Moment& now) {
   return by_warp || (before.thread == now.thread && !(before.spread & other_threads));
 }
 
-// Adds an access to those that a moment stands for.
+// Adds an access to those that a moment represents.
 void add(Moment& all, const Moment& now) {
   uint8_t spread = all.spread & other_blocks;
   if (all.interval != 0) {
@@ -40,7 +40,7 @@ void look(Conflict& conflict, const Moment& before, const Moment& now, const cha
   if (!conflict.is_there && !is_ordered(before, now)) conflict = {true, before, did};
 }
 
-// Adds what was found of so many bytes, from one of the access on.
+// Merges the conflicts found in `bytes` bytes, beginning at byte `from` of the access.
 void join(Conflict& all, const Conflict& found, uint64_t from, uint64_t bytes) {
   if (!found.is_there) return;
   uint64_t stored = all.stored;
@@ -76,7 +76,7 @@ Shadow::Page& Shadow::page_of(uint64_t word) {
   return *last_;
 }
 
-// `from`: which byte of the access is the first one of these.
+// `from`: index of the first of these bytes within the access.
 void Shadow::record_word(uint64_t begin, uint64_t end, Access access, const Moment& now,
                          uint64_t from, Conflict& all) {
   Page& page = page_of(begin / 4);

@@ -1,11 +1,11 @@
-// Races: two threads that access the same bytes, one of them writing and not both atomically, with
-// nothing that orders them. What orders: the program of one thread; a barrier of the block, which ends an
-// interval; a barrier of the warp, which ends a part of the interval for the threads of the warp.
+// Race detection. A race is two unordered accesses of different threads to the same bytes, at least one of them a write
+// and not both atomic. Accesses are ordered by a thread's program order, by a block's barrier, which ends an interval,
+// and by a warp's barrier, which ends a part of the interval for that warp's threads.
 //
-// Each word of four bytes has a cell that remembers the last write and the last reads; words that are
-// accessed by smaller parts have one for each byte. Of several reads since a write, the cell keeps the
-// last one and how far the others were spread: that decides whether a write conflicts with one of them
-// (as in FastTrack, Flanagan and Freund 2009, with the few clocks that barriers need in place of vectors).
+// Each four-byte word has a cell that records the last write and the last reads. Words that are accessed by smaller
+// parts have a cell for each byte. If there were several reads since a write, the cell keeps the last one and how
+// widely the others were spread. This decides whether a write conflicts with one of them (as in FastTrack, Flanagan and
+// Freund 2009; barriers need only a few clocks in place of vectors).
 #pragma once
 
 #include <bitset>
@@ -16,14 +16,14 @@
 
 namespace retrograde::simt {
 
-// Who accesses, and when.
+// An access: who made it, and when.
 struct Moment {
   uint32_t block = 0;
-  uint32_t interval = 0;  // of the block, from 1; 0: nobody
-  uint32_t part = 0;      // of the interval, for the thread's warp
-  uint16_t thread = 0;    // of the block
+  uint32_t interval = 0;  // of the block, from 1; 0: no access
+  uint32_t part = 0;      // part of the interval, for the thread's warp
+  uint16_t thread = 0;    // in the block
   int16_t site = -1;
-  uint8_t spread = 0;  // others since: 1 of this warp, 2 of other warps, 4 of other blocks
+  uint8_t spread = 0;  // other accesses since: 1 by this warp, 2 by other warps, 4 by other blocks
 };
 
 struct Cell {
@@ -40,13 +40,13 @@ struct Conflict {
 
 enum class Access { load, store, atomic };
 
-// Of one kind of memory during one launch, or one block.
+// The access records of one kind of memory during one launch, or one block.
 class Shadow {
  public:
-  // `address` is counted from anywhere. The first conflict, with a load or an atomic update if there is
-  // one. A store over the same values is none: the caller says so later of the bytes that others stored.
+  // `address` may count from any origin. Returns the first conflict, preferring one with a load or atomic update.
+  // Storing an equal value is not a conflict: the caller checks this later, for the bytes that others stored.
   Conflict record(uint64_t address, int32_t bytes, Access, const Moment&);
-  // As if nothing had been accessed.
+  // Forgets all accesses.
   void clear() {
     generation_++;
     last_ = nullptr;
@@ -58,7 +58,7 @@ class Shadow {
     uint64_t generation = 0;
     Cell words[page_words];
     std::bitset<page_words> has_bytes;  // words that are accessed in parts
-    std::unique_ptr<Cell[]> bytes;      // four for each word, once one of them is
+    std::unique_ptr<Cell[]> bytes;      // four per word, allocated once one is needed
   };
   Page& page_of(uint64_t word);
   void record_word(uint64_t begin, uint64_t end, Access, const Moment&, uint64_t from, Conflict&);

@@ -2,7 +2,7 @@
 
 namespace retrograde::simt {
 
-// Never destroyed: threads may still be in the driver when the process ends.
+// Never destroyed: threads may still be in the driver when the process exits.
 State& state() {
   static State& all = *new State;
   return all;

@@ -1,5 +1,5 @@
-// What the simulated driver keeps: devices, contexts and what belongs to them. One lock for all of it,
-// held during every call of the driver, kernels included.
+// The state of the simulated driver: devices, contexts, and what belongs to them. One lock protects all of it; every
+// driver call holds it, also while kernels run.
 #pragma once
 
 #include <functional>
@@ -29,13 +29,13 @@ struct Allocation {
   ContextState* context = nullptr;
 };
 
-// An address range of its own for each device, which nothing else in the process is in.
+// The memory of one device, in an address range that nothing else in the process uses.
 class DeviceMemory {
  public:
   Result allocate(size_t bytes, ContextState*, Address&);
   Result free(Address);
   void free_all(const ContextState*);
-  // The allocation that all these bytes are in, or null.
+  // The allocation that contains all these bytes, or null.
   const Allocation* find(Address, size_t bytes, Address* base = nullptr) const;
   const std::map<Address, Allocation>& live() const { return live_; }
   size_t used_bytes() const { return used_bytes_; }
@@ -51,7 +51,7 @@ class DeviceMemory {
 
 // ---- work ----
 
-// One operation of a stream; it runs once all that it waits for has run.
+// One operation of a stream; it runs after all operations in `after`.
 struct Operation {
   std::function<Result()> run;
   std::vector<std::shared_ptr<Operation>> after;
@@ -60,18 +60,18 @@ struct Operation {
 using OperationPtr = std::shared_ptr<Operation>;
 
 struct GraphState {
-  std::vector<std::function<Result()>> nodes;  // in order: one stream is captured
+  std::vector<std::function<Result()>> nodes;  // in order, because only one stream is captured
 };
 
 struct StreamState {
   ContextState* context = nullptr;
-  bool is_blocking = true;  // it waits for the default stream, and the other way round
+  bool is_blocking = true;  // whether it and the default stream wait for each other
   OperationPtr last;
-  // While a graph is captured:
+  // During a capture:
   std::unique_ptr<GraphState> capture;
   uint64_t capture_id = 0;
   bool is_invalidated = false;
-  int capture_mode = 0;  // 0: global, 1: of this thread, 2: relaxed
+  int capture_mode = 0;  // 0: global, 1: this thread only, 2: relaxed
   const void* capture_thread = nullptr;
 };
 
@@ -92,11 +92,11 @@ struct ContextState {
   int device = 0;
   bool is_primary = false;
   int references = 0;
-  Result lost = success;  // an error that stays
+  Result lost = success;  // a permanent error
   StreamState default_stream;
   std::set<std::unique_ptr<StreamState>> streams;
   std::set<std::unique_ptr<ModuleState>> modules;
-  std::vector<OperationPtr> pending;  // in the order that they were asked for
+  std::vector<OperationPtr> pending;  // in the order in which they were enqueued
 };
 
 struct State {
@@ -104,7 +104,7 @@ struct State {
   std::set<std::unique_ptr<ContextState>> contexts;
   std::set<std::unique_ptr<EventState>> events;
   std::set<std::unique_ptr<GraphState>> graphs;
-  std::map<const uint8_t*, size_t> locked_host;  // memory that is locked to its pages
+  std::map<const uint8_t*, size_t> locked_host;  // page-locked host memory
   retrograde_simt_copied copied = {};
   uint64_t captures = 0;
   bool is_initialized = false;
@@ -112,11 +112,11 @@ struct State {
 State& state();
 
 ContextState*& current_context();  // of this thread
-// Identifies the thread.
+// Identifies the calling thread.
 const void* this_thread();
 int& capture_mode_of_this_thread();
 
-// The element of a set of pointers, or null.
+// The matching element of a set of pointers, or null.
 template <typename T>
 T* find_in(const std::set<std::unique_ptr<T>>& all, const void* wanted) {
   for (const auto& one : all) {
@@ -137,20 +137,20 @@ bool erase_from(std::set<std::unique_ptr<T>>& all, const void* wanted) {
 // ---- streams.cpp ----
 
 StreamState* find_stream(ContextState&, Stream);
-// Adds work, to the graph where the stream is captured.
+// Adds work to the stream or, during a capture, to the graph.
 Result enqueue(StreamState&, std::function<Result()>);
-// Runs until all of these have run.
+// Runs operations until all of these have run.
 Result complete(ContextState&, const std::vector<OperationPtr>&);
 Result complete_all(ContextState&);
 Result complete_stream(StreamState&);
-// Refuses what may not be called while this thread, or anyone in global mode, captures, unless this
-// thread is in relaxed mode; the captures are invalid then.
+// Rejects calls that are forbidden while this thread, or any thread in global mode, captures, unless this thread is in
+// relaxed mode. A rejected call invalidates the captures.
 Result refuse_in_capture();
-Result refuse_on(StreamState&);  // of work that a captured stream cannot have
+Result refuse_on(StreamState&);  // rejects work that a captured stream forbids
 
 // ---- finding.cpp ----
 
-// Text that goes with the next error.
+// The text for the next error.
 void set_finding(const std::string&);
 const std::string& finding();
 

@@ -1,5 +1,5 @@
-// Streams: work waits until somebody waits for it. What may overtake what is drawn by chance then, as
-// far as streams, the default stream and events leave it open.
+// Streams: operations run only when something waits for them. Their order is then random, within the constraints of
+// streams, the default stream and events.
 #include <algorithm>
 #include <random>
 
@@ -23,7 +23,7 @@ bool are_done(const std::vector<OperationPtr>& wanted) {
                      [](const OperationPtr& one) { return !one || one->is_done; });
 }
 
-// Of what is ready: the first that was asked for, or any.
+// Chooses among ready operations: the first that was enqueued, or a random one.
 size_t choose(const std::vector<OperationPtr>& pending) {
   std::vector<size_t> ready;
   for (size_t i = 0; i < pending.size(); i++) {
@@ -36,7 +36,7 @@ void add_last(Operation& operation, const StreamState& stream) {
   if (stream.last && !stream.last->is_done) operation.after.push_back(stream.last);
 }
 
-// The default stream waits for all blocking streams, and they for it.
+// The default stream waits for all blocking streams, and they wait for it.
 void add_order(Operation& operation, StreamState& stream) {
   ContextState& context = *stream.context;
   add_last(operation, stream);
@@ -49,7 +49,7 @@ void add_order(Operation& operation, StreamState& stream) {
   }
 }
 
-// What did not run is dropped: a lost context runs nothing any more.
+// Drops operations that have not run: a lost context runs nothing any more.
 Result lose(ContextState& context, Result result) {
   context.lost = result;
   for (const OperationPtr& operation : context.pending) operation->is_done = true;
@@ -136,7 +136,7 @@ Result refuse_on(StreamState& stream) {
     return capture_unsupported;
   }
   if (&stream != &stream.context->default_stream) return success;
-  // The default stream would wait for the captured one.
+  // Reject, because the default stream would wait for the captured one.
   Result result = success;
   for_each_capture([&](StreamState& other) {
     if (other.context != stream.context || !other.is_blocking) return;

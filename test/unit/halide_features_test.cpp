@@ -135,7 +135,7 @@ TEST(Targets, RefuseSanitizersByName) {
                                       {Target::TSAN, "\"tsan\""},
                                       {Target::SanitizerCoverage, "\"sanitizer_coverage\""}}) {
     expect_error<Unsupported>(
-        {name, "no checks of a sanitizer", "Leave out"},
+        {name, "this sanitizer's checks", "Leave out"},
         [&, feature = feature] { f.realize({3}, jit.with_feature(feature)); });
   }
 }
@@ -146,8 +146,8 @@ TEST(Targets, RefuseLargeBuffersByName) {
   f(x) = x;
   const Target large = get_jit_target_from_environment().with_feature(Target::LargeBuffers);
   EXPECT_EQ(large.unsupported_part(), "large_buffers");
-  const std::initializer_list<std::string_view> words{"\"large_buffers\"", "numbered in 31 bits",
-                                                      "in tiles"};
+  const std::initializer_list<std::string_view> words{"\"large_buffers\"",
+                                                      "at most 2147483647 elements", "in tiles"};
   expect_error<Unsupported>(words, [&] { f.realize({3}, large); });
   const TemporaryFolder folder;
   expect_error<Unsupported>(words, [&] {

@@ -54,7 +54,7 @@ struct Pipe {
   void close_writing() { close(std::exchange(ends[1], -1)); }
 };
 
-// What both write, to their end or the deadline; false: it came first.
+// Reads what the child writes to both pipes, until both end; false if the deadline comes first.
 bool read_both(Pipe (&pipes)[2], std::string* (&texts)[2], Clock::time_point deadline) {
   std::array<pollfd, 2> open = {pollfd{pipes[0].ends[0], POLLIN, 0},
                                 pollfd{pipes[1].ends[0], POLLIN, 0}};
@@ -69,7 +69,7 @@ bool read_both(Pipe (&pipes)[2], std::string* (&texts)[2], Clock::time_point dea
       if (open[i].fd < 0 || !(open[i].revents & (POLLIN | POLLHUP))) continue;
       const ssize_t got = read(open[i].fd, part.data(), part.size());
       if (got > 0) texts[i]->append(part.data(), static_cast<size_t>(got));
-      if (got == 0) open[i].fd = -1;  // poll passes over it
+      if (got == 0) open[i].fd = -1;  // poll ignores negative descriptors
     }
   }
   return true;

@@ -7,7 +7,7 @@
 namespace device_check {
 namespace {
 
-// The driver's functions by their published signatures; 0 is success.
+// Calls a function of the driver; its signature is the published one, and 0 means success.
 template <typename... Args>
 bool succeeds(void* library, const char* function, Args... args) {
   const auto call = reinterpret_cast<int (*)(Args...)>(dlsym(library, function));

@@ -1,4 +1,4 @@
-// device.h -- which device there is, asked of CUDA's driver itself: nothing of ours stands between.
+// device.h -- finds the GPU by asking CUDA's driver directly, without using our runtime.
 #pragma once
 
 #include <string>
@@ -7,9 +7,9 @@ namespace device_check {
 
 struct Device {
   std::string name;
-  int capability = 0;      // 90: 9.0
-  int driver_version = 0;  // 12040: of CUDA 12.4
-  std::string why_none;    // not empty: there is no device
+  int capability = 0;      // 90 means 9.0
+  int driver_version = 0;  // 12040 means CUDA 12.4
+  std::string why_none;    // empty if there is a device
 };
 
 Device find_device();

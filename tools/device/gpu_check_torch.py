@@ -1,10 +1,10 @@
-"""What gpu_check asks of PyTorch: the same programs where one or two of its calls compute them.
+"""Runs gpu_check's programs in PyTorch, those that one or two PyTorch calls can compute.
 
     gpu_check_torch.py TASKS.json
 
-TASKS.json names the device, the seconds that all may take, the programs that were timed with their scales,
-and files of the results at scale 1. Prints JSON: for each program milliseconds at its scale, and how far the
-result at scale 1 is from ours. Programs without such calls are left out, and told.
+TASKS.json contains the device, a time limit in seconds for everything, the timed programs with their scales,
+and files with our results at scale 1. Prints JSON: for each program, milliseconds at its scale, and the
+difference between PyTorch's result and ours at scale 1. Programs without such calls are left out and listed.
 """
 import json
 import statistics

@@ -1,22 +1,21 @@
-// gpu_check -- what the tests say of the simulated device, asked of an NVIDIA GPU.
+// gpu_check -- checks an NVIDIA GPU against the simulated device.
 //
-//   gpu_check [--output FILE] [--seconds N]    on the GPU of this machine
-//   gpu_check --simulated                      the same checks on the simulated device: of this program
+//   gpu_check [--output FILE] [--seconds N]    checks the GPU of this machine
+//   gpu_check --simulated                      runs the same checks on the simulated device, to test this program
 //
-//   --seconds N       that it may take, about (540; on the simulated device 10)
-//   --random N        random pipelines under random schedules (2000; on the simulated device 5)
-//   --first-seed N    of the first of them (1)
-//   --only NAME       of the programs these, of which there may be several
-//   --python PROGRAM  that may have PyTorch (python3)
+//   --seconds N       approximate time limit (540; on the simulated device 10)
+//   --random N        number of random pipelines under random schedules (2000; on the simulated device 5)
+//   --first-seed N    seed of the first of them (1)
+//   --only NAME       run only this program; may be repeated
+//   --python PROGRAM  interpreter that may have PyTorch (python3)
 //
-// Has the driver compile kernels of every operator in every type; compares, bit for bit, what the GPU and the
-// executor of the simulated device give for pipelines of every operator (those of the differential tests), for
-// the programs of test/support/gpu_programs and for random ones; runs
-// the programs under compute-sanitizer where that is installed; times them beside the bandwidth of copies and
-// the rate of FMA that it measures, and beside PyTorch where that is installed. Writes all of it as JSON. Builds
-// nothing and needs no network.
+// The checks are: the driver compiles kernels of every operator in every type. Results of the GPU and of the simulated
+// device agree bit for bit, for pipelines of every operator (those of the differential tests), for the programs of
+// test/support/gpu_programs, and for random ones. The programs run under compute-sanitizer, if it is installed. Their
+// times are compared with the copy bandwidth and FMA rate measured in the same run, and with PyTorch, if it is
+// installed. The results are written as JSON. It builds nothing and needs no network.
 //
-// Exit status: 0 all is well, 1 something is not, 2 wrong arguments, 77 there is no GPU.
+// Exit status: 0 all checks passed, 1 a check failed, 2 wrong arguments, 77 there is no GPU.
 #include <unistd.h>
 
 #include <algorithm>
@@ -46,12 +45,12 @@ constexpr int problems_found = 1, wrong_arguments = 2, no_device = 77;
 
 struct Arguments {
   std::string output, python = "python3";
-  double seconds = -1;  // as usual, both
+  double seconds = -1;  // -1: the default, also for `random`
   int random = -1;
   uint64_t first_seed = 1;
   bool is_simulated = false;
   Names only;
-  // Of a worker, which this program starts.
+  // Arguments for a worker, which this program starts itself.
   std::string worker, file;
   int capability = 75;
 };
@@ -66,7 +65,7 @@ struct Arguments {
 double number(const std::string& flag, const std::string& text) {
   char* end = nullptr;
   const double value = std::strtod(text.c_str(), &end);
-  if (text.empty() || *end || !(value >= 0)) usage(flag + " wants a number, not \"" + text + "\"");
+  if (text.empty() || *end || !(value >= 0)) usage(flag + " needs a number, not \"" + text + "\"");
   return value;
 }
 
@@ -78,7 +77,7 @@ Arguments arguments_of(int argc, char** argv) {
       result.is_simulated = true;
       continue;
     }
-    if (i + 1 == argc) usage(flag + " is no flag, or wants a value");
+    if (i + 1 == argc) usage(flag + " is not a flag, or needs a value");
     const std::string value = argv[++i];
     if (flag == "--output")
       result.output = value;
@@ -106,7 +105,7 @@ Arguments arguments_of(int argc, char** argv) {
   return result;
 }
 
-// ---- a worker: one part on the device that the environment chooses ----
+// ---- a worker: runs one part on the device that the environment selects ----
 
 int work(const Arguments& arguments) {
   const retrograde::Target target = target_for(arguments.capability);
@@ -157,7 +156,7 @@ class TemporaryFolder {
   fs::path path_;
 };
 
-// Of random pipelines, one after another.
+// A range of seeds of random pipelines.
 struct Seeds {
   uint64_t first = 1;
   int count = 0;
@@ -173,7 +172,7 @@ class Check {
                        {"simulated", arguments.is_simulated}};
   }
 
-  // The exit status.
+  // Returns the exit status.
   int run() {
     compile_kernels_there();
     compare_part("operators", 0.2);
@@ -207,8 +206,8 @@ class Check {
     problems_.push_back(text);
   }
 
-  // Of the random pipelines, for workers beside each other: half of the processors' for the device, half for
-  // the executor.
+  // Splits the random pipelines among concurrent workers: half of the processors serve the device, half the simulated
+  // device.
   std::vector<Seeds> shares() const {
     constexpr int most = 8;
     const int workers =
@@ -243,7 +242,8 @@ class Check {
     if (arguments_.is_simulated) words.push_back("--simulated");
     return words;
   }
-  // Of what is checked: the GPU, or the simulated device with another order of threads than the executor's.
+  // The environment for the device under test: the GPU, or the simulated device with another thread order than in the
+  // reference run.
   std::map<std::string, std::string> environment() const {
     if (!arguments_.is_simulated) return {{"RETROGRADE_GPU", "cuda"}};
     return {{"RETROGRADE_GPU", "simulated"},
@@ -273,12 +273,12 @@ class Check {
       told["modules"].push_back(record.name);
       told["compiled"] = told["compiled"].get<int64_t>() + std::ranges::count(record.bytes, '\n');
     }
-    if (told["modules"].empty()) problem("of the kernels of every operator none was compiled");
+    if (told["modules"].empty()) problem("no kernel of any operator was compiled");
     std::cout << "  " << told["compiled"] << " kernels in " << told["modules"].size() << " modules"
               << std::endl;
   }
 
-  // What one worker left, and how it ended.
+  // A worker's records, and how it ended.
   struct Told {
     Ended ended;
     std::vector<Record> records;
@@ -290,7 +290,7 @@ class Check {
       return Told{std::move(ended), read_records(file)};
     });
   }
-  // All records; that a worker ended early is a problem.
+  // Collects all records; a worker that ended early is reported as a problem.
   std::vector<Record> records_of(const std::string& part, const std::string& where,
                                  std::vector<std::future<Told>>& workers) {
     std::vector<Record> all;
@@ -299,7 +299,7 @@ class Check {
       std::ranges::move(told.records, std::back_inserter(all));
       if (told.ended.succeeded()) continue;
       problem(part + " end early on " + where +
-              (told.ended.timed_out ? ", its time was over" : "") + ", status " +
+              (told.ended.timed_out ? ", its time limit was reached" : "") + ", status " +
               std::to_string(told.ended.status) + ": " + told.ended.err);
     }
     return all;
@@ -320,7 +320,7 @@ class Check {
     const std::vector<Record> other = records_of(part, "the executor", here);
     const Agreement agreement = compare(own, other);
     for (const std::string& text : agreement.problems) problem(text);
-    if (agreement.compared == 0) problem("of the " + part + " none was compared");
+    if (agreement.compared == 0) problem("nothing was compared in the part " + part);
     std::cout << "  " << agreement.compared << " compared bit for bit, " << agreement.refused
               << " refused by the compiler, " << agreement.problems.size() << " problems"
               << std::endl;
@@ -348,7 +348,7 @@ class Check {
       words.insert(words.end(), own.begin(), own.end());
       const Ended ended = run_child(words, environment(), std::min(60.0, seconds_left() / 4));
       std::string verdict = ended.succeeded() ? "clean"
-                            : ended.timed_out ? "its time was over"
+                            : ended.timed_out ? "time limit reached"
                                               : "findings";
       if (verdict == "findings")
         problem(std::string(tool) + ": " + ended.out.substr(0, 2000) + ended.err);
@@ -380,7 +380,7 @@ class Check {
     std::fflush(stdout);
   }
 
-  // The script gets what was timed and what was computed, and gives times and differences.
+  // Passes timings and results to the Python script, which returns its own times and the differences.
   void compare_with_torch() {
     constexpr double to_import_it = 3;
     if (arguments_.is_simulated && seconds_left() < to_import_it) {
@@ -413,7 +413,7 @@ class Check {
     if (told.contains("not_installed")) std::cout << "  not installed" << std::endl;
     const Json programs = told.value("programs", Json::object());
     for (const auto& [name, one] : programs.items()) {
-      // Sums in another order.
+      // PyTorch sums in another order.
       constexpr double allowed = 1e-4;
       const double difference = one.value("largest_difference", 0.0);
       if (!(difference <= allowed))
@@ -426,7 +426,7 @@ class Check {
   }
 };
 
-// Before minutes are spent on it.
+// Checked first, because the run takes minutes.
 void check_writable(const std::string& path) {
   if (path.empty()) return;
   const fs::path folder = fs::absolute(path).parent_path();

@@ -1,4 +1,4 @@
-// The pipelines of the differential tests, which have every operator in every type: in kernels.
+// Runs the pipelines of the differential tests as kernels; they contain every operator in every type.
 #include <algorithm>
 #include <chrono>
 #include <limits>
@@ -14,14 +14,14 @@ namespace {
 using namespace retrograde;
 
 #include "differential/pipelines/common.h"
-// Not to be sorted above.
+// These includes must follow the ones above.
 #include "differential/pipelines/arithmetic.h"
 #include "differential/pipelines/functions.h"
 #include "differential/pipelines/images.h"
 #include "differential/pipelines/reductions.h"
 #include "differential/pipelines/updates.h"
 
-// The stage's loops over elements that do not depend on each other in blocks of threads, where it has any.
+// Maps the stage's independent loops over elements to blocks of threads, if it has any.
 void make_kernel(Stage stage, const graph::FuncPtr& f) {
   std::vector<Var> free;
   for (const VarOrRVar& loop : stage.split_vars()) {
@@ -38,7 +38,7 @@ void make_kernel(Stage stage, const graph::FuncPtr& f) {
   }
 }
 
-// Outputs, and what has updates, is stored; the rest is computed in the kernels of what reads it.
+// Stores outputs and Funcs with updates; all others are computed in the kernels of their consumers.
 void make_kernels(const std::vector<Func>& outputs) {
   std::vector<graph::FuncPtr> ends;
   for (const Func& f : outputs) ends.push_back(f.function());

@@ -10,7 +10,7 @@ using namespace retrograde;
 
 namespace {
 
-// Which NaN it is, nobody says.
+// Replaces every NaN by the same one, because the bits of a NaN are unspecified.
 template <typename T, int exponent_bits, int mantissa_bits>
 void make_one_nan(std::string& bytes) {
   constexpr T mantissa = (T{1} << mantissa_bits) - 1, exponent = ((T{1} << exponent_bits) - 1)
@@ -43,7 +43,7 @@ Record recorded(const std::string& name, const std::function<std::string()>& com
   try {
     record.bytes = compute();
   } catch (const RuntimeError& error) {
-    // How much memory a program needs may be known only when it runs.
+    // A program's memory may only be known when it runs.
     record.state = fuzz::lacks_memory(error) ? Record::State::Refused : Record::State::Failed;
     record.bytes = error.what();
   } catch (const UserError& error) {

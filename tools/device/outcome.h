@@ -1,4 +1,4 @@
-// outcome.h -- what a program gave on a device, as a record of its bytes, or of why there are none.
+// outcome.h -- records a program's result on a device: its bytes, or why there are none.
 #pragma once
 
 #include <functional>
@@ -9,10 +9,11 @@
 
 namespace device_check {
 
-// Of all elements, fetched from the device; every NaN as the same one, since which it is, nobody says.
+// The bytes of all elements, copied from the device. All NaNs become the same, because the bits of a NaN are
+// unspecified.
 std::string bytes_of(retrograde::Buffer<>& buffer);
 
-// What is refused is refused for every device; what fails may fail on one.
+// A program that is refused is refused on every device; one that fails may fail on one device only.
 Record recorded(const std::string& name, const std::function<std::string()>& compute);
 
 }  // namespace device_check

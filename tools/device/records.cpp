@@ -8,7 +8,7 @@
 namespace device_check {
 namespace {
 
-// name, a tab, the state's number, a tab, the number of bytes, the end of the line; the bytes.
+// Format: name, tab, number of the state, tab, number of bytes, newline; then the bytes.
 bool read_record(std::istream& in, Record& record) {
   std::string line;
   if (!std::getline(in, line)) return false;

@@ -1,5 +1,5 @@
-// records.h -- what one device gave, bit for bit, in a file: so that two devices can be compared that one
-// process cannot have.
+// records.h -- stores the exact results of one device in a file, to compare two devices that one process cannot use
+// both.
 #pragma once
 
 #include <cstdint>
@@ -13,13 +13,13 @@ struct Record {
   enum class State : uint8_t { Done, Refused, Failed };
   std::string name;
   State state = State::Done;
-  std::string bytes;  // of all elements; or why there are none
+  std::string bytes;  // of all elements, or why there are none
 };
 
 class RecordWriter {
  public:
   explicit RecordWriter(const std::string& path) : out_(path, std::ios::binary) {}
-  // It is in the file when this is over, whatever becomes of the process.
+  // Flushes the record to the file before returning, so that it survives a crash.
   void add(const Record& record);
   bool is_good() const { return out_.good(); }
 
@@ -27,15 +27,16 @@ class RecordWriter {
   std::ofstream out_;
 };
 
-// Those that are whole.
+// The complete records.
 std::vector<Record> read_records(const std::string& path);
 
 struct Agreement {
   size_t compared = 0, refused = 0, bytes = 0;
-  std::vector<std::string> problems;  // a line for each
+  std::vector<std::string> problems;  // one line each
 };
 
-// Of what both have by name; what one lacks is no problem, since their time may have been over.
+// Compares the records that both have, by name. Missing records are no problem, because a time limit may have ended a
+// run.
 Agreement compare(const std::vector<Record>& device, const std::vector<Record>& executor);
 
 }  // namespace device_check

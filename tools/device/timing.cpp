@@ -1,5 +1,5 @@
-// Times of the programs beside what the device allows: how fast it copies and how many products it adds
-// is measured in the same run, by kernels of ours through the same runtime.
+// Times the programs relative to the device's limits. Copy bandwidth and FMA rate are measured in the same run, by our
+// own kernels through the same runtime.
 #include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
@@ -19,8 +19,8 @@ double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-// Seconds of one run: the median of batches, each long enough that waiting for its end is nothing. In no
-// seconds, of a single one.
+// Seconds per run: the median of batches, each so long that the final wait is negligible. If `seconds` is 0, the time
+// of a single run.
 double time_of(const std::function<void()>& run, const std::function<void()>& wait,
                double seconds) {
   constexpr size_t batches = 7;
@@ -54,7 +54,7 @@ double time_realizing(Func f, const std::vector<int>& sizes, const Target& targe
 
 // ---- what the device can do ----
 
-// Bytes in a second, read and written.
+// In bytes per second, reads plus writes.
 double copy_bandwidth(const Target& target, const Timings& options) {
   const int elements = options.is_small ? 1 << 12 : 1 << 26;
   Buffer<float> in(elements);
@@ -70,10 +70,10 @@ double copy_bandwidth(const Target& target, const Timings& options) {
   return 8.0 * elements / time_realizing(out, {elements}, target, options.share(20));
 }
 
-// Operations in a second, a product and a sum as two.
+// In operations per second; a product and a sum count as two.
 double fma_rate(const Target& target, const Timings& options) {
   const int threads = options.is_small ? 1 << 8 : 1 << 20, steps = options.is_small ? 16 : 4096;
-  constexpr int chains = 8;  // of one thread, so that none waits for the one before
+  constexpr int chains = 8;  // independent chains per thread, which hide latency
   Var x("x"), k("k"), xi("xi");
   RDom r(0, steps, "r");
   Func sums("sums"), out("fused");

@@ -31,7 +31,7 @@ std::string run_program(fuzz::RandomProgram& program, const Target& target) {
       for (const Type& type : program.outputs[o].types()) {
         outputs.emplace_back(type, regions[o].extents);
         outputs.back().set_min(regions[o].mins);
-        // Updates may leave elements as they are.
+        // Updates may leave elements unchanged.
         std::memset(outputs.back().data(), 0, outputs.back().size_in_bytes());
       }
     }
@@ -41,7 +41,7 @@ std::string run_program(fuzz::RandomProgram& program, const Target& target) {
   return bytes;
 }
 
-// An image of PTX alone: the simulated device takes it, too, for it has no kernel that would have to run.
+// Makes an image with PTX only. The simulated device loads it too, because no kernel has to run.
 void load(const std::string& ptx) {
   const retrograde_gpu_image image = {RETROGRADE_GPU_IMAGE_MAGIC, ptx.size(), ptx.c_str(), 0,
                                       nullptr};

@@ -1,4 +1,4 @@
-// worker.h -- what runs on one device, which the process's RETROGRADE_GPU chooses.
+// worker.h -- the checks that run on one device, which RETROGRADE_GPU selects for the process.
 #pragma once
 
 #include <cstdint>
@@ -12,31 +12,30 @@ namespace device_check {
 
 retrograde::Target target_for(int capability);
 
-// The programs of test/support/gpu_programs: these, or all where none is named.
+// The programs of test/support/gpu_programs: those that are named, or all if none are.
 using Names = std::vector<std::string>;
 void run_programs(const retrograde::Target& target, const Names& only, RecordWriter& records);
 
-// Every operator and kind of node in every type, as PTX for this chip and those before it, which the driver
-// compiles; for the simulated device in one form alone. A record for each that the seconds suffice for: the
+// Compiles every operator and node kind in every type to PTX for this chip and earlier ones, which the driver then
+// compiles; for the simulated device, in one form only. Writes a record for each one that fits the time limit: the
 // names of its kernels.
 void compile_kernels(int capability, bool is_simulated, double seconds, RecordWriter& records);
 
-// The pipelines of test/differential/pipelines, which have every operator in every type, as far as the seconds
-// suffice.
+// Runs the pipelines of test/differential/pipelines, which have every operator in every type, within the time limit.
 void run_operators(const retrograde::Target& target, double seconds, RecordWriter& records);
 
-// Random pipelines under random schedules, of `count` seeds from `first` on, as far as the seconds suffice.
+// Runs random pipelines under random schedules, for `count` seeds beginning at `first`, within the time limit.
 void run_random(const retrograde::Target& target, uint64_t first, int count, double seconds,
                 RecordWriter& records);
 
 struct Timings {
-  bool is_small = false;  // as a test has them
+  bool is_small = false;  // small sizes, for tests
   double seconds = 60;
   Names only = {};
-  // Seconds of one of so many; a test takes the fewest runs.
+  // Time limit for one of `count` measurements; a test makes as few runs as possible.
   double share(int count) const { return is_small ? 0 : seconds / count; }
 };
-// JSON: bandwidth of copies, rate of FMA, the time of each program beside what these allow.
+// Returns JSON: copy bandwidth, FMA rate, and each program's time relative to these limits.
 std::string time_programs(const retrograde::Target& target, const Timings& options);
 
 }  // namespace device_check

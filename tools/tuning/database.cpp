@@ -38,7 +38,7 @@ std::string hash_of(const std::string& text) {
 
 }  // namespace
 
-// One statement: values in their order, then rows.
+// An SQL statement: values are bound in order, then rows are read.
 class Statement {
  public:
   Statement(Database& database, const char* sql) : database_(database) {
@@ -61,7 +61,7 @@ class Statement {
                       SQLITE_TRANSIENT);
     return *this;
   }
-  // Whether there is another row.
+  // Advances to the next row; returns false if there is none.
   bool next() {
     const int code = sqlite3_step(statement_);
     if (code != SQLITE_ROW && code != SQLITE_DONE) fail();
@@ -114,7 +114,7 @@ int64_t Database::number(const char* sql) {
   return statement.next() ? statement.integer(0) : 0;
 }
 
-// What is not ours is left as it is.
+// Checks that the file is ours; other files are not changed.
 void Database::check_kind() {
   const bool is_empty = number("select count(*) from sqlite_master") == 0;
   if (is_empty && number("pragma application_id") == 0) return run(tables);

@@ -19,7 +19,7 @@ namespace {
 using tuning::FitSample;
 using tuning::Machine;
 
-constexpr size_t most_samples = 240;  // of all programs together, each as many as the others
+constexpr size_t most_samples = 240;  // of all programs together, the same number for each
 
 FitSample sample_of(const Measured& measured, const Target& target, int threads) {
   const graph::Graph graph = graph::parse_graph(measured.graph);
@@ -38,7 +38,7 @@ struct Program {
   std::vector<FitSample> samples;
 };
 
-// Of each program as many, evenly from the fastest to the slowest.
+// Takes the same number of samples from each program, spread evenly from the fastest to the slowest.
 std::vector<Program> samples_of(const std::vector<Measured>& all, const Target& target,
                                 int threads) {
   std::vector<std::vector<const Measured*>> by_program;
@@ -79,7 +79,7 @@ std::vector<double> ranks(const std::vector<double>& values) {
   return result;
 }
 
-// Spearman's, of predicted and measured.
+// Spearman's rank correlation of predicted and measured times.
 double rank_correlation(const Machine& machine, const std::vector<FitSample>& samples) {
   if (samples.size() < 2) return 1;
   std::vector<double> predicted, measured;

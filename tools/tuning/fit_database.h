@@ -1,4 +1,4 @@
-// fit_database.h -- the machine's figures, corrected by what was measured.
+// fit_database.h -- fits the machine's figures to the measurements.
 #pragma once
 
 #include <iosfwd>
@@ -8,8 +8,8 @@
 
 namespace retrograde::tune {
 
-// From the figures that are in use (machine_for). Tells on `out` how wrong predictions are before and
-// after, and how wrong for programs that the fit did not see: half of them at a time.
+// Starts from the figures in use (machine_for). Prints to `out` the prediction error before and after, and by two-fold
+// cross-validation: for programs that the fit did not use.
 // Requires: the database has measurements of this machine with so many threads.
 tuning::Machine fit_database(Database& database, int threads, std::ostream& out);
 

@@ -1,19 +1,19 @@
-// tune -- what the cost model knows of this machine, and measured schedules.
+// tune -- measures this machine for the cost model, and measures schedules.
 //
-//   tune --machine                   measures its figures, prints them, keeps them in the user's cache
-//   tune --show                      prints those in use: measured ones, or constants
-//   tune PROGRAM.graph...            measures the schedules that a search finds for programs that
-//                                    are given as text (graph/graph.h), on inputs of estimated sizes
-//   tune ... -- COMMAND ARGS...      of all that a command compiles or schedules while it runs
-//   tune --fit                       corrects the figures by what was measured, keeps them
+//   tune --machine                   measures the machine's figures, prints them, keeps them in the user's cache
+//   tune --show                      prints the figures in use: measured ones, or constants
+//   tune PROGRAM.graph...            measures the schedules that a search finds for programs in text form
+//                                    (graph/graph.h), on inputs of estimated sizes
+//   tune ... -- COMMAND ARGS...      for everything that a command compiles or schedules while it runs
+//   tune --fit                       fits the figures to the measurements, keeps them
 //
-//   --seconds N        for each program (60)        --each N      that each schedule runs (0.5)
+//   --seconds N        for each program (60)        --each N      seconds that each schedule runs (0.5)
 //   --limit N          schedules of each program    --threads N
 //   --output PATH      with --machine or --fit a file for RETROGRADE_MACHINE to name; else a folder
 //                      for the best schedules: NAME.schedule as a log, NAME.cpp as C++
-//   --database FILE    else measured.sqlite in the user's cache folder
+//   --database FILE    default: measured.sqlite in the user's cache folder
 //
-// Who stops it in the middle goes on from there: what is in the database is not measured again.
+// An interrupted run can be continued: schedules that are in the database are not measured again.
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -45,7 +45,7 @@ struct CommandLine {
   std::string database;
   tune::Options options;
   std::vector<std::string> files;
-  std::vector<char*> command;  // what stands behind "--", null-terminated
+  std::vector<char*> command;  // the words after "--", null-terminated
 
   bool is_valid() const {
     const bool tunes = !files.empty() || !command.empty();
@@ -68,7 +68,7 @@ std::optional<double> number(const char* text) {
   return value;
 }
 
-// Of an option and what follows it; false: there is none such.
+// Reads an option and its value; false if there is no such option.
 bool read_value(const std::string& name, const char* value, CommandLine& line) {
   if (name == "--output") return line.options.output = value, true;
   if (name == "--database") return line.database = value, true;
@@ -136,7 +136,7 @@ std::string contents_of(const std::string& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-// A folder that goes when this goes.
+// A temporary folder that is deleted on destruction.
 class Folder {
  public:
   Folder() {
@@ -154,7 +154,7 @@ class Folder {
   char path_[32] = "/tmp/retrograde_tune_XXXXXX";
 };
 
-// What the command compiles or schedules, as files in the folder.
+// Writes everything that the command compiles or schedules to files in the folder.
 void run_command(const std::vector<char*>& command, const char* folder) {
   const pid_t child = fork();
   if (child == 0) {

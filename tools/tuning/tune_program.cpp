@@ -25,8 +25,8 @@ namespace {
 
 using graph::FuncPtr;
 using Clock = std::chrono::steady_clock;
-constexpr double warm_up = 4;   // times what a schedule runs, before the first
-constexpr double hopeless = 3;  // times the best: not worth a second run
+constexpr double warm_up = 4;   // times a schedule's run time, before the first measurement
+constexpr double hopeless = 3;  // times the best time: not worth a second run
 
 struct Candidate {
   std::vector<FuncPtr> outputs;
@@ -34,8 +34,8 @@ struct Candidate {
   double predicted_seconds = 0;
 };
 
-// What the search costs, the rules' schedule first, then by predicted time. Several threads of the
-// search ask at once.
+// Collects the candidates that the search evaluates: the rules' schedule first, then by predicted time. Several threads
+// of the search may add at once.
 class Candidates {
  public:
   explicit Candidates(const std::vector<FuncPtr>& outputs) : outputs_(outputs) {
@@ -59,7 +59,7 @@ class Candidates {
 
  private:
   const std::vector<FuncPtr>& outputs_;
-  std::set<std::string> known_;  // names of the graph without a schedule
+  std::set<std::string> known_;  // names of the unscheduled graph
   std::mutex mutex_;
   std::vector<Candidate> found_;
 
@@ -102,7 +102,7 @@ std::string in_milliseconds(double seconds) {
   return out.str();
 }
 
-// One program and what is known of it.
+// One program with its measurements.
 class Session {
  public:
   Session(const std::string& name, const std::string& text, const Options& options,
@@ -164,7 +164,7 @@ class Session {
     best_ = candidate.outputs;
   }
 
-  // The first runs of a process are slower than all others, for longer than one schedule runs.
+  // Warms up: the first runs of a process are slower than all others, for longer than one schedule runs.
   void wake(const Candidate& candidate) const {
     Options longer = options_;
     longer.run_seconds *= warm_up;

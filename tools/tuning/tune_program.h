@@ -1,4 +1,4 @@
-// tune_program.h -- measures the schedules that the search finds for a program, best first.
+// tune_program.h -- measures the schedules that the search finds for a program, in order of predicted time.
 #pragma once
 
 #include <iosfwd>
@@ -10,17 +10,17 @@
 namespace retrograde::tune {
 
 struct Options {
-  double seconds = 60;       // for each program: after them no new schedule is begun
-  double run_seconds = 0.5;  // that each schedule runs
-  int limit = 0;             // schedules to measure now, of each program; 0: all that there are
+  double seconds = 60;       // for each program; afterwards no new schedule is started
+  double run_seconds = 0.5;  // for each schedule
+  int limit = 0;             // number of schedules to measure now, per program; 0: no limit
   int threads = 0;           // 0: all
-  std::string output;        // a folder for the best schedules; empty: none are written
+  std::string output;        // folder for the best schedules; empty: none are written
 };
-// Of this machine, where none are named.
+// The machine's number of threads if the options name none.
 int threads_of(const Options& options);
 
-// `text`: of a graph (graph/graph.h). Those that the database has are not measured again. The rules'
-// schedule comes first; then by predicted time. Tells of each on `out`.
+// `text`: a graph (graph/graph.h). Schedules that are in the database are not measured again. The rules' schedule comes
+// first; the others follow by predicted time. Reports each on `out`.
 void tune_program(const std::string& name, const std::string& text, const Options& options,
                   Database& database, std::ostream& out);
 

@@ -1,9 +1,10 @@
-// calls.cpp -- what a call of an operator costs in C++, through PyTorch's dispatcher, on tensors of one element.
+// calls.cpp -- measures the cost of calling an operator in C++, through PyTorch's dispatcher, on tensors of one
+// element.
 //
 //   calls OPERATOR.so
 //
-// Writes microseconds as JSON: PyTorch's own sum and ours, without and with a gradient wanted. The least of
-// many rounds, in which all take turns.
+// Writes microseconds as JSON: PyTorch's own sum and ours, without and with a gradient. The result is the least of many
+// rounds, in which all take turns.
 #include <ATen/ATen.h>
 #include <ATen/core/dispatch/Dispatcher.h>
 #include <dlfcn.h>

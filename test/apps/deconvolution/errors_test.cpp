@@ -38,10 +38,10 @@ TEST_F(DeconvolutionErrors, HugePictures) {
 TEST_F(DeconvolutionErrors, FunctionsThatAreNone) {
   const fs::path in = write_noise("in.png", 60, 60);
   refused_input(in, {"\"disc:0\"", "its radius is 0"}, {"--psf", "disc:0"});
-  refused_input(in, {"\"disc:x\"", "\"x\" is no number"}, {"--psf", "disc:x"});
+  refused_input(in, {"\"disc:x\"", "\"x\" is not a number"}, {"--psf", "disc:x"});
   refused_input(in, {"its size is 8"}, {"--psf", "motion:8"});
   refused_input(in, {"its size is 1e+09"}, {"--psf", "motion:1e9"});
-  refused_input(in, {"\"-1\" is no seed"}, {"--psf", "motion:9:-1"});
+  refused_input(in, {"\"-1\" is not a seed"}, {"--psf", "motion:9:-1"});
   refused_input(in, {"no_file", "must be an image file"}, {"--psf", folder_ / "no_file"});
   apps::Image black{5, 5, 8, std::vector<float>(75, 0.0f)};
   apps::write_image(folder_ / "black.png", black);

@@ -1,4 +1,4 @@
-"""What counts as public, and how programs show it: lists that no header says."""
+"""Lists that no header contains: which names are public, and how programs show them."""
 import re
 
 HEADER_FOLDERS = ["frontend", "generator", "checks"]
@@ -15,7 +15,7 @@ INTERNAL_HEADERS = {
     "graph/function.h", "graph/give_directive.h", "graph/graph.h", "graph/graph_lines.h", "graph/names.h", "graph/parameter_contents.h", "graph/provenance.h",
     "graph/race_checks.h", "graph/reduction_domain.h", "graph/reduction_leaves.h", "graph/rfactor.h", "graph/schedule.h",
     "graph/wrappers.h", "lower/lower.h"}
-# Parts of templates that users name in no other way than by the whole.
+# Parts of templates that users never name by themselves.
 INTERNAL_SCOPES = {"Declared", "ArrayTraits", "ElementTraits", "InputValue", "InputElements", "ScalarElements",
                    "OutputElements", "GeneratorParamBase::InCpp", "RegisterGenerator", "tell_pass_observers",
                    "GeneratorInputBase::values", "GeneratorInputBase::value_of", "GeneratorOutput::OutputElements", "ParamMap::Entry", "AutoScheduleParam"}
@@ -27,7 +27,7 @@ INTERNAL_NAMES = re.compile(
     r"allowed|said_by|Var|generator|GeneratorFactory|RegisterGenerator|NamesInterface|IOKind|kind|"
     r"GeneratorParamsMap|set_inputs|emit_cpp_stub")
 
-# How programs show an object whose class they seldom name.
+# Patterns by which programs show an object whose class they rarely name.
 SHOWN_BY = {
     "Dimension": r"\.dim\(", "OutputImageParam": r"ImageParam|output_buffer", "JITHandlers": r"jit_handlers|JITUserContext",
     "FuncTupleElementRef": r"\)\[\d\]", "FuncRef": r"Func", "Realization": r"realize", "Stage": r"update\(|Func",

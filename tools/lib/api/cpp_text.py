@@ -1,4 +1,4 @@
-"""C++ as text: literals, comments, and what belongs inside which parenthesis."""
+"""Parses C++ as text: literals, comments, and matching parentheses."""
 import re
 
 TOKEN = re.compile(r'"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\'|//[^\n]*|/\*.*?\*/', re.S)

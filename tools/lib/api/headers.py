@@ -1,9 +1,9 @@
-"""Names and requirements: what the headers declare, and what their comments say of it.
+"""Public names and requirements: what headers declare, and what their comments say about it.
 
-Names are what stands in namespace retrograde outside of the rooms of `ir/rooms.h` and `detail`. Each is explained
-by the comment above or behind it, else by the one above its group of lines, else by the header's title.
-Requirements stand in comments behind "Requires:", a rule after the other, with the kind of the error in parentheses
-where it is no CompileError:
+Names are declarations in namespace retrograde outside of the namespaces of `ir/rooms.h` and `detail`. A name is
+explained by the comment above or behind it, else by the one above its group of lines, else by the header's title.
+Requirements follow "Requires:" in comments. Rules are separated by semicolons; the kind of the error is in
+parentheses unless it is CompileError:
 
     // Takes one row. Requires: a crop or slice lies inside the buffer; it must have memory (RuntimeError).
 """
@@ -42,18 +42,18 @@ class Name:
 
     @property
     def word(self):
-        """A word that every use of it holds; empty for operators and the like."""
+        """A word that every use of it contains; empty for operators and similar names."""
         words = re.findall(r"\w+", self.name)
         return words[-1] if words and self.kind in ("function", "value", "type", "enum", "concept") else ""
 
     def owner(self):
-        """What shows the class of a member."""
+        """A pattern for text that shows the class of a member."""
         if not self.scope:
             return None
         return re.compile(SHOWN_BY.get(self.scope, r"\b" + self.scope.split("::")[-1] + r"\b"))
 
     def use(self):
-        """What a use of it looks like."""
+        """A pattern for its uses."""
         word = re.escape(self.name)
         if self.kind in ("class", "struct", "constructor") and (self.full in SHOWN_BY or self.scope in SHOWN_BY):
             return re.compile(SHOWN_BY.get(self.full) or SHOWN_BY[self.scope])
@@ -80,7 +80,7 @@ class Name:
 
 
 class Requirement:
-    """One rule as a header says it, of what is declared at `line`."""
+    """One rule of a header, about the declaration at `line`."""
 
     def __init__(self, header, line, text, kind):
         self.header, self.line, self.text, self.kind = header, line, text, kind
@@ -97,7 +97,7 @@ class Requirement:
 
 
 def spoken(lines):
-    """The first sentence of a comment's lines, requirements left out."""
+    """The first sentence of a comment, without its requirements."""
     words = REQUIRES.split(" ".join(lines))[0].strip()
     if re.match(r"-{3,}", words):
         return ""
@@ -106,7 +106,7 @@ def spoken(lines):
 
 
 def requirements_in(lines):
-    """The rules behind "Requires:", each with its kind."""
+    """The rules after "Requires:", each with its kind."""
     for said in REQUIRES.split(" ".join(lines))[1:]:
         for item in one_line(said).rstrip(".").split("; "):
             kind = KIND.search(item)
@@ -114,7 +114,7 @@ def requirements_in(lines):
 
 
 class HeaderReader:
-    """One walk over a header: namespaces, classes and their public parts; bodies of functions are skipped."""
+    """One pass over a header: namespaces, classes and their public parts. Bodies of functions are skipped."""
 
     def __init__(self, root, header):
         self.header = header
@@ -148,7 +148,7 @@ class HeaderReader:
         return i
 
     def declaration(self, begin, end, owner, public):
-        """Reads what begins here; gives the place behind it."""
+        """Reads the declaration that begins here; returns the index after it."""
         i = begin
         while i < end and self.code[i] not in ";{":
             literal = TOKEN.match(self.code, i)
@@ -180,12 +180,12 @@ class HeaderReader:
         if re.match(r"\s*friend\b(?!.*operator)", bare):
             return behind
         self.name_of(bare, begin, owner)
-        # A default member initializer or a lambda in braces may go on to the semicolon.
+        # A default member initializer or a lambda in braces may continue to the semicolon.
         return behind
 
     @staticmethod
     def bare(head):
-        """Without template<...>, requires(...) and attributes in front."""
+        """Strips template<...>, requires(...) and attributes from the front."""
         text = head
         while True:
             text = text.lstrip()
@@ -206,7 +206,7 @@ class HeaderReader:
 
     @staticmethod
     def without_angles(text):
-        """Template arguments away; operators with angles were read before."""
+        """Removes template arguments; operators with angle brackets were read before."""
         while True:
             shorter = re.sub(r"(?<=\w)<[^<>=]*>", "", text)
             if shorter == text:
@@ -247,7 +247,7 @@ class HeaderReader:
                 self.add(value.group(1), "value", begin, owner)
 
     def macro_names(self):
-        """What a macro of the header declares: RETROGRADE_BIT_OPERATOR(operator&)."""
+        """The declarations that a macro of the header makes: RETROGRADE_BIT_OPERATOR(operator&)."""
         for match in re.finditer(r"^[ \t]*RETROGRADE_(\w+)\((.*)\)\s*(?://.*)?$", self.text, re.M):
             if re.match("ERROR|NODE|FIELDS", match.group(1)):
                 continue
@@ -268,7 +268,7 @@ class HeaderReader:
         return own or self.comment_of_group(at) or self.title()
 
     def title(self):
-        """What stands behind the header's name in its first lines: rdom.h -- reduction domains."""
+        """The text after the header's name in its first lines: rdom.h -- reduction domains."""
         begin = next((i for i in range(len(self.lines)) if self.is_comment(i)), 0)
         lines = []
         while self.is_comment(begin + len(lines)) and self.lines[begin + len(lines)].strip() != "//":
@@ -313,7 +313,7 @@ class HeaderReader:
         return ""
 
     def requirements(self):
-        """Those of every comment, each of the declaration below it."""
+        """The requirements of every comment, each for the declaration below it."""
         found, i = [], 0
         while i < len(self.lines):
             if not self.is_comment(i):
@@ -337,7 +337,7 @@ def public_headers(root):
 
 
 def read_names(root):
-    """Overloads are one name; a comment of any of them speaks for it."""
+    """Merges overloads to one name; a comment of any of them explains it."""
     merged = {}
     for header in public_headers(root):
         for name in HeaderReader(root, header).read():
@@ -348,7 +348,7 @@ def read_names(root):
 
 
 def read_requirements(root):
-    """Of the public headers, and of those parts of others that users see."""
+    """The requirements of the public headers, and of the parts of other headers that users see."""
     result = []
     for header in dict.fromkeys(public_headers(root) + sorted(INTERNAL_HEADERS)):
         reader = HeaderReader(root, header)

@@ -4,18 +4,18 @@ import re
 from api.cpp_text import TOKEN, arguments, one_line, pieces, unescape, without_comments
 
 FOLDERS = ["graph", "frontend", "generator", "autoschedule", "autodiff", "checks", "lower", "ir", "jit", "aot"]
-# IR as text is for tools and tests; its errors are one rule at each place of a text.
+# IR text is for tools and tests; its errors are one rule per position in a text.
 INTERNAL_FILES = {"ir/lexer.cpp", "ir/parse.cpp"}
-# What raises an error: which of its arguments is the rule, and the kind.
+# Functions that raise an error: the index of the rule among their arguments, and the kind of error.
 RAISERS = {"user_error": (1, "CompileError"), "call_error": (1, "RuntimeError"),
            "unsupported": (1, "Unsupported"), "type_error": (1, "CompileError"),
            "literal_in": (3, "CompileError")}
-# A class's own `refuse` says whose part it is; the rule is its second argument.
+# A class's own `refuse` adds the subject; the rule is its second argument.
 RAISERS_OF_GENERATORS = {"refuse": (1, "CompileError"), **RAISERS}
 
 
 class Rule:
-    """`text`: literals as they stand, whatever is between them as an ellipsis."""
+    """`text`: the message's literals, with an ellipsis for whatever is between them."""
 
     def __init__(self, root, path, line, kind, text, literals):
         self.file = str(path.relative_to(root / "compiler"))

@@ -1,4 +1,4 @@
-"""docs/api.md, and what is missing from it."""
+"""Generates docs/api.md and lists what is missing from it."""
 import re
 
 from api.headers import read_names, read_requirements
@@ -36,7 +36,7 @@ class Page:
         self.rules_of = {r: [rule for rule in self.rules if r.says(rule)] for r in self.requirements}
 
     def test_of(self, requirement):
-        """Of the tests that break the rule one that names what it is of, where there is one."""
+        """Among the tests that break the rule, prefers one that names the rule's subject."""
         tests = [test for rule in self.rules_of[requirement] for test in self.tests_of_rule.get(rule, [])]
         word = re.compile(r"\b" + re.escape(requirement.of.split("::")[-1]) + r"\b")
         return next((test for test in tests if word.search(test.code)), tests[0] if tests else None)

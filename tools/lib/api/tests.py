@@ -1,4 +1,4 @@
-"""Cases of the test programs: which names they use, which rules they break."""
+"""Test cases: which names they use, and which rules they break."""
 import re
 
 from api.cpp_text import closing, one_line, pieces, without_comments
@@ -25,7 +25,7 @@ def case_name(match, path):
 
 
 def cases_of(root, path):
-    """The text between two cases belongs to the second."""
+    """Splits a file into cases. The text between two cases belongs to the second."""
     text = path.read_text()
     starts = list(CASE.finditer(text))
     begin = 0
@@ -46,7 +46,7 @@ def read_tests(root):
 # ---- rules ----
 
 def stands_for(phrase, rule):
-    """Whether who expects `phrase` expects this rule, though others have these words: they are half of it."""
+    """Whether expecting `phrase` means this rule, even if other rules contain it: it is at least half of the rule."""
     return any(phrase in part for part in rule.parts) and 2 * len(phrase) >= sum(map(len, rule.parts))
 
 
@@ -66,7 +66,7 @@ def tests_of_rules(rules, tests):
         phrases = [phrase for phrase, count in said_by.items() if count and phrase in rule.text
                    and (count == 1 or stands_for(phrase, rule))]
         for phrase in sorted(phrases, key=lambda phrase: (-len(phrase), phrase)):
-            # The programs that expect errors first.
+            # Programs that expect errors come first.
             found += sorted(tests_of[phrase], key=lambda test: (test.path.parent.name != "error", test.name))
         if found:
             result[rule] = found

@@ -1,5 +1,5 @@
-// Minima of minima in PTX: see codegen/part_minima.h.
-#include "codegen/part_minima.h"
+// Minima of minima in PTX: see codegen/nested_minima.h.
+#include "codegen/nested_minima.h"
 
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ size_t count(const std::string& text, const std::string& part) {
 }
 
 TEST(PartMinima, EverySecondOfAChainIsUnsigned) {
-  const std::string parted = part_minima(
+  const std::string parted = rewrite_nested_minima(
       function("\tneg.s32 \t%r4, %r2;\n\tmin.s32 \t%r5, %r1, %r4;\n\tmin.s32 \t%r6, %r3, %r5;\n"));
   EXPECT_NE(parted.find("\tmin.s32 \t%r5, %r1, %r4;\n"), std::string::npos) << parted;
   EXPECT_EQ(count(parted, "min.s32"), 1u) << parted;
@@ -38,8 +38,8 @@ TEST(PartMinima, AreThoseOfEachTypeAndOfLoops) {
     const std::string chain = "\t" + name + " \t%a, %b, %c;\n\t" + name + " \t%d, %a, 5;\n",
                       loop = "$L__BB0_1:\n\t" + name +
                              " \t%d, %a, %c;\n\tmov.b32 \t%a, %d;\n\t@%p1 bra \t$L__BB0_1;\n";
-    EXPECT_EQ(count(part_minima(function(chain)), name), 1u) << name;
-    EXPECT_EQ(count(part_minima(function(loop)), name), 0u) << name;
+    EXPECT_EQ(count(rewrite_nested_minima(function(chain)), name), 1u) << name;
+    EXPECT_EQ(count(rewrite_nested_minima(function(loop)), name), 0u) << name;
   }
 }
 
@@ -48,12 +48,12 @@ TEST(PartMinima, EverythingElseIsAsItWas) {
       "\tmin.s32 \t%r2, %r1, 255;\n\tmax.s32 \t%r3, %r2, 0;\n\tmin.u32 \t%r4, %r1, %r2;\n"
       "\tmin.u32 \t%r5, %r4, %r2;\n\tmin.f32 \t%f2, %f1, %f1;\n\tmin.f32 \t%f3, %f2, %f1;\n"
       "\tmin.s64 \t%rd2, %rd1, %rd1;\n\tmin.s64 \t%rd3, %rd2, %rd1;\n";
-  EXPECT_EQ(part_minima(function(clamp)), function(clamp));
+  EXPECT_EQ(rewrite_nested_minima(function(clamp)), function(clamp));
   // Names of registers are those of one function.
   const std::string two =
       function("\tmin.s32 \t%r2, %r1, 255;\n") + function("\tmin.s32 \t%r3, %r2, 255;\n");
-  EXPECT_EQ(part_minima(two), two);
-  EXPECT_EQ(part_minima(""), "");
+  EXPECT_EQ(rewrite_nested_minima(two), two);
+  EXPECT_EQ(rewrite_nested_minima(""), "");
 }
 
 }  // namespace

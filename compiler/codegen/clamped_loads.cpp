@@ -1,16 +1,16 @@
-// Loads at a ramp that bounds hold inside of an image, as the borders of loops have them:
+// Loads at a ramp that is clamped to an image's bounds, as border iterations have them:
 //
 //   in[max(min(ramp(x, 1, 32), broadcast(w - 1)), broadcast(0)) + broadcast(row)]
 //
-// From lane to lane the index stays or goes up by one, so that all lanes lie within as many elements
-// as there are lanes. Where the machine has a shuffle by numbers, that is
+// From lane to lane the index stays or increases by one, so n lanes lie within n consecutive elements. If the machine
+// has a permute with variable indices, the load becomes
 //
 //   first = index of lane 0, last = index of lane 31
 //   spread = in[ramp(first, 1, 32)] if (ramp(first, 1, 32) <= last)
 //   result[i] = spread[index[i] - first]
 //
-// and elsewhere a dense load if last - first is 31, as it is but at the border itself. Lanes whose
-// predicate is off count for neither end.
+// Otherwise it is a dense load if last - first is 31, which fails only right at the border, and a gather if not. Lanes
+// whose predicate is false count for neither `first` nor `last`.
 #include <llvm/IR/IntrinsicsX86.h>
 
 #include "codegen/access.h"
@@ -22,9 +22,9 @@ using namespace ir;
 
 namespace {
 
-constexpr int most_coordinate_nodes = 64;  // larger ones are looked at as a whole
+constexpr int most_coordinate_nodes = 64;  // larger ones are not analysed
 
-// The shuffle of a whole register of such elements by numbers of their width, if the machine has it.
+// The permute with variable indices for a whole register of such elements, if the machine has one.
 llvm::Intrinsic::ID shuffle_by_numbers(const Machine& machine, int bits, int lanes) {
   switch (bits * lanes) {
     case 128:
@@ -54,8 +54,8 @@ llvm::Intrinsic::ID shuffle_by_numbers(const Machine& machine, int bits, int lan
   return llvm::Intrinsic::not_intrinsic;
 }
 
-// Whether a coordinate goes up from lane to lane, by at most one each time; nothing where it may do
-// anything else. `room`: nodes that may be looked at.
+// True if the coordinate increases by 0 or 1 from lane to lane, false if it is uniform, nothing if it may do anything
+// else. `room`: number of nodes that may still be visited.
 std::optional<bool> climbs(const Frame& frame, const Expr& e, int& room) {
   if (--room < 0) return std::nullopt;
   if (const auto* name = e.as<Variable>()) {
@@ -89,17 +89,17 @@ std::optional<bool> climbs(const Frame& frame, const Expr& e, int& room) {
   }
 }
 
-// The coordinate less what is the same in all lanes: loops that change only that keep the rest.
-Expr climbing_part(const Frame& frame, const Expr& e) {
+// The coordinate without its uniform terms. Loops that change only those terms keep the rest invariant.
+Expr varying_part(const Frame& frame, const Expr& e) {
   if (const auto* name = e.as<Variable>())
-    return climbing_part(frame, frame.coordinates.at(name->name).index);
+    return varying_part(frame, frame.coordinates.at(name->name).index);
   if (e.kind() != Kind::Add && e.kind() != Kind::Sub) return e;
   const auto* n = e.as<Binary>();
   int room = most_coordinate_nodes;
-  return climbing_part(frame, *climbs(frame, n->a, room) ? n->a : n->b);
+  return varying_part(frame, *climbs(frame, n->a, room) ? n->a : n->b);
 }
 
-// The first and the last lane that is on. Where none is, they are lanes all the same.
+// The first and last lane whose predicate is true. If there is none, the values are still valid lanes.
 struct LaneEnds {
   Value *first, *last;
 };
@@ -117,7 +117,7 @@ LaneEnds ends_of(llvm::IRBuilder<>& b, Value* predicate, int lanes) {
           b.CreateSub(b.getInt32(width - 1), after)};
 }
 
-// The value of one lane of what climbs() knows.
+// The value of one lane of a coordinate that climbs() accepts.
 Value* at_lane(Values& values, const Expr& e, Value* lane) {
   if (const auto* name = e.as<Variable>())
     return at_lane(values, values.c.frame.coordinates.at(name->name).index, lane);
@@ -128,12 +128,12 @@ Value* at_lane(Values& values, const Expr& e, Value* lane) {
                 at_lane(values, n->b, lane));
 }
 
-// Lanes `start` and following, of a type that fills a register.
-Value* load_spread(Values& values, const Storage& from, Type type, const Expr& index, int start,
-                   Value* predicate) {
+// Loads the lanes from `start` on, in a type that fills a register.
+Value* load_and_permute(Values& values, const Storage& from, Type type, const Expr& index,
+                        int start, Value* predicate) {
   FunctionContext& c = values.c;
   const int lanes = type.lanes();
-  const Expr climbing = climbing_part(c.frame, index);
+  const Expr climbing = varying_part(c.frame, index);
   Value* base = at_lane(values, climbing, c.b.getInt32(static_cast<uint32_t>(start)));
   llvm::Type* number = c.b.getIntNTy(static_cast<unsigned>(8 * type.bytes()));
   const auto step_at = [&](Value* lane) {
@@ -178,8 +178,8 @@ Value* load_dense_or_gather(Values& values, const Storage& from, Type type, cons
 
 }  // namespace
 
-Value* load_held(Values& values, const Storage& from, Type type, const Expr& index,
-                 Value* predicate) {
+Value* load_clamped(Values& values, const Storage& from, Type type, const Expr& index,
+                    Value* predicate) {
   FunctionContext& c = values.c;
   int room = most_coordinate_nodes;
   if (index.type().element_of() != Int(32) || !climbs(c.frame, index, room).value_or(false))
@@ -190,7 +190,7 @@ Value* load_held(Values& values, const Storage& from, Type type, const Expr& ind
     std::vector<Value*> parts;
     for (int start = 0; start < lanes; start += piece) {
       Value* mask = predicate ? slice(c.e, predicate, start, piece) : nullptr;
-      parts.push_back(load_spread(values, from, type.with_lanes(piece), index, start, mask));
+      parts.push_back(load_and_permute(values, from, type.with_lanes(piece), index, start, mask));
     }
     return concat(c.e, parts);
   }

@@ -1,4 +1,4 @@
-#include "codegen/part_minima.h"
+#include "codegen/nested_minima.h"
 
 #include <algorithm>
 #include <array>
@@ -17,7 +17,7 @@ string_view trimmed(string_view text) {
   return begin == string_view::npos ? string_view() : text.substr(begin, end + 1 - begin);
 }
 
-// "min.s32 %r1, %r2, 5;" without what stands before and behind; no operands: it is something else.
+// An instruction such as "min.s32 %r1, %r2, 5;" without surrounding blanks and semicolon. No operands: any other line.
 struct Instruction {
   string_view name;
   std::vector<string_view> operands;
@@ -48,8 +48,8 @@ bool is_of(const Instruction& instruction, const Kind& kind) {
   return instruction.name == kind.name && instruction.operands.size() == 3;
 }
 
-// The registers of a function that may hold the result of such an instruction, copied or not: ptxas unrolls
-// loops, whose minima are of those before by a copy.
+// The registers of a function that may hold the result of such an instruction, also after copies: ptxas unrolls loops,
+// in which a copy carries one iteration's minimum to the next.
 std::set<string_view> results_of(const Kind& kind, const std::vector<Instruction>& function) {
   std::set<string_view> registers;
   for (size_t before = size_t(-1); before != registers.size();) {
@@ -63,7 +63,7 @@ std::set<string_view> results_of(const Kind& kind, const std::vector<Instruction
   return registers;
 }
 
-void add_parted(const Instruction& one, const Kind& kind, std::string& out) {
+void add_unsigned(const Instruction& one, const Kind& kind, std::string& out) {
   const auto line = [&](std::initializer_list<string_view> parts) {
     out += "\t";
     for (const string_view part : parts) out += part;
@@ -87,26 +87,26 @@ void add_function(const std::vector<string_view>& lines, std::string& out) {
   for (size_t k = 0; k < kinds.size(); ++k) results[k] = results_of(kinds[k], function);
   for (size_t i = 0; i < lines.size(); ++i) {
     const Instruction& one = function[i];
-    bool is_parted = false;
-    for (size_t k = 0; k < kinds.size() && !is_parted; ++k) {
-      is_parted = is_of(one, kinds[k]) &&
-                  (results[k].count(one.operands[1]) > 0 || results[k].count(one.operands[2]) > 0);
-      if (is_parted) add_parted(one, kinds[k], out);
+    bool is_rewritten = false;
+    for (size_t k = 0; k < kinds.size() && !is_rewritten; ++k) {
+      is_rewritten = is_of(one, kinds[k]) && (results[k].count(one.operands[1]) > 0 ||
+                                              results[k].count(one.operands[2]) > 0);
+      if (is_rewritten) add_unsigned(one, kinds[k], out);
     }
-    if (!is_parted) out.append(lines[i]).append("\n");
+    if (!is_rewritten) out.append(lines[i]).append("\n");
   }
 }
 
 }  // namespace
 
-std::string part_minima(const std::string& ptx) {
+std::string rewrite_nested_minima(const std::string& ptx) {
   std::string out;
   std::vector<string_view> function;
   for (string_view rest = ptx; !rest.empty();) {
     const size_t end = std::min(rest.find('\n'), rest.size());
     function.push_back(rest.substr(0, end));
     rest.remove_prefix(std::min(end + 1, rest.size()));
-    // LLVM closes functions at the line's beginning, and nothing else.
+    // LLVM ends each function with a "}" at the beginning of a line, and no other line is just that.
     if (function.back() != "}" && !rest.empty()) continue;
     add_function(function, out);
     function.clear();
