@@ -23,7 +23,7 @@ bool is_among(const std::vector<AdjointInput>& inputs, const Symbol* symbol) {
                              [&](const AdjointInput& i) { return i.symbol().get() == symbol; });
 }
 
-// Functions of their arguments' values only: facts of a buffer's shape are no reads of it.
+// Only reads of values count: queries of a buffer's shape are no reads.
 std::shared_ptr<Symbol> read_symbol(const Expr& e) {
   if (const auto* call = e.as<Call>())
     return call->symbol.defined() ? call->symbol.lock() : nullptr;
@@ -71,7 +71,7 @@ std::string asked_through(const FuncContents& f) {
   return "propagate adjoints through " + quoted(f.name);
 }
 
-// Every wanted input behind f is one that the rule was made for.
+// Checks that every wanted input that f depends on is an input of the rule.
 std::vector<FuncPtr> check_covered(const FuncContents& f,
                                    FunctionRef<bool(const Symbol*)> is_wanted,
                                    FunctionRef<bool(const Symbol*)> is_requested) {
@@ -92,7 +92,7 @@ std::vector<FuncPtr> check_covered(const FuncContents& f,
   return covered;
 }
 
-// One contribution, of the right shape, for each wanted input.
+// Checks that each wanted input has one contribution of the right shape.
 void check_contributions(const FuncContents& f, const std::vector<AdjointContribution>& given,
                          FunctionRef<bool(const Symbol*)> is_wanted) {
   const std::vector<AdjointInput>& inputs = f.custom_derivatives->adjoint_inputs;
@@ -121,8 +121,8 @@ void check_contributions(const FuncContents& f, const std::vector<AdjointContrib
   }
 }
 
-// `given` as an adjoint. Nothing is known of the rule: what it gives may be exactly 0 where the
-// partials of the input are infinite, and infinite where they are 0.
+// `given` as an adjoint. The rule may return values that are exactly 0 where the partials of the input are infinite,
+// and infinite where they are 0, so the result has both traits.
 FuncPtr as_adjoint(const std::string& name, const FuncPtr& given) {
   FuncPtr result = make_func(Role::CustomRule, name);
   result->made->traits = {.masked = true, .singular = true};
@@ -194,7 +194,7 @@ CustomAdjointResult run_custom_adjoint(const FuncPtr& f, const FuncPtr& adjoint,
     if (is_wanted(symbol)) wanted.push_back({symbol, region_of(regions.of(symbol))});
   }
   if (wanted.empty()) return result;
-  // The rule may be replaced while it runs.
+  // Holds the rules, because another thread may replace them while the rule runs.
   std::shared_ptr<const CustomDerivatives> rules = f->custom_derivatives;
   std::vector<AdjointContribution> given = rules->adjoint(
       AdjointContext(Func(f), Func(adjoint), region_of(regions.of(f.get())), wanted));

@@ -14,7 +14,7 @@ SynthesisResult synthesize(const Seed& seed, const SynthesisOptions& options) {
                                         : synthesize_adjoints(seed, options);
 }
 
-// Scalars whose gradients are built because everything's are.
+// Scalars that were not requested; they get gradients only because everything does.
 Names unasked_scalars(const Seed& seed, const SynthesisOptions& options) {
   Names scalars;
   if (options.only_requested) return scalars;
