@@ -20,7 +20,7 @@ constexpr const char* what_to_do =
     "(AdjointOptions::checkpoint_states), or keep the versions whatever they cost: "
     "AdjointOptions{.overwritten = Overwritten::Store}";
 
-// In double: nothing overflows, and what is counted is exact as far as it matters.
+// The bytes as a double: it cannot overflow and is exact in the range that matters.
 Expr bytes_of(const KeptVersions& versions) {
   Expr bytes = make_const(Float(64), static_cast<double>(total_bytes(versions.copy->types)));
   for (const Expr& any_extent : versions.extents) {
@@ -65,7 +65,7 @@ FuncPtr VersionBudget::take(const KeptVersions& versions, std::vector<Explanatio
   return guard(versions, taken_);
 }
 
-// A scalar that is 0, or fails; the copy's pure definition reads it.
+// Builds the check: a scalar that is 0 or fails. The copy's pure definition reads it.
 FuncPtr VersionBudget::guard(const KeptVersions& versions, const Expr& bytes) const {
   FuncPtr check = make_func(Role::VersionCheck, versions.copy->name + "_fits", versions.primal);
   const Expr fits = bytes <= make_const(Float(64), static_cast<double>(rules_.bytes));
