@@ -6,18 +6,18 @@
 //
 // The shapes, tried in this order:
 //   accumulation  V = f[W(i)] + E(i), E free of f. A is unchanged, and E is swept with A[W(i)]. Iterations commute.
-//   selection     V is either f[W(i)] or E(i), as in max, min and argmax. A helper Func recomputes which iteration wrote
-//                 each element last; that iteration gets the adjoint.
+//   selection     V is either f[W(i)] or E(i), as in max, min and argmax. A helper Func recomputes which iteration
+//                 wrote each element last; that iteration gets the adjoint.
 //   overwriting   V is free of f, indices are affine. The last writer gets the adjoint, and A is 0 before the update
 //                 where it writes.
-//   recurrence    Indices are affine, and no two iterations write one element. Reads of values that an earlier iteration
-//                 wrote make A a recurrence in the opposite order; reads of older values contribute to the adjoint
-//                 before the update.
+//   recurrence    Indices are affine, and no two iterations write one element. Reads of values that an earlier
+//                 iteration wrote make A a recurrence in the opposite order; reads of older values contribute to the
+//                 adjoint before the update.
 //   checkpoints   With a budget, any other loop over time: it runs backward from a few kept states (checkpoint.h).
 //   fold          Iterations that read and write a single element, as products do. The steps of each element become a
 //                 dimension, and its adjoint a recurrence along it (fold_into_element.h).
-//   tape          Anything else. The iterations run backward one by one for each element of the pure dimensions, and the
-//                 values that they need are kept (tape.h).
+//   tape          Anything else. The iterations run backward one by one for each element of the pure dimensions, and
+//                 the values that they need are kept (tape.h).
 //
 // A value that a partial needs must still be in f at the end, as proven over index sets. Otherwise it is kept within a
 // budget (version_budget.h), or this is an error.
