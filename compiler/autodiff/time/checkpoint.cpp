@@ -60,7 +60,7 @@ class CheckpointedLoop {
       Expr value = cast_to(type, call_value(before, layout_.element(slot), index));
       initial.push_back(make_select(slot < elements, value, adjoint));
     }
-    machine_->types.clear();  // the definition says them again
+    machine_->types.clear();  // set again by the definition
     define_pure(machine_, layout_.with_pure(slot), initial);
     append(result_.helpers, {before, machine_});
   }
@@ -96,7 +96,7 @@ class CheckpointedLoop {
     for (const ReductionVariable& r : loops) names[r.var] = loop_variable(rdom, r.var);
     return names;
   }
-  // Copies of a state go through the same loops: enough for all elements.
+  // Copies of states use the same loops, which must cover all elements.
   Expr writes_per_iteration() const {
     Expr most = make_const(Int(32), static_cast<int>(std::max(record_.size(), adjoint_.size())));
     if (!plan_.needs_values()) return most;
@@ -104,7 +104,7 @@ class CheckpointedLoop {
     return simplify(max(most, (layout_.elements() + inner - 1) / inner));
   }
 
-  // `write`: the number of the write in this iteration; `number`: of the write in this pass.
+  // `write`: the number of the write within the iteration. `number`: the number of the write within the pass.
   std::vector<Branch> branches(const Expr& action, const Expr& write, const Expr& number,
                                const Expr& slot) const {
     auto is = [&](Action a) { return action == static_cast<int>(a); };
@@ -165,7 +165,7 @@ class CheckpointedLoop {
             mapped(w.values, [&](const Expr& v) { return placed(v, places); })};
   }
 
-  // ---- what others see ----
+  // ---- contributions to other Funcs ----
 
   void note_work() {
     const std::vector<Expr> inner = mapped(plan_.inner, &ReductionVariable::extent);
@@ -235,8 +235,9 @@ class CheckpointedLoop {
   CheckpointPlan plan_;
   ActionTable table_;
   std::optional<CheckpointSlots> slots_;
-  std::vector<SlotWrite> record_, adjoint_;  // one iteration of a step, over its own variables
-  Substitution forward_, backward_;          // the loop's variables for these
+  std::vector<SlotWrite> record_,
+      adjoint_;                      // one iteration of a step, in terms of its own variables
+  Substitution forward_, backward_;  // from its variables to the loop's
 };
 
 }  // namespace

@@ -104,8 +104,8 @@ class Planner {
     return c_.sweep(seeds());
   }
 
-  // f's values are held exactly, and adjoints: floating-point types are those of the adjoints, the
-  // first as wide as anything that is summed.
+  // Chooses types that hold values of f and adjoints exactly. Floating-point types are those of the adjoints; the first
+  // is as wide as the widest sum.
   void choose_types(const std::vector<LeafAdjoint>& leaves) {
     plan_.types.clear();
     for (size_t k = 0; k < f_->types.size(); ++k) {
