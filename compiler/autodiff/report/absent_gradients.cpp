@@ -15,7 +15,7 @@ class AbsentGradients {
                   SynthesisResult& result, SynthesisAccount& account)
       : primal_(primal), covered_(covered), result_(result), account_(account) {}
 
-  // What was asked for and got no contribution is zero, and says why.
+  // Gives a zero, with its reason, to each requested symbol without contributions.
   void find_absent() {
     for (const FuncPtr& f : primal_.order) {
       if (covered_.contains(f.get()) ||
@@ -33,12 +33,12 @@ class AbsentGradients {
           make_adjoint(primal_.target_of(p.get()), p->name + "_adj", {}).func;
     }
   }
-  // What was asked for and has nothing to do with the output.
+  // Gives a zero to each requested symbol that the output does not depend on.
   void find_strangers() {
     std::unordered_set<const Symbol*> reached;
     for (const FuncPtr& f : primal_.order) reached.insert(f.get());
     for (const auto& p : parameters_of({primal_.seed.output})) reached.insert(p.get());
-    std::map<std::string, const Symbol*> strangers;  // by name: in an order that is always the same
+    std::map<std::string, const Symbol*> strangers;  // by name, for a deterministic order
     for (const Symbol* symbol : primal_.options.requested) {
       if (symbol && !reached.contains(symbol)) strangers[shape_of(symbol).name] = symbol;
     }
@@ -66,7 +66,7 @@ class AbsentGradients {
     }
     return result;
   }
-  // Whether its gradient is a zero that somebody may ask for.
+  // Whether its gradient is a zero that a user may look up.
   bool is_wanted_zero(const Symbol* symbol, const std::string& name, bool floating, Type type) {
     if (!floating) {
       account_.add(Explanation::Kind::Zero, name,
@@ -95,7 +95,7 @@ class AbsentGradients {
   const std::unordered_set<const Symbol*>& covered_;
   SynthesisResult& result_;
   SynthesisAccount& account_;
-  std::unordered_set<const Symbol*> zero_;  // by no path
+  std::unordered_set<const Symbol*> zero_;  // without a differentiable path to the output
 };
 
 }  // namespace

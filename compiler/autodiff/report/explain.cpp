@@ -13,9 +13,9 @@ namespace {
 
 using Kind = Explanation::Kind;
 
-constexpr size_t most_names = 8;  // of one kind in a summary
+constexpr size_t most_names = 8;  // listed for each kind in a summary
 
-// In the order in which a person asks.
+// The order of a summary: what users ask first comes first.
 constexpr Kind told_first[] = {Kind::Cost,    Kind::Stored,       Kind::Recomputed,
                                Kind::Version, Kind::Scattered,    Kind::Privatised,
                                Kind::Zero,    Kind::NotRequested, Kind::LeftOut,
@@ -51,7 +51,7 @@ std::string line_of(const char* what, const std::vector<Explanation>& facts) {
   return result + "\n";
 }
 
-// Some of what reaches an adjoint is zero, and it is built all the same; or all of it is.
+// An adjoint that is built may still have contributions that are zero; it is listed as zero in part.
 std::string zeros_of(const std::vector<Explanation>& all) {
   std::set<std::string> built;
   for (const Explanation& e : of_kind(all, Kind::Built)) built.insert(e.subject);
@@ -79,7 +79,7 @@ std::string without_numbers(const std::string& name) {
   return std::regex_replace(name, number, "");
 }
 
-// Quoted names lose their numbers where that leaves no two alike.
+// Drops the numbers of quoted names where the short names stay distinct.
 std::string with_short_names(const std::string& words) {
   static const std::regex name("\"[^\"\n]*\"");
   std::map<std::string, std::set<std::string>> alike;

@@ -32,7 +32,7 @@ Explanation stored(const FuncOperations& f) {
           f.bytes.value().value_or(0)};
 }
 
-// A Func of the program with updates that nobody scheduled.
+// Whether it is a Func of the program that has updates and no directives.
 bool is_stored_by_default(const FuncOperations& f) {
   return f.stored && !f.func->made && !f.func->is_pure() && !f.is_extern &&
          f.func->schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined;
@@ -68,7 +68,7 @@ Explanation totals(const WantedFunc& output, const OperationCount& primal,
                counted(gradient.bytes(), "byte"))};
 }
 
-// Bytes that `count` keeps beside the results that were asked for.
+// The bytes that `count` stores, without the requested results.
 std::optional<double> kept_between(const OperationCount& count,
                                    const std::vector<WantedFunc>& results) {
   double bytes = 0;
@@ -82,8 +82,7 @@ std::optional<double> kept_between(const OperationCount& count,
   return bytes;
 }
 
-// Where a gradient keeps more than twice what the program itself keeps on its way, and in what
-// most.
+// Adds a note if a gradient stores more than twice the intermediate results of the program, and names the largest.
 void note_memory(const WantedFunc& output, const std::vector<WantedFunc>& gradients,
                  const OperationCount& primal, const OperationCount& gradient,
                  std::vector<Explanation>& result) {

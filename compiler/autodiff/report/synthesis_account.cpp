@@ -10,7 +10,7 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// ", 96 elements, 384 bytes when stored"; nothing when the region is known at run time only.
+// ", 96 elements, 384 bytes when stored"; empty if the region is known at run time only.
 std::string size_text(const FuncContents& f, const std::vector<LoopVariable>& region) {
   int64_t elements = 1;
   for (const LoopVariable& v : region) {

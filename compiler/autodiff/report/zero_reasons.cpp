@@ -19,7 +19,7 @@ const Symbol* read_by(const Expr& e) {
   return v ? v->symbol.raw() : nullptr;
 }
 
-// Why the derivative of `e` by its operands is 0; empty: it need not be.
+// Why the derivative of `e` by its operands is 0; empty if it need not be.
 std::string barrier(const Expr& e) {
   if (e.as<Cast>() && !e.type().is_float()) return "in a cast to " + to_string(e.type());
   if (e.type().is_bool()) return "in a condition";
@@ -32,12 +32,12 @@ std::string barrier(const Expr& e) {
   return blocks ? text("in ", op_info(call->op).name, ", whose derivative is 0") : "";
 }
 
-// What stands between reads of the input and the value of an expression.
+// Finds the operations with derivative 0 between reads of the input and the value of an expression.
 class Barriers {
  public:
   explicit Barriers(const Symbol* input) : input_(input) {}
 
-  // `before`: known already; empty: nothing.
+  // `before`: a barrier found above `e`; empty: none.
   void look(const Expr& e, const std::string& before) {
     if (!seen_.insert({e.get(), before}).second) return;
     if (read_by(e) == input_) found_.insert(before);
