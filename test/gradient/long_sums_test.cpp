@@ -284,7 +284,7 @@ TEST(LongSums, ShortOnesStayInFloat32) {
   EXPECT_EQ(d.accumulator(d(a)).name(), d(a).name());
   EXPECT_EQ(d.accumulator(d(b)).types()[0], Float(64));
   EXPECT_EQ(d(b).types()[0], Float(32));
-  expect_mentions(d.explain(Detail::All), {"adds up in double"});
+  expect_mentions(d.explain(Detail::All), {"accumulates in double"});
 }
 
 // loss = sum of p h(i), computed in 16 bits: the gradient by p and by a sum of three values each

@@ -50,8 +50,7 @@ TEST(SharedAdjoints, AnInnerAdjointThatSeveralInputsNeedIsKept) {
   ASSERT_TRUE(inner.defined());
   EXPECT_EQ(inner.dimensions(), 2);
   EXPECT_EQ(inner.outputs(), 1) << "that of drive()";
-  expect_mentions(d.explain(Detail::All),
-                  {"keeps 1 inner adjoint of each iteration, from which 3"});
+  expect_mentions(d.explain(Detail::All), {"keeps 1 inner adjoint of each iteration, shared by 3"});
   const autodiff::OperationCount count = d.operations().gradient;
   const autodiff::FuncOperations* kept = count.find(inner.function().get());
   ASSERT_NE(kept, nullptr);

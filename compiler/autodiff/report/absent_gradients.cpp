@@ -55,7 +55,7 @@ class AbsentGradients {
 
  private:
   std::string without_path(const Symbol* symbol) const {
-    std::string result = "the output does not depend on its value by a differentiable path";
+    std::string result = "the output does not depend on its value along a differentiable path";
     const char* separator = ": ";
     for (const std::string& reason :
          zero_reasons(symbol, primal_.order, [&](const FuncContents& f) {
@@ -74,15 +74,15 @@ class AbsentGradients {
     } else if (primal_.active.cancels(symbol)) {
       account_.add(
           Explanation::Kind::Zero, name,
-          "the output is the same for all of its values: it is what a softmax, a log-sum-exp or "
-          "a norm is shifted or scaled by, which cancels");
+          "the output is the same for all of its values: it only shifts or scales a softmax, a "
+          "log-sum-exp or a norm, which cancels");
       return true;
     } else if (auto left = primal_.options.left_out.find(symbol);
                left != primal_.options.left_out.end()) {
       account_.add(Explanation::Kind::NotRequested, name, "left out: " + left->second);
     } else if (!primal_.active.contains(symbol)) {
       account_.add(Explanation::Kind::NotRequested, name,
-                   "nothing that was requested depends on it");
+                   "no requested gradient needs its adjoint");
     } else {
       account_.add(Explanation::Kind::Zero, name, without_path(symbol));
       zero_.insert(symbol);

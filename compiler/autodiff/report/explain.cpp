@@ -71,7 +71,7 @@ std::string summary_of(const std::vector<Explanation>& all, Kind kind) {
 std::string summary_of(const std::vector<Explanation>& all) {
   std::string result;
   for (Kind kind : told_first) result += summary_of(all, kind);
-  return result + "explain(Detail::All) tells why, fact by fact.\n";
+  return result + "explain(Detail::All) lists every fact with its reason.\n";
 }
 
 std::string without_numbers(const std::string& name) {

@@ -25,8 +25,7 @@ std::string barrier(const Expr& e) {
   if (e.type().is_bool()) return "in a condition";
   const auto* call = e.as<Call>();
   if (!call) return "";
-  if (call->call_type != CallType::Operator)
-    return text("in the place where ", quoted(call->name), " is read");
+  if (call->call_type != CallType::Operator) return text("in an index of ", quoted(call->name));
   const RuleClass cls = derivative_rule(call->op).cls;
   const bool blocks = cls == RuleClass::Constant || cls == RuleClass::Blocked;
   return blocks ? text("in ", op_info(call->op).name, ", whose derivative is 0") : "";
@@ -57,7 +56,7 @@ std::set<std::string> barriers_in(const Symbol* input, const FuncContents& f) {
   for (int s = 0; s < f.stage_count(); ++s) {
     const Definition& d = f.stage(s);
     for (const Expr& value : d.values) barriers.look(value, "");
-    for (const Expr& arg : d.args) barriers.look(arg, "in a place where it writes");
+    for (const Expr& arg : d.args) barriers.look(arg, "in an index that it writes to");
     if (d.predicate.defined()) barriers.look(d.predicate, "in a condition");
     for (const ReductionVariable& r : d.rvars) {
       barriers.look(r.min, "in the bounds of a loop");

@@ -135,7 +135,7 @@ class PartSizes {
     const std::string number = is_const(count) ? ir::print(count) : text("at most ", parts_of(g));
     const std::string each =
         bytes >= unknown_elements ? "" : text(" of ", static_cast<int64_t>(bytes), " bytes each");
-    return text("accumulated in ", number, " private parts", each, ", as many as fit ",
+    return text("accumulated in ", number, " privatised copies", each, ", as many as fit ",
                 static_cast<int64_t>(private_bytes), " bytes");
   }
 

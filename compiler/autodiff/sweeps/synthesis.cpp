@@ -190,9 +190,9 @@ class Synthesis {
     if (box.size() != args.size()) {
       account_.add(
           Explanation::Kind::Zero, target.name,
-          text("the output reads no element of it, at most its bounds: what the custom adjoint "
-               "of ",
-               quoted(f.name), " contributes does not count"));
+          text("the output reads no element of it, at most its bounds: the contribution of the "
+               "custom adjoint of ",
+               quoted(f.name), " is ignored"));
       return;
     }
     contributions_.add_pointwise(c.input.get(), target.args, box, {}, values);
@@ -231,7 +231,7 @@ class Synthesis {
       account_.add(Explanation::Kind::Version, f->name,
                    text(quoted(shared.func->name), " keeps ", kept,
                         kept == 1 ? " inner adjoint" : " inner adjoints",
-                        " of each iteration, from which ", leaves.size(), " contributions go on"));
+                        " of each iteration, shared by ", leaves.size(), " contributions"));
     }
     for (size_t i = 0; i < leaves.size(); ++i)
       contributions_.add(f, leaves[i], shared.adjoints[i], domain);

@@ -169,7 +169,7 @@ class TangentSynthesis {
       result_.tangents[f.get()] = tangent;
     } else if (std::ranges::any_of(f->types, [](Type t) { return t.is_float(); })) {
       explain(Explanation::Kind::Zero, *f,
-              "it does not depend on an input that moves by a differentiable path");
+              "it does not depend on an input that moves along a differentiable path");
     }
   }
 
@@ -199,7 +199,7 @@ class TangentSynthesis {
     if (builder.dual()) {
       result_.funcs.push_back(builder.dual());
       explain(Explanation::Kind::Version, *f,
-              text("its updates need values that they overwrite: computed again, with the tangent, "
+              text("its updates need values that they overwrite: recomputed, with the tangent, "
                    "in ",
                    quoted(builder.dual()->name)));
     }

@@ -208,9 +208,9 @@ class CheckpointedLoop {
   }
 
   void explain_schedule() {
-    std::string what = "no value of it is needed, none is kept";
+    std::string what = "its partials need no values of it, so no state is kept";
     if (plan_.needs_values())
-      what = text("from ", kept_text(), ", ", again_text(), " computed again beside the ",
+      what = text("from ", kept_text(), ", ", again_text(), " recomputed beside the ",
                   ir::print(plan_.steps), " that are reversed");
     c_.note(text(" is a loop of ", ir::print(plan_.steps), " steps that ", quoted(machine_->name),
                  " runs backward: ", what),

@@ -65,11 +65,10 @@ class Folder {
     replaced_[f.get()] = [=](const Call& call, const std::vector<Expr>& args) {
       return read_at_end(call, args, *f, *axis, folded, pure);
     };
-    explanations.push_back(
-        {Explanation::Kind::Version, f->name,
-         text("others read its last steps only: ", quoted(folded->name), " keeps ", axis->slots,
-              axis->slots == 1 ? " of them" : " of them in turn", " and has the adjoint; that of ",
-              quoted(f->name), " is not made")});
+    explanations.push_back({Explanation::Kind::Version, f->name,
+                            text("only its last steps are read: ", quoted(folded->name), " keeps ",
+                                 axis->slots, axis->slots == 1 ? " of them" : " of them in turn",
+                                 " and has the adjoint; ", quoted(f->name), " has none")});
     return true;
   }
 

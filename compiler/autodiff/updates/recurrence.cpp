@@ -153,7 +153,7 @@ class Recurrence {
     result_.current = make_adjoint(c_.query.target, name_of_own(), {}, values_of(exact_, c_.point));
     result_.current.helpers = {exact_};
     result_.current.accumulator = exact_;
-    c_.note(": its adjoint carries sums along many elements, in double", result_);
+    c_.note(": its adjoint carries long sums from element to element, in double", result_);
   }
   // The Func in which the recurrence runs.
   const FuncPtr& carrying() const { return exact_ ? exact_ : result_.current.func; }

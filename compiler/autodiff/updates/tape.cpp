@@ -216,8 +216,8 @@ class Tape {
     c_.hand_over(adjoint_, seeds_, before, result_);
     Expr& predicate = result_.domains[0].predicate;
     predicate = with_values(predicate, c_.query.f, result_.self_values);
-    c_.note(text(" is run backward one iteration after the other: ", quoted(adjoint_->name),
-                 " keeps the adjoint of each"),
+    c_.note(text(" is run backward iteration by iteration: ", quoted(adjoint_->name),
+                 " keeps the adjoint of each iteration"),
             result_);
   }
 

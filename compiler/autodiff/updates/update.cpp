@@ -126,7 +126,7 @@ class UpdateDifferentiation {
     result_.previous = c_.adjoint_before(initial);
     result_.helpers.push_back(winner);
     c_.note(text(" selects: ", quoted(winner->name),
-                 " computes again which iteration wrote each element last"),
+                 " recomputes which iteration wrote each element last"),
             result_);
     return true;
   }
@@ -152,8 +152,8 @@ class UpdateDifferentiation {
   }
 
   void explain_unused_budget() {
-    c_.note(text(" overwrites nothing that is needed: ", quoted(f_->name),
-                 " keeps its steps along a dimension of its own, and the budget for checkpoints is "
+    c_.note(text(" needs no checkpoints: ", quoted(f_->name),
+                 " keeps every step along a dimension of its own, so the budget for checkpoints is "
                  "not used; written in place, as f(x) = g(f(x), t), it is run backward from kept "
                  "states"),
             result_, Explanation::Kind::Performance);
