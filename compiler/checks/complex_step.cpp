@@ -2,8 +2,8 @@
 
 #include <unordered_map>
 
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autodiff/sweeps/local_derivative.h"
-#include "autodiff/sweeps/made_definitions.h"
 #include "frontend/data/image_param.h"
 #include "frontend/data/param.h"
 #include "graph/define.h"
@@ -129,13 +129,13 @@ class Complexifier {
     const Expr e = without_lets(root);
     kept_.push_back(e);  // so that the addresses in memo_ stay theirs
     for (const Expr& node : autodiff::post_order({e})) {
-      if (!memo_.contains(node.get())) memo_.emplace(node.get(), made(node));
+      if (!memo_.contains(node.get())) memo_.emplace(node.get(), converted(node));
     }
     return memo_.at(e.get());
   }
   Complex operand(const Expr& e) { return memo_.at(e.get()); }
 
-  Complex made(const Expr& e) {
+  Complex converted(const Expr& e) {
     const bool is_float = e.type().is_float();
     if (const Call* call = e.as<Call>()) return is_float ? of_call(*call) : real_call(e, *call);
     if (const Variable* v = e.as<Variable>()) return is_float ? of_scalar(e, *v) : Complex{e, {}};

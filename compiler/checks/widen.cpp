@@ -1,7 +1,7 @@
 #include "checks/widen.h"
 
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autodiff/sweeps/local_derivative.h"
-#include "autodiff/sweeps/made_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/data/image_param.h"
 #include "frontend/data/param.h"

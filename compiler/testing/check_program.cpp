@@ -19,7 +19,7 @@ constexpr uint8_t canary = 0xa5;
 constexpr size_t longest_detail = 400;  // internal errors carry whole programs
 
 struct GuardedOutput {
-  Runtime::Buffer<> whole, inner;  // of the same memory
+  Runtime::Buffer<> outer, inner;  // views of the same memory
 };
 
 using Regions = std::vector<oracle::Region>;  // of each output
@@ -31,10 +31,10 @@ GuardedOutput make_output(Type type, const oracle::Region& output) {
     extents.push_back(output.extents[d] + 2 * margin);
   }
   GuardedOutput result;
-  result.whole = Runtime::Buffer<>(to_halide_type(type), extents);
-  result.whole.set_min(mins);
-  std::memset(result.whole.data(), canary, result.whole.size_in_bytes());
-  result.inner = result.whole;
+  result.outer = Runtime::Buffer<>(to_halide_type(type), extents);
+  result.outer.set_min(mins);
+  std::memset(result.outer.data(), canary, result.outer.size_in_bytes());
+  result.inner = result.outer;
   for (size_t d = 0; d < output.mins.size(); ++d) {
     result.inner.crop(static_cast<int>(d), output.mins[d], output.extents[d]);
   }
@@ -42,7 +42,7 @@ GuardedOutput make_output(Type type, const oracle::Region& output) {
 }
 
 bool is_intact(const GuardedOutput& output, const oracle::Region& region) {
-  const halide_buffer_t& raw = *output.whole.raw_buffer();
+  const halide_buffer_t& raw = *output.outer.raw_buffer();
   bool intact = true;
   oracle::region_of(raw).for_each([&](const std::vector<int>& point) {
     bool inside = true;

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "autodiff/derivative.h"
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "gradient/gradient_check.h"
 #include "graph/define.h"
 #include "graph/function.h"

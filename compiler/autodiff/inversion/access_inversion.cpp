@@ -29,8 +29,8 @@ std::optional<int64_t> constant_extent(const Interval& range) {
   return range.is_bounded() ? as_const_int(extent_of(range)) : std::nullopt;
 }
 
-bool can_prove_inside(const Interval& part, const Interval& whole) {
-  const auto& [min, max] = whole;
+bool can_prove_inside(const Interval& part, const Interval& outer) {
+  const auto& [min, max] = outer;
   return (!min.defined() || (part.min.defined() && can_prove(part.min >= min))) &&
          (!max.defined() || (part.max.defined() && can_prove(part.max <= max)));
 }

@@ -37,8 +37,8 @@ Scope<Interval> scope_of(const std::vector<LoopVariable>& vars);
 Expr extent_of(const Interval& range);
 // The extent if it is constant; nullopt if it is unbounded or known at run time only.
 std::optional<int64_t> constant_extent(const Interval& range);
-// An unbounded end of `part` lies inside `whole` only if `whole` is unbounded there, too.
-bool can_prove_inside(const Interval& part, const Interval& whole);
+// An unbounded end of `part` lies inside `outer` only if `outer` is unbounded there, too.
+bool can_prove_inside(const Interval& part, const Interval& outer);
 struct IterationDomain {
   std::vector<LoopVariable> vars;  // innermost first
   Expr predicate;                  // undefined: none

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "autodiff/matrices/colour_dimension.h"
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"

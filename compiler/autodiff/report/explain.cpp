@@ -55,10 +55,10 @@ std::string line_of(const char* what, const std::vector<Explanation>& facts) {
 std::string zeros_of(const std::vector<Explanation>& all) {
   std::set<std::string> built;
   for (const Explanation& e : of_kind(all, Kind::Built)) built.insert(e.subject);
-  std::vector<Explanation> whole, in_part;
+  std::vector<Explanation> entirely, in_part;
   for (const Explanation& e : of_kind(all, Kind::Zero))
-    (built.count(e.subject) ? in_part : whole).push_back(e);
-  return line_of("zero", whole) + line_of("zero in part", in_part);
+    (built.count(e.subject) ? in_part : entirely).push_back(e);
+  return line_of("zero", entirely) + line_of("zero in part", in_part);
 }
 
 std::string summary_of(const std::vector<Explanation>& all, Kind kind) {

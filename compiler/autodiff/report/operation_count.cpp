@@ -21,8 +21,8 @@ namespace retrograde::autodiff {
 namespace {
 
 std::string number_text(double value) {
-  bool whole = value == std::floor(value) && std::abs(value) < 1e15;
-  return whole ? std::to_string(static_cast<int64_t>(value)) : text(value);
+  bool is_integer = value == std::floor(value) && std::abs(value) < 1e15;
+  return is_integer ? std::to_string(static_cast<int64_t>(value)) : text(value);
 }
 
 // One iteration of a stage, or one value of a Func: its own work, and the Funcs that it reads.

@@ -431,12 +431,10 @@ Expr divided_first(const Expr& adjoint, const Partial& partial) {
 
 }  // namespace
 
-Strength made_strong(Strength strength) {
+Strength as_strong(Strength strength) {
   return is_cut(strength) ? Strength::Both : Strength::Strong;
 }
-Strength made_cut(Strength strength) {
-  return is_strong(strength) ? Strength::Both : Strength::Cut;
-}
+Strength as_cut(Strength strength) { return is_strong(strength) ? Strength::Both : Strength::Cut; }
 
 Expr times_partial(const Expr& adjoint, const Partial& partial) {
   if (is_zero(partial.factor)) return make_zero(adjoint.type());

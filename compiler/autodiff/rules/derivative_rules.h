@@ -24,8 +24,8 @@ enum class Strength : uint8_t {
   Cut,   // the adjoint may be infinite (it passed a pole): a partial of 0 is a strong zero
   Both,  // Strong and Cut
 };
-Strength made_strong(Strength strength);
-Strength made_cut(Strength strength);
+Strength as_strong(Strength strength);
+Strength as_cut(Strength strength);
 
 struct Partial {
   Expr factor;  // undefined: no contribution to this operand

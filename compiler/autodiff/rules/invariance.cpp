@@ -183,11 +183,11 @@ Response of_binary(const Binary& e, const Response& a, const Response& b) {
 // condition holds, the clamp goes away.
 Response where(const Expr& condition, const Response& r) {
   Response result = r;
-  const Expr given = result.place.empty() ? condition : simplify(without_likely(condition));
+  const Expr assumption = result.place.empty() ? condition : simplify(without_likely(condition));
   for (Expr& index : result.place) {
-    const Expr choice = simplify(make_select(given, index, index + 1));
+    const Expr choice = simplify(make_select(assumption, index, index + 1));
     const auto* select = choice.as<Select>();
-    if (select && equal(select->condition, given)) index = select->when_true;
+    if (select && equal(select->condition, assumption)) index = select->when_true;
   }
   return result;
 }

@@ -11,7 +11,7 @@
 //               then summed in order. If there are many elements, in rows shorter than a vector, only lanes get copies.
 //               A scatter gets lanes if it has few elements. The number of parts is limited by a budget in bytes and
 //               does not depend on the number of threads, so the result does not, either. If fewer than four parts fit,
-//               a scatter stays a scatter (private_parts.h).
+//               a scatter stays a scatter (privatisation.h).
 //
 // Long sums. Adding n float32 terms in sequence may lose log2(n) bits: the sum of 12 million times 0.1 is wrong by a
 // tenth. A float32 adjoint is accumulated in double, privatised copies included, if an element sums many_terms

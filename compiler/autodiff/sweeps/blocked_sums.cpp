@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "graph/define.h"
 #include "graph/names.h"
 #include "ir/build.h"

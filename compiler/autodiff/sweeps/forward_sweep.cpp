@@ -109,10 +109,10 @@ class ForwardSweep {
     const Passed here = passed_[local.operands[i].get()];
     const bool is_quotient = partial.divisor.defined();
     if (factor.infinite || (here.choice && factor.read))
-      partial.strength = made_strong(partial.strength);
+      partial.strength = as_strong(partial.strength);
     if (passed.singular || (passed.infinite && local.levels_off_by(i)) ||
         (here.quotient && !is_quotient))
-      partial.strength = made_cut(partial.strength);
+      partial.strength = as_cut(partial.strength);
     passed_[e.get()].choice |= here.choice || partial.factor.as<Select>();
     passed_[e.get()].quotient |= here.quotient || is_quotient;
     AdjointTraits& traits = traits_[e.get()];

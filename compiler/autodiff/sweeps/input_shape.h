@@ -22,9 +22,9 @@ bool is_floating(const std::vector<Type>& types);
 void check_is_floating(const std::string& asked, const std::vector<Type>& types,
                        const std::string& whose, const std::string& what_to_do);
 
-// Throws CompileError unless `given` is defined and has the dimensions and number of values of `shape`, all floats.
-// `what` names `given` in the message, for example "a direction"; `of` names the input.
+// Throws CompileError unless `candidate` is defined and has the dimensions and number of values of `shape`, all floats.
+// `what` names `candidate` in the message, for example "a direction"; `of` names the input.
 void check_shape(const std::string& asked, const std::string& what, const std::string& of,
-                 const InputShape& shape, const FuncContents& given);
+                 const InputShape& shape, const FuncContents& candidate);
 
 }  // namespace retrograde::autodiff

@@ -52,7 +52,7 @@ LocalDerivative sum_of(const std::vector<Expr>& operands, std::vector<Partial> p
     for (const Expr& part : {p.factor, p.divisor}) {
       if (part.defined()) partial.add(facts.finiteness_of(part));
     }
-    if (partial.risky) p.strength = made_strong(p.strength);
+    if (partial.risky) p.strength = as_strong(p.strength);
     partial.risky |= p.divisor.defined();
     result.factors.push_back(partial);
   }
@@ -180,8 +180,8 @@ Finiteness ExprFacts::finiteness_of(const Expr& factor) const {
 }
 
 LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts) {
-  if (StableForm whole = stable_form(e); !whole.operands.empty()) {
-    LocalDerivative sum = sum_of(whole.operands, whole.partials, facts);
+  if (StableForm form = stable_form(e); !form.operands.empty()) {
+    LocalDerivative sum = sum_of(form.operands, form.partials, facts);
     const auto* call = e.as<Call>();
     sum.levels_off.assign(sum.operands.size(), call ? levels_off(call->op) : is_quotient(e));
     return sum;
@@ -220,9 +220,9 @@ AdjointTraits traits_of(const Expr& adjoint) {
     const bool is_operator = call->call_type == CallType::Operator;
     result.singular |= is_operator && has_poles(*call);
     result.vanished |= is_operator && levels_off(call->op);
-    const Provenance* made = provenance_of(*call);
-    if (made) result.add(made->traits);
-    if (made && e.same_as(top)) is_seed = false;
+    const Provenance* provenance = provenance_of(*call);
+    if (provenance) result.add(provenance->traits);
+    if (provenance && e.same_as(top)) is_seed = false;
     return true;
   });
   result.masked |= is_seed;

@@ -11,7 +11,7 @@
 
 #include "analysis/interval.h"
 #include "autodiff/sweeps/distinct_nodes.h"
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autoschedule/cost_estimate.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
@@ -162,11 +162,11 @@ class Sharing {
   Numbers kept_;
 };
 
-bool is_inside(const Box& part, const Box& whole) {
-  return std::ranges::equal(part, whole, can_prove_inside);
+bool is_inside(const Box& part, const Box& outer) {
+  return std::ranges::equal(part, outer, can_prove_inside);
 }
 
-// Whether all elements that the values read over the whole domain exist. An access of the primal may be guarded by a
+// Whether all elements that the values read over the outer domain exist. An access of the primal may be guarded by a
 // condition that does not hold there.
 bool reads_what_is_there(const std::vector<Expr>& values, const IterationDomain& domain,
                          const Regions& regions) {

@@ -55,9 +55,9 @@ LeafAdjoint with_self_values(const LeafAdjoint& leaf, const FuncPtr& f,
 // The adjoints of the requested parameters. Those of Funcs are included if requested, or if there are no parameters.
 std::vector<WantedFunc> gradients_of(const Primal& primal, const SynthesisResult& result) {
   std::vector<WantedFunc> gradients;
-  const auto add = [&](const Symbol* symbol, const auto& made, const auto& key) {
-    const auto found = made.find(key);
-    if (found == made.end() || !primal.active.is_requested(symbol)) return;
+  const auto add = [&](const Symbol* symbol, const auto& built, const auto& key) {
+    const auto found = built.find(key);
+    if (found == built.end() || !primal.active.is_requested(symbol)) return;
     gradients.push_back(
         {found->second, mapped(primal.target_of(symbol).region, &LoopVariable::range)});
   };
@@ -138,7 +138,7 @@ class Synthesis {
                                         : update.seeds;
     for (const IterationDomain& domain : update.domains)
       contribute_stage(f, update.values, seeds, domain, update.self_values, update.keeps_steps);
-    for (const GivenAdjoint& g : update.given) {
+    for (const DirectContribution& g : update.direct) {
       if (primal_.active.contains(g.leaf.leaf)) contributions_.add(f, g.leaf, g.domain);
     }
     account_.add(update.explanations);

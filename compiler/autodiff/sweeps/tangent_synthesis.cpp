@@ -5,7 +5,7 @@
 #include "autodiff/rules/value_range.h"
 #include "autodiff/sweeps/custom_rules.h"
 #include "autodiff/sweeps/forward_sweep.h"
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
@@ -226,9 +226,9 @@ class TangentSynthesis {
     if (!own) return found->second;
     FuncPtr sum = make_func(Role::Tangent, f.name + "_tan_sum", f.name);
     const std::vector<Expr> args = variables_of(f.args);
-    std::vector<Expr> values = values_of(own, args), given = values_of(found->second, args);
+    std::vector<Expr> values = values_of(own, args), direction = values_of(found->second, args);
     for (size_t k = 0; k < f.types.size(); ++k)
-      values[k] = values[k] + cast_to(adjoint_type(f.types[k]), given[k]);
+      values[k] = values[k] + cast_to(adjoint_type(f.types[k]), direction[k]);
     define_pure(sum, args, values);
     sum->made->traits = own->made->traits;
     result_.funcs.push_back(sum);

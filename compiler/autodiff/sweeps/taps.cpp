@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autoschedule/scatter_schedule.h"
 #include "ir/build.h"
 #include "ir/equal.h"

@@ -28,7 +28,7 @@ class CheckpointedLoop {
   void run() {
     plan_ = plan_checkpoints(c_, layout_, result_.current.func, machine_);
     table_ = make_table();
-    if (table_.made_by) result_.helpers.push_back(table_.made_by);
+    if (table_.computed_by) result_.helpers.push_back(table_.computed_by);
     slots_.emplace(c_, layout_, plan_, machine_);
     define_machine();
     record_ = record_writes(c_, plan_, *slots_);
@@ -128,7 +128,7 @@ class CheckpointedLoop {
     Expr kept = slots_->kept() + slot * layout_.elements() + element;
     result.push_back({is(Action::Store), in_state, {kept, slots_->all_values(element)}});
     result.push_back({is(Action::Restore), in_state, {element, slots_->all_values(kept)}});
-    if (table_.made_by) result.push_back({const_true(), const_false(), result.back().write});
+    if (table_.computed_by) result.push_back({const_true(), const_false(), result.back().write});
     return result;
   }
   Expr has_run(const Substitution& places) const {
@@ -192,12 +192,12 @@ class CheckpointedLoop {
       before.push_back(make_select(inside, a, make_zero(a.type())));
     }
     result_.previous = c_.adjoint_before(before);
-    for (size_t i = 0; i < plan_.given.size(); ++i) {
-      const CheckpointPlan::Given& g = plan_.given[i];
-      Expr slot = slots_->given(i), sum = slots_->sum_at(slot);
+    for (size_t i = 0; i < plan_.contributions.size(); ++i) {
+      const CheckpointPlan::StepContribution& g = plan_.contributions[i];
+      Expr slot = slots_->contribution(i), sum = slots_->sum_at(slot);
       if (g.compensated) sum = sum + slots_->sum_at(slot + 1);
-      result_.given.push_back({{g.leaf.leaf, cast_to(g.leaf.adjoint.type(), sum)},
-                               g.over_time ? c_.domain : one_step()});
+      result_.direct.push_back({{g.leaf.leaf, cast_to(g.leaf.adjoint.type(), sum)},
+                                g.over_time ? c_.domain : one_step()});
     }
     explain_schedule();
   }
@@ -223,7 +223,7 @@ class CheckpointedLoop {
   }
   std::string again_text() const {
     if (plan_.constant_steps) return text(ir::print(table_.count(Action::Advance)), " steps");
-    return text("each step at most r times, as ", quoted(table_.made_by->name),
+    return text("each step at most r times, as ", quoted(table_.computed_by->name),
                 " finds at run time,");
   }
 
@@ -243,7 +243,7 @@ class CheckpointedLoop {
 }  // namespace
 
 bool wants_checkpoints(const UpdateContext& c) {
-  if (!c.query.checkpoints.is_given() || c.definition.rvars.empty()) return false;
+  if (!c.query.checkpoints.is_set() || c.definition.rvars.empty()) return false;
   auto steps = as_const_int(simplify(c.definition.rvars.back().extent));
   return !steps || *steps > 0;
 }

@@ -27,7 +27,7 @@ struct ActionTable {
   // The columns of a row: an Action, a step, a slot for states.
   std::function<Expr(int column, const Expr& row)> entry;
   std::array<Expr, action_kinds> counts;  // number of rows of each kind
-  FuncPtr made_by;                        // computes the table at run time; null: constant table
+  FuncPtr computed_by;                    // computes the table at run time; null: constant table
   const Expr& count(Action action) const { return counts[static_cast<size_t>(action)]; }
 };
 

@@ -1,7 +1,7 @@
 // Computes the table of checkpoint_actions.h at run time, by a Func.
 #include <algorithm>
 
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autodiff/time/checkpoint_actions.h"
 #include "autodiff/time/revolve.h"
 #include "diagnostics/error.h"
@@ -87,7 +87,7 @@ class ActionsFunc {
   ActionTable table() const {
     ActionTable result;
     result.rows = rows_;
-    result.made_by = func_;
+    result.computed_by = func_;
     result.entry = [func = func_, first = frames()](int column, const Expr& row) {
       return call_value(func, {row + first}, column);
     };

@@ -14,7 +14,7 @@ namespace retrograde::autodiff {
 
 struct CheckpointPlan {
   // The contribution of iterations to one element of another Func or image.
-  struct Given {
+  struct StepContribution {
     LeafAdjoint leaf;
     bool over_time =
         false;  // one value for each iteration of each step, instead of a sum over steps
@@ -31,8 +31,8 @@ struct CheckpointPlan {
   std::vector<Type> types;  // types that hold values of f and their adjoints
   int sum_value = -1;       // the value of the Tuple that sums use: the first floating-point one
   std::string at_hand;      // a variable: the slot of the current adjoints
-  std::vector<LeafAdjoint> passed_on;  // contributions to f itself
-  std::vector<Given> given;            // contributions to others
+  std::vector<LeafAdjoint> passed_on;           // contributions to f itself
+  std::vector<StepContribution> contributions;  // contributions to others
   std::vector<Expr> needed;  // reads of f that partials and indices need, inner reads first
   std::vector<std::vector<Expr>> places;  // the distinct places of `needed`
   std::vector<size_t> place_of;           // for each of `needed`: its number in `places`

@@ -24,7 +24,7 @@ class CheckpointSlots {
   // The slot of the value noted for a place, in the current iteration of the inner loops.
   Expr note(size_t place) const;
   // The slot of contribution i of the plan, in the current iteration.
-  Expr given(size_t i) const;
+  Expr contribution(size_t i) const;
 
   // The content of a slot: as it is; as a value of f; as its adjoint; as a sum.
   Expr at(const Expr& slot, size_t k) const;
@@ -40,7 +40,7 @@ class CheckpointSlots {
   const CheckpointPlan& plan_;
   FuncPtr machine_;
   Expr at_hand_, noted_, kept_, count_;
-  std::vector<Expr> given_;
+  std::vector<Expr> contributions_;
 };
 
 }  // namespace retrograde::autodiff

@@ -34,7 +34,7 @@ class CheckpointStep {
     std::vector<SlotWrite> writes{{slots_.at_hand(), slots_.all_values(written)}, {written, {}}};
     for (Type t : plan_.types) writes[1].values.push_back(make_zero(t));
     pass_on(writes);
-    for (size_t i = 0; i < plan_.given.size(); ++i) append_given(i, writes);
+    for (size_t i = 0; i < plan_.contributions.size(); ++i) append_contribution(i, writes);
     return writes;
   }
 
@@ -76,9 +76,9 @@ class CheckpointStep {
     }
   }
 
-  void append_given(size_t i, std::vector<SlotWrite>& writes) const {
-    const CheckpointPlan::Given& g = plan_.given[i];
-    Expr slot = slots_.given(i), old = slots_.sum_at(slot);
+  void append_contribution(size_t i, std::vector<SlotWrite>& writes) const {
+    const CheckpointPlan::StepContribution& g = plan_.contributions[i];
+    Expr slot = slots_.contribution(i), old = slots_.sum_at(slot);
     Expr term = cast_to(old.type(), noted(g.leaf.adjoint));
     auto write = [&](const Expr& place, const Expr& value) {
       writes.push_back({place, slots_.all_values(place)});

@@ -43,7 +43,7 @@ using SelfValues = std::map<Expr, Expr, StructuralLess>;
 // The budget for states of a loop over time: one of the two numbers, or none.
 struct CheckpointBudget {
   int64_t states = 0, bytes = 0;
-  bool is_given() const { return states > 0 || bytes > 0; }
+  bool is_set() const { return states > 0 || bytes > 0; }
 };
 
 struct UpdateQuery {
@@ -60,7 +60,7 @@ struct UpdateQuery {
 };
 
 // A contribution to the symbol that `leaf` reads, for each point of the domain.
-struct GivenAdjoint {
+struct DirectContribution {
   LeafAdjoint leaf;
   IterationDomain domain;
 };
@@ -70,8 +70,8 @@ struct UpdateAdjoint {
   AdjointFunc previous;      // the adjoint before the stage; null: the same as `current`
   std::vector<Expr> values;  // values to sweep for contributions to others; undefined: none
   std::vector<Expr> seeds;   // their adjoints; empty: `current` where the stage writes
-  std::vector<IterationDomain> domains;  // domains of the sweep
-  std::vector<GivenAdjoint> given;       // contributions to others that need no sweep
+  std::vector<IterationDomain> domains;    // domains of the sweep
+  std::vector<DirectContribution> direct;  // contributions to others that need no sweep
   SelfValues self_values;
   bool keeps_steps = false;      // f or a helper has an element for every iteration
   std::vector<FuncPtr> helpers;  // generated Funcs, producers first

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autodiff/sweeps/reverse_sweep.h"
 #include "autodiff/updates/update.h"
 #include "graph/own_reads.h"

@@ -77,10 +77,10 @@ void LargeMaker::add_piece() {
   add((this->*pieces[c_.below(static_cast<int>(std::size(pieces)))])(images_.back()));
 }
 
-void LargeMaker::add(const Image& made) {
-  if (!made.f.defined()) return;
-  kept(made.f);
-  images_.push_back(made);
+void LargeMaker::add(const Image& image) {
+  if (!image.f.defined()) return;
+  kept(image.f);
+  images_.push_back(image);
 }
 
 // The image, or a loss of it: one number, or two. No terms of a loss cancel each other: its rounding

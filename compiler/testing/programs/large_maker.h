@@ -30,7 +30,7 @@ class LargeMaker {
   void begin(const LargeSize& size);
   Piece begin_with_theme();
   void add_piece();
-  void add(const Image& made);
+  void add(const Image& image);
   void end_with(const Image& last);
   // A new image, which the gradient is asked for too: a Buffer, or an ImageParam with estimates that
   // are right, wrong or none.

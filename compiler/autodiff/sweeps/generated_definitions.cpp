@@ -1,4 +1,4 @@
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 
 #include "autodiff/sweeps/local_derivative.h"
 #include "graph/define.h"

@@ -1,4 +1,4 @@
-#include "autodiff/sweeps/private_parts.h"
+#include "autodiff/sweeps/privatisation.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-// private_parts.h -- plans privatised accumulators: when a sum is split, into how many parts, and the loops of one
+// privatisation.h -- plans privatised accumulators: when a sum is split, into how many parts, and the loops of one
 // part.
 #pragma once
 
