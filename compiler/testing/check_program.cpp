@@ -1,5 +1,5 @@
-// Outputs are realized into crops of larger buffers that are filled with a canary: a store outside
-// of an output is a wrong result, too.
+// Runs programs into guarded outputs: crops of larger buffers that are filled with a canary value. A store outside of
+// an output is thus a wrong result, too.
 #include "testing/check_program.h"
 
 #include <cstring>
@@ -22,7 +22,7 @@ struct GuardedOutput {
   Runtime::Buffer<> outer, inner;  // views of the same memory
 };
 
-using Regions = std::vector<oracle::Region>;  // of each output
+using Regions = std::vector<oracle::Region>;  // for each output
 
 GuardedOutput make_output(Type type, const oracle::Region& output) {
   std::vector<int> mins, extents;
@@ -59,7 +59,7 @@ bool is_intact(const GuardedOutput& output, const oracle::Region& region) {
   return intact;
 }
 
-// One for each value of each output.
+// Returns one output for each value of each output Func.
 std::vector<GuardedOutput> run(Pipeline& compiled, const Regions& regions,
                                const RandomProgram& program, const Target& target) {
   std::vector<GuardedOutput> outputs;
@@ -107,7 +107,7 @@ void compare_outputs(const Regions& regions, const RandomProgram& program,
   }
 }
 
-// What the checks of accesses find; where kernels run, races and their accesses out of bounds, too.
+// Whether the error is a finding: an access outside of its memory or, for kernels, also a race.
 bool is_finding(const RuntimeError& error, const Target& target) {
   return is_access_outside(error) || (target.has_feature(Target::CUDA) && !lacks_memory(error));
 }
