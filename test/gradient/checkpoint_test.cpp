@@ -69,7 +69,7 @@ Program predicated(int n) {
   return {weighted_sum(u, {6}), {start, gain}};
 }
 
-// What a step needs is known without its state: nothing is kept.
+// The values that a step needs are known without its state, so nothing is kept.
 Program linear(int n) {
   Buffer<float> start = line(6), decay = plane(6, n, 8);
   Func u("linear_u");

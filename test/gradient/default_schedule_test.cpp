@@ -1,4 +1,4 @@
-// What lowering does with adjoints that nobody scheduled, and with those that somebody did.
+// The default schedule of adjoints without directives, and its interaction with users' directives.
 #include "autoschedule/default_schedule.h"
 
 #include <gtest/gtest.h>
@@ -298,7 +298,7 @@ struct Warp {
     RDom r(0, width, 0, height, 0, channels);
     loss() += warped(r.x, r.y, r.z) * (r.x + 2 * r.y - r.z);
   }
-  // By the image, added up in double.
+  // The gradient by the image, summed in double.
   std::vector<double> expected() const {
     std::vector<double> sums(image.number_of_elements());
     const size_t plane = width * height;
@@ -351,7 +351,7 @@ TEST_F(DefaultSchedule, SmallKernelsOfSmallPicturesAreSummedInLanes) {
   expect_sums_in_lanes(40, Float(32));
 }
 
-// Of a convolution: sums of several channels, so that what is loaded is used for all of them.
+// Gradients of a convolution: several channels are summed together, so that each loaded value is used for all of them.
 TEST_F(DefaultSchedule, ReductionsKeepATileOfTheirSumsInRegisters) {
   Buffer<float> image(66, 66, 8), kernels(3, 3, 8, 8), seed(64, 64, 8);
   Var c("c");
@@ -607,7 +607,7 @@ TEST_F(DefaultSchedule, PartsOfASumAreManyWhereItsLastLoopIsShort) {
   EXPECT_TRUE(has_parts);
 }
 
-// By the two coordinates at which an image is read: both sum over what four corners hold.
+// Gradients by the two coordinates at which an image is read: both sum over the four corners.
 TEST_F(DefaultSchedule, SumsThatLookTheSamePlacesUpShareTheirLoops) {
   const int size = 40, channels = 6;
   const Buffer<float> image = gradient::random_image({size, size, channels}, -1, 1, 1);

@@ -241,8 +241,8 @@ Derivative filter_gradient(const Buffer<float>& a, float decay, int length) {
   return propagate_adjoints(loss, {.wrt = {a}});
 }
 
-// What a constant below 1 forgets, or few elements carry, stays in float32.
-// The term that is carried holds each value of the step twice: 2^40 of them, if it were a tree.
+// Scans that a constant below 1 damps, or that carry few elements, stay in float32. The carried term holds each value
+// of the step twice; as a tree it would have 2^40 nodes.
 TEST(CarriedSums, OfStepsThatUseTheirValuesTwiceAreFoundInTime) {
   const int n = 100;
   Buffer<float> input(n);
