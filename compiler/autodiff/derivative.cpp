@@ -6,7 +6,7 @@
 #include "autodiff/report/explain_costs.h"
 #include "autodiff/rules/derivative_rules.h"
 #include "autodiff/sweeps/input_shape.h"
-#include "autodiff/sweeps/leave_out.h"
+#include "autodiff/sweeps/omitted_gradients.h"
 #include "autodiff/sweeps/regions.h"
 #include "autodiff/sweeps/synthesis.h"
 #include "ir/build.h"
@@ -72,7 +72,7 @@ Expr seed_value(const Func& output, size_t k, const Expr& value) {
 
 Derivative run(const Seed& seed, const AdjointOptions& options) {
   const SynthesisOptions how = to_synthesis(options);
-  auto result = std::make_shared<SynthesisResult>(synthesize_what_can_be(seed, how));
+  auto result = std::make_shared<SynthesisResult>(synthesize_supported(seed, how));
   for (const AdjointInput& input : options.wrt) result->requested.push_back(input.symbol());
   return Derivative(result);
 }

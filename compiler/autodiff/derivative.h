@@ -1,12 +1,12 @@
-// derivative.h -- the gradient: propagate_adjoints and what it gives.
+// derivative.h -- reverse-mode gradients of pipelines: propagate_adjoints and its result, Derivative.
 //
 // Func loss; RDom r(input); loss() += pow(model(r.x, r.y) - target(r.x, r.y), 2);
 // Derivative d = propagate_adjoints(loss);
 // Func grad = d(weights);            // weights: a Func, Buffer, ImageParam or Param
 //
-// The adjoint of a Func or image has its dimensions; that of a Param has none. It is 0 outside of
-// the region that the output depends on. Adjoints are ordinary Funcs without side effects: they can
-// be differentiated again.
+// The adjoint of a Func or image has its dimensions; that of a Param has none. It is 0 outside of the region that the
+// output depends on. Adjoints are ordinary Funcs without side effects, so they can be scheduled and differentiated
+// again.
 #pragma once
 
 #include <memory>
@@ -32,13 +32,12 @@ struct SynthesisResult;
 class AdjointInput;
 class ZeroGradients;
 
-// What the output takes to compute, and what the gradients by all that was requested take (with no
-// request: by all images and parameters), each as a pipeline of its own. What the gradients read of
-// the primal counts among theirs.
+// The operations to compute the output, and those to compute all requested gradients (by default: by all images and
+// parameters), each as a pipeline of its own. Primal values that the gradients read count among the gradients.
 struct GradientOperations {
   autodiff::OperationCount primal, gradient;
-  // gradient over primal; nothing where a count depends on extents known at run time only. The
-  // cheap-gradient principle bounds it by a small constant, whatever the number of inputs.
+  // gradient over primal; nullopt if a count depends on extents known at run time only. By the cheap-gradient principle
+  // it is bounded by a small constant, whatever the number of inputs.
   std::optional<double> ratio() const;
 };
 
@@ -46,14 +45,13 @@ class Derivative {
  public:
   explicit Derivative(std::shared_ptr<const autodiff::SynthesisResult> result);
 
-  // The adjoint of `func` as it is after update definition `update_id`; -1: after its pure
-  // definition. For a Func that is only accumulated into, all of these are the same. A Func that
-  // only reads an image point by point, and that the output does not use, stands for the image.
+  // The adjoint of `func` as it is after update definition `update_id`; -1 means after its pure definition. For a Func
+  // that is only accumulated into, all of these are equal. A Func that only reads an image point by point, and that the
+  // output does not use, is treated as the image.
   //
-  // Zero everywhere where the output does not depend on it, and for integers; explanations() then
-  // say why. (A Buffer that is bound to an ImageParam is something else than the ImageParam.)
-  // A gradient is not built where `wrt` names others, a custom adjoint covers it, or its steps are
-  // not kept.
+  // The adjoint is zero everywhere if the output does not depend on the Func, and for integers; explanations() then
+  // gives the reason. A Buffer that is bound to an ImageParam is not the same input as the ImageParam. A gradient is
+  // not built if `wrt` names other inputs only, if a custom adjoint covers the Func, or if its steps are not kept.
   // Requires: a Func has a definition; a Func has an adjoint after each of its definitions; a
   // gradient is looked up that was built, or is zero.
   Func operator()(const Func& func, int update_id = -1) const;
@@ -65,27 +63,27 @@ class Derivative {
   }
   // The adjoint of `func` as its consumers see it: after its last definition.
   Func adjoint(const Func& func) const;
-  // The same for an input of any kind.
+  // The adjoint of an input of any kind.
   Func of(const AdjointInput& input) const;
-  // Whether a gradient by it was built: of() gives a Func of zeros, or an error, where none was.
+  // Whether a gradient by the input was built. Otherwise of() returns a Func of zeros or throws.
   bool has(const AdjointInput& input) const;
-  // Where an adjoint is summed up, for schedules by hand: the adjoint itself; or, where an element
-  // gets many terms (accumulation.h), the Func in double that it rounds.
+  // The Func that sums up an adjoint, for schedules by hand: the adjoint itself or, if an element gets many terms
+  // (accumulation.h), the Func in double that the adjoint rounds.
   Func accumulator(const Func& adjoint) const;
 
-  // Everything that was made, producers before consumers: adjoints, private parts, helpers.
+  // All generated Funcs, producers before consumers: adjoints, privatised copies, helpers.
   std::vector<Func> funcs() const;
-  // What was built and how, what was not requested, and why a gradient is zero: also one that was
-  // looked up since and has nothing to do with the output.
+  // Facts about the gradients: what was built and how, what was not requested, and why a gradient is zero. These
+  // include gradients that were looked up later and that the output does not depend on.
   std::vector<Explanation> explanations() const;
-  // What of it is stored and what computed again, in bytes and operations, and what of the primal
-  // is not needed, with the schedules that the Funcs have now: the gradients that were asked for,
-  // computed together as one pipeline (operation_count.h says what counts).
+  // Facts about memory and operations, with the current schedules of the Funcs: which values are stored or recomputed,
+  // in bytes and operations, and which primal values are not needed. They describe the requested gradients, computed
+  // together as one pipeline (operation_count.h defines what counts).
   std::vector<Explanation> costs() const;
-  // Both, for people: what it costs and what is stored, computed again, scattered, zero or left
-  // out, a line each; or every fact with its reason.
+  // Both kinds of facts as text. The summary has a line for the cost and one each for what is stored, recomputed,
+  // scattered, zero or left out. Detail::All has a line for every fact with its reason.
   std::string explain(Detail detail = Detail::Summary) const;
-  // Counted with the schedules that the Funcs have now.
+  // Counted with the current schedules of the Funcs.
   GradientOperations operations() const;
 
  private:
@@ -93,21 +91,21 @@ class Derivative {
   Func absent(const std::shared_ptr<const ir::Symbol>& symbol, const std::string& name) const;
   bool output_uses(const graph::FuncContents& f) const;
   std::shared_ptr<const autodiff::SynthesisResult> result_;
-  std::shared_ptr<ZeroGradients> zeros_;  // that were looked up
+  std::shared_ptr<ZeroGradients> zeros_;  // zero gradients that were looked up
 };
 
-// What to do about an update that overwrites a value which a partial derivative needs.
+// How to handle an update that overwrites a value which a partial derivative needs.
 enum class Overwritten {
-  // Keep the versions, in Funcs with one more dimension or in copies, where all of them together
-  // fit AdjointOptions::version_bytes; else a CompileError. Where sizes are known at run time only,
-  // a call that needs more fails. explain() says what is kept.
+  // Keep the versions, in Funcs with one more dimension or in copies, if all of them fit into
+  // AdjointOptions::version_bytes; else throw a CompileError. If sizes are known at run time only, a call that needs
+  // more fails. explain() lists the versions kept.
   Auto,
-  Refuse,  // a CompileError that names the update, the value and the rewrite
-  Store,   // keep the versions whatever they cost
+  Refuse,  // throw a CompileError that names the update, the value and the rewrite
+  Store,   // keep the versions whatever their size
   Error = Refuse,
 };
 
-// Something to differentiate by.
+// An input to differentiate by: a Func, image, Buffer or Param.
 class AdjointInput {
  public:
   explicit AdjointInput(std::shared_ptr<ir::Symbol> symbol) : symbol_(std::move(symbol)) {}
@@ -135,25 +133,27 @@ struct AdjointOptions {
   Overwritten overwritten = Overwritten::Auto;
   int64_t version_bytes = autodiff::default_version_bytes;  // 256 MiB; under Overwritten::Auto
   std::vector<AdjointInput> wrt = {};  // only these gradients are wanted; empty: all
-  // A budget for loops over time: updates whose outermost reduction variable is time, run n times,
-  // which overwrite values that their partials need. Instead of all n versions, a few states of the
-  // Func are kept, and the steps between them are computed again: with s states the least number of
-  // steps, r n - C(s + r, r - 1) for C(s + r - 1, s) < n <= C(s + r, s) (revolve: A. Griewank, A.
-  // Walther, Algorithm 799, ACM Transactions on Mathematical Software 26(1), 2000). n may be known
-  // at run time only: a Param, an extent of an input. Then a table of about (r + 3) n rows of 12
-  // bytes is made as the pipeline runs; a call whose n needs more than 2^24 rows fails. A Func that
-  // keeps its steps along a dimension of its own, f(x, t + 1) = g(f(x, t)), is run the same way
-  // where others read its last steps only (overwrite_time.h): then it has no adjoint of its own, unless
-  // it is in `wrt`. Where every step is read it keeps them, and explain() says so. Gradients are
-  // the same bits for every budget; other updates follow `overwritten`. Give one: the number of
-  // states kept, at least 1, or the bytes that they may take, enough for one.
+  // A budget for loops over time: updates whose outermost reduction variable is time, run n times, which overwrite
+  // values that their partials need. Instead of all n versions a few states of the Func are kept, and the steps between
+  // them are recomputed. With s states this takes the least number of steps, r n - C(s + r, r - 1) for C(s + r - 1, s)
+  // < n <= C(s + r, s) (revolve: A. Griewank, A. Walther, Algorithm 799, ACM Transactions on Mathematical Software
+  // 26(1), 2000).
+  //
+  // n may be known at run time only, as a Param or an extent of an input. Then the pipeline computes a table of about
+  // (r + 3) n rows of 12 bytes; a call whose n needs more than 2^24 rows fails.
+  //
+  // A Func that keeps its steps along a dimension of its own, f(x, t + 1) = g(f(x, t)), is run the same way if other
+  // Funcs read only its last steps (overwrite_time.h); then it has no adjoint of its own, unless it is in `wrt`. If
+  // every step is read, the steps are kept, and explain() says so.
+  //
+  // Gradients have the same bits for every budget; other updates follow `overwritten`. Set one of the two: the number
+  // of states kept, at least 1, or the bytes that they may take, enough for one state.
   std::optional<int> checkpoint_states = {};
   std::optional<int64_t> checkpoint_bytes = {};
 };
 
-// The gradient of sum over output_bounds of adjoint * output with respect to everything that
-// `output` depends on. output_bounds: min and extent of each dimension of the output; `adjoint` is
-// read there only.
+// The gradient of the sum over output_bounds of adjoint * output, with respect to everything that `output` depends on.
+// output_bounds: min and extent of each dimension of the output; `adjoint` is read there only.
 // Requires: the output must be defined; only floating-point values have derivatives; the output
 // needs bounds in each of its dimensions; an adjoint has the dimensions of its Func; an adjoint has
 // as many values as its Func; the adjoint must be defined; a Func with a custom tangent needs a
@@ -166,7 +166,7 @@ Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Reg
 // Requires: the adjoint must be a defined Buffer.
 Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint,
                               const AdjointOptions& options = {});
-// Of a Func without dimensions: the adjoint of its value is 1.
+// The gradient of a Func without dimensions: the adjoint of its value is 1.
 // Requires: a scalar output has one value; the gradient is that of a scalar, or of a sum with given
 // weights.
 Derivative propagate_adjoints(const Func& output, const AdjointOptions& options = {});

@@ -13,7 +13,7 @@ bool is_about(const Explanation& fact, const std::string& name) {
                                   fact.kind == Kind::Custom || fact.kind == Kind::Version);
 }
 
-// What was said of a name. `is_zero`: nothing else but that its gradient is zero.
+// The facts about a name. `is_zero`: they only state that its gradient is zero.
 struct Facts {
   bool is_zero = true;
   std::string text;

@@ -1,5 +1,4 @@
-// gradient_lookup -- what was asked for by a name that has no gradient of its own: a zero that says
-// why, or an error.
+// gradient_lookup.h -- looks up gradients that were not built: returns a zero with its reason, or throws.
 #pragma once
 
 #include <map>
@@ -13,11 +12,11 @@
 
 namespace retrograde {
 
-// Gradients of what the output does not depend on, made when somebody asks for them: the same Func
-// each time.
+// Gradients by inputs that the output does not depend on. They are built when first looked up; later look-ups return
+// the same Func.
 class ZeroGradients {
  public:
-  // `facts`: what synthesis said.  CompileError when they say that there is a gradient which was
+  // `facts` are the explanations of the synthesis. Throws CompileError if they show that the gradient exists but was
   // not built.
   graph::FuncPtr find(const std::shared_ptr<const ir::Symbol>& symbol, const std::string& name,
                       const std::vector<Explanation>& facts);
@@ -25,14 +24,14 @@ class ZeroGradients {
 
  private:
   mutable std::mutex mutex_;
-  // Nothing else may hold what was looked up: the next one must not get its address.
+  // The keys keep the symbols alive, so that no other symbol gets the same address.
   std::map<std::shared_ptr<const ir::Symbol>, graph::FuncPtr> zeros_;
   std::vector<Explanation> explanations_;
 };
 
 namespace autodiff {
 
-// The image that a Func reads point by point and does nothing else: f(x, y) = im(x, y); else null.
+// The image that a Func reads point by point, without any computation: f(x, y) = im(x, y); else null.
 std::shared_ptr<const ParameterContents> image_read_by(const FuncContents& f);
 
 }  // namespace autodiff

@@ -12,7 +12,7 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// The adjoints of all images and parameters that the first output depends on come to be outputs.
+// Adds the adjoints of all images and parameters that the first output depends on to the outputs.
 std::vector<FuncPtr> with_adjoints(const std::vector<FuncPtr>& outputs) {
   const Derivative d = retrograde::propagate_adjoints(Func(outputs[0]));
   std::vector<FuncPtr> result = outputs;

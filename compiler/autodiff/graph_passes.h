@@ -1,4 +1,4 @@
-// graph_passes.h -- the passes from graph to graph, by name: for tools/opt and the golden tests.
+// graph_passes.h -- the passes from graph to graph by name, for tools/opt and the golden tests.
 #pragma once
 
 #include <string>
@@ -12,8 +12,8 @@ struct GraphPass {
   const char* name;
   std::vector<FuncPtr> (*run)(const std::vector<FuncPtr>& outputs);
 };
-// In the order in which a program meets them.
+// In the order in which a compilation runs them.
 const std::vector<GraphPass>& graph_passes();
-const GraphPass* find_graph_pass(const std::string& name);  // null when there is none
+const GraphPass* find_graph_pass(const std::string& name);  // null if unknown
 
 }  // namespace retrograde::autodiff

@@ -19,8 +19,8 @@ struct JacobianResult {
   std::string asked, explanation;
   bool by_rows = false;
   Colours colours;
-  size_t coloured_dimensions = 0;  // of what has colours
-  Func compressed, dense, band;    // band: undefined when there is none
+  size_t coloured_dimensions = 0;  // dimensions of the Func that is coloured
+  Func compressed, dense, band;    // band: undefined if the offsets are unbounded
   Region band_offsets;
 };
 
@@ -30,7 +30,7 @@ namespace {
 
 using namespace autodiff;
 
-// Zeros of the shape of an input or output: a seed to be replaced.
+// Zeros of the shape of an input or output: a seed that is replaced later.
 Func placeholder(const std::string& name, int dimensions, Type type) {
   Func f(name);
   f(variables("x", static_cast<size_t>(dimensions))) =
@@ -51,7 +51,7 @@ InputShape checked_input(const std::string& asked, const AdjointInput& input) {
   return shape;
 }
 
-// Elements of the input that a region of the output depends on, and that exist; flat.
+// The flat elements of the input that exist and that a region of the output depends on.
 Box box_of_input(const Func& output, const Box& region, const AdjointInput& input,
                  const InputShape& shape) {
   Regions regions(topological_order({output.function()}), region);
@@ -100,7 +100,7 @@ Candidate by_rows(const Func& output, const AdjointInput& input, const InputShap
           true};
 }
 
-// Fewer colours; the other way where one is not possible.
+// The candidate with fewer colours; if one is not possible, the other.
 Candidate best(const Func& output, const AdjointInput& input, const InputShape& shape,
                const Box& rows, const Box& columns, const Region& bounds,
                const JacobianOptions& options) {
@@ -121,7 +121,7 @@ Candidate best(const Func& output, const AdjointInput& input, const InputShape& 
     Candidate other =
         by_rows(output, input, shape, rows, columns, bounds, options.overwritten, most);
     if (other.compressed) return other;
-  } catch (const Error&) {  // a reverse mode that is not there is no choice
+  } catch (const Error&) {  // rows are no candidate if reverse mode is not supported
     if (refused) std::rethrow_exception(refused);
   }
   if (!result.compressed && refused) std::rethrow_exception(refused);
@@ -132,7 +132,7 @@ Candidate best(const Func& output, const AdjointInput& input, const InputShape& 
 
 struct Entries {
   const Candidate& candidate;
-  Func all;  // undefined: zero
+  Func all;  // undefined: the matrix is zero
   std::vector<Type> types;
 
   // d output(y) / d input(x)
@@ -170,7 +170,7 @@ void make_band(JacobianResult& result, const Entries& entries, size_t dims,
   std::vector<Expr> x;
   for (size_t d = 0; d < dims; ++d) {
     auto [low, high] = (*offsets)[d];
-    // Of rows, the pattern is the transpose.
+    // For rows, the pattern is that of the transpose.
     if (entries.candidate.by_rows) std::tie(low, high) = std::tuple(-high, -low);
     result.band_offsets.push_back({static_cast<int>(low), static_cast<int>(high - low + 1)});
     x.push_back(Expr(y[d]) + static_cast<int>(low) + k[d]);
@@ -207,7 +207,7 @@ std::vector<Type> derivative_types(const Func& f) { return mapped(f.types(), adj
 
 // ---- second derivatives ----
 
-// The gradient by one input, and how it moves along a seed of another.
+// The gradient by one input, and its tangent along a seed of another.
 struct SecondOrder {
   Func gradient, seed, moved;
   InputShape row_shape, column_shape;  // flat
@@ -237,8 +237,8 @@ SecondOrder second_order(const std::string& asked, const Func& loss, const Adjoi
   return s;
 }
 
-// Whether what autodiff gives as the gradient is one, so that second derivatives commute: not where
-// rules or stop_gradient stand for derivatives.
+// Whether the synthesized gradient is a true gradient, so that second derivatives commute. Custom rules and
+// stop_gradient break this.
 bool is_a_gradient(const Func& loss) {
   bool result = true;
   for (const FuncPtr& f : topological_order({loss.function()})) {
@@ -325,8 +325,7 @@ Jacobian hessian(const Func& loss, const AdjointInput& rows, const AdjointInput&
                             s.column_shape.dimensions, loss.name() + "_hessian"));
 }
 
-// diagonal(x) = sum of H(x, x') over x' of the colour of x; but x itself, none of them has an entry
-// in row x.
+// diagonal(x) = sum of H(x, x') over x' of the colour of x. Of these x', only x itself has an entry in row x.
 HessianDiagonal hessian_diagonal(const Func& loss, const AdjointInput& wrt,
                                  Overwritten overwritten) {
   std::string asked = "make the diagonal of the Hessian of " + quoted(loss.name());

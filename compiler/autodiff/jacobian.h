@@ -1,15 +1,13 @@
-// jacobian.h -- whole Jacobians and Hessians that are sparse or small, from few pipelines' worth of
-// work.
+// jacobian.h -- whole Jacobians and Hessians that are sparse or small, at the cost of a few products.
 //
 // Jacobian j = jacobian(blur, image, {{0, 64}});   // d blur(y) / d image(x), y in [0, 64)
 // j.colours();                                     // 3 for a stencil of three points, of any size
 // j.dense()(y, x);  j.band()(y, k);                // as Funcs
 //
-// Elements that no output element has in common share a seed (colouring.h), so as many products are
-// evaluated as there are colours, in one pipeline with one more dimension. The pattern is proven
-// from the definitions (dependence.h): entries that it leaves out are zero, and all others are
-// read off the products directly, without subtractions. Data-dependent places and reductions over
-// everything make dense parts, which cost a colour an element.
+// Elements that share no output element share a seed (colouring.h). One product is evaluated for each colour, all in
+// one pipeline with one more dimension. The sparsity pattern is proven from the definitions (dependence.h): entries
+// outside of it are zero, and all others are read directly off the products, without subtractions. Data-dependent
+// indices and full reductions give dense parts, which take one colour for each element.
 #pragma once
 
 #include <memory>
@@ -24,8 +22,8 @@ namespace autodiff {
 struct JacobianResult;
 }
 
-// Which sums are evaluated: over columns (tangents, one seed an element of the input) or over rows
-// (adjoints, one an element of the output). Auto: the one with fewer colours, Columns at a tie.
+// Which products are evaluated: Columns uses tangents, with one seed for each element of the input; Rows uses adjoints,
+// with one for each element of the output. Auto takes the one with fewer colours, and Columns at a tie.
 enum class Compression { Auto, Columns, Rows };
 
 struct JacobianOptions {
@@ -37,34 +35,33 @@ class Jacobian {
  public:
   explicit Jacobian(std::shared_ptr<const autodiff::JacobianResult> result);
 
-  // How many products are evaluated.
+  // The number of products that are evaluated.
   int colours() const;
   bool by_rows() const;
-  // The colour of an element of the input (of the output when by_rows), int32 in [0, colours()).
+  // The colour of an element of the input (of the output if by_rows), int32 in [0, colours()).
   // Requires: an element has a coordinate in each dimension.
   Expr colour(const std::vector<Expr>& element) const;
-  // All products: the dimensions of the output (the input when by_rows), then the colour. Schedule
-  // this one; what follows reads it.
+  // All products: the dimensions of the output (of the input if by_rows), then the colour. Schedule this Func; the
+  // others read it.
   Func compressed() const;
-  // Dimensions of the output, then those of the input: the derivative of output(y...) by
-  // input(x...).
+  // Dimensions of the output, then those of the input: the derivative of output(y...) by input(x...).
   Func dense() const;
-  // Dimensions of the output, then an offset for each: band()(y..., k...) is the derivative of
-  // output(y...) by input(y + band_offsets().min + k ...).
+  // Dimensions of the output, then one offset for each: band()(y..., k...) is the derivative of output(y...) by input(y
+  // + band_offsets().min + k ...).
   // Requires: a band is made of constant offsets between output and input.
   Func band() const;
-  Region band_offsets() const;  // of entries that may be nonzero: constants
+  Region band_offsets() const;  // constant offsets of the entries that may be nonzero
   std::string explain() const;
 
  private:
   std::shared_ptr<const autodiff::JacobianResult> result_;
 };
 
-// Of `output` over output_bounds (min and extent in each dimension) by an input. One of several
-// values (a Func of Tuples) has one more dimension here, the value, last:
+// The Jacobian of `output` over output_bounds (min and extent in each dimension) by an input. A Func of several values
+// (a Tuple) has one more dimension here, the last, for the value:
 //   jacobian(f, pair, ...).dense()(y..., x..., k)     d f(y) / d pair(x)[k]
 //   hessian(loss, pair).dense()(i..., k, j..., l)     d2 loss / d pair(i)[k] d pair(j)[l]
-// What propagate_tangents and propagate_adjoints require, it requires.
+// All requirements of propagate_tangents and propagate_adjoints apply.
 // Requires: what to differentiate by must be defined; only floating-point values have derivatives;
 // only floating-point values that are defined have derivatives; the output needs bounds in each of
 // its dimensions; rows are compressed of an output of one value (Unsupported); which elements
@@ -75,21 +72,20 @@ class Jacobian {
 Jacobian jacobian(const Func& output, const AdjointInput& input, const Region& output_bounds,
                   const JacobianOptions& options = {});
 
-// The second derivatives of a scalar: dense()(i..., j...) = d2 loss / d wrt(i) d wrt(j). Tangents
-// of the adjoint. Errors as jacobian and hessian_vector_product.
+// The second derivatives of a scalar: dense()(i..., j...) = d2 loss / d wrt(i) d wrt(j), as tangents of the adjoint.
+// Throws the errors of jacobian and hessian_vector_product.
 // Requires: the input is a float that the loss depends on.
 Jacobian hessian(const Func& loss, const AdjointInput& wrt,
                  Overwritten overwritten = Overwritten::Store);
-// A block off the diagonal: dense()(i..., j...) = d2 loss / d rows(i) d columns(j).
+// An off-diagonal block: dense()(i..., j...) = d2 loss / d rows(i) d columns(j).
 Jacobian hessian(const Func& loss, const AdjointInput& rows, const AdjointInput& columns,
                  Overwritten overwritten = Overwritten::Store);
 
-// d2 loss / d wrt(i)^2 alone, with the dimensions of wrt: fewer colours, as only neighbours must
-// differ.
+// Only d2 loss / d wrt(i)^2, with the dimensions of wrt. It needs fewer colours, because only neighbours must differ.
 struct HessianDiagonal {
   Func diagonal;
   int colours = 1;
-  Func compressed;  // undefined when the diagonal is zero
+  Func compressed;  // undefined if the diagonal is zero
 };
 HessianDiagonal hessian_diagonal(const Func& loss, const AdjointInput& wrt,
                                  Overwritten overwritten = Overwritten::Store);

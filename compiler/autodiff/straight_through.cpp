@@ -13,8 +13,8 @@ Expr straight_through(const Expr& value, const Expr& surrogate) {
     user_error("make a straight-through form", "the value and its surrogate are floats of one type",
                text("they are ", type(value), " and ", type(surrogate)), "Cast one of them");
   }
-  // The difference is 0 and its derivative is the surrogate's. Strict: contracted, it would be the
-  // rounding of the surrogate's last product.
+  // The difference is 0 and its derivative is that of the surrogate. strict_float: contracted to an FMA, it would be
+  // the rounding error of the surrogate's last product.
   Expr nothing = strict_float(surrogate - stop_gradient(surrogate));
   return strict_float(stop_gradient(value) + nothing);
 }

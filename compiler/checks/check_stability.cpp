@@ -19,8 +19,8 @@ using namespace checks;
 using checks::Values;
 using Limits = std::numeric_limits<float>;
 
-// Of the largest, smallest normal and smallest number of a type. Doubles are taken to the ends of
-// float32, beyond which there is nothing to compare them with.
+// The largest, smallest normal and smallest positive number of a type. For double these are the ends of float32, beyond
+// which there is no reference to compare with.
 struct Ends {
   double max, min, denormal;
 };
@@ -49,15 +49,14 @@ double magnitude(Extreme extreme, Type type) {
   return 0;
 }
 
-// One Func or adjoint, and what it is in double: the same definitions, so that they differ by
-// rounding alone.
+// One Func or adjoint, and the same definitions in double: the two differ by rounding alone.
 struct Watched {
   std::string name;  // of the primal
   bool is_adjoint;
   Func own;
   Shape shape;
 };
-using Arrays = std::vector<std::vector<Values>>;  // of each watched Func, of each of its values
+using Arrays = std::vector<std::vector<Values>>;  // by watched Func, then by its values
 
 class StabilityChecker {
  public:
@@ -97,7 +96,7 @@ class StabilityChecker {
   }
 
  private:
-  // ---- what is looked at ----
+  // ---- the Funcs that are checked ----
 
   Derivative adjoints() const {
     std::vector<Expr> ones;
@@ -110,7 +109,7 @@ class StabilityChecker {
 
   void watch() {
     auto order = topological_order({output_.function()});
-    widen({output_.function()});  // says what has no meaning in double before anything is bound
+    widen({output_.function()});  // reports operations without a meaning in double before binding
     autodiff::Regions regions(order, box_of(shape_));
     Derivative derivative = adjoints();
     std::vector<Watched> adjoints;
@@ -222,7 +221,7 @@ class StabilityChecker {
 
   // ---- errors ----
 
-  // A case of the same name grows: samples are one case.
+  // Adds to the last case if it has the same name: all samples are one case.
   void add_case(const std::string& name) {
     const bool is_new = report_.cases.empty() || report_.cases.back().name != name;
     if (is_new) report_.cases.push_back({name, {}, {}, {}});
@@ -258,7 +257,7 @@ class StabilityChecker {
     return {w.name, w.is_adjoint, value, at, own, wide, culprit(w.own, value, at)};
   }
 
-  // ---- estimates, in double, so that what is seen is not its rounding ----
+  // ---- estimates, in double, so that their own rounding does not show ----
 
   void estimate(StabilityReport::Case& to) {
     const double eps = Limits::epsilon();
@@ -306,7 +305,7 @@ class StabilityChecker {
   Param<double> amount_{"rounding_amount"};
   Param<int> seed_{"rounding_seed"};
   std::vector<Watched> watched_;
-  Batch own_, wide_;  // what is watched, in its own precision and in double
+  Batch own_, wide_;  // the watched Funcs in their own precision and in double
   std::vector<Input> inputs_;
   std::vector<Values> now_;  // the inputs' values
   StabilityReport report_;

@@ -2,8 +2,8 @@
 
 #include <unordered_map>
 
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autodiff/sweeps/local_derivative.h"
-#include "autodiff/sweeps/made_definitions.h"
 #include "frontend/data/image_param.h"
 #include "frontend/data/param.h"
 #include "graph/define.h"
@@ -14,13 +14,13 @@ namespace retrograde::checks {
 
 namespace {
 
-// Thrown inside, and caught by complex_graph.
+// Thrown internally, and caught by complex_graph.
 struct Refused {
   std::string why;
 };
 
 struct Complex {
-  Expr re, im;  // im undefined: not a float
+  Expr re, im;  // im is undefined for values that are no floats
 };
 
 Expr zero() { return make_const(Float(64), 0.0); }
@@ -49,7 +49,7 @@ Complex exponential(const Complex& a) {
   return {e * real_op(Op::cos, a.im), e * real_op(Op::sin, a.im)};
 }
 Complex logarithm(const Complex& a) { return {real_op(Op::log, modulus(a)), angle(a)}; }
-// For a real part that is not negative.
+// Requires a nonnegative real part.
 Complex square_root(const Complex& a) {
   Expr re = real_op(Op::sqrt, (modulus(a) + a.re) * 0.5);
   return {re, a.im / (re * 2.0)};
@@ -69,7 +69,7 @@ Complex hyperbolic_sine(const Complex& a) {
 Complex hyperbolic_cosine(const Complex& a) {
   return {product_of(Op::cosh, Op::cos, a), product_of(Op::sinh, Op::sin, a)};
 }
-// For a real base that is not negative, or a real integer power.
+// Requires a nonnegative real base, or a real integer power.
 Complex power(const Complex& a, const Complex& p) {
   if (is_zero(p.im)) {
     Expr size = call_op(Op::pow, Float(64), {modulus(a), p.re}), turn = angle(a) * p.re;
@@ -94,7 +94,7 @@ class Complexifier {
   ComplexGraph take() { return std::move(result_); }
 
  private:
-  // Where value k of a Func begins among the values of its complex twin.
+  // The position of value k of a Func among the values of its complex version.
   static int position(const FuncContents& f, int k) {
     int result = 0;
     for (int i = 0; i < k; ++i) result += f.types[static_cast<size_t>(i)].is_float() ? 2 : 1;
@@ -127,15 +127,15 @@ class Complexifier {
 
   Complex of(const Expr& root) {
     const Expr e = without_lets(root);
-    kept_.push_back(e);  // so that the addresses in memo_ stay theirs
+    kept_.push_back(e);  // keeps the nodes of memo_ alive
     for (const Expr& node : autodiff::post_order({e})) {
-      if (!memo_.contains(node.get())) memo_.emplace(node.get(), made(node));
+      if (!memo_.contains(node.get())) memo_.emplace(node.get(), converted(node));
     }
     return memo_.at(e.get());
   }
   Complex operand(const Expr& e) { return memo_.at(e.get()); }
 
-  Complex made(const Expr& e) {
+  Complex converted(const Expr& e) {
     const bool is_float = e.type().is_float();
     if (const Call* call = e.as<Call>()) return is_float ? of_call(*call) : real_call(e, *call);
     if (const Variable* v = e.as<Variable>()) return is_float ? of_scalar(e, *v) : Complex{e, {}};
@@ -199,7 +199,7 @@ class Complexifier {
     if (!c.type.is_float()) return {part(0), {}};
     return {part(0), part(1)};
   }
-  // Of an integer or a condition.
+  // A call with integer or boolean value.
   Complex real_call(const Expr& e, const Call& c) {
     if (c.call_type == CallType::Func) return read(c);
     return {map_children(e, [&](const Expr& child) { return operand(child).re; }), {}};
@@ -273,7 +273,7 @@ class Complexifier {
       case Op::likely:
       case Op::likely_if_innermost:
       case Op::strict_float:
-      case Op::stop_gradient:  // the differences do not know of it either
+      case Op::stop_gradient:  // ignored, as finite differences ignore it
         return x[0];
       default:
         break;

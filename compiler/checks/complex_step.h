@@ -1,14 +1,13 @@
-// The same graph of Funcs over complex numbers: derivatives by a step into the imaginary direction.
+// complex_step.h -- rewrites a graph of Funcs over complex numbers, for derivatives by the complex-step method.
 //
 //   f(x + i h v) = f(x) + i h <f'(x), v> + O(h^2)       (Squire and Trapp, SIAM Review 40, 1998)
 //
-// There is no subtraction, so that h may be so small that the error is rounding alone. Every
-// floating value of a Func becomes two, its real and its imaginary part. Comparisons, indices and
-// what is constant between its steps (floor) look at the real part, so that the branch is that of
-// the original; min, max and abs choose by it.
+// There is no subtraction, so h may be so small that the error is rounding alone. Every floating-point value of a Func
+// becomes two, its real and its imaginary part. Comparisons, indices and step functions (floor) use the real part, so
+// the original branches are taken; min, max and abs choose by it.
 //
-// Not every operator allows it: the function must be complex differentiable and its imaginary part
-// computable for tiny imaginary parts. Of the others there is a reason.
+// An operator is supported if it is complex differentiable and its imaginary part can be computed for tiny imaginary
+// parts. For other operators the graph is refused with a reason.
 #pragma once
 
 #include <map>
@@ -20,13 +19,13 @@
 namespace retrograde::checks {
 
 struct ComplexGraph {
-  Func output;  // values: real and imaginary part in turn; integers alone
-  // Behind each floating input: its imaginary part; unbound.
+  Func output;  // values: alternating real and imaginary parts; integers have no imaginary part
+  // The imaginary part of each floating-point input; unbound.
   std::map<const ir::Symbol*, std::shared_ptr<graph::ParameterContents>> imaginary;
-  std::string refused;  // why there is no graph; empty when there is one
+  std::string refused;  // reason if there is no graph; else empty
 };
 
-// `output`: of a graph in double (widen.h).
+// `output` belongs to a graph in double (widen.h).
 ComplexGraph complex_graph(const Func& output);
 
 }  // namespace retrograde::checks

@@ -1,4 +1,4 @@
-// Which operation of a definition made a value that is not finite.
+// culprit.h -- finds the operation of a definition that produced a value which is not finite.
 #pragma once
 
 #include <string>
@@ -8,10 +8,10 @@
 
 namespace retrograde::checks {
 
-// The first in the order of evaluation of value `value` of f at a place, as text; in f's own
-// precision, or as it is. Of updates: with the iteration; "what its updates make of finite values"
-// when all that they are given is finite; "an update" where that cannot be looked at: loops without
-// constant bounds, places that are no variables, very many iterations. Otherwise empty.
+// The first such operation of value `value` of f at an element, in the order of evaluation, as text. The values are
+// those of f's own precision. For updates the text includes the iteration. It is "what its updates make of finite
+// values" if all operands are finite, and "an update" if the update cannot be analysed: loops without constant bounds,
+// indices that are no variables, very many iterations. Otherwise empty.
 std::string culprit(const Func& f, int value, const std::vector<int>& at);
 
 }  // namespace retrograde::checks

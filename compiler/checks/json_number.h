@@ -1,4 +1,4 @@
-// JSON has no NaN and no infinity: they are written as text.
+// JSON has no NaN and no infinity, so they are written as text.
 #pragma once
 
 #include <cmath>

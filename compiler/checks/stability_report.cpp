@@ -1,4 +1,4 @@
-// StabilityReport as JSON.
+// Writes a StabilityReport as JSON.
 #include <nlohmann/json.hpp>
 
 #include "checks/check_stability.h"

@@ -1,7 +1,7 @@
 #include "checks/widen.h"
 
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autodiff/sweeps/local_derivative.h"
-#include "autodiff/sweeps/made_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/data/image_param.h"
 #include "frontend/data/param.h"
@@ -57,7 +57,7 @@ class Widening {
     }
   }
 
-  // What only moves is not rounded: constants, reads, `undef`.
+  // Values that are only copied are not rounded: constants, reads, `undef`.
   static bool is_computed(const Expr& value) {
     if (value.as<FloatImm>() || !value.type().is_float()) return false;
     const Call* call = value.as<Call>();
@@ -73,7 +73,7 @@ class Widening {
     for (const ReductionVariable& r : d.rvars) words.push_back(variable(r.var));
     for (Expr& value : d.values) {
       if (!is_computed(value)) continue;
-      words.push_back(make_const(Int(32), static_cast<int>(words.size())));  // of this value
+      words.push_back(make_const(Int(32), static_cast<int>(words.size())));  // number of this value
       Expr u = cast_to(Float(64), call_op(Op::random, Float(32), words));
       value = value * (1.0 + rounding_.amount * (2.0 * u - 1.0));
     }

@@ -1,11 +1,12 @@
-// The same graph of Funcs with every float a double: the reference for what single precision loses.
+// widen.h -- copies a graph of Funcs with every float widened to double: the reference for the loss of single
+// precision.
 //
-// Inputs become new parameters in double, so that they can move by less than a float32 resolves.
-// The fast_* forms become the functions that they approximate. Random numbers stay the same ones.
+// Inputs become new parameters in double, so that they can move by less than the resolution of float32. The fast_*
+// functions become the functions that they approximate. Random numbers stay the same.
 //
-// Rounding can be put back in, at random (Parker's Monte Carlo arithmetic; here once per value of a
-// Func and not once per operation): every value that is computed, in any definition, is multiplied
-// by 1 + amount * u, with u in [-1, 1) drawn from the seed, the Func and the point.
+// On request, rounding is added at random (Parker's Monte Carlo arithmetic; here once for each value of a Func instead
+// of once for each operation): every computed value, in any definition, is multiplied by 1 + amount * u, with u in [-1,
+// 1) drawn from the seed, the Func and the point.
 #pragma once
 
 #include <map>
@@ -18,7 +19,7 @@ namespace retrograde::checks {
 
 struct Widened {
   std::map<const Symbol*, FuncPtr> funcs;
-  // Floating images and scalars; unbound.
+  // Floating-point images and scalars; unbound.
   std::map<const Symbol*, std::shared_ptr<ParameterContents>> parameters;
 };
 
@@ -27,7 +28,7 @@ struct Rounding {
   Expr seed;    // int32
 };
 
-// Unsupported: C functions, extern stages, and the bits of floats.
+// Throws Unsupported for C functions, extern stages, and the bits of floats.
 Widened widen(const std::vector<FuncPtr>& outputs, const Rounding& rounding = {});
 
 }  // namespace retrograde::checks

@@ -1,4 +1,4 @@
-// Element access to host buffers by type, and the comparison.
+// Access to elements of host buffers by type, and the comparison of arrays with buffers.
 #include "testing/array.h"
 
 #include <HalideRuntime.h>

@@ -1,5 +1,5 @@
-// What the interpreter returns: a dense box of values with their uncertainty, and its comparison
-// with a buffer that machine code filled.
+// array.h -- the result of the interpreter: a dense box of values with error bounds, and its comparison with a buffer
+// that machine code filled.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,7 @@ struct halide_buffer_t;
 
 namespace retrograde::oracle {
 
-// Half-open, dimension 0 first.
+// A half-open region, dimension 0 first.
 struct Region {
   std::vector<int> mins, extents;
   int dimensions() const { return static_cast<int>(mins.size()); }
@@ -31,7 +31,7 @@ struct Array {
   Value& at(const std::vector<int>& point) { return values[index_of(point)]; }
 };
 
-// One element of a host buffer of any type and layout.
+// Reads one element of a host buffer of any type and layout.
 ir::Scalar read_element(const halide_buffer_t& buffer, const std::vector<int>& point);
 void write_element(halide_buffer_t& buffer, const std::vector<int>& point, const ir::Scalar& value);
 Type type_of_buffer(const halide_buffer_t& buffer);
@@ -43,8 +43,8 @@ struct Comparison {
   bool agrees() const { return mismatches == 0; }
 };
 
-// Every element of `expected`: equal when its error is 0 (NaN equals NaN, -0 equals 0), else within
-// slack * error. Unstable and undefined elements are counted, not compared.
+// Compares every element of `expected`. An element with error 0 must be equal (NaN equals NaN, -0 equals 0); others may
+// differ by slack * error. Unstable and undefined elements are counted, not compared.
 Comparison compare(const Array& expected, const halide_buffer_t& actual, double slack = 2);
 
 }  // namespace retrograde::oracle

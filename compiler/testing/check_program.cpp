@@ -1,5 +1,5 @@
-// Outputs are realized into crops of larger buffers that are filled with a canary: a store outside
-// of an output is a wrong result, too.
+// Runs programs into guarded outputs: crops of larger buffers that are filled with a canary value. A store outside of
+// an output is thus a wrong result, too.
 #include "testing/check_program.h"
 
 #include <cstring>
@@ -19,10 +19,10 @@ constexpr uint8_t canary = 0xa5;
 constexpr size_t longest_detail = 400;  // internal errors carry whole programs
 
 struct GuardedOutput {
-  Runtime::Buffer<> whole, inner;  // of the same memory
+  Runtime::Buffer<> outer, inner;  // views of the same memory
 };
 
-using Regions = std::vector<oracle::Region>;  // of each output
+using Regions = std::vector<oracle::Region>;  // for each output
 
 GuardedOutput make_output(Type type, const oracle::Region& output) {
   std::vector<int> mins, extents;
@@ -31,10 +31,10 @@ GuardedOutput make_output(Type type, const oracle::Region& output) {
     extents.push_back(output.extents[d] + 2 * margin);
   }
   GuardedOutput result;
-  result.whole = Runtime::Buffer<>(to_halide_type(type), extents);
-  result.whole.set_min(mins);
-  std::memset(result.whole.data(), canary, result.whole.size_in_bytes());
-  result.inner = result.whole;
+  result.outer = Runtime::Buffer<>(to_halide_type(type), extents);
+  result.outer.set_min(mins);
+  std::memset(result.outer.data(), canary, result.outer.size_in_bytes());
+  result.inner = result.outer;
   for (size_t d = 0; d < output.mins.size(); ++d) {
     result.inner.crop(static_cast<int>(d), output.mins[d], output.extents[d]);
   }
@@ -42,7 +42,7 @@ GuardedOutput make_output(Type type, const oracle::Region& output) {
 }
 
 bool is_intact(const GuardedOutput& output, const oracle::Region& region) {
-  const halide_buffer_t& raw = *output.whole.raw_buffer();
+  const halide_buffer_t& raw = *output.outer.raw_buffer();
   bool intact = true;
   oracle::region_of(raw).for_each([&](const std::vector<int>& point) {
     bool inside = true;
@@ -59,7 +59,7 @@ bool is_intact(const GuardedOutput& output, const oracle::Region& region) {
   return intact;
 }
 
-// One for each value of each output.
+// Returns one output for each value of each output Func.
 std::vector<GuardedOutput> run(Pipeline& compiled, const Regions& regions,
                                const RandomProgram& program, const Target& target) {
   std::vector<GuardedOutput> outputs;
@@ -107,7 +107,7 @@ void compare_outputs(const Regions& regions, const RandomProgram& program,
   }
 }
 
-// What the checks of accesses find; where kernels run, races and their accesses out of bounds, too.
+// Whether the error is a finding: an access outside of its memory or, for kernels, also a race.
 bool is_finding(const RuntimeError& error, const Target& target) {
   return is_access_outside(error) || (target.has_feature(Target::CUDA) && !lacks_memory(error));
 }

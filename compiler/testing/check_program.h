@@ -1,4 +1,4 @@
-// One program against the oracle: builds it, schedules it, runs the machine code, compares.
+// check_program.h -- compiles, schedules and runs one random program, and compares its result with the interpreter.
 #pragma once
 
 #include <functional>
@@ -11,27 +11,28 @@
 
 namespace retrograde::fuzz {
 
-// How an access outside of its storage becomes a finding.
+// How accesses outside of allocated memory are detected.
 enum class Watch {
   Accesses,  // the machine code checks accesses and promises (Target::CheckedAccesses)
-  Pages,     // the machine code as users get it; its heap blocks end before a forbidden page
+  Pages,     // unmodified machine code, whose heap blocks end before a protected page
 };
 
-// Floats may differ by twice the error that contraction to FMA and the stated ULP of math functions
-// can cause in this very computation (tracked_value.h); everything else is compared bit for bit. The
-// program has the schedule afterwards. Counts: "values", and those "unstable", which say nothing.
+// Floats may differ by twice the error that contraction to FMA and the stated ULP of math functions can cause in this
+// computation (tracked_value.h); everything else is compared bit for bit. Leaves the schedule on the program. The
+// counts are "values" and, of these, "unstable" ones, which cannot be compared.
 Judged check_program(const RandomProgram& program, const ScheduleLog& schedule,
                      const Target& target, Watch watch = Watch::Accesses);
-// The same; `schedule` gives the schedule. What is compiled runs once after each of `preparations`, which
-// set how it runs: each run is compared.
+// The same, where `schedule` schedules the program. The compiled program runs once after each of `preparations`, which
+// set up how it runs; each run is compared.
 Judged check_with_schedule(const RandomProgram& program, const std::function<void()>& schedule,
                            const Target& target,
                            const std::vector<std::function<void()>>& preparations = {[] {}},
                            Watch watch = Watch::Accesses);
 
-// Of a run: what there is of some memory, of a device among others, was not enough. No finding.
+// Whether a run failed because memory, for example of a device, was too small. That is no finding.
 bool lacks_memory(const RuntimeError&);
-// Whether Target::CheckedAccesses gave the error: an access outside of its memory, or a false promise. A finding.
+// Whether Target::CheckedAccesses raised the error: an access outside of its memory, or a broken promise. That is a
+// finding.
 bool is_access_outside(const UserError&);
 
 }  // namespace retrograde::fuzz

@@ -40,7 +40,7 @@ class Shrinking {
         smaller |= try_places(1, [&](At first, At, List&) {
           *first -= std::min(*first, std::max(*first / share, 1u));
         });
-      // One less of what is counted, and the choices of one.
+      // Decrements a count, and removes the choices of one item.
       for (int width = 2; width < 24 && !smaller; ++width)
         smaller = try_places(width, [](At first, At last, List& l) {
           if (*first > 0) --*first, l.erase(first + 1, last);
@@ -51,7 +51,7 @@ class Shrinking {
 
  private:
   using At = List::iterator;
-  // Changes each part of the list that is so wide, from its end, half of it at a time.
+  // Applies `edit` to each part of the list of this width, from its end, in steps of half the width.
   template <typename Edit>
   bool try_places(int width, const Edit& edit) {
     bool any = false;

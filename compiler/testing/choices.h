@@ -1,11 +1,10 @@
-// Random decisions that can be replayed and shrunk: a program is a function of the list of choices
-// that its generator took.
+// choices.h -- random decisions that can be replayed and shrunk: a program is a function of the list of choices that
+// its generator took.
 //
-// Drawn from a seed the list has no end; replayed from a list it continues with zeros. A generator
-// gives the choice 0 to the simplest alternative, so a shorter list, or one with smaller numbers,
-// makes a simpler program, and every list makes a legal one: the reducer needs to know nothing of
-// programs.
-// Idea: D. MacIver and A. Donaldson, Test-Case Reduction via Test-Case Generation, ECOOP 2020.
+// Drawn from a seed, the list is endless; replayed from a list, it continues with zeros. A generator maps the choice 0
+// to the simplest alternative. So a shorter list, or one with smaller numbers, gives a simpler program, and every list
+// gives a legal one: the reducer needs no knowledge of programs. Idea: D. MacIver and A. Donaldson, Test-Case Reduction
+// via Test-Case Generation, ECOOP 2020.
 #pragma once
 
 #include <cstdint>
@@ -22,12 +21,12 @@ class Choices {
 
   int below(int n);
   int between(int low, int high) { return low + below(high - low + 1); }
-  // What one of the functions gives; the first one is the simplest.
+  // Returns the result of one of the functions; the first one is the simplest.
   template <typename Result>
   Result one_of(std::initializer_list<std::function<Result()>> alternatives) {
     return alternatives.begin()[below(static_cast<int>(alternatives.size()))]();
   }
-  // False is the simpler answer.
+  // False is the simpler result.
   bool chance(int percent) { return below(100) >= 100 - percent; }
   // A small number of either sign; 0 is the simplest, then 1, -1, 2 ...
   int around_zero(int most);
@@ -43,8 +42,8 @@ class Choices {
   bool is_replay_;
 };
 
-// The smallest list found whose program still fails, after `max_trials` trials at most. `fails` is
-// true of the list given.
+// Returns the smallest list found whose program still fails, after at most `max_trials` trials. `fails` must hold for
+// `choices`.
 std::vector<uint32_t> shrink_choices(std::vector<uint32_t> choices,
                                      const std::function<bool(const std::vector<uint32_t>&)>& fails,
                                      int max_trials = 1500);

@@ -13,19 +13,19 @@ namespace retrograde::fuzz {
 
 namespace {
 
-constexpr size_t alignment = 8;  // of the largest element; vectors need no more
+constexpr size_t alignment = 8;  // that of the largest element; vectors need no more
 
-// Pages that may be touched, and one behind them that may not.
+// Accessible pages, followed by one protected page.
 struct Mapping {
   uint8_t* first;
-  size_t bytes;  // of the pages that may be touched
+  size_t bytes;  // size of the accessible pages
 };
 
-// Mappings stay, and serve blocks of as many pages again: programs allocate in their inner loops.
+// Mappings are kept and reused for blocks of the same number of pages, because programs allocate in their inner loops.
 struct Memory {
   std::mutex mutex;
-  std::map<size_t, std::vector<Mapping>> free;  // by their bytes
-  std::unordered_map<void*, Mapping> used;      // by the block in them
+  std::map<size_t, std::vector<Mapping>> free;  // by size in bytes
+  std::unordered_map<void*, Mapping> used;      // by block
 };
 
 Memory& memory() {
@@ -37,7 +37,7 @@ size_t page_bytes() { return static_cast<size_t>(sysconf(_SC_PAGESIZE)); }
 
 size_t round_up(size_t bytes, size_t to) { return (bytes + to - 1) / to * to; }
 
-// Without a first page where there is no memory.
+// Returns a mapping with a null first page if there is no memory.
 Mapping map_pages(size_t bytes) {
   const size_t page = page_bytes();
   void* const all =

@@ -1,6 +1,6 @@
-// Evaluation by demand. Recursion goes from Func to Func, so it is as deep as the pipeline; it runs
-// on a stack of its own (diagnostics/large_stack.h). An arm of a select that is not chosen is never
-// evaluated, so it may read outside of its producer's domain.
+// Evaluation on demand. Recursion goes from Func to Func, so it is as deep as the pipeline; it runs on a stack of its
+// own (diagnostics/large_stack.h). A branch of a select that is not chosen is never evaluated, so it may read outside
+// of its producer's domain.
 #include "testing/interpreter.h"
 
 #include <HalideRuntime.h>
@@ -36,7 +36,7 @@ struct PointHash {
   }
 };
 
-// A box that grows; empty until the first point.
+// A growing box; empty until the first point.
 struct Hull {
   Point mins, maxs;
   bool empty = true;
@@ -76,16 +76,16 @@ struct Hull {
   }
 };
 
-// A stage ready to run, and the values of its nodes at the current point: of those that expressions
-// share, one. No Func calls itself except through its own storage, so one frame per stage is enough.
+// A stage that is ready to run, and the values of its nodes at the current point; shared nodes have one value. A Func
+// calls itself only through its own storage, so one frame for each stage suffices.
 struct Frame {
   struct Slot {
     Value value;
-    uint64_t epoch = 0;  // when it was computed
+    uint64_t epoch = 0;  // time of the computation
   };
   Definition definition;                           // without lets
   std::vector<bool> is_pure_arg;                   // args[d] is the pure variable d itself
-  std::unordered_map<std::string, size_t> places;  // of its variables in the point
+  std::unordered_map<std::string, size_t> places;  // positions of its variables in the point
   std::unordered_map<const ExprNode*, Slot> slots;
   uint64_t epoch = 0;
   Point point;  // pure args, then rvars
@@ -105,15 +105,15 @@ Frame frame_of(const FuncContents& func, int stage) {
   return frame;
 }
 
-// Storage of one slice of a Func with updates, over a box of its scattered dimensions. Cells are
-// initialised from the pure definition when they are first read.
+// Storage of one slice of a Func with updates, over a box of its scattered dimensions. Cells are initialised from the
+// pure definition when first read.
 struct Island {
   Region box;
-  std::vector<Value> cells;  // point-major, one per Tuple element
+  std::vector<Value> cells;  // point-major, one for each value of the Tuple
   std::vector<bool> written;
-  Hull reached;  // outside of the box included
+  Hull reached;  // accessed points, also outside of the box
   bool grows_on_store = true;
-  bool poisoned = false;  // a store went to an unstable place
+  bool poisoned = false;  // a store had an unstable index
 };
 
 struct FuncState {
@@ -122,7 +122,7 @@ struct FuncState {
   std::vector<int> pure_dims, scattered_dims;
   std::unordered_map<Point, std::vector<Value>, PointHash> memo;  // pure Funcs
   std::unordered_map<Point, std::vector<std::unique_ptr<Island>>, PointHash> slices;
-  Island* active = nullptr;  // being computed
+  Island* active = nullptr;  // the island being computed
   Point active_slice;
 };
 
@@ -250,7 +250,7 @@ class Interpreter::Impl {
     }
   }
 
-  // The cells of a point inside the island's box.
+  // The cells of a point inside of the island's box.
   Value* cell(FuncState& f, Island& island, const Point& point, const Point& place) {
     size_t index = 0, stride = 1;
     for (size_t d = 0; d < place.size(); ++d) {
@@ -289,7 +289,7 @@ class Interpreter::Impl {
     for (auto& island : islands) {
       if (inside(island->box, place)) return *island;
     }
-    // Later islands lie outside of what the stores touch, so they need not hold the stores.
+    // Later islands need not hold the stores: they lie outside of the points that the stores access.
     auto island = std::make_unique<Island>();
     island->grows_on_store = islands.empty();
     compute(f, slice, place, *island);
@@ -319,7 +319,7 @@ class Interpreter::Impl {
   void run_update(FuncState& f, Frame& frame, Island& island) {
     std::fill(frame.point.begin(), frame.point.end(), 0);
     for (size_t i = 0; i < f.pure_dims.size(); ++i) frame.point[f.pure_dims[i]] = f.active_slice[i];
-    Region loops;                // the reduction domain, then the pure dimensions of this stage
+    Region loops;                // the reduction domain, then the stage's pure dimensions
     std::vector<int> positions;  // in frame.point
     add_reduction_loops(f, frame, loops, positions);
     for (size_t i = 0; i < f.scattered_dims.size(); ++i) {
@@ -345,14 +345,14 @@ class Interpreter::Impl {
     }
   }
 
-  // What an update stores at one point.
+  // The store of an update at one point.
   struct Stored {
     Point point;
     std::vector<Value> values;
-    bool unsure = false;  // whether it is stored
+    bool unsure = false;  // the store itself depends on an unstable condition
   };
 
-  // All points of an iteration are computed before the first is stored.
+  // Computes all points of an iteration before the first is stored.
   void update_points(FuncState& f, Frame& frame, Island& island) {
     const ReductionVariable* number = point_number(frame.definition);
     std::vector<Stored> all;
@@ -444,7 +444,7 @@ class Interpreter::Impl {
     return parameter->is_buffer ? buffer_fact(*parameter, n) : value_of(*parameter, e.type());
   }
 
-  // An arm of && and || that decides alone keeps the other from being evaluated.
+  // Short-circuit evaluation: if one operand of && or || decides, the other is not evaluated.
   Value binary(Frame& frame, const Binary& n) {
     ++operations_;
     const Value& a = get(frame, n.a);
@@ -528,7 +528,7 @@ class Interpreter::Impl {
     call_error("interpret", "the condition of a require holds", message);
   }
 
-  // ---- what lies outside of the pipeline ----
+  // ---- inputs of the pipeline ----
 
   Value value_of(const ParameterContents& p, Type type) const {
     if (!p.value)

@@ -1,4 +1,4 @@
-// What a check says of one random program.
+// judgement.h -- the verdict of a check on one random program.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@ namespace retrograde::fuzz {
 
 enum class Judgement : uint8_t {
   Right,
-  Kink,     // of a gradient: no differences at a kink or a jump; forward agrees with reverse
+  Kink,  // gradients only: at a kink or jump, where differences do not apply; forward agrees with reverse
   Refused,  // UserError or Unsupported
   Illegal,  // the program itself is refused, or its value is not finite
   Wrong,
@@ -19,7 +19,7 @@ enum class Judgement : uint8_t {
 struct Judged {
   Judgement judgement = Judgement::Right;
   std::string detail = {};
-  std::map<std::string, uint64_t> counts = {};  // of what was done, in words
+  std::map<std::string, uint64_t> counts = {};  // statistics, by name
 };
 
 inline const char* name_of(Judgement judgement) {

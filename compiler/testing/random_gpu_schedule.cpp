@@ -14,7 +14,7 @@ namespace retrograde::fuzz {
 
 namespace {
 
-// A stage; where its loops run over blocks, something may be computed in them.
+// A stage. If its loops run over blocks, Funcs may be computed in them.
 struct Site {
   const graph::FuncContents* func;
   int stage;
@@ -29,7 +29,7 @@ class GpuScheduler {
  public:
   explicit GpuScheduler(Choices& choices) : choices_(choices) {}
 
-  // Users come after what they use, and are scheduled first.
+  // Consumers come after their producers and are scheduled first.
   GpuScheduleCounts run(const RandomProgram& program) {
     for (const Func& f : program.funcs) {
       if (f.defined()) known_.insert(f.function().get());
@@ -66,7 +66,7 @@ class GpuScheduler {
     for (const Func& part : parts) schedule(part);
   }
 
-  // Partial results of an update that may have them, which are a Func like any other.
+  // Factors an update into partial results, if it allows that; these are a Func like any other.
   void cut(Func& f, int number, std::vector<Func>& parts) {
     if (!is_associative_update(*f.function(), number) || !choices_.chance(35)) return;
     std::vector<VarOrRVar> reductions = loops_of(f.update(number - 1)).reductions;
@@ -83,7 +83,8 @@ class GpuScheduler {
     ++counts_["partial results"];
   }
 
-  // Updates of one element by several threads at a time: then reductions run like pure loops.
+  // Makes updates atomic, so that several threads may update one element at a time. Reductions then run like pure
+  // loops.
   void make_atomic(const Func& f, int number, Stage& stage, std::vector<VarOrRVar>& pure,
                    std::vector<VarOrRVar>& reductions) {
     const bool may_be = !reductions.empty() && f.outputs() == 1;
@@ -95,13 +96,13 @@ class GpuScheduler {
     ++counts_["atomic updates"];
   }
 
-  // What f uses is used where f is computed.
+  // The producers of f are used where f is computed.
   void used_in(const Func& f, const std::set<Site>& sites) {
     for (int stage = 0; stage <= f.num_update_definitions(); ++stage)
       note_uses(*f.function(), stage, sites);
   }
 
-  // Funcs of boundary conditions and inline reductions stand for what they read.
+  // Funcs of boundary conditions and inline reductions count as uses of the Funcs that they read.
   void note_uses(const Contents& f, int stage, const std::set<Site>& sites) {
     graph::walk(f.stage(stage), [&](const ir::Call& call) {
       if (call.call_type != ir::CallType::Func || call.symbol.raw() == &f) return;
@@ -155,7 +156,7 @@ class GpuScheduler {
     blocks_.insert_or_assign(Site{f.function().get(), number}, Blocks{f, blocks.front()});
   }
 
-  // Of what each thread computes.
+  // Vectorizes the work of a thread.
   VarOrRVar vectors(Stage& stage, const VarOrRVar& loop) {
     ++counts_["vectors in threads"];
     const VarOrRVar lane = Var();
@@ -164,13 +165,13 @@ class GpuScheduler {
     return lane;
   }
 
-  // Rows of threads may be warps.
+  // Sizes of rows of threads; some are whole warps.
   int tile_size(int dimension) {
     constexpr int warp = 32;
     return dimension == 0 && choices_.chance(10) ? warp : choices_.pick<int>({4, 1, 2, 3, 8});
   }
 
-  // Outputs are as small as they come.
+  // Tail strategies; outputs are limited to those that need no minimum size.
   TailStrategy tail(bool is_output) {
     if (is_output)
       return choices_.pick<TailStrategy>({TailStrategy::GuardWithIf, TailStrategy::Predicate});
@@ -178,7 +179,7 @@ class GpuScheduler {
         {TailStrategy::GuardWithIf, TailStrategy::Auto, TailStrategy::Predicate});
   }
 
-  // The innermost may be lanes; some are loops of each thread.
+  // Maps loops to threads. The innermost may become lanes; some stay loops of each thread.
   void run_as_threads(Stage& stage, const std::vector<VarOrRVar>& threads) {
     const bool has_lanes = choices_.chance(10);
     for (size_t d = 0; d < threads.size(); ++d) {
@@ -188,11 +189,11 @@ class GpuScheduler {
     }
   }
 
-  // By the threads of a block that uses it. Gives the partial results that updates are cut into.
+  // Computes f by the threads of a block that uses it. Returns the partial results into which updates were factored.
   std::vector<Func> in_block(Func f, const Blocks& blocks, const Site& site) {
     ++counts_["Funcs in blocks"];
     f.compute_at(LoopLevel(blocks.func, blocks.loop, site.stage));
-    // Registers are for what each thread makes for itself, which is seldom so.
+    // Rarely, because registers suit only values that each thread computes for itself.
     if (choices_.chance(2)) {
       f.store_in(MemoryType::Register);
     } else if (choices_.chance(25)) {

@@ -1,7 +1,7 @@
-// Kept legal by construction:
-// - reduction loops keep their order and run one iteration after the other, unless the iterations
-//   are independent or the update is associative and atomic;
-// - outputs are rounded up or shifted inwards only where the extents of all runs allow it;
+// Draws random loop directives. They are legal by construction:
+// - reduction loops keep their order and run serially, unless the iterations are independent or the update is
+//   associative and atomic;
+// - outputs are rounded up or shifted inwards only if the extents of all runs allow it;
 // - a loop inside a vectorized one has a constant extent.
 #include "testing/random_loops.h"
 
@@ -69,7 +69,7 @@ class LoopScheduler {
     if (random_.chance(5)) make_serial();
   }
 
-  // A copy of the schedule so far with directives of its own.
+  // Adds specializations: copies of the current schedule, each with further directives.
   void specialize() {
     const int count = random_.between(1, 2);
     for (int i = 0; i < count; ++i) {
@@ -95,7 +95,7 @@ class LoopScheduler {
     split(at, random_factor(), names_.fresh(stem(old) + "o"));
   }
 
-  // The outer loop may keep the name.
+  // Splits a loop; the outer loop may keep the name.
   void split(int at, int factor, const std::string& outer_name) {
     const Loop old = loops_[at];
     Loop outer = old, inner = old;
@@ -112,7 +112,7 @@ class LoopScheduler {
 
   int random_factor() { return random_.pick(std::vector<int>{2, 3, 4, 4, 5, 8, 8, 16}); }
 
-  // Names of reduction loops say so.
+  // The stem of new names, which marks reduction loops.
   static std::string stem(const Loop& loop) {
     return loop.is_reduction ? "rr" : loop.name.substr(0, 1);
   }
@@ -188,7 +188,7 @@ class LoopScheduler {
     add(std::move(order));
   }
 
-  // The reduction loops go back into their order, in the places where such loops landed.
+  // Restores the order of the reduction loops, in the positions where reduction loops landed.
   void restore_reduction_order(Loops& shuffled) const {
     size_t next = 0;
     for (Loop& loop : shuffled) {
@@ -229,7 +229,7 @@ class LoopScheduler {
     add(graph::RunLoop{loops_[at].name, type});
   }
 
-  // As vectorize(x, 8) and its like do, where the outer loop keeps the name.
+  // Splits and sets the type, as vectorize(x, 8) and similar directives do; the outer loop keeps the name.
   void split_and_set(int at, ForType type, int factor) {
     const Loop& old = loops_[at];
     split(at, factor, random_.chance(50) ? old.name : names_.fresh(stem(old) + "o"));
@@ -277,12 +277,12 @@ class LoopScheduler {
   Choices& random_;
   LoopNames& names_;
   ScheduleLog& log_;
-  std::vector<Loops> variants_;  // of the specializations
+  std::vector<Loops> variants_;  // the loops of each specialization
   int variant_condition_ = -1;
   bool has_failing_specialization_ = false;
 };
 
-// Of a reduction loop: a variable that it comes from, and its extent where that is constant.
+// The origin of a reduction loop: a variable that it derives from, and its extent if constant.
 struct Origin {
   std::string variable;
   int extent = unknown_extent;

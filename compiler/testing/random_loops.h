@@ -1,4 +1,4 @@
-// Random legal loop directives for one stage.
+// random_loops.h -- random legal loop directives for one stage.
 #pragma once
 
 #include <string>
@@ -13,47 +13,47 @@ constexpr int unknown_extent = -1;
 
 struct Loop {
   std::string name;
-  int extent = unknown_extent;  // when constant
-  int dimension = -1;           // of a pure variable's own loop
+  int extent = unknown_extent;  // if constant
+  int dimension = -1;           // the dimension, if it is the own loop of a pure variable
   bool is_reduction = false;
-  bool is_independent = true;  // iterations may run at the same time
+  bool is_independent = true;  // iterations may run concurrently
   bool is_original = true;
   ForType type = ForType::Serial;
 };
 using Loops = std::vector<Loop>;  // innermost first
 
-// What the directives of a stage have to respect.
+// Constraints on the directives of a stage.
 struct StageContext {
   bool is_update = false;
-  // Of an output: the extents of each dimension over all runs. Otherwise empty.
+  // For outputs: the extents of each dimension over all runs. Empty for other Funcs.
   std::vector<std::vector<int>> output_extents;
-  bool is_associative = false;  // an update that may be atomic, reordered and factored
+  bool is_associative = false;  // an update that may be made atomic, reordered and factored
   bool may_specialize = true;
 };
 
-// The loops of a stage in the end: the general ones, then those of each specialization.
+// The final loops of a stage: the general ones, then those of each specialization.
 using LoopVariants = std::vector<Loops>;
 
-// The loops that a stage has now.
+// The current loops of a stage.
 Loops loops_of(const graph::FuncContents& f, int stage);
 
-// Whether an update combines each element with something that does not read the Func, by an
-// operator that is associative and commutative bit for bit.
+// Whether an update combines each element with an expression that does not read the Func, by an operator that is
+// exactly associative and commutative.
 bool is_associative_update(const graph::FuncContents& f, int stage);
 
-// Fresh names for loops.
+// Generates fresh loop names.
 struct LoopNames {
   int count = 0;
   std::string fresh(const std::string& stem) { return stem + std::to_string(++count); }
 };
 
-// What the conditions of specializations compare with, and its value.
+// The parameter that conditions of specializations compare with, and its value.
 struct Selector {
   Expr parameter;
   int value = 0;
 };
 
-// Draws directives for the place, which has these loops, and appends them to the log.
+// Draws directives for a stage with these loops, and appends them to the log.
 LoopVariants schedule_loops(Loops loops, const StageContext& context, const Selector& selector,
                             const ScheduleLog::Entry& place, Choices& random, LoopNames& names,
                             ScheduleLog& log);

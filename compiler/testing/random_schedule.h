@@ -1,5 +1,7 @@
-// Random legal schedules as logs: wrappers, clones and factored updates; where each Func is
-// computed and stored, how, and the loops of each of its stages.
+// random_schedule.h -- random legal schedules as logs.
+//
+// They have wrappers, clones and factored updates, compute and storage levels of each Func, and directives for the
+// loops of each of its stages.
 #pragma once
 
 #include "graph/schedule_log.h"
@@ -7,21 +9,21 @@
 
 namespace retrograde::fuzz {
 
-// Names are those of the Funcs without the numbers that the process gives them: f0, r.x. What
-// specializations compare with is a Param of the log's own. The program stays as it is.
-// The style says how often, in a hundred Funcs, each placement is drawn.
+// How often each placement is drawn, in percent of the Funcs.
 struct ScheduleStyle {
-  int inlined = 25;         // of pure ones; of others a third
-  int at = 50;              // in a loop of another
-  int stored_outside = 55;  // of those: further out than they are computed
+  int inlined = 25;         // pure Funcs; a third of this for others
+  int at = 50;              // computed in a loop of another Func
+  int stored_outside = 55;  // of these, stored further out than computed
   int most_nested = 3;      // Funcs computed in loops of each other
 
   static ScheduleStyle windows();  // sliding windows in sliding windows
 };
+// Names are those of the Funcs without the numbers of this process: f0, r.x. Specializations compare with a Param that
+// belongs to the log. The program is not changed.
 ScheduleLog random_schedule(const RandomProgram& program, Choices& choices,
                             const ScheduleStyle& style = {});
 
-// Gives it to the Funcs of a program.
+// Applies the schedule to the Funcs of a program.
 inline void apply(const ScheduleLog& log, const RandomProgram& program) {
   graph::apply_log(log, outputs_of(program));
 }

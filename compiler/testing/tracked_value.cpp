@@ -149,7 +149,7 @@ bool is_discrete(Op op) {
   return op == Op::floor || op == Op::ceil || op == Op::round || op == Op::trunc;
 }
 
-constexpr int fast_bits = 11;  // of the fast forms
+constexpr int fast_bits = 11;  // precision of the fast functions
 
 // Errors of the implementation itself, on exact operands.
 double own_error(Op op, Rounding rounding, const std::vector<Value>& args, const Scalar& result) {

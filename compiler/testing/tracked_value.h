@@ -1,14 +1,12 @@
-// A scalar together with a bound on how far another legal evaluation of the same program may be
-// from it.
+// tracked_value.h -- a scalar with a bound on the difference to other legal evaluations of the same program.
 //
-// The interpreter computes strictly: every operation rounds to its declared type. A compiler may
-// contract a * b + c into one rounding, another one may reassociate sums. Comparing results with
-// "a few ULP" is then either too loose or wrong (cancellation makes any ULP count wrong). So every
-// value carries `error`: the largest distance that the freedom granted by a Rounding model allows.
-// Arithmetic that happens to be exact keeps error 0, and is compared bit for bit.
+// The interpreter computes strictly: every operation rounds to its declared type. A compiler may contract a * b + c
+// into one rounding; another may reassociate sums. Comparing results by "a few ULP" is then either too loose or wrong,
+// because cancellation invalidates any ULP count. So every value carries `error`: the largest difference that the
+// freedom of a Rounding model allows. Arithmetic that is exact keeps error 0 and is compared bit for bit.
 //
-// A discrete decision (comparison, float to integer) that the error could tip makes its result
-// unstable: error is infinity, and nothing can be said about that value.
+// If the error could change a discrete decision (a comparison, a float converted to an integer), the result is
+// unstable: its error is infinity, and it cannot be compared.
 //
 // Source: running error analysis, N. Higham, Accuracy and Stability of Numerical Algorithms, 3.3.
 #pragma once
@@ -29,7 +27,7 @@ enum class Rounding {
 
 struct Value {
   ir::Scalar scalar;
-  double error = 0;  // infinity: unstable. Of an integer or bool only 0 or infinity
+  double error = 0;  // infinity: unstable. Integers and bools have 0 or infinity only
 
   bool is_undef() const { return scalar.type.is_handle(); }  // the value of undef()
   bool is_stable() const { return error < std::numeric_limits<double>::infinity(); }
@@ -46,7 +44,7 @@ struct Value {
 // The distance between neighbouring numbers of a float type at x.
 double ulp(Type type, double x);
 
-// The operations of ir/scalar.h with errors carried along.
+// The operations of ir/scalar.h, with error bounds.
 Value apply_binary(Rounding rounding, ir::Kind kind, const Value& a, const Value& b);
 Value apply_not(const Value& a);
 Value apply_cast(Rounding rounding, Type type, const Value& a);

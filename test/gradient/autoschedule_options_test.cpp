@@ -183,7 +183,7 @@ void set_estimates(const Program& program) {
   }
 }
 
-// Of a machine with small caches, so that small programs meet the rules for large ones.
+// The parameters of a machine with small caches, so that small programs meet the rules for large ones.
 const MachineParams small_machine(2, 8 << 10, 40);
 
 Pipeline scheduled_without(const std::string& name, const std::set<Decision>& without) {
@@ -400,7 +400,7 @@ TEST(AutoscheduleOptions, RefuseTruthInOtherWords) {
   }
 }
 
-// What is compiled is compiled again when its options change.
+// A program is compiled again if its options change.
 TEST_F(Places, OptionsOfAGradientTakeEffectWhenItIsCompiledNext) {
   Func gradient = propagate_adjoints(gradient::weighted_sum(sums, {30}))(image);
   const std::string before = gradient.loop_nest();

@@ -69,7 +69,7 @@ Program predicated(int n) {
   return {weighted_sum(u, {6}), {start, gain}};
 }
 
-// What a step needs is known without its state: nothing is kept.
+// The values that a step needs are known without its state, so nothing is kept.
 Program linear(int n) {
   Buffer<float> start = line(6), decay = plane(6, n, 8);
   Func u("linear_u");
@@ -318,9 +318,8 @@ TEST(Checkpoints, TheGradientCanBeDifferentiatedAgain) {
 TEST(Checkpoints, ExplainSaysWhatIsKeptAndWhatIsComputedAgain) {
   Program p = pushed(10);
   Derivative d = propagate_adjoints(p.loss, {.checkpoint_states = 3});
-  expect_mentions(d.explain(Detail::All),
-                  {"a loop of 10 steps", "3 kept states of 28 bytes",
-                   "15 steps computed again beside the 10 that are reversed"});
+  expect_mentions(d.explain(Detail::All), {"a loop of 10 steps", "3 kept states of 28 bytes",
+                                           "15 steps recomputed beside the 10 that are reversed"});
 }
 
 TEST(Checkpoints, ALoopOfOneStepNeedsNoCheckpointAndIsNoError) {

@@ -106,7 +106,8 @@ Adjacency random_graph(std::mt19937& random, int vertices, int edges) {
   return graph;
 }
 
-// By definition: neighbours differ, and every entry is alone in its row or in its transpose's.
+// Checks the definition: neighbours differ, and every entry is the only one of its colour in its row or in its
+// transpose's.
 bool recovers(const Adjacency& graph, const VertexColours& c) {
   for (int i = 0; i < static_cast<int>(graph.size()); ++i) {
     for (int j : graph[static_cast<size_t>(i)]) {

@@ -75,7 +75,7 @@ class CustomExternStages : public ::testing::Test {
   Buffer<float> a = random_image({size}, 0.25, 1.5, 1), w = random_image({size}, -1, 1, 2);
   Func g{"g"};
 
-  // What the stages read: a function of the image, defined everywhere.
+  // The Func that the stages read: a function of the image, defined everywhere.
   CustomExternStages() {
     g(x) = sin(a(clamp(x, 0, size - 1))) * 2.0f;
     g.compute_root();

@@ -1,5 +1,5 @@
-// How adjoints of look-ups at places that data decide are scheduled when nobody does it: slices of
-// large scatters, sums of private parts, planes that share their places.
+// The default schedule of adjoints of data-dependent reads: slices of large scatters, sums of privatised copies, planes
+// that share their indices.
 #include <gtest/gtest.h>
 
 #include <regex>
@@ -33,7 +33,7 @@ struct Warp {
         lerp(lerp(image(i, j, c), image(i + 1, j, c), u(x, y) - i),
              lerp(image(i, j + 1, c), image(i + 1, j + 1, c), u(x, y) - i), v(x, y) - j);
   }
-  // By the image, by the flow, and the warped image.
+  // The gradients by the image and by the flow, and the warped image.
   std::vector<Func> outputs() {
     const Derivative d = propagate_adjoints(warped, seed);
     std::vector<Func> funcs{d(image), d(flow), warped};
@@ -167,7 +167,7 @@ TEST(LookUps, ThatAreSummedRunPlaneAfterPlane) {
   expect_same_values(warp);
 }
 
-// What reads one place only has no use for it.
+// A Func that reads a single element does not use it.
 TEST(LookUps, OfATableKeepTheirLoops) {
   const Buffer<float> table = gradient::random_image({256, 3}, 0, 1, 1);
   const Buffer<float> seed = gradient::random_image({40, 30, 3}, -1, 1, 3);

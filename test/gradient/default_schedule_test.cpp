@@ -1,4 +1,4 @@
-// What lowering does with adjoints that nobody scheduled, and with those that somebody did.
+// The default schedule of adjoints without directives, and its interaction with users' directives.
 #include "autoschedule/default_schedule.h"
 
 #include <gtest/gtest.h>
@@ -298,7 +298,7 @@ struct Warp {
     RDom r(0, width, 0, height, 0, channels);
     loss() += warped(r.x, r.y, r.z) * (r.x + 2 * r.y - r.z);
   }
-  // By the image, added up in double.
+  // The gradient by the image, summed in double.
   std::vector<double> expected() const {
     std::vector<double> sums(image.number_of_elements());
     const size_t plane = width * height;
@@ -351,7 +351,7 @@ TEST_F(DefaultSchedule, SmallKernelsOfSmallPicturesAreSummedInLanes) {
   expect_sums_in_lanes(40, Float(32));
 }
 
-// Of a convolution: sums of several channels, so that what is loaded is used for all of them.
+// Gradients of a convolution: several channels are summed together, so that each loaded value is used for all of them.
 TEST_F(DefaultSchedule, ReductionsKeepATileOfTheirSumsInRegisters) {
   Buffer<float> image(66, 66, 8), kernels(3, 3, 8, 8), seed(64, 64, 8);
   Var c("c");
@@ -607,7 +607,7 @@ TEST_F(DefaultSchedule, PartsOfASumAreManyWhereItsLastLoopIsShort) {
   EXPECT_TRUE(has_parts);
 }
 
-// By the two coordinates at which an image is read: both sum over what four corners hold.
+// Gradients by the two coordinates at which an image is read: both sum over the four corners.
 TEST_F(DefaultSchedule, SumsThatLookTheSamePlacesUpShareTheirLoops) {
   const int size = 40, channels = 6;
   const Buffer<float> image = gradient::random_image({size, size, channels}, -1, 1, 1);
@@ -906,9 +906,8 @@ TEST_F(DefaultSchedule, AScanIsNotComputedAgainForEachElement) {
   total() += squares(all.x, all.y) * squares(all.x, all.y);
   const Derivative d = propagate_adjoints(total);
   EXPECT_TRUE(is_stored(d(a), scan));
-  expect_mentions(d.explain(Detail::All),
-                  {"performance \"scan\": unless a directive schedules it, it is "
-                   "computed at root"});
+  expect_mentions(d.explain(Detail::All), {"performance \"scan\": without a directive it is "
+                                           "computed at root"});
 }
 
 TEST_F(DefaultSchedule, AHandScheduleKeepsSmallReductionsThatAreReadOnceInline) {
@@ -923,7 +922,7 @@ TEST_F(DefaultSchedule, AHandScheduleKeepsSmallReductionsThatAreReadOnceInline) 
   EXPECT_FALSE(is_stored(propagate_adjoints(total)(a), window));
 }
 
-// A warp whose private parts would take as much as 32 images.
+// A warp whose privatised copies would take as much as 32 images.
 TEST(PrivateParts, TakeNoMoreThanABudget) {
   Var x("x"), y("y"), c("c");
   ImageParam image(Float(32), 3, "image"), flow(Float(32), 3, "flow");
@@ -951,9 +950,9 @@ TEST(PrivateParts, AreFewerForLargeTargets) {
     total() += warped(r.x, r.y) * warped(r.x, r.y);
     return propagate_adjoints(total, {.wrt = {image}}).explain(Detail::All);
   };
-  expect_mentions(explained(256), {"32 private parts of 524288 bytes each"});
+  expect_mentions(explained(256), {"32 privatised copies of 524288 bytes each"});
   expect_mentions(explained(1024),
-                  {"8 private parts of 8388608 bytes each, as many as fit 67108864"});
+                  {"8 privatised copies of 8388608 bytes each, as many as fit 67108864"});
 }
 
 // As many as fit is known when the pipeline runs; the bits are those of any number of threads.
@@ -966,7 +965,7 @@ TEST(PrivateParts, OfSizesKnownAtRunTime) {
   total() = 0.0f;
   total() += read(r) * read(r) * cast<float>(r % 7);
   const Derivative d = propagate_adjoints(total, {.wrt = {image}});
-  expect_mentions(d.explain(Detail::All), {"at most 32 private parts"});
+  expect_mentions(d.explain(Detail::All), {"at most 32 privatised copies"});
   Buffer<float> values(37), expected(37);
   Buffer<int> places(5000);
   for (int i = 0; i < 37; ++i) values(i) = 0.25f * static_cast<float>(i - 18);

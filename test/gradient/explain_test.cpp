@@ -81,7 +81,7 @@ TEST(Explain, ZerosAndWhatWasNotRequestedSayWhy) {
   expect_line(d, Explanation::Kind::Zero, a.name(), "does not depend on its value");
   expect_line(d, Explanation::Kind::Zero, f.name(), "floor has derivative 0");
   Derivative only = propagate_adjoints(weighted_sum(f, {9}), {.wrt = {a}});
-  expect_line(only, Explanation::Kind::NotRequested, b.name(), "nothing that was requested");
+  expect_line(only, Explanation::Kind::NotRequested, b.name(), "no requested gradient");
 }
 
 // Between a loop over time that is folded and the output, copies stand for the Funcs of the user.
@@ -140,7 +140,7 @@ TEST(Explain, ZerosSayWhichReaderStopsThem) {
   stopped(a[1].name(), f, " in a cast to int32");
   stopped(a[2].name(), f, " in stop_gradient");
   stopped(a[3].name(), f, " in a condition");
-  stopped(a[4].name(), f, " in the place where \"" + a[5].name());
+  stopped(a[4].name(), f, " in an index of \"" + a[5].name());
   stopped(a[6].name(), g, ", and its own gradient is zero");
   stopped(g.name(), f, " in round");
   expect_line(d, Explanation::Kind::Zero, h.name(),
@@ -192,32 +192,32 @@ TEST(Explain, TheAccountOfASmallPipeline) {
       R"(built "told_loss": "told_loss_adj", 0 gathers over reduction domains, 0 scatters inside pure dimensions, 0 privatised sums, 1 elements, 4 bytes when stored
 built "told_blurred": "told_blurred_adj", 0 gathers over reduction domains, 0 scatters inside pure dimensions, 0 privatised sums, 8 elements, 32 bytes when stored
 built "told_gain": "told_gain_adj", 1 gathers over reduction domains, 0 scatters inside pure dimensions, 0 privatised sums, 10 elements, 40 bytes when stored
-performance "told_gain": unless a directive schedules "told_gain_adj", it is computed at root, in parallel over its outermost dimension, in vectors along its first
+performance "told_gain": without a directive "told_gain_adj" is computed at root, parallel over its outermost dimension and vectorized over its innermost
 built "told_in": "told_in_adj", 0 gathers over reduction domains, 0 scatters inside pure dimensions, 0 privatised sums, 10 elements, 40 bytes when stored
-not requested "told_count": nothing that was requested depends on it
-not requested "told_kernel": nothing that was requested depends on it
-recomputed "told_loss_adj": in each of 30 reads, 0 operations a time, no bytes
-stored "told_gain": the gradient reads its values; 40 bytes, 30 operations, as it is wanted itself or read often
-stored "told_blurred": the gradient reads its values; 32 bytes, 152 operations, as it has updates
-performance "told_blurred": unless a directive schedules it, it is computed at root: inside of the loops of who reads it, its updates would run again for each element
-recomputed "told_blurred_adj": in each of 30 reads, 5 operations a time, no bytes
-stored "told_gain_adj": 40 bytes, 310 operations, as it has updates
-stored "told_in_adj": 40 bytes, 70 operations, as it is wanted itself or read often
+not requested "told_count": no requested gradient needs its adjoint
+not requested "told_kernel": no requested gradient needs its adjoint
+recomputed "told_loss_adj": at each of 30 reads, 0 operations each time, no memory
+stored "told_gain": the gradient reads its values; 40 bytes, 30 operations, because it is requested or read often
+stored "told_blurred": the gradient reads its values; 32 bytes, 152 operations, because it has updates
+performance "told_blurred": without a directive it is computed at root: inside the loops of its consumer its updates would run again for each element
+recomputed "told_blurred_adj": at each of 30 reads, 5 operations each time, no memory
+stored "told_gain_adj": 40 bytes, 310 operations, because it has updates
+stored "told_in_adj": 40 bytes, 70 operations, because it is requested or read often
 left out "told_count": the gradient needs none of its values
 left out "told_loss": the gradient needs none of its values
-cost "told_loss": 249 operations and 36 bytes; its gradient alone 562 operations, 2.26 times as many, and 152 bytes
-performance "told_loss": its gradient keeps 112 bytes on the way, the program 32; most of it in "told_gain", 40: schedule it inside of who reads it to keep less
+cost "told_loss": 249 operations and 36 bytes; its gradient alone: 562 operations, 2.26 times as many, and 152 bytes
+performance "told_loss": its gradient stores 112 bytes of intermediate results, the program 32; most of them in "told_gain", 40: compute it inside the loops of its consumer to store less
 )");
   EXPECT_EQ(
       d.explain(),
-      R"(cost "told_loss": 249 operations and 36 bytes; its gradient alone 562 operations, 2.26 times as many, and 152 bytes
+      R"(cost "told_loss": 249 operations and 36 bytes; its gradient alone: 562 operations, 2.26 times as many, and 152 bytes
 stored (4): "told_gain" (40 bytes), "told_gain_adj" (40 bytes), "told_in_adj" (40 bytes), "told_blurred" (32 bytes)
 recomputed (2): "told_loss_adj", "told_blurred_adj"
 not requested (2): "told_count", "told_kernel"
 left out (2): "told_count", "told_loss"
 built (4): "told_loss", "told_blurred", "told_gain", "told_in"
 performance (3): "told_gain", "told_blurred", "told_loss"
-explain(Detail::All) tells why, fact by fact.
+explain(Detail::All) lists every fact with its reason.
 )");
 }
 
@@ -229,7 +229,7 @@ TEST(Explain, NamesKeepTheirNumbersWhereTwoAreAlike) {
             "zero \"twin$1\": \"twin$2\" reads it in floor\n"
             "scattered \"alone\": see \"alone_adj\"\n");
   EXPECT_EQ(to_string({facts[1]}, Detail::Summary),
-            "scattered (1): \"alone\"\nexplain(Detail::All) tells why, fact by fact.\n");
+            "scattered (1): \"alone\"\nexplain(Detail::All) lists every fact with its reason.\n");
 }
 
 TEST(Explain, SummariesTellZeroFromZeroInPart) {
@@ -270,7 +270,7 @@ TEST(Explain, WhatIsStoredFollowsTheSchedule) {
   EXPECT_EQ(line_of(f),
             "stored: the gradient reads its values; 64 bytes, 48 operations, by its schedule");
   f.compute_inline();
-  expect_mentions(line_of(f), {"recomputed: the gradient reads its values; in each of "});
+  expect_mentions(line_of(f), {"recomputed: the gradient reads its values; at each of "});
 }
 
 TEST(Explain, ExtentsOfRunTimeStaySymbolsInTheCosts) {

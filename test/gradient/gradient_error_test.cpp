@@ -1,5 +1,4 @@
-// What cannot be differentiated as written: each error has its kind, its four parts and the names
-// in it.
+// Programs that cannot be differentiated: each error has its class, its four parts and the names in it.
 #include <gtest/gtest.h>
 
 #include "autodiff/derivative.h"

@@ -241,8 +241,8 @@ Derivative filter_gradient(const Buffer<float>& a, float decay, int length) {
   return propagate_adjoints(loss, {.wrt = {a}});
 }
 
-// What a constant below 1 forgets, or few elements carry, stays in float32.
-// The term that is carried holds each value of the step twice: 2^40 of them, if it were a tree.
+// Scans that a constant below 1 damps, or that carry few elements, stay in float32. The carried term holds each value
+// of the step twice; as a tree it would have 2^40 nodes.
 TEST(CarriedSums, OfStepsThatUseTheirValuesTwiceAreFoundInTime) {
   const int n = 100;
   Buffer<float> input(n);
@@ -284,7 +284,7 @@ TEST(LongSums, ShortOnesStayInFloat32) {
   EXPECT_EQ(d.accumulator(d(a)).name(), d(a).name());
   EXPECT_EQ(d.accumulator(d(b)).types()[0], Float(64));
   EXPECT_EQ(d(b).types()[0], Float(32));
-  expect_mentions(d.explain(Detail::All), {"adds up in double"});
+  expect_mentions(d.explain(Detail::All), {"accumulates in double"});
 }
 
 // loss = sum of p h(i), computed in 16 bits: the gradient by p and by a sum of three values each

@@ -100,7 +100,7 @@ TEST(OperationCount, TheGradientOfASquaredErrorCostsASmallMultiple) {
   ASSERT_TRUE(operations.ratio());
   EXPECT_GT(*operations.ratio(), 1);
   EXPECT_LT(*operations.ratio(), 5);
-  // Of what nobody asked for, nothing.
+  // Funcs that were not requested cost nothing.
   Derivative only = propagate_adjoints(loss, {.wrt = {a}});
   EXPECT_LT(value(only.operations().gradient.operations()),
             value(operations.gradient.operations()));

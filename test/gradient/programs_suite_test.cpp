@@ -39,7 +39,7 @@ TEST_P(Suite, GraphsAreTheirText) {
   EXPECT_EQ(graph::difference(graph::parse_graph(graph::to_text(graph)), graph), "")
       << graph::to_text(graph);
   for (const graph::FuncPtr& f : graph.funcs) {
-    // What several adjoints share is of none of them.
+    // Funcs that several adjoints share belong to none of them.
     const bool is_shared = f->made && f->made->role == graph::Role::SharedValue;
     EXPECT_TRUE(!f->made || is_shared || !f->made->of.empty()) << f->name;
   }

@@ -1,4 +1,4 @@
-// Whole programs against central differences.
+// Gradients of complete programs against central differences.
 #include "gradient/gradient_check.h"
 #include "support/errors.h"
 #include "support/measured_threads.h"

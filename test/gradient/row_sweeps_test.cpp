@@ -50,7 +50,7 @@ Fit tone_curve() {
   return {mean(error), {picture, gain, gamma, lift}};
 }
 
-// Which pixels are marked, by a scale and a shift of each channel.
+// A mask of pixels, by a scale and a shift of each channel.
 Fit logistic() {
   Var x("x"), y("y"), c("c");
   const Buffer<float> picture = pixels(-1, 1, 3), marks = pixels(0, 1, 4);

@@ -382,7 +382,7 @@ TEST(SecondDerivatives, AnUnchosenArmContributesNothingInMachineCode) {
   expect_unchosen_arms_contribute_nothing<float>(Path::Inline, true);
 }
 
-// By the functions that users call.
+// Through the public functions.
 class HessiansAtExceptionalPoints : public ::testing::Test {
  protected:
   Buffer<float> a = Buffer<float>(2), one = Buffer<float>(2);

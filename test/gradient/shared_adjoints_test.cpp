@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "autodiff/derivative.h"
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "gradient/gradient_check.h"
 #include "graph/define.h"
 #include "graph/function.h"
@@ -50,8 +50,7 @@ TEST(SharedAdjoints, AnInnerAdjointThatSeveralInputsNeedIsKept) {
   ASSERT_TRUE(inner.defined());
   EXPECT_EQ(inner.dimensions(), 2);
   EXPECT_EQ(inner.outputs(), 1) << "that of drive()";
-  expect_mentions(d.explain(Detail::All),
-                  {"keeps 1 inner adjoint of each iteration, from which 3"});
+  expect_mentions(d.explain(Detail::All), {"keeps 1 inner adjoint of each iteration, shared by 3"});
   const autodiff::OperationCount count = d.operations().gradient;
   const autodiff::FuncOperations* kept = count.find(inner.function().get());
   ASSERT_NE(kept, nullptr);

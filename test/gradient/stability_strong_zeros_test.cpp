@@ -26,7 +26,7 @@ class StrongZeros : public ::testing::Test {
     loss() += f(r);
     return loss;
   }
-  // By the interpreter, as machine code, and by one tangent for each element.
+  // Evaluates by the interpreter, as machine code, and by one tangent for each element.
   void expect(const Func& f, Buffer<float>& wrt, const std::vector<float>& expected) {
     Func loss = sum_of(f);
     Func gradient = propagate_adjoints(loss)(wrt);

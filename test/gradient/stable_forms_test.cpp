@@ -26,12 +26,12 @@ Real logistic_slope(Real x) {
 }
 Real logistic(Real x) { return x > 0 ? 1 / (1 + std::exp(-x)) : std::exp(x) / (1 + std::exp(x)); }
 
-// Of (exp(x) - 1) / x, at the numbers below.
+// The derivative of (exp(x) - 1) / x, at the numbers below.
 Real growth_slope(Real x) {
   const Real series = 0.5L + x / 3 + x * x / 8 + x * x * x / 30;
   return std::fabs(x) < 0.002L ? series : (std::exp(x) - std::expm1(x) / x) / x;
 }
-// Of log(1 + x) / x.
+// The derivative of log(1 + x) / x.
 Real logarithm_slope(Real x) {
   const Real series = -0.5L + x * 2 / 3 - x * x * 3 / 4 + x * x * x * 4 / 5;
   return std::fabs(x) < 0.002L ? series : (1 / (1 + x) - std::log1p(x) / x) / x;
@@ -196,7 +196,7 @@ std::vector<float> extremes() {
   return all;
 }
 
-// What is lost below the smallest normal number does not count.
+// Errors below the smallest normal number are not counted.
 double ulps(float found, Real expected) {
   if (!std::isfinite(found)) return 1e30;
   if (std::fabs(static_cast<Real>(found) - expected) < std::numeric_limits<float>::min()) return 0;
@@ -295,7 +295,7 @@ class OverFuncs : public ::testing::Test {
     total() = 0.0f;
     total() += weight(r);
   }
-  // Of softmax; `spread`: how far apart the values are.
+  // The gradient of softmax; `spread`: the range of the values.
   std::vector<Real> probabilities(float offset, float spread) {
     std::vector<Real> p(n);
     Real top = -1e9L, sum = 0;

@@ -1,7 +1,8 @@
-// Gradients of programs large enough that private parts, rows and lanes are really run apart: the
-// same bits from run to run, on 1, 2, 4 and 8 threads, with iterations taken forward and backward.
-// (The small programs of the suite are run so by gradient_check.h.) What the values are is checked
-// against the dot product with forward mode.
+// Gradients are deterministic: the same bits from run to run, on 1, 2, 4 and 8 threads, with iterations taken forward
+// and backward.
+//
+// The programs are large enough that privatised copies, rows and lanes really run in parallel. (gradient_check.h runs
+// the small programs of the suite in the same way.) The values are checked against the dot product with forward mode.
 #include "autodiff/tangents.h"
 #include "gradient/programs_large.h"
 

@@ -130,7 +130,7 @@ TEST(TimeAxis, GradientsAgreeWithCentralDifferences) {
     SCOPED_TRACE(c.name);
     Program p = c.build(6);
     Derivative d = propagate_adjoints(p.loss, {.checkpoint_states = 2});
-    expect_mentions(d.explain(Detail::All), {"others read its last steps only", "2 kept states"});
+    expect_mentions(d.explain(Detail::All), {"only its last steps are read", "2 kept states"});
     for (Buffer<float>& input : p.inputs) expect_gradient(p.loss, d, input);
   }
 }
@@ -293,7 +293,7 @@ TEST(TimeAxis, FuncsBehindTheLoopHaveTheirAdjoints) {
   EXPECT_THROW(d(u), CompileError) << d.explain(Detail::All);
   Buffer<float> found = d(last).realize({7}), expected = all(last).realize({7});
   for (int i = 0; i < 7; ++i) EXPECT_EQ(found(i), expected(i));
-  // Who asks for the adjoint of every step gets it, and the memory for it.
+  // A request for the adjoint of every step is honoured, at the price of its memory.
   Derivative asked = propagate_adjoints(loss, {.wrt = {u}, .checkpoint_states = 2});
   EXPECT_TRUE(asked(u).defined());
 }

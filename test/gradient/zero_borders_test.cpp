@@ -27,7 +27,7 @@ struct Stencil {
     out(x) += image(x + r.x, r.y) * weights(r.x, r.y);
   }
   Func gradient() { return propagate_adjoints(out, Func(seed), {{0, width}})(image); }
-  // By the image, term by term.
+  // The gradient by the image, term by term.
   float expected(int i, int k) const {
     float sum = 0;
     for (int tap = 0; tap < taps; tap++) {

@@ -1,5 +1,5 @@
-// Random pipelines under Pipeline::auto_schedule: always legal, and right. What is refused is
-// refused without a schedule, too.
+// Random pipelines under Pipeline::auto_schedule: schedules are legal and results are right. A program that is refused
+// is also refused without a schedule.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -22,7 +22,7 @@ constexpr int step = 1;  // 160
 constexpr int step = 2;  // 80: every second shard
 #endif
 
-// What is said of half of the Funcs, and of those that are made of them.
+// Directives for half of the Funcs, and for the Funcs generated from these.
 ScheduleLog part_of(const ScheduleLog& log, Choices& choices) {
   ScheduleLog part;
   std::set<std::string> seen, kept;

@@ -1,5 +1,5 @@
-// Random pipelines under Pipeline::auto_schedule for a GPU: always legal, and right on the simulated
-// device. What is refused is refused without a schedule, too.
+// Random pipelines under Pipeline::auto_schedule for a GPU: schedules are legal and results are right on the simulated
+// device. A program that is refused is also refused without a schedule.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

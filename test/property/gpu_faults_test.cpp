@@ -1,8 +1,9 @@
-// What the simulated device is for: kernels with a fault put in, such as a lowering with a bug would make
-// them: a barrier left out, or of warps in place of the block, arrays of shared memory that overlap, a condition
-// lost. Some do no harm (a barrier
-// between accesses that do not meet). One is real where some order of threads gives something else; each
-// real one is found in the first run that looks for races, whatever its order.
+// The simulated device finds faults in kernels that a lowering with a bug would generate.
+//
+// Each test breaks a kernel: a barrier is removed, or narrowed from the block to a warp, arrays of shared memory
+// overlap, or a condition is dropped. Some faults are harmless, as a barrier between accesses that do not conflict. A
+// fault is real if some order of threads gives a different result; each real one is found in the first run that checks
+// for races, whatever its order is.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 

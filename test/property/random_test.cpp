@@ -25,7 +25,7 @@ constexpr int step = 2;  // 160 programs: every second shard
 constexpr double max_refused_fraction = 0.15;  // of one shard
 constexpr double max_unstable_fraction = 0.1;
 
-// What is drawn, under the name that the fuzzer knows it by.
+// The styles that are drawn, under the names that the fuzzer uses.
 struct Kind {
   const char* name;
   Style style;

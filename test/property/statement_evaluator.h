@@ -1,6 +1,5 @@
-// Runs a flat statement on small buffers, lane by lane, with the meaning of ir/scalar.h: what
-// passes must preserve. Reading or writing outside of a buffer, or of one that is freed, is an
-// error (an exception with the access in it).
+// Runs a flat statement on small buffers, lane by lane, with the scalar operations of ir/scalar.h. Passes must preserve
+// its result. Reading or writing outside of a buffer, or in a freed one, throws an exception that describes the access.
 #pragma once
 
 #include <algorithm>
@@ -52,7 +51,7 @@ class StatementEvaluator : public test::LaneEvaluator {
   }
 
  private:
-  // What nobody has stored: a value that changes the result when it is used.
+  // The value of memory before the first store; it changes the result if it is used.
   static Scalar poison(Type type) {
     return type.is_float() ? Scalar::of_float(type, 777) : Scalar::of_int(type, 777);
   }

@@ -7,13 +7,13 @@
 
 namespace retrograde::stability {
 
-// What is the most extreme among the numbers of a case; later ones win.
+// Returns the most extreme kind among the numbers of a case; later kinds win.
 enum class Extreme { Ordinary, Large, Zeros, Tiny, Denormals, Huge, Infinities, NaNs };
 constexpr int extreme_count = 8;
 const char* to_string(Extreme extreme);
 Extreme extreme_of(const std::vector<float>& numbers);
 
-// Of n numbers each. n = 1 and 2: every combination; more: random ones, the same each time.
+// Cases of n numbers each. n = 1 and 2: every combination; larger n: random ones, the same each time.
 std::vector<std::vector<float>> cases(int n);
 
 }  // namespace retrograde::stability

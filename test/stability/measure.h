@@ -1,4 +1,4 @@
-// The adjoint of a problem in float32, as machine code, against its true gradient.
+// Measures the adjoint of a problem, in float32 and as machine code, against its true gradient.
 #pragma once
 
 #include <array>

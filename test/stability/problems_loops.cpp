@@ -44,7 +44,7 @@ Traced length_of(const Numbers& x) {
   for (const Traced& v : x) sum = sum + v * v;
   return sqrt(sum);
 }
-// By x² + y² of the other numbers: nothing cancels.
+// Divides by x² + y² of the other numbers, so that nothing cancels.
 Reals unit_vector_gradient(const Reals& x) {
   Real others = 0, length = 0;
   for (size_t i = 1; i < x.size(); ++i) others += x[i] * x[i];

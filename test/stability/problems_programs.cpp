@@ -14,13 +14,13 @@ Real series(Real x, int terms, Coefficient c) {
   for (int k = 0; k < terms; ++k, power *= x) sum += c(k) * power;
   return sum;
 }
-// Of (exp(x) - 1) / x.
+// The derivative of (exp(x) - 1) / x.
 Real growth_slope(Real x) {
   if (std::abs(x) > 0.1L) return (std::exp(x) - std::expm1(x) / x) / x;
   return series(x, 14, [](int k) { return (k + 1) / std::tgamma(k + 3.0L); });
 }
 Real growth(Real x) { return x == 0 ? 1 : std::expm1(x) / x; }
-// Of log(1 + x) / x.
+// The derivative of log(1 + x) / x.
 Real logarithm_slope(Real x) {
   if (std::abs(x) > 0.1L) return (1 / (1 + x) - std::log1p(x) / x) / x;
   return series(x, 24, [](int k) { return (k % 2 ? 1 : -1) * (k + 1) / (k + 2.0L); });
@@ -36,7 +36,7 @@ Reals smoothed_cross_entropy_gradient(const Reals& x) {
   return result;
 }
 
-// Of the first of n numbers over their norm: (1 - u_0^2) / r and -u_0 u_i / r.
+// The gradient of the first of n numbers over their norm: (1 - u_0^2) / r and -u_0 u_i / r.
 Reals first_of_unit_gradient(const Reals& x) {
   Real r = 0;
   for (Real v : x) r = std::hypot(r, v);

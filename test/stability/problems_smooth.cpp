@@ -18,7 +18,7 @@ Reals softmax(const Reals& x) {
   for (Real& v : result) v /= sum;
   return result;
 }
-// Of the first weight: p0 (1 - p0) and -p0 pi, with 1 - p0 as the sum of the others.
+// The gradient of the first softmax weight: p0 (1 - p0) and -p0 pi, with 1 - p0 as the sum of the others.
 Reals softmax_gradient(const Reals& x) {
   const Reals p = softmax(x);
   Reals result{0};
@@ -28,14 +28,14 @@ Reals softmax_gradient(const Reals& x) {
   }
   return result;
 }
-// Of -log of the first weight.
+// The gradient of -log of the first weight.
 Reals cross_entropy_gradient(const Reals& x) {
   Reals result = softmax(x);
   result[0] = 0;
   for (size_t i = 1; i < result.size(); ++i) result[0] -= result[i];
   return result;
 }
-// Of x / |(x, y)|: y² / r³ and -x y / r³.
+// The gradient of x / |(x, y)|: y² / r³ and -x y / r³.
 Reals unit_gradient(const Reals& x) {
   const Real r = std::hypot(x[0], x[1]), u = x[0] / r, w = x[1] / r;
   return {w * w / r, -u * w / r};

@@ -175,7 +175,7 @@ inline Traced atan2(const Traced& y, const Traced& x) {
   return tracing::binary(y, x, std::atan2(y.exact, x.exact), std::atan2(y.own, x.own),
                          r == 0 ? 0 : x.exact / r, r == 0 ? 0 : -y.exact / r);
 }
-// By the power: 0 at a base of 0, where the value stays 0 nearby.
+// The partial by the exponent: 0 at a base of 0, where the value stays 0 nearby.
 inline Traced pow(const Traced& a, const Traced& p) {
   const Real v = std::pow(a.exact, p.exact);
   return tracing::binary(a, p, v, std::pow(a.own, p.own),

@@ -1,5 +1,5 @@
-// Programs that include this check the accesses of what they compile (Target::CheckedAccesses), unless RG_JIT_TARGET
-// names a target of its own.
+// Enables checked accesses (Target::CheckedAccesses) for all code that the including program compiles, unless
+// RG_JIT_TARGET names a target.
 #pragma once
 
 #include <cstdlib>

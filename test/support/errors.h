@@ -1,4 +1,4 @@
-// What is thrown, and whether its message says what it should.
+// Expectations on errors: the class that is thrown, and the phrases of its message.
 #pragma once
 
 #include <gtest/gtest.h>

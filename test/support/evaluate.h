@@ -1,5 +1,5 @@
-// The value of an expression, lane by lane, by scalar.h. What loads and calls mean is for those who
-// derive from LaneEvaluator to say.
+// Evaluates an expression lane by lane, with the scalar operations of scalar.h. Classes derived from LaneEvaluator
+// define loads and calls.
 #pragma once
 
 #include <cmath>
@@ -27,7 +27,7 @@ class LaneEvaluator {
 
  protected:
   virtual Lanes load(const ir::Load& n) = 0;
-  // Of one lane of a call to anything but an operator.
+  // The value of one lane of a call to anything but an operator.
   virtual ir::Scalar other_call(const ir::Call& n, const Lanes& args) = 0;
   virtual ir::Scalar operate(ir::Kind kind, const ir::Scalar& a, const ir::Scalar& b) {
     return ir::eval_binary(kind, a, b);
@@ -155,7 +155,7 @@ class LaneEvaluator {
   }
 };
 
-// Of a pure expression. Loads and calls give made-up values that depend on their indices alone.
+// The value of a pure expression. Loads and calls return made-up values that depend on their indices alone.
 class Evaluator : public LaneEvaluator {
  public:
   explicit Evaluator(const std::map<std::string, ir::Scalar>& variables) {

@@ -1,5 +1,5 @@
-// every_kernel.h -- kernels that have everything which the language can ask of a device, by the IR's own
-// lists: each kind of node and each operator, in every type that it takes.
+// every_kernel.h -- kernels that cover everything a device supports: each kind of IR node and each operator, in every
+// type that it takes.
 #pragma once
 
 #include <string>
@@ -16,7 +16,8 @@ const std::vector<Type>& types();
 // stores its values in every type that it takes, in vectors of so many lanes. `types`: those that may occur.
 ir::LoweredFunction of_everything(int lanes, const std::vector<Type>& types);
 
-// What only a host can do: a function with a kernel that does it, each named after the operator or the kind.
+// Operations that only a host supports: a function with a kernel that uses it, named after the operator or the node
+// kind.
 std::vector<ir::LoweredFunction> of_hosts_alone();
 
 // Kinds and operators of the lists that are in neither.

@@ -1,4 +1,4 @@
-// A test's expectation that ptxas takes PTX, where it is installed.
+// Expects that ptxas, where it is installed, accepts PTX.
 #pragma once
 
 #include <gtest/gtest.h>

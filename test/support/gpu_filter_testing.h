@@ -1,4 +1,4 @@
-// What the function of gpu_generator.cpp computes, in plain C++; sums of whole numbers, which are exact.
+// The reference for the function of gpu_generator.cpp, in plain C++; sums of integers, which are exact.
 #pragma once
 
 #include <HalideBuffer.h>

@@ -1,4 +1,4 @@
-// A generator whose function has kernels: what they make and what the host makes take turns.
+// A generator whose function has kernels, with producers and consumers alternating between device and host.
 // test/unit/aot_gpu_test.cpp calls it.
 #include <retrograde/retrograde.h>
 

@@ -1,4 +1,4 @@
-// Kernels as the compiler would write them for the simulated device, by hand.
+// Hand-written kernels for the simulated device, in the form that the compiler generates.
 #pragma once
 
 #include <cstdint>

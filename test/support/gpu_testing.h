@@ -1,5 +1,5 @@
-// What the tests of the GPU runtime share: a pipeline of one kernel as generated code would run it, and
-// a test that wants nothing left on the simulated device afterwards.
+// Helpers for tests of the GPU runtime: a pipeline of one kernel as generated code would run it, and a test fixture
+// that checks for leaks on the simulated device.
 #pragma once
 
 #include <HalideBuffer.h>

@@ -1,4 +1,4 @@
-// A buffer whose neighbourhood cannot be touched.
+// A buffer between protected pages.
 #pragma once
 
 #include <HalideRuntime.h>

@@ -1,4 +1,4 @@
-// OwnThreads that also measure what compiled code allocates.
+// OwnThreads that also measures the allocations of compiled code.
 #pragma once
 
 #include <atomic>

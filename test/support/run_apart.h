@@ -1,4 +1,4 @@
-// Runs a function in a process of its own: a crash or a hang there is a result like any other.
+// Runs a function in a separate process, so that a crash or a hang is a result like any other.
 #pragma once
 
 #include <poll.h>

@@ -1,4 +1,4 @@
-// Names that differ by the number alone that the process made them unique with, counted anew.
+// Renumbers names, so that texts which differ only in the process's unique numbers are equal.
 #pragma once
 
 #include <map>

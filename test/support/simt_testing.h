@@ -1,4 +1,4 @@
-// What the tests of the simulated device share: a context, and kernels over an array.
+// Helpers for tests of the simulated device: a context, and kernels over an array.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// A new folder of the test's own, gone with everything in it when the object goes.
+// A new folder, deleted with its contents by the destructor.
 #pragma once
 
 #include <stdlib.h>

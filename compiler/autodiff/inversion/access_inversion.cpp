@@ -29,15 +29,15 @@ std::optional<int64_t> constant_extent(const Interval& range) {
   return range.is_bounded() ? as_const_int(extent_of(range)) : std::nullopt;
 }
 
-bool can_prove_inside(const Interval& part, const Interval& whole) {
-  const auto& [min, max] = whole;
+bool can_prove_inside(const Interval& part, const Interval& outer) {
+  const auto& [min, max] = outer;
   return (!min.defined() || (part.min.defined() && can_prove(part.min >= min))) &&
          (!max.defined() || (part.max.defined() && can_prove(part.max <= max)));
 }
 
 namespace {
 
-// Finds which indices take part, forms the groups, and multiplies their pieces out.
+// Selects the indices that can be inverted, forms the groups, and multiplies their pieces out.
 class Inverter {
  public:
   explicit Inverter(const AccessQuery& query) : query_(query) {
@@ -79,9 +79,8 @@ class Inverter {
     }
   }
 
-  // An obstacle that depends only on variables that the other indices determine is a parameter: its
-  // value is the same all over the fibre. Indices with any other obstacle take no part in the
-  // relation.
+  // An obstacle is a subexpression that isl cannot represent. If it depends only on variables that the other indices
+  // determine, it is constant over the fibre and becomes a parameter. Indices with any other obstacle are not inverted.
   void resolve_indices() {
     IslContext context(query_.operations);
     IslBridge bridge(context, names_of(query_.domain.vars));
@@ -126,7 +125,7 @@ class Inverter {
     return true;
   }
 
-  // Data that decide, and what else is no quasi-affine form: x % w, x * y.
+  // Records the obstacles for the note: data, and expressions that are not quasi-affine, such as x % w and x * y.
   void note_obstacles(const std::set<Expr, StructuralLess>& obstacles) {
     for (const Expr& e : obstacles) {
       std::set<std::string> data;
@@ -140,7 +139,7 @@ class Inverter {
     }
   }
 
-  // Conjuncts that isl does not follow stay expressions.
+  // Conjuncts that isl cannot represent stay expressions.
   void find_residual(IslBridge& bridge) {
     std::vector<Expr> affine;
     for (const Expr& e : conjuncts_) (bridge.condition(e) ? affine : residual_).push_back(e);
@@ -180,7 +179,7 @@ class Inverter {
     return result;
   }
 
-  // Stage variables that occur outside of parameters.
+  // The stage variables that occur outside of parameters.
   std::vector<size_t> variables_in(const Expr& e) const {
     std::set<std::string> found;
     walk(e, [&](const Expr& node) {
@@ -226,8 +225,8 @@ class Inverter {
       for (const auto& free : piece.free)
         extents[groups[k].vars[static_cast<size_t>(free.var)].name] = free.extent;
     }
-    // Parameters hold stage variables, which their own iterations replace; a parameter may stand in
-    // another.
+    // Parameters contain stage variables, which are replaced by their expressions. Parameters may be nested, so the
+    // substitution is repeated.
     for (size_t round = 0; round < fixed_.size(); ++round) {
       Substitution now = g.iteration;
       for (auto& [name, e] : g.iteration) e = substitute(e, now);
@@ -244,14 +243,14 @@ class Inverter {
     return g;
   }
 
-  // f(x + s(x), x): isl may choose x = e0 - s(x), which says nothing. Without parameters it is e1.
+  // For f(x + s(x), x) isl may choose x = e0 - s(x), which is circular. Without parameters it chooses x = e1.
   void note_circular(const Substitution& iteration) const {
     for (const auto& [name, e] : iteration) {
       for (const LoopVariable& v : query_.domain.vars) is_circular_ |= uses_variable(e, v.name);
     }
   }
 
-  // From the inversion's own names to the target's variables and a reduction domain.
+  // Renames the inversion's own variables to those of the target and of a new reduction domain.
   void rename(Gather& g, const std::map<std::string, Expr>& extents) const {
     Substitution names;
     for (size_t d = 0; d < query_.indices.size(); ++d) {
@@ -275,12 +274,12 @@ class Inverter {
   }
 
   const AccessQuery& query_;
-  std::vector<bool> takes_part_;  // per index
-  std::vector<Expr> fixed_;       // obstacles that are parameters
+  std::vector<bool> takes_part_;  // for each index: whether it is inverted
+  std::vector<Expr> fixed_;       // obstacles that became parameters
   std::vector<Expr> conjuncts_, residual_;
   std::string note_;
   bool may_fix_ = true;               // parameters are allowed
-  mutable bool is_circular_ = false;  // a variable was found in terms of itself
+  mutable bool is_circular_ = false;  // a variable was expressed in terms of itself
 };
 
 }  // namespace
@@ -333,9 +332,9 @@ AccessQuery restricted(AccessQuery query, size_t d, const Expr& index, const Exp
   return query;
 }
 
-// select(inside, x, something that isl cannot follow): the part where it can becomes a query of its
-// own, so that the border of a boundary condition with parametric size does not make a scatter of
-// the interior. Empty: nothing to split.
+// Splits a query at a select, one branch of which isl cannot represent: select(inside, x, other). Each branch
+// becomes a query of its own, so that a boundary condition of parametric size does not turn the interior into a
+// scatter. Empty if there is nothing to split.
 std::vector<AccessQuery> split_at_select(const AccessQuery& query) {
   IslContext context;
   IslBridge bridge(context, names_of(query.domain.vars));
@@ -344,7 +343,7 @@ std::vector<AccessQuery> split_at_select(const AccessQuery& query) {
     if (!s || bridge.affine(query.indices[d]) || !bridge.condition(s->condition)) continue;
     if (!bridge.affine(s->when_true) && !bridge.affine(s->when_false)) continue;
     std::vector<AccessQuery> parts{restricted(query, d, s->when_false, negation(s->condition))};
-    // A disjunction is cut into disjoint parts, whose domains are boxes again.
+    // A disjunction is split into disjoint parts, whose domains are boxes again.
     Expr before = const_true(), rest = s->condition;
     for (const auto* either = rest.as<Or>(); either; either = rest.as<Or>()) {
       parts.push_back(restricted(query, d, s->when_true, before && either->a));
@@ -357,8 +356,7 @@ std::vector<AccessQuery> split_at_select(const AccessQuery& query) {
   return {};
 }
 
-// Bounds of variables follow conjuncts like x < 5, so that reduction domains made of them are
-// short.
+// Tightens the bounds of variables by conjuncts like x < 5, so that reduction domains are short.
 void tighten(IterationDomain& domain, const Expr& conjunct) {
   if (const auto* both = conjunct.as<And>()) {
     tighten(domain, both->a);

@@ -22,8 +22,7 @@ isl::map insert_input(const isl::map& m) {
   return isl::manage(isl_map_insert_dims(m.copy(), isl_dim_in, static_cast<unsigned>(n), 1));
 }
 
-// The largest difference between two outputs of one input; nullopt when it is unbounded (or only by
-// parameters).
+// The largest difference between two outputs of one input; nullopt if unbounded, or bounded by parameters only.
 std::optional<int64_t> spread(const isl::map& one_output) {
   isl::map pairs = one_output.reverse().apply_range(one_output);
   const isl::val largest = pairs.deltas().dim_max_val(0);
@@ -44,7 +43,7 @@ isl::pw_aff smallest_output(const isl::map& one_output) {
   return coalesced(result);
 }
 
-// The variables that are settled, one after the other, with the fibre that is left.
+// Settles the variables one after the other and keeps the remaining fibre.
 class FibrePlanner {
  public:
   explicit FibrePlanner(const FibreSpace& space) : space_(space) {}
@@ -132,7 +131,7 @@ class FibrePlanner {
     if (c.extent == unbounded) c.is_static = true, c.stride = 1;
     return c;
   }
-  // Fewer iterations first, then the stage's own reduction variables, which keep their bounds.
+  // Prefers fewer iterations, then the stage's own reduction variables, whose bounds stay.
   bool is_better(const Candidate& a, const Candidate& b) const {
     auto rank = [&](const Candidate& c) {
       const LoopVariable& v = space_.vars[static_cast<size_t>(c.var)];
@@ -141,7 +140,7 @@ class FibrePlanner {
     return rank(a) < rank(b);
   }
 
-  // Where the free variable starts: its own minimum, else the smallest point of the fibre.
+  // The start of the free variable: its own minimum, else the smallest point of the fibre.
   isl::pw_aff base_of(const Fibre& fibre, const Candidate& c) {
     if (c.is_static) {
       const LoopVariable& v = space_.vars[static_cast<size_t>(c.var)];
@@ -152,7 +151,7 @@ class FibrePlanner {
       }
       return on_space(space_.bridge.bound(v.min), fibre.exact);
     }
-    // With as little of the domain as keeps the extent, the expression has fewer pieces.
+    // Intersected with as little of the domain as keeps the extent, the expression has fewer pieces.
     isl::map own = fibre.loose.intersect_range(space_.own_range[static_cast<size_t>(c.var)]);
     for (const isl::map& m : {only_output(fibre.loose, c.var), only_output(own, c.var)}) {
       auto s = spread(m);
@@ -162,7 +161,7 @@ class FibrePlanner {
     }
     return smallest_output(only_output(fibre.exact, c.var));
   }
-  // An expression of the parameters alone, as a function on the fibre's inputs.
+  // An expression of the parameters alone, as a function of the fibre's inputs.
   isl::pw_aff on_space(const isl::pw_aff& e, const isl::map& fibre) const {
     isl_pw_aff* moved =
         isl_pw_aff_drop_dims(e.copy(), isl_dim_in, 0, static_cast<unsigned>(var_count()));

@@ -14,14 +14,13 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Folding a border into the interior may cost this much more iterations before the two are split.
+// A border is folded into the interior if that multiplies the iterations by at most this factor.
 constexpr double fold_tolerance = 2.5;
-// An interior of fewer iterations an element than this does not choose between its own places and
-// those of a border. A larger one stays one update all the same: its border would be a large update
-// of its own.
+// A border is folded into an interior of fewer iterations an element only if the indices need no select between the
+// two. For a longer interior it is folded anyway, because the border alone would be a large update.
 constexpr double short_interior = 4;
 
-// Which points of a group's stage read which elements, and over what.
+// The access relation of a group, with its domain and context.
 struct GroupRelation {
   GroupRelation(const Group& group, const std::vector<Expr>& fixed, unsigned long operations)
       : context(operations),
@@ -34,17 +33,17 @@ struct GroupRelation {
     build_domain();
   }
 
-  IslContext context;  // outlives every isl object below
+  IslContext context;  // must outlive every isl object below
   const Group& group;
   IslBridge bridge;
-  isl::set domain, box;             // with and without the predicate
-  isl::set not_empty;               // where the target has elements
-  std::vector<isl::set> own_range;  // of each variable alone
-  std::vector<isl::pw_aff> affine;  // the indices
+  isl::set domain, box;             // iterations with and without the predicate
+  isl::set not_empty;               // parameters for which the target has elements
+  std::vector<isl::set> own_range;  // range of each variable alone
+  std::vector<isl::pw_aff> affine;  // affine forms of the indices
 
   int var_count() const { return static_cast<int>(group.vars.size()); }
   int index_count() const { return static_cast<int>(group.indices.size()); }
-  // {z -> y} over all of z: the domain is not applied.
+  // {z -> y} for all z, not restricted to the domain.
   isl::map values_of(const std::vector<isl::pw_aff>& indices) const {
     isl::map result = universe_map(bridge.ctx(), group.vars.size(), group.indices.size());
     for (int d = 0; d < index_count(); ++d) {
@@ -69,8 +68,9 @@ struct GroupRelation {
     for (const isl::set& s : conditions) domain = coalesced(domain.intersect(s));
   }
 
-  // Where the target has no element there is nothing to do. Ends over parameters of their own, as
-  // those that isl cannot follow, say nothing about the others, and would make the search longer.
+  // Assumes that the target has elements, since an empty one needs no work. Ends that introduce parameters of their
+  // own, such as those that isl cannot represent, are skipped: they constrain nothing else and would lengthen the
+  // search.
   void assume_not_empty(const LoopVariable& v) {
     if (!v.min.defined() || !v.max.defined()) return;
     const size_t known = bridge.parameters().size();
@@ -81,8 +81,7 @@ struct GroupRelation {
 
 // ---- pieces ----
 
-// The index in dimension d when it is the same for all points of the piece: a function of the
-// parameters.
+// The index in dimension d if it is the same for all points of the piece, as a function of the parameters.
 std::optional<isl::pw_aff> fixed_index(const isl::map& piece, int d) {
   isl::map one = only_output(piece, d);
   int n = isl_map_dim(one.get(), isl_dim_in);
@@ -91,7 +90,7 @@ std::optional<isl::pw_aff> fixed_index(const isl::map& piece, int d) {
   if (!is_single_valued(constant)) return std::nullopt;
   isl::pw_aff value = *function_of(constant);
   if (pieces_of(value) != 1) return std::nullopt;
-  // Without the conditions on parameters under which the piece has points at all.
+  // Drops the conditions on parameters under which the piece has points.
   isl::pw_aff total;
   value.foreach_piece([&](isl::set, isl::multi_aff a) { total = isl::pw_aff(a.at(0)); });
   return total;
@@ -124,7 +123,7 @@ std::vector<isl::map> split_pieces(const GroupRelation& relation) {
   }
   std::vector<isl::map> result;
   for (const Part& part : parts) {
-    // A union of disjoint sets (x < 0 or x >= n) is cheaper as two boxes.
+    // Two boxes are cheaper than a union of disjoint sets such as x < 0 or x >= n.
     isl_set* disjoint = isl_set_make_disjoint(part.where.copy());
     isl::set sets = coalesced(isl::manage(disjoint));
     isl::map values = relation.values_of(part.indices);
@@ -134,18 +133,18 @@ std::vector<isl::map> split_pieces(const GroupRelation& relation) {
   return result;
 }
 
-// Whether the places that are read are the same sums all over the domain. Where they are not,
-// every vector of the interior would choose between those of the borders.
+// Whether the indices are the same expressions over the whole domain. Otherwise every vector of the interior would
+// select between its own indices and those of a border.
 bool in_one_piece(const FibrePlan& plan) {
   return std::ranges::all_of(plan.coordinates,
                              [](const FibreCoordinate& c) { return pieces_of(c.value) == 1; });
 }
 
-// The relation split where the indices' pieces differ, or whole where that costs little.
+// Splits the relation where the indices have different pieces; keeps it whole if that costs little.
 std::vector<isl::map> choose_pieces(GroupRelation& relation) {
   isl::map whole = coalesced(relation.values_of(relation.affine).intersect_domain(relation.domain));
   std::vector<isl::map> split = split_pieces(relation);
-  if (split.empty()) return {};  // no point of the stage reads anything
+  if (split.empty()) return {};  // the stage reads no element
   if (split.size() == 1) return {whole};
   FibrePlan all = relation.plan(whole);
   if (all.free_vars.empty()) return {whole};
@@ -166,7 +165,7 @@ isl::pw_aff element_dim(const isl::set& space, int d) {
   isl_local_space* local = isl_local_space_from_space(isl_set_get_space(space.get()));
   return isl::manage(isl_pw_aff_var_on_domain(local, isl_dim_set, static_cast<unsigned>(d)));
 }
-// The function on a space with more inputs at the end.
+// The same function on a space with more inputs at the end.
 isl::pw_aff pad(const isl::pw_aff& e, const isl::set& space) {
   int have = isl_pw_aff_dim(e.get(), isl_dim_in), want = isl_set_dim(space.get(), isl_dim_set);
   return isl::manage(isl_pw_aff_insert_dims(e.copy(), isl_dim_in, static_cast<unsigned>(have),
@@ -178,7 +177,7 @@ isl::pw_aff constant_on(const isl::set& space, const isl::pw_aff& e) {
   return pad(isl::manage(isl_pw_aff_drop_dims(e.copy(), isl_dim_in, 0, have)), space);
 }
 
-// One piece in terms of the elements that it reads.
+// Expresses one piece in terms of the elements that it reads.
 class PieceExpressions {
  public:
   PieceExpressions(GroupRelation& relation, const isl::map& piece)
@@ -205,7 +204,7 @@ class PieceExpressions {
   }
 
  private:
-  // y: names of elements, or the fixed index.
+  // y: the names of elements, or fixed indices.
   std::vector<Expr> element_names(GroupPiece& g) {
     for (int d = 0; d < r_.index_count(); ++d) {
       auto fixed = fixed_index(piece_, d);
@@ -220,15 +219,15 @@ class PieceExpressions {
     isl::set context = rho_box().intersect(fixed_elements());
     isl::set needed = coalesced(plan_.valid.gist(context));
     needed = isl::manage(isl_set_gist_params(needed.release(), assumed().release()));
-    // Coalescing leaves unions that are one basic set all the same.
+    // Coalescing leaves some unions that equal a single basic set.
     isl::set hull = isl::manage(isl_set_from_basic_set(isl_set_simple_hull(needed.copy())));
     if (hull.is_equal(needed)) needed = hull;
     if (isl_set_plain_is_universe(needed.get()) != isl_bool_true)
       g.predicate.push_back(r_.bridge.to_expr(needed, names));
   }
 
-  // What holds wherever a gather adds anything: the adjoints that it reads are 0 where a stage's
-  // pure variables have no value. A reduction domain may be empty, and what is read is not 0 then.
+  // Constraints that hold wherever a gather adds a nonzero term: adjoints are 0 outside of the stage's pure variables.
+  // They are not assumed of reduction variables: a reduction domain may be empty while the adjoint read is not 0.
   isl::set assumed() const {
     isl::set pure = r_.not_empty;
     for (size_t i = 0; i < r_.group.vars.size(); ++i) {
@@ -274,10 +273,9 @@ class PieceExpressions {
     return result;
   }
 
-  // Where the predicate is false the point found may lie outside the domain, and what is read there
-  // outside of buffers: it is clamped into the domain, unless interval arithmetic, which is what
-  // bounds inference will use, shows that it is inside for every element. Where bounds are
-  // constants the simplifier drops these clamps again.
+  // Where the predicate is false, the iteration may lie outside of the domain, and its reads outside of buffers. It is
+  // clamped into the domain unless interval arithmetic, as bounds inference uses it, proves it inside for every
+  // element. If bounds are constant, the simplifier drops these clamps again.
   void protect(GroupPiece& g) const {
     Scope<Interval> scope;
     for (int d : r_.group.dims) scope.push(element_name(d), Interval::everything());
@@ -293,7 +291,7 @@ class PieceExpressions {
       bool below = !v.max.defined() || (range.max.defined() && can_prove(range.max <= v.max));
       if (above && below) continue;
       e = likely(e);
-      // The first point of a domain whose run-time extent may be 0: its last one lies before it.
+      // The extent may be 0 at run time; the last point of an empty domain then lies before its first.
       const bool may_be_empty = v.min.defined() && v.max.defined() && !can_prove(v.min <= v.max);
       if (v.min.defined() && !may_be_empty) e = max(e, v.min);
       if (v.max.defined()) e = min(e, v.max);

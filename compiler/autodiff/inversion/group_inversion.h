@@ -1,4 +1,4 @@
-// Inversion of one group of linked indices; see access_inversion.h for the whole.
+// group_inversion.h -- inverts one group of linked indices; access_inversion.h explains the inversion as a whole.
 #pragma once
 
 #include <string>
@@ -8,17 +8,17 @@
 
 namespace retrograde::autodiff {
 
-// One way in which the elements of a group's dimensions are read.
+// One piece of the inverted relation, for the dimensions of a group.
 struct GroupPiece {
   struct FreeVariable {
     int var;  // position in the group's domain
     Expr extent;
   };
-  std::vector<Expr> lhs;  // one a dimension of the group: element_name(d), or a fixed index
+  std::vector<Expr> lhs;  // for each dimension of the group: element_name(d), or a fixed index
   std::vector<bool> pure;
   std::vector<FreeVariable> free;
   Substitution
-      iteration;  // over element_name, rho_name and, inside parameters, other stage variables
+      iteration;  // in terms of element_name, rho_name and, inside parameters, other stage variables
   std::vector<Expr> predicate;
 };
 
@@ -26,19 +26,18 @@ struct GroupPiece {
 std::string element_name(int d);
 std::string rho_name(const std::string& stage_var);
 
-// Stage variables and target dimensions that are linked through indices or predicates. Groups are
-// inverted apart: borders of x and of y never multiply into one union, and isl works on small
-// spaces.
+// Stage variables and target dimensions that are linked through indices or predicates. Each group is inverted
+// separately, so borders of x and of y are not multiplied into one union, and isl works on small spaces.
 struct Group {
-  std::vector<int> dims;      // of the target
-  std::vector<Expr> indices;  // one a dim
+  std::vector<int> dims;      // dimensions of the target
+  std::vector<Expr> indices;  // for each of dims
   std::vector<LoopVariable> vars;
   std::vector<Expr> predicate;       // conjuncts
-  std::vector<LoopVariable> region;  // one a dim, or empty
+  std::vector<LoopVariable> region;  // for each of dims, or empty
 };
 
-// Every point of the group's domain is in exactly one piece. `fixed`: sub-expressions that are
-// parameters. `operations`: see AccessQuery.
+// Inverts the group; every point of its domain is in exactly one piece. `fixed` has the subexpressions that are
+// parameters; `operations` as in AccessQuery.
 std::vector<GroupPiece> invert_group(const Group& group, const std::vector<Expr>& fixed,
                                      unsigned long operations);
 

@@ -58,10 +58,10 @@ bool IslBridge::mentions_dim(const Expr& e) const {
 
 namespace {
 
-// Sums and products of such integers are taken modulo a power of two, which isl's are not.
+// Whether arithmetic of the type wraps modulo a power of two, which that of isl does not.
 bool wraps(Type t) { return !t.is_int() || t.bits() < 32; }
 
-// Parameters come back as int32, of which wider data have no counterpart.
+// Whether the type is too wide: parameters are converted back as int32, which cannot hold wider data.
 bool is_wide(Type t) { return t.bits() > 32 || (t.is_uint() && t.bits() == 32); }
 bool has_wide_data(const Expr& e) {
   return any_node(e, [&](const Expr& node) {
@@ -71,7 +71,7 @@ bool has_wide_data(const Expr& e) {
   });
 }
 
-// Whether numbers of such operands are those of isl.
+// Whether isl represents numbers of the operands' type.
 bool is_followed(const Binary& comparison) {
   const Type t = comparison.a.type();
   if (is_wide(t)) return t.is_int() && !has_wide_data(comparison.a) && !has_wide_data(comparison.b);
@@ -86,7 +86,7 @@ std::optional<isl::pw_aff> IslBridge::obstacle(const Expr& e) {
   return std::nullopt;
 }
 
-// A condition that isl does not follow: a parameter, 0 or 1, where its value is known to be fixed.
+// A condition that isl cannot represent: a parameter, 0 or 1, if its value is known to be fixed.
 std::optional<isl::set> IslBridge::opaque(const Expr& e) {
   if (fixed_.contains(e)) return parameter(e).ge_set(constant(1));
   obstacles_.insert(e);
@@ -128,7 +128,7 @@ std::optional<isl::pw_aff> IslBridge::binary(const Binary& b, const Expr& e) {
   }
 }
 
-// int(abs(a)) and int(absd(a, b)): the unsigned value in between is converted back.
+// int(abs(a)) and int(absd(a, b)): the unsigned intermediate value is converted back.
 std::optional<isl::pw_aff> IslBridge::absolute(const Cast& c) {
   const auto* call = as_op(c.value, Op::abs, Op::absd);
   if (!call) return std::nullopt;
@@ -150,7 +150,7 @@ std::optional<isl::pw_aff> IslBridge::bits(const Call& c, const Expr& e) {
   if (!(shifts || c.is_op(Op::bitwise_and)) || !e.type().is_int() || e.type().bits() < 32)
     return obstacle(e);
   const std::optional<int64_t> amount = as_const_int(c.args[1]);
-  constexpr int64_t largest = int64_t{1} << 30;  // power of two in an int32
+  constexpr int64_t largest = int64_t{1} << 30;  // largest power of two in an int32
   if (!amount || *amount < 0 || *amount >= largest || (shifts && *amount > 30)) return obstacle(e);
   const int64_t power = shifts ? int64_t{1} << *amount : *amount + 1;
   if ((power & (power - 1)) != 0) return obstacle(e);
@@ -199,7 +199,7 @@ std::optional<isl::pw_aff> IslBridge::affine_form(const Expr& e) {
 
 namespace {
 
-// Nodes of the tree, shared parts counted each time, up to `most`.
+// The number of nodes of the expression as a tree, up to `most`; shared nodes count each time.
 int tree_size(const Expr& e, int most) {
   int size = 1;
   for_each_child(e, [&](const Expr& child) {
@@ -207,8 +207,8 @@ int tree_size(const Expr& e, int most) {
   });
   return size;
 }
-// From here on a bound has pieces as a rule, or floors in floors, as those of a pyramid's levels:
-// what isl would find out about it is not worth the time.
+// A bound of at least this size mostly has pieces, or nested floors as those of pyramid levels. What isl would derive
+// from it is not worth the time.
 constexpr int large_bound = 40;
 
 }  // namespace
@@ -280,14 +280,14 @@ int64_t to_int(__isl_take isl_val* v) {
   return result;
 }
 
-// As isl's C functions call a lambda for each of what they take apart.
+// The callback through which isl's C functions call a lambda for each part.
 template <class Visit, class... Parts>
 isl_stat visit_each(Parts*... parts, void* visit) {
   (*static_cast<Visit*>(visit))(parts...);
   return isl_stat_ok;
 }
 
-// Sums with positive terms first, so that differences print as differences.
+// Builds sums with positive terms first, so that differences print as differences.
 class SumBuilder {
  public:
   void add(const Expr& term, int64_t coefficient) {
@@ -392,7 +392,7 @@ class IslToExpr {
     std::vector<Expr> terms;
     auto collect = [&](isl_constraint* c) {
       isl_aff* a = isl_constraint_get_aff(c);
-      // The divs' own defining inequalities say nothing new.
+      // Constraints that only define a div add no information.
       if (!isl_constraint_is_div_constraint(c)) {
         terms.push_back(isl_constraint_is_equality(c) ? equality(a) : inequality(a));
       }
@@ -403,7 +403,7 @@ class IslToExpr {
     return conjunction(terms);
   }
 
-  // a == 0, written with the terms on the side where they are positive.
+  // a == 0, written with each term on the side where it is positive.
   Expr equality(__isl_keep isl_aff* a) const { return balance(a, Kind::EQ); }
   Expr inequality(__isl_keep isl_aff* a) const { return balance(a, Kind::GE); }
   Expr balance(__isl_keep isl_aff* a, Kind kind) const {

@@ -1,8 +1,7 @@
-// Expressions to isl and back.
+// isl_bridge.h -- converts expressions to isl objects and back.
 //
-// A space is a tuple of named integer dimensions (loop variables) and parameters. Sub-expressions
-// that isl cannot follow and that mention no dimension become parameters: they are the same for
-// every point of the set.
+// A space is a tuple of named integer dimensions (loop variables) and parameters. Subexpressions that isl cannot
+// represent and that contain no dimension become parameters: they are the same for every point of the set.
 #pragma once
 
 #include <isl/cpp.h>
@@ -31,12 +30,12 @@ struct IslContext {
   isl_ctx* ctx;
 };
 
-// Throws what isl failed by. Its C functions report a failure, the end of the budget as a rule, by
-// a value that passes for an answer, or by stopping half-way through a loop over pieces.
+// Throws the last error of isl. isl's C functions report a failure, mostly an exceeded budget, through a return value
+// that can be mistaken for an answer, or by stopping half-way through a loop over pieces.
 void throw_if_failed(isl_ctx* ctx);
 
-// What `search` gives, for at most so many operations; nullopt when it takes more. The others of the
-// context count from 0 again.
+// Returns the result of `search` with a budget of `operations`; nullopt if it is exceeded. Afterwards the context's own
+// budget starts again from 0.
 template <class Search>
 auto found_within(isl_ctx* ctx, unsigned long operations, const Search& search) {
   throw_if_failed(ctx);
@@ -56,9 +55,9 @@ auto found_within(isl_ctx* ctx, unsigned long operations, const Search& search) 
   return result;
 }
 
-// The same with fewer pieces: those that are one are joined. isl 0.25 reads through the null pointers
-// that a failure within coalesce leaves, so it is not cut short by the budget, and gets no pieces of
-// sets and maps that hold rational points, but no integer ones.
+// The same set with fewer pieces: pieces that form one are merged. isl 0.25 dereferences the null pointers that a
+// failure within coalesce leaves. So no budget applies here, and equalities are detected first, which removes pieces of
+// sets and maps that contain rational but no integer points.
 template <class Pieces>
 Pieces coalesced(const Pieces& pieces) {
   isl_ctx* const ctx = pieces.ctx().get();
@@ -74,26 +73,26 @@ Pieces coalesced(const Pieces& pieces) {
 
 class IslBridge {
  public:
-  // Dimensions in tuple order.
+  // `dims` are in tuple order.
   IslBridge(IslContext& context, std::vector<std::string> dims);
 
-  // The same parameters over another tuple. Parameters met later are not shared.
+  // The same parameters over another tuple. Parameters that are added later are not shared.
   IslBridge with_dims(std::vector<std::string> dims) const;
 
   isl::set universe() const { return universe_; }
   isl_ctx* ctx() const { return ctx_; }
   int rank() const { return static_cast<int>(dims_.size()); }
 
-  // nullopt when `e` is not quasi-affine; what stood in the way is added to `obstacles()`.
+  // Returns nullopt if `e` is not quasi-affine, and adds the cause to `obstacles()`.
   std::optional<isl::pw_aff> affine(const Expr& e);
   std::optional<isl::set> condition(const Expr& e);
-  // `e` as one parameter unless it is affine without pieces: bounds of loops should not split sets.
+  // `e` as one parameter, unless it is affine in a single piece: bounds of loops should not split sets.
   isl::pw_aff bound(const Expr& e);
   isl::pw_aff dim(int position) const;
-  // Where each of the dimensions is in its range.
+  // For each dimension, the set in which it is in its range.
   std::vector<isl::set> ranges_of(const std::vector<LoopVariable>& dims);
 
-  // A sub-expression over the dimensions whose value is known to be fixed: from now on a parameter.
+  // Declares that a subexpression over the dimensions has a fixed value, so that it becomes a parameter.
   void make_parameter(const Expr& e) {
     fixed_.insert(e);
     known_.clear();
@@ -101,14 +100,13 @@ class IslBridge {
   const std::set<Expr, StructuralLess>& obstacles() const { return obstacles_; }
   void clear_obstacles() {
     obstacles_.clear();
-    known_.clear();  // those without an affine form are to be noted again
+    known_.clear();  // so that expressions without an affine form are reported again
   }
 
-  // Back. `names` gives an expression for each dimension of the space at hand (sets and domains of
-  // pw_affs).
+  // Converts back to expressions. `names` has an expression for each dimension of the set, or of the pw_aff's domain.
   Expr to_expr(const isl::pw_aff& e, const std::vector<Expr>& names) const;
   Expr to_expr(const isl::set& s, const std::vector<Expr>& names) const;  // true for the universe
-  // An expression over the parameters only (a pw_aff without dimensions).
+  // Converts a pw_aff without dimensions, whose expression has parameters only.
   Expr to_expr(const isl::pw_aff& e) const { return to_expr(e, {}); }
   const std::map<std::string, Expr>& parameters() const { return parameters_; }
 
@@ -131,7 +129,7 @@ class IslBridge {
   std::map<Expr, std::string, StructuralLess> parameter_names_;
   std::map<std::string, Expr> parameters_;
   std::set<Expr, StructuralLess> fixed_, obstacles_;
-  NodeMemo<std::optional<isl::pw_aff>> known_;  // of nodes seen: expressions share them
+  NodeMemo<std::optional<isl::pw_aff>> known_;  // by node: expressions share nodes
 };
 
 }  // namespace retrograde::autodiff

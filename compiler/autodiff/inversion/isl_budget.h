@@ -1,9 +1,9 @@
-// Work that isl may do.
+// isl_budget.h -- the budget of isl operations.
 #pragma once
 
 namespace retrograde::autodiff {
 
-// Operations in one context; beyond them, isl::exception_quota. A million take about a second.
+// The budget of one context; exceeding it throws isl::exception_quota. A million operations take about a second.
 inline constexpr unsigned long isl_operations = 20'000'000;
 
 }  // namespace retrograde::autodiff

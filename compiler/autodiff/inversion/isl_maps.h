@@ -1,11 +1,11 @@
-// Small steps on isl maps between flat, anonymous tuples.
+// isl_maps.h -- small operations on isl maps between flat, anonymous tuples.
 #pragma once
 
 #include <isl/cpp.h>
 
 namespace retrograde::autodiff {
 
-// All pairs of tuples of such lengths, and none of them.
+// The maps of all pairs, and of no pair, of tuples of these lengths.
 isl::map universe_map(isl_ctx* ctx, size_t in, size_t out);
 isl::map empty_map(isl_ctx* ctx, size_t in, size_t out);
 // The map with output `which` alone.

@@ -8,8 +8,8 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Pieces that overlap are cut before their points are counted, which may take longer than any table
-// of points is worth.
+// Overlapping pieces are made disjoint before their points are counted. That may take longer than any table of points
+// is worth, so it has a budget.
 constexpr unsigned long enumerating_operations = 1'000'000;
 
 using Points = std::vector<std::vector<int64_t>>;
@@ -24,7 +24,7 @@ isl_stat collect(__isl_take isl_point* p, void* user) {
   std::vector<int64_t> point;
   for (int d = 0; d < into.dims; ++d) {
     isl_val* v = isl_point_get_coordinate_val(p, isl_dim_set, d);
-    point.push_back(isl_val_get_num_si(v));  // of no value 0, and the failure is on record
+    point.push_back(isl_val_get_num_si(v));  // 0 without a value; isl then records the failure
     isl_val_free(v);
   }
   isl_point_free(p);

@@ -1,4 +1,4 @@
-// Extents and elements of isl sets of integer tuples without parameters.
+// isl_points.h -- ranges and elements of isl sets of integer tuples without parameters.
 #pragma once
 
 #include <isl/cpp.h>
@@ -11,11 +11,10 @@
 
 namespace retrograde::autodiff {
 
-// Least and largest of each coordinate; nullopt when one has no bound, or the set is empty.
+// The smallest and largest value of each coordinate; nullopt if one is unbounded, or if the set is empty.
 std::optional<std::vector<ConstantRange>> ranges_of(const isl::set& s);
 
-// All elements in lexicographic order; nullopt when there are more than `most`, or they take too
-// long to find.
+// All elements in lexicographic order; nullopt if there are more than `most` or finding them takes too long.
 std::optional<std::vector<std::vector<int64_t>>> points_of(const isl::set& s, int64_t most);
 
 }  // namespace retrograde::autodiff

@@ -43,7 +43,7 @@ class Narrower {
     }
     return false;
   }
-  // Of c * r + rest >= 0; undefined where the rest is not the same for the whole loop.
+  // The end of r in c * r + rest >= 0; undefined if the rest varies within the loop.
   Expr end_of(const Sum& form, const ReductionVariable& r, int64_t c) const {
     Expr end = to_expr(times(plus(form, linear_sum(variable(r.var), c), -1), -c));
     return !end.defined() || uses_any_variable(end, variables_) || depends_on_data(end) ? Expr()
@@ -60,7 +60,7 @@ class Narrower {
   }
 
   Gather& g_;
-  std::unordered_set<std::string> variables_;  // that a loop's ends may not mention
+  std::unordered_set<std::string> variables_;  // not allowed in the bounds of a loop
 };
 
 }  // namespace

@@ -1,18 +1,18 @@
-// Conditions on one reduction variable become the ends of its range.
+// narrow_reductions.h -- turns conditions on one reduction variable of a gather into the bounds of its loop.
 //
 //   rho in [0, n) where rho < m && p     =>     rho in [0, min(n, m)) where p
 //
-// A border of run-time size is such a gather: the elements beyond a clamp's end. Loops that are
-// trimmed later (lower/trim_loops) say the same, but not those that are split into lanes and parts
-// first, as the sums of few elements are: they ran over all of the domain.
+// A border of run-time size is such a gather: it sums the elements beyond the end of a clamp. lower/trim_loops has the
+// same effect later, but not for loops that are first split into lanes and parts, as those of sums of few elements are.
+// Without this pass these loops run over the whole domain.
 #pragma once
 
 #include "autodiff/inversion/access_inversion.h"
 
 namespace retrograde::autodiff {
 
-// In place: the gather's reduction domain must be its own. Constant extents stay: their loops are
-// unrolled, with their conditions.
+// Modifies the gather in place; the gather must own its reduction domain. Constant extents stay, because such loops are
+// unrolled together with their conditions.
 void narrow_reductions(Gather& g, const std::vector<std::string>& target_args);
 
 }  // namespace retrograde::autodiff

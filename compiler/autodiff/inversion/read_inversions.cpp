@@ -16,7 +16,7 @@ bool chooses(const Expr& index) {
                   [&](const Expr& e) { return e.as<Min>() || e.as<Max>() || e.as<Select>(); });
 }
 
-// Where the adjoint may be other than 0; undefined: not known.
+// The condition under which the adjoint may be nonzero; undefined if unknown.
 Expr where_it_counts(const Expr& adjoint) {
   const auto* selection = adjoint.as<Select>();
   if (!selection) return {};
@@ -24,7 +24,7 @@ Expr where_it_counts(const Expr& adjoint) {
   return is_zero(selection->when_false) ? selection->condition : Expr();
 }
 
-// All that the inversion depends on.
+// A key of all inputs of the inversion.
 std::string text_of(const AccessQuery& query) {
   std::string text;
   const auto add = [&](const Expr& e) { text += (e.defined() ? ir::print(e) : "_") + ","; };
@@ -56,7 +56,7 @@ const Inversion& ReadInversions::of(const FuncContents& f, const Symbol& symbol,
   return selected ? *selected : find(f, symbol, query);
 }
 
-// Null: no such thing.
+// Null if ignoring the unselected part does not help.
 const Inversion* ReadInversions::where_selected(const FuncContents& f, const Symbol& symbol,
                                                 AccessQuery query, const Expr& adjoint) {
   if (std::ranges::none_of(query.indices, chooses)) return nullptr;

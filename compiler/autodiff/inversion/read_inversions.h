@@ -1,5 +1,6 @@
-// The inversions of a program's reads, each found once: accesses of one stage often share their
-// indices, and an inversion is the expensive part of a contribution.
+// read_inversions.h -- caches the inversions of a program's reads.
+//
+// Accesses of one stage often share their indices, and an inversion is the expensive part of a contribution.
 #pragma once
 
 #include <map>
@@ -12,9 +13,9 @@ namespace retrograde::autodiff {
 
 class ReadInversions {
  public:
-  // Of a read of `symbol` in a stage of f, which contributes `adjoint` to it. Where a selection
-  // makes the adjoint 0, the read does not count, if that turns the many pieces of a clamped read
-  // into one: select(x < 0 || x > 9, 0, a(clamp(x, 0, 9))).
+  // The inversion of a read of `symbol` in a stage of f, which contributes `adjoint` to it. Where a select makes the
+  // adjoint 0, the read is ignored if that turns the many pieces of a clamped read into one: select(x < 0 || x > 9, 0,
+  // a(clamp(x, 0, 9))).
   const Inversion& of(const FuncContents& f, const Symbol& symbol, const AccessQuery& query,
                       const Expr& adjoint);
 
@@ -23,10 +24,10 @@ class ReadInversions {
                                   const Expr& adjoint);
   const Inversion& find(const FuncContents& f, const Symbol& symbol, const AccessQuery& query);
   std::map<std::string, Inversion> found_;
-  // By all that they depend on: the steps of a loop that is written out read in the same way. Not
-  // those with reduction domains, which are of one adjoint each.
+  // Inversions without reduction domains, keyed by all their inputs: the steps of an unrolled loop have equal reads.
+  // Inversions with reduction domains are not shared, because each adjoint needs a domain of its own.
   std::map<std::string, Inversion> without_domains_;
-  unsigned long operations_ = worthwhile_operations;  // for the next
+  unsigned long operations_ = worthwhile_operations;  // budget of the next search
 };
 
 }  // namespace retrograde::autodiff

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <unordered_map>
 
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
@@ -35,7 +35,7 @@ class Lifter {
   }
 
   void lift(const FuncPtr& f) {
-    // The pattern of derivatives, which is found before, refuses extern stages.
+    // The pattern of derivatives, which is computed earlier, refuses extern stages.
     if (f->is_extern()) internal_error("an extern stage lies on the way of several seeds");
     const FuncPtr result = make_func(Role::Coloured, f->name + "_by_colour", f->name);
     if (f->made) result->made->traits = f->made->traits;

@@ -10,10 +10,10 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Patterns that are looked at entry by entry.
+// The most entries of a pattern that is examined entry by entry.
 constexpr int64_t many_entries = 20'000;
 
-// Elements of a box by number, dimension 0 innermost.
+// Numbers the elements of a box, dimension 0 innermost.
 struct Numbering {
   std::vector<ConstantRange> ranges;
   int64_t size() const {
@@ -45,7 +45,7 @@ Buffer<int> table_over(const Numbering& box, const std::vector<int64_t>& more) {
   return result;
 }
 
-// At the nearest element.
+// Reads the nearest element of the table.
 Expr read(const Buffer<int>& table, const std::vector<Expr>& at) {
   std::vector<Expr> place;
   for (size_t d = 0; d < at.size(); ++d) {
@@ -103,7 +103,7 @@ void add_alone(ColourTable& table, const Numbering& box, const Adjacency& graph,
   int* alone = table.alone.data();
   size_t n = graph.size();
   for (size_t i = 0; i < n; ++i) {
-    // Its own colour: no neighbour has it.
+    // The diagonal entry: no neighbour has the vertex's own colour.
     alone[i + static_cast<size_t>(colours.of[i]) * n] = 1;
     for (int j : graph[i]) {
       auto c = static_cast<size_t>(colours.of[static_cast<size_t>(j)]);

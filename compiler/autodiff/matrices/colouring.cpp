@@ -8,7 +8,7 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Steps that the search may take before it settles for fewer ties between dimensions.
+// The budget of the search in steps; beyond it the search fails.
 constexpr int64_t many_steps = 20'000'000;
 
 int64_t modulo(int64_t a, int64_t n) { return ((a % n) + n) % n; }
@@ -22,13 +22,13 @@ class Search {
   explicit Search(const std::vector<std::vector<int64_t>>& differences) {
     for (const auto& d : differences) {
       if (is_zero(d)) continue;
-      // d and -d say the same.
+      // d and -d are equivalent.
       auto first = std::ranges::find_if(d, [](int64_t c) { return c != 0; });
       if (*first > 0) differences_.push_back(d);
     }
   }
 
-  // The factors for n colours, in lexicographic order; false when there are none.
+  // Finds the first factors for n colours, in lexicographic order; false if there are none.
   bool find(int64_t n, Colouring& result) {
     result.count = n;
     std::ranges::fill(result.factors, 0);
@@ -47,7 +47,7 @@ class Search {
     }
     return true;
   }
-  // In one dimension no other factor is better than 1.
+  // In one dimension no factor is better than 1.
   static bool next(Colouring& c) {
     int64_t end = c.factors.size() == 1 ? std::min<int64_t>(c.count, 2) : c.count;
     for (int64_t& k : c.factors) {
@@ -66,7 +66,7 @@ Expr Colouring::of(const std::vector<Expr>& element) const {
   Expr n = make_const(Int(32), count), sum = make_zero(Int(32));
   for (size_t d = 0; d < factors.size(); ++d) {
     if (factors[d] == 0) continue;
-    // The remainder first: a product of two numbers below `count` does not overflow.
+    // Takes the remainder first: a product of two numbers below `count` does not overflow.
     Expr term = binary(Kind::Mod, element[d], n);
     sum = sum + (factors[d] == 1 ? term : term * make_const(Int(32), factors[d]));
   }

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "autodiff/matrices/colour_dimension.h"
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
@@ -15,13 +15,13 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Colours that are still a small dense matrix.
+// Up to this many colours the matrix counts as small and dense.
 constexpr int64_t many_colours = 4096;
-// So few that a better colouring gains little.
+// With so few colours a better colouring gains little.
 constexpr int64_t few_colours = 3;
-// Differences that are looked at one by one.
+// The most differences that are examined one by one.
 constexpr int64_t many_differences = 100'000;
-// Of isl, to leave a condition out that costs little.
+// The isl budget of a simplification that saves little: dropping a condition.
 constexpr unsigned long covering_operations = 200'000;
 
 int64_t product(const std::vector<int64_t>& factors) {
@@ -33,7 +33,7 @@ int64_t product(const std::vector<int64_t>& factors) {
   return result;
 }
 
-// Unsupported where isl gives up.
+// Throws Unsupported if isl exceeds its budget.
 template <class Search>
 auto found_or_refused(const CompressionQuery& query, const Search& search) {
   try {
@@ -63,7 +63,7 @@ std::unique_ptr<Compressed> Compressed::make(const CompressionQuery& query) {
   });
 }
 
-// What is asked of the pattern later has all the operations to itself.
+// Each later query of the pattern has the whole budget.
 template <class Search>
 auto Compressed::searched(const Search& search) const {
   isl_ctx_reset_operations(dependence_->context().ctx);
@@ -77,8 +77,8 @@ std::optional<Colours> Compressed::colour() const {
       (query_.diagonal_only ? pattern_ : pattern_.reverse().apply_range(pattern_)).deltas();
   int64_t most = query_.most_colours > 0 ? query_.most_colours : many_colours;
   std::optional<Colouring> linear = linear_colours(coalesced(differences), most);
-  // Irregular patterns of a few elements; tables cost more than they save for the others. For the
-  // diagonal it is enough that neighbours differ, whether M is symmetric or not.
+  // Tables are for irregular patterns of few elements; for others they cost more than they save. For the diagonal it
+  // suffices that neighbours differ, whether or not M is symmetric.
   if (!linear || linear->count > few_colours) {
     if (auto table = colour_table(pattern_, query_.symmetric || query_.diagonal_only,
                                   linear ? linear->count : most + 1))
@@ -115,7 +115,7 @@ std::optional<Colouring> Compressed::linear_colours(const isl::set& differences,
   std::optional<Colouring> found;
   if (auto points =
           points_of(differences, all_differences > many_differences ? 0 : many_differences)) {
-    // Every difference in a box: the elements of a box conflict each with each.
+    // If all differences of a box occur, all pairs of elements conflict.
     bool is_box = static_cast<int64_t>(points->size()) == all_differences;
     if (!is_box) found = smallest_colouring(*points, extents.size(), std::min(most, enough));
   }
@@ -123,7 +123,7 @@ std::optional<Colouring> Compressed::linear_colours(const isl::set& differences,
   return found;
 }
 
-// 1 for elements of the colour. Those outside of the columns took no part in the pattern.
+// 1 for elements of the colour. Elements outside of the columns are not part of the pattern.
 Expr Compressed::seed_value(const std::vector<Expr>& column, const Expr& colour) const {
   Type type = query_.seed->types[0];
   Expr condition = colours_.of(column) == colour;
@@ -163,7 +163,7 @@ Expr Compressed::may_be_nonzero(const std::vector<Expr>& row,
   });
 }
 
-// A star colouring finds an entry in its own row, or that of its transpose in the other.
+// A star colouring determines an entry from its own row, or from its transpose in the other row.
 Expr Compressed::entry(const FuncPtr& all, const std::vector<Expr>& row,
                        const std::vector<Expr>& column, int k) const {
   auto at = [&](std::vector<Expr> place, const std::vector<Expr>& other) {

@@ -1,5 +1,6 @@
-// compressed -- the pattern of a linear pipeline's matrix, colours for its columns, and the
-// pipeline evaluated for all colours: what jacobian.h is made of.
+// compressed.h -- evaluates the matrix of a linear pipeline in compressed form; the basis of jacobian.h.
+//
+// It finds the matrix's pattern, colours the columns, and evaluates the pipeline for all colours:
 //
 //   out(y) = sum_x M(y, x) seed(x)      =>      all(y, c) = sum of M(y, x) over x of colour c
 #pragma once
@@ -15,30 +16,31 @@
 namespace retrograde::autodiff {
 
 struct CompressionQuery {
-  FuncPtr output, seed;        // of the linear pipeline
-  Box rows, columns;           // elements of the output and of the seed that count
-  bool diagonal_only = false;  // entries (x, x) alone are wanted; rows and columns have one shape
+  FuncPtr output, seed;        // output and input of the linear pipeline
+  Box rows, columns;           // relevant elements of the output and of the seed
+  bool diagonal_only = false;  // only entries (x, x) are wanted; rows and columns have one shape
   bool symmetric = false;      // M equals its transpose
-  int64_t most_colours = 0;    // 0: any number
-  unsigned long operations = isl_operations;  // of isl, in a part of the search for the pattern
+  int64_t most_colours = 0;    // 0: no limit
+  unsigned long operations =
+      isl_operations;  // isl budget for each part of the search for the pattern
 };
 
 class Compressed {
  public:
-  // Null when more than `most_colours` are needed. Unsupported where the pattern has no bounds,
-  // needs too many colours, or takes too long to find.
+  // Returns null if more than `most_colours` are needed. Throws Unsupported if the pattern has no bounds, needs too
+  // many colours, or takes too long to find.
   static std::unique_ptr<Compressed> make(const CompressionQuery& query);
 
   const Colours& colours() const { return colours_; }
-  // The Func `all` above, made at each call; null: M is zero.
+  // Builds the Func `all` above, a new one in each call; null if M is zero.
   FuncPtr evaluate() const;
-  // M(row, column), with `all` from evaluate(), where it may be nonzero; value k of a Tuple.
+  // M(row, column), value k of a Tuple, where it may be nonzero. `all` comes from evaluate().
   Expr entry(const FuncPtr& all, const std::vector<Expr>& row, const std::vector<Expr>& column,
              int k) const;
-  // Whether M(y, x) may be other than 0.
+  // Whether M(y, x) may be nonzero.
   Expr may_be_nonzero(const std::vector<Expr>& row, const std::vector<Expr>& column) const;
-  // Least and largest x - y of entries, one a dimension; nullopt where they have no bounds, or rows
-  // and columns differ in dimensions.
+  // The least and largest x - y of entries for each dimension; nullopt if they are unbounded, or if rows and columns
+  // differ in dimensions.
   std::optional<std::vector<ConstantRange>> offsets() const;
 
  private:

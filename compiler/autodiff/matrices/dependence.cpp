@@ -17,16 +17,16 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Beyond so many pieces a relation becomes its hull, and beyond so many conditions those inside of
-// others do not count: both stay supersets.
+// A relation with more pieces is replaced by its hull; conditions beyond the limit are ignored inside of others. Both
+// keep a superset.
 constexpr int many_pieces = 24;
 constexpr size_t many_conditions = 64;
-// Each piece is compared with each other, to find those that are one.
+// Coalescing compares every pair of pieces, so it is skipped beyond this number.
 constexpr int most_compared = 64;
 
 unsigned size_of(size_t n) { return static_cast<unsigned>(n); }
 
-// For any value of the parameters.
+// Projects out the parameters.
 isl::map without_parameters(const isl::map& m) {
   return isl::manage(isl_map_project_out(m.copy(), isl_dim_param, 0,
                                          size_of(isl_map_dim(m.get(), isl_dim_param))));
@@ -36,19 +36,20 @@ isl::map hull_of(const isl::map& m) {
   return isl::manage(isl_map_from_basic_map(isl_map_simple_hull(m.copy())));
 }
 
-// Few pieces, which together hold the same, or more.
+// Reduces the number of pieces; the result is the same set or a superset.
 isl::map tidy(const isl::map& m) {
   const int pieces = isl_map_n_basic_map(m.get());
   if (pieces <= 1) return m;
   const isl::map result = pieces <= most_compared ? coalesced(m) : m;
-  isl_ctx_reset_operations(isl_map_get_ctx(m.get()));  // what is economy does not count
+  isl_ctx_reset_operations(
+      isl_map_get_ctx(m.get()));  // simplification does not count against the budget
   return isl_map_n_basic_map(result.get()) <= many_pieces ? result : hull_of(m);
 }
 
-// One read, with the conditions under which it counts.
+// One read, with the conditions under which it happens.
 struct Read {
   const Call* call;
-  std::optional<isl::set> where;  // over the loop variables of the stage; nullopt: everywhere
+  std::optional<isl::set> where;  // over the stage's loop variables; nullopt: everywhere
 };
 
 // One definition of a Func as relations over its loop variables.
@@ -84,7 +85,7 @@ class StageRelations {
     return without_parameters(result.intersect_domain(domain));
   }
 
-  // Reads of Funcs anywhere in the definition, or in one of its values.
+  // The reads of Funcs anywhere in the definition, or in one of its values.
   std::vector<Read> reads(std::optional<size_t> value) {
     if (value) {
       collect(without_lets(definition_.values[*value]));
@@ -107,7 +108,7 @@ class StageRelations {
     return 0;
   }
 
-  // Each node once a condition.
+  // Visits each node once for each condition.
   void collect(const Expr& root) {
     conditions_.assign(1, std::nullopt);
     std::set<std::pair<const ExprNode*, size_t>> seen;
@@ -165,7 +166,7 @@ class Composer {
  private:
   size_t dims() const { return source_->args.size(); }
 
-  // Of the value that is read, where they are known apart.
+  // The relation of the value that is read, if the values of its Tuple have separate relations.
   isl::map relation_of(const Call& call) const {
     auto found = relations_.find(call.symbol.raw());
     if (found == relations_.end()) return empty_map(context_.ctx, call.args.size(), dims());
@@ -178,7 +179,7 @@ class Composer {
            std::ranges::any_of(found->second, [](const isl::map& m) { return !m.is_empty(); });
   }
 
-  // One for each value of a Tuple, or one for all where updates may couple them.
+  // One relation for each value of a Tuple, or one for all if updates may couple them.
   std::vector<isl::map> relations(const FuncContents& f) const {
     if (&f == source_.get()) {
       return {isl::manage(
@@ -222,8 +223,8 @@ class Composer {
     return result;
   }
 
-  // {element -> element of f that it may have been computed from}: equal in the dimensions in which
-  // every update writes, and reads, its own pure variable.
+  // {element -> element of f that it may have been computed from}: equal in the dimensions in which every update reads
+  // and writes at its own pure variable.
   isl::map coupling(const FuncContents& f) const {
     isl::map result = universe_map(context_.ctx, f.args.size(), f.args.size());
     bool couples = false;

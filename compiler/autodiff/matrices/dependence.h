@@ -1,14 +1,14 @@
-// dependence -- which elements of one Func can an element of another depend on?
+// dependence.h -- computes which elements of one Func an element of another may depend on.
 //
 //   f(y) = g(e(y)),  g(z) reads source(d(z))      =>      {y -> x : x = d(e(y))}
 //
-// The relation is a superset, proven from the definitions: reads are composed from stage to stage
-// as integer relations (isl); the arms of a select count where its condition allows; a reduction
-// counts for all of its domain. An index that isl does not follow, because data or a parameter
-// decide, may be anything. Where updates read elements of their own Func other than the one that
-// they write, all elements that agree in the remaining dimensions depend on each other.
-// The graph of tangents of a direction shows the pattern of the Jacobian, in which everything that
-// is constant has dropped out: that of the primal would show too much.
+// The relation is a superset, proven from the definitions. Reads are composed from stage to stage as integer relations
+// (isl). The branches of a select count where its condition allows; a reduction counts for its whole domain. An index
+// that isl cannot represent, because it depends on data or a parameter, may have any value. If updates read elements of
+// their own Func other than the one written, all elements that agree in the remaining dimensions depend on each other.
+//
+// For the pattern of the Jacobian this is applied to the graph of tangents, in which all constants have dropped out.
+// The graph of the primal would give too large a pattern.
 #pragma once
 
 #include <isl/cpp.h>
@@ -21,13 +21,13 @@ namespace retrograde::autodiff {
 
 class Dependence {
  public:
-  // `source` is any Func that `f` may depend on. Unsupported where an extern stage lies between;
-  // isl::exception where a part of the search takes more than so many operations.
+  // `source` is any Func that `f` may depend on. Throws Unsupported if an extern stage lies between, and isl::exception
+  // if a part of the search takes more than `operations`.
   Dependence(const FuncPtr& f, const FuncPtr& source, unsigned long operations = isl_operations);
 
-  // {element of f -> element of source}; without parameters. Empty: f does not depend on it.
+  // {element of f -> element of source}, without parameters. Empty if f does not depend on it.
   const isl::map& map() const { return map_; }
-  // The same with elements inside of boxes only; ends that are no constants do not count.
+  // The same, restricted to elements inside of boxes; ends that are not constant are ignored.
   isl::map inside(const Box& of_f, const Box& of_source) const;
   IslContext& context() { return context_; }
 

@@ -1,9 +1,8 @@
-// flat_input -- an input of several values as one with one more dimension: the value, last.
+// flat_input.h -- views an input of several values as one with one more dimension, last, for the value.
 //
 //   pair(x) of 2 values        =>   pair'(x, k), k in [0, 2)
 //
-// So that what is written for arrays of numbers (jacobian.h) serves Funcs of Tuples. Everything
-// here leaves inputs of one value as they are.
+// Functions for arrays of numbers (jacobian.h) then work for Funcs of Tuples. Inputs of one value are not changed.
 #pragma once
 
 #include <string>
@@ -18,10 +17,10 @@ namespace retrograde::autodiff {
 InputShape flat(const InputShape& shape);
 Box flat(Box box, const InputShape& shape);
 
-// Of a Func of the shape of an input, such as its adjoint.
+// The flat view of a Func that has the shape of an input, such as its adjoint.
 Func flat(const Func& f, const InputShape& shape);
 
-// The direction of the input itself that a seed of its flat shape means.
+// The direction of the input itself that corresponds to a seed of its flat shape.
 Func direction(const Func& seed, const InputShape& shape);
 
 // ---- arguments ----

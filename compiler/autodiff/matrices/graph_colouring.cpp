@@ -9,7 +9,7 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Vertices by falling degree, then by number.
+// Vertices by decreasing degree, then by number.
 std::vector<int> largest_first(const std::vector<size_t>& degrees) {
   std::vector<int> order(degrees.size());
   std::iota(order.begin(), order.end(), 0);
@@ -19,7 +19,7 @@ std::vector<int> largest_first(const std::vector<size_t>& degrees) {
   return order;
 }
 
-// Colours that a vertex may not get, forgotten from vertex to vertex.
+// The colours forbidden for one vertex; reset for each vertex.
 class Forbidden {
  public:
   explicit Forbidden(size_t vertices) : last_(vertices + 1, -1) {}
@@ -64,8 +64,8 @@ class StarColouring {
   const std::vector<int>& near(int v) const { return graph_[static_cast<size_t>(v)]; }
   int colour(int v) const { return colours_[static_cast<size_t>(v)]; }
 
-  // Paths v - w - x - y. While w has no colour, v and x must differ; once it has, v may take the
-  // colour of x only if x has no other neighbour of the colour of w, nor v one.
+  // Forbids colours along paths v - w - x - y. While w has no colour, v and x must differ. Once w has one, v may take
+  // the colour of x only if x has no other neighbour of w's colour, and v has none.
   void forbid_by(int v, int w) {
     forbidden_.add(colour(w));
     bool again = colour(w) >= 0 && std::any_of(near(v).begin(), near(v).end(), [&](int other) {

@@ -15,7 +15,7 @@ class AbsentGradients {
                   SynthesisResult& result, SynthesisAccount& account)
       : primal_(primal), covered_(covered), result_(result), account_(account) {}
 
-  // What was asked for and got no contribution is zero, and says why.
+  // Gives a zero, with its reason, to each requested symbol without contributions.
   void find_absent() {
     for (const FuncPtr& f : primal_.order) {
       if (covered_.contains(f.get()) ||
@@ -33,12 +33,12 @@ class AbsentGradients {
           make_adjoint(primal_.target_of(p.get()), p->name + "_adj", {}).func;
     }
   }
-  // What was asked for and has nothing to do with the output.
+  // Gives a zero to each requested symbol that the output does not depend on.
   void find_strangers() {
     std::unordered_set<const Symbol*> reached;
     for (const FuncPtr& f : primal_.order) reached.insert(f.get());
     for (const auto& p : parameters_of({primal_.seed.output})) reached.insert(p.get());
-    std::map<std::string, const Symbol*> strangers;  // by name: in an order that is always the same
+    std::map<std::string, const Symbol*> strangers;  // by name, for a deterministic order
     for (const Symbol* symbol : primal_.options.requested) {
       if (symbol && !reached.contains(symbol)) strangers[shape_of(symbol).name] = symbol;
     }
@@ -55,7 +55,7 @@ class AbsentGradients {
 
  private:
   std::string without_path(const Symbol* symbol) const {
-    std::string result = "the output does not depend on its value by a differentiable path";
+    std::string result = "the output does not depend on its value along a differentiable path";
     const char* separator = ": ";
     for (const std::string& reason :
          zero_reasons(symbol, primal_.order, [&](const FuncContents& f) {
@@ -66,7 +66,7 @@ class AbsentGradients {
     }
     return result;
   }
-  // Whether its gradient is a zero that somebody may ask for.
+  // Whether its gradient is a zero that a user may look up.
   bool is_wanted_zero(const Symbol* symbol, const std::string& name, bool floating, Type type) {
     if (!floating) {
       account_.add(Explanation::Kind::Zero, name,
@@ -74,15 +74,15 @@ class AbsentGradients {
     } else if (primal_.active.cancels(symbol)) {
       account_.add(
           Explanation::Kind::Zero, name,
-          "the output is the same for all of its values: it is what a softmax, a log-sum-exp or "
-          "a norm is shifted or scaled by, which cancels");
+          "the output is the same for all of its values: it only shifts or scales a softmax, a "
+          "log-sum-exp or a norm, which cancels");
       return true;
     } else if (auto left = primal_.options.left_out.find(symbol);
                left != primal_.options.left_out.end()) {
       account_.add(Explanation::Kind::NotRequested, name, "left out: " + left->second);
     } else if (!primal_.active.contains(symbol)) {
       account_.add(Explanation::Kind::NotRequested, name,
-                   "nothing that was requested depends on it");
+                   "no requested gradient needs its adjoint");
     } else {
       account_.add(Explanation::Kind::Zero, name, without_path(symbol));
       zero_.insert(symbol);
@@ -95,7 +95,7 @@ class AbsentGradients {
   const std::unordered_set<const Symbol*>& covered_;
   SynthesisResult& result_;
   SynthesisAccount& account_;
-  std::unordered_set<const Symbol*> zero_;  // by no path
+  std::unordered_set<const Symbol*> zero_;  // without a differentiable path to the output
 };
 
 }  // namespace

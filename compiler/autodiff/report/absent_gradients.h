@@ -1,5 +1,4 @@
-// Gradients that were asked for and that nothing contributes to: zeros that may be looked up, and
-// why they are.
+// absent_gradients.h -- requested gradients without contributions: they become zeros, with an explanation.
 #pragma once
 
 #include "autodiff/report/synthesis_account.h"
@@ -7,7 +6,7 @@
 
 namespace retrograde::autodiff {
 
-// `covered`: inside of a custom adjoint that was used.
+// `covered`: Funcs inside of a custom adjoint.
 void explain_absent(const Primal& primal, const std::unordered_set<const Symbol*>& covered,
                     SynthesisResult& result, SynthesisAccount& account);
 

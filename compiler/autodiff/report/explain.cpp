@@ -13,9 +13,9 @@ namespace {
 
 using Kind = Explanation::Kind;
 
-constexpr size_t most_names = 8;  // of one kind in a summary
+constexpr size_t most_names = 8;  // listed for each kind in a summary
 
-// In the order in which a person asks.
+// The order of a summary: what users ask first comes first.
 constexpr Kind told_first[] = {Kind::Cost,    Kind::Stored,       Kind::Recomputed,
                                Kind::Version, Kind::Scattered,    Kind::Privatised,
                                Kind::Zero,    Kind::NotRequested, Kind::LeftOut,
@@ -51,14 +51,14 @@ std::string line_of(const char* what, const std::vector<Explanation>& facts) {
   return result + "\n";
 }
 
-// Some of what reaches an adjoint is zero, and it is built all the same; or all of it is.
+// An adjoint that is built may still have contributions that are zero; it is listed as zero in part.
 std::string zeros_of(const std::vector<Explanation>& all) {
   std::set<std::string> built;
   for (const Explanation& e : of_kind(all, Kind::Built)) built.insert(e.subject);
-  std::vector<Explanation> whole, in_part;
+  std::vector<Explanation> entirely, in_part;
   for (const Explanation& e : of_kind(all, Kind::Zero))
-    (built.count(e.subject) ? in_part : whole).push_back(e);
-  return line_of("zero", whole) + line_of("zero in part", in_part);
+    (built.count(e.subject) ? in_part : entirely).push_back(e);
+  return line_of("zero", entirely) + line_of("zero in part", in_part);
 }
 
 std::string summary_of(const std::vector<Explanation>& all, Kind kind) {
@@ -71,7 +71,7 @@ std::string summary_of(const std::vector<Explanation>& all, Kind kind) {
 std::string summary_of(const std::vector<Explanation>& all) {
   std::string result;
   for (Kind kind : told_first) result += summary_of(all, kind);
-  return result + "explain(Detail::All) tells why, fact by fact.\n";
+  return result + "explain(Detail::All) lists every fact with its reason.\n";
 }
 
 std::string without_numbers(const std::string& name) {
@@ -79,7 +79,7 @@ std::string without_numbers(const std::string& name) {
   return std::regex_replace(name, number, "");
 }
 
-// Quoted names lose their numbers where that leaves no two alike.
+// Drops the numbers of quoted names where the short names stay distinct.
 std::string with_short_names(const std::string& words) {
   static const std::regex name("\"[^\"\n]*\"");
   std::map<std::string, std::set<std::string>> alike;

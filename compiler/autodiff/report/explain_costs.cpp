@@ -18,9 +18,9 @@ std::string counted(const Count& count, const char* what) {
 
 const char* reason_to_store(const FuncContents& f) {
   if (f.schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined) return "by its schedule";
-  if (f.is_extern()) return "as a C function fills it";
-  if (!f.is_pure()) return "as it has updates";
-  return "as it is wanted itself or read often";
+  if (f.is_extern()) return "because a C function fills it";
+  if (!f.is_pure()) return "because it has updates";
+  return "because it is requested or read often";
 }
 
 Explanation stored(const FuncOperations& f) {
@@ -32,25 +32,24 @@ Explanation stored(const FuncOperations& f) {
           f.bytes.value().value_or(0)};
 }
 
-// A Func of the program with updates that nobody scheduled.
+// Whether it is a Func of the program that has updates and no directives.
 bool is_stored_by_default(const FuncOperations& f) {
   return f.stored && !f.func->made && !f.func->is_pure() && !f.is_extern &&
          f.func->schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined;
 }
 Explanation computed_once(const FuncOperations& f) {
-  return {
-      What::Performance, f.func->name,
-      "unless a directive schedules it, it is computed at root: inside of the loops of who reads "
-      "it, its updates would run again for each element"};
+  return {What::Performance, f.func->name,
+          "without a directive it is computed at root: inside the loops of its consumer its "
+          "updates would run again for each element"};
 }
 
 Explanation recomputed(const FuncOperations& f) {
   Operations each;
   for (const StageOperations& s : f.stages) each += s.each;
   return {What::Recomputed, f.func->name,
-          text(f.func->made ? "" : "the gradient reads its values; ", "in each of ",
+          text(f.func->made ? "" : "the gradient reads its values; ", "at each of ",
                counted(f.evaluations, "read"), ", ", counted(each.total(), "operation"),
-               " a time, no bytes")};
+               " each time, no memory")};
 }
 
 Explanation totals(const WantedFunc& output, const OperationCount& primal,
@@ -64,11 +63,11 @@ Explanation totals(const WantedFunc& output, const OperationCount& primal,
   }
   return {What::Cost, output.func->name,
           text(counted(before, "operation"), " and ", counted(primal.bytes(), "byte"),
-               "; its gradient alone ", counted(after, "operation"), ratio, ", and ",
+               "; its gradient alone: ", counted(after, "operation"), ratio, ", and ",
                counted(gradient.bytes(), "byte"))};
 }
 
-// Bytes that `count` keeps beside the results that were asked for.
+// The bytes that `count` stores, without the requested results.
 std::optional<double> kept_between(const OperationCount& count,
                                    const std::vector<WantedFunc>& results) {
   double bytes = 0;
@@ -82,8 +81,7 @@ std::optional<double> kept_between(const OperationCount& count,
   return bytes;
 }
 
-// Where a gradient keeps more than twice what the program itself keeps on its way, and in what
-// most.
+// Adds a note if a gradient stores more than twice the intermediate results of the program, and names the largest.
 void note_memory(const WantedFunc& output, const std::vector<WantedFunc>& gradients,
                  const OperationCount& primal, const OperationCount& gradient,
                  std::vector<Explanation>& result) {
@@ -98,9 +96,10 @@ void note_memory(const WantedFunc& output, const std::vector<WantedFunc>& gradie
   }
   result.push_back(
       {What::Performance, output.func->name,
-       text("its gradient keeps ", Count(*more).text(), " bytes on the way, the program ",
-            Count(*own).text(), "; most of it in ", quoted(largest->func->name), ", ",
-            largest->bytes.text(), ": schedule it inside of who reads it to keep less")});
+       text("its gradient stores ", Count(*more).text(),
+            " bytes of intermediate results, the program ", Count(*own).text(),
+            "; most of them in ", quoted(largest->func->name), ", ", largest->bytes.text(),
+            ": compute it inside the loops of its consumer to store less")});
 }
 
 }  // namespace

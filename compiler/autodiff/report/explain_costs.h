@@ -1,5 +1,5 @@
-// What a gradient keeps in memory, what it computes again and what it leaves out, with bytes and
-// operations: the part of Derivative::explain() that depends on schedules.
+// explain_costs.h -- the part of Derivative::explain() that depends on schedules: what a gradient stores, recomputes
+// and leaves out, with bytes and operations.
 #pragma once
 
 #include <vector>
@@ -9,9 +9,9 @@
 
 namespace retrograde::autodiff {
 
-// `primal` and `gradient`: counts of the output alone, and of the gradients alone. Funcs in the
-// order in which the gradient computes them, then what it needs nothing of, then the sums; where it
-// keeps more than twice what the program does on its way, that too.
+// `primal` and `gradient` are the counts of the output alone and of the gradients alone. The facts list Funcs in the
+// order in which the gradient computes them, then Funcs that it does not need, then the totals. A note follows if the
+// gradient stores more than twice the intermediate results of the program.
 std::vector<Explanation> explain_costs(const WantedFunc& output,
                                        const std::vector<WantedFunc>& gradients,
                                        const OperationCount& primal,

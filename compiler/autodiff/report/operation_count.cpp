@@ -21,11 +21,11 @@ namespace retrograde::autodiff {
 namespace {
 
 std::string number_text(double value) {
-  bool whole = value == std::floor(value) && std::abs(value) < 1e15;
-  return whole ? std::to_string(static_cast<int64_t>(value)) : text(value);
+  bool is_integer = value == std::floor(value) && std::abs(value) < 1e15;
+  return is_integer ? std::to_string(static_cast<int64_t>(value)) : text(value);
 }
 
-// One iteration of a stage, or one value of a Func: its own work, and what it reads.
+// One iteration of a stage, or one value of a Func: its own work, and the Funcs that it reads.
 struct Body {
   Operations own;
   std::vector<const Call*> reads;  // of Funcs
@@ -103,7 +103,7 @@ class Counter {
     result_.funcs.push_back(std::move(entry));
   }
 
-  // None where the region is empty: nobody reads it.
+  // Zero if the region is empty, that is, never read.
   static Count elements(const FuncOperations& f) {
     return f.region.empty() && f.func->dimensions() > 0 ? Count() : Count::points(f.region);
   }
@@ -123,7 +123,7 @@ class Counter {
     return stage;
   }
 
-  // A last update whose iterations follow a table counts by what they do.
+  // A last update that follows a table of actions: counts each action by its own work.
   void count_work(FuncOperations& entry, const std::vector<AdjointWork>& work) {
     entry.stages.pop_back();
     bodies_[entry.func.get()].pop_back();
@@ -156,7 +156,7 @@ class Counter {
     return result;
   }
 
-  // Consumers first: how often `entry` runs is known, and so how often what it reads does.
+  // Called for consumers first: the evaluations of `entry` are known, and determine those of its producers.
   void count_evaluations(FuncOperations& entry) {
     const std::vector<Body>& bodies = bodies_[entry.func.get()];
     for (size_t s = 0; s < bodies.size(); ++s) {
@@ -171,7 +171,7 @@ class Counter {
   std::vector<FuncPtr> outputs_, order_;
   Regions regions_;
   std::unordered_set<const FuncContents*> stored_by_default_;
-  std::unordered_map<const Symbol*, std::vector<Operations>> value_costs_;  // of what is inlined
+  std::unordered_map<const Symbol*, std::vector<Operations>> value_costs_;  // of inlined Funcs
   std::unordered_map<const Symbol*, std::vector<Body>> bodies_;  // one for each entry of stages
   std::unordered_map<const Symbol*, size_t> places_;
   OperationCount result_;
@@ -231,7 +231,7 @@ std::optional<double> Count::value() const {
   return constant_;
 }
 
-// A product of extents that nobody would read, as of table lookups, is left out.
+// Abbreviates products of extents that are too long to read, as those of table lookups.
 static std::string readable(const std::string& product) {
   constexpr size_t longest = 200;
   return product.size() <= longest ? product : "(...)";

@@ -10,7 +10,7 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// ", 96 elements, 384 bytes when stored"; nothing when the region is known at run time only.
+// ", 96 elements, 384 bytes when stored"; empty if the region is known at run time only.
 std::string size_text(const FuncContents& f, const std::vector<LoopVariable>& region) {
   int64_t elements = 1;
   for (const LoopVariable& v : region) {
@@ -45,20 +45,20 @@ void SynthesisAccount::built(const AdjointFunc& adjoint, const std::string& prim
            size_text(accumulating, region)));
   if (gathers + scatters + privatised > 0) {
     add(Explanation::Kind::Performance, primal,
-        text("unless a directive schedules ", quoted(accumulating.name),
-             ", it is computed at root, in parallel over its outermost dimension, in vectors "
-             "along its first"));
+        text("without a directive ", quoted(accumulating.name),
+             " is computed at root, parallel over its outermost dimension and vectorized over its "
+             "innermost"));
   }
   if (adjoint.accumulator) {
     add(Explanation::Kind::Built, primal,
-        text(quoted(accumulating.name), " adds up in double what ", quoted(adjoint.func->name),
-             " rounds once: an element may get many terms"));
+        text(quoted(accumulating.name), " accumulates in double, and ", quoted(adjoint.func->name),
+             " rounds the sum once, because an element may sum many terms"));
   }
   for (const std::string& note : adjoint.notes)
     add(Explanation::Kind::Performance, primal, text(quoted(adjoint.func->name), ": ", note));
   if (privatised > 0) {
     add(Explanation::Kind::Privatised, primal,
-        "accumulated in a fixed number of parts, which are summed in order");
+        "accumulated in a fixed number of privatised copies, which are summed in order");
   }
 }
 

@@ -1,4 +1,4 @@
-// What synthesis did and did not do, in words: the lines of Derivative::explain().
+// synthesis_account.h -- collects the facts of Derivative::explain() during synthesis.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@ class SynthesisAccount {
  public:
   void add(Explanation::Kind kind, const std::string& subject, const std::string& detail);  // once
   void add(const std::vector<Explanation>& lines);
-  // An adjoint of `primal` over a region: how it accumulates, where, how large it is.
+  // Reports an adjoint of `primal` over a region: how it accumulates and its size.
   void built(const AdjointFunc& adjoint, const std::string& primal,
              const std::vector<LoopVariable>& region);
 

@@ -19,25 +19,24 @@ const Symbol* read_by(const Expr& e) {
   return v ? v->symbol.raw() : nullptr;
 }
 
-// Why the derivative of `e` by its operands is 0; empty: it need not be.
+// Why the derivative of `e` by its operands is 0; empty if it need not be.
 std::string barrier(const Expr& e) {
   if (e.as<Cast>() && !e.type().is_float()) return "in a cast to " + to_string(e.type());
   if (e.type().is_bool()) return "in a condition";
   const auto* call = e.as<Call>();
   if (!call) return "";
-  if (call->call_type != CallType::Operator)
-    return text("in the place where ", quoted(call->name), " is read");
+  if (call->call_type != CallType::Operator) return text("in an index of ", quoted(call->name));
   const RuleClass cls = derivative_rule(call->op).cls;
   const bool blocks = cls == RuleClass::Constant || cls == RuleClass::Blocked;
   return blocks ? text("in ", op_info(call->op).name, ", whose derivative is 0") : "";
 }
 
-// What stands between reads of the input and the value of an expression.
+// Finds the operations with derivative 0 between reads of the input and the value of an expression.
 class Barriers {
  public:
   explicit Barriers(const Symbol* input) : input_(input) {}
 
-  // `before`: known already; empty: nothing.
+  // `before`: a barrier found above `e`; empty: none.
   void look(const Expr& e, const std::string& before) {
     if (!seen_.insert({e.get(), before}).second) return;
     if (read_by(e) == input_) found_.insert(before);
@@ -57,7 +56,7 @@ std::set<std::string> barriers_in(const Symbol* input, const FuncContents& f) {
   for (int s = 0; s < f.stage_count(); ++s) {
     const Definition& d = f.stage(s);
     for (const Expr& value : d.values) barriers.look(value, "");
-    for (const Expr& arg : d.args) barriers.look(arg, "in a place where it writes");
+    for (const Expr& arg : d.args) barriers.look(arg, "in an index that it writes to");
     if (d.predicate.defined()) barriers.look(d.predicate, "in a condition");
     for (const ReductionVariable& r : d.rvars) {
       barriers.look(r.min, "in the bounds of a loop");

@@ -1,7 +1,8 @@
-// zero_reasons -- why no derivative reaches an input: who reads it, and what stands in between.
+// zero_reasons.h -- explains why no derivative reaches an input: its consumers, and the operation that blocks each
+// path.
 //
 //   f(x) = floor(a(x)) + b(index(x))    a: "f" reads it in floor, whose derivative is 0
-//                                       index: "f" reads it in the place where "b" is read
+//                                       index: "f" reads it in an index of "b"
 #pragma once
 
 #include <string>
@@ -12,8 +13,8 @@
 
 namespace retrograde::autodiff {
 
-// One clause a reader, at most a few: "\"f\" reads it in floor, whose derivative is 0". `order`:
-// the graph; has_adjoint: whether something other than zero reaches a Func of it.
+// One clause for each consumer, at most a few: "\"f\" reads it in floor, whose derivative is 0". `order` is the graph;
+// `has_adjoint` tells whether a Func of it has a nonzero adjoint.
 std::vector<std::string> zero_reasons(const Symbol* input, const std::vector<FuncPtr>& order,
                                       FunctionRef<bool(const FuncContents&)> has_adjoint);
 

@@ -1,6 +1,7 @@
-// One row an operator. Sources: [GW] Griewank & Walther, Evaluating Derivatives, 2nd ed.,
-// tables 2.1 and 14.1; [DLMF] NIST Digital Library of Mathematical Functions. "definition": follows
-// from the operator's definition here.
+// The derivative tables: one row for each operator.
+//
+// Sources: [GW] Griewank & Walther, Evaluating Derivatives, 2nd ed., tables 2.1 and 14.1; [DLMF] NIST Digital Library
+// of Mathematical Functions. "definition" means that the rule follows from the operator's definition in this project.
 #include "autodiff/rules/derivative_rules.h"
 
 #include <cmath>
@@ -41,7 +42,7 @@ Expr zero_where(const Expr& condition, const Expr& e) {
   return make_select(condition, make_zero(e.type()), e);
 }
 
-// d|u| = sign(u), and 0 at 0.
+// The derivative of |u|: sign(u), which is 0 at 0.
 Expr sign(const Expr& u) {
   return make_select(u > num(u, 0), num(u, 1), make_select(u < num(u, 0), num(u, -1), num(u, 0)));
 }
@@ -60,16 +61,18 @@ Partials fma_partials(Args a, const Expr&) {
 Partials sqrt_partials(Args a, const Expr& v) { return {quotient(num(a[0], 0.5), v)}; }
 Partials exp_partials(Args, const Expr& v) { return {strong(v)}; }
 Partials log_partials(Args a, const Expr&) { return {quotient(num(a[0], 1), a[0])}; }
-// Whether p - 1 is a number of p's type.
+// Whether p - 1 is exact in p's type.
 bool has_exact_predecessor(const Expr& p) {
   auto value = as_const_float(p);
   return value && round_to_type(p.type(), *value - 1) == *value - 1;
 }
-// dx: p x^(p-1), 0 where p is 0.  dp: x^p log x, 0 where x is 0.
-// Where p - 1 is rounded, x^(p-1) is wrong by that times log x, or is another power altogether:
-// p v / x is not, unless v overflowed or underflowed.
-// Derivatives of both, as those of a program: the 0 of dx is p / x, whose derivative by p is 1 / x,
-// and where x is 0 nothing depends on p, in dx as in dp.
+// dx = p x^(p-1), and 0 where p is 0. dp = x^p log x, and 0 where x is 0.
+//
+// If p - 1 is inexact, x^(p-1) is off by the rounding error times log x, or is a different power altogether. Then dx is
+// p v / x, except where v overflowed or underflowed.
+//
+// Both expressions are built so that their own derivatives are right, too. Where p is 0, dx is p / x, whose derivative
+// by p is 1 / x. Where x is 0, neither dx nor dp depends on p.
 Partials power_partials(Args a, const Expr& v, Op power, Op logarithm) {
   const Expr& x = a[0];
   const Expr at_origin = x == num(x, 0);
@@ -99,7 +102,7 @@ Partials hypot_partials(Args a, const Expr&) {
 Partials sin_partials(Args a, const Expr&) { return {strong(call_op(Op::cos, {a[0]}))}; }
 Partials cos_partials(Args a, const Expr&) { return {strong(-call_op(Op::sin, {a[0]}))}; }
 Partials tan_partials(Args a, const Expr& v) { return {strong(num(a[0], 1) + square(v))}; }
-// (1 - x)(1 + x) keeps the digits near the poles that 1 - x^2 loses.
+// 1 - x^2 loses digits near the poles; (1 - x)(1 + x) keeps them.
 Expr one_minus_square(const Expr& x) { return (num(x, 1) - x) * (num(x, 1) + x); }
 Partials asin_partials(Args a, const Expr&) {
   return {strong(num(a[0], 1) / call_op(Op::sqrt, {one_minus_square(a[0])}))};
@@ -116,8 +119,7 @@ Partials atan2_partials(Args a, const Expr&) {
 }
 Partials sinh_partials(Args a, const Expr&) { return {strong(call_op(Op::cosh, {a[0]}))}; }
 Partials cosh_partials(Args a, const Expr&) { return {strong(call_op(Op::sinh, {a[0]}))}; }
-// 1 - v^2 has no digits left where v has rounded to 1: 4 e / (1 + e)^2 with e = exp(-2 |x|) keeps
-// them.
+// 1 - v^2 has no digits left where v has rounded to 1. 4 e / (1 + e)^2 with e = exp(-2 |x|) keeps them.
 Partials tanh_partials(Args a, const Expr&) {
   Expr e = call_op(Op::exp, {num(a[0], -2) * call_op(Op::abs, {a[0]})});
   return {strong(num(a[0], 4) * e / square(num(a[0], 1) + e))};
@@ -133,8 +135,8 @@ Partials acosh_partials(Args a, const Expr&) {
 Partials atanh_partials(Args a, const Expr&) {
   return {strong(num(a[0], 1) / one_minus_square(a[0]))};
 }
-// exp(-x^2) as exp(-h^2) exp(-(x - h)(x + h)), where h is x rounded to sixteenths and its square
-// exact: the rounding error of a large square would be a factor. Beyond 30 both are 0.
+// Computes exp(-x^2) as exp(-h^2) exp(-(x - h)(x + h)), where h is x rounded to sixteenths, so that h^2 is exact. In
+// exp(-x^2) the rounding error of a large x^2 would become a factor of the result. Beyond 30 both factors are 0.
 Partials erf_partials(Args a, const Expr&) {
   const Expr& x = a[0];
   Expr h = call_op(Op::floor, {x * num(x, 16)}) / num(x, 16);
@@ -155,8 +157,8 @@ Partials saturating_cast_partials(Args a, const Expr& v) {
   if (v.type().is_float()) inside = call_op(Op::abs, {a[0]}) <= num(a[0], largest_of(v.type()));
   return {plain(make_select(inside, make_one(v.type()), make_zero(v.type())))};
 }
-// Where x is 0 the value is 0 for every y: the partial by y is a 0 that no infinite or NaN adjoint
-// or tangent undoes. The one by x is y even there, as the product rule has it.
+// Where x is 0, the value is 0 for every y. The partial by y is then a strong zero, even against an infinite or NaN
+// adjoint or tangent. The partial by x is y there, too, as in the product rule.
 Partials strong_mul_partials(Args a, const Expr&) { return {strong(a[1]), {a[0], Strength::Both}}; }
 Partials strong_div_partials(Args a, const Expr& v) {
   return {quotient(num(a[0], 1), a[1]), {-v, Strength::Strong, a[1], true}};
@@ -273,7 +275,7 @@ OpTable smooth_operators() {
   };
 }
 
-// The operators whose derivative is 0, and those that pass on a value by a promise.
+// Operators whose derivative is 0, and operators that return an argument under a promise.
 OpTable other_operators() {
   const char* bits = "integers only: derivative 0";
   const char* test = "a truth value: derivative 0";
@@ -319,8 +321,8 @@ OpTable make_op_table() {
   return t;
 }
 
-// d min(a, b): the operand that the primal takes gets all. At a tie that is one of them: the two
-// sum to 1.
+// min and max: the operand that the primal returns gets the whole adjoint. At a tie exactly one of them gets it, so the
+// partials sum to 1.
 Partials taken_partials(Args a, const Expr& first_taken) {
   Type type = a[0].type();
   return {plain(make_select(first_taken, make_one(type), make_zero(type))),
@@ -413,8 +415,8 @@ bool is_strong(Strength strength) {
   return strength == Strength::Strong || strength == Strength::Both;
 }
 
-// adjoint / divisor * factor, in that order. A constant factor, at most 1, goes first: it cannot
-// overflow, and one division is all.
+// Computes adjoint / divisor * factor in that order. A constant factor, whose magnitude is at most 1, is applied first:
+// it cannot overflow, and one division is enough.
 Expr divided_first(const Expr& adjoint, const Partial& partial) {
   const Expr divisor = cast_to(adjoint.type(), partial.divisor);
   const bool is_scaled = is_const(partial.factor);
@@ -429,16 +431,14 @@ Expr divided_first(const Expr& adjoint, const Partial& partial) {
 
 }  // namespace
 
-Strength made_strong(Strength strength) {
+Strength as_strong(Strength strength) {
   return is_cut(strength) ? Strength::Both : Strength::Strong;
 }
-Strength made_cut(Strength strength) {
-  return is_strong(strength) ? Strength::Both : Strength::Cut;
-}
+Strength as_cut(Strength strength) { return is_strong(strength) ? Strength::Both : Strength::Cut; }
 
 Expr times_partial(const Expr& adjoint, const Partial& partial) {
   if (is_zero(partial.factor)) return make_zero(adjoint.type());
-  // A choice stays a choice: inf * 0 must not make a NaN of the operand that was not taken.
+  // A select stays a select: inf * 0 would put a NaN into the adjoint of the operand that was not chosen.
   if (const auto* choice = partial.factor.as<Select>()) {
     return make_select(
         choice->condition,
@@ -459,7 +459,8 @@ Expr times_partial(const Expr& adjoint, const Partial& partial) {
     return call_op(Op::strong_mul, adjoint.type(), {factor, adjoint});
   Expr product = call_op(Op::strong_mul, adjoint.type(), {adjoint, factor});
   if (partial.strength != Strength::Both) return product;
-  // A product in both branches: the derivative of this one is that of a product where factor is 0.
+  // Both branches are products, so that differentiating this expression again gives the derivative of a product where
+  // the factor is 0.
   return make_select(factor == make_zero(factor.type()),
                      call_op(Op::strong_mul, product.type(), {factor, adjoint}), product);
 }

@@ -1,6 +1,6 @@
-// The scalar derivative rules: one table over all operators and binary kinds, with domains,
-// conventions and sources. Structural rules (select, calls of Funcs, updates) stand in
-// reverse_sweep.h and synthesis.h.
+// derivative_rules.h -- the table of derivatives of scalar operators: partials, domains, conventions and sources.
+//
+// The rules for structure (select, calls of Funcs, updates) are in reverse_sweep.h and synthesis.h.
 #pragma once
 
 #include <vector>
@@ -12,35 +12,35 @@ namespace retrograde::autodiff {
 enum class RuleClass : uint8_t {
   Smooth,    // has partials
   Constant,  // piecewise constant: derivative 0 wherever it exists, and 0 by convention elsewhere
-  Transparent,  // the value of one argument: its adjoint is the call's
-  Blocked,      // 0 because the user says so
-  NoRule,       // no derivative; `convention` says why. Reaching one with an adjoint is an error.
+  Transparent,  // returns one argument unchanged, which gets the adjoint of the call
+  Blocked,      // 0 because the user requested it: stop_gradient
+  NoRule,  // no derivative, for the reason in `convention`; an adjoint that reaches it is an error
 };
 
-// How a partial meets the adjoint: strongly, unless nothing infinite can meet a zero.
+// How a partial is multiplied with the adjoint. A strong zero keeps the product 0 where the other factor is infinite.
 enum class Strength : uint8_t {
-  Plain,   // finite wherever the operands are, says the rule; the sweeps look at the operands, too
-  Strong,  // may be infinite or NaN where the primal is finite: an adjoint of 0 makes the product 0
-  Cut,     // the adjoint may be infinite (it passed a pole): a partial of 0 makes the product 0
-  Both,    // Strong and Cut
+  Plain,  // the rule promises a finite partial for finite operands; sweeps also check the operands
+  Strong,  // the partial may be infinite or NaN where the primal is finite: an adjoint of 0 is a strong zero
+  Cut,   // the adjoint may be infinite (it passed a pole): a partial of 0 is a strong zero
+  Both,  // Strong and Cut
 };
-Strength made_strong(Strength strength);
-Strength made_cut(Strength strength);
+Strength as_strong(Strength strength);
+Strength as_cut(Strength strength);
 
 struct Partial {
-  Expr factor;  // undefined: this operand gets nothing
+  Expr factor;  // undefined: no contribution to this operand
   Strength strength = Strength::Strong;
-  // The partial is factor / divisor; undefined: 1. The adjoint is divided before it is multiplied:
-  // 1 / y may overflow where adjoint / y, an adjoint itself, does not.
+  // The partial is factor / divisor; an undefined divisor means 1. The adjoint is divided before it is multiplied,
+  // because 1 / y may overflow where adjoint / y does not.
   Expr divisor = {};
-  // A factor of 0 stays 0 whatever the divisor is: it is the value of a strong quotient.
+  // The factor is the value of a strong quotient: where it is 0 the partial is 0, whatever the divisor is.
   bool is_strong_quotient = false;
 };
 
-// A partial that may be infinite where an adjoint is 0.
+// A partial that may be infinite where the adjoint is 0.
 inline Partial strong(Expr factor) { return {std::move(factor)}; }
 
-// Partials for operands `args` with value `value` (the node itself, for rules that reuse it).
+// Returns the partials for the operands `args`. `value` is the node itself, for rules that reuse it.
 using PartialsFn = std::vector<Partial> (*)(const std::vector<Expr>& args, const Expr& value);
 
 struct DerivativeRule {
@@ -50,31 +50,31 @@ struct DerivativeRule {
   const char* domain;      // where the primal is finite and differentiable
   const char* convention;  // at kinks and poles, or the reason for having no rule
   const char* source;
-  // Smooth only, for people: partials over the operands x, y, w and the value v; what they are at
-  // infinite operands; how far a partial in float32 is from the true one, in ULP, inside the domain
-  // and away from overflow (rule tables are tested against it; -1: as the approximation, not
-  // bounded).
+  // Smooth only: text for docs/derivatives.md and bounds for tests. `formula` gives the partials in terms of the
+  // operands x, y, w and the value v; `infinities` gives them at infinite operands. `max_ulp` bounds the error of a
+  // partial in float32, in ULP, inside the domain and away from overflow. Tests check it; -1 means as accurate as the
+  // approximated function, without a bound.
   const char* formula = "";
   const char* infinities = "";
   int max_ulp = 0;
 };
 
 const DerivativeRule& derivative_rule(Op op);
-// Binary kinds of kinds.def and Not, Cast, Reinterpret, Select.
+// The rule of a binary kind of kinds.def, or of Not, Cast, Reinterpret or Select.
 const DerivativeRule& derivative_rule(Kind kind);
-bool has_derivative_rule(Kind kind);  // whether the table has a row for the kind
+bool has_derivative_rule(Kind kind);
 
-// A number that keeps a zero that it multiplies.
+// Whether `e` is a finite constant: 0 times it is 0, so no strong zero is needed.
 bool is_finite_constant(const Expr& e);
 
-// The type in which the adjoint of a value of floating `type` is accumulated: float32 for the
-// 16-bit floats.
+// The type in which the adjoint of a value of floating-point `type` is accumulated: float32 for the 16-bit types.
 Type adjoint_type(Type type);
-// Whether a partial of the operator may be infinite where its value is finite: sqrt at 0.
+// Whether a partial of the operator may be infinite where its value is finite, as that of sqrt at 0.
 bool has_poles(const Call& call);
-// Whether the value may be finite, and the partial 0, where an operand is infinite: exp at -inf.
+// Whether the value may be finite, and the partial 0, at an infinite operand, as for exp at -inf.
 bool levels_off(Op op);
-// adjoint * partial, by the partial's strength; `adjoint` and the result are of the adjoint type.
+// Returns adjoint * partial, multiplied as the strength of the partial says. `adjoint` and the result have the adjoint
+// type.
 Expr times_partial(const Expr& adjoint, const Partial& partial);
 
 }  // namespace retrograde::autodiff

@@ -21,13 +21,14 @@ struct Response {
     Fixed,
     Shifted,
     Scaled,
-    Zero,      // scaled by anything
-    Infinite,  // shifted and scaled by anything
+    Zero,      // the constant 0: Scaled with any degree
+    Infinite,  // an infinite constant: Shifted and Scaled with any degree
     Unknown,
   };
   Kind kind = Kind::Fixed;
-  double degree = 0;        // Shifted, Scaled: not 0
-  std::vector<Expr> place;  // the element of the Func, over the variables at hand, without hints
+  double degree = 0;  // nonzero for Shifted and Scaled
+  std::vector<Expr>
+      place;  // the element of the Func, over the consumer's variables, without likely()
   bool is(Kind k) const { return kind == k; }
 };
 using How = Response::Kind;
@@ -50,7 +51,7 @@ bool same(const Response& a, const Response& b) {
   return a.kind == b.kind && a.degree == b.degree && same_place(a.place, b.place);
 }
 
-// a + sign * b for shifts, a * b^sign for scales.
+// The response of a + sign * b for shifts, of a * b^sign for scales.
 Response combined(How kind, const Response& a, const Response& b, double sign) {
   const auto fits = [&](const Response& r) { return r.is(kind) || r.is(How::Fixed); };
   if (!fits(a) || !fits(b)) return unknown;
@@ -59,7 +60,7 @@ Response combined(How kind, const Response& a, const Response& b, double sign) {
   return same_place(a.place, b.place) ? with_degree(a, kind, a.degree + sign * b.degree) : unknown;
 }
 
-// Either of the two.
+// The response of a value that is either of the two.
 Response joined(const Response& a, const Response& b) {
   const auto is_scaled = [](const Response& r) {
     return r.is(How::Scaled) || r.is(How::Fixed) || r.is(How::Zero);
@@ -87,7 +88,7 @@ Response product(const Response& a, const Response& b, double sign) {
   return combined(How::Scaled, a, b, sign);
 }
 
-// pow(v, exponent).
+// The response of pow(v, exponent).
 Response power(const Response& v, double exponent) {
   if (v.is(How::Zero)) return exponent > 0 ? v : unknown;
   return v.is(How::Fixed) || v.is(How::Scaled) ? times(v, exponent) : unknown;
@@ -178,19 +179,20 @@ Response of_binary(const Binary& e, const Response& a, const Response& b) {
   }
 }
 
-// With the place as it is there: gathers of adjoints clamp what they read, inside of its bounds.
+// Simplifies the element's indices under the condition. Gathers of adjoints clamp the indices that they read; where the
+// condition holds, the clamp goes away.
 Response where(const Expr& condition, const Response& r) {
   Response result = r;
-  const Expr given = result.place.empty() ? condition : simplify(without_likely(condition));
+  const Expr assumption = result.place.empty() ? condition : simplify(without_likely(condition));
   for (Expr& index : result.place) {
-    const Expr choice = simplify(make_select(given, index, index + 1));
+    const Expr choice = simplify(make_select(assumption, index, index + 1));
     const auto* select = choice.as<Select>();
-    if (select && equal(select->condition, given)) index = select->when_true;
+    if (select && equal(select->condition, assumption)) index = select->when_true;
   }
   return result;
 }
 
-// Of a constant, or of a node by the responses of its children, which `of` gives.
+// The response of a constant, or of a node given the responses `of` its children.
 Response response_of_node(const Expr& e, FunctionRef<const Response&(const Expr&)> of) {
   if (auto value = as_const_float(e)) return of_constant(*value);
   if (const auto* binary = e.as<Binary>()) return of_binary(*binary, of(binary->a), of(binary->b));
@@ -204,7 +206,7 @@ Response response_of_node(const Expr& e, FunctionRef<const Response&(const Expr&
   return std::ranges::all_of(operands, is_constant_kind) ? fixed : unknown;
 }
 
-// What happens to all Funcs when one of them is shifted or scaled.
+// The responses of all Funcs when one of them is shifted or scaled.
 class Propagation {
  public:
   Propagation(const std::vector<FuncPtr>& order,
@@ -227,7 +229,7 @@ class Propagation {
     });
   }
 
-  // False: unknown.
+  // Returns false if a response is unknown.
   bool add(const FuncPtr& f) {
     if (f->custom_derivatives || f->is_extern()) return false;
     std::vector<Response>& own = responses_[f.get()];
@@ -251,8 +253,8 @@ class Propagation {
     return true;
   }
 
-  // What a stage writes, by the element written: its place must follow from the pure variables,
-  // which stand at their own positions.
+  // The response of a stage's value in terms of the element written. The place must be a function of pure variables
+  // that stand at their own positions.
   static Response at_element(const FuncContents& f, int s, const Response& written) {
     const Definition& stage = f.stage(s);
     for (const Expr& index : written.place) {
@@ -299,7 +301,7 @@ class Propagation {
   std::unordered_map<const Symbol*, std::vector<Response>> responses_;
 };
 
-// ---- which Funcs are worth a look ----
+// ---- candidates: Funcs that are subtracted or divided by ----
 
 struct Suspects {
   std::unordered_set<const Symbol*> subtracted, divisors;

@@ -13,7 +13,7 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// exp(w) where e is 1 + exp(w).
+// Returns exp(w) if e is 1 + exp(w), else an undefined Expr.
 Expr exp_of_one_plus_exp(const Expr& e) {
   const auto* sum = e.as<Add>();
   if (!sum || !(is_one(sum->a) || is_one(sum->b))) return {};
@@ -21,7 +21,7 @@ Expr exp_of_one_plus_exp(const Expr& e) {
   return as_op(other, Op::exp) ? other : Expr();
 }
 
-// e / (1 + e), for e up to infinity.
+// e / (1 + e), finite also for an infinite e.
 Expr odds_to_probability(const Expr& e) {
   Expr one = make_one(e.type()), reciprocal = one / (one + e);
   return make_select(e > one, one - reciprocal, e * reciprocal);
@@ -37,12 +37,12 @@ StableForm logistic(const Expr& v, const Div& quotient) {
 
 Expr is_infinite(const Expr& e) { return call_op(Op::is_inf, Bool(e.type().lanes()), {e}); }
 
-// t / S for a term t that may be infinite, and S with it.
+// t / S for a term t of the sum S. A t that is infinite makes S infinite, and the ratio 1.
 Expr ratio(const Expr& t, const Expr& sum) {
   return make_select(is_infinite(t), make_one(t.type()), t / sum);
 }
 
-// 1 / the number of infinite terms, where terms[own] is one.
+// 1 / (the number of infinite terms), where terms[own] is infinite.
 Expr share_of_infinite(const std::vector<Expr>& terms, size_t own) {
   const Expr one = make_one(terms[own].type()), half = make_const(one.type(), 0.5);
   if (terms.size() == 2) return make_select(is_infinite(terms[1 - own]), half, one);
@@ -111,8 +111,8 @@ struct Coefficients {
   double above = 0, below = 0;
 };
 
-// Numerator and denominator as combinations of the same terms. Empty: they are none, or have too
-// many.
+// Writes numerator and denominator as linear combinations of the same terms. Empty if they are no such sums or have too
+// many terms.
 std::vector<Coefficients> coefficients_of(const Div& quotient) {
   std::vector<Coefficients> result;
   auto add = [&](const SignedTerm& t, double Coefficients::*side) {
@@ -131,8 +131,9 @@ std::vector<Coefficients> coefficients_of(const Div& quotient) {
   return is_common ? result : std::vector<Coefficients>{};
 }
 
-// v = N / S, N = sum of n_t t, S = sum of s_t t:  d/dt = sum of (n_t s_u - s_t n_u) u / S / S
-// In n_t / S - v s_t / S the terms u = t cancel. By the argument of an exponential: times t.
+// v = N / S, N = sum of n_t t, S = sum of s_t t:  dv/dt = sum of (n_t s_u - s_t n_u) u / S / S
+// In n_t / S - v s_t / S the terms with u = t would cancel. If t is an exponential, the derivative by its argument is t
+// times that.
 StableForm ratio_of_sums(const Div& quotient) {
   StableForm result;
   const std::vector<Coefficients> terms = coefficients_of(quotient);
@@ -160,8 +161,8 @@ StableForm of_quotient(const Expr& e, const Div& quotient) {
   return {};
 }
 
-// v = atan(a / b), whose partials are those of atan2: the quotient's square overflows. 0 where b
-// is: the value jumps.
+// v = atan(a / b) gets the partials of atan2, because the square of the quotient overflows. At b = 0 the value jumps
+// and the partials are 0.
 StableForm angle(const Expr& e) {
   const auto* quotient = e.as<Div>();
   if (!quotient || is_const(quotient->b)) return {};
@@ -171,7 +172,7 @@ StableForm angle(const Expr& e) {
   return {{quotient->a, quotient->b}, {strong(gradient[0]), strong(gradient[1])}};
 }
 
-// The constant c where a is c b.
+// Returns the constant c if a is c b.
 std::optional<double> multiple_of(const Expr& a, const Expr& b) {
   if (const double sign = sign_between(a, b); sign != 0) return sign;
   const auto* product = a.as<Mul>();
@@ -205,12 +206,12 @@ StableForm of_product(const Mul& product) {
 
 // ---- max(a, b) + log(1 + exp(-|a - b|)) ----
 
-// exp(-|d|) where e is log(1 + exp(-|d|)).
+// Returns exp(-|d|) if e is log(1 + exp(-|d|)), else an undefined Expr.
 Expr decay_of(const Expr& e) {
   const Call* log = as_op(e, Op::log);
   return log ? exp_of_one_plus_exp(log->args[0]) : Expr();
 }
-// Whether e is exp(-|a - b|); without the difference where b is 0.
+// Whether e is exp(-|a - b|), or exp(-|a|) where b is 0.
 bool is_decay_by(const Expr& e, const Expr& a, const Expr& b) {
   const Expr exponent = e.as<Call>()->args[0], size = without_sign(exponent);
   const Call* distance = as_op(size, Op::abs);
@@ -224,9 +225,9 @@ bool is_decay_by(const Expr& e, const Expr& a, const Expr& b) {
   return is_by(a, b) || is_by(b, a);
 }
 
-// v = max(a, b) + log(1 + exp(-|a - b|)) + rest = log(exp(a) + exp(b)) + rest, which is smooth
-// where its parts have a kink:  dv/da = 1 / (1 + exp(b - a)), dv/db = 1 / (1 + exp(a - b)) With
-// -min(a, b) for the maximum: of -a and -b.
+// v = max(a, b) + log(1 + exp(-|a - b|)) + rest = log(exp(a) + exp(b)) + rest is smooth where its parts have a kink:
+//   dv/da = 1 / (1 + exp(b - a)), dv/db = 1 / (1 + exp(a - b))
+// With -min(a, b) in place of the maximum, the operands are -a and -b.
 StableForm smooth_maximum(const Expr& sum) {
   std::vector<SignedTerm> terms = signed_terms_of(sum);
   const auto logarithm = std::ranges::find_if(
@@ -258,7 +259,7 @@ StableForm smooth_maximum(const Expr& sum) {
   return result;
 }
 
-// v = a - a + rest: dv/da = 0. By its two paths an infinite adjoint would reach a as inf - inf.
+// v = a - a + rest: dv/da = 0. Along the two paths an infinite adjoint would reach a as inf - inf.
 StableForm sum_that_cancels(const Expr& sum) {
   std::vector<SignedTerm> distinct;
   bool cancels = false;

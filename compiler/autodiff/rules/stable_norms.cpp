@@ -12,14 +12,15 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// a where e is a * a or pow(a, 2).
+// Returns a if e is a * a or pow(a, 2), else an undefined Expr.
 Expr square_root_of(const Expr& e) {
   if (const auto* product = e.as<Mul>()) return equal(product->a, product->b) ? product->a : Expr();
   const Call* power = as_op(e, Op::pow);
   return power && as_const_float(power->args[1]) == 2.0 ? power->args[0] : Expr();
 }
 
-// The components of the norm whose square the sum is; of a constant, its root. Empty: it is none.
+// The components of the norm whose square is `sum`; a constant term counts as the square of its root. Empty if `sum` is
+// no sum of squares.
 std::vector<Expr> components_of(const Expr& sum) {
   std::vector<Expr> result;
   for (const Expr& term : terms_of(sum)) {
@@ -46,15 +47,16 @@ struct Polar {
   Expr over_length(const Expr& e) const { return e * inverse / scale; }
 };
 
-// Divided by the largest of |a_1|, ..., |a_n| first: their sum may overflow. Its own derivative
-// cancels, so none is taken.
+// Divides by the largest of |a_1|, ..., |a_n| first, because the sum of squares may overflow. The derivative of that
+// scale cancels, so the scale is not differentiated.
 Polar polar(const std::vector<Expr>& a) {
   const Expr zero = make_zero(a[0].type());
   Expr scale, squares, at_origin;
   for (const Expr& e : a) {
     const Expr size = call_op(Op::abs, {e}), is_zero = e == zero;
     scale = scale.defined() ? binary(Kind::Max, scale, size) : size;
-    at_origin = at_origin.defined() ? at_origin && is_zero : is_zero;  // not so beside a NaN
+    at_origin =
+        at_origin.defined() ? at_origin && is_zero : is_zero;  // false if a component is NaN
   }
   scale = call_op(Op::stop_gradient, {scale});
   Polar result{{}, scale, {}};
@@ -75,7 +77,7 @@ struct Normalised {
 };
 
 // With u = a / |a|:  d/da_i = (sum of the other u_j^2) / |a|, d/da_j = -u_i u_j / |a|
-// The same above the constant c, and 1 / c, 0 below.
+// With max(|a|, c) these hold for |a| above the constant c; below it the partials are 1 / c and 0.
 StableForm form_of(const Normalised& v) {
   size_t own = 0;
   while (own < v.a.size() && !equal(v.a[own], v.component)) ++own;
@@ -104,7 +106,7 @@ StableForm of_quotient(const Div& quotient) {
   return form_of({quotient.a, components_of_norm(norm), norm, bounded ? bounded->b : Expr()});
 }
 
-// Of e = 1 / |a|.
+// The components of a if e is 1 / |a|, else empty.
 std::vector<Expr> components_of_reciprocal(const Expr& e) {
   const auto* quotient = e.as<Div>();
   if (quotient && is_one(quotient->a)) return components_of_norm(quotient->b);
@@ -131,7 +133,7 @@ StableForm of_reciprocal(const Expr& e) {
 
 }  // namespace
 
-// v = |a|:  d/da_i = a_i / |a|. With a constant among the squares these do not underflow.
+// v = |a|:  d/da_i = a_i / |a|. If one of the squares is a constant, the quotients do not underflow.
 StableForm norm_form(const Expr& e) {
   const Call* root = as_op(e, Op::sqrt);
   StableForm result{root ? components_of(root->args[0]) : std::vector<Expr>{}, {}};
@@ -144,7 +146,7 @@ StableForm norm_form(const Expr& e) {
 
 namespace {
 
-// Products of products: to this depth, so that long chains of them take linear time.
+// How deep products of products are searched. The limit keeps long chains of products linear in time.
 constexpr int deepest_product = 2;
 
 void add_factors(const Expr& e, int depth, std::vector<Expr>& factors) {
@@ -154,7 +156,7 @@ void add_factors(const Expr& e, int depth, std::vector<Expr>& factors) {
   add_factors(product->b, depth + 1, factors);
 }
 
-// The factors of a product in which a norm stands twice, the two of them last; else none.
+// The factors of a product in which one norm occurs twice, with these two last; empty for other expressions.
 std::vector<Expr> with_square_last(const Expr& e) {
   if (const Expr root = square_root_of(e); root.defined() && !e.as<Mul>()) return {root, root};
   std::vector<Expr> factors;
@@ -171,7 +173,7 @@ std::vector<Expr> with_square_last(const Expr& e) {
   return {};
 }
 
-// The product of all but one; undefined where there is no other.
+// The product of all factors except `own`; undefined if there is no other factor.
 Expr product_without(const std::vector<Expr>& factors, size_t own) {
   Expr product;
   for (size_t i = 0; i < factors.size(); ++i) {
@@ -182,8 +184,9 @@ Expr product_without(const std::vector<Expr>& factors, size_t own) {
 
 }  // namespace
 
-// v = r |a|^2:  d/da_i = r 2 a_i, d/dr = |a|^2. Through |a| it is 2 r |a| times the unit vector: the
-// same, but for the origin, where neither has a derivative and the whole has 2 r.
+// v = r |a|^2:  d/da_i = r 2 a_i, d/dr = |a|^2. Differentiated through |a|, d/da_i would be 2 r |a| times the unit
+// vector. That agrees except at the origin, where |a| has no derivative, and where this form also gives the right
+// second derivative, 2 r.
 StableForm squared_norm_form(const Expr& e) {
   std::vector<Expr> factors = with_square_last(e);
   if (factors.empty()) return {};
@@ -217,7 +220,7 @@ StableForm normalised_form(const Expr& e) {
 
 std::vector<Expr> unit_vector(const std::vector<Expr>& a) { return polar(a).u; }
 
-// With y and x scaled by the larger of them: neither overflow nor underflow of y^2 + x^2 shows.
+// y and x are divided by the larger magnitude, so that y^2 + x^2 neither overflows nor underflows.
 std::vector<Expr> angle_gradient(const Expr& y, const Expr& x) {
   const Expr zero = make_zero(x.type()), size_x = call_op(Op::abs, {x}),
              size_y = call_op(Op::abs, {y});

@@ -1,4 +1,4 @@
-// Shapes of expressions that several stable forms look for.
+// stable_patterns.h -- matchers of expression shapes that several stable forms share.
 #pragma once
 
 #include <vector>
@@ -8,19 +8,19 @@
 
 namespace retrograde::autodiff {
 
-// e, or what it is the negation of.
+// e without its negation, if it has one.
 Expr without_sign(const Expr& e);
-// 1 where w is x, -1 where it is -x, 0 where it is neither.
+// 1 if w is x, -1 if w is -x, else 0.
 double sign_between(const Expr& w, const Expr& x);
 
-// The terms of a sum; empty when there are more than four: longer ones are reductions.
+// The terms of a sum; empty if there are more than four, because longer sums are reductions.
 std::vector<Expr> terms_of(const Expr& sum);
 
 struct SignedTerm {
   Expr value;
   double sign = 1;
 };
-// The same through differences.
+// As terms_of, but differences count as sums, too.
 std::vector<SignedTerm> signed_terms_of(const Expr& sum);
 
 }  // namespace retrograde::autodiff

@@ -10,28 +10,28 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// c_0 + c_1 x + ...
+// The polynomial c_0 + c_1 x + ...
 Expr polynomial(const std::vector<double>& coefficients, const Expr& x) {
   Expr result = make_const(x.type(), coefficients.back());
   for (size_t k = coefficients.size() - 1; k-- > 0;)
     result = make_const(x.type(), coefficients[k]) + x * result;
   return result;
 }
-// Where the series hold.
+// Whether x is so near 0 that the series apply.
 Expr is_near(const Expr& x) { return call_op(Op::abs, x.type(), {x}) < make_const(x.type(), 0.5); }
 size_t terms_for(Type type, size_t in_float, size_t in_double) {
   return type.bits() == 64 ? in_double : in_float;
 }
 
-// N, which is 0 at x = 0, and its derivative by x.
+// A numerator or denominator N that vanishes at x = 0, and its derivative by x.
 struct Vanishing {
   Expr slope;           // N'
   Expr relative_slope;  // N' / N
-  Expr quotient_slope;  // of N / x, where |x| < 1 / 2
+  Expr quotient_slope;  // derivative of N / x, for |x| < 1 / 2
 };
 
-// N = t (exp(w) - 1), w = s x:  N' / N = s + s t / N, d(N / x)/dx = t (1/2 + w / 3 + ... + (k - 1)
-// w^(k-2) / k! + ...)
+// N = t (exp(w) - 1), w = s x:  N' / N = s + s t / N,
+//   d(N / x)/dx = t (1/2 + w / 3 + ... + (k - 1) w^(k-2) / k! + ...)
 Vanishing exp_minus_one(const Expr& n, const Expr& x) {
   const auto* difference = n.as<Sub>();
   if (!difference) return {};
@@ -49,8 +49,8 @@ Vanishing exp_minus_one(const Expr& n, const Expr& x) {
           polynomial(series, exponential->args[0])};
 }
 
-// N = log(1 + w), w = s x; with q = w / (2 + w), w = 2 q / (1 - q):  log(1 + w) = 2 (q + q^3 / 3 +
-// ...), d(N / x)/dx = -(1 - q)^2 / 2 (1 / (1 + q) + q (1/3 + q^2 / 5 + ...))
+// N = log(1 + w), w = s x; with q = w / (2 + w), w = 2 q / (1 - q):  log(1 + w) = 2 (q + q^3 / 3 + ...),
+//   d(N / x)/dx = -(1 - q)^2 / 2 (1 / (1 + q) + q (1/3 + q^2 / 5 + ...))
 Vanishing log_of_one_plus(const Expr& n, const Expr& x) {
   const Call* logarithm = as_op(n, Op::log);
   if (!logarithm) return {};
@@ -92,8 +92,8 @@ StableForm vanishing_quotient(const Expr& v, const Div& quotient) {
   return {{x}, {strong(make_select(is_near(x), near, far))}};
 }
 
-// v = sin(x) / x:  dv/dx = (cos(x) - v) / x, which cancels near 0: sum of (-1)^k 2k x^(2k-1) /
-// (2k+1)!
+// v = sin(x) / x:  dv/dx = (cos(x) - v) / x, which cancels near 0. The series there is
+//   sum of (-1)^k 2k x^(2k-1) / (2k+1)!
 StableForm sine_quotient(const Expr& v, const Div& quotient) {
   const Call* sine = as_op(quotient.a, Op::sin);
   const Expr& x = quotient.b;

@@ -12,7 +12,7 @@ namespace retrograde::autodiff {
 namespace {
 
 constexpr double inf = std::numeric_limits<double>::infinity();
-constexpr double largest_exponent = 88;  // of exp in float32
+constexpr double largest_exponent = 88;  // exp of more may overflow float32
 
 ValueRange between(double min, double max, bool infinite = false) {
   return {{min, max}, infinite && (min == -inf || max == inf)};
@@ -25,7 +25,7 @@ ValueRange joined(const ValueRange& a, const ValueRange& b) {
 }
 bool excludes_zero(const ValueRange& a) { return !a.contains(0); }
 
-// The ends where an operation has them; NaN: no bound.
+// The range from `low` to `high`; NaN means no bound.
 ValueRange from_ends(double low, double high, bool infinite) {
   return between(std::isnan(low) ? -inf : low, std::isnan(high) ? inf : high, infinite);
 }
@@ -51,13 +51,13 @@ ValueRange square(const ValueRange& a) {
   const double high = std::max(std::abs(a.min), std::abs(a.max));
   return between(excludes_zero(a) ? low * low : 0, high * high, a.infinite);
 }
-// 0 may be -0: a quotient by it has either sign.
+// The divisor 0 may be -0, so a quotient by it may be infinite of either sign.
 ValueRange quotient(const ValueRange& a, const ValueRange& b) {
   if (!excludes_zero(b)) return {{}, true};
   return product(a, between(1 / b.max, 1 / b.min));
 }
 
-// The second operand where one is NaN, so that the first bounds one side only.
+// If one operand is NaN, the result is the second operand, so the first operand bounds one side only.
 ValueRange smaller(const ValueRange& a, const ValueRange& b) {
   return between(std::min(a.min, b.min), b.max, a.infinite || b.infinite);
 }
@@ -82,14 +82,14 @@ ValueRange root(const ValueRange& a) {
   return between(std::sqrt(std::max(a.min, 0.0)), std::sqrt(std::max(a.max, 0.0)), a.infinite);
 }
 
-// Of a number to a constant, positive power: finite.
+// A number to a constant, positive power is finite.
 ValueRange power(const ValueRange& a, const ValueRange& exponent) {
   if (exponent == constant(2)) return square(a);
   const bool is_known = exponent.min == exponent.max && exponent.min > 0;
   return between(a.min >= 0 ? 0 : -inf, inf, a.infinite || !is_known);
 }
 
-// `infinite`: one of the operands may be.
+// `infinite`: whether one of the operands may be infinite.
 ValueRange of_operator(Op op, const std::vector<ValueRange>& a, bool infinite) {
   if (const int passed = passed_operand(op); passed >= 0) return a[static_cast<size_t>(passed)];
   switch (exact_form(op)) {
@@ -120,7 +120,7 @@ ValueRange of_operator(Op op, const std::vector<ValueRange>& a, bool infinite) {
   return between(values.low, values.high, infinite || is_risky_op(op));
 }
 
-// Of -x * x, which is how -(x * x) is often written.
+// Whether a * b is -x * x, which is how -(x * x) is often written.
 bool is_negation_of(const Expr& a, const Expr& b) {
   const auto* difference = a.as<Sub>();
   return difference && is_zero(difference->a) && equal(difference->b, b);
@@ -147,7 +147,7 @@ ValueRange of_binary(const Binary& e, const ValueRange& a, const ValueRange& b) 
   }
 }
 
-// Of a constant, or of a node by the ranges of its children, which `of` gives.
+// The range of a constant, or of a node given the ranges `of` its children.
 ValueRange range_of_node(const Expr& e, FunctionRef<ValueRange(const Expr&)> of) {
   if (auto value = as_const_float(e)) return constant(*value);
   if (!e.type().is_float()) return {};
@@ -168,7 +168,7 @@ ValueRange range_of_node(const Expr& e, FunctionRef<ValueRange(const Expr&)> of)
   return between(-inf, inf, infinite);
 }
 
-// `next` grew out of `before`: what grows leaps.
+// Widens each bound of `next` that grew beyond `before`.
 ValueRange widened(const ValueRange& before, const ValueRange& next) {
   ValueRange result = next;
   if (next.min < before.min) result.min = next.min >= 0 ? 0 : -inf;
@@ -212,8 +212,8 @@ bool ValueRanges::is_promised_finite(const Expr& leaf) const {
   return image && image->is_finite;
 }
 
-// Whether it chooses among constants and what is promised to be finite, and computes nothing that
-// could overflow.
+// Whether the value only selects among constants and elements promised finite, and computes nothing that could
+// overflow.
 bool ValueRanges::only_passes_on(const Expr& value) const {
   if (auto number = as_const_float(value)) return std::isfinite(*number);
   if (!value.type().is_float()) return true;

@@ -1,15 +1,15 @@
-// What values Funcs can have: bounds, and whether a value may be infinite.
+// value_range.h -- bounds of the values of Funcs, and whether a value may be infinite.
 //
-// What images, parameters and extern stages hold counts as finite, and so do sums and products of
-// finite numbers. What is left are constants and poles: 1 / x, log(0), an exp that overflows, the
-// identity of a maximum over an empty domain. Bounds hold wherever the value is not NaN; they prove
-// that logistic functions, softened norms and what was clamped are finite.
+// Elements of images, parameters and extern stages count as finite, and so do sums and products of finite numbers.
+// Infinities come from constants and poles: 1 / x, log(0), an exp that overflows, the identity of a maximum over an
+// empty domain. Bounds hold wherever the value is not NaN. They prove that logistic functions, softened norms and
+// clamped values are finite.
 //
-// A promise (ImageParam::promise_finite) holds for what images and Funcs hold, without it that is
-// "whatever was stored", which a strong product must meet.
+// Without a promise (ImageParam::promise_finite) an image may hold any bits, and a strong product must cope with that.
+// With it, elements of the image, and of Funcs that copy them, are known to be finite.
 //
-// Method: one pass over the Funcs, producers first. Updates that read their own Func are evaluated
-// again until nothing grows, where a bound that grows goes to 0, then to infinity.
+// Method: one pass over the Funcs, producers first. Updates that read their own Func are evaluated repeatedly until no
+// bound grows; a bound that grows is widened to 0, then to infinity.
 #pragma once
 
 #include <unordered_map>
@@ -28,14 +28,14 @@ struct ValueRange : IntervalOf<double> {
 
 class ValueRanges {
  public:
-  ValueRanges() = default;  // of no Func anything is known
-  // `order`: producers before consumers. Of others nothing is known.
+  ValueRanges() = default;  // knows nothing about any Func
+  // `order` has producers before consumers. Nothing is known about Funcs outside of it.
   explicit ValueRanges(const std::vector<FuncPtr>& order);
 
   ValueRange of(const Expr& e) const;
   bool may_be_infinite(const Expr& e) const { return of(e).infinite; }
-  // An element of an ImageParam of which its user promises that, or of a Func that holds nothing but
-  // such elements and constants.
+  // Whether `leaf` reads an ImageParam with promise_finite, or a Func that holds only elements of such images and
+  // constants.
   bool is_promised_finite(const Expr& leaf) const;
 
  private:

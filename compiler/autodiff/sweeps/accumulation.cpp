@@ -7,9 +7,9 @@
 #include "autodiff/sweeps/blocked_sums.h"
 #include "autodiff/sweeps/border_conditions.h"
 #include "autodiff/sweeps/gather_places.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autodiff/sweeps/join_borders.h"
-#include "autodiff/sweeps/made_definitions.h"
-#include "autodiff/sweeps/private_parts.h"
+#include "autodiff/sweeps/privatisation.h"
 #include "autodiff/sweeps/running_sums.h"
 #include "autodiff/sweeps/zero_borders.h"
 #include "frontend/language/var.h"
@@ -21,8 +21,9 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Gathers over one domain that differ in their borders share an update: beyond its border each adds
-// 0. Then what they sum is gone through once. Only a few: one body has all that they read.
+// Gathers over one domain that differ only in their borders share an update, in which each adds 0 beyond its border.
+// The shared loop then reads common operands once. The number of gathers is limited because one body holds all their
+// reads.
 constexpr size_t most_borders = 4;
 void share_domains(std::vector<Contribution>& contributions) {
   const auto domain_of = [](Gather g) {
@@ -42,7 +43,7 @@ void share_domains(std::vector<Contribution>& contributions) {
   }
 }
 
-// Whether elements between those that it reaches stay 0.
+// Whether some elements between those that it reaches stay 0.
 bool leaves_zeros(const Contribution& c) {
   return !c.gather.is_everywhere() ||
          (c.gather.predicate.defined() && !is_range_condition(c.gather.predicate));
@@ -83,7 +84,7 @@ class Builder {
   }
 
  private:
-  // A running sum in double goes on in double.
+  // A running sum that starts in double continues in double.
   bool is_wider(const Expr& value) const {
     return value.defined() &&
            std::ranges::all_of(types_, [&](Type t) { return value.type().bits() > t.bits(); });
@@ -98,7 +99,7 @@ class Builder {
     return f;
   }
 
-  // How far the dimensions of the target run, where that is known: a guess as users give them.
+  // Sets estimates of the extents of the target's dimensions where they are known, as users do.
   void estimate(const FuncPtr& f) const {
     if (target_.region.size() != target_.args.size()) return;
     for (size_t d = 0; d < target_.args.size(); ++d) {
@@ -151,13 +152,14 @@ class Builder {
     result_.stages.push_back(Accumulation::Pointwise);
   }
 
-  // Whether the terms are added in float32 blocks before they come to a sum in double. Data may
-  // send whatever they like to an element of a scatter.
+  // Whether the terms are added in float32 blocks before a sum in double. A scatter has no blocks, because data decide
+  // how many of its terms meet in one element.
   bool has_blocks(const Iterations& update) const {
     return is_wide_ && !update.over.scatters && is_long(update) &&
            std::ranges::all_of(target_.types, [](Type t) { return t == Float(32); });
   }
-  // Has terms added up by a block, so that the rest of the update adds blocks; false: there is none.
+  // Moves the terms into a Func of blocks; what remains of the update adds the blocks. Returns false if there are no
+  // blocks.
   bool take_blocks(const std::vector<Expr>& point, int lanes, std::vector<ReductionVariable>& rvars,
                    std::vector<Expr>& terms, Expr& predicate) {
     const auto sum = sum_in_blocks(name_, target_.name, point, rvars, terms, predicate);
@@ -188,8 +190,8 @@ class Builder {
     result_.stages.push_back(update.over.scatters ? Accumulation::Scatter : Accumulation::Gather);
   }
 
-  // parts(lane, y..., part) accumulates a slice of the reduction domain; then adj(y...) sums over
-  // lanes and parts. Elements fixed on the left-hand side need no y.
+  // parts(lane, y..., part) accumulates a slice of the reduction domain; then adj(y...) sums over lanes and parts.
+  // Dimensions whose index is fixed on the left-hand side need no y.
   void add_privatised(const Iterations& update, const PartPlan& plan) {
     const Gather& g = update.over;
     FuncPtr parts = new_func(claim_name(name_ + "_parts"), Role::Accumulator);
@@ -218,8 +220,8 @@ class Builder {
     sum_parts(g, parts, plan);
     if (!plan.note.empty()) result_.notes.push_back(plan.note);
   }
-  // Lanes of blocks are added in pairs before they come to the sums in double, which then are half as
-  // many: a conversion, an addition and a way to memory each.
+  // Adds pairs of lanes of blocks before the sums in double. This halves the number of those sums, each of which costs
+  // a conversion, an addition and a memory round trip.
   static void add_lanes_in_pairs(const FuncPtr& parts, const Expr& lane, std::vector<Expr>& terms) {
     if (!lane.defined()) return;
     const int half = parts->made->lanes / 2;
@@ -242,7 +244,7 @@ class Builder {
 
   const AdjointTarget& target_;
   std::string name_;
-  std::vector<Type> types_;  // in which to accumulate
+  std::vector<Type> types_;  // types of accumulation
   bool is_wide_ = false;     // wider than the target's
   std::vector<Expr> args_;
   AdjointFunc result_;

@@ -1,5 +1,6 @@
-// active_symbols.h -- which Funcs and parameters lie between what is asked for and the output: the
-// ones that get an adjoint.
+// active_symbols.h -- finds the Funcs and parameters that need an adjoint.
+//
+// These are the symbols on a path from a requested input to the output.
 #pragma once
 
 #include <unordered_set>
@@ -9,23 +10,23 @@
 
 namespace retrograde::autodiff {
 
-// Of a symbol that is an image or scalar parameter; else null.
+// The contents of a symbol that is an image or scalar parameter; null for other symbols.
 const ParameterContents* as_parameter(const Symbol* symbol);
-// What a leaf of an expression refers to; null for variables that are no parameter.
+// The symbol that a leaf of an expression refers to; null for variables that are no parameter.
 Symbol* symbol_of(const Expr& leaf);
 
 class ActiveSymbols {
  public:
-  // `order`: all that the output depends on, producers first.
+  // `order` has all Funcs that the output depends on, producers first.
   ActiveSymbols(const FuncPtr& output, const std::vector<FuncPtr>& order,
                 const SynthesisOptions& options);
 
   bool is_requested(const Symbol* symbol) const;
   bool contains(const Symbol* symbol) const { return active_.contains(symbol); }
   bool contains(const Expr& leaf) const;
-  // Whether derivatives go on from a Func to something wanted.
+  // Whether derivatives pass through the Func to a wanted input.
   bool is_passed_by(const Symbol* f) const { return passing_.contains(f); }
-  // Whether the output is the same for all values of the Func (rules/invariance.h).
+  // Whether the output does not depend on the values of the Func (rules/invariance.h).
   bool cancels(const Symbol* f) const { return cancelling_.contains(f); }
 
  private:

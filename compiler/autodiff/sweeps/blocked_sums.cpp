@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "graph/define.h"
 #include "graph/names.h"
 #include "ir/build.h"
@@ -12,16 +12,16 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Terms of a block, one after the other; lanes have blocks of their own.
+// The number of terms of a block. Each lane has blocks of its own.
 constexpr int64_t short_block = 16, long_block = 32;
-// Blocks of a sum from which on they are long.
+// Sums of at least this many long blocks use long blocks.
 constexpr int64_t enough_blocks = 16;
-// Fewer terms are not worth a block.
+// A block with fewer terms does not pay.
 constexpr int64_t least_terms = 8;
-// Blocks of a loop from which on rounding up to whole ones costs little.
+// For loops of at least this many blocks, rounding up to whole blocks costs little.
 constexpr int64_t least_to_round = 8;
 
-// Of a sum of so many terms, INT64_MAX: unknown.
+// The size of a block in a sum of `terms` terms; INT64_MAX means unknown.
 int64_t terms_of_block(int64_t terms) {
   return terms / long_block >= enough_blocks ? long_block : short_block;
 }
@@ -35,8 +35,8 @@ int64_t number_of_terms(const std::vector<ReductionVariable>& rvars) {
   return terms;
 }
 
-// So many neighbouring iterations of a loop, at most `most`: a divisor of the extent where one is
-// near.
+// The number of consecutive iterations of a loop that form a block, at most `most`; a divisor of the extent if there is
+// one above most / 2.
 int64_t cut_of(int64_t extent, int64_t most) {
   for (int64_t size = most; size * 2 > most; --size) {
     if (extent % size == 0) return size;
@@ -66,7 +66,9 @@ class Cutter {
   const std::vector<ReductionVariable>& inner() const { return inside_->vars; }
   const std::vector<ReductionVariable>& outer() const { return outside_->vars; }
   const std::vector<Expr>& conditions() const { return conditions_; }
-  const std::vector<Expr>& numbers() const { return numbers_; }  // of blocks: Vars of the block's
+  const std::vector<Expr>& numbers() const {
+    return numbers_;
+  }  // block numbers: Vars of the block's Func
   const Substitution& place() const { return place_; }
   std::vector<Expr> places_outside() const {
     return mapped(outer(), [&](const auto& r) { return loop_variable(outside_, r.var); });
@@ -87,7 +89,7 @@ class Cutter {
   void keep_outside(const ReductionVariable& r) {
     place_[r.var] = add_outside(r.var, r.min, r.extent);
   }
-  // Beyond the end the place is clamped: what is read there must exist.
+  // Splits the loop into blocks. Indices beyond the end are clamped, because the elements that are read must exist.
   void cut(const ReductionVariable& r, int64_t extent, int64_t size) {
     const Expr all = make_const(Int(32), extent), each = make_const(Int(32), size);
     const Expr number =

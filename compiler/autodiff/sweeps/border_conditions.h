@@ -1,4 +1,4 @@
-// Which conditions of a gather are true but for borders, and where they come to stand.
+// border_conditions.h -- recognises the conditions of a gather that fail only near a border.
 #pragma once
 
 #include <vector>
@@ -8,18 +8,18 @@
 
 namespace retrograde::autodiff {
 
-// Conditions on ranges are true but for borders; those on residues are not.
+// Whether `e` restricts a range. Such conditions fail only at borders; conditions on residues fail everywhere.
 bool is_range_condition(const Expr& e);
-// The conditions of a gather that fail in a border only: those on ranges, in which reduction
-// variables move no further than a stencil does. Loops are cut there. What a wider reduction
-// variable decides becomes the ends of its own loop (trim_loops).
+// Whether the condition of a gather fails only in a border: it restricts a range, and its reduction variables move it
+// no further than a stencil does. Loops are split there. A condition on a longer reduction variable becomes the bounds
+// of that variable's loop instead (trim_loops).
 bool fails_in_a_border(const Expr& condition, const std::vector<ReductionVariable>& rvars);
-// Whether a gather sums a few terms, which its condition leaves out in borders alone.
+// Whether a gather sums a few terms, and its condition drops terms only at borders.
 bool has_borders(const Gather& g);
 
-// The predicate of an update: those of its parts that fail in a border are likely.
+// The predicate of an update, in which the parts that fail only at a border are marked likely.
 Expr with_likely_parts(const Expr& predicate, const std::vector<ReductionVariable>& rvars);
-// The value, or zero where the predicate is false; an undefined one holds everywhere.
+// The value, or zero where the predicate is false. An undefined predicate is true.
 Expr masked(const Expr& predicate, const Expr& value);
 
 }  // namespace retrograde::autodiff

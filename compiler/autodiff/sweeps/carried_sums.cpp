@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "graph/own_reads.h"
 #include "ir/build.h"
 #include "ir/node_memo.h"
@@ -12,12 +12,11 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// A node that is linear in what is carried: a product with `factor` (undefined: 1), a quotient, a
-// sum, a choice.
+// A node that is linear in the carried value: a product with `factor` (undefined: 1), a quotient, a sum or a select.
 struct Linear {
   enum class Kind { Carried, Scaled, Divided, Sum, Choice, Unknown } kind = Kind::Unknown;
-  std::vector<Expr> parts;  // those that may hold what is carried
-  Expr factor;              // or divisor, or condition
+  std::vector<Expr> parts;  // operands that may contain the carried value
+  Expr factor;              // the factor, divisor or condition
 };
 
 Linear scaled(const Expr& a, const Expr& b, const FuncContents* carried) {
@@ -68,7 +67,7 @@ std::optional<double> magnitude(const Expr& factor) {
   return value ? std::optional(std::fabs(*value)) : std::nullopt;
 }
 
-// Terms share nodes: each is looked at once.
+// Terms share nodes, so each node is visited once.
 class Factors {
  public:
   explicit Factors(const FuncContents* carried) : carried_(carried) {}
@@ -132,7 +131,7 @@ class InDouble {
                 : map_children(term, [&](const Expr& part) { return of(part); });
   }
 
-  // The term in its own type, of exact values.
+  // The term in its own type, reading the exact values.
   Expr of_exact(const Expr& term) const {
     return map_calls_of(term, rounded_.get(), [&](const Call& call, const std::vector<Expr>&) {
       return cast_to(call.type, call_value(exact_, call.args, call.component));
@@ -156,7 +155,7 @@ bool carries_sums(const std::vector<Expr>& terms, const FuncContents* carried) {
     if (!factor) return true;
     sum += *factor;
   }
-  // The terms that are remembered are a geometric series: 1 / (1 - sum) of them count.
+  // The sum over remembered terms is a geometric series, which effectively has 1 / (1 - sum) terms.
   return !(sum <= 1 - 1.0 / many_carried);
 }
 

@@ -1,5 +1,6 @@
-// What the stages contribute to the adjoints of what they read: each read inverted, and kept until
-// the adjoint is made of all that it gets.
+// contributions.h -- collects the contributions to each adjoint until the adjoint is built.
+//
+// Each read of a stage contributes to the adjoint of the Func or image that it reads. The access is inverted here.
 #pragma once
 
 #include <string>
@@ -18,20 +19,20 @@ class Contributions {
   Contributions(const Primal& primal, SynthesisAccount& account)
       : primal_(primal), account_(account) {}
 
-  // values(args), one for each value of the symbol, inside of a box; undefined ones are zero.
-  // `read`: elements that anybody looks at; may be empty (unknown).
+  // Adds values(args) inside of a box, one for each value of the symbol; undefined ones are zero. `read` is the region
+  // that consumers read; empty if unknown.
   void add_pointwise(const Symbol* symbol, const std::vector<std::string>& args, const Box& box,
                      const std::vector<LoopVariable>& read, const std::vector<Expr>& values);
-  // Of a stage of f to what the leaf reads. `adjoint`: that of the leaf, in other words.
+  // Adds the contribution of a stage of f to the symbol that the leaf reads. `adjoint` replaces the leaf's own adjoint.
   void add(const FuncPtr& f, const LeafAdjoint& leaf, const Expr& adjoint,
            const IterationDomain& domain);
   void add(const FuncPtr& f, const LeafAdjoint& leaf, const IterationDomain& domain) {
     add(f, leaf, leaf.adjoint, domain);
   }
-  // Whether the readers of a Func that only looks another one up have contributed to that one
-  // themselves. The Func keeps its own adjoint, for who asks for it.
+  // For a Func that only looks another one up: whether its consumers have contributed to that other Func themselves.
+  // The Func still has its own adjoint, in case it was requested.
   bool pass_on(const FuncContents& f);
-  // All that the symbol's adjoint gets.
+  // Returns and removes all contributions to the symbol.
   std::vector<Contribution> take(const Symbol* symbol);
 
  private:

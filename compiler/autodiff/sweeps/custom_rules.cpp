@@ -4,8 +4,8 @@
 #include <unordered_set>
 
 #include "autodiff/rules/derivative_rules.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autodiff/sweeps/input_shape.h"
-#include "autodiff/sweeps/made_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
@@ -23,7 +23,7 @@ bool is_among(const std::vector<AdjointInput>& inputs, const Symbol* symbol) {
                              [&](const AdjointInput& i) { return i.symbol().get() == symbol; });
 }
 
-// Functions of their arguments' values only: facts of a buffer's shape are no reads of it.
+// Only reads of values count: queries of a buffer's shape are no reads.
 std::shared_ptr<Symbol> read_symbol(const Expr& e) {
   if (const auto* call = e.as<Call>())
     return call->symbol.defined() ? call->symbol.lock() : nullptr;
@@ -71,7 +71,7 @@ std::string asked_through(const FuncContents& f) {
   return "propagate adjoints through " + quoted(f.name);
 }
 
-// Every wanted input behind f is one that the rule was made for.
+// Checks that every wanted input that f depends on is an input of the rule.
 std::vector<FuncPtr> check_covered(const FuncContents& f,
                                    FunctionRef<bool(const Symbol*)> is_wanted,
                                    FunctionRef<bool(const Symbol*)> is_requested) {
@@ -92,12 +92,12 @@ std::vector<FuncPtr> check_covered(const FuncContents& f,
   return covered;
 }
 
-// One contribution, of the right shape, for each wanted input.
-void check_contributions(const FuncContents& f, const std::vector<AdjointContribution>& given,
+// Checks that each wanted input has one contribution of the right shape.
+void check_contributions(const FuncContents& f, const std::vector<AdjointContribution>& returned,
                          FunctionRef<bool(const Symbol*)> is_wanted) {
   const std::vector<AdjointInput>& inputs = f.custom_derivatives->adjoint_inputs;
   std::unordered_set<const Symbol*> seen;
-  for (const AdjointContribution& c : given) {
+  for (const AdjointContribution& c : returned) {
     InputShape shape = shape_of(c.input.symbol().get());
     if (!is_among(inputs, c.input.symbol().get())) {
       user_error(asked_through(f), "a rule contributes to the inputs that it was made for",
@@ -121,13 +121,13 @@ void check_contributions(const FuncContents& f, const std::vector<AdjointContrib
   }
 }
 
-// `given` as an adjoint. Nothing is known of the rule: what it gives may be exactly 0 where the
-// partials of the input are infinite, and infinite where they are 0.
-FuncPtr as_adjoint(const std::string& name, const FuncPtr& given) {
+// `returned` as an adjoint. The rule may return values that are exactly 0 where the partials of the input are infinite,
+// and infinite where they are 0, so the result has both traits.
+FuncPtr as_adjoint(const std::string& name, const FuncPtr& returned) {
   FuncPtr result = make_func(Role::CustomRule, name);
   result->made->traits = {.masked = true, .singular = true};
-  const std::vector<Expr> args = variables_of(implicit_names(given->dimensions()));
-  define_pure(result, args, mapped(values_of(given, args), [](const Expr& value) {
+  const std::vector<Expr> args = variables_of(implicit_names(returned->dimensions()));
+  define_pure(result, args, mapped(values_of(returned, args), [](const Expr& value) {
                 return cast_to(adjoint_type(value.type()), value);
               }));
   return result;
@@ -194,12 +194,12 @@ CustomAdjointResult run_custom_adjoint(const FuncPtr& f, const FuncPtr& adjoint,
     if (is_wanted(symbol)) wanted.push_back({symbol, region_of(regions.of(symbol))});
   }
   if (wanted.empty()) return result;
-  // The rule may be replaced while it runs.
+  // Holds the rules, because another thread may replace them while the rule runs.
   std::shared_ptr<const CustomDerivatives> rules = f->custom_derivatives;
-  std::vector<AdjointContribution> given = rules->adjoint(
+  std::vector<AdjointContribution> returned = rules->adjoint(
       AdjointContext(Func(f), Func(adjoint), region_of(regions.of(f.get())), wanted));
-  check_contributions(*f, given, is_wanted);
-  for (const AdjointContribution& c : given) {
+  check_contributions(*f, returned, is_wanted);
+  for (const AdjointContribution& c : returned) {
     if (!is_wanted(c.input.symbol().get())) continue;
     std::string name = shape_of(c.input.symbol().get()).name;
     if (c.is_zero) {
@@ -238,10 +238,10 @@ FuncPtr run_custom_tangent(const FuncPtr& f, FunctionRef<FuncPtr(const Symbol*)>
                "List it in custom_tangent");
   }
   if (moving.empty()) return nullptr;
-  Func given = rules->tangent(TangentContext(Func(f), rules->tangent_inputs, moving));
+  Func returned = rules->tangent(TangentContext(Func(f), rules->tangent_inputs, moving));
   check_shape(asked, "the tangent that its rule gives", "the Func",
-              {f->name, f->dimensions(), f->types}, *given.function());
-  return as_adjoint(f->name + "_tan", given.function());
+              {f->name, f->dimensions(), f->types}, *returned.function());
+  return as_adjoint(f->name + "_tan", returned.function());
 }
 
 FuncPtr zero_derivative(const Symbol& symbol, const std::string& suffix) {

@@ -1,5 +1,4 @@
-// Running the rules of custom_derivative.h and checking what they give: what the two syntheses see
-// of them.
+// custom_rules.h -- runs the rules of custom_derivative.h and checks their results, for both modes.
 #pragma once
 
 #include <string>
@@ -11,7 +10,7 @@
 
 namespace retrograde::autodiff {
 
-// What FuncContents::custom_derivatives points to. Never changed once it is there.
+// The contents of FuncContents::custom_derivatives; immutable.
 struct CustomDerivatives {
   std::vector<AdjointInput> adjoint_inputs, tangent_inputs;
   CustomAdjoint adjoint;  // null: none
@@ -22,18 +21,17 @@ struct CustomDerivatives {
 bool has_custom_adjoint(const FuncContents& f);
 bool has_custom_tangent(const FuncContents& f);
 
-// Funcs, images and parameters that the definitions or the extern arguments of f name, each once;
-// f is not among them.
+// The Funcs, images and parameters in the definitions or extern arguments of f, each once, without f itself.
 std::vector<std::shared_ptr<Symbol>> read_by(const FuncContents& f);
 
-// What f depends on by a path that passes none of the inputs, which are not among it.
+// A symbol that f depends on along a path that passes none of the inputs. The inputs do not count.
 struct Inside {
   std::shared_ptr<Symbol> symbol;
-  std::string reader;  // who names it
+  std::string reader;  // the Func that reads it
 };
 std::vector<Inside> inside_of(const FuncContents& f, const std::vector<AdjointInput>& inputs);
 
-// The region of an extern stage's argument that `of_func` needs.
+// The region of an extern stage's argument that the region `of_func` needs.
 Box extern_reads(const FuncContents& f, const std::shared_ptr<Symbol>& argument, int dimensions,
                  const Box& of_func);
 
@@ -44,20 +42,20 @@ struct CustomContribution {
 struct CustomAdjointResult {
   std::vector<CustomContribution> contributions;  // to wanted inputs, without zeros
   std::vector<std::string> zeros;                 // wanted inputs that were declared zero
-  std::vector<FuncPtr> covered;                   // between the inputs and f
+  std::vector<FuncPtr> covered;                   // Funcs between the inputs and f
 };
-// is_wanted: lies between what was requested and the output; is_requested: by name.
+// `is_wanted`: the symbol lies between a requested input and the output. `is_requested`: it was requested by name.
 CustomAdjointResult run_custom_adjoint(const FuncPtr& f, const FuncPtr& adjoint,
                                        const Regions& regions,
                                        FunctionRef<bool(const Symbol*)> is_wanted,
                                        FunctionRef<bool(const Symbol*)> is_requested);
 
-// tangent_of: null where it is zero. has_direction: it was given, not derived. Null: identically
-// zero, as nothing that f depends on moves.
+// `tangent_of` returns null for a zero tangent. `has_direction`: the tangent was specified by the user, not derived.
+// Returns null if the tangent is identically zero because nothing that f depends on moves.
 FuncPtr run_custom_tangent(const FuncPtr& f, FunctionRef<FuncPtr(const Symbol*)> tangent_of,
                            FunctionRef<bool(const Symbol*)> has_direction);
 
-// Zeros in the shape of an input, under its name and `suffix`.
+// Zeros in the shape of an input, named after the input and `suffix`.
 FuncPtr zero_derivative(const Symbol& symbol, const std::string& suffix);
 
 }  // namespace retrograde::autodiff

@@ -9,7 +9,8 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Equal for equal nodes, whose children stand as numbers: users may give two images one name.
+// A key that is equal for equal nodes, whose children are replaced by their numbers. Symbols are compared by address,
+// since two images may have the same name.
 std::string key_of(const Expr& shallow) {
   const auto* call = shallow.as<Call>();
   const auto* v = shallow.as<Variable>();

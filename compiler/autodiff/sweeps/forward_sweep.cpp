@@ -44,7 +44,7 @@ class ForwardSweep {
       if (!facts_.is_active(e)) return;
       tangents_[e.get()] = cast_to(adjoint_type(e.type()), tangent_of_(e));
       traits_[e.get()] = traits_of(tangents_[e.get()]);
-      // A Func's tangent may have overflowed, as its value may.
+      // The tangent of a Func may have overflowed, as its value may.
       const auto* call = e.as<Call>();
       traits_[e.get()].infinite |= call && call->call_type == CallType::Func;
     } else if (e.type().is_float() && (facts_.is_active(e) || undefs_.contains(e.get()))) {
@@ -53,7 +53,7 @@ class ForwardSweep {
     }
   }
 
-  // What keeps the old value has to keep the old tangent: that is known for choices only.
+  // An undef that keeps the old value must keep the old tangent, too. That is supported for selects only.
   void note_undef(const Expr& e) {
     bool below = false;
     for_each_child(e, [&](const Expr& child) { below |= undefs_.contains(child.get()); });
@@ -99,9 +99,9 @@ class ForwardSweep {
     return sum;
   }
 
-  // How the tangent of operand i meets its partial; notes in e's traits what becomes of it. An
-  // adjoint meets the partials in the opposite order: where it would be 0 before it reaches an
-  // infinite partial, the tangent has passed that one and is cut.
+  // Returns partial i with the strength that the operand's tangent requires, and records the consequences in e's
+  // traits. A tangent meets the partials in the opposite order to an adjoint: where the adjoint would be 0 before it
+  // reaches an infinite partial, the tangent has already passed that partial and must be cut.
   Partial partial_of(const LocalDerivative& local, size_t i, const Expr& e) {
     Partial partial = local.partials[i];
     const Finiteness& factor = local.factors[i];
@@ -109,10 +109,10 @@ class ForwardSweep {
     const Passed here = passed_[local.operands[i].get()];
     const bool is_quotient = partial.divisor.defined();
     if (factor.infinite || (here.choice && factor.read))
-      partial.strength = made_strong(partial.strength);
+      partial.strength = as_strong(partial.strength);
     if (passed.singular || (passed.infinite && local.levels_off_by(i)) ||
         (here.quotient && !is_quotient))
-      partial.strength = made_cut(partial.strength);
+      partial.strength = as_cut(partial.strength);
     passed_[e.get()].choice |= here.choice || partial.factor.as<Select>();
     passed_[e.get()].quotient |= here.quotient || is_quotient;
     AdjointTraits& traits = traits_[e.get()];
@@ -128,11 +128,11 @@ class ForwardSweep {
   std::unordered_set<const ExprNode*> undefs_;
   std::unordered_map<const ExprNode*, Expr> tangents_;
   std::unordered_map<const ExprNode*, AdjointTraits> traits_;
-  // Within the expression that is swept: what a tangent came through, which may have made it 0 or,
-  // where the value is finite, infinite.
+  // Operations that a tangent passed within this expression. They may have made it 0 or, though the value is finite,
+  // infinite.
   struct Passed {
     bool choice = false;
-    bool quotient = false;  // by a denormal number, or a logarithm of one
+    bool quotient = false;  // division by, or logarithm of, a possibly denormal number
   };
   std::unordered_map<const ExprNode*, Passed> passed_;
   ForwardResult result_;

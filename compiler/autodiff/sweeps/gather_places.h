@@ -1,7 +1,7 @@
-// Where one gather adds: places that the bounds of its update can follow.
+// gather_places.h -- rewrites the left-hand side of a gather so that bounds inference can follow it.
 //
-//   image_adj(0, y) += a(y)   =>   image_adj(x, y) += select(x == 0, a(y), 0), when few x exist
-//   image_adj(p) += a(r)      =>   image_adj(clamp(p, low, high)) += a(r), of the region read
+//   image_adj(0, y) += a(y)   =>   image_adj(x, y) += select(x == 0, a(y), 0), if x has few values
+//   image_adj(p) += a(r)      =>   image_adj(clamp(p, low, high)) += a(r), with the bounds of the region read
 #pragma once
 
 #include "autodiff/sweeps/accumulation.h"

@@ -29,28 +29,28 @@ InputShape shape_of(const Symbol* symbol) {
 }
 
 void check_shape(const std::string& asked, const std::string& what, const std::string& of,
-                 const InputShape& shape, const FuncContents& given) {
-  if (!given.is_defined()) {
+                 const InputShape& shape, const FuncContents& candidate) {
+  if (!candidate.is_defined()) {
     user_error(asked, text(what, " must be defined"),
                text("that of ", quoted(shape.name), " has no definition"),
                "Define it before it is given");
   }
-  if (given.dimensions() != shape.dimensions) {
+  if (candidate.dimensions() != shape.dimensions) {
     user_error(asked, text(what, " has the dimensions of ", of),
-               text(quoted(given.name), " has ", given.dimensions(), " and ", quoted(shape.name),
-                    " has ", shape.dimensions),
+               text(quoted(candidate.name), " has ", candidate.dimensions(), " and ",
+                    quoted(shape.name), " has ", shape.dimensions),
                text("Define ", what, " over the same dimensions"));
   }
-  if (given.types.size() != shape.types.size()) {
+  if (candidate.types.size() != shape.types.size()) {
     user_error(asked, text(what, " has as many values as ", of),
-               text(quoted(given.name), " has ", given.types.size(), " and ", quoted(shape.name),
-                    " has ", shape.types.size()),
+               text(quoted(candidate.name), " has ", candidate.types.size(), " and ",
+                    quoted(shape.name), " has ", shape.types.size()),
                "Define it as a Tuple of as many values");
   }
-  for (Type t : given.types) {
+  for (Type t : candidate.types) {
     if (t.is_float()) continue;
     user_error(asked, text(what, " is made of floating-point values"),
-               text(quoted(given.name), " has type ", to_string(t)), "Convert them to float");
+               text(quoted(candidate.name), " has type ", to_string(t)), "Convert them to float");
   }
 }
 

@@ -1,4 +1,4 @@
-// What a derivative by an input looks like: the shape that directions and contributions must have.
+// input_shape.h -- the shape that directions and contributions for an input must have, and checks of it.
 #pragma once
 
 #include <string>
@@ -11,20 +11,20 @@ namespace retrograde::autodiff {
 struct InputShape {
   std::string name;
   int dimensions = 0;
-  std::vector<Type> types;  // empty: not defined
+  std::vector<Type> types;  // empty: undefined
   bool is_floating() const;
 };
-// Of a Func, image or parameter; null and others: undefined.
+// The shape of a Func, image or parameter; undefined for null and other symbols.
 InputShape shape_of(const Symbol* symbol);
 
 bool is_floating(const std::vector<Type>& types);
-// CompileError unless some value is a float. `whose`: the message's subject, as "its type".
+// Throws CompileError unless some value is a float. `whose` is the message's subject, for example "its type".
 void check_is_floating(const std::string& asked, const std::vector<Type>& types,
                        const std::string& whose, const std::string& what_to_do);
 
-// CompileError unless `given` is defined, with the dimensions and the number of values of `shape`,
-// all of them floats. `what`: "a direction"; `of`: what the message calls the input.
+// Throws CompileError unless `candidate` is defined and has the dimensions and number of values of `shape`, all floats.
+// `what` names `candidate` in the message, for example "a direction"; `of` names the input.
 void check_shape(const std::string& asked, const std::string& what, const std::string& of,
-                 const InputShape& shape, const FuncContents& given);
+                 const InputShape& shape, const FuncContents& candidate);
 
 }  // namespace retrograde::autodiff

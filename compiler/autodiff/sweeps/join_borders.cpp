@@ -30,8 +30,7 @@ bool say_the_same(const std::vector<Expr>& a, const std::vector<Expr>& b) {
   return all_in(a, b) && all_in(b, a);
 }
 
-// A condition on `arg` that ends right before `place`, moved by one; undefined: it is something
-// else.
+// If the condition on `arg` ends right before `place`, returns it extended by that element; else an undefined Expr.
 Expr moved_past(const Expr& condition, const std::string& arg, const Expr& place) {
   const auto is_arg = [&](const Expr& e) {
     const auto* variable = e.as<Variable>();
@@ -49,7 +48,7 @@ Expr moved_past(const Expr& condition, const std::string& arg, const Expr& place
   return {};
 }
 
-// Everything the same but for one dimension, in which one is at a place and the other everywhere.
+// Whether the two agree except in dimension d, where `border` has a single index and `inner` runs over all elements.
 bool are_beside_each_other(const Contribution& inner, const Contribution& border, size_t d) {
   const Gather &a = inner.gather, &b = border.gather;
   if (inner.component != border.component || a.rdom || a.scatters || !a.pure[d]) return false;
@@ -59,7 +58,7 @@ bool are_beside_each_other(const Contribution& inner, const Contribution& border
   return true;
 }
 
-// Where both add; nothing where the border is no more of the same.
+// The predicate of both terms together; nullopt if the border's term does not continue the interior's.
 std::optional<Expr> joined(const Contribution& inner, const Contribution& border, size_t d,
                            const std::string& arg) {
   if (!are_beside_each_other(inner, border, d)) return std::nullopt;
@@ -84,7 +83,7 @@ bool is_border(const Gather& g, size_t d) {
   return !g.rdom && !g.scatters && !g.pure[d] && is_const(g.lhs[d]);
 }
 
-// What the border joins; null: nothing.
+// Merges the border into one of `others` and returns that one; null if none fits.
 Contribution* join(const Contribution& border, const std::vector<Contribution*>& others,
                    const AdjointTarget& target) {
   for (size_t d = 0; d < border.gather.lhs.size(); ++d) {
@@ -111,8 +110,8 @@ void join_borders(std::vector<Contribution>& contributions, const AdjointTarget&
   size_t most = 0;
   for (const Contribution* c : left) most = std::max(most, fixed_dimensions(c));
   const size_t all = left.size();
-  for (; most > 0; --most) {  // corners join sides before these join the interior
-    // A side fits once the corners of what it joins are there.
+  for (; most > 0; --most) {  // corners are merged into sides before sides into the interior
+    // A side may fit only after the corners of its neighbours have been merged.
     for (bool more = true; more;) {
       const size_t before = left.size();
       std::unordered_set<const Contribution*> gone;

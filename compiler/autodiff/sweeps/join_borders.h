@@ -1,11 +1,10 @@
-// A border joins the interior whose term goes on there.
+// join_borders.h -- merges a border update into the interior term that it continues.
 //
 //   f_adj(x) = select(x < n - 1, a(min(x + 1, n - 1)), 0)
 //   f_adj(n - 1) += a(n - 1)                               =>   f_adj(x) = a(min(x + 1, n - 1))
 //
-// Clamped reads of neighbours are gathers from the inside and updates of the ends. The element
-// before the first and the one behind the last are read by the neighbour on the other side: as terms
-// these are the same, so that the step back is a stencil over a clamped place again.
+// Inverting clamped reads of neighbours gives a gather for the interior and an update for each end. The end's term
+// equals the interior's term one element further, so merged they are a stencil with a clamped index again.
 #pragma once
 
 #include <vector>
@@ -14,7 +13,7 @@
 
 namespace retrograde::autodiff {
 
-// In place: fewer contributions that add the same.
+// Modifies `contributions` in place: fewer contributions with the same sum.
 void join_borders(std::vector<Contribution>& contributions, const AdjointTarget& target);
 
 }  // namespace retrograde::autodiff

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <functional>
 
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autoschedule/cost_estimate.h"
 #include "ir/build.h"
 #include "ir/visit.h"

@@ -1,10 +1,10 @@
-// kept_values.h -- adjoints read what a Func holds instead of computing it again.
+// kept_values.h -- lets adjoints read a Func's stored value instead of recomputing it.
 //
 //   f(x) = exp(g(x))         g_adj(x) = f_adj(x) * exp(g(x))    =>    g_adj(x) = f_adj(x) * f(x)
 //
-// The derivatives of exp, pow, tanh and others are expressions of the value itself. Where a pure
-// Func has this value, and it is dearer than a way to memory and back, its adjoint reads the Func: a
-// schedule that stores it computes it once, and one that inlines it computes what was there before.
+// The derivatives of exp, pow, tanh and others are expressions of the value itself. If a pure Func holds that value,
+// and recomputing it costs more than a memory round trip, the adjoint reads the Func. A schedule that stores the Func
+// then computes the value once; a schedule that inlines it computes the same as before.
 #pragma once
 
 #include <vector>
@@ -14,7 +14,7 @@
 
 namespace retrograde::autodiff {
 
-// `values`: those of the Func's pure definition, of which the adjoint was made.
+// `values` are those of the Func's pure definition, from which the adjoint was derived.
 LeafAdjoint with_kept_values(const LeafAdjoint& leaf, const FuncPtr& f,
                              const std::vector<Expr>& values);
 

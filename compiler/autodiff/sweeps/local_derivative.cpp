@@ -20,8 +20,8 @@ bool makes_risky(const Expr& e) {
                    (call->call_type == CallType::Operator && is_risky_op(call->op))));
 }
 
-// The operands that decide whether the value is finite: an integer is, and so is a choice between
-// finite values.
+// Visits the operands that decide whether the value is finite. Integers are finite, and so is a select between finite
+// values, whatever its condition.
 void for_each_operand(const Expr& e, ExprVisit visit) {
   const auto* cast = e.as<Cast>();
   if (cast && !cast->value.type().is_float()) return;
@@ -36,7 +36,7 @@ void for_each_operand(const Expr& e, ExprVisit visit) {
   }
 }
 
-// The value of the operand, whatever the types.
+// A derivative of 1: the value is the operand's, whatever the types.
 LocalDerivative same_as(const Expr& e, const Expr& operand) {
   LocalDerivative result{LocalDerivative::Kind::Sum, {operand}, {}, {}, {}, {{}}};
   result.partials.push_back({make_one(adjoint_type(e.type())), Strength::Plain});
@@ -52,14 +52,14 @@ LocalDerivative sum_of(const std::vector<Expr>& operands, std::vector<Partial> p
     for (const Expr& part : {p.factor, p.divisor}) {
       if (part.defined()) partial.add(facts.finiteness_of(part));
     }
-    if (partial.risky) p.strength = made_strong(p.strength);
+    if (partial.risky) p.strength = as_strong(p.strength);
     partial.risky |= p.divisor.defined();
     result.factors.push_back(partial);
   }
   return result;
 }
 
-// By what may be infinite: the value is 0 there.
+// Whether `e` is a quotient whose divisor may be infinite; the value is 0 there.
 bool is_quotient(const Expr& e) {
   const auto* quotient = e.as<Div>();
   return quotient && e.type().is_float() && !is_const(quotient->b);
@@ -105,7 +105,7 @@ LocalDerivative of_call(const Expr& e, const Call& call, const ExprFacts& facts)
 std::vector<Expr> post_order(const std::vector<Expr>& roots) {
   std::vector<Expr> order;
   std::unordered_set<const ExprNode*> seen;
-  std::vector<std::pair<Expr, bool>> stack;  // explicit, since user-made DAGs can be deep
+  std::vector<std::pair<Expr, bool>> stack;  // explicit, because users' DAGs can be deep
   for (auto root = roots.rbegin(); root != roots.rend(); ++root) {
     if (root->defined()) stack.emplace_back(*root, false);
   }
@@ -145,7 +145,7 @@ void ExprFacts::classify(const Expr& e, FunctionRef<bool(const Expr&)> is_wanted
            .infinite = floating && ranges.may_be_infinite(e)};
   } else {
     for_each_child(e, [&](const Expr& child) { active |= is_active(child); });
-    if (active && !floating) {  // derivatives pass through floating values only
+    if (active && !floating) {  // derivatives pass through floating-point values only
       if (e.as<Cast>()) notes_.insert("a cast to " + to_string(e.type()) + " has derivative 0");
       active = false;
     }
@@ -180,8 +180,8 @@ Finiteness ExprFacts::finiteness_of(const Expr& factor) const {
 }
 
 LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts) {
-  if (StableForm whole = stable_form(e); !whole.operands.empty()) {
-    LocalDerivative sum = sum_of(whole.operands, whole.partials, facts);
+  if (StableForm form = stable_form(e); !form.operands.empty()) {
+    LocalDerivative sum = sum_of(form.operands, form.partials, facts);
     const auto* call = e.as<Call>();
     sum.levels_off.assign(sum.operands.size(), call ? levels_off(call->op) : is_quotient(e));
     return sum;
@@ -220,9 +220,9 @@ AdjointTraits traits_of(const Expr& adjoint) {
     const bool is_operator = call->call_type == CallType::Operator;
     result.singular |= is_operator && has_poles(*call);
     result.vanished |= is_operator && levels_off(call->op);
-    const Provenance* made = provenance_of(*call);
-    if (made) result.add(made->traits);
-    if (made && e.same_as(top)) is_seed = false;
+    const Provenance* provenance = provenance_of(*call);
+    if (provenance) result.add(provenance->traits);
+    if (provenance && e.same_as(top)) is_seed = false;
     return true;
   });
   result.masked |= is_seed;

@@ -1,6 +1,6 @@
-// What one node of an expression contributes to derivatives: shared by the reverse sweep, which
-// carries adjoints from a value to its leaves, and the forward sweep, which carries tangents from
-// the leaves to a value.
+// local_derivative.h -- the partial derivatives of one node of an expression, for both sweeps.
+//
+// The reverse sweep carries adjoints from a value to its leaves, the forward sweep tangents from the leaves to a value.
 //
 // Linearised:  dv = sum_i partial_i * d operand_i
 #pragma once
@@ -21,17 +21,17 @@ namespace retrograde::autodiff {
 
 class ValueRanges;
 
-// Children before parents, each node once. Undefined roots are skipped.
+// All nodes below the roots, each once, children before parents. Undefined roots are skipped.
 std::vector<Expr> post_order(const std::vector<Expr>& roots);
 
-// Where derivatives end inside an expression: reads of Funcs and images, variables.
+// Whether derivatives end at `e` inside an expression: at reads of Funcs and images, and at variables.
 bool is_leaf(const Expr& e);
 
 struct Finiteness {
   bool risky = false;     // infinite or NaN at finite operands
-  bool read = false;      // what a Func or image holds, however wild that is
-  bool infinite = false;  // by a leaf that may be
-  bool product = false;   // of reads, which may overflow
+  bool read = false;      // an element of a Func or image, which may hold any bits
+  bool infinite = false;  // depends on a leaf that may be infinite
+  bool product = false;   // a product of reads, which may overflow
   void add(const Finiteness& other) {
     risky |= other.risky;
     read |= other.read;
@@ -40,18 +40,18 @@ struct Finiteness {
   }
 };
 
-// What is true of the nodes of a DAG.
+// Properties of the nodes of a DAG.
 class ExprFacts {
  public:
-  // `order`: children before parents. `is_wanted` says by which leaves to differentiate.
+  // `order` has children before parents. `is_wanted` selects the leaves to differentiate by.
   ExprFacts(const std::vector<Expr>& order, FunctionRef<bool(const Expr&)> is_wanted,
             const ValueRanges& ranges);
 
-  // Depends on a wanted leaf by a path of floating values.
+  // Whether `e` depends on a wanted leaf along a path of floating-point values.
   bool is_active(const Expr& e) const { return active_.contains(e.get()); }
-  // What a factor made of nodes of the DAG may be.
+  // Whether a factor built from nodes of the DAG may be infinite, and how.
   Finiteness finiteness_of(const Expr& factor) const;
-  // Casts through which a derivative is lost.
+  // The casts through which a derivative is lost.
   const std::set<std::string>& notes() const { return notes_; }
 
  private:
@@ -63,27 +63,28 @@ class ExprFacts {
 
 struct LocalDerivative {
   enum class Kind : uint8_t {
-    Zero,    // by rule; `note` says which
-    Choice,  // of operands 0 and 1 by `condition`
-    Sum,     // partials times operands
+    Zero,    // zero by the rule named in `note`
+    Choice,  // selects operand 0 or 1 by `condition`
+    Sum,     // sum of partials times operands
   };
   Kind kind = Kind::Zero;
   std::vector<Expr> operands;
-  std::vector<Partial> partials;  // Sum: one an operand; an undefined factor is 0
+  std::vector<Partial> partials;  // Sum: one for each operand; an undefined factor is 0
   Expr condition;
   std::string note;
-  std::vector<Finiteness> factors;  // Sum: what the partials may be
+  std::vector<Finiteness> factors;  // Sum: finiteness of the partials
   bool poles = false;               // partials may be infinite where the value is finite
-  // Sum: whether the partial may be 0 where the operand is infinite; empty: none is.
+  // Sum: whether the partial may be 0 where the operand is infinite. Empty means false for all.
   std::vector<bool> levels_off = {};
   bool levels_off_by(size_t i) const { return i < levels_off.size() && levels_off[i]; }
 };
 
-// Of an active node that is no leaf. Partials that may be infinite or NaN are Strong. Throws
-// Unsupported where there is no rule.
+// The derivative of an active node that is no leaf. Partials that may be infinite or NaN are Strong. Throws Unsupported
+// if there is no rule.
 LocalDerivative local_derivative(const Expr& e, const ExprFacts& facts);
 
-// Here or in a Func between here and the output. A seed that the user gives counts as masked.
+// The traits of an adjoint, which it may have here or in a Func between here and the output. A seed that the user
+// specifies counts as masked.
 AdjointTraits traits_of(const Expr& adjoint);
 
 }  // namespace retrograde::autodiff

@@ -11,11 +11,11 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Of a read at a corner of a box in two dimensions.
+// A read at a corner of a two-dimensional box has this many pieces.
 constexpr size_t most_pieces = 4;
 
-// Whether each index is a function of one variable, of another one each: neither a diagonal nor a
-// slice, of whose Func most elements are never read.
+// Whether each index is a function of one variable, a different one each. Diagonals and slices do not qualify: most
+// elements of their Func are never read.
 bool maps_coordinates(const Call& call, const std::vector<std::string>& args) {
   std::set<std::string> used;
   for (const Expr& index : call.args) {

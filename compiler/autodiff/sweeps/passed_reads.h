@@ -1,18 +1,18 @@
-// Reads of a Func that only looks another one up, as boundary conditions do, in terms of that one.
+// passed_reads.h -- rewrites reads of a Func that only looks another Func up, as boundary conditions do.
 //
 //   bounded(x) = f(clamp(x, 0, n - 1))              next(x) = bounded(x - 1) + bounded(x + 1)
 //
-// By the adjoint of `bounded`, f_adj would have an update for each side and corner of its box:
+// Through the adjoint of `bounded`, f_adj would have an update for each side and corner of its box:
 //
 //   bounded_adj(x) = next_adj(x + 1) + next_adj(x - 1)
 //   f_adj(x) = bounded_adj(x);  f_adj(0) += bounded_adj(-1);  f_adj(n - 1) += bounded_adj(n)
 //
-// With f(clamp(x - 1, 0, n - 1)) in place of bounded(x - 1) it is a stencil as `next` is, once
-// borders have joined (join_borders.h):
+// With f(clamp(x - 1, 0, n - 1)) in place of bounded(x - 1), and after borders are merged (join_borders.h), f_adj is a
+// stencil as `next` is:
 //
 //   f_adj(x) = next_adj(min(x + 1, n - 1)) + next_adj(max(x - 1, 0))
 //
-// Not for reads that run over reduction variables: their borders would be sums over these, too.
+// Not applied to reads that run over reduction variables: their borders would be sums over these variables, too.
 #pragma once
 
 #include <unordered_map>
@@ -25,29 +25,28 @@
 
 namespace retrograde::autodiff {
 
-// Of a Func by a stage of `reader`, over the variables of `domain`.
+// A read of a Func by a stage of `reader`, in terms of the variables of `domain`.
 struct PassedRead {
   FuncPtr reader;
   LeafAdjoint read;
   IterationDomain domain;
 };
 
-// Whether all that f does is to read an element at a place that its coordinates say one by one, or a
-// constant where they say so.
+// Whether f only reads an element at indices that are functions of one coordinate each, or a constant where its
+// coordinates select that.
 bool is_look_up(const FuncContents& f);
-// The value that a read of such a Func has, by what this reads.
+// The value of a read of such a Func, expressed by the Func that it looks up.
 Expr looked_up(const FuncContents& f, const Call& read);
-// Whether the inversion takes few pieces, none of which sums: then it may stand for the inversion of
-// two reads one after the other.
+// Whether the inversion has few pieces, none of which sums. Then it may replace the inversion of two reads in sequence.
 bool is_short(const Inversion& inversion);
 
-// Who reads the Funcs that look others up.
+// The reads of the Funcs that look others up.
 class PassedReads {
  public:
   void note(const Symbol* of, PassedRead read) { reads_[of].push_back(std::move(read)); }
-  // The Func's adjoint has more than what its readers contribute.
+  // Declares that the Func's adjoint gets more than the contributions of its consumers.
   void close(const Symbol* of) { closed_.insert(of); }
-  // Empty where it is closed.
+  // The noted reads of the symbol; empty if it is closed.
   const std::vector<PassedRead>& of(const Symbol* symbol) const;
 
  private:

@@ -1,5 +1,6 @@
-// What synthesis knows of the program that it differentiates: its Funcs, what is read of them, which
-// of them lie between what is asked for and the output.
+// primal.h -- facts about the program being differentiated.
+//
+// These are its Funcs, the regions read of them, and which of them lie between the requested inputs and the output.
 #pragma once
 
 #include <vector>
@@ -21,13 +22,13 @@ struct Primal {
   ActiveSymbols active;
 
   AdjointTarget target_of(const Symbol* symbol) const;
-  // Whether it is asked for by name.
+  // Whether its gradient was requested by name.
   bool is_named(const Symbol* symbol) const;
-  // The adjoint of each value where the stage writes; undefined for values that are no floats. A
-  // place that depends on data may lie outside of all that is read: 0 there.
+  // The adjoint of each value at the place that the stage writes; undefined for values that are no floats. A
+  // data-dependent place may lie outside of all regions read; the adjoint is 0 there.
   std::vector<Expr> adjoints_at_write(const FuncContents& f, int stage,
                                       const FuncPtr& adjoint) const;
-  // Down to the leaves that get an adjoint, `except` one.
+  // Sweeps down to the leaves that get an adjoint, without `except`.
   SweepResult sweep(const std::vector<Expr>& values, const std::vector<Expr>& seeds,
                     const Symbol* except = nullptr) const;
 };

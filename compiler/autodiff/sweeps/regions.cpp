@@ -12,7 +12,7 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Pure variables, then reduction variables.
+// The loops of a definition: pure variables, then reduction variables.
 std::vector<LoopVariable> loops_of(const FuncContents& f, const Definition& definition,
                                    const Box& box) {
   std::vector<LoopVariable> loops;
@@ -25,7 +25,8 @@ std::vector<LoopVariable> loops_of(const FuncContents& f, const Definition& defi
   return loops;
 }
 
-// Where the place of an update depends on data, only what others read counts.
+// Takes the bounds from `other` where `box` has none: for a data-dependent index only the region that others read is
+// known.
 Box or_else(const Box& box, const Box& other) {
   Box result = box;
   for (size_t d = 0; d < box.size(); ++d) {
@@ -66,13 +67,11 @@ void Regions::grow(const Symbol* symbol, const Box& box) {
 
 void Regions::add_func(const FuncPtr& f) {
   auto found = boxes_.find(f.get());
-  if (found == boxes_.end() || (found->second.empty() && !f->args.empty()))
-    return;  // nothing of it is read
-  // An output's elements are given: beyond them it has none.
+  if (found == boxes_.end() || (found->second.empty() && !f->args.empty())) return;  // never read
+  // The region of an output is fixed: it has no elements beyond.
   const bool is_output = outputs_.contains(f.get());
   std::map<const Symbol*, Box> callees;
-  // From the last stage back: what an update reads of the Func itself, the stages before it must
-  // hold.
+  // From the last stage to the first, because earlier stages must hold the elements of the Func that an update reads.
   for (int s = f->stage_count() - 1; s >= 0; --s) {
     const Definition& definition = f->stage(s);
     Scope<Interval> scope = scope_of(loops_of(*f, definition, boxes_[f.get()]));
@@ -96,7 +95,7 @@ void Regions::add_func(const FuncPtr& f) {
   add_extern_arguments(*f);
 }
 
-// The definitions do not say what a C function reads.
+// Adds the arguments of a C function, whose reads the definitions do not show.
 void Regions::add_extern_arguments(const FuncContents& f) {
   if (!f.is_extern()) return;
   for (const ExternArgument& a : f.extern_definition->args) {

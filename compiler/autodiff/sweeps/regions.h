@@ -1,4 +1,4 @@
-// The region of every Func that a region of the outputs needs: what the adjoint sums over.
+// regions.h -- the region of every Func that a region of the outputs needs: the domain over which adjoints sum.
 #pragma once
 
 #include <map>
@@ -15,18 +15,17 @@ namespace retrograde::autodiff {
 
 class Regions {
  public:
-  // `order`: producers before consumers, the output last. `output`: its region.
+  // `order` has producers before consumers and ends with the output, whose region is `output`.
   Regions(const std::vector<FuncPtr>& order, const Box& output);
   // The same for several outputs, anywhere in the order.
   Regions(const std::vector<FuncPtr>& order, const std::map<const Symbol*, Box>& outputs);
 
-  // One more Func and its region, and what it reads.
+  // Adds a Func with its region, and all that it reads.
   void add(const FuncPtr& f, const Box& box);
-  // Elements of a Func or image that are read or computed; undefined ends are unbounded. Empty:
-  // never read.
+  // The elements of a Func or image that are read or computed. Undefined ends are unbounded; an empty Box means never
+  // read.
   const Box& of(const Symbol* symbol) const;
-  // The variables of a stage with their ranges: pure variables, then reduction variables, innermost
-  // first.
+  // The variables of a stage with their ranges: pure variables, then reduction variables, innermost first.
   IterationDomain domain(const FuncContents& f, int stage) const;
   std::vector<LoopVariable> loop_variables(const Symbol* symbol,
                                            const std::vector<std::string>& names) const;
@@ -39,7 +38,7 @@ class Regions {
   std::set<const Symbol*> outputs_;
 };
 
-// A region in whole numbers, min and max of each dimension.
+// Converts a region, min and extent, to the min and max of each dimension.
 Box box_of(const Region& region);
 
 }  // namespace retrograde::autodiff

@@ -78,8 +78,8 @@ class ReverseSweep {
     AdjointTraits traits = state.traits;
     if ((traits.masked && factor.read) || (traits.vanished && factor.infinite) ||
         (traits.levelled && factor.product))
-      partial.strength = made_strong(partial.strength);
-    if (traits.singular) partial.strength = made_cut(partial.strength);
+      partial.strength = as_strong(partial.strength);
+    if (traits.singular) partial.strength = as_cut(partial.strength);
     traits.add({.masked = partial.factor.as<Select>() != nullptr,
                 .vanished = local.levels_off_by(i),
                 .levelled = local.levels_off_by(i),

@@ -10,8 +10,8 @@ namespace retrograde::autodiff {
 
 namespace {
 
-constexpr size_t most_in_a_sum = 4;  // adjoints
-constexpr size_t few_adjoints = 8;   // in all, that one sum reads
+constexpr size_t most_in_a_sum = 4;  // adjoints read by one running sum
+constexpr size_t few_adjoints = 8;   // up to this many adjoints stay in a single sum
 
 using Sources = std::set<const Symbol*>;
 
@@ -34,7 +34,8 @@ std::vector<std::vector<Contribution>> running_groups(
   Sources all, last, group;
   for (const Contribution& contribution : contributions) {
     const Sources sources = sources_of(contribution);
-    const bool goes_on = sources == last;  // taps of one stage share an update
+    const bool goes_on =
+        sources == last;  // the taps of one stage stay in one group, to share an update
     if (groups.empty() || (!goes_on && group.size() >= most_in_a_sum)) {
       groups.emplace_back();
       group.clear();

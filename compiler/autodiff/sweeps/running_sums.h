@@ -1,18 +1,17 @@
-// A sum of many adjoints as running sums, each of a few of them.
+// running_sums.h -- splits a sum of many adjoints into running sums of a few each.
 //
 //   b_adj = a1_adj + a2_adj + ... + a20_adj    =>    s1 = a1_adj + ... + a4_adj
-//                                                    s2 = s1 + a5_adj + ... + a8_adj
-//                                                    ...
-//                                                    b_adj = s4 + a17_adj + ... + a20_adj
+//                                                     s2 = s1 + a5_adj + ... + a8_adj
+//                                                     ...
+//                                                     b_adj = s4 + a17_adj + ... + a20_adj
 //
-// What every step of an iteration reads, as the right-hand side of a linear system, gets a
-// contribution from each. One sum of all would hold the adjoints of all steps until the last one is
-// there; of running sums few are alive at once. The terms are added in the same order, that in which
-// the adjoints are made, so that the result has the same bits where it is pointwise. A few terms a
-// sum: each is a way of one more Func to memory and back.
+// A Func that every step of an iteration reads, as the right-hand side of a linear system, gets a contribution from
+// each step. A single sum would keep the adjoints of all steps alive until the last one is computed; with running sums
+// few are alive at once. Terms are added in the order in which the adjoints are computed, so pointwise results keep the
+// same bits. Each sum has a few terms because each adds the memory round trip of one more Func.
 //
-// Source: accumulation of adjoints in the reverse sweep of a tape (Griewank and Walther, Evaluating
-// Derivatives, SIAM 2008, section 3.2), which adds each when it is made; ours by groups.
+// Source: accumulation of adjoints in the reverse sweep of a tape (Griewank and Walther, Evaluating Derivatives, SIAM
+// 2008, section 3.2), which adds each adjoint as soon as it is computed; ours adds groups.
 #pragma once
 
 #include <vector>
@@ -21,7 +20,7 @@
 
 namespace retrograde::autodiff {
 
-// In their order; one group, where the contributions come from few adjoints.
+// Splits the contributions into groups, in order. One group if the contributions come from few adjoints.
 std::vector<std::vector<Contribution>> running_groups(
     const std::vector<Contribution>& contributions);
 

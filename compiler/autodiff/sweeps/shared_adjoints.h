@@ -1,17 +1,17 @@
-// What the contributions of one stage have in common, in a Func of its own.
+// shared_adjoints.h -- computes the common subexpressions of one stage's contributions once, in a Func of their own.
 //
 //   h(x, t + 1) = tanh(w(x) h(x, t) + u(x, t))
 //   w_adj(x)    += sum over t of h_adj(x, t + 1) tanh'(...) h(x, t)
 //   u_adj(x, t) += h_adj(x, t + 1) tanh'(...)
 //
-// Contributions are gathered at places of their own, so that each computes its terms by itself: a
-// step with many inputs would be computed again for every one. Here h_adj(x, t + 1) tanh'(...), the
-// adjoint of an inner value of the step from which two contributions or more go on, becomes a value
-// of h_adj_inner(x, t), over the variables of the stage.
+// Contributions are gathered over different index sets, so each computes its terms separately: a step with many inputs
+// would be recomputed for each input. Here h_adj(x, t + 1) tanh'(...) is the adjoint of an inner value of the step from
+// which two or more contributions follow. It becomes a value of the Func h_adj_inner(x, t), over the variables of the
+// stage.
 //
-// Only adjoints: what a partial reads of the primal stays where stable forms (stable_forms.h) find
-// it when the gradient is differentiated. Only where that saves more operations than it takes to
-// bring the values to memory and back, and what is read over the whole domain is there.
+// Only adjoints are shared. The primal values that a partial reads stay in the expression, where stable_forms.h finds
+// them when the gradient is differentiated again. Sharing must save more operations than the memory round trip of the
+// values costs, and all that they read must exist over the whole domain.
 #pragma once
 
 #include <vector>
@@ -23,12 +23,11 @@
 namespace retrograde::autodiff {
 
 struct SharedAdjoints {
-  FuncPtr func;                // null: nothing is worth it
-  std::vector<Expr> adjoints;  // of the leaves, with reads of func
+  FuncPtr func;                // null: sharing does not pay
+  std::vector<Expr> adjoints;  // of the leaves, reading func
 };
 
-// `leaves`: of one sweep from `seeds`, over the variables of `domain`. `regions`: of what the
-// primal reads.
+// `leaves` come from one sweep from `seeds`, over the variables of `domain`. `regions` are those that the primal reads.
 SharedAdjoints share_adjoints(const std::string& name, const IterationDomain& domain,
                               const std::vector<LeafAdjoint>& leaves,
                               const std::vector<Expr>& seeds, const Regions& regions);

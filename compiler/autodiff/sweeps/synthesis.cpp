@@ -19,7 +19,7 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Derivatives come from definitions, or from a rule.
+// Throws: an extern stage, or a Func with a rule for the other mode only, has no definitions to differentiate.
 [[noreturn]] void refuse_without_rule(const FuncContents& f, const FuncContents& output) {
   if (f.custom_derivatives) {
     unsupported(text("propagate adjoints through ", quoted(f.name)),
@@ -45,20 +45,19 @@ bool is_zero_over(const FuncContents& f, const std::vector<LoopVariable>& region
          });
 }
 
-// Where something is read may depend on values of f, too.
+// Replaces values of f in the leaf's indices, too, because an index may depend on them.
 LeafAdjoint with_self_values(const LeafAdjoint& leaf, const FuncPtr& f,
                              const SelfValues& self_values) {
   const auto known = [&](const Expr& e) { return with_values(e, f, self_values); };
   return {map_children(leaf.leaf, known), known(leaf.adjoint)};
 }
 
-// The adjoints of the parameters that were asked for; those of Funcs, too, where these were, or
-// where there are no others.
+// The adjoints of the requested parameters. Those of Funcs are included if requested, or if there are no parameters.
 std::vector<WantedFunc> gradients_of(const Primal& primal, const SynthesisResult& result) {
   std::vector<WantedFunc> gradients;
-  const auto add = [&](const Symbol* symbol, const auto& made, const auto& key) {
-    const auto found = made.find(key);
-    if (found == made.end() || !primal.active.is_requested(symbol)) return;
+  const auto add = [&](const Symbol* symbol, const auto& built, const auto& key) {
+    const auto found = built.find(key);
+    if (found == built.end() || !primal.active.is_requested(symbol)) return;
     gradients.push_back(
         {found->second, mapped(primal.target_of(symbol).region, &LoopVariable::range)});
   };
@@ -77,7 +76,7 @@ class Synthesis {
 
   SynthesisResult run() {
     const auto& [output, region, values] = primal_.seed;
-    // Over the bounds that were given: updates of the output may reach further, where the seed is 0.
+    // The seed covers the specified bounds. Updates of the output may reach further, where the seed is 0.
     contributions_.add_pointwise(output.get(), output->args, region,
                                  primal_.regions.loop_variables(output.get(), output->args),
                                  values);
@@ -85,7 +84,7 @@ class Synthesis {
       if (primal_.active.contains(f->get())) differentiate(*f);
     }
     for (const auto& parameter : parameters_of({output})) finish_parameter(*parameter);
-    // What reaches them past the rule alone is no gradient of the output by them.
+    // Covered Funcs may get an adjoint along paths beside the rule. That is not the gradient of the output by them.
     std::erase_if(result_.after_stage,
                   [&](const auto& entry) { return covered_.contains(entry.first.first); });
     explain_absent(primal_, covered_, result_, account_);
@@ -101,7 +100,7 @@ class Synthesis {
     if (contributions.empty()) return;
     AdjointTarget target = primal_.target_of(f.get());
     AdjointFunc adjoint = make_adjoint(target, f->name + "_adj", contributions);
-    bool extendable = true;  // nothing has read it yet
+    bool extendable = true;  // no consumer yet
     record(*f, f->stage_count() - 1, adjoint);
     register_func(adjoint, target);
     if (f->custom_derivatives || f->is_extern()) {
@@ -139,13 +138,13 @@ class Synthesis {
                                         : update.seeds;
     for (const IterationDomain& domain : update.domains)
       contribute_stage(f, update.values, seeds, domain, update.self_values, update.keeps_steps);
-    for (const GivenAdjoint& g : update.given) {
+    for (const DirectContribution& g : update.direct) {
       if (primal_.active.contains(g.leaf.leaf)) contributions_.add(f, g.leaf, g.domain);
     }
     account_.add(update.explanations);
   }
 
-  // Nothing of the stages before the update is left where anybody reads.
+  // The update overwrites every element that is read, so the adjoints of the stages before it are zero.
   void stop_at_update(const FuncContents& f, int stage, const AdjointTarget& target) {
     account_.add(
         Explanation::Kind::Zero, f.name,
@@ -154,9 +153,8 @@ class Synthesis {
     for (int s = 0; s < stage; ++s) record(f, s, zero);
   }
 
-  // The reverse of a recurrence goes on in the adjoint of what comes after it, which then also
-  // holds what later iterations read of earlier ones. Who asks for the adjoint after the update
-  // gets one without.
+  // The reverse of a recurrence extends the adjoint of the Func after the update, which then also contains what later
+  // iterations read of earlier ones. A requested adjoint after the update gets a copy without the extension.
   void keep_unextended(const FuncContents& f, int stage, AdjointFunc adjoint, int own_stages) {
     if (!primal_.active.is_requested(&f)) return;
     adjoint.func =
@@ -192,9 +190,9 @@ class Synthesis {
     if (box.size() != args.size()) {
       account_.add(
           Explanation::Kind::Zero, target.name,
-          text("the output reads no element of it, at most its bounds: what the custom adjoint "
-               "of ",
-               quoted(f.name), " contributes does not count"));
+          text("the output reads no element of it, at most its bounds: the contribution of the "
+               "custom adjoint of ",
+               quoted(f.name), " is ignored"));
       return;
     }
     contributions_.add_pointwise(c.input.get(), target.args, box, {}, values);
@@ -222,7 +220,7 @@ class Synthesis {
       for (const LeafAdjoint& leaf : sweep.leaves) contributions_.add(f, leaf, domain);
     }
   }
-  // What the contributions share is computed once an iteration.
+  // Computes common subexpressions of the contributions once for each iteration.
   void add_sharing(const FuncPtr& f, const std::vector<LeafAdjoint>& leaves,
                    const std::vector<Expr>& seeds, const IterationDomain& domain) {
     SharedAdjoints shared =
@@ -233,7 +231,7 @@ class Synthesis {
       account_.add(Explanation::Kind::Version, f->name,
                    text(quoted(shared.func->name), " keeps ", kept,
                         kept == 1 ? " inner adjoint" : " inner adjoints",
-                        " of each iteration, from which ", leaves.size(), " contributions go on"));
+                        " of each iteration, shared by ", leaves.size(), " contributions"));
     }
     for (size_t i = 0; i < leaves.size(); ++i)
       contributions_.add(f, leaves[i], shared.adjoints[i], domain);
@@ -259,7 +257,7 @@ class Synthesis {
   SynthesisAccount account_;
   Contributions contributions_;
   VersionBudget versions_;
-  std::unordered_set<const Symbol*> covered_;  // inside of a custom adjoint that was used
+  std::unordered_set<const Symbol*> covered_;  // Funcs inside of a custom adjoint
   SynthesisResult result_;
 };
 

@@ -1,13 +1,11 @@
-// The reverse pipeline of a graph of Funcs, as Funcs.
+// synthesis.h -- reverse mode: builds the adjoint pipeline of a graph of Funcs, as Funcs.
 //
-// Primal:      f_n = F_n(f_0, ..., f_{n-1}, images, parameters), Funcs in topological order, each a
-//              chain of stages
+// Primal:      f_n = F_n(f_0, ..., f_{n-1}, images, parameters), Funcs in topological order, each a chain of stages
 // Linearised:  df_n = sum_j (dF_n / df_j) df_j
-// Transposed:  f_j_adj = sum_n (dF_n / df_j)^T f_n_adj, Funcs in the opposite order, stages from
-//              last to first
+// Transposed:  f_j_adj = sum_n (dF_n / df_j)^T f_n_adj, Funcs in the opposite order, stages from last to first
 //
-// Every access of a stage contributes to the adjoint of what it reads; access_inversion.h turns the
-// contribution into a gather, accumulation.h adds them up. update.h handles updates that read or
+// Every access of a stage contributes to the adjoint of the Func or image that it reads. access_inversion.h turns the
+// contribution into a gather, accumulation.h adds the contributions up, and update.h handles updates that read or
 // overwrite their own Func.
 #pragma once
 
@@ -32,12 +30,12 @@ namespace retrograde::autodiff {
 struct SynthesisOptions {
   VersionRules versions;
   CheckpointBudget checkpoints;
-  bool only_requested = false;                  // else everything that the output depends on
+  bool only_requested = false;                  // false: all inputs that the output depends on
   std::unordered_set<const Symbol*> requested;  // Funcs and parameters
-  std::unordered_map<const Symbol*, std::string> left_out;  // parameters, and why
+  std::unordered_map<const Symbol*, std::string> left_out;  // parameters, with the reason
 };
 
-// The adjoint of the output: an expression over its pure variables for each value; undefined: zero.
+// The adjoint of the output: for each value an expression in the output's pure variables; undefined means zero.
 struct Seed {
   FuncPtr output;
   Box region;
@@ -45,15 +43,15 @@ struct Seed {
 };
 
 struct SynthesisResult {
-  // By Func and stage: the adjoint of the Func as it is after that stage.
+  // Key: Func and stage. Value: the adjoint of the Func as it is after that stage.
   std::map<std::pair<const Symbol*, int>, FuncPtr> after_stage;
-  std::map<const Symbol*, FuncPtr> parameters;    // images and scalars
-  std::map<const Symbol*, FuncPtr> accumulators;  // of adjoints that sum in double: by adjoint
-  std::vector<FuncPtr> funcs;                     // all that was made, producers before consumers
+  std::map<const Symbol*, FuncPtr> parameters;    // by image or scalar parameter
+  std::map<const Symbol*, FuncPtr> accumulators;  // the sum in double, by adjoint
+  std::vector<FuncPtr> funcs;                     // all generated Funcs, producers before consumers
   std::vector<Explanation> explanations;
-  std::vector<std::shared_ptr<Symbol>> requested;  // kept alive: nothing else may hold them
-  // What was differentiated, and what for: the adjoints of what was requested, else of all images
-  // and parameters, or of all Funcs where there are none.
+  std::vector<std::shared_ptr<Symbol>> requested;  // kept alive here, possibly by nothing else
+  // The output that was differentiated, and its gradients: those of the requested symbols; else of all images and
+  // parameters; else, if there are none, of all Funcs.
   WantedFunc output;
   std::vector<WantedFunc> gradients;
 };

@@ -5,7 +5,7 @@
 #include "autodiff/rules/value_range.h"
 #include "autodiff/sweeps/custom_rules.h"
 #include "autodiff/sweeps/forward_sweep.h"
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
@@ -16,21 +16,21 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// One definition linearised. Reads of the Func's own tangent are reads of `own`.
+// One definition linearised. It reads the Func's own tangent as `own`.
 struct StageTangent {
-  std::vector<Expr> values;  // one a value; undefined: zero
+  std::vector<Expr> values;  // for each value; undefined: zero
   bool moves = false;        // a value has a tangent that is not identically zero
   AdjointTraits traits;
 };
 
-// The tangent of one Func.
+// Builds the tangent of one Func.
 class FuncTangent {
  public:
   FuncTangent(const FuncPtr& f, FunctionRef<Expr(const Expr&)> tangent_of,
               const ValueRanges& ranges)
       : f_(f), tangent_of_(tangent_of), ranges_(ranges) {}
 
-  // Null when it is identically zero. With `dual` set, the tangent reads it.
+  // Returns null if the tangent is identically zero. If `dual` is set, the tangent reads it.
   FuncPtr build() {
     if (!moves()) return nullptr;
     tangent_ = make_func(Role::Tangent, f_->name + "_tan", f_->name);
@@ -45,14 +45,15 @@ class FuncTangent {
  private:
   size_t count() const { return f_->types.size(); }
 
-  // With its own tangent taken as zero: what moves no stage alone moves none.
+  // Whether any stage moves if the Func's own tangent is taken as zero. If none does, the tangent is zero.
   bool moves() {
     bool result = false;
     for (int s = 0; s < f_->stage_count(); ++s) result |= linearise_stage(s, nullptr, 0).moves;
     return result;
   }
 
-  // Tangents pass through the stages again and again: what one does to them concerns all.
+  // Repeats linearisation until the traits are stable: tangents pass through the stages repeatedly, so a trait of one
+  // stage applies to all.
   bool linearise_all(const FuncPtr& own, size_t offset) {
     AdjointTraits& traits = own->made->traits;
     AdjointTraits before;
@@ -65,8 +66,8 @@ class FuncTangent {
     return alone;
   }
 
-  // The tangents of all stages, where the Func's own stand at `offset` of `own`. False when they
-  // need its values.
+  // Linearises all stages, reading the Func's own tangents at `offset` of `own`. Returns false if the tangents need the
+  // Func's values.
   bool linearise(const FuncPtr& own, size_t offset) {
     stages_.clear();
     bool alone = true;
@@ -98,7 +99,7 @@ class FuncTangent {
                       FunctionRef<Expr(const Expr&)> tangent_of) const {
     try {
       return sweep_forward(values, tangent_of, ranges_);
-    } catch (const Unsupported& e) {  // an expression does not know where it stands
+    } catch (const Unsupported& e) {  // the sweep does not know the stage
       Message m = e.message();
       m.asked += " in " + quoted(stage_name(*f_, s));
       throw Unsupported(m);
@@ -116,7 +117,7 @@ class FuncTangent {
     return tangent_;
   }
 
-  // Stage s of `to`: the primal values, if any, then the tangents.
+  // Defines stage s of `to`: the primal values, if any, then the tangents.
   void define(const FuncPtr& to, int s, std::vector<Expr> values,
               const std::vector<Expr>& tangents) const {
     const Definition& definition = f_->stage(s);
@@ -168,7 +169,7 @@ class TangentSynthesis {
       result_.tangents[f.get()] = tangent;
     } else if (std::ranges::any_of(f->types, [](Type t) { return t.is_float(); })) {
       explain(Explanation::Kind::Zero, *f,
-              "it does not depend on an input that moves by a differentiable path");
+              "it does not depend on an input that moves along a differentiable path");
     }
   }
 
@@ -198,7 +199,7 @@ class TangentSynthesis {
     if (builder.dual()) {
       result_.funcs.push_back(builder.dual());
       explain(Explanation::Kind::Version, *f,
-              text("its updates need values that they overwrite: computed again, with the tangent, "
+              text("its updates need values that they overwrite: recomputed, with the tangent, "
                    "in ",
                    quoted(builder.dual()->name)));
     }
@@ -225,9 +226,9 @@ class TangentSynthesis {
     if (!own) return found->second;
     FuncPtr sum = make_func(Role::Tangent, f.name + "_tan_sum", f.name);
     const std::vector<Expr> args = variables_of(f.args);
-    std::vector<Expr> values = values_of(own, args), given = values_of(found->second, args);
+    std::vector<Expr> values = values_of(own, args), direction = values_of(found->second, args);
     for (size_t k = 0; k < f.types.size(); ++k)
-      values[k] = values[k] + cast_to(adjoint_type(f.types[k]), given[k]);
+      values[k] = values[k] + cast_to(adjoint_type(f.types[k]), direction[k]);
     define_pure(sum, args, values);
     sum->made->traits = own->made->traits;
     result_.funcs.push_back(sum);

@@ -1,14 +1,12 @@
-// The forward pipeline of a graph of Funcs: tangents as Funcs.
+// tangent_synthesis.h -- forward mode: builds the tangent pipeline of a graph of Funcs, as Funcs.
 //
-// Primal:      f_n = F_n(f_0, ..., f_{n-1}, images, parameters), Funcs in topological order, each a
-//              chain of stages
+// Primal:      f_n = F_n(f_0, ..., f_{n-1}, images, parameters), Funcs in topological order, each a chain of stages
 // Linearised:  df_n = sum_j (dF_n / df_j) df_j, Funcs and stages in the same order
 //
-// The tangent of a Func has its stages: same places, same reduction domains, same predicates, so
-// nothing is inverted, and every update that runs has a tangent. A stage whose partials (or places,
-// or predicate) read the Func itself needs the values as they are at that moment, which updates
-// then overwrite. Such a Func is computed again together with its tangent, as one Tuple, in which
-// the two are in step by construction:
+// The tangent of a Func has its stages, with the same indices, reduction domains and predicates. Nothing is inverted,
+// and every legal update has a tangent. If the partials, indices or predicate of a stage read the Func itself, the
+// tangent needs the values of that moment, which later updates overwrite. Such a Func is recomputed together with its
+// tangent, as one Tuple, so the two are in step by construction:
 //
 //   f(x, r) = sin(f(x, r - 1))      f_dual(x, r) = {sin(u), cos(u) * u_tan}
 //                                   with {u, u_tan} = f_dual(x, r - 1)
@@ -22,19 +20,19 @@
 
 namespace retrograde::autodiff {
 
-// By what each input is perturbed: a Func with its dimensions, and one value for each of its
-// values. That of a Func is added to its values after the last definition.
+// The perturbation of each input: a Func with the input's dimensions and number of values. A perturbation of a Func is
+// added to the Func's values after its last definition.
 using Directions = std::map<const Symbol*, FuncPtr>;
 
 struct TangentResult {
-  std::map<const Symbol*, FuncPtr> tangents;  // of Funcs; one that is missing is zero
-  std::vector<FuncPtr> order;                 // Funcs that the output depends on, it too
-  std::vector<FuncPtr> funcs;                 // all that was made, producers before consumers
+  std::map<const Symbol*, FuncPtr> tangents;  // by Func; a missing tangent is zero
+  std::vector<FuncPtr> order;                 // Funcs that the output depends on, and the output
+  std::vector<FuncPtr> funcs;                 // all generated Funcs, producers before consumers
   std::vector<Explanation> explanations;
 };
 
 TangentResult synthesize_tangents(const FuncPtr& output, const Directions& directions);
-// The tangent of a Func that has none: zeros.
+// The zero tangent of a Func.
 FuncPtr zero_tangent(const FuncContents& f);
 
 }  // namespace retrograde::autodiff

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autoschedule/scatter_schedule.h"
 #include "ir/build.h"
 #include "ir/equal.h"
@@ -31,7 +31,7 @@ namespace {
 // Contributions that can share one update definition.
 struct UpdateGroup {
   Gather gather;          // of the first tap; all have its domain and predicate
-  std::vector<Tap> taps;  // several in scatters only
+  std::vector<Tap> taps;  // several only in scatters
 };
 
 Expr rename_rdom(const Expr& e, const Gather& from, const Gather& to) {
@@ -59,8 +59,8 @@ std::vector<UpdateGroup> group_updates(const std::vector<Contribution>& contribu
   return groups;
 }
 
-// Scatters over one domain become one update over its iterations and their taps, which share
-// storage, the places' coordinates and what the terms have in common.
+// Merges scatters over one domain into one update over its iterations and their taps. The taps share storage,
+// coordinates and common subexpressions.
 std::vector<UpdateGroup> join_taps(const std::vector<UpdateGroup>& groups) {
   std::vector<UpdateGroup> joined;
   std::map<std::string, size_t> open;
@@ -88,7 +88,7 @@ std::vector<UpdateGroup> join_taps(const std::vector<UpdateGroup>& groups) {
   return joined;
 }
 
-// The value of the tap that `tap` numbers; one for all where they agree.
+// The element of `values` that `tap` selects; without a select if all are equal.
 Expr of_tap(const Expr& tap, const std::vector<Expr>& values) {
   Expr result = values.back();
   for (size_t i = values.size() - 1; i-- > 0;) {

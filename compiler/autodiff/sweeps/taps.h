@@ -1,6 +1,8 @@
-// Contributions that share an update: equal gathers are one, with the sum of their terms. Scatters
-// over one domain, as those to the corners of the cell in which a pixel is read, are the taps of one
-// update, over its domain and then over them.
+// taps.h -- merges contributions into shared update definitions.
+//
+// Equal gathers become one update with the sum of their terms. Scatters over one domain, such as those to the corners
+// of the cell that a pixel interpolates, become the taps of one update: it loops over the domain and then over the
+// taps.
 #pragma once
 
 #include <vector>
@@ -9,14 +11,14 @@
 
 namespace retrograde::autodiff {
 
-// One place of an update, as one corner of a cell between which a pixel is read.
+// One index of an update, such as one corner of an interpolation cell.
 struct Tap {
   std::vector<Expr> place;
-  std::vector<Expr> sums;  // one a value; undefined: nothing is added
+  std::vector<Expr> sums;  // for each value; undefined: no term
 };
 
-// One update: its iterations, with the taps as the last loop where there are several, and what each
-// does. `over` is the gather, or scatter, of the first tap.
+// One update: its iterations, with the taps as the last loop if there are several, and the body. `over` is the gather
+// or scatter of the first tap.
 struct Iterations {
   Gather over;
   std::vector<ReductionVariable> rvars;
@@ -25,11 +27,11 @@ struct Iterations {
   Expr predicate;
 };
 
-// What two gathers must agree on to share an update, with the reduction variables numbered. To be
-// taps of one, scatters need not agree on the places that are no pure dimensions.
+// A key that is equal for gathers that can share an update; reduction variables are numbered in it. For taps of one
+// scatter the indices outside of the pure dimensions may differ: `with_places` is then false.
 std::string shape_of(const Gather& g, bool with_places = true);
 
-// Of the contributions that are not pointwise, to a Func of so many values.
+// The updates for those contributions that are not pointwise, to a Func with `values` values.
 std::vector<Iterations> updates_of(const std::vector<Contribution>& contributions, size_t values);
 
 }  // namespace retrograde::autodiff

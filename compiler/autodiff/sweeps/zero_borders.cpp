@@ -14,7 +14,7 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// What is at least 0 where a comparison of integers holds; undefined: it is none.
+// An expression that is at least 0 where an integer comparison holds; undefined for other conditions.
 Expr slack(const Expr& condition) {
   const auto is_whole = [](const Expr& e) { return e.type() == Int(32); };
   if (const auto* n = condition.as<LT>(); n && is_whole(n->a)) return n->b - n->a - 1;
@@ -28,7 +28,7 @@ bool implies(const Expr& a, const Expr& b) {
   return of_a.defined() && of_b.defined() && can_prove(of_b >= of_a);
 }
 
-// A place that was clamped into a domain (access_inversion.h), as it was before.
+// An index without the clamps into a domain that access_inversion.h added.
 Expr before_clamps(const Expr& index) {
   const auto is_place = [](const Expr& e) {
     return any_node(e, [](const Call& call) { return call.is_likely(); });
@@ -41,8 +41,8 @@ Expr before_clamps(const Expr& index) {
   return as_op(index, Op::likely) ? without_likely(index) : index;
 }
 
-// The call of an adjoint that is zero where the condition is false, at the place before it was clamped;
-// undefined: of another.
+// Returns the call without the clamp of its index, if the callee is an adjoint that is zero where the condition is
+// false; else an undefined Expr.
 Expr unclamped_read(const Expr& e, const Expr& condition) {
   const auto* call = e.as<Call>();
   const FuncPtr f = call && call->call_type == CallType::Func ? func_of(*call) : nullptr;
@@ -65,8 +65,7 @@ Expr unclamped_read(const Expr& e, const Expr& condition) {
   return {};
 }
 
-// What the term is where the condition holds, and zero where it does not; undefined: there is no such
-// form of it.
+// The term where the condition holds, and zero elsewhere; undefined if it cannot be written without the condition.
 Expr zero_without(const Expr& term, const Expr& condition) {
   const auto in = [&](const Expr& e) { return zero_without(e, condition); };
   const auto both = [&](const Expr& a, const Expr& b, auto make) -> Expr {
@@ -94,9 +93,9 @@ Expr zero_without(const Expr& term, const Expr& condition) {
   return unclamped_read(term, condition);
 }
 
-// Whether a condition is of a border between taps, and this little of all: where taps are many beside the
-// elements, it leaves out much. One that names no element may fail as far beyond a border as a parameter is large,
-// and the zeros up to there would be stored.
+// Whether the condition belongs to a border between taps that is thin compared with the target's extent. If there are
+// many taps for the elements, the condition leaves out much work and stays. A condition on parameters alone may fail
+// arbitrarily far beyond a border, and the zeros up to there would be stored.
 constexpr double least_of_a_tap = 4;
 bool is_thin(const Expr& condition, const Gather& g, const AdjointTarget& target) {
   const auto is_of = [&](const std::string& arg) { return uses_variable(condition, arg); };
@@ -106,7 +105,7 @@ bool is_thin(const Expr& condition, const Gather& g, const AdjointTarget& target
     if (uses_variable(condition, r.var))
       taps *= static_cast<double>(as_const_int(r.extent).value_or(1));
   }
-  if (taps == 1) return false;  // of an element, whatever the tap
+  if (taps == 1) return false;  // depends on the element only, not on the tap
   for (size_t d = 0; d < target.region.size() && d < target.args.size(); ++d) {
     if (!uses_variable(condition, target.args[d])) continue;
     const auto extent = constant_extent(target.region[d].range());

@@ -28,7 +28,7 @@ class CheckpointedLoop {
   void run() {
     plan_ = plan_checkpoints(c_, layout_, result_.current.func, machine_);
     table_ = make_table();
-    if (table_.made_by) result_.helpers.push_back(table_.made_by);
+    if (table_.computed_by) result_.helpers.push_back(table_.computed_by);
     slots_.emplace(c_, layout_, plan_, machine_);
     define_machine();
     record_ = record_writes(c_, plan_, *slots_);
@@ -60,7 +60,7 @@ class CheckpointedLoop {
       Expr value = cast_to(type, call_value(before, layout_.element(slot), index));
       initial.push_back(make_select(slot < elements, value, adjoint));
     }
-    machine_->types.clear();  // the definition says them again
+    machine_->types.clear();  // set again by the definition
     define_pure(machine_, layout_.with_pure(slot), initial);
     append(result_.helpers, {before, machine_});
   }
@@ -96,7 +96,7 @@ class CheckpointedLoop {
     for (const ReductionVariable& r : loops) names[r.var] = loop_variable(rdom, r.var);
     return names;
   }
-  // Copies of a state go through the same loops: enough for all elements.
+  // Copies of states use the same loops, which must cover all elements.
   Expr writes_per_iteration() const {
     Expr most = make_const(Int(32), static_cast<int>(std::max(record_.size(), adjoint_.size())));
     if (!plan_.needs_values()) return most;
@@ -104,7 +104,7 @@ class CheckpointedLoop {
     return simplify(max(most, (layout_.elements() + inner - 1) / inner));
   }
 
-  // `write`: the number of the write in this iteration; `number`: of the write in this pass.
+  // `write`: the number of the write within the iteration. `number`: the number of the write within the pass.
   std::vector<Branch> branches(const Expr& action, const Expr& write, const Expr& number,
                                const Expr& slot) const {
     auto is = [&](Action a) { return action == static_cast<int>(a); };
@@ -128,7 +128,7 @@ class CheckpointedLoop {
     Expr kept = slots_->kept() + slot * layout_.elements() + element;
     result.push_back({is(Action::Store), in_state, {kept, slots_->all_values(element)}});
     result.push_back({is(Action::Restore), in_state, {element, slots_->all_values(kept)}});
-    if (table_.made_by) result.push_back({const_true(), const_false(), result.back().write});
+    if (table_.computed_by) result.push_back({const_true(), const_false(), result.back().write});
     return result;
   }
   Expr has_run(const Substitution& places) const {
@@ -165,7 +165,7 @@ class CheckpointedLoop {
             mapped(w.values, [&](const Expr& v) { return placed(v, places); })};
   }
 
-  // ---- what others see ----
+  // ---- contributions to other Funcs ----
 
   void note_work() {
     const std::vector<Expr> inner = mapped(plan_.inner, &ReductionVariable::extent);
@@ -192,12 +192,12 @@ class CheckpointedLoop {
       before.push_back(make_select(inside, a, make_zero(a.type())));
     }
     result_.previous = c_.adjoint_before(before);
-    for (size_t i = 0; i < plan_.given.size(); ++i) {
-      const CheckpointPlan::Given& g = plan_.given[i];
-      Expr slot = slots_->given(i), sum = slots_->sum_at(slot);
+    for (size_t i = 0; i < plan_.contributions.size(); ++i) {
+      const CheckpointPlan::StepContribution& g = plan_.contributions[i];
+      Expr slot = slots_->contribution(i), sum = slots_->sum_at(slot);
       if (g.compensated) sum = sum + slots_->sum_at(slot + 1);
-      result_.given.push_back({{g.leaf.leaf, cast_to(g.leaf.adjoint.type(), sum)},
-                               g.over_time ? c_.domain : one_step()});
+      result_.direct.push_back({{g.leaf.leaf, cast_to(g.leaf.adjoint.type(), sum)},
+                                g.over_time ? c_.domain : one_step()});
     }
     explain_schedule();
   }
@@ -208,9 +208,9 @@ class CheckpointedLoop {
   }
 
   void explain_schedule() {
-    std::string what = "no value of it is needed, none is kept";
+    std::string what = "its partials need no values of it, so no state is kept";
     if (plan_.needs_values())
-      what = text("from ", kept_text(), ", ", again_text(), " computed again beside the ",
+      what = text("from ", kept_text(), ", ", again_text(), " recomputed beside the ",
                   ir::print(plan_.steps), " that are reversed");
     c_.note(text(" is a loop of ", ir::print(plan_.steps), " steps that ", quoted(machine_->name),
                  " runs backward: ", what),
@@ -223,7 +223,7 @@ class CheckpointedLoop {
   }
   std::string again_text() const {
     if (plan_.constant_steps) return text(ir::print(table_.count(Action::Advance)), " steps");
-    return text("each step at most r times, as ", quoted(table_.made_by->name),
+    return text("each step at most r times, as ", quoted(table_.computed_by->name),
                 " finds at run time,");
   }
 
@@ -235,14 +235,15 @@ class CheckpointedLoop {
   CheckpointPlan plan_;
   ActionTable table_;
   std::optional<CheckpointSlots> slots_;
-  std::vector<SlotWrite> record_, adjoint_;  // one iteration of a step, over its own variables
-  Substitution forward_, backward_;          // the loop's variables for these
+  std::vector<SlotWrite> record_,
+      adjoint_;                      // one iteration of a step, in terms of its own variables
+  Substitution forward_, backward_;  // from its variables to the loop's
 };
 
 }  // namespace
 
 bool wants_checkpoints(const UpdateContext& c) {
-  if (!c.query.checkpoints.is_given() || c.definition.rvars.empty()) return false;
+  if (!c.query.checkpoints.is_set() || c.definition.rvars.empty()) return false;
   auto steps = as_const_int(simplify(c.definition.rvars.back().extent));
   return !steps || *steps > 0;
 }

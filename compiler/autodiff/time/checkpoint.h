@@ -1,31 +1,29 @@
-// A loop over time, run backward from a few kept states.
+// checkpoint.h -- adjoints of loops over time that run backward from a few kept states (checkpointing).
 //
-// The tape of tape.h keeps what every iteration overwrites. Here time is the outermost reduction
-// variable of the update, a step is all iterations of the others, and a state is what the update
-// may change of f beside its pure variables: P elements. Only some states are kept (revolve.h), the
-// steps between them are computed again. One Func does it, with one update that follows a table of
-// actions, a serial loop inside each element of the pure dimensions:
+// The tape of tape.h keeps every value that an iteration overwrites. Here time is the outermost reduction variable of
+// the update. A step is all iterations of the other variables. A state is the part of f that the update may change,
+// beside its pure variables: P elements. Only some states are kept (revolve.h), and the steps between them are
+// recomputed. One Func does this. Its single update follows a table of actions, in a serial loop for each element of
+// the pure dimensions:
 //   f_checkpoints(x, s)   [ state P | adjoint P | a | values of one step | sums | kept states ]
-//   action of the table   store or restore a state: copies; advance: one step of the primal;
-//                         record: a step that notes the values which its partials need;
-//                         adjoint: the same step backward, as on a tape
-// The size of the program does not depend on the number of steps; the table has one row an action.
+//   actions               store or restore a state: copies; advance: one step of the primal; record: a step that also
+//                         stores the values that its partials need; adjoint: the same step backward, as on a tape
+// The size of the program does not depend on the number of steps; the table has one row for each action.
 //
-// What a step contributes to others is added up inside: where the place that it read does not
-// depend on time, one sum for each iteration of a step is kept, so that parameters and images
-// without a time axis cost no memory for each step. Otherwise one value an iteration is kept; then
-// the gradient itself has a time axis.
+// Contributions of a step to other Funcs are summed inside. If the element that the step read does not depend on time,
+// one sum is kept for each iteration of a step, so parameters and images without a time axis take no memory for each
+// step. Otherwise one value is kept for each iteration; the gradient then has a time axis, too.
 #pragma once
 
 #include "autodiff/updates/update_context.h"
 
 namespace retrograde::autodiff {
 
-// Whether the update is a loop over time whose values are lost, and a budget was given.
+// Whether the update is a loop over time whose values are lost, and a budget is specified.
 bool wants_checkpoints(const UpdateContext& context);
-// Throws when the budget has no room for one state, is in bytes while a state's size is known at
-// run time only, or makes a known number of steps need too long a table. A number of steps that is
-// known at run time only is no obstacle: the pipeline makes its table then (checkpoint_actions.h).
+// Throws if the budget cannot hold one state, if it is in bytes but the size of a state is known at run time only, or
+// if a constant number of steps needs too long a table. A number of steps that is known at run time only is supported:
+// the pipeline computes the table then (checkpoint_actions.h).
 void differentiate_by_checkpoints(const UpdateContext& context, UpdateAdjoint& result);
 
 }  // namespace retrograde::autodiff

@@ -68,7 +68,7 @@ ActionTable action_table(int steps, int states) {
                                        return r[0] == static_cast<int>(kind);
                                      }));
   }
-  // The Expr shares the memory.
+  // The Expr keeps the memory alive.
   result.entry = [table = in_memory(rows).parameter()](int column, const Expr& row) {
     return call_image(table->name, table->type, {Expr(column), row}, SymbolRef(table));
   };

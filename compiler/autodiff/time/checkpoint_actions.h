@@ -1,13 +1,13 @@
-// What a checkpointed loop does, row by row: actions on the current state.
+// checkpoint_actions.h -- the table of actions that a checkpointed loop executes.
 //
-// The rows are those of revolve.h. Where the number n of steps is a constant they are an image.
-// Where it is known at run time only, a Func makes them as the pipeline runs, of the same rules:
+// The rows are those of revolve.h. If the number n of steps is constant, they are an image. If it is known at run time
+// only, a Func computes them in the pipeline by the same rules:
 //   f_actions(p)   [ frames, depth 0 to s | rows ]   a Tuple of three integers
-//   frame          begin, end, r: the steps at this depth that are still to be reversed, and how
-//                  often each of them may run at most
-//   row            action, step, depth: the next one follows from the row before and its frame
-// Cutting a frame of n steps with s states and r leaves frames of r - 1 (the first part) and r, so
-// r is looked for once, among C(s + r, s).
+//   frame          begin, end, r: the steps at this depth that must still be reversed, and how often each of them may
+//                  run at most
+//   row            action, step, depth: each row follows from the previous one and its frame
+// Splitting a frame of n steps with s states and r repetitions leaves frames with r - 1 (the first part) and r. So r is
+// searched for only once, among C(s + r, s).
 #pragma once
 
 #include <array>
@@ -18,30 +18,30 @@
 
 namespace retrograde::autodiff {
 
-// What one pass over the inner loops does; Idle: nothing.
+// The action of one pass over the inner loops.
 enum class Action : int { Idle = -1, Store, Restore, Advance, Record, Adjoint };
 inline constexpr size_t action_kinds = 5;
 
 struct ActionTable {
-  Expr rows;  // how many
-  // Of a row: an Action, a step, a slot for states.
+  Expr rows;  // number of rows
+  // The columns of a row: an Action, a step, a slot for states.
   std::function<Expr(int column, const Expr& row)> entry;
-  std::array<Expr, action_kinds> counts;  // rows of each kind
-  FuncPtr made_by;                        // at run time; null: nobody
+  std::array<Expr, action_kinds> counts;  // number of rows of each kind
+  FuncPtr computed_by;                    // computes the table at run time; null: constant table
   const Expr& count(Action action) const { return counts[static_cast<size_t>(action)]; }
 };
 
-// Where no step backward needs the state before it: nothing is kept, and nothing run again.
+// The table for loops whose backward steps do not need the state before them: nothing is kept or recomputed.
 ActionTable reversals_alone(const Expr& steps);
-// In memory.
+// A constant table.
 ActionTable action_table(int steps, int states);
-// Made at run time by a Func of this name. With more steps than most_steps_at_run_time calls fail.
+// A table computed at run time by a Func of this name. Calls with more than most_steps_at_run_time steps fail.
 ActionTable action_table(const Expr& steps, int states, const std::string& name);
 
-// Rows that a table may have, and the number of steps that certainly needs no more.
+// The most rows of a table, and the most steps that certainly fit.
 inline constexpr int64_t most_rows = int64_t{1} << 24;
 int most_steps_at_run_time(int states);
-// States that a table made at run time may use: it has a column for each.
+// The most states of a table computed at run time, which has a column for each.
 inline constexpr int most_states_at_run_time = 1 << 16;
 
 }  // namespace retrograde::autodiff

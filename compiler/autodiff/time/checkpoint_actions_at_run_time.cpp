@@ -1,7 +1,7 @@
-// The table of checkpoint_actions.h, made by a Func.
+// Computes the table of checkpoint_actions.h at run time, by a Func.
 #include <algorithm>
 
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autodiff/time/checkpoint_actions.h"
 #include "autodiff/time/revolve.h"
 #include "diagnostics/error.h"
@@ -14,7 +14,7 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Expressions of a number of steps that is between 0 and most_steps_at_run_time.
+// Expressions in a number of steps between 0 and most_steps_at_run_time.
 class BinomialBound {
  public:
   BinomialBound(const Expr& steps, int states)
@@ -28,14 +28,14 @@ class BinomialBound {
     if (states_ == 1) return steps_ - 1;
     return by_repetitions([](int r) { return make_const(Int(32), r); });
   }
-  // Steps that are run again: r n - C(s + r, s + 1).
+  // The number of recomputed steps: r n - C(s + r, s + 1).
   Expr advances() const {
     if (states_ == 1) return steps_ * (steps_ - 1) / 2;
     return by_repetitions([&](int r) {
       return steps_ * r - make_const(Int(32), r > 0 ? revolve_steps_within(states_ + 1, r - 1) : 0);
     });
   }
-  // C(S + R, S) for all S and R that occur, at (S, R). With one state nobody reads it.
+  // A table of C(S + R, S) at (S, R), for all S and R that occur. Not used with a single state.
   Buffer<int> binomials() const {
     Buffer<int> table(states_ + 1, repetitions_ + 1);
     for (int r = 0; r <= repetitions_; ++r) {
@@ -50,7 +50,7 @@ class BinomialBound {
   Expr by_repetitions(const Leaf& leaf) const {
     return choose(0, repetitions_, leaf);
   }
-  // leaf(r) for the least r in [first, last] that is enough.
+  // leaf(r) for the least sufficient r in [first, last].
   template <typename Leaf>
   Expr choose(int first, int last, const Leaf& leaf) const {
     if (first == last) return leaf(first);
@@ -78,8 +78,7 @@ class ActionsFunc {
         bound_(steps_, states),
         func_(make_func(Role::CheckpointPlan)) {
     func_->name = name;
-    // Reversing a step takes two rows; of n frames all but the first are followed by a restored
-    // state, and at most all begin with a stored one.
+    // Reversing a step takes two rows. Of n frames, all except the first restore a state, and at most all store one.
     rows_ = max(bound_.advances() + steps_ * 4 - 1, 0);
     define_start(steps);
     append_loop();
@@ -88,11 +87,11 @@ class ActionsFunc {
   ActionTable table() const {
     ActionTable result;
     result.rows = rows_;
-    result.made_by = func_;
+    result.computed_by = func_;
     result.entry = [func = func_, first = frames()](int column, const Expr& row) {
       return call_value(func, {row + first}, column);
     };
-    Expr again = steps_ * variable("r");  // at most; for who reads a count
+    Expr again = steps_ * variable("r");  // an upper bound, for cost estimates
     result.counts = {steps_, steps_, again, steps_, steps_};
     return result;
   }
@@ -121,8 +120,8 @@ class ActionsFunc {
   }
   Triple frame(const Expr& depth) const { return at(clamp(depth, 0, states_)); }
 
-  // In iteration i, after row i: when its step is the last before the cut, the steps behind are a
-  // frame of their own, one deeper; then row i + 1.
+  // Iteration i runs after row i. If its step is the last one before the cut, the steps after the cut become a frame of
+  // their own, one level deeper. Then it appends row i + 1.
   void append_loop() {
     const DomainPtr rdom = make_domain();
     Expr write = add_loop(rdom, "write", make_zero(Int(32)), make_const(Int(32), 3));
@@ -140,7 +139,7 @@ class ActionsFunc {
     append_update(func_, {place}, {value.a, value.b, value.c}, rdom->vars, write == 2 || cuts);
   }
 
-  // Where a frame is cut: revolve.cpp's first_part.
+  // Where a frame is cut: first_part of revolve.cpp.
   Expr middle(const Triple& frame, const Expr& states) const {
     const Buffer<int> binomials = bound_.binomials();
     auto table = binomials.parameter();
@@ -154,7 +153,7 @@ class ActionsFunc {
     return frame.a + select(states <= 1, size - 1, first);
   }
 
-  // `now`: the row's frame, which ends at the cut by now.
+  // `now`: the frame of the row, which already ends at the cut.
   Triple next_row(const Triple& row, const Triple& now) const {
     const Expr &step = row.b, &depth = row.c;
     Triple behind = frame(depth + 1);
@@ -187,7 +186,7 @@ class ActionsFunc {
 }  // namespace
 
 int most_steps_at_run_time(int states) {
-  int64_t low = 1, high = most_rows;  // low is few enough, high is not
+  int64_t low = 1, high = most_rows;  // low steps fit, high steps do not
   while (high - low > 1) {
     int64_t middle = (low + high) / 2;
     (revolve_advances(middle, states) + 4 * middle <= most_rows ? low : high) = middle;

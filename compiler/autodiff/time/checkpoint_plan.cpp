@@ -34,7 +34,7 @@ class Planner {
       if (as_call_of(leaf.leaf, f_)) {
         plan_.passed_on.push_back(leaf);
       } else {
-        add_given(leaf);
+        add_contribution(leaf);
       }
     }
     for (const Expr& read : c_.needed_reads(sweep)) add_needed(read);
@@ -104,8 +104,8 @@ class Planner {
     return c_.sweep(seeds());
   }
 
-  // f's values are held exactly, and adjoints: floating-point types are those of the adjoints, the
-  // first as wide as anything that is summed.
+  // Chooses types that hold values of f and adjoints exactly. Floating-point types are those of the adjoints; the first
+  // is as wide as the widest sum.
   void choose_types(const std::vector<LeafAdjoint>& leaves) {
     plan_.types.clear();
     for (size_t k = 0; k < f_->types.size(); ++k) {
@@ -128,13 +128,13 @@ class Planner {
     return result;
   }
 
-  void add_given(const LeafAdjoint& leaf) {
+  void add_contribution(const LeafAdjoint& leaf) {
     const Expr& predicate = c_.domain.predicate;
-    CheckpointPlan::Given given;
-    given.leaf = leaf;
-    given.over_time = predicate.defined() && uses_variable(predicate, plan_.time.var);
+    CheckpointPlan::StepContribution contribution;
+    contribution.leaf = leaf;
+    contribution.over_time = predicate.defined() && uses_variable(predicate, plan_.time.var);
     for_each_child(leaf.leaf, [&](const Expr& index) {
-      given.over_time |= uses_variable(index, plan_.time.var);
+      contribution.over_time |= uses_variable(index, plan_.time.var);
       if (!calls(index, f_)) return;
       unsupported(
           c_.asked(), "a checkpointed loop forgets the values that its steps saw",
@@ -142,8 +142,9 @@ class Planner {
           "Leave out the budget and pass AdjointOptions{.overwritten = "
           "Overwritten::Store}");
     });
-    given.compensated = !given.over_time && plan_.constant_steps.value_or(many_terms) >= many_terms;
-    plan_.given.push_back(given);
+    contribution.compensated =
+        !contribution.over_time && plan_.constant_steps.value_or(many_terms) >= many_terms;
+    plan_.contributions.push_back(contribution);
   }
 
   void add_needed(const Expr& read) {

@@ -15,8 +15,8 @@ CheckpointSlots::CheckpointSlots(const UpdateContext& context, const TapeLayout&
   at_hand_ = simplify(layout_.elements() * 2);
   noted_ = simplify(at_hand_ + 1);
   Expr next = noted_ + plan_.inner_count * static_cast<int>(plan_.places.size());
-  for (const CheckpointPlan::Given& g : plan_.given) {
-    given_.push_back(simplify(next));
+  for (const CheckpointPlan::StepContribution& g : plan_.contributions) {
+    contributions_.push_back(simplify(next));
     next = next + plan_.inner_count * (g.over_time ? plan_.steps : g.width());
   }
   kept_ = simplify(next);
@@ -30,7 +30,7 @@ double CheckpointSlots::least_slots() const {
   double states = 2 + (plan_.needs_values() && plan_.constant_steps ? plan_.states : 0);
   double slots = layout_.least_elements() * states + 1;
   slots += inner * static_cast<double>(plan_.places.size());
-  for (const CheckpointPlan::Given& g : plan_.given)
+  for (const CheckpointPlan::StepContribution& g : plan_.contributions)
     slots += inner * (g.over_time ? plan_.constant_steps.value_or(1) : g.width());
   return slots;
 }
@@ -42,10 +42,10 @@ Expr CheckpointSlots::note(size_t place) const {
          static_cast<int>(place);
 }
 
-Expr CheckpointSlots::given(size_t i) const {
-  const CheckpointPlan::Given& g = plan_.given[i];
-  if (g.over_time) return given_[i] + iteration_number(c_.definition.rvars);
-  return given_[i] + iteration_number(plan_.inner) * g.width();
+Expr CheckpointSlots::contribution(size_t i) const {
+  const CheckpointPlan::StepContribution& g = plan_.contributions[i];
+  if (g.over_time) return contributions_[i] + iteration_number(c_.definition.rvars);
+  return contributions_[i] + iteration_number(plan_.inner) * g.width();
 }
 
 Expr CheckpointSlots::at(const Expr& slot, size_t k) const {

@@ -1,4 +1,5 @@
-// The slots of a checkpointed Func, which is one array beside its pure dimensions:
+// checkpoint_slots.h -- the slots of a checkpointed Func, which is one array beside its pure dimensions:
+//
 //   [ state P | adjoint P | a | values of one step | sums | kept states ]
 #pragma once
 
@@ -16,16 +17,16 @@ class CheckpointSlots {
 
   const TapeLayout& elements() const { return layout_; }
   const Expr& count() const { return count_; }
-  // First slots. The state starts at 0.
+  // The first slot of each section. The state starts at 0.
   const Expr& at_hand() const { return at_hand_; }
   const Expr& kept() const { return kept_; }
   Expr adjoint(const Expr& element) const;
-  // Of the place, in the iteration at hand of the inner loops.
+  // The slot of the value noted for a place, in the current iteration of the inner loops.
   Expr note(size_t place) const;
-  // Of contribution number i of the plan, in the iteration at hand.
-  Expr given(size_t i) const;
+  // The slot of contribution i of the plan, in the current iteration.
+  Expr contribution(size_t i) const;
 
-  // What a slot holds: as it is; a value of f; its adjoint; a sum.
+  // The content of a slot: as it is; as a value of f; as its adjoint; as a sum.
   Expr at(const Expr& slot, size_t k) const;
   Expr value_at(const Expr& slot, size_t k) const;
   Expr adjoint_at(const Expr& slot, size_t k) const;
@@ -39,7 +40,7 @@ class CheckpointSlots {
   const CheckpointPlan& plan_;
   FuncPtr machine_;
   Expr at_hand_, noted_, kept_, count_;
-  std::vector<Expr> given_;
+  std::vector<Expr> contributions_;
 };
 
 }  // namespace retrograde::autodiff

@@ -34,18 +34,18 @@ class CheckpointStep {
     std::vector<SlotWrite> writes{{slots_.at_hand(), slots_.all_values(written)}, {written, {}}};
     for (Type t : plan_.types) writes[1].values.push_back(make_zero(t));
     pass_on(writes);
-    for (size_t i = 0; i < plan_.given.size(); ++i) append_given(i, writes);
+    for (size_t i = 0; i < plan_.contributions.size(); ++i) append_contribution(i, writes);
     return writes;
   }
 
  private:
-  // Reads of f as they are in the current state.
+  // Reads of f become reads of the current state.
   Expr in_state(const Expr& e) const {
     return map_calls_of(e, f_, [&](const Call& call, const std::vector<Expr>& args) {
       return slots_.value_at(elements_.slot_of(args), static_cast<size_t>(call.component));
     });
   }
-  // Reads of f as the step noted them.
+  // Reads of f become reads of the values that the step stored.
   Expr noted(const Expr& e) const {
     return rewrite(e, [&](const Expr& node, const auto& recurse) -> Expr {
       const Call* call = as_call_of(node, f_);
@@ -59,7 +59,7 @@ class CheckpointStep {
   }
 
   void pass_on(std::vector<SlotWrite>& writes) const {
-    std::vector<std::vector<Expr>> places{c_.write};  // of the writes after the first
+    std::vector<std::vector<Expr>> places{c_.write};  // places of the writes after the first
     for (const LeafAdjoint& leaf : plan_.passed_on) {
       const Call* call = as_call_of(leaf.leaf, f_);
       const size_t i = place_number(places, call->args) + 1;
@@ -76,9 +76,9 @@ class CheckpointStep {
     }
   }
 
-  void append_given(size_t i, std::vector<SlotWrite>& writes) const {
-    const CheckpointPlan::Given& g = plan_.given[i];
-    Expr slot = slots_.given(i), old = slots_.sum_at(slot);
+  void append_contribution(size_t i, std::vector<SlotWrite>& writes) const {
+    const CheckpointPlan::StepContribution& g = plan_.contributions[i];
+    Expr slot = slots_.contribution(i), old = slots_.sum_at(slot);
     Expr term = cast_to(old.type(), noted(g.leaf.adjoint));
     auto write = [&](const Expr& place, const Expr& value) {
       writes.push_back({place, slots_.all_values(place)});
@@ -86,8 +86,7 @@ class CheckpointStep {
     };
     if (g.over_time) return write(slot, term);
     if (!g.compensated) return write(slot, old + term);
-    // What old + term loses, exactly: D. Knuth, The Art of Computer Programming 2, section 4.2.2,
-    // theorem B.
+    // The exact rounding error of old + term: D. Knuth, The Art of Computer Programming 2, section 4.2.2, theorem B.
     term = exactly(term);
     Expr sum = exactly(old + term), from_term = exactly(sum - old);
     Expr lost = exactly(exactly(old - exactly(sum - from_term)) + exactly(term - from_term));

@@ -1,4 +1,4 @@
-// One iteration of a step of a checkpointed loop, forward and backward, as writes into its slots.
+// checkpoint_step.h -- one iteration of a step of a checkpointed loop, forward and backward, as writes into slots.
 #pragma once
 
 #include <vector>
@@ -7,10 +7,10 @@
 
 namespace retrograde::autodiff {
 
-// Forward: the values that are needed later are noted; the last one is the step's own write.
+// Forward: stores the values that are needed later; the last write is the step's own.
 std::vector<SlotWrite> record_writes(const UpdateContext& context, const CheckpointPlan& plan,
                                      const CheckpointSlots& slots);
-// Backward: a = A[W]; A[W] = 0; A[R_k] += a dV/dv_k; then what others get.
+// Backward: a = A[W]; A[W] = 0; A[R_k] += a dV/dv_k; then the contributions to others.
 std::vector<SlotWrite> adjoint_writes(const UpdateContext& context, const CheckpointPlan& plan,
                                       const CheckpointSlots& slots);
 

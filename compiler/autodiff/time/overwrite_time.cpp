@@ -28,12 +28,12 @@ class Folder {
         options_(options) {}
 
   const std::vector<FuncPtr>& order() const { return order_; }
-  std::map<const Symbol*, FuncPtr> copies;  // of Funcs that read folded ones
+  std::map<const Symbol*, FuncPtr> copies;  // copies of Funcs that read folded ones
   std::vector<Explanation> explanations;
 
   void run() {
     for (const FuncPtr& f : order_) {
-      if (f->custom_derivatives || f->is_extern()) return;  // rules name the Funcs they are for
+      if (f->custom_derivatives || f->is_extern()) return;  // rules refer to the original Funcs
     }
     for (const FuncPtr& f : order_) {
       if (!fold(f)) copy_if_changed(f);
@@ -65,11 +65,10 @@ class Folder {
     replaced_[f.get()] = [=](const Call& call, const std::vector<Expr>& args) {
       return read_at_end(call, args, *f, *axis, folded, pure);
     };
-    explanations.push_back(
-        {Explanation::Kind::Version, f->name,
-         text("others read its last steps only: ", quoted(folded->name), " keeps ", axis->slots,
-              axis->slots == 1 ? " of them" : " of them in turn", " and has the adjoint; that of ",
-              quoted(f->name), " is not made")});
+    explanations.push_back({Explanation::Kind::Version, f->name,
+                            text("only its last steps are read: ", quoted(folded->name), " keeps ",
+                                 axis->slots, axis->slots == 1 ? " of them" : " of them in turn",
+                                 " and has the adjoint; ", quoted(f->name), " has none")});
     return true;
   }
 
@@ -96,15 +95,14 @@ class Folder {
     return folded;
   }
 
-  // Of the times before the first step that the slot may stand for, the last; none further back
-  // than a step reads.
+  // The last time before the first step that belongs in the slot; no further back than a step reads.
   static Expr time_at_start(const Expr& slot, const TimeAxis& axis) {
     Expr last = axis.first - axis.sign;
     Expr back = slot_of(axis.sign > 0 ? last - slot : slot - last, axis);
     return simplify(last - min(back, axis.lag - 1) * axis.sign);
   }
 
-  // f at `args`: from its slot where `in_slot`, else from the pure definition.
+  // f at `args`: from its slot if `in_slot` holds, else from the pure definition.
   static Expr chosen(const Expr& in_slot, int k, std::vector<Expr> args, const TimeAxis& axis,
                      const FuncPtr& folded, const FuncPtr& pure) {
     Expr unwritten = call_value(pure, args, k);
@@ -123,9 +121,9 @@ class Folder {
     return chosen(in_slot, call.component, args, axis, folded, pure);
   }
 
-  // ---- its readers ----
+  // ---- consumers ----
 
-  // Reads of folded and copied Funcs replaced; those of `own` by `read`.
+  // Redirects reads of folded and copied Funcs; `read` replaces those of `own`.
   Expr redirected(const Expr& e, const FuncContents* own = nullptr, const Read& read = {}) const {
     return map_func_calls(e, [&](const Call& call, const std::vector<Expr>& args) {
       if (own && call.symbol.raw() == own) return read(call, args);
@@ -134,7 +132,7 @@ class Folder {
     });
   }
 
-  // The first stages of f.
+  // A copy of the first stages of f.
   FuncPtr clone(const FuncPtr& f, int stages, const std::string& name) const {
     return clone_prefix(f, stages, name, Role::TimeFold,
                         [&](const Expr& e) { return redirected(e); });

@@ -17,7 +17,7 @@ int64_t revolve_steps_within(int64_t states, int64_t repetitions) {
 
 namespace {
 
-// The least number of times that every step may run with so many states.
+// The least number of times that every step must be allowed to run with `states` states.
 int64_t repetitions_for(int64_t steps, int64_t states) {
   if (states == 1) return steps - 1;
   int64_t r = 0;
@@ -25,9 +25,9 @@ int64_t repetitions_for(int64_t steps, int64_t states) {
   return r;
 }
 
-// A stretch of steps whose first state is kept is cut in two: the later part is reversed first,
-// then the stretch is what is before the cut. As many stretches are open as states are kept, which
-// may be millions: they are a list, not calls within calls.
+// A stretch of steps, whose first state is kept, is split in two. The later part is reversed first; then the stretch
+// continues with the part before the cut. As many stretches are open as states are kept, possibly millions, so they
+// form a list instead of recursive calls.
 class Schedule {
  public:
   Schedule(int steps, int states) : states_(states) {
@@ -47,7 +47,7 @@ class Schedule {
     int begin, end;
   };
 
-  // State `begin` is current. It is kept unless one step is left.
+  // Opens a stretch; the current state is `begin`. The state is stored unless the stretch has a single step.
   void open(int begin, int end) {
     stretches_.push_back({begin, end});
     if (end - begin > 1) add(RevolveAction::Kind::Store, begin, slot());
@@ -65,13 +65,13 @@ class Schedule {
     if (!stretches_.empty()) add(RevolveAction::Kind::Restore, stretches_.back().begin, slot());
   }
 
-  // Where the innermost stretch keeps its first state.
+  // The slot in which the innermost stretch keeps its first state.
   int slot() const { return static_cast<int>(stretches_.size()) - 1; }
   void add(RevolveAction::Kind kind, int step, int slot = -1) {
     actions.push_back({kind, step, slot});
   }
 
-  // Steps before the next kept state: all but one, when none may be kept.
+  // The number of steps before the next kept state; all except one if no further state may be kept.
   static int first_part(int64_t steps, int64_t states) {
     if (states == 1) return static_cast<int>(steps - 1);
     int64_t r = repetitions_for(steps, states);

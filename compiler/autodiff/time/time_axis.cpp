@@ -35,7 +35,7 @@ class TimeAxisFinder {
              return uses_variable(e, v.name);
            });
   }
-  // sign * (a - b), when constant.
+  // sign * (a - b) if that is constant.
   std::optional<int64_t> steps_between(const Expr& a, const Expr& b) const {
     auto difference = as_const_int(simplify(a - b));
     return difference ? std::optional(*difference * axis_.sign) : std::nullopt;
@@ -44,14 +44,14 @@ class TimeAxisFinder {
   Expr ever_written() const {
     std::vector<Expr> write = c_.write, point = c_.point;
     write[axis_.dim] = point[axis_.dim] = make_zero(Int(32));
-    IterationDomain everywhere = c_.domain;  // in pure dimensions
+    IterationDomain everywhere = c_.domain;  // unbounded in pure dimensions
     for (LoopVariable& v : everywhere.vars) {
       if (!v.is_reduction) v.min = v.max = Expr();
     }
     return simplify(UpdateRelations(everywhere, write, c_.pure).written(point));
   }
 
-  // The dimension that is written at time + constant or constant - time.
+  // Finds the dimension that is written at time + constant or constant - time.
   bool find_dimension() {
     if (c_.domain.predicate.defined() && uses_variable(c_.domain.predicate, time().var))
       return false;
@@ -76,7 +76,7 @@ class TimeAxisFinder {
     return false;
   }
 
-  // Earlier updates write before the first step only.
+  // Whether earlier updates write only times before the first step.
   bool starts_before() const {
     for (int s = 1; s < c_.query.stage; ++s) {
       auto before = steps_between(axis_.first, without_lets(f_->stage(s).args[axis_.dim]));
@@ -110,14 +110,15 @@ class TimeAxisFinder {
     }
     return true;
   }
-  // What a step wrote, or, of times before the first step, what was there at the start.
+  // The condition that the value read is in a slot: a step wrote it, or it was there at the start, for times before the
+  // first step.
   Expr where_in_slot(const UpdateRelations::Read& read, int lag) {
     Expr at_start = variable(time().var) < simplify(time().min + lag);
     if (relations_.sees_new_unless(read, at_start)) return const_true();
     return lag > 0 ? at_start || read.sees_new_condition : read.sees_new_condition;
   }
 
-  // Other Funcs read the last slots.
+  // Checks that other Funcs read only the last slots.
   bool find_readers() {
     int64_t window = 0;
     for (const FuncPtr& g : order_) {
@@ -125,13 +126,13 @@ class TimeAxisFinder {
       for_each_expr(*g, [&](const Expr& e) { window = std::max(window, read_by(e)); });
     }
     if (window == 0 || window > most_slots) return false;
-    // What is read from before the first step must be there at the start.
+    // Slices from before the first step must be in a slot at the start.
     if (window > axis_.lag && !can_prove(time().extent >= static_cast<int>(window) - axis_.lag))
       return false;
     axis_.slots = std::max(axis_.slots, static_cast<int>(window));
     return true;
   }
-  // Slices before the end that an expression reads.
+  // The number of slices before the end that an expression reads.
   int64_t read_by(const Expr& e) const {
     int64_t window = 0;
     walk(e, [&](const Expr& node) {
@@ -158,7 +159,7 @@ std::optional<TimeAxis> find_time_axis(const UpdateContext& c, const std::vector
   try {
     return TimeAxisFinder(c, order).find();
   } catch (const isl::exception&) {
-    return std::nullopt;  // isl gave up
+    return std::nullopt;  // isl exceeded its budget
   }
 }
 

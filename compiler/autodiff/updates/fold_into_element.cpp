@@ -43,7 +43,7 @@ class Fold {
     return point;
   }
 
-  // A Func with a dimension for steps, which has the values of `from` at one of them.
+  // A Func with one more dimension, for steps; it equals `from` at step `at`.
   FuncPtr begin_steps(const std::string& name, const Expr& at, const FuncPtr& from) const {
     FuncPtr steps = make_func(Role::Steps, name, f_->name);
     define_pure(steps, at_step(variable(step_)), mapped(from->types, make_zero));
@@ -80,7 +80,8 @@ class Fold {
     append_loop(adjoint_, now_, values, now_ + 1, mirrored(c_.definition.rvars));
   }
 
-  // steps[x, to] <- values where an iteration writes, else steps[x, from]; in the order given.
+  // Appends the update steps[x, to] <- values if the predicate holds, else steps[x, from]. The loop runs in the given
+  // order.
   void append_loop(const FuncPtr& steps, const Expr& to, const std::vector<Expr>& values,
                    const Expr& from, const Substitution& order) {
     const DomainPtr domain = make_domain();
@@ -98,7 +99,7 @@ class Fold {
     append_update(steps, mapped(at_step(to), here), chosen, domain->vars, {});
   }
 
-  // Reads of f are those of the values kept.
+  // Replaces reads of f by the kept values.
   Expr kept(const Expr& e) const { return replaced(e, kept_); }
 
   void hand_over(const std::vector<Expr>& seeds) {
@@ -111,8 +112,8 @@ class Fold {
   const UpdateContext& c_;
   FuncContents* f_;
   UpdateAdjoint& result_;
-  const std::string step_;  // name of the last dimension
-  const Expr now_;          // number of the iteration
+  const std::string step_;  // name of the step dimension, the last one
+  const Expr now_;          // number of the current iteration
   FuncPtr adjoint_;
   SelfValues kept_;
 };

@@ -1,5 +1,7 @@
-// Slots of tapes, states and iterations have 32-bit numbers. What certainly needs more is refused
-// when the gradient is made, before anything is allocated.
+// numbering.h -- refuses gradients whose slots or iterations exceed 32-bit numbers.
+//
+// Slots of tapes, states and iterations have 32-bit numbers. An excess that is certain is reported when the gradient is
+// built, before anything is allocated.
 #pragma once
 
 #include <string>
@@ -9,11 +11,11 @@
 
 namespace retrograde::autodiff {
 
-// The product of extents, those that are known at run time only counting as one: a lower bound.
+// A lower bound of the product of extents: an extent that is known at run time only counts as one.
 double least_product(const std::vector<Expr>& extents);
 double least_iterations(const std::vector<ReductionVariable>& loops);
 
-// Throws Unsupported, with advice, where `count` of `what` have no 32-bit numbers.
+// Throws Unsupported, with advice, if `count` of `what` exceeds 32-bit numbers.
 void check_numbers(const UpdateContext& context, double count, const std::string& what);
 
 }  // namespace retrograde::autodiff

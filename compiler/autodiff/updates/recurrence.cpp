@@ -1,4 +1,4 @@
-// An update that overwrites: values that are lost, values that are passed on.
+// Adjoints of an update that overwrites elements, or carries values from element to element.
 #include "autodiff/updates/recurrence.h"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ class Recurrence {
   Recurrence(const UpdateContext& context, UpdateAdjoint& result)
       : c_(context), f_(context.f), result_(result), relations_(c_.domain, c_.write, c_.pure) {}
 
-  // Whether the update has one of the shapes; `result` is only changed then.
+  // Returns whether the update has one of the shapes; changes `result` only then.
   bool run() {
     if (!relations_.write_is_affine()) return false;
     if (!relations_.write_is_injective()) return last_writers();
@@ -55,11 +55,11 @@ class Recurrence {
   struct SelfRead {
     Expr call;
     UpdateRelations::Read relation;
-    bool carries_adjoint = false;  // reached by the sweep
-    bool is_needed = false;        // a partial, or a place, needs its value
+    bool carries_adjoint = false;  // the sweep reaches it
+    bool is_needed = false;        // a partial or an index needs its value
   };
 
-  // Elements that several iterations write, and none reads: the last of them counts.
+  // Several iterations may write an element and none reads it, so only the last writer counts.
   bool last_writers() {
     if (c_.reads_self() || !relations_.predicate_is_affine()) return false;
     result_.values = c_.values;
@@ -68,7 +68,7 @@ class Recurrence {
     return true;
   }
 
-  // nullopt: one reads at a place that depends on data.
+  // Returns nullopt if a read has a data-dependent index.
   std::optional<std::vector<SelfRead>> self_reads() {
     std::vector<SelfRead> reads;
     for (const Expr& call : c_.self_reads()) {
@@ -91,8 +91,8 @@ class Recurrence {
     }
   }
 
-  // A needed value must be the final one, or a kept version; false: one that a budget for
-  // checkpoints is to bring back.
+  // Finds the needed values: each must be the final value or a kept version. Returns false if a value is to be
+  // recomputed from checkpoints.
   bool find_values(const std::vector<SelfRead>& reads) {
     for (const SelfRead& r : reads) {
       if (!r.is_needed) continue;
@@ -120,8 +120,7 @@ class Recurrence {
     return copy;
   }
 
-  // The recurrence writes into the adjoint after the stage: a copy, when somebody reads that one
-  // already.
+  // The recurrence extends the adjoint after the stage; if that one has consumers, a copy is extended.
   void own_current() {
     if (c_.query.extendable) return;
     result_.current =
@@ -154,15 +153,15 @@ class Recurrence {
     result_.current = make_adjoint(c_.query.target, name_of_own(), {}, values_of(exact_, c_.point));
     result_.current.helpers = {exact_};
     result_.current.accumulator = exact_;
-    c_.note(": its adjoint carries sums along many elements, in double", result_);
+    c_.note(": its adjoint carries long sums from element to element, in double", result_);
   }
-  // The Func that runs backward.
+  // The Func in which the recurrence runs.
   const FuncPtr& carrying() const { return exact_ ? exact_ : result_.current.func; }
   Expr as_carried(const Expr& term) const {
     return exact_ ? carried_in_double(term, result_.current.func, exact_) : term;
   }
 
-  // Equal reads are one, with the sum of their adjoints: it has one domain to sum over.
+  // Merges equal reads and adds their adjoints, so that there is one domain to sum over.
   std::vector<LeafAdjoint> self_leaves(const SweepResult& sweep) const {
     std::vector<LeafAdjoint> result;
     for (const LeafAdjoint& leaf : sweep.leaves) {
@@ -178,7 +177,7 @@ class Recurrence {
     return result;
   }
 
-  // Contributions of self reads: to newer values (`to_new`) or to those before the stage.
+  // Contributions of self reads to new values (`to_new`) or to values from before the stage.
   std::vector<Contribution> self_contributions(const std::vector<SelfRead>& reads,
                                                const SweepResult& sweep, bool to_new) {
     std::vector<Contribution> result;
@@ -200,11 +199,13 @@ class Recurrence {
     if (to_new ? relation.always_new : relation.never_new) condition = const_true();
     AccessQuery query{restricted(c_.domain, condition), call.args, c_.query.target.args,
                       c_.query.target.region};
-    query.narrows = !to_new;  // other terms are added in the first iteration of a sum
+    query.narrows =
+        !to_new;  // terms without a sum are added in its first iteration, so it must not be empty
     return invert_access(query);
   }
 
-  // A(p) += sum over reads of A(W(i)) dV/df, p running against the order in which it was written.
+  // Finds the order of p in A(p) += sum over reads of A(W(i)) dV/df. It runs against the order in which elements were
+  // written.
   bool find_order(const std::vector<SelfRead>& reads) {
     if (!relations_.predicate_is_affine()) return false;
     std::vector<UpdateRelations::Read> relevant;
@@ -212,7 +213,7 @@ class Recurrence {
     for (const SelfRead& r : reads) {
       if (!r.carries_adjoint || r.relation.never_new) continue;
       relevant.push_back(r.relation);
-      // The terms of several sums would have to run inside of one element.
+      // Several sums would have to run inside of one element, which is not supported.
       for (const Gather& g : inverted(*as_call_of(r.call, f_), r.relation, true).gathers) {
         if (g.scatters) return false;
         if (g.rdom) sums.push_back(g.rdom);
@@ -227,7 +228,7 @@ class Recurrence {
   void append_reverse_loop(const std::vector<Contribution>& contributions) {
     const DomainPtr rdom = make_domain();
     Substitution place;
-    // Terms that sum over a domain of their own: its variables run inside the element.
+    // The variables of a sum run inside of the element.
     const Gather* summed = nullptr;
     for (const Contribution& c : contributions) {
       if (c.gather.rdom) summed = &c.gather;
@@ -256,7 +257,7 @@ class Recurrence {
     c_.note(" is a recurrence: its adjoint runs backward", result_);
   }
 
-  // The element that the reverse loops are at; `place` learns it.
+  // The current element of the reverse loops; adds it to `place`.
   std::vector<Expr> reverse_place(const DomainPtr& rdom, Substitution& place) const {
     std::vector<Expr> lhs = c_.point;
     for (const ReverseLoop& loop : order_) {
@@ -269,7 +270,7 @@ class Recurrence {
     return lhs;
   }
 
-  // The element is the one that the gather's fixed indices name.
+  // Whether the current element has the fixed indices of the gather.
   Expr element_condition(const Gather& g) const {
     Expr condition = const_true();
     for (size_t d = 0; d < g.lhs.size(); ++d) {
@@ -278,16 +279,16 @@ class Recurrence {
     return condition;
   }
 
-  // The adjoint before the stage: 0 where the stage writes, plus what the stage read of older
-  // values. Values of a Tuple that the stage leaves alone keep their adjoint.
+  // The adjoint before the stage: 0 where the stage writes, plus the contributions of reads of older values. Values of
+  // a Tuple that the stage does not change keep their adjoint.
   void start_previous(const Expr& written, const std::vector<Contribution>& contributions) {
     std::vector<Expr> initial = values_of(result_.current.func, c_.point);
     for (Expr& a : initial) a = make_select(simplify(written), make_zero(a.type()), a);
     result_.previous = c_.adjoint_before(initial, contributions);
   }
 
-  // Which elements the stage writes, over `point`; undefined: not known. With a predicate on data:
-  // those where the predicate holds for the only iteration that may.
+  // The condition, over `point`, under which the stage writes an element; undefined if unknown. Under a data-dependent
+  // predicate these are the elements for which the predicate of their only iteration holds.
   Expr written_elements() const {
     if (relations_.predicate_is_affine()) return relations_.written(c_.point);
     Expr written = const_false();
@@ -306,7 +307,7 @@ class Recurrence {
   UpdateAdjoint& result_;
   UpdateRelations relations_;
   std::vector<ReverseLoop> order_;
-  FuncPtr exact_;  // in double, what the current adjoint rounds; null: that one itself
+  FuncPtr exact_;  // the sum in double that the current adjoint rounds; null: the adjoint itself
   std::map<int, FuncPtr> prefixes_;
 };
 

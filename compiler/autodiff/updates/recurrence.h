@@ -1,4 +1,5 @@
-// Updates whose index sets are known: which iteration wrote what another one reads.
+// recurrence.h -- adjoints of updates with known index sets: the analysis tells which iteration wrote the value that
+// another one reads.
 #pragma once
 
 #include <memory>
@@ -8,16 +9,16 @@
 
 namespace retrograde::autodiff {
 
-// Overwriting and recurrences of update.h, where every place is quasi-affine and no element is
-// written twice, unless nothing reads it. Returns false, and leaves `result` alone, for any other
-// update. Throws when a partial needs a value that was overwritten and may not be kept.
+// Handles the shapes "overwriting" and "recurrence" of update.h: every index is quasi-affine, and no element is written
+// twice, unless the update never reads its Func. Returns false and leaves `result` unchanged for any other update.
+// Throws if a partial needs an overwritten value that may not be kept.
 bool differentiate_recurrence(const UpdateContext& context, UpdateAdjoint& result);
 
-// Whether a stage after the context's own may write what `read` reads.
+// Whether a later stage may write an element that `read` reads.
 bool is_written_later(const UpdateContext& context, const UpdateRelations& relations,
                       const UpdateRelations::Read& read);
 
-// Reads of f by itself whose value is still there when f is complete: proven, or not contained.
+// The reads of f by itself whose values are proven to be unchanged when f is complete.
 class FinalValues {
  public:
   explicit FinalValues(const UpdateContext& context);

@@ -1,6 +1,6 @@
 #include "autodiff/updates/selection.h"
 
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autodiff/updates/versions.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
@@ -53,7 +53,7 @@ class SelectionFinder {
     if (const auto* n = e.as<Select>()) return pick(n->condition, n->when_true, n->when_false, k);
     return std::nullopt;
   }
-  // condition ? a : b, one of which is the old value.
+  // Matches condition ? a : b where one branch is the old value.
   std::optional<Choice> pick(const Expr& condition, const Expr& a, const Expr& b, int k) const {
     if (is_self(a, k) && !calls(b, f_.get())) return Choice{logical_not(condition), b};
     if (is_self(b, k) && !calls(a, f_.get())) return Choice{condition, a};

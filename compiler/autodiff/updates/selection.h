@@ -1,5 +1,5 @@
-// Updates that keep either the old value or a new one: max, min, argmax, argmin, and selects like
-// them.
+// selection.h -- recognises updates that keep either the old value or a new one: max, min, argmax, argmin and such
+// selects.
 #pragma once
 
 #include <optional>
@@ -9,12 +9,12 @@
 
 namespace retrograde::autodiff {
 
-// winner runs the update again and remembers the number of the iteration that wrote each element
-// last, -1: none.
+// `winner` runs the update again and stores, for each element, the number of the iteration that wrote it last; -1 for
+// none.
 struct Selection {
   FuncPtr winner;
-  int index_value;          // which value of `winner` is that number
-  std::vector<Expr> taken;  // per value of f: what is taken; undefined: the value is never changed
+  int index_value;          // the value of the Tuple `winner` that holds the number
+  std::vector<Expr> taken;  // for each value of f: the new value; undefined: never changed
 };
 std::optional<Selection> find_selection(const FuncPtr& f, int stage);
 

@@ -41,13 +41,14 @@ class Tape {
     check_numbers(c_, layout_.least_elements() + kept, "the slots of a tape");
   }
 
-  // Its elements outside of what is read, and those that were overwritten, are exactly 0.
+  // The adjoint on the tape. It is exactly 0 for elements that are never read and for those that were overwritten,
+  // hence masked.
   void begin_adjoint() {
     adjoint_ = begin_tape(f_->name + "_adj_tape", result_.current.func);
     adjoint_->made->traits.masked = true;
   }
 
-  // A tape whose elements are those of `from`, and whose other slots are 0.
+  // A tape that starts with the elements of `from` and 0 in all other slots.
   FuncPtr begin_tape(const std::string& name, const FuncPtr& from) const {
     FuncPtr tape = make_func(Role::Tape, name, f_->name);
     const DomainPtr domain = make_domain();
@@ -58,19 +59,19 @@ class Tape {
     return tape;
   }
 
-  // Value k of `tape` in slot s.
+  // Value k of `tape` in a slot.
   Expr at(const FuncPtr& tape, const Expr& slot, size_t k) const {
     return call_value(tape, layout_.with_pure(slot), static_cast<int>(k));
   }
 
-  // a(i), for the iteration at hand.
+  // a(i) of the current iteration.
   std::vector<Expr> saved_seeds() const {
     return c_.adjoints_at(adjoint_, layout_.with_pure(layout_.elements() + now_));
   }
 
   // ---- kept values ----
 
-  // Of the reads that are needed those whose value is lost.
+  // Finds the needed reads whose values are lost.
   void find_needed(const SweepResult& sweep) {
     FinalValues finals(c_);
     for (const Expr& read : c_.needed_reads(sweep)) {
@@ -78,7 +79,7 @@ class Tape {
     }
   }
 
-  // f_tape runs the update again and records what it reads.
+  // Builds f_tape, which runs the update again and records the values that it reads.
   void keep_values() {
     c_.check_versions_are_kept(needed_.front());
     FuncPtr before = clone_prefix(c_.query.f, c_.query.stage);
@@ -107,7 +108,7 @@ class Tape {
     explain_kept(tape, width);
   }
 
-  // Extents of the tape: those of the pure dimensions, then slots.
+  // Extents of the tape: the pure dimensions, then the slots.
   std::vector<Expr> slots_of(int width) const {
     std::vector<Expr> extents;
     const std::vector<Expr> all = c_.extents();
@@ -125,7 +126,7 @@ class Tape {
             result_);
   }
 
-  // Reads of f become reads of its elements on the tape.
+  // Redirects reads of f to its elements on the tape.
   Expr on_tape(const Expr& e, const FuncPtr& tape) const {
     return map_calls_of(e, f_, [&](const Call& call, const std::vector<Expr>& args) {
       return at(tape, layout_.slot_of(args), static_cast<size_t>(call.component));
@@ -153,7 +154,7 @@ class Tape {
     steps.push_back({written, {}});
     for (size_t k = 0; k < f_->types.size(); ++k)
       steps[1].values.push_back(make_zero(c_.query.target.types[k]));
-    std::vector<std::vector<Expr>> places{c_.write};  // of the steps after the first
+    std::vector<std::vector<Expr>> places{c_.write};  // places of the steps after the first
     for (const LeafAdjoint& leaf : sweep.leaves) {
       const Call* call = as_call_of(leaf.leaf, f_);
       if (!call) continue;
@@ -172,7 +173,7 @@ class Tape {
     append_steps(adjoint_, steps, mirrored(c_.definition.rvars), predicate);
   }
 
-  // One update: in step s of an iteration, step s's place gets its values.
+  // Appends one update: step s of an iteration writes its values to its place.
   void append_steps(const FuncPtr& tape, const std::vector<SlotWrite>& steps,
                     const Substitution& reversed, const Expr& predicate) {
     const DomainPtr domain = make_domain();
@@ -215,8 +216,8 @@ class Tape {
     c_.hand_over(adjoint_, seeds_, before, result_);
     Expr& predicate = result_.domains[0].predicate;
     predicate = with_values(predicate, c_.query.f, result_.self_values);
-    c_.note(text(" is run backward one iteration after the other: ", quoted(adjoint_->name),
-                 " keeps the adjoint of each"),
+    c_.note(text(" is run backward iteration by iteration: ", quoted(adjoint_->name),
+                 " keeps the adjoint of each iteration"),
             result_);
   }
 
@@ -224,11 +225,11 @@ class Tape {
   FuncContents* f_;
   UpdateAdjoint& result_;
   TapeLayout layout_;
-  Expr now_, iterations_;  // number of the iteration, and how many there are
+  Expr now_, iterations_;  // number of the current iteration; number of iterations
   FuncPtr adjoint_;
   std::vector<Expr> seeds_;
-  std::vector<Expr> needed_;  // reads of f whose values are kept, inner ones first
-  std::vector<int> kept_at_;  // of each
+  std::vector<Expr> needed_;  // reads of f whose values are kept, inner reads first
+  std::vector<int> kept_at_;  // for each of needed_: its place within an iteration
 };
 
 }  // namespace

@@ -58,7 +58,7 @@ Expr TapeLayout::slot_of(const std::vector<Expr>& args) const {
   for (size_t d = 0; d < args.size(); ++d) {
     if (c_.pure[d]) continue;
     Expr index = cast_to(Int(32), args[d]);
-    // What operators give has bounds here, where all loops are known, but none inside of some.
+    // Some operators have bounds here, where all loops are known, but not inside of some of the loops.
     if (has_operators(index) || !is_always_inside(index, d))
       index = clamp(index, box_[d].min, box_[d].max);
     slot = slot + (index - box_[d].min) * strides_[d];

@@ -59,8 +59,8 @@ class UpdateDifferentiation {
 
   // ---- accumulation ----
 
-  // The part of `e` that is added to the call `self`, when e is self + part: E of the header;
-  // undefined when it is not.
+  // If e is self + part, where `self` is the call of the element written, returns the part (E of the header); else an
+  // undefined Expr.
   Expr added_to(const Expr& e, int k) const {
     if (!calls(e, f_)) return {};
     if (const Call* call = as_call_of(e, f_)) {
@@ -94,8 +94,8 @@ class UpdateDifferentiation {
     for (size_t k = 0; k < c_.values.size(); ++k) {
       added.push_back(added_to(c_.values[k], static_cast<int>(k)));
       if (!added.back().defined() && f_->types[k].is_float()) return false;
-      // Integers carry no adjoint, but must not steer the floating values; they cannot: those are
-      // free of f.
+      // An integer value need not have this form, because integers carry no adjoint. The terms of the floating-point
+      // values do not depend on it: they are free of f.
     }
     result_.values = added;
     result_.domains = {c_.domain};
@@ -126,7 +126,7 @@ class UpdateDifferentiation {
     result_.previous = c_.adjoint_before(initial);
     result_.helpers.push_back(winner);
     c_.note(text(" selects: ", quoted(winner->name),
-                 " computes again which iteration wrote each element last"),
+                 " recomputes which iteration wrote each element last"),
             result_);
     return true;
   }
@@ -152,8 +152,8 @@ class UpdateDifferentiation {
   }
 
   void explain_unused_budget() {
-    c_.note(text(" overwrites nothing that is needed: ", quoted(f_->name),
-                 " keeps its steps along a dimension of its own, and the budget for checkpoints is "
+    c_.note(text(" needs no checkpoints: ", quoted(f_->name),
+                 " keeps every step along a dimension of its own, so the budget for checkpoints is "
                  "not used; written in place, as f(x) = g(f(x), t), it is run backward from kept "
                  "states"),
             result_, Explanation::Kind::Performance);

@@ -39,7 +39,7 @@ bool mentions_undef(const Expr& e) {
   return any_node(e, [](const Call& call) { return call.is_op(Op::undef); });
 }
 
-// A value, and where it does not come from an undef.
+// A value, and the condition under which it contains no undef.
 struct PartlyDefined {
   Expr where, value;
 };
@@ -69,7 +69,7 @@ PartlyDefined defined_part(const Expr& e) {
   return {where, value};
 }
 
-// Where an update's value is undef the old value stays: it says so then.
+// Makes it explicit that the old value stays where an update's value is undef.
 Expr with_old_value(const Expr& value, const Expr& old) {
   PartlyDefined part = defined_part(value);
   if (is_const_true(part.where)) return value;

@@ -1,11 +1,11 @@
-// What every way of differentiating an update looks at: its definition without lets, the places it
-// writes, the adjoint after it.
+// update_context.h -- facts about one update that all ways of differentiating it share: its definition without lets,
+// the elements it writes, and the adjoint after it.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "autodiff/sweeps/reverse_sweep.h"
 #include "autodiff/updates/update.h"
 #include "graph/own_reads.h"
@@ -13,12 +13,13 @@
 
 namespace retrograde::autodiff {
 
-bool depends_on_data(const Expr& e);  // calls a Func or reads an image
+bool depends_on_data(const Expr& e);  // whether it calls a Func or reads an image
 std::string point_text(const std::string& name, const std::vector<Expr>& args);
-// `domain` where `condition` holds, too.
+// `domain`, restricted to where `condition` holds.
 IterationDomain restricted(IterationDomain domain, const Expr& condition);
 
-// The number of a place among those known, which a new one joins: Tuples read several values at one.
+// The number of `place` in `places`, to which a new place is appended. Several values of a Tuple may be read at one
+// place.
 size_t place_number(std::vector<std::vector<Expr>>& places, const std::vector<Expr>& place);
 
 struct UpdateContext {
@@ -28,54 +29,52 @@ struct UpdateContext {
   FuncContents* f;
   const Definition& definition;
   IterationDomain domain;
-  std::vector<Expr> values, write;  // right- and left-hand side
-  std::vector<Expr> point;          // the pure variables of f
-  std::vector<bool> pure;           // per dimension: written at its own pure variable
+  std::vector<Expr> values, write;  // right- and left-hand side of the update
+  std::vector<Expr> point;          // pure variables of f
+  std::vector<bool> pure;  // for each dimension: whether it is written at its pure variable
 
   std::string asked() const;  // first part of error messages
-  // Distinct reads of f on the right-hand side, those inside of another's index first.
+  // The distinct reads of f on the right-hand side. Reads inside of another read's index come first.
   std::vector<Expr> self_reads() const;
   bool reads_self() const { return !self_reads().empty(); }
-  // Values of `adjoint` at a place; undefined for values of f that are no floats.
+  // The values of `adjoint` at a place; undefined for values of f that are no floats.
   std::vector<Expr> adjoints_at(const FuncPtr& adjoint, const std::vector<Expr>& place) const;
   std::vector<Expr> adjoints_at_write(const FuncPtr& adjoint) const;
-  // The values, with `seeds` as their adjoints (undefined: none), down to reads of f and to what is
-  // wanted.
+  // Sweeps the values with the adjoints `seeds` (undefined: none) down to reads of f and to wanted leaves.
   SweepResult sweep(const std::vector<Expr>& seeds) const;
-  // The same with the adjoint of f at the place written.
+  // The same with the adjoint of f at the element written.
   SweepResult sweep_at_write(const FuncPtr& adjoint) const;
-  // The values of all iterations, whose adjoints `adjoint` holds: what one iteration passes to the
-  // reads of f reaches all earlier ones, so its traits become the adjoint's.
+  // Sweeps the values of all iterations, whose adjoints `adjoint` holds. The contribution of one iteration to reads of
+  // f reaches all earlier iterations, so its traits become those of the adjoint.
   SweepResult sweep_iterations(const FuncPtr& adjoint,
                                FunctionRef<std::vector<Expr>()> seeds) const;
-  // Those of self_reads() whose value is needed by what a sweep found: by a partial, a place, or
-  // another read's place.
+  // The self_reads() whose values a swept partial, an index, or another read's index needs.
   std::vector<Expr> needed_reads(const SweepResult& sweep) const;
 
-  // Before a version of f is kept for `read`: throws when none may be.
+  // Throws if no version of f may be kept for `read`.
   void check_versions_are_kept(const Expr& read) const;
-  // Takes room for `copy`, with so many elements in each dimension, from the budget.
+  // Takes the memory of `copy`, with these extents, from the budget.
   void take_room(const FuncPtr& copy, const std::vector<Expr>& extents,
                  UpdateAdjoint& result) const;
-  // Extents of what is read of f; undefined ones are not known.
+  // Extents of the region of f that is read; undefined if unknown.
   std::vector<Expr> extents() const;
 
-  // The adjoint of f before the update.
+  // Builds the adjoint of f before the update.
   AdjointFunc adjoint_before(const std::vector<Expr>& initial,
                              const std::vector<Contribution>& contributions = {}) const;
-  // The result where `steps` runs the iterations backward: `seeds`, its values at hand in each, and
-  // those `before` all of them.
+  // Fills in the result if `steps` runs the iterations backward: `seeds` are its values in each iteration, `before`
+  // those before all of them.
   void hand_over(const FuncPtr& steps, const std::vector<Expr>& seeds,
                  const std::vector<Expr>& before, UpdateAdjoint& result) const;
-  // Explains the update, of which `what` goes on to tell.
+  // Adds an explanation that names the update, followed by `what`.
   void note(const std::string& what, UpdateAdjoint& result,
             Explanation::Kind kind = Explanation::Kind::Version) const;
 };
 
-// What `values` has other expressions for becomes these.
+// Replaces the subexpressions of `e` that are keys of `values`.
 Expr replaced(const Expr& e, const SelfValues& values);
-// Reads of f in an expression that belongs to another Func become what `self_values` says, else the
-// final values; f is then owned by that Func.
+// Replaces reads of f, in an expression of another Func, by `self_values`, else by the final values. The other Func
+// then owns its reference to f.
 Expr with_values(const Expr& e, const FuncPtr& f, const SelfValues& self_values);
 
 }  // namespace retrograde::autodiff

@@ -65,8 +65,8 @@ Expr UpdateRelations::written(const std::vector<Expr>& names) const {
   return bridge_.to_expr(coalesced(write_->range()), names);
 }
 
-// Reduction variables are ordered, the last one outermost; points that differ in pure variables
-// never meet.
+// The order of iterations: reduction variables are ordered, the last one outermost. Points that differ in pure
+// variables are not ordered, since they never write the same element.
 isl::map UpdateRelations::earlier() const {
   isl::map same = isl::manage(
       isl_map_universe(isl_space_map_from_set(isl_set_get_space(bridge_.universe().get()))));
@@ -129,7 +129,7 @@ std::vector<ReverseLoop> UpdateRelations::first_guess() const {
       if (pure_[d] || done[d] || !v.is_reduction || !uses_variable(write_indices_[d], v.name))
         continue;
       done[d] = true;
-      // Descending where the index grows with the variable.
+      // Descending if the index increases with the variable.
       Expr step = substitute(write_indices_[d], v.name, make_const(Int(32), 1)) -
                   substitute(write_indices_[d], v.name, make_const(Int(32), 0));
       auto value = as_const_int(step);

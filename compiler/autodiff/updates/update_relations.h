@@ -1,4 +1,5 @@
-// Index sets of an update: what it writes, what it reads of its own Func, and in which order.
+// update_relations.h -- index sets of an update: the elements that it writes, those that it reads of its own Func, and
+// the order of both.
 #pragma once
 
 #include <optional>
@@ -9,7 +10,7 @@
 
 namespace retrograde::autodiff {
 
-// Order in which the reverse recurrence visits the elements: location dimensions innermost first.
+// A loop of the reverse recurrence over elements; loops are listed innermost first.
 struct ReverseLoop {
   int dim;
   bool descending;
@@ -17,36 +18,35 @@ struct ReverseLoop {
 
 class UpdateRelations {
  public:
-  // `write`: left-hand side; `pure`: which of its dimensions are pure variables.
+  // `write`: the left-hand side. `pure`: whether each of its dimensions is a pure variable.
   UpdateRelations(const IterationDomain& domain, const std::vector<Expr>& write,
                   const std::vector<bool>& pure);
 
   bool write_is_affine() const { return write_.has_value(); }
   bool predicate_is_affine() const { return predicate_is_affine_; }
   bool write_is_injective() const;
-  // Elements that are written, over `names`. Exact when the predicate is affine.
+  // The condition, over `names`, that an element is written. Exact if the predicate is affine.
   Expr written(const std::vector<Expr>& names) const;
-  // Iterations that no later one overwrites.
+  // The condition that no later iteration overwrites the element.
   Expr last_writers() const;
 
-  // Of a read at `indices` (nullopt: not affine).
+  // The relation of a read at `indices`; nullopt if they are not affine.
   struct Read {
     isl::map map;       // iteration -> element
-    isl::set sees_new;  // iterations that read what an earlier iteration wrote
+    isl::set sees_new;  // iterations that read a value which an earlier iteration wrote
     bool always_new, never_new;
-    bool overwritten;  // an iteration at or after the read writes the element
+    bool overwritten;  // the iteration of the read, or a later one, writes the element
     Expr sees_new_condition;
   };
   std::optional<Read> read(const std::vector<Expr>& indices);
-  // Whether every iteration reads what an earlier one wrote, but for those where `condition` holds.
+  // Whether every iteration reads a value that an earlier one wrote, except where `condition` holds.
   bool sees_new_unless(const Read& read, const Expr& condition);
-  // Whether one of the elements read may be written by another stage, given its domain and
-  // left-hand side.
+  // Whether another stage, with this domain and left-hand side, may write one of the elements read.
   bool may_write(const Read& read, const IterationDomain& other,
                  const std::vector<Expr>& other_write) const;
 
-  // An order of elements in which every reader's element comes before the elements that it read;
-  // nullopt: none found.
+  // An order of elements in which the element of each consumer precedes the elements that it read; nullopt if none is
+  // found.
   std::optional<std::vector<ReverseLoop>> reverse_order(const std::vector<Read>& reads) const;
 
  private:
@@ -62,7 +62,7 @@ class UpdateRelations {
   std::vector<bool> pure_;
   IslBridge bridge_;
   isl::set domain_;
-  std::optional<isl::map> write_;  // on the domain
+  std::optional<isl::map> write_;  // restricted to the domain
   bool predicate_is_affine_ = true;
 };
 

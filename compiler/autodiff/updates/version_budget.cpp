@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/expr_ops.h"
 #include "frontend/language/var.h"
@@ -20,7 +20,7 @@ constexpr const char* what_to_do =
     "(AdjointOptions::checkpoint_states), or keep the versions whatever they cost: "
     "AdjointOptions{.overwritten = Overwritten::Store}";
 
-// In double: nothing overflows, and what is counted is exact as far as it matters.
+// The bytes as a double: it cannot overflow and is exact in the range that matters.
 Expr bytes_of(const KeptVersions& versions) {
   Expr bytes = make_const(Float(64), static_cast<double>(total_bytes(versions.copy->types)));
   for (const Expr& any_extent : versions.extents) {
@@ -35,7 +35,7 @@ Expr bytes_of(const KeptVersions& versions) {
   return simplify(bytes);
 }
 
-std::string whole(double number) {
+std::string integer_text(double number) {
   return std::to_string(static_cast<int64_t>(std::min(number, 0x1p62)));
 }
 
@@ -55,17 +55,17 @@ FuncPtr VersionBudget::take(const KeptVersions& versions, std::vector<Explanatio
            " bytes (AdjointOptions::version_bytes): ");
   if (const auto total = as_const_float(taken_)) {
     if (*total > static_cast<double>(rules_.bytes))
-      refuse(versions, text("with those of ", quoted(versions.primal), " they are ", whole(*total),
-                            " bytes"));
-    note(kept +
-         text(whole(as_const_float(own).value_or(0)), " bytes, all together ", whole(*total)));
+      refuse(versions, text("with those of ", quoted(versions.primal), " they are ",
+                            integer_text(*total), " bytes"));
+    note(kept + text(integer_text(as_const_float(own).value_or(0)), " bytes, all together ",
+                     integer_text(*total)));
     return nullptr;
   }
   note(kept + "its size is known at run time only, when a call that needs more fails");
   return guard(versions, taken_);
 }
 
-// A scalar that is 0, or fails; the copy's pure definition reads it.
+// Builds the check: a scalar that is 0 or fails. The copy's pure definition reads it.
 FuncPtr VersionBudget::guard(const KeptVersions& versions, const Expr& bytes) const {
   FuncPtr check = make_func(Role::VersionCheck, versions.copy->name + "_fits", versions.primal);
   const Expr fits = bytes <= make_const(Float(64), static_cast<double>(rules_.bytes));

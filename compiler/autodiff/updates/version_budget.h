@@ -1,9 +1,8 @@
-// What may be kept of values that updates overwrite and partials need
-// (AdjointOptions::overwritten).
+// version_budget.h -- the memory budget for overwritten values that partials need (AdjointOptions::overwritten).
 //
-// One budget for a whole program: what its updates keep counts together. Where sizes are known at
-// run time only, so are the bytes: then a check stands before the copy, in a Func of its own that
-// fails beyond the budget, and memory that was reserved by then is never touched.
+// All updates of a program share one budget. If sizes are known at run time only, so are the bytes. Then a Func of its
+// own checks them before the copy and fails if they exceed the budget. Memory that is already reserved by then is never
+// touched.
 #pragma once
 
 #include <cstdint>
@@ -23,11 +22,11 @@ struct VersionRules {
   int64_t bytes = default_version_bytes;
 };
 
-// A Func with versions of another one.
+// A Func that holds versions of another one.
 struct KeptVersions {
   FuncPtr copy;
-  std::vector<Expr> extents;  // their product is the number of its elements; undefined: unknown
-  std::string primal, asked;  // the Func it keeps, what was asked for: for messages
+  std::vector<Expr> extents;  // extents of the copy; undefined: unknown
+  std::string primal, asked;  // for messages: the Func whose versions it holds, the user's request
 };
 
 class VersionBudget {
@@ -35,9 +34,8 @@ class VersionBudget {
   explicit VersionBudget(const VersionRules& rules) : rules_(rules) {}
 
   bool keeps_any() const { return rules_.keep != VersionRules::Keep::Never; }
-  // Takes from the budget: throws UserError where more is known to be needed than there is, or
-  // where nothing is known. May change the copy's pure definition, and gives the Func that checks,
-  // or null.
+  // Takes the copy's memory from the budget. Throws UserError if it exceeds the budget, or if an extent is unknown. May
+  // change the copy's pure definition, and returns the Func that checks at run time, or null.
   FuncPtr take(const KeptVersions& versions, std::vector<Explanation>& explanations);
 
  private:
@@ -46,7 +44,7 @@ class VersionBudget {
   std::string rule() const;
 
   VersionRules rules_;
-  Expr taken_;  // bytes; undefined: none
+  Expr taken_;  // bytes taken so far; undefined: none
 };
 
 }  // namespace retrograde::autodiff

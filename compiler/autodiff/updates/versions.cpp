@@ -1,6 +1,6 @@
 #include "autodiff/updates/versions.h"
 
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 #include "frontend/language/var.h"
 #include "graph/define.h"
 #include "graph/own_reads.h"

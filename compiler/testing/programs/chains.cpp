@@ -1,11 +1,12 @@
-// Chains of Funcs at changing resolution, as pyramids, resamplers and filters are: each reads a few places of the
-// ones before it, along one dimension closer together, further apart or shifted. Under schedules that store further
-// out than they compute, nearly every Func is a sliding window of its own shape.
+// Generates chains of Funcs at changing resolution, such as pyramids, resamplers and filters.
+//
+// Each Func reads a few elements of the previous ones, along one dimension closer together, further apart or shifted.
+// Under schedules that store further out than they compute, nearly every Func is a sliding window of its own shape.
 #include "testing/programs/maker.h"
 
 namespace retrograde::fuzz {
 
-// Where a consumer at `u` reads: up- and down-sampled by 2 to 4, more often beside itself.
+// The index that a consumer at `u` reads: up- or downsampled by 2 to 4, more often adjacent.
 Expr Maker::resampled(const Expr& u, int factor, bool reads_coarser) {
   const int offset = c_.around_zero(2);
   if (factor == 1) return u + offset;
@@ -27,7 +28,7 @@ void Maker::add_link() {
   const auto along = static_cast<size_t>(c_.below(static_cast<int>(vars.size())));
   Expr value;
   for (int reads = c_.between(1, 3); reads > 0; --reads) {
-    // The last one, so that the chain has no ends; then any of those before.
+    // The last Func, so that the chain is connected; then any earlier one.
     const bool is_last = !value.defined() || c_.chance(60);
     const Func& source =
         is_last ? p_.funcs.back()
@@ -39,7 +40,7 @@ void Maker::add_link() {
     value = value.defined() ? value + read * c_.between(1, 3) : read;
   }
   f(vars) = kept_small(value, wide_modulus);
-  // Some add to what they have: not pure, but pure along the window.
+  // Some have an update: not pure, but pure along the window.
   if (c_.chance(10)) {
     std::vector<Expr> place(vars.begin(), vars.end());
     f(vars) = kept_small(f(vars) + p_.funcs.back()(place), wide_modulus);

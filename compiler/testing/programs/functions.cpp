@@ -25,7 +25,7 @@ Expr Maker::smooth(const Type& type, const Point& at, int depth) {
   });
 }
 
-// The same with less exact functions, which the interpreter takes for the exact ones in double.
+// The same with the fast functions, which the interpreter evaluates exactly in double.
 Expr Maker::fast(const Type& type, const Point& at, int depth) {
   const Expr a = converted(Float(32), value(type, at, depth - 1));
   return c_.one_of<Expr>({
@@ -66,7 +66,7 @@ Expr Maker::broken(const Type& type, const Point& at, int depth) {
   });
 }
 
-// Branches that are NaN or infinite where they are not taken, or are chosen by place.
+// Branches that are NaN or infinite where they are not taken, or that are selected by coordinates.
 Expr Maker::guarded(const Type& type, const Point& at, int depth) {
   const Expr a = value(type, at, depth - 1);
   auto one = [&](double v) { return cast(type, Expr(v)); };

@@ -32,9 +32,9 @@ ImageParam Maker::handle_of(const Buffer<>& image) {
   return handle;
 }
 
-// Floats so that a step of 2^-7 to either side, and a quarter of it, is exact in the type: in
-// [0.25, 1.25], or in [0.27, 0.46] with 8 bits. Beside integers, all that narrow ones can be and
-// small wide ones: in [-4, 4]. ties: few values.
+// Fills an image. Floats are such that a step of 2^-7 to either side, and a quarter of it, is exact in the type: in
+// [0.25, 1.25], or in [0.27, 0.46] with 8 bits. With integers, floats are in [-4, 4]; narrow integers take all values,
+// and wide ones small values. `ties`: few distinct values.
 void Maker::fill(Buffer<>& image, bool ties) {
   const halide_buffer_t& raw = *image.raw_buffer();
   const Type type = oracle::type_of_buffer(raw);
@@ -91,16 +91,16 @@ Expr Maker::coordinate(const Point& at, int d) {
   return at.all[static_cast<size_t>(c_.below(static_cast<int>(at.all.size())))];
 }
 
-// Near the coordinate; or where a value says, within a box.
+// An index near the coordinate; or a data-dependent one, within a box.
 Expr Maker::place(const Point& at, int d) {
   if (!s_.has_integers || !at.may_reduce || !c_.chance(6)) return near(coordinate(at, d), at.all);
   Point flat = at;
-  flat.may_reduce = false;  // and no value inside of it
+  flat.may_reduce = false;  // no reduction inside of the index
   const int low = c_.around_zero(3);
   return clamp(value(Int(32), flat, 1), low, low + c_.between(0, 12));
 }
 
-// The last one more often.
+// Returns a Func, the last one with a higher probability.
 const Func& Maker::any_func() {
   const int n = static_cast<int>(p_.funcs.size());
   if (s_.has_integers && c_.chance(50)) return p_.funcs.back();
@@ -122,7 +122,7 @@ Expr Maker::read_func(const Point& at) {
   return any_value(f(place));
 }
 
-// The Func that is being updated, where it is written or elsewhere; of an output a step before.
+// Reads the Func that is being updated, at the element written or elsewhere; for outputs, one step back.
 Expr Maker::read_self(const Point& at) {
   std::vector<Expr> place = at.write;
   const bool elsewhere = c_.chance(60);

@@ -15,7 +15,7 @@ constexpr LargeSize full_sizes[] = {
     {1200, 900, 1}, {20, 1000, 5},   {1000, 20, 16}, {1, 1, 5000},   {512, 300, 32}, {360, 250, 48},
     {256, 300, 64}, {2200, 2000, 1}, {512, 300, 32}};
 
-// Odd, more than a vector in the first dimension.
+// An odd extent, longer than a vector in the first dimension.
 constexpr int small_side(int full, int most) { return full <= 5 ? full : most - full % 7; }
 
 }  // namespace
@@ -28,7 +28,7 @@ LargeMaker::Image LargeMaker::of_size(const LargeSize& size) const {
 
 void LargeMaker::estimate_wrongly(ImageParam& handle, const std::vector<int>& sizes) {
   const int how = c_.below(4);
-  if (how == 0) return;  // none at all
+  if (how == 0) return;  // no estimates
   for (size_t d = 0; d < sizes.size(); ++d) {
     const int estimate = how == 1 ? sizes[d] : how == 2 ? 2 * sizes[d] : std::max(1, sizes[d] / 50);
     handle.dim(static_cast<int>(d)).set_estimate(0, estimate);
@@ -59,7 +59,7 @@ Func LargeMaker::input(int width, int height, int planes) {
 
 void LargeMaker::add_piece() {
   using Maker = LargeMaker;
-  // Those that few rules are for, more often.
+  // Pieces to which few rules apply occur more often.
   static constexpr Piece pieces[] = {
       &Maker::pointwise,      &Maker::stencil,       &Maker::border,
       &Maker::chain,          &Maker::transposed,    &Maker::halved,
@@ -77,14 +77,14 @@ void LargeMaker::add_piece() {
   add((this->*pieces[c_.below(static_cast<int>(std::size(pieces)))])(images_.back()));
 }
 
-void LargeMaker::add(const Image& made) {
-  if (!made.f.defined()) return;
-  kept(made.f);
-  images_.push_back(made);
+void LargeMaker::add(const Image& image) {
+  if (!image.f.defined()) return;
+  kept(image.f);
+  images_.push_back(image);
 }
 
-// The image, or a loss of it: one number, or two. No terms of a loss cancel each other: its rounding
-// errors would be as large as it is.
+// Ends with the image, or with a loss of it: one or two numbers. The terms of a loss do not cancel, because its
+// rounding errors would be as large as its value.
 void LargeMaker::end_with(const Image& last) {
   const int how = c_.below(4);
   oracle::Region region{{0, 0, 0}, {last.width, last.height, last.planes}};
@@ -112,7 +112,7 @@ void LargeMaker::end_with(const Image& last) {
   p_.runs = {{region}};
 }
 
-// What few rules are for, at a size that they are for.
+// Begins with a piece to which few rules apply, at a size for which they apply.
 LargeMaker::Piece LargeMaker::begin_with_theme() {
   struct Theme {
     Piece piece;

@@ -1,4 +1,4 @@
-// What maps large images to images.
+// Pieces of large programs that map images to images.
 #include <algorithm>
 
 #include "frontend/language/inline_reductions.h"
@@ -22,7 +22,7 @@ LargeMaker::Image LargeMaker::pointwise(const Image& a) {
   return {f, a.width, a.height, a.planes};
 }
 
-// With an image as large that was made before, so that values live long.
+// Combines the image with an earlier one of its size, so that values have long lifetimes.
 LargeMaker::Image LargeMaker::mixed(const Image& a) {
   const Image& other = images_[static_cast<size_t>(c_.below(static_cast<int>(images_.size())))];
   Func f = named("mixed");
@@ -34,7 +34,7 @@ LargeMaker::Image LargeMaker::mixed(const Image& a) {
   return {f, a.width, a.height, a.planes};
 }
 
-// Each of a few Funcs reads the one before at several places: inlined, they are thousands of reads.
+// A few Funcs, each of which reads the previous one at several elements: inlined, they are thousands of reads.
 LargeMaker::Image LargeMaker::copied_body(const Image& a) {
   if (a.width < 20 || !affords(a.elements() * 100)) return {};
   Func f = a.f;
@@ -73,7 +73,7 @@ LargeMaker::Image LargeMaker::border(const Image& a) {
   return {f, a.width, a.height, a.planes};
 }
 
-// Stencils one after the other, across and along: Jacobi steps, or blurs.
+// A chain of stencils, across and along: Jacobi steps, or blurs.
 LargeMaker::Image LargeMaker::chain(const Image& a) {
   const int steps = c_.between(2, 6);
   const bool is_jacobi = c_.chance(50), is_smooth = c_.chance(50);
@@ -123,7 +123,7 @@ LargeMaker::Image LargeMaker::doubled(const Image& a) {
   return {f, 2 * a.width, a.height, a.planes};
 }
 
-// ---- places of data ----
+// ---- data-dependent indices ----
 
 LargeMaker::Image LargeMaker::looked_up(const Image& a) {
   const Func at = steps(a), table = input(16, 1, c_.chance(50) ? a.planes : 1);
@@ -137,7 +137,7 @@ LargeMaker::Image LargeMaker::looked_up(const Image& a) {
   return {f, a.width, a.height, a.planes};
 }
 
-// Between pixels, by a displacement that is the same for all planes, or one for each.
+// Interpolates between pixels, by a displacement that is the same for all planes, or one for each.
 LargeMaker::Image LargeMaker::warped(const Image& a) {
   if (!affords(a.elements() * 40)) return {};
   const bool each = c_.chance(25), both = c_.chance(60);
@@ -154,7 +154,7 @@ LargeMaker::Image LargeMaker::warped(const Image& a) {
   return {f, a.width, a.height, a.planes};
 }
 
-// Of the planes of an input that one where it is largest; what a reduction finds is a Tuple.
+// Selects, at each pixel, the plane in which an input is largest; the reduction is a Tuple.
 LargeMaker::Image LargeMaker::best_plane(const Image& a) {
   if (!affords(a.elements() * a.planes * 4)) return {};
   const Func scores = steps(a);

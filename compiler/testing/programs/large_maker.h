@@ -1,5 +1,7 @@
-// How large programs are put together. large.cpp: sizes, images, the order of things.
-// large_images.cpp: what maps images to images. large_sums.cpp: what sums and scatters.
+// large_maker.h -- the generator of large programs.
+//
+// large.cpp: sizes, images, the order of pieces. large_images.cpp: maps from images to images. large_sums.cpp: sums and
+// scatters.
 #pragma once
 
 #include "frontend/language/boundary_conditions.h"
@@ -30,10 +32,10 @@ class LargeMaker {
   void begin(const LargeSize& size);
   Piece begin_with_theme();
   void add_piece();
-  void add(const Image& made);
+  void add(const Image& image);
   void end_with(const Image& last);
-  // A new image, which the gradient is asked for too: a Buffer, or an ImageParam with estimates that
-  // are right, wrong or none.
+  // A new input image, by which the gradient is requested, too: a Buffer, or an ImageParam with estimates that are
+  // right, wrong or missing.
   Func input(int width, int height, int planes);
   void estimate_wrongly(ImageParam& handle, const std::vector<int>& sizes);
   Func named(const char* name) { return Func(name + std::to_string(p_.funcs.size())); }
@@ -41,9 +43,9 @@ class LargeMaker {
     p_.funcs.push_back(f);
     return f;
   }
-  // Whether so many operations are still to be had.
+  // Takes operations from the budget; false if it is exhausted.
   bool affords(double operations) { return (work_ += operations) < most_work; }
-  // Steps of 1/1000 of an input, from -1 to 1, where a program reads places and branches from.
+  // An input in steps of 1/1000 from -1 to 1, from which a program computes indices and branches.
   Func steps(const Image& like) { return input(like.width, like.height, like.planes); }
   static Expr bin_of(const Expr& step) {
     return clamp(cast<int>(floor(step * 7.77f + 8.013f)), 0, 15);

@@ -1,4 +1,4 @@
-// What sums large images up, scans them, and scatters them.
+// Pieces of large programs that sum, scan and scatter images.
 #include <algorithm>
 
 #include "testing/programs/large_maker.h"
@@ -26,7 +26,7 @@ LargeMaker::Image LargeMaker::convolved(const Image& a) {
   const Func weights = input(k * l, a.planes, planes);
   const RDom r(0, k, 0, l, 0, a.planes);
   Func f = named("conv");
-  if (c_.chance(40)) {  // each plane by itself
+  if (c_.chance(40)) {  // each plane separately
     const RDom q(0, k, 0, l);
     f(x, y, c) = 0.0f;
     f(x, y, c) += a.f(x + q.x, y + q.y, c) * weights(q.x + k * q.y, c, 0);
@@ -39,7 +39,7 @@ LargeMaker::Image LargeMaker::convolved(const Image& a) {
   return {scaled, a.width - k + 1, a.height - l + 1, planes};
 }
 
-// Each plane as a matrix times another, or times one of its own.
+// Multiplies each plane, as a matrix, by a common one or by one of its own.
 LargeMaker::Image LargeMaker::multiplied(const Image& a) {
   const int columns = sizes_ == LargeSizes::Small ? 19 : c_.between(0, 3) * 33 + c_.between(1, 33);
   if (!affords(a.elements() * columns * 6) || a.width > 3000) return {};
@@ -81,7 +81,7 @@ LargeMaker::Image LargeMaker::column_scan(const Image& a) {
   return {f, a.width, a.height, a.planes};
 }
 
-// A recursive filter along both axes, as it is made of one and transposes.
+// A recursive filter along both axes, composed of one filter and transposes.
 LargeMaker::Image LargeMaker::filtered_twice(const Image& a) {
   if (a.height < 3 || a.width < 3) return {};
   const Image down = column_scan(a);
@@ -97,7 +97,7 @@ LargeMaker::Image LargeMaker::filtered_twice(const Image& a) {
 
 // ---- scatters ----
 
-// A histogram of weights by an input's steps, of all planes or of each; read where the input says.
+// A histogram of weights by an input's steps, over all planes or for each; it is read at a data-dependent index.
 LargeMaker::Image LargeMaker::levelled(const Image& a) {
   const bool each = c_.chance(60), counts = c_.chance(40);
   const Func at = steps(a);
@@ -121,7 +121,7 @@ LargeMaker::Image LargeMaker::levelled(const Image& a) {
   return {f, a.width, a.height, a.planes};
 }
 
-// Each element goes near where it is, by an input that is the same for all planes, or one for each.
+// Scatters each element nearby, by an input that is the same for all planes, or one for each.
 LargeMaker::Image LargeMaker::splatted(const Image& a) {
   if (!affords(a.elements() * 30)) return {};
   const bool each = c_.chance(40), down = c_.chance(50);
@@ -163,7 +163,7 @@ LargeMaker::Image LargeMaker::centred(const Image& a) {
   return {f, a.width, a.height, a.planes};
 }
 
-// By the mean and the variance of each plane: one Tuple, or two Funcs that read the same.
+// Normalises by the mean and the variance of each plane: one Tuple, or two Funcs with the same operands.
 LargeMaker::Image LargeMaker::normalised(const Image& a) {
   const RDom r(0, a.width, 0, a.height), q(0, a.width, 0, a.height);
   const float share = 1.0f / (static_cast<float>(a.width) * static_cast<float>(a.height));
@@ -191,7 +191,7 @@ LargeMaker::Image LargeMaker::normalised(const Image& a) {
   return {f, a.width, a.height, a.planes};
 }
 
-// Means of patches around, weighted by how alike they are.
+// Means of neighbouring patches, weighted by their similarity.
 LargeMaker::Image LargeMaker::patched(const Image& a) {
   const int shifts = c_.between(2, 10), patch = c_.between(1, 3);
   if (a.width < shifts + patch + 1 || a.height < patch ||
@@ -210,7 +210,7 @@ LargeMaker::Image LargeMaker::patched(const Image& a) {
   return {f, a.width - shifts - patch, a.height - patch + 1, a.planes};
 }
 
-// What each pair of elements has, which is read for either of them.
+// Values of pairs of elements, which are read for either element.
 LargeMaker::Image LargeMaker::paired(const Image& a) {
   const int shifts = c_.between(6, 12), k = c_.between(0, 2);
   if (a.width < shifts + k + 2 || a.height < k + 1 || !affords(a.elements() * shifts * 12))
@@ -226,7 +226,7 @@ LargeMaker::Image LargeMaker::paired(const Image& a) {
   return {f, a.width - shifts - k, a.height - (k > 0 ? 1 : 0), a.planes};
 }
 
-// Sums of rows under a predicate: of coordinates, or of an input.
+// Sums of rows under a predicate over coordinates, or over an input.
 LargeMaker::Image LargeMaker::partly_summed(const Image& a) {
   RDom r(0, a.width);
   const int how = c_.below(3);
@@ -246,7 +246,7 @@ LargeMaker::Image LargeMaker::partly_summed(const Image& a) {
   return {f, a.width, a.height, a.planes};
 }
 
-// Two Funcs that read the same table at the same places of an input.
+// Two Funcs that gather from the same table at the same indices.
 LargeMaker::Image LargeMaker::summed_twice(const Image& a) {
   if (!affords(a.elements() * 20)) return {};
   const Func at = steps(a), table = input(16, 1, 1);

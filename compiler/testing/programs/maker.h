@@ -1,11 +1,9 @@
-// How a program is put together: one object that the parts of the generator share.
+// maker.h -- the generator of random programs: one object that its parts share.
 //
-// program.cpp: the styles, the order of things, regions. places.cpp: indices. inputs.cpp: images, and
-// reads of them and of Funcs. values.cpp: expressions. functions.cpp: smooth functions, kinks, guarded
-// branches. stages.cpp: Funcs, updates, reductions, loops over time. chains.cpp: Funcs
-// at changing resolution. structures.cpp: what programs of
-// users are made of. pieces.cpp: the same of images of any size. rules.cpp: derivatives that the
-// author writes.
+// program.cpp: styles, the order of structures, regions. places.cpp: indices. inputs.cpp: images, and reads of them and
+// of Funcs. values.cpp: expressions. functions.cpp: smooth functions, kinks, guarded branches. stages.cpp: Funcs,
+// updates, reductions, loops over time. chains.cpp: Funcs at changing resolution. structures.cpp: structures of users'
+// programs. pieces.cpp: the same for images of any size. rules.cpp: custom derivatives.
 #pragma once
 
 #include "frontend/language/boundary_conditions.h"
@@ -13,16 +11,16 @@
 
 namespace retrograde::fuzz {
 
-// Values of Funcs are reduced modulo this, so that a few additions never overflow.
+// Values of Funcs are reduced modulo this number, so that a few additions never overflow.
 constexpr int wide_modulus = 4096;
 
-// The coordinates of a point, and the Func that is being updated there.
+// The coordinates of a point, and the Func that is updated there.
 struct Point {
   std::vector<Expr> all;    // pure variables, then reduction variables
   std::vector<Expr> write;  // where the update writes
   Func self;
-  std::vector<bool> is_pure;  // dimensions of `self` that the update leaves alone
-  bool may_reduce = true;     // no reduction inside of another, nor of an unfinished Func
+  std::vector<bool> is_pure;  // for each dimension of `self`: whether the update leaves it pure
+  bool may_reduce = true;     // false inside of a reduction or of an unfinished Func
   bool in_update() const { return !write.empty(); }
 };
 
@@ -47,12 +45,12 @@ class Maker {
   Expr affine(const Expr& u, const std::vector<Expr>& all);
   Expr piecewise(const Expr& u, const std::vector<Expr>& all);
   Expr odd(const Expr& u, const std::vector<Expr>& all);
-  // Near `u`, made of it and of the other coordinates in `all`; the same inside of [0, n); a place in
-  // [0, n) that `data` decides.
+  // near: an index near `u`, from it and the other coordinates in `all`. inside: the same, within [0, n). by_data: an
+  // index in [0, n) that depends on data.
   Expr near(const Expr& u, const std::vector<Expr>& all);
   Expr inside(const Expr& u, const std::vector<Expr>& all, const Expr& n);
   Expr by_data(const Expr& u, const Expr& n);
-  Expr place_condition(const std::vector<Expr>& all);  // of the coordinates only
+  Expr place_condition(const std::vector<Expr>& all);  // depends on the coordinates only
 
   // ---- inputs ----
   void make_inputs();
@@ -157,18 +155,19 @@ class Maker {
   RandomProgram& p_;
   const Style& s_;
   int budget_ = 0, reads_ = 0, strides_ = 0;
-  std::vector<int> inlined_reads_;  // of each Func: of images, when everything is inlined into it
-  // Where updates of the output touch it, when its regions must hold that.
+  std::vector<int>
+      inlined_reads_;  // for each Func: its image reads if everything is inlined into it
+  // The reach of updates of the output, which its regions must contain.
   struct Reach {
     size_t d;
     int low, high;
   };
   std::vector<Reach> reaches_;
-  bool is_output_ = false;  // what is being made, and its regions must hold that
+  bool is_output_ = false;  // the current Func is the output, with that constraint
   std::vector<Exact> exact_;
 };
 
-// An image, or a Func over a region, and what stands around it.
+// Adds a boundary condition to an image, or to a Func over a region.
 template <typename Source, typename... Where>
 Func bounded(int kind, const Expr& exterior, const Source& source, const Where&... region) {
   using namespace BoundaryConditions;
@@ -180,10 +179,10 @@ Func bounded(int kind, const Expr& exterior, const Source& source, const Where&.
 
 std::vector<Var> first_variables(int dimensions);
 
-// Outside of an integer type's range casts are undefined: floats are clamped.
+// Converts `e`, clamping floats: a cast outside of an integer type's range is undefined.
 Expr converted(const Type& type, const Expr& e);
 
-// Integers of 32 and 64 bits, whose overflow has no meaning.
+// Integers of 32 and 64 bits, whose overflow is undefined.
 bool is_wide(const Type& type);
 
 Expr sum_of(const Expr& a, const Expr& b);

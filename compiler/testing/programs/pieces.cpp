@@ -1,7 +1,6 @@
-// The pieces that people write programs for images with: stencils, reductions written inline, argmin
-// and argmax, boundary conditions, averages of rows, histograms, recursive filters, halved sizes;
-// any stage may be at root. Each reads no more than what is there, so a value or a gradient that
-// asks for more is wrong.
+// Pieces of typical image programs: stencils, inline reductions, argmin and argmax, boundary conditions, averages of
+// rows, histograms, recursive filters, halved sizes. Any stage may be at root. Each reads only elements that exist, so
+// a value or a gradient that needs more is wrong.
 #include <algorithm>
 
 #include "frontend/language/inline_reductions.h"
@@ -9,7 +8,7 @@
 
 namespace retrograde::fuzz {
 
-// Of any size; flat ones are long.
+// An image of any size; one-dimensional images are long.
 void Maker::make_exact_image() {
   const bool is_flat = c_.chance(30);
   const int width = is_flat ? c_.between(3, 700) : c_.between(5, 70);
@@ -40,7 +39,7 @@ void Maker::end_pieces() {
   p_.runs = {{{{0, 0}, {exact_.back().width, exact_.back().height}}}};
 }
 
-// Those that images are mostly made of are drawn as often as all others.
+// The most common pieces are drawn as often as all others together.
 void Maker::add_piece() {
   static constexpr void (Maker::*adds[])() = {&Maker::add_taps,      &Maker::add_window,
                                               &Maker::add_border,    &Maker::add_half,

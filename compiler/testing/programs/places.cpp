@@ -1,4 +1,4 @@
-// Integer expressions in the coordinates of a point: where a program reads or writes.
+// Integer expressions in the coordinates of a point: the indices at which a program reads or writes.
 #include "testing/programs/maker.h"
 
 namespace retrograde::fuzz {
@@ -34,7 +34,7 @@ Expr Maker::piecewise(const Expr& u, const std::vector<Expr>& all) {
       [&] { return max(u, other(all)); },
       [&] { return min(u, other(all) + c_.around_zero(1)); },
       [&] { return clamp(affine(u, all), c_.around_zero(2), p_.count + c_.around_zero(1)); },
-      [&] { return 2 * (u / 2) + 1 - u % 2; },  // neighbours change places
+      [&] { return 2 * (u / 2) + 1 - u % 2; },  // swaps neighbours
       [&] { return u / 2 + (u % 2) * c_.between(1, 3); },
       [&] { return (c_.between(2, 13) * u + c_.between(0, 3)) % natural_size; },
       [&] { return (-u) % c_.between(2, 4); },

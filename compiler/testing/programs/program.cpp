@@ -133,7 +133,7 @@ oracle::Region Maker::main_region(size_t output) {
       region.mins.push_back(c_.chance(30) ? c_.around_zero(8) : 0);
     } else {
       region.mins.push_back(c_.chance(20) ? c_.around_zero(2) : 0);
-      // Small ones, and odd ones that no vector fits.
+      // Small extents, and odd ones that no vector divides.
       region.extents.push_back(c_.chance(10)   ? c_.between(1, 3)
                                : c_.chance(15) ? c_.between(7, 9)
                                                : natural_size);
@@ -143,7 +143,7 @@ oracle::Region Maker::main_region(size_t output) {
   return region;
 }
 
-// An output must hold whatever its updates touch.
+// The region of an output must contain all accesses of its updates.
 void Maker::cover(size_t output, oracle::Region& region) const {
   if (output > 0) return;  // a copy
   for (const auto& [d, low, high] : reaches_) {
@@ -153,7 +153,7 @@ void Maker::cover(size_t output, oracle::Region& region) const {
   }
 }
 
-// A Func that the other output reads over a larger region cannot be an output itself.
+// Adds a copy as second output. A Func that the other output reads over a larger region cannot be an output itself.
 void Maker::add_copy() {
   const Func source =
       p_.funcs[static_cast<size_t>(c_.below(static_cast<int>(p_.funcs.size()) - 1))];
@@ -162,8 +162,8 @@ void Maker::add_copy() {
   p_.runs[0].push_back(main_region(1));
 }
 
-// Over tiny and odd regions, somewhere else. Often: such sizes decide which schedules are legal, so
-// one program has few of them.
+// Adds a run over a tiny or odd region at another position. Such sizes often decide which schedules are legal, so a
+// program has few of them.
 void Maker::add_run() {
   std::vector<oracle::Region> regions = p_.runs[0];
   for (size_t o = 0; o < regions.size(); ++o) {

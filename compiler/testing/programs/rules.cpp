@@ -1,4 +1,4 @@
-// Derivatives that the author writes, all of them right: the gradient is the one without them.
+// Custom derivatives, all of them correct: the gradient is that without them.
 #include "autodiff/custom_derivative.h"
 #include "autodiff/straight_through.h"
 #include "autodiff/tangents.h"
@@ -13,7 +13,7 @@ bool is_floating(const Func& f) {
   return std::ranges::all_of(f.types(), [](const Type& t) { return t.is_float(); });
 }
 
-// The derivative of `source` by its inputs, synthesized: what a rule of a copy of it gives.
+// The synthesized derivative of `source` by its inputs, as the rule of a copy of it returns it.
 std::vector<AdjointContribution> by_synthesis(const Func& source,
                                               const std::vector<AdjointInput>& inputs,
                                               const AdjointContext& c) {
@@ -37,7 +37,7 @@ Func tangent_by_synthesis(const Func& source, const std::vector<AdjointInput>& i
   return propagate_tangents(source, directions)(source);
 }
 
-// What nobody reads may be NaN: it must not meet a derivative of 0.
+// Elements outside of the region read may be NaN, which must not be multiplied by a derivative of 0.
 Expr times(const Expr& derivative, const Expr& partial) {
   const Expr zero = cast(partial.type(), Expr(0.0f));
   return derivative * cast(derivative.type(), select(is_finite(partial), partial, zero));
@@ -75,7 +75,7 @@ void give_closed_rule(const Func& f, const Func& source) {
 
 }  // namespace
 
-// Values that are `a`, written so that rules of derivatives act in them.
+// Values equal to `a`, written so that custom derivatives act in them.
 Expr Maker::ruled(const Type& type, const Point& at, int depth) {
   const Expr a = value(type, at, depth - 1);
   const auto one_factor_at_a_time = [&] {
@@ -92,7 +92,7 @@ Expr Maker::ruled(const Type& type, const Point& at, int depth) {
   });
 }
 
-// A Func that reads the last one, with rules: by all inputs of the program, or by the Func read.
+// A Func that reads the last one, with custom derivatives: by all inputs of the program, or by the Func read.
 void Maker::add_custom() {
   const Func source = p_.funcs.back();
   if (!is_floating(source)) return;

@@ -25,7 +25,7 @@ Region Maker::ranges(int most) {
 
 void Maker::choose_predicate(RDom& r, const Point& at) {
   if (!c_.chance(30)) return;
-  Point plain = at;  // an update of its own is not read there
+  Point plain = at;  // does not read the updated Func
   plain.write.clear();
   plain.may_reduce = false;
   r.where(c_.chance(75)     ? place_condition(plain.all)
@@ -35,14 +35,14 @@ void Maker::choose_predicate(RDom& r, const Point& at) {
 
 Expr Maker::reduced(const Type& type, const Point& at, int depth) {
   RDom r(ranges(s_.has_integers ? 2 : 1));
-  // an inline reduction becomes a Func: it reads no unfinished one
+  // An inline reduction becomes a Func, so it must not read an unfinished one.
   Point inner{at.all, {}, Func(), {}, !s_.has_integers};
   for (int d = 0; d < r.dimensions(); ++d) inner.all.push_back(r[d]);
   const Expr a = kept_small(value(type, inner, std::min(depth - 1, 1)), 64);
   return c_.one_of<Expr>({
       [&] { return sum(r, a); },
       [&] { return is_wide(type) ? sum(r, a) : product(r, a); },
-      // of nothing: infinite
+      // Over an empty domain the result is infinite.
       [&] { return max(maximum(r, a), converted(type, Expr(-9.0f))); },
       [&] { return min(minimum(r, a), converted(type, Expr(9.0f))); },
       [&] {
@@ -76,7 +76,7 @@ void Maker::add_func(int dimensions) {
   finish(f);
 }
 
-// Of the variable of dimension d itself, or where the domain or data say.
+// The index to write: the dimension's own variable, or one that depends on the domain or on data.
 Expr Maker::write_place(const RDom& r, size_t d, const std::vector<Var>& vars) {
   std::vector<Expr> all;
   for (int k = 0; r.defined() && k < r.dimensions(); ++k) all.push_back(r[k]);
@@ -103,7 +103,7 @@ Expr Maker::write_place(const RDom& r, size_t d, const std::vector<Var>& vars) {
   });
 }
 
-// A place near the variable, from whose extent follows what is touched; a step back is read, too.
+// An index near the variable, from whose extent the accessed region follows; the previous step is read, too.
 Expr Maker::reached(const RVar& r, size_t d) {
   const auto min = ir::as_const_int(r.min()), extent = ir::as_const_int(r.extent());
   const int first = static_cast<int>(min.value_or(0)) + c_.around_zero(2),
@@ -134,13 +134,12 @@ void Maker::add_update(Func& f, const std::vector<Var>& vars) {
   f(at.write) = Tuple(values);
 }
 
-// Something to update with.
+// A value to update with.
 Expr Maker::fresh(const Type& type, const Point& at, int depth) {
   return kept_small(value(type, at, depth), 64);
 }
 
-// Two values that need each other: the product of complex numbers, or the largest value so far and
-// something that belongs to it.
+// Two coupled values: the product of complex numbers, or the largest value so far with a value that belongs to it.
 std::vector<Expr> Maker::updated_together(const Func& f, const Point& at) {
   const Type type = f.types()[0], other = f.types()[1];
   const Expr a = f(at.write).element(0), b = f(at.write).element(1);
@@ -154,7 +153,7 @@ Expr Maker::updated(const Func& f, int k, const Point& at) {
   const Type type = f.types()[static_cast<size_t>(k)];
   const Expr self = f(at.write).element(k), other = f(at.write).element(f.outputs() - 1 - k);
   const int depth = c_.between(0, 2);
-  // What is added up stays small; bools are not multiplied.
+  // Sums stay small; bools are not multiplied.
   const bool only_adds = s_.has_integers && (is_wide(type) || type.is_bool());
   const auto scaled = [&](const Expr& e, const Expr& by) { return only_adds ? e : e * by; };
   return c_.one_of<Expr>({
@@ -171,7 +170,7 @@ Expr Maker::updated(const Func& f, int k, const Point& at) {
                              : min(self, fresh(type, at, depth));
       },
       [&] { return select(place_condition(at.all), self, fresh(type, at, depth)); },
-      // machine code stores all values of a Tuple, or none
+      // Machine code stores all values of a Tuple, or none.
       [&] {
         return select(place_condition(at.all), fresh(type, at, depth),
                       s_.has_runs && f.outputs() > 1 ? self : undef(type));
@@ -194,8 +193,7 @@ void Maker::add_sine() {
   finish(f);
 }
 
-// Of the Func before it, of its type; some at half or at twice the resolution. The first one reads
-// an image.
+// A stencil of the previous Func, of its type; some at half or twice the resolution. The first one reads an image.
 void Maker::add_stencil() {
   Func f("s" + std::to_string(p_.funcs.size()));
   const bool is_first = p_.funcs.empty();
@@ -223,7 +221,7 @@ void Maker::add_stencil() {
   finish(f);
 }
 
-// Reads the Func before it, so that something is connected; a float at least, for gradients.
+// The output reads the previous Func, so that the program is connected; at least one value is a float, for gradients.
 void Maker::add_output() {
   Func f("out");
   const std::vector<Var> vars = first_variables(c_.between(1, s_.has_runs ? 3 : 2));
@@ -251,10 +249,11 @@ void Maker::add_output() {
   p_.outputs = {f};
 }
 
-// ---- loops over time: the outermost reduction variable is the step, which computes a state from the
-// last one. Checkpoints are for these.
+// ---- loops over time, for checkpoints ----
 
-// A state with the dimensions of f, or one that a second reduction variable runs through.
+// The outermost reduction variable is the step, which computes a state from the previous one.
+
+// A state with the dimensions of f, or one over which a second reduction variable runs.
 void Maker::add_loop() {
   budget_ = 8;
   Func f("loop" + std::to_string(p_.funcs.size()));
@@ -282,7 +281,7 @@ void Maker::add_loop() {
   p_.has_loop = true;
 }
 
-// Of bounded size after any number of steps.
+// A step whose result stays bounded after any number of steps.
 Expr Maker::stepped(const Func& f, int k, const Point& at) {
   const Expr self = f(at.write).element(k), other = f(at.write).element(f.outputs() - 1 - k);
   const Expr input = value(Float(32), at, 1);

@@ -1,12 +1,11 @@
-// Structures that programs of users are made of, over the Func that was defined last: pyramids,
-// histograms that are sliced, convolutions, tables, scans, loops one after the other, the place of
-// a maximum, domains with parametric ends, boundary conditions of boundary conditions.
+// Structures of users' programs over the last Func: pyramids, sliced histograms, convolutions, tables, scans,
+// consecutive loops, argmax, domains with parametric bounds, boundary conditions of boundary conditions.
 #include "frontend/language/inline_reductions.h"
 #include "testing/programs/maker.h"
 
 namespace retrograde::fuzz {
 
-// At (u, v), as far as the last Func has such dimensions.
+// The last Func at (u, v), as far as it has these dimensions.
 Expr Maker::last_at(const Expr& u, const Expr& v) {
   const Func& last = p_.funcs.back();
   std::vector<Expr> place{u, v, Expr(1)};
@@ -25,8 +24,7 @@ Func Maker::define(const std::string& name, const std::vector<Var>& vars, const 
   return define(name, vars, Tuple(value));
 }
 
-// Down and up again, with what is lost on the way, times a gain; on a mirrored border of run-time
-// size.
+// A pyramid: down- and upsampled, with the residual times a gain, on a mirrored border of run-time size.
 void Maker::add_pyramid() {
   const bool in_both = c_.chance(40);
   const auto half = [&](const Expr& v) { return in_both ? v / 2 : v; };
@@ -55,7 +53,7 @@ Func Maker::with_mirrored_border(const Func& f) {
   return bounded(c_.between(2, 4), 0.5f, f, region);
 }
 
-// A bilateral grid in small: sums and counts of what is alike, blurred, read between its planes.
+// A small bilateral grid: sums and counts of similar values, blurred, interpolated between its planes.
 void Maker::add_grid() {
   const Func guide = define("guide", {x}, clamp(last_at(x, 1), 0.0f, 1.0f));
   RDom r(0, natural_size);
@@ -77,7 +75,7 @@ void Maker::add_grid() {
   define("sliced", {x}, read(0) / (read(1) + 0.5f));
 }
 
-// Of a weight that an image holds for each tap, channel in and channel out.
+// A convolution with weights from an image, for each tap, input channel and output channel.
 void Maker::add_convolution() {
   const auto i = static_cast<size_t>(c_.below(static_cast<int>(p_.images.size())));
   const Buffer<>& weights = p_.images[i];
@@ -101,7 +99,7 @@ void Maker::add_convolution() {
     define("relu", {x, y}, max(sums(x, y), c_.chance(50) ? 0.0f : 0.1f * sums(x, y)));
 }
 
-// A table that is learned, read at a place of data or between two of its entries.
+// A learned table, read at a data-dependent index or between two entries.
 void Maker::add_table() {
   const Func values = define("values", {x, y}, last_at(x, y));
   const Func table = define("table", {x}, sin(values(x, 1) + cast<float>(x) * p_.scale));
@@ -112,7 +110,7 @@ void Maker::add_table() {
                        : lerp(nearest, table(clamp(low + 1, 0, 7)), v - floor(v)));
 }
 
-// Along both axes, forward or backward.
+// Scans along both axes, forward or backward.
 void Maker::add_scans() {
   Func s = define("scan", {x, y}, last_at(x, y));
   RDom r(1, natural_size - 1);
@@ -131,7 +129,7 @@ void Maker::add_scans() {
   if (c_.chance(40)) s(x, back) = step(s(x, back), s(x, back + 1));
 }
 
-// One keeps its steps, and drives another that overwrites its state.
+// Two loops: one keeps its steps and drives another that overwrites its state.
 void Maker::add_two_loops() {
   const int steps = c_.between(2, 6);
   const Var t("t");
@@ -146,7 +144,7 @@ void Maker::add_two_loops() {
               c_.chance(50) ? state(x)[1] - 0.25f * state(x)[0] : cos(state(x)[1] * driven)};
 }
 
-// What stands where something else is largest.
+// The value at the position where another Func is largest.
 void Maker::add_place_of_maximum() {
   const Func f = define("scores", {x, y}, last_at(x, y));
   RDom r(0, c_.between(2, natural_size));
@@ -155,7 +153,7 @@ void Maker::add_place_of_maximum() {
   define("best", {x, y}, f(c_.chance(50) ? at : x + at, y) * best[1] + best[1]);
 }
 
-// Triangles and bands whose ends are parameters.
+// Triangular and banded domains with parametric bounds.
 void Maker::add_parametric_sum() {
   const Func f = define("source", {x, y}, last_at(x, y));
   const Expr rows = c_.chance(30) ? max(p_.count - c_.between(1, 4), 0) : Expr(p_.count);

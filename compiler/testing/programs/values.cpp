@@ -1,5 +1,5 @@
-// Expressions: leaves, conversions between all types, operators of integers and bools. What is wide
-// stays far from overflow: Funcs hold small values, factors are smaller still; narrow integers wrap.
+// Expressions: leaves, conversions between all types, operators on integers and bools. Wide values stay far from
+// overflow: Funcs hold small values, factors are smaller still; narrow integers wrap.
 #include "testing/programs/maker.h"
 
 namespace retrograde::fuzz {
@@ -41,7 +41,7 @@ Expr Maker::condition(const Point& at, int depth) {
   });
 }
 
-// |a| small enough that products of two do not overflow.
+// An operand so small that products of two do not overflow.
 Expr Maker::factor(const Type& type, const Point& at, int depth) {
   const Expr a = value(type, at, depth);
   return is_wide(type) ? a % cast(type, 61) : a;
@@ -62,7 +62,7 @@ Expr Maker::arithmetic(const Type& type, const Point& at, int depth) {
 Expr Maker::operation(const Type& type, const Point& at, int depth) {
   const auto operand = [&] { return value(type, at, depth - 1); };
   const auto sum = [&] { return operand() + operand(); };
-  // Unsigned and wide: no wrap-around through zero.
+  // Unsigned wide differences must not wrap through zero.
   const auto difference = [&] {
     return type.is_uint() && is_wide(type) ? max(operand(), operand()) : operand() - operand();
   };
@@ -72,7 +72,7 @@ Expr Maker::operation(const Type& type, const Point& at, int depth) {
     const Expr divisor = c_.chance(40) ? operand() : cast(type, sign * by);
     return c_.chance(50) ? operand() / divisor : operand() % divisor;
   };
-  // Their results are unsigned.
+  // The results of abs and absd are unsigned.
   const auto distance = [&] {
     const Type from = c_.chance(50) ? type.with_code(TypeCode::Int) : type;
     const Expr a = value(type.is_float() ? type : from, at, depth - 1);
@@ -127,8 +127,8 @@ Expr Maker::leaf(const Type& type, const Point& at) {
       [&] { return converted(type, read_image(at)); },
       [&] { return converted(type, read_image(at)); },
       [&] { return converted(type, parameter()); },
-      // By a Param: where inversion fixes the coordinate, functions of it alone would be
-      // folded in float32, which the checks in double take for an error
+      // Scaled by a Param. Where inversion fixes the coordinate, functions of it alone would be folded in float32,
+      // which the checks in double would report as an error.
       [&] {
         if (s_.has_integers && !at.all.empty()) return converted(type, coordinate(at, 0));
         return at.all.empty() ? constant(type)
@@ -139,7 +139,7 @@ Expr Maker::leaf(const Type& type, const Point& at) {
   });
 }
 
-// Functions of bfloat16 are float32.
+// Functions of bfloat16 return float32.
 Expr Maker::value(const Type& type, const Point& at, int depth) {
   if (depth <= 0 || --budget_ < 0) return leaf(type, at);
   if (s_.has_integers && (!type.is_float() || c_.chance(92))) return arithmetic(type, at, depth);

@@ -26,7 +26,7 @@ struct Outcome {
   }
 };
 
-// What an access is to an analysis of integer sets.
+// The class of an access for an analysis of integer sets.
 enum class Nature {
   QuasiAffine,   // piecewise affine with floors of constants: a gather exists
   Determined,    // data, but only of variables that the other indices determine: a gather exists

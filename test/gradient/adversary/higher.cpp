@@ -47,7 +47,7 @@ class Higher {
     const Derivative d = propagate_adjoints(tangent(), s_.seed, s_.bounds(), s_.options());
     return u_.along([&](const AdjointInput& x) { return d.of(x); });
   }
-  // Of the sum over inputs of <v, gradient>, one input at a time.
+  // The derivative of the sum over inputs of <v, gradient>, one input at a time.
   Product adjoint_of_adjoint() const {
     Product result;
     const std::vector<Direction> directions = v_.directions();
@@ -67,7 +67,7 @@ class Higher {
     return result;
   }
 
-  // What is not finite may be a pole of the second derivative: differences tell.
+  // A value that is not finite may be a pole of the second derivative; differences decide.
   void compare(const char* what, const Product& a, const Product& b) const {
     if (!a.is_finite() || !b.is_finite()) return;
     const double slack = 1e-9 * (a.magnitude + b.magnitude + first_.magnitude + 1 + s_.largest);

@@ -1,4 +1,4 @@
-// What all checks of one program share: evaluation in double, random weights, how inputs move.
+// The helpers that all checks of one program share: evaluation in double, random weights, perturbed inputs.
 #pragma once
 
 #include <ctime>
@@ -10,7 +10,7 @@
 
 namespace retrograde::gradient {
 
-// Of one Func, and of one evaluation; more is passed over.
+// Limits for one Func and for one evaluation; larger programs are skipped.
 constexpr size_t max_points = size_t{1} << 17;
 constexpr uint64_t max_operations = 20'000'000;
 
@@ -121,7 +121,7 @@ bool is_finite(const oracle::Array& values);
 
 void compare_higher(Subject& s, const Motion& v, const Derivative& derivative);
 void compare_dense(Subject& s);
-// By each input; undefined where it is not read.
+// The gradient by each input; undefined if the input is not read.
 using Gradients = std::vector<std::pair<Func, oracle::Region>>;
 // twin: null, or the same program with a stage that a C function computes.
 // How many gradients have machine code under a random schedule too.

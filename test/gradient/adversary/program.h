@@ -1,4 +1,4 @@
-// Programs made to break propagate_adjoints, and what of each is looked at.
+// Random programs that stress propagate_adjoints, and the checks that each gets.
 #pragma once
 
 #include "testing/programs/program.h"
@@ -8,7 +8,7 @@ namespace retrograde::gradient {
 using fuzz::Choices;
 using fuzz::natural_size;
 
-// What of a program is looked at besides its gradient.
+// The checks of a program beside that of its gradient.
 struct AdversaryChecks {
   int order = 1;        // derivatives of derivatives, up to this one
   bool dense = false;   // Jacobian and Hessian by one image

@@ -1,5 +1,4 @@
-// Which rules of the autoscheduler a schedule shows, so that one sees that random programs exercise
-// each.
+// Detects the autoscheduler's rules in a schedule, to show that random programs exercise each of them.
 #pragma once
 
 #include <set>

@@ -1,4 +1,4 @@
-// Programs for the autoscheduler, and what it is told.
+// Programs for the autoscheduler, with their options.
 #pragma once
 
 #include <optional>
@@ -13,7 +13,7 @@ struct ScheduledProgram {
   Extents extents = Extents::Constant;
   AutoscheduleOptions told = {};
   bool is_whole = true;  // by Pipeline::auto_schedule(), not what a gradient gets by default
-  // Of a large program: the same at sizes that the interpreter can do.
+  // For a large program: the same structure at a size that the interpreter can handle.
   std::optional<AdversaryProgram> small = {};
 };
 

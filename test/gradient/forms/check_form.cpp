@@ -26,7 +26,7 @@ namespace {
 constexpr int places = 6;
 const char* const leaf_names[leaf_count] = {"x", "y", "z"};
 
-// Of all sizes from 1e-3 to 4 and of either sign, rounded to the type.
+// Numbers of all magnitudes from 1e-3 to 4 and of either sign, rounded to the type.
 Place place_of(std::mt19937_64& random, Type type) {
   Place at;
   std::uniform_real_distribution<double> exponent(-7, 1.4), sign(-1, 1);

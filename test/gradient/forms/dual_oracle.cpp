@@ -38,7 +38,7 @@ struct Dual {
 constexpr double units = 4;
 constexpr int trials = 8;
 
-// By node: how far a value may be off.
+// For each node: a bound on the error of its value.
 using Spread = std::unordered_map<const ir::ExprNode*, Wide>;
 
 class Evaluation {

@@ -1,4 +1,4 @@
-#include "autodiff/sweeps/made_definitions.h"
+#include "autodiff/sweeps/generated_definitions.h"
 
 #include "autodiff/sweeps/local_derivative.h"
 #include "graph/define.h"
@@ -25,7 +25,7 @@ void note_traits(const FuncPtr& f, const std::vector<Expr>& adjoints) {
 
 namespace {
 
-// Of this definition only: an adjoint may get hundreds of them.
+// Freezes the callees of this definition only; an adjoint may get hundreds of definitions.
 void freeze_callees(const Definition& d, const FuncContents& f) {
   walk(d, [&](const Call& call) {
     const FuncPtr callee = call.call_type == CallType::Func ? func_of(call) : nullptr;

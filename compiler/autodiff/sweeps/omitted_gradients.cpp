@@ -1,4 +1,4 @@
-#include "autodiff/sweeps/leave_out.h"
+#include "autodiff/sweeps/omitted_gradients.h"
 
 #include "autodiff/time/overwrite_time.h"
 #include "diagnostics/error.h"
@@ -10,12 +10,12 @@ namespace {
 using Names = std::vector<const Symbol*>;
 
 SynthesisResult synthesize(const Seed& seed, const SynthesisOptions& options) {
-  return options.checkpoints.is_given() ? synthesize_folded(seed, options)
-                                        : synthesize_adjoints(seed, options);
+  return options.checkpoints.is_set() ? synthesize_folded(seed, options)
+                                      : synthesize_adjoints(seed, options);
 }
 
-// Scalars whose gradients are built because everything's are.
-Names unasked_scalars(const Seed& seed, const SynthesisOptions& options) {
+// Scalars that were not requested; they get gradients only because everything does.
+Names unrequested_scalars(const Seed& seed, const SynthesisOptions& options) {
   Names scalars;
   if (options.only_requested) return scalars;
   for (const auto& p : parameters_of({seed.output})) {
@@ -38,13 +38,13 @@ std::optional<SynthesisResult> without(const Names& names, const Seed& seed,
 
 }  // namespace
 
-SynthesisResult synthesize_what_can_be(const Seed& seed, const SynthesisOptions& options) {
+SynthesisResult synthesize_supported(const Seed& seed, const SynthesisOptions& options) {
   try {
     return synthesize(seed, options);
   } catch (const InternalError&) {
     throw;
   } catch (const Error& error) {
-    const Names scalars = unasked_scalars(seed, options);
+    const Names scalars = unrequested_scalars(seed, options);
     for (const Symbol* symbol : scalars) {
       if (auto result = without({symbol}, seed, options, error.what())) return *std::move(result);
     }

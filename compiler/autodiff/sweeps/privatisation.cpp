@@ -1,4 +1,4 @@
-#include "autodiff/sweeps/private_parts.h"
+#include "autodiff/sweeps/privatisation.h"
 
 #include <algorithm>
 
@@ -12,24 +12,25 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// Parts of a privatised accumulation: enough for the threads of today's machines, few enough to sum
-// and to store.
+// The number of parts of a privatised accumulation: enough for the threads of today's machines, few enough to sum and
+// store.
 constexpr int part_count = 32;
-// Setting parts to zero and summing them may cost as much as this many elements an iteration; with
-// fewer parts than the least, a scatter stays one.
+// Zeroing and summing parts may cost as much as this many elements an iteration. With fewer than least_parts, a scatter
+// is not privatised.
 constexpr double elements_an_iteration = 4;
 constexpr int least_parts = 4;
-// Elements of one part of a scatter, lanes included, that stay in a near cache.
+// The number of elements of one part of a scatter, lanes included, that fit a near cache.
 constexpr double near_elements = 1 << 14;
-// Bytes that all parts of one adjoint may take: what a large target has no room for is accumulated
-// in place, in parallel over its pure dimensions only.
+// Memory budget in bytes for all parts of one adjoint. A larger target is accumulated in place, in parallel over its
+// pure dimensions only.
 constexpr double private_bytes = 64 << 20;
-// Below so many elements, with so many iterations each, the pure dimensions alone do not fill a
-// machine: one tile of registers holds them, or a few do.
+// With at most few_elements elements, each of many_iterations iterations, the pure dimensions alone do not occupy a
+// machine. Up to one_tile elements fit one register tile; up to few_elements fit a few tiles.
 constexpr double one_tile = 64, few_elements = 1024, many_iterations = 4096;
-// That a lane of a part adds up where there are several tiles, so that parts cost little beside it.
+// The least number of terms that a lane of a part adds if there are several tiles, so that zeroing and summing the
+// parts cost little beside them.
 constexpr double terms_a_lane = 8;
-// Iterations from which on lanes of their own are worth setting to zero and adding up.
+// Sums of at least this many iterations repay zeroing and summing the lanes.
 constexpr double lanes_pay = 16 * lane_count;
 
 class PartSizes {
@@ -40,8 +41,7 @@ class PartSizes {
   bool sums_many_terms(const Gather& g) const {
     return g.rdom && (is_few_elements(g) || iterations_of(g, many_terms) >= many_terms);
   }
-  // Whether the elements alone give too little to do in parallel, and each sums over many
-  // iterations.
+  // Whether the elements alone offer too little parallelism, and each sums over many iterations.
   bool is_worth_splitting(const Iterations& update) const {
     const Gather& g = update.over;
     return g.rdom && (leaves_lanes_idle(update) || is_few_elements(g));
@@ -53,9 +53,9 @@ class PartSizes {
     const bool has_pure_dimension = std::ranges::find(g.pure, true) != g.pure.end();
     return iterations >= (has_pure_dimension ? many_iterations : part_count * lane_count);
   }
-  // Whether vectors of elements are worse than vectors of terms: rows of elements are shorter than
-  // one, as in a small kernel with many channels, or lie across what is read, as in a layer that
-  // mixes channels; while each element sums over long rows.
+  // Whether vectors of elements are worse than vectors of terms, while each element sums over long rows. Rows of
+  // elements may be shorter than a vector, as in a small kernel with many channels, or strided in what they read, as in
+  // a layer that mixes channels.
   bool leaves_lanes_idle(const Iterations& update) const {
     const Gather& g = update.over;
     if (g.scatters || g.pure.empty() || target_.region.size() != g.pure.size()) return false;
@@ -64,8 +64,7 @@ class PartSizes {
     return g.pure[0] && (is_short || reads_across(update)) && (!row || *row >= lane_count) &&
            elements_of(g) <= near_elements && iterations_of(g, many_iterations) >= lanes_pay;
   }
-  // Whether all that is read for neighbouring elements lies apart, and that for neighbouring terms
-  // together.
+  // Whether the reads are strided for neighbouring elements and contiguous for neighbouring terms.
   bool reads_across(const Iterations& update) const {
     const std::string &row = target_.args[0], &term = update.rvars[0].var;
     bool along = false, across = false;
@@ -83,9 +82,9 @@ class PartSizes {
     }
     return across && !along;
   }
-  // Each part of a scatter holds every element that it may reach: the more elements for the
-  // iterations, the fewer parts. A power of two. One: there are only lanes. Where sizes are known
-  // at run time only, the most there may be.
+  // The number of parts, a power of two; 1 means only lanes. Each part of a scatter holds every element that the
+  // scatter may reach, so there are fewer parts if there are many elements for the iterations. If sizes are known at
+  // run time only, this is the maximum.
   int parts_of(const Gather& g) const {
     if (!g.scatters && elements_of(g) > few_elements) return 1;
     if (!g.scatters && elements_of(g) > one_tile) return parts_of_a_tile(g);
@@ -99,8 +98,8 @@ class PartSizes {
       parts /= 2;
     return parts;
   }
-  // Parts for the threads of elements that a few tiles of registers hold: each has lanes of its own
-  // for every element, which are set to zero and added up.
+  // The number of parts for elements that fill a few register tiles. Each part has lanes for every element, which must
+  // be zeroed and summed.
   int parts_of_a_tile(const Gather& g) const {
     int parts = part_count;
     while (parts > 1 && iterations_of(g, many_iterations) < parts * lane_count * terms_a_lane)
@@ -108,7 +107,7 @@ class PartSizes {
     return parts;
   }
   double bytes_an_element() const { return total_bytes(types_); }
-  // `parts_of`, or as many of them as fit at run time.
+  // `parts_of`, or at run time the number of parts that fit if that is smaller.
   Expr part_count_of(const Gather& g) const {
     const Expr most = make_const(Int(32), parts_of(g));
     if (!g.scatters || target_.region.size() != g.pure.size() ||
@@ -121,8 +120,8 @@ class PartSizes {
     }
     return simplify(cast_to(Int(32), min(max(fit, make_one(Int(64))), cast_to(Int(64), most))));
   }
-  // Lanes let a gather add in vectors. In a scatter, neighbouring iterations often meet in one
-  // element, and would wait for each other: lanes have elements of their own where these are few.
+  // Lanes let a gather add in vectors. In a scatter, neighbouring iterations often meet in one element and would wait
+  // for each other, so lanes get elements of their own if there are few.
   bool has_lanes(const Gather& g) const {
     if (!g.scatters) return true;
     if (target_.region.size() != g.pure.size()) return false;
@@ -136,7 +135,7 @@ class PartSizes {
     const std::string number = is_const(count) ? ir::print(count) : text("at most ", parts_of(g));
     const std::string each =
         bytes >= unknown_elements ? "" : text(" of ", static_cast<int64_t>(bytes), " bytes each");
-    return text("accumulated in ", number, " private parts", each, ", as many as fit ",
+    return text("accumulated in ", number, " privatised copies", each, ", as many as fit ",
                 static_cast<int64_t>(private_bytes), " bytes");
   }
 
@@ -146,7 +145,7 @@ class PartSizes {
     for (const LoopVariable& v : target_.region) elements *= extent_of(v);
     return elements;
   }
-  // A loop of unknown extent counts as `unknown` iterations.
+  // The number of iterations; a loop of unknown extent counts as `unknown`.
   static double iterations_of(const Gather& g, double unknown) {
     double iterations = 1;
     for (const ReductionVariable& r : g.rdom->vars) {
@@ -155,7 +154,7 @@ class PartSizes {
     }
     return iterations;
   }
-  // Elements that the pure dimensions of the update run over; a great many when unknown.
+  // The number of elements that the pure dimensions of the update run over; very large if unknown.
   double elements_of(const Gather& g) const {
     double elements = 1;
     for (size_t d = 0; d < g.pure.size(); ++d) {
@@ -189,8 +188,8 @@ std::optional<PartPlan> plan_parts(const Iterations& update, const AdjointTarget
   return PartPlan{sizes.parts_of(g) > 1, count, sizes.has_lanes(g), sizes.note(g, count)};
 }
 
-// The loop whose iterations are dealt out to parts: the outermost that makes enough tasks, so that a
-// part reads what lies together; where none does, the longest.
+// The loop that is split into parts: the outermost with enough iterations to run in parallel, so that a part reads
+// contiguous memory; else the longest loop.
 static size_t loop_in_parts(const Iterations& update) {
   const size_t count = update.rvars.size() - (update.has_taps ? 1 : 0);
   const auto extent = [&](size_t i) {
@@ -204,10 +203,10 @@ static size_t loop_in_parts(const Iterations& update) {
   return longest;
 }
 
-// x = (part * chunk + rho) * lanes + lane for the variable in parts when it is the innermost too;
-// else lanes split the innermost variable. Beyond the end the place is clamped: what it reads must
-// exist even where the condition is false. Both are cut off the steady state, whose accumulators stay
-// in registers.
+// If the variable in parts is also the innermost, x = (part * chunk + rho) * lanes + lane; else lanes split the
+// innermost variable. Indices beyond the end are clamped, because the elements that are read must exist even where the
+// condition is false. Loop partitioning removes clamp and condition from the steady state, whose accumulators stay in
+// registers.
 Slice slice_of(const Iterations& update, const Expr& lane, const Expr& part, const Expr& parts,
                bool in_blocks) {
   Slice slice;
@@ -229,7 +228,7 @@ Slice slice_of(const Iterations& update, const Expr& lane, const Expr& part, con
     if (in_parts || in_lanes) {
       slice.conditions.push_back(likely(at < all));
       at = binary(Kind::Min, likely(at), all - 1);
-      if (!as_const_int(all)) at = max(at, make_zero(Int(32)));  // it may be 0
+      if (!as_const_int(all)) at = max(at, make_zero(Int(32)));  // the extent may be 0
     }
     slice.place[old] = min + at;
   }

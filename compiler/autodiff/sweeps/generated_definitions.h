@@ -1,4 +1,4 @@
-// Definitions of the Funcs that differentiation makes, and reads of them.
+// generated_definitions.h -- helpers to define the Funcs that differentiation generates, and to read them.
 #pragma once
 
 #include <vector>
@@ -9,18 +9,18 @@ namespace retrograde::autodiff {
 
 // A call of value `index` of f.
 Expr call_value(const FuncPtr& f, const std::vector<Expr>& args, int index);
-// Calls of all its values.
+// Calls of all values of f.
 std::vector<Expr> values_of(const FuncPtr& f, const std::vector<Expr>& args);
 
-// f(args) <- values over the reduction variables, where predicate. As an update written by a user,
-// but the domain need not be mentioned. Calls of `f` in it become weak.
+// Adds the update f(args) <- values over the reduction variables, where the predicate holds. It equals an update
+// written by a user, except that the domain need not occur in it. Its calls of `f` become weak references.
 void append_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> values,
                    const std::vector<ReductionVariable>& rvars, Expr predicate);
-// f(args) += terms, each in the type of the value that it is added to; undefined ones add nothing.
+// Adds the update f(args) += terms. Each term is cast to the type of its value; undefined terms add nothing.
 void append_sums(const FuncPtr& f, const std::vector<Expr>& args, const std::vector<Expr>& terms,
                  const std::vector<ReductionVariable>& rvars, const Expr& predicate);
 
-// What `values` do to adjoints concerns all that f passes on.
+// Records the traits of `values` for f, and for every adjoint computed from f.
 void note_traits(const FuncPtr& f, const std::vector<Expr>& values);
 
 }  // namespace retrograde::autodiff
