@@ -1,4 +1,4 @@
-// Which constants keep their value in another type.
+// Decides which constants keep their value in another type.
 #include "ir/literal.h"
 
 #include <cmath>

@@ -39,9 +39,9 @@ void destroy(const Node* node) {
 
 }  // namespace
 
-// A deleted node drops its children, which may end here again: those are queued in the outermost
-// call, on whose stack the queue lives. (A thread_local queue with a destructor would be gone
-// before the last static Expr is.)
+// Deleting a node drops its children, which may call this function again: the outermost call queues
+// those, and owns the queue on its stack. (A thread_local queue with a destructor would be
+// destroyed before the last static Expr.)
 void release(const Node* node) noexcept {
   thread_local std::vector<const Node*>* pending = nullptr;
   if (pending) {
