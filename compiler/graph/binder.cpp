@@ -68,7 +68,7 @@ Expr Binder::bound(const Call& call, const Expr& e) const {
   return call_image(call.name, call.type, call.args, symbol);
 }
 
-// A Func owns its definitions and its wrappers, which must not own it in turn.
+// A Func owns its definitions and its wrappers, so they must not own it.
 bool Binder::owns_me(const FuncContents& callee) const {
   if (&callee == f_.get()) return true;
   return std::ranges::any_of(callee.wrappers, [&](const auto& w) { return w.second == f_; });

@@ -1,9 +1,9 @@
 // define.cpp -- the rules for definitions.
 //
 // Checks of every definition, in this order: number of arguments, defined expressions, types, free
-// variables; for pure definitions that the arguments are distinct Vars; for updates that all
-// reduction variables are of one domain, that the Func is not frozen, and that a pure variable
-// keeps its place in every reference of the Func to itself.
+// variables. For pure definitions, the arguments must be distinct Vars. For updates, all reduction
+// variables must come from one domain, the Func must not be frozen, and a pure variable must keep
+// its position in every reference of the Func to itself.
 #include "graph/define.h"
 
 #include <algorithm>
@@ -28,7 +28,7 @@ std::string list(const std::vector<Expr>& exprs) {
   return "(" + listed(exprs, [](const Expr& e) { return text(e); }) + ")";
 }
 
-// What is being defined, for messages: "define "f"(x, r.x)".
+// The definition in question as messages show it: "define "f"(x, r.x)".
 struct Site {
   const FuncContents& f;
   std::string asked;
@@ -62,7 +62,8 @@ bool mentions_undef(const Expr& root) {
   return any_node(root, [](const Expr& e) { return is_undef(e); });
 }
 
-// Undef means that nothing is stored, which says nothing of where. `exprs`: of either side.
+// An undef value means that nothing is stored; an undef coordinate has no meaning. `exprs`: all
+// expressions of both sides.
 void check_coordinates(const Site& site, const std::vector<Expr>& args,
                        const std::vector<Expr>& exprs) {
   const auto refuse = [&](const Expr& coordinate, const std::string& where) {
@@ -82,7 +83,7 @@ void check_coordinates(const Site& site, const std::vector<Expr>& args,
   }
 }
 
-// `exprs`: as they were written, of either side.
+// `exprs`: all expressions of both sides, as the user wrote them.
 void check_constants(const Site& site, const std::vector<Expr>& exprs) {
   for (const Expr& root : exprs) {
     const Expr part = overflowing_part(root);
@@ -109,7 +110,7 @@ void check_types(const Site& site, const std::vector<Expr>& values, const std::v
   }
 }
 
-// Everything in the definition that is a name: each variable once, lets inside excluded.
+// The names in a definition: each free variable once, without names bound by lets.
 struct Names {
   std::vector<const Variable*> free;
   std::vector<const Call*> self_calls;
@@ -142,13 +143,14 @@ Names names_in(const FuncContents& f, const std::vector<Expr>& roots) {
   return names;
 }
 
-// Plain Vars only: a parameter or reduction variable carries a symbol.
+// A plain Var, as opposed to a parameter or reduction variable, which carry a symbol.
 const Variable* as_plain_var(const Expr& e) {
   const Variable* v = e.as<Variable>();
   return v && !v->symbol.defined() && v->type == Int(32) ? v : nullptr;
 }
 
-// The reduction domain of a definition, null when it has none. `result`: known already.
+// The reduction domain of a definition, null when it has none. `result`: the domain, if already
+// known.
 DomainPtr domain_in(const Site& site, const Names& names, DomainPtr result = nullptr) {
   for (const Variable* v : names.free) {
     auto domain = domain_of(*v);
@@ -262,7 +264,7 @@ void check_update_arity(const Site& site, const std::vector<Expr>& args) {
              "Give as many arguments");
 }
 
-// Coordinates of the left-hand side as int32.
+// The coordinates of the left-hand side as int32.
 std::vector<Expr> update_coordinates(const Site& site, const std::vector<Expr>& args) {
   std::vector<Expr> result;
   for (const Expr& arg : args) {
@@ -275,8 +277,8 @@ std::vector<Expr> update_coordinates(const Site& site, const std::vector<Expr>& 
   return result;
 }
 
-// Dimensions in which the left-hand side is the pure variable itself: those are done independently
-// of each other.
+// Dimensions in which the left-hand side is the pure variable itself; their iterations are
+// independent.
 std::vector<std::string> pure_positions(const FuncContents& f, const std::vector<Expr>& args) {
   std::vector<std::string> result(args.size());
   for (size_t i = 0; i < args.size(); i++) {
@@ -303,8 +305,8 @@ void check_self_calls(const Site& site, const Names& names, const std::vector<st
   }
 }
 
-// The domain as an update of f may own it: one with a predicate that reads f would own f in turn,
-// so that neither ever went away. Then a copy that does not.
+// The domain in a form that an update of f may own. If its predicate reads f, ownership would be
+// cyclic and leak both; such a domain is copied with weak references to f.
 DomainPtr domain_for(const FuncPtr& f, const DomainPtr& domain) {
   if (!domain->predicate.defined()) return domain;
   const Expr released = redirect_calls(domain->predicate, f, f, true);
@@ -365,7 +367,7 @@ void make_outputs(FuncContents& f) {
 
 namespace {
 
-// Why an expression has no single value in a call; empty when it has.
+// Why an expression has no single value in a call; empty when it has one.
 std::string varying_part(const Expr& root) {
   std::string part;
   walk(root, [&](const Expr& e) {
@@ -444,8 +446,8 @@ void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vec
   f->version++;
 }
 
-// The domain is that of the expressions as they were written; all else is asked of what is left of
-// them after folding.
+// The domain comes from the expressions as written; all other checks apply to the folded
+// expressions.
 void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
                    const std::vector<Expr>& raw_values, const DomainPtr& given) {
   const Site site = site_of(*f, raw_args, true);
@@ -473,7 +475,7 @@ void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
   if (domain && domain->predicate.defined()) exprs.push_back(domain->predicate);
   check_coordinates(site, args, exprs);
   const Names names = names_in(*f, exprs);
-  domain_in(site, names, domain);  // the predicate may bring in another one
+  domain_in(site, names, domain);  // the predicate may mention another domain
   if (domain) check_bounds(site, f, *domain);
   const std::vector<std::string> pure = pure_positions(*f, args);
   check_free_variables(site, names, pure);

@@ -1,4 +1,4 @@
-// Arguments are read as expressions: names and enumerators are variables to that parser.
+// Arguments are parsed as expressions, in which names and enumerators appear as variables.
 #include "graph/directive_text.h"
 
 #include "diagnostics/error.h"

@@ -6,7 +6,7 @@ namespace retrograde::graph {
 
 namespace {
 
-// The schedule that a directive changes; every one on the way to it counts as scheduled.
+// The schedule that a directive changes; it and every schedule around it count as scheduled.
 StageLoops& touch(const SchedulePlace& place) {
   StageLoops* result = &place.f->stage(place.stage).schedule;
   result->is_given = true;
@@ -17,16 +17,16 @@ StageLoops& touch(const SchedulePlace& place) {
   return *result;
 }
 
-// ---- levels, which may be set after they were given ----
+// ---- levels of LoopLevel objects, which may be set later ----
 
 using LevelSource = std::shared_ptr<LoopLevelContents> FuncPlacement::*;
 
-// Where the schedule of the Func keeps the object behind a level.
+// The member of the schedule that holds the object behind a level.
 LevelSource source_of(const ComputeAt&) { return &FuncPlacement::compute_from; }
 LevelSource source_of(const StoreAt&) { return &FuncPlacement::store_from; }
 LevelSource source_of(const HoistStorage&) { return &FuncPlacement::hoist_from; }
 
-// What the object says later, the schedule says, unless it was given another level since.
+// Setting the object later updates the schedule, unless it has another level by then.
 template <typename D>
 void give_level(D at, const FuncPtr& f) {
   const LevelSource source = source_of(at);
@@ -42,7 +42,7 @@ void give_level(D at, const FuncPtr& f) {
   });
 }
 
-// As long as the object is not set, the stage joins no loop of any Func.
+// Until the object is set, the stage is not fused with any loop.
 void give_level(ComputeWith with, const SchedulePlace& place) {
   if (!with.from->defined) {
     const auto object = reinterpret_cast<uintptr_t>(with.from.get());

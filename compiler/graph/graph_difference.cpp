@@ -6,7 +6,7 @@ namespace retrograde::graph {
 
 std::string difference(const Graph& a, const Graph& b) {
   const std::vector<Line> as = lines_of(to_text(a)), bs = lines_of(to_text(b));
-  std::string entity, part;  // that the line belongs to
+  std::string entity, part;  // the entity and part that contain the line
   for (size_t i = 0; i < as.size() || i < bs.size(); ++i) {
     const std::string in_a = i < as.size() ? as[i].whole : "nothing";
     const std::string in_b = i < bs.size() ? bs[i].whole : "nothing";

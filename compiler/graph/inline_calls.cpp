@@ -43,7 +43,7 @@ Expr inline_calls(const Expr& e, const FuncContents& inlined) {
 void inline_into(const SchedulePlace& place, const std::vector<FuncPtr>& inlined) {
   FuncContents& f = *place.f;
   for (const FuncPtr& g : inlined) check(f, *g);
-  // Consumers first: what they call is then called here.
+  // Consumers first, because inlining them adds calls of their producers.
   std::vector<FuncPtr> order = topological_order(inlined);
   std::erase_if(order,
                 [&](const FuncPtr& g) { return std::ranges::find(inlined, g) == inlined.end(); });

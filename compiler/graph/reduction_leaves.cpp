@@ -46,7 +46,8 @@ class LeafFinder {
     const Expr offset = outer.value() * factor + inner.value();
     const auto extent = as_const_int(leaf.extent), step = as_const_int(factor);
     const bool divides = extent && step && *extent % *step == 0;
-    // Where the outer variable becomes a pure one its schedule may run it past both ends.
+    // The condition has both ends: if the outer variable becomes pure, its schedule may overrun
+    // either one.
     if (!divides) leaves_.tails.push_back(offset >= 0 && offset < leaf.extent);
     // The tail's condition holds wherever the variable is used.
     const Expr inside =

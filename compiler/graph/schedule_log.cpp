@@ -26,7 +26,8 @@ namespace graph {
 
 namespace {
 
-// The one of these that is meant: itself, or the only one with other numbers; null: there is none.
+// The element with this name, or the only one whose name differs just by numbers; null when there
+// is none.
 template <typename Range, typename NameOf>
 auto meant(const Range& all, const std::string& name, const NameOf& name_of)
     -> decltype(&*all.begin()) {
@@ -41,7 +42,7 @@ auto meant(const Range& all, const std::string& name, const NameOf& name_of)
   return count == 1 ? found : nullptr;
 }
 
-// Those that the process put into it, in the order in which it made names.
+// The numbers that make the name unique, in order.
 std::vector<uint64_t> numbers_of(const std::string& name) {
   std::vector<uint64_t> numbers;
   for (size_t at = name.find('$'); at != std::string::npos; at = name.find('$', at + 1))
@@ -49,13 +50,14 @@ std::vector<uint64_t> numbers_of(const std::string& name) {
   return numbers;
 }
 
-// Names by what they are without numbers, those that differ by these alone in their order.
+// Groups names by their text without numbers; within a group, orders them by their numbers.
 class NameGroups {
  public:
   void add(const std::string& name) {
     groups_[without_numbers(name)].emplace(numbers_of(name), name);
   }
-  // Of `others`, the one that stands where `name` stands here; null unless there are as many.
+  // The name in `others` at the same position in its group; null unless the groups have equal
+  // sizes.
   const std::string* same_place(const std::string& name, const NameGroups& others) const {
     const std::string plain = without_numbers(name);
     const auto mine = groups_.find(plain), theirs = others.groups_.find(plain);
@@ -125,7 +127,7 @@ class Replay {
  private:
   static constexpr const char* asked = "apply a schedule log";
 
-  // 1. It is given to a stage, or to a Func, as it must be. 2. That stage is there.
+  // 1. A stage directive applies to a stage, a Func directive to a Func. 2. That stage exists.
   static void check(const SchedulePlace& place, const ScheduleLog::Entry& entry) {
     const bool fits = is_of_stage(entry.directive)
                           ? entry.stage >= 0 && entry.stage < place.f->stage_count()
@@ -147,7 +149,7 @@ class Replay {
     made_[name] = names_.funcs[name] = names_.funcs[f->name] = f;
   }
 
-  // A loop that has the name of one that it is made of keeps that name here.
+  // If a new loop reuses the name of the loop that it derives from, it does so here too.
   static void keep_names(const SchedulePlace& place, Directive& directive) {
     const auto keep = [&](std::string& made, const std::string& old) {
       if (made == old) made = loop(place, old);
@@ -169,7 +171,7 @@ class Replay {
       return names_.funcs.at(*same);
     if (const auto* found = meant(names_.funcs, name, [](const auto& f) { return f.first; }))
       return found->second;
-    // What reads an image, where nobody has asked for it yet.
+    // The Func that reads an image, created at its first mention.
     for (const auto& [image, contents] : names_.parameters) {
       if (contents->is_buffer && image + "_im" == without_numbers(name))
         return names_.funcs[name] = func_of_image(contents);
@@ -192,7 +194,7 @@ class Replay {
                text("none is called ", quoted(name)),
                "Apply it to the program that it was taken from, or cut what is said of that image");
   }
-  // What is prefetched need not be of the program.
+  // The source of a prefetch need not belong to the program.
   NamedFunc func_or_image(const std::string& name) {
     if (const ParameterPtr found = image(name)) return found->name;
     const FuncPtr found = func_or_none(name);
@@ -209,7 +211,7 @@ class Replay {
     return loop_of(mapped(place.schedule().dims, &Dim::var), name);
   }
   void find(LoopLevel& level) {
-    // What is said of a level that is not there is said when the pipeline is compiled.
+    // A level that does not exist is reported when the pipeline is compiled.
     const FuncPtr f = level.kind == LoopLevel::Kind::At ? func_or_none(level.func) : nullptr;
     if (!f) return;
     level.func = f->name;
@@ -220,7 +222,7 @@ class Replay {
     level.var = loop_of(loops, level.var);
   }
 
-  // Parameters that only the schedule reads are the log's own; from text they are new.
+  // Parameters that only the schedule reads belong to the log; those parsed from text are new.
   void note_parameters(const Expr& e) {
     if (!e.defined()) return;
     walk(e, [&](const Variable& v) {
@@ -290,7 +292,7 @@ namespace {
 
 using namespace graph;
 
-// blur.update(0).specialization(1).
+// The prefix "blur.update(0).specialization(1)."
 std::string place_text(const ScheduleLog::Entry& entry) {
   std::string out = quote_name(entry.func) + ".";
   if (entry.stage > 0) out += text("update(", entry.stage - 1, ").");
@@ -298,7 +300,7 @@ std::string place_text(const ScheduleLog::Entry& entry) {
   return out;
 }
 
-// Takes "word(7)." off the beginning.
+// Consumes "word(7)." at the beginning.
 bool take(std::string& rest, const std::string& word, int& number) {
   if (rest.rfind(word + "(", 0) != 0) return false;
   const size_t begin = word.size() + 1, end = rest.find(").", begin);
@@ -379,7 +381,7 @@ bool is_below(const ScheduleLog::Entry& entry, const ScheduleLog::Entry& place) 
          std::equal(place.special.begin(), place.special.end(), entry.special.begin());
 }
 
-// What becomes of loops whose directive goes: the loop that was there before, or none ("").
+// Maps each loop that a removed directive creates to the loop that it replaced, or to none ("").
 std::map<std::string, std::string> loops_without(const Directive& directive) {
   std::map<std::string, std::string> loops;
   if (const auto* split = std::get_if<SplitLoop>(&directive)) {
@@ -393,7 +395,7 @@ std::map<std::string, std::string> loops_without(const Directive& directive) {
   return loops;
 }
 
-// Whether all that it names is still there.
+// Returns whether everything that the directive names still exists.
 bool rename_loops(Directive& directive, const ScheduleLog::Entry& gone, bool is_stage,
                   const std::map<std::string, std::string>& loops) {
   bool is_whole = true;
@@ -426,7 +428,7 @@ ScheduleLog ScheduleLog::without(size_t index) const {
   const std::string made = made_by(gone.directive);
   const bool is_factored = std::holds_alternative<FactorOut>(gone.directive);
   const auto loops = loops_without(gone.directive);
-  int special = -1;  // the number of the specialization that goes
+  int special = -1;  // the index of the removed specialization
   if (std::holds_alternative<Specialize>(gone.directive)) {
     special = static_cast<int>(std::ranges::count_if(log.entries, [&](auto& e) {
       return e.directive.index() == gone.directive.index() && e.func == gone.func &&

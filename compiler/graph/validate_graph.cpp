@@ -1,4 +1,4 @@
-// The rules of the algorithm IR, each with its name, checked Func by Func.
+// Checks the rules of the algorithm IR, each of which has a name, Func by Func.
 #include <algorithm>
 #include <unordered_set>
 
@@ -92,7 +92,7 @@ class GraphValidator {
     }
   }
 
-  // Every variable is bound by its definition or a let, or stands for a parameter or a fact.
+  // Every variable is bound by its definition or a let, or is a parameter or buffer metadata.
   void check_names(const FuncContents& f, const Expr& root,
                    std::unordered_set<std::string> bound) const {
     walk(root, [&](const Let& let) { bound.insert(let.name); });
@@ -124,7 +124,7 @@ class GraphValidator {
             "a call has the type of the value that it reads", e);
   }
 
-  // A schedule's loops are what its directives make of the first ones.
+  // A schedule's loops are the result of its directives on the first loops.
   void check(const FuncContents& f, const StageLoops& schedule,
              const std::vector<Dim>& first) const {
     StageLoops built;
