@@ -1,5 +1,5 @@
-// Sums are taken apart into linear form first, so that a variable that occurs twice counts once;
-// each atom of the sum then has its own rule below. What does not vary stands for itself.
+// Sums are decomposed into linear form first, so that a variable that occurs twice counts once.
+// Each atom of the sum has its own rule below. An expression that does not vary is its own bound.
 #include "analysis/bounds_engine.h"
 
 #include <algorithm>
@@ -61,7 +61,7 @@ Interval BoundsEngine::compute(const Expr& e) {
   return is_atom ? bounds_of_atom(e) : sum_bounds(form);
 }
 
-// What linear_form called an atom is never taken apart again, so the recursion always descends.
+// Atoms of linear_form are never decomposed again, so the recursion always descends.
 Interval BoundsEngine::bounds_of_atom(const Expr& atom) {
   return atoms_.get(atom, [&] { return atom_bounds(atom); });
 }
@@ -82,8 +82,9 @@ Interval BoundsEngine::sum_bounds(const Sum& form) {
   return apart ? *apart : sum_of_bounds(form);
 }
 
-// What varies of a sum, with its sign; of minima and maxima, too, what is in either side, and what is divided, of which
-// a remainder may be left. Minima share their sides: the first few are enough.
+// Collects the varying atoms of a sum with their signs. It looks into both sides of minima and
+// maxima, and into dividends, of which a remainder may be left. Nested minima repeat their sides,
+// so the number is limited.
 void BoundsEngine::collect_varying(const Sum& form, bool negated,
                                    std::vector<std::pair<Expr, bool>>& found) {
   for (const Term& term : form.terms) {
@@ -102,7 +103,7 @@ void BoundsEngine::collect_varying(const Sum& form, bool negated,
   }
 }
 
-// Whether something that varies is in both, and less of it in their sum.
+// Whether both contain a varying atom that partly cancels in their sum.
 bool BoundsEngine::shares_varying(const Sum& rest, const Sum& side, int64_t factor) {
   std::vector<std::pair<Expr, bool>> of_rest, of_side;
   collect_varying(side, factor < 0, of_side);
@@ -115,8 +116,9 @@ bool BoundsEngine::shares_varying(const Sum& rest, const Sum& side, int64_t fact
   });
 }
 
-// 16*x + 8*min(d - 2*x, 1)  is  min(8*d, 16*x + 8): ends of x and of the minimum apart would add up
-// to more. The same of max. Each step takes one of them away; a few steps, since each doubles the work.
+// 16*x + 8*min(d - 2*x, 1)  is  min(8*d, 16*x + 8): bounding x and the minimum separately would be
+// too wide. The same holds for max. Each step removes one minimum or maximum, and doubles the work,
+// so the number of steps is limited.
 std::optional<Interval> BoundsEngine::bounds_by_sides(const Sum& form) {
   for (const Term& term : form.terms) {
     const Expr& atom = term.atom;
@@ -136,8 +138,8 @@ std::optional<Interval> BoundsEngine::bounds_by_sides(const Sum& form) {
   return std::nullopt;
 }
 
-// Where x + y <= 29 is known, x + y + z lies below 29 + z. The ends of x and y apart, 29 - y and
-// 29 - x, would add up to more than that as soon as the loops over x and y are looked at.
+// If x + y <= 29 is known, x + y + z is at most 29 + z. The separate ends of x and y, 29 - y and 29
+// - x, would give a wider range once the loops over x and y are eliminated.
 std::optional<Interval> BoundsEngine::bounds_by_facts(const Sum& form) {
   std::optional<Interval> result;
   for (const Sum& fact : facts_) {
@@ -155,7 +157,7 @@ std::optional<Interval> BoundsEngine::bounds_by_facts(const Sum& form) {
   return result;
 }
 
-// Every end adds up on its own; the part that does not vary goes into both.
+// Adds the ends term by term; the part that does not vary is added to both.
 Interval BoundsEngine::sum_of_bounds(const Sum& form) {
   Sum fixed = linear_sum(form.type, form.constant);
   std::vector<std::pair<Interval, int64_t>> varying;
@@ -176,7 +178,7 @@ Interval BoundsEngine::sum_of_bounds(const Sum& form) {
     return to_expr(sum);
   };
   Interval result{end(false), end(true)};
-  // One handle for both ends where they are equal, so that is_point() holds.
+  // Equal ends share one handle, so that is_point() holds.
   if (result.is_bounded() && constant_difference(result.min, result.max) == 0)
     result.max = result.min;
   return result;
@@ -190,9 +192,9 @@ Expr canonical_cut(Kind kind, const Expr& a, const Expr& b) {
 
 }  // namespace
 
-// c*y - c*k*(y / k)  is  c*(y % k): two correlated terms become one. So do those of a part of y that
-// varies:  a + k*((b - a) / k), where the last of tiles begins, is  b - (b - a) % k, whatever a is.
-// And the difference of two clamps of one value becomes one clamp.
+// Joins correlated terms. c*y - c*k*(y / k)  is  c*(y % k). The same holds for a varying part of y:
+// a + k*((b - a) / k), the start of the last tile, is  b - (b - a) % k  for any a. The difference
+// of two clamps of one value becomes one clamp.
 Sum BoundsEngine::joined(Sum form) {
   for (const Term& term : std::vector<Term>(form.terms)) {
     const Div* div = term.atom.as<Div>();
@@ -241,7 +243,7 @@ Interval BoundsEngine::atom_bounds(const Expr& e) {
       [&](const ExprNode& n) { return type_range(n.type); });
 }
 
-// int(abs(a)): ends of the unsigned value in between say nothing of the sign when they are symbols.
+// For int(abs(a)), symbolic ends of the unsigned value in between do not determine the sign.
 Interval BoundsEngine::cast_bounds(Type type, const Expr& value) {
   const auto* call = value.as<Call>();
   if (call && call->is_op(Op::abs, Op::absd) && call->args[0].type() == type && type.is_int()) {
@@ -253,7 +255,8 @@ Interval BoundsEngine::cast_bounds(Type type, const Expr& value) {
   if (!value.type().is_float() || v.min.defined() || !is_nonnegative_or_nan(value))
     return interval_cast(type, value.type(), v);
   if (v.max.defined()) return interval_cast(type, value.type(), {make_zero(value.type()), v.max});
-  // Where it may be NaN, too, the integer is kept from being negative (lower/nests/strict_indices.h).
+  // Where it may be NaN too, the integer is kept from being negative
+  // (lower/nests/strict_indices.h).
   Interval result = type_range(type);
   if (has_linear_form(type)) result.min = make_zero(type);
   return result;
@@ -343,7 +346,7 @@ BoundsEngine::Truth BoundsEngine::compare_truth(Kind kind, const Expr& a, const 
     if (low && high && *low == 0 && *high == 0) return Truth::True;
     return (low && *low > 0) || (high && *high < 0) ? Truth::False : Truth::Unknown;
   }
-  int64_t limit = kind == Kind::LT ? -1 : 0;  // holds while a - b <= limit
+  int64_t limit = kind == Kind::LT ? -1 : 0;  // the comparison means a - b <= limit
   if (high && *high <= limit) return Truth::True;
   return low && *low > limit ? Truth::False : Truth::Unknown;
 }
@@ -380,7 +383,7 @@ void BoundsEngine::narrow(const Expr& condition, bool is_true, Narrowed& narrowe
   if (!op) return;
   Kind kind = condition.kind();
   if (kind == Kind::And || kind == Kind::Or) {
-    if (is_true != (kind == Kind::And)) return;  // "one of both" says nothing about either
+    if (is_true != (kind == Kind::And)) return;  // a disjunction implies neither operand
     narrow(op->a, is_true, narrowed);
     narrow(op->b, is_true, narrowed);
   } else if (is_true) {
@@ -466,7 +469,7 @@ Interval BoundsEngine::value_of_func(const Call& call) {
   return it == shared_->values->end() ? type_range(call.type) : it->second;
 }
 
-// Operands that may be NaN, or infinite where that makes a NaN, leave everything open.
+// If an operand may be NaN, or infinite where that gives NaN, the value is unbounded.
 Interval BoundsEngine::bounds_within(const Call& call, const OpInfo& info) {
   if (info.real.nan == Nan::NanOutside) return Interval::everything();
   for (const Expr& arg : call.args) {
@@ -481,7 +484,7 @@ Interval BoundsEngine::bounds_within(const Call& call, const OpInfo& info) {
   return {end(info.values.low), end(info.values.high)};
 }
 
-// A function that rises and has a value at the lower end has one above it.
+// For an increasing function with a value at the lower end, all values are above that one.
 Interval BoundsEngine::bounds_at_ends(const Call& call, const OpInfo& info) {
   const Interval v = bounds(call.args[0]);
   if (info.real.nan == Nan::NanOutside) {

@@ -1,11 +1,12 @@
-// Names of index values: what they stand for, where that says more than the name does.
+// Replaces names of index values by their definitions where that simplifies.
 //
-//   let m = t*64 - q in  .. x + t*64 - m ..    =>    x + q          (what cancels)
-//   if (s == 1) { .. i*s .. }                  =>    i              (what a branch knows)
+//   let m = t*64 - q in  .. x + t*64 - m ..    =>    x + q          (terms cancel)
+//   if (s == 1) { .. i*s .. }                  =>    i              (the branch determines s)
 //
-// Lets keep the text of bounds small, so names are opened only where that makes no more terms. What
-// a branch knows of a value goes into what lets outside of it derive from that. Loop variables, and
-// what depends on them, keep their names in branches: lanes of `if (x == 3) f[x]` stay a vector.
+// Lets keep the text of bounds small, so a name is expanded only if the number of terms does not
+// grow. A value that a branch determines is propagated into lets outside of the branch that derive
+// from it. Loop variables, and values derived from them, keep their names in branches: lanes of `if
+// (x == 3) f[x]` stay a vector.
 #include <algorithm>
 
 #include "ir/build.h"
@@ -16,10 +17,10 @@ namespace retrograde::simplification {
 
 namespace {
 
-// Larger sums stay behind their names.
+// Names of larger sums are not expanded.
 constexpr size_t max_opened_terms = 8;
 
-// Whether the value is the same wherever its name is in scope, and may be computed again there.
+// Whether the value is the same wherever its name is in scope, and may be recomputed there.
 bool is_steady(const Expr& value) {
   return !any_node(value, [](const Expr& node) {
     const auto* call = node.as<Call>();
@@ -46,8 +47,7 @@ std::optional<Sum> Simplifier::find_meaning(const Expr& atom) {
   return opened;
 }
 
-// What a name stands for, in terms of those that have no such meaning; null when it has none
-// itself.
+// The definition of a name in terms of names without one; null when the name has none.
 const Sum* Simplifier::meaning(const Expr& atom) {
   const auto* variable = atom.as<Variable>();
   if (!variable || !is_index_type(atom.type()) || atom.type().is_vector()) return nullptr;
@@ -59,7 +59,7 @@ const Sum* Simplifier::meaning(const Expr& atom) {
   return found->second ? &*found->second : nullptr;
 }
 
-// Opens one name where fewer terms remain, or two of which something cancels.
+// Expands one name if fewer terms remain, or two names if some of their terms cancel.
 bool Simplifier::cancel_names(Sum& sum) {
   if (!is_index_type(sum.type) || sum.type.is_vector() || sum.terms.size() < 2) return false;
   const auto named = filtered(sum.terms, [&](const Term& term) { return meaning(term.atom); });
@@ -86,14 +86,14 @@ bool Simplifier::cancel_names(Sum& sum) {
   return false;
 }
 
-// The number that a name is where a branch has decided it.
+// The constant that an enclosing branch determines for the name; undefined when there is none.
 Expr Simplifier::number_of(const Expr& variable) {
   if (known_numbers_ == 0) return {};
   const Sum* sum = meaning(variable);
   return sum && sum->is_constant() ? make_const(variable.type(), sum->constant) : Expr();
 }
 
-// ---- what branches know ----
+// ---- values that branches determine ----
 
 namespace {
 

@@ -1,5 +1,6 @@
-// Division and modulus by a constant c > 1. Terms that c divides leave the quotient; the rest
-// shrinks by common factors, is decided by its range, or merges with an inner division.
+// Division and modulus by a constant c > 1. Terms that c divides move out of the quotient. The
+// remaining ones are reduced by common factors, decided by their range, or merged with an inner
+// division.
 #include <numeric>
 
 #include "ir/build.h"
@@ -57,8 +58,8 @@ Expr Simplifier::div_by(const Expr& a, int64_t c) {
   return rebuild(plus(split.whole, rest), Kind::Div, a, constant(a, c));
 }
 
-// The multiple of c at or below x, when the lower end of a variable in x gives it: of x between
-// 8 k + 2 and 8 k + 7, that is 8 k.
+// The multiple of c at or below x, if the lower end of a variable in x determines it. For x between
+// 8 k + 2 and 8 k + 7 it is 8 k.
 std::optional<Sum> Simplifier::multiple_below(const Sum& x, int64_t c) {
   for (const Term& term : x.terms) {
     const auto* variable = term.atom.as<Variable>();
@@ -78,7 +79,7 @@ std::optional<Sum> Simplifier::multiple_below(const Sum& x, int64_t c) {
   return std::nullopt;
 }
 
-// rest / c, where no term is divisible and the constant lies in [0, c).
+// rest / c, where c divides no term and the constant lies in [0, c).
 Expr Simplifier::div_atom(const Sum& rest, int64_t c) {
   const auto as_constant = [&](int64_t value) { return make_const(rest.type, value); };
   if (rest.is_constant()) return as_constant(0);
@@ -166,7 +167,7 @@ Expr Simplifier::mod_by(const Expr& a, int64_t c) {
   return binary(Kind::Mod, to_expr(rest), constant(a, c));
 }
 
-// A ramp whose stride c divides is divided lane by lane; one that stays inside a multiple of c
+// A ramp whose stride c divides is divided lane by lane; one that stays between two multiples of c
 // gives one quotient.
 Expr Simplifier::div_vector(const Ramp& a, int64_t c) {
   const std::optional<int64_t> stride = as_const_int(a.stride);

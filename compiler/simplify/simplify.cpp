@@ -22,8 +22,7 @@ bool can_prove(const Expr& condition, const BoundsMap& bounds) {
   return is_const_true(simplify(condition, bounds));
 }
 
-// An end of a variable's bounds may mention another variable only when that one's bounds come
-// first.
+// Orders variables so that the bounds of each mention only earlier ones.
 Simplifier::Simplifier(const BoundsMap& bounds) {
   std::unordered_set<std::string> done;
   const std::function<void(const std::string&)> bind = [&](const std::string& name) {
@@ -83,7 +82,7 @@ Expr Simplifier::node(const Expr& e) {
 
 Expr Simplifier::apply(Kind kind, const Expr& a, const Expr& b) {
   if (Expr splat = distribute_broadcast(kind, a, b); splat.defined()) return splat;
-  if (++depth_ > 60) {  // rules must not run away on rules' results
+  if (++depth_ > 60) {  // limits the recursion of rules on the results of rules
     --depth_;
     return binary(kind, a, b);
   }
@@ -141,7 +140,7 @@ Expr Simplifier::constant(const Expr& like, int64_t value) const {
 Simplifier::Binding::Binding(Simplifier& owner, const std::string& name, const Expr& min,
                              const Expr& max, const Expr& replacement)
     : owner_(owner), name_(name) {
-  // What was found for a name of another scope does not hold for this one.
+  // Results for the same name in another scope do not hold here.
   if (!owner.seen_names_.insert(name).second) {
     owner.forget();
     owner.meanings_.erase(name);
