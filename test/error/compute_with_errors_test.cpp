@@ -1,4 +1,4 @@
-// Stages that cannot share loops are refused before anything is lowered, by messages that say why.
+// Illegal uses of compute_with are rejected before lowering, with messages that give the reason.
 #include <gtest/gtest.h>
 
 #include "retrograde/retrograde.h"

@@ -1,4 +1,4 @@
-// define_extern: one test for each message of its own, by kind and key phrase.
+// define_extern: one test for each of its messages, by kind and key phrase.
 #include <gtest/gtest.h>
 
 #include "retrograde/retrograde.h"

@@ -273,7 +273,7 @@ TEST(DefinitionErrors, RecurrenceWithoutFirstValue) {
 }
 
 TEST(DefinitionErrors, RecursionAmongFuncs) {
-  // Cannot be written with Funcs; contents put together by hand are checked too.
+  // Cannot be written with Funcs; contents assembled by hand are checked too.
   Var x("x");
   Func a("circle_a"), b("circle_b");
   a(x) = x;
@@ -521,7 +521,7 @@ TEST(BufferErrors, Sizes) {
                [] { Buffer<double> b(1 << 30, 1 << 30); });
 }
 
-// Dimension 2 would begin 2^31 elements on, which int32 takes for a negative number.
+// Dimension 2 would begin at element 2^31, which is negative as an int32.
 TEST(BufferErrors, StridesThatOverflow) {
   const int n = 1 << 16, half = 1 << 15;
   static uint8_t memory[4];  // never touched
@@ -540,7 +540,7 @@ TEST(BufferErrors, StridesThatOverflow) {
                [&] { Buffer<uint8_t>::make_interleaved(memory, n, 3, half); });
   expect_error({"strides must fit 31 bits"},
                [&] { Buffer<>::make_interleaved(UInt(8), n, 3, half); });
-  // All elements are one: its shape is, and a dense Buffer of it would not be.
+  // All strides are 0 here: the shape is legal, but a dense Buffer of it would not be.
   const halide_dimension_t shape[] = {{0, n, 0}, {0, half, 0}, {0, 2, 0}};
   Buffer<uint8_t> same(memory, 3, shape);
   expect_error(words, [&] { Buffer<float>::make_with_shape_of(same); });
@@ -641,7 +641,7 @@ TEST(PipelineErrors, Outputs) {
   expect_error({"needs a definition"}, [] { Func("undefined_output").realize({3}); });
 }
 
-// ---- arguments of calls: found before anything is compiled ----
+// ---- arguments of calls: checked before compilation ----
 
 TEST(CallArguments, Sizes) {
   Setting s;

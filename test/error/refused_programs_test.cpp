@@ -1,5 +1,5 @@
-// Programs that mean nothing, or not what they say: each is refused with all four parts of a
-// message.
+// Programs without a meaning, or that do not mean what they say: each is rejected by a message with
+// all four parts.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -50,7 +50,7 @@ TEST_F(Refused, LerpOfConstantsOfDifferentTypes) {
   EXPECT_EQ(lerp(1.0, f32, 0.5f).type(), Float(32));
 }
 
-// A call that C++20's lerp of doubles would take, too.
+// A call that also matches C++20's std::lerp of doubles.
 TEST_F(Refused, LerpOfNumbersIsTheLanguagesOwn) {
   const Expr whole = lerp(42, 69, 0.25f);
   EXPECT_EQ(whole.type(), Int(32));
@@ -164,7 +164,7 @@ TEST_F(Refused, ConstantsThatOverflow) {
     f(x) = 0;
     f(large * 16) += 1;
   });
-  // Elsewhere there is room, or arithmetic wraps around.
+  // In a wider type there is room, and unsigned arithmetic wraps around.
   EXPECT_EQ(define(cast<int64_t>(large) * Expr(0x76543210)), halide_type_of<int64_t>());
   EXPECT_EQ(define(cast<uint32_t>(large) * cast<uint32_t>(0x76543210)), halide_type_of<uint32_t>());
   EXPECT_EQ(define(cast<int16_t>(32767) + cast<int16_t>(1)), halide_type_of<int16_t>());
@@ -269,7 +269,7 @@ TEST_F(Refused, LoopsThatRaceWhenTheyAreOne) {
   expect_error({"where \"x\" runs on a GPU"},
                [&] { update([&](Stage s) { s.gpu_blocks(x).fuse(r, x, t); }); });
   expect_error(parallel, [&] { update([&](Stage s) { s.parallel(x).fuse(r, x, t).serial(t); }); });
-  // Pure loops, serial ones, and updates that are atomic are as before.
+  // Pure loops, serial loops and atomic updates are not affected.
   update([&](Stage s) { s.parallel(y).fuse(x, y, Var("t")); });
   update([&](Stage s) { s.fuse(r, x, t).parallel(y); });
   update([&](Stage s) { s.atomic().parallel(x).fuse(r, x, t); });

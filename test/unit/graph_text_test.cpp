@@ -1,5 +1,6 @@
-// The text of graphs: parse_graph(to_text(g)) is g, for programs written for it, for random ones
-// under random schedules, and for gradients (gradient_suite_test); what breaks a rule is named.
+// The text of graphs: parse_graph(to_text(g)) equals g, for programs written for this test, for
+// random ones under random schedules, and for gradients (gradient_suite_test). Violated rules are
+// named.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>

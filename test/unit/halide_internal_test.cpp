@@ -1,5 +1,5 @@
-// What programs written for Halide take from Halide::Internal, and names of its newer releases: each
-// does what it says; and what Halide does not have is not in its namespace.
+// The parts of Halide::Internal that Halide programs use, and names of newer Halide releases, with
+// their effects. Names that Halide does not have must not be in its namespace.
 #include "Halide.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 
 #include "support/errors.h"
 
-// A program's own names, which Halide does not have: no declaration of ours may be in the way.
+// A program's own names, which Halide does not have: no declaration of ours may conflict.
 namespace Halide {
 struct Compression {
   int level = 3;
@@ -289,7 +289,7 @@ TEST(Functions, AnswerWhatFuncsDo) {
   EXPECT_EQ(of_image.function().required_types(), std::vector<Type>{UInt(8)});
 }
 
-// A program that schedules what it did not write.
+// A program that schedules Funcs which it did not write.
 TEST(Functions, LoopsSayWhatTheyAre) {
   Var x("x"), y("y");
   Func f("f");
@@ -417,7 +417,7 @@ TEST(Targets, WithAProcessor) {
 int64_t saturated(int64_t value, int64_t low, int64_t high) {
   return value < low ? low : value > high ? high : value;
 }
-// Shifted to the right, halves up; a negative amount to the left.
+// A right shift that rounds halves up; a negative amount shifts left.
 int64_t rounded_right(int64_t value, int amount) {
   if (amount <= 0) return value << -amount;
   return (value + (int64_t{1} << (amount - 1))) >> amount;

@@ -1,4 +1,4 @@
-// Minima of minima in PTX: see codegen/part_minima.h.
+// Nested minima in PTX: see codegen/part_minima.h.
 #include "codegen/part_minima.h"
 
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 namespace retrograde::codegen {
 namespace {
 
-// A function of these lines, and nothing else.
+// A function that consists of these lines.
 std::string function(const std::string& lines) { return ".entry f()\n{\n" + lines + "}\n"; }
 
 size_t count(const std::string& text, const std::string& part) {
@@ -49,7 +49,7 @@ TEST(PartMinima, EverythingElseIsAsItWas) {
       "\tmin.u32 \t%r5, %r4, %r2;\n\tmin.f32 \t%f2, %f1, %f1;\n\tmin.f32 \t%f3, %f2, %f1;\n"
       "\tmin.s64 \t%rd2, %rd1, %rd1;\n\tmin.s64 \t%rd3, %rd2, %rd1;\n";
   EXPECT_EQ(part_minima(function(clamp)), function(clamp));
-  // Names of registers are those of one function.
+  // Register names are local to a function.
   const std::string two =
       function("\tmin.s32 \t%r2, %r1, 255;\n") + function("\tmin.s32 \t%r3, %r2, 255;\n");
   EXPECT_EQ(part_minima(two), two);

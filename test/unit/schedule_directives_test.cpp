@@ -1,4 +1,4 @@
-// What directives write into schedules, and which uses of them are refused at the call.
+// Effects of directives on schedules, and uses that are rejected immediately.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -210,7 +210,7 @@ TEST_F(Directives, SpecializeFailIsTheLast) {
   f.specialize_fail("no such size");
   expect_refused([&] { f.specialize(n > 2); }, {"last", "before specialize_fail"});
   expect_refused([&] { f.specialize_fail("again"); }, {"last"});
-  f.specialize(n > 1).parallel(y);  // one that is there already
+  f.specialize(n > 1).parallel(y);  // an existing one
   EXPECT_EQ(f.get_schedule().specializations[1].failure, "no such size");
   expect_refused([&] { g.specialize_fail(""); }, {"message"});
 }
@@ -351,7 +351,7 @@ TEST_F(Directives, ExternStagesKeepTheirArguments) {
                Unsupported);
 }
 
-// ---- what is reported ----
+// ---- tracing ----
 
 TEST_F(Directives, TracingIsKept) {
   f.trace_loads().trace_stores().add_trace_tag("one").add_trace_tag("two");
