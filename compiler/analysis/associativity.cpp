@@ -105,7 +105,7 @@ class Prover {
   AssociativityProof proof_;
 
   // Whether the value is unchanged and no other value of its group depends on it.
-  bool is_untouched(const std::vector<int>& group) const {
+  bool is_unchanged(const std::vector<int>& group) const {
     const Variable* v = values_[group[0]].as<Variable>();
     return group.size() == 1 && v && v->name == xs_[group[0]];
   }
@@ -131,7 +131,7 @@ class Prover {
   }
 
   bool prove_group(const std::vector<int>& group) {
-    if (is_untouched(group)) {
+    if (is_unchanged(group)) {
       op_.values[group[0]] = values_[group[0]];
       return true;
     }

@@ -56,7 +56,7 @@ Interval BoundsEngine::compute(const Expr& e) {
   if (!e.type().is_scalar()) return type_range(e.type());
   if (!varies(e)) return Interval::point(canonical(e));
   if (!has_linear_form(e.type())) return atom_bounds(e);
-  Sum form = joined(linear_form(e));
+  Sum form = join_correlated_terms(linear_form(e));
   bool is_atom = form.terms.size() == 1 && form.terms[0].atom.same_as(e);
   return is_atom ? bounds_of_atom(e) : sum_bounds(form);
 }
@@ -78,7 +78,7 @@ Interval BoundsEngine::sum_bounds(const Sum& form) {
   if (!form.valid) return Interval::everything();
   const std::optional<Interval> known = bounds_by_facts(form);
   if (known) return *known;
-  const std::optional<Interval> apart = bounds_by_sides(form);
+  const std::optional<Interval> apart = bounds_by_distribution(form);
   return apart ? *apart : sum_of_bounds(form);
 }
 
@@ -104,7 +104,7 @@ void BoundsEngine::collect_varying(const Sum& form, bool negated,
 }
 
 // Whether both contain a varying atom that partly cancels in their sum.
-bool BoundsEngine::shares_varying(const Sum& rest, const Sum& side, int64_t factor) {
+bool BoundsEngine::may_cancel(const Sum& rest, const Sum& side, int64_t factor) {
   std::vector<std::pair<Expr, bool>> of_rest, of_side;
   collect_varying(side, factor < 0, of_side);
   if (of_side.empty()) return false;
@@ -119,19 +119,19 @@ bool BoundsEngine::shares_varying(const Sum& rest, const Sum& side, int64_t fact
 // 16*x + 8*min(d - 2*x, 1)  is  min(8*d, 16*x + 8): bounding x and the minimum separately would be
 // too wide. The same holds for max. Each step removes one minimum or maximum, and doubles the work,
 // so the number of steps is limited.
-std::optional<Interval> BoundsEngine::bounds_by_sides(const Sum& form) {
+std::optional<Interval> BoundsEngine::bounds_by_distribution(const Sum& form) {
   for (const Term& term : form.terms) {
     const Expr& atom = term.atom;
     if (atom.kind() != Kind::Min && atom.kind() != Kind::Max) continue;
     const auto& op = *atom.as<Binary>();
     const Sum rest = plus(form, linear_form(atom), -term.factor);
     const Sum a = linear_form(op.a), b = linear_form(op.b);
-    if (!rest.valid || !a.valid || !b.valid || sides_taken_ >= most_sides) continue;
-    if (!shares_varying(rest, a, term.factor) && !shares_varying(rest, b, term.factor)) continue;
-    ++sides_taken_;
-    const Interval x = sum_bounds(joined(plus(rest, a, term.factor)));
-    const Interval y = sum_bounds(joined(plus(rest, b, term.factor)));
-    --sides_taken_;
+    if (!rest.valid || !a.valid || !b.valid || distributions_ >= most_distributions) continue;
+    if (!may_cancel(rest, a, term.factor) && !may_cancel(rest, b, term.factor)) continue;
+    ++distributions_;
+    const Interval x = sum_bounds(join_correlated_terms(plus(rest, a, term.factor)));
+    const Interval y = sum_bounds(join_correlated_terms(plus(rest, b, term.factor)));
+    --distributions_;
     const bool is_least = (atom.kind() == Kind::Min) == (term.factor > 0);
     return is_least ? interval_min(x, y) : interval_max(x, y);
   }
@@ -195,7 +195,7 @@ Expr canonical_cut(Kind kind, const Expr& a, const Expr& b) {
 // Joins correlated terms. c*y - c*k*(y / k)  is  c*(y % k). The same holds for a varying part of y:
 // a + k*((b - a) / k), the start of the last tile, is  b - (b - a) % k  for any a. The difference
 // of two clamps of one value becomes one clamp.
-Sum BoundsEngine::joined(Sum form) {
+Sum BoundsEngine::join_correlated_terms(Sum form) {
   for (const Term& term : std::vector<Term>(form.terms)) {
     const Div* div = term.atom.as<Div>();
     auto k = div ? as_const_int(div->b) : std::nullopt;
@@ -331,7 +331,7 @@ BoundsEngine::Truth BoundsEngine::compare_truth(Kind kind, const Expr& a, const 
   if (a.type().is_bool() || !a.type().is_int_or_uint()) return Truth::Unknown;
   std::optional<int64_t> low, high;  // of a - b
   if (has_linear_form(a.type())) {
-    Interval d = sum_bounds(joined(plus(linear_form(a), linear_form(b), -1)));
+    Interval d = sum_bounds(join_correlated_terms(plus(linear_form(a), linear_form(b), -1)));
     low = constant_min(d);
     high = constant_max(d);
   } else if (a.type().bits() < 64) {
@@ -431,7 +431,7 @@ void BoundsEngine::narrow_nonpositive(const Sum& form, Narrowed& narrowed) {
     if (!old) continue;
     ++loose;
     Sum rest = plus(form, linear_form(term.atom), -term.factor);
-    Expr least = sum_bounds(joined(rest)).min;
+    Expr least = sum_bounds(join_correlated_terms(rest)).min;
     if (!least.defined()) continue;
     int64_t c = term.factor;
     Sum limit = linear_form(least);  // c*v + limit <= 0

@@ -53,10 +53,10 @@ class BoundsEngine {
   Interval sum_bounds(const Sum& form);
   Interval sum_of_bounds(const Sum& form);
   std::optional<Interval> bounds_by_facts(const Sum& form);
-  std::optional<Interval> bounds_by_sides(const Sum& form);
+  std::optional<Interval> bounds_by_distribution(const Sum& form);
   void collect_varying(const Sum& form, bool negated, std::vector<std::pair<Expr, bool>>& found);
-  bool shares_varying(const Sum& rest, const Sum& side, int64_t factor);
-  Sum joined(Sum form);
+  bool may_cancel(const Sum& rest, const Sum& side, int64_t factor);
+  Sum join_correlated_terms(Sum form);
   Interval bounds_of_atom(const Expr& atom);
   Interval atom_bounds(const Expr& e);
   Interval cast_bounds(Type type, const Expr& value);
@@ -84,9 +84,9 @@ class BoundsEngine {
   Scope<Interval> scope_;
   BoundsEngine* outer_ = nullptr;  // the engine without the condition
   std::vector<Sum> facts_;         // implied by the condition, each <= 0
-  static constexpr int most_sides = 3;
+  static constexpr int most_distributions = 3;
   static constexpr size_t most_varying = 32;
-  int sides_taken_ = 0;  // nesting depth of bounds_by_sides
+  int distributions_ = 0;  // nesting depth of bounds_by_distribution
   NodeMemo<Interval> memo_;
   NodeMemo<Interval> atoms_;  // for expressions that are not sums
   NodeMemo<bool> varies_;

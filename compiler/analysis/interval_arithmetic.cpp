@@ -324,8 +324,8 @@ Interval float_to_int(Type to, const Interval& v) {
     if (!e.defined()) return {};
     auto value = as_const_float(e);
     if (!value) return has_linear_form(to) ? cast_to(to, e) : Expr();
-    double whole = std::trunc(*value);
-    return std::isfinite(whole) && to.can_represent(whole) ? cast_to(to, e) : Expr();
+    double truncated = std::trunc(*value);
+    return std::isfinite(truncated) && to.can_represent(truncated) ? cast_to(to, e) : Expr();
   };
   // Conversion of a value beyond the type is undefined, so one unbounded end makes both unknown.
   Interval ends{end(v.min), end(v.max)};

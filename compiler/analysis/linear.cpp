@@ -66,16 +66,16 @@ class Collector {
     auto divisor = as_const_int(binary.b);
     if (!divisor || *divisor <= 0) return linear_sum(e);
     Sum numerator = form(binary.a);
-    SplitSum q = split_by(numerator, *divisor);
+    DividedSum q = divide_terms(numerator, *divisor);
     bool is_div = e.kind() == Kind::Div;
-    if (q.rest.terms.empty()) return is_div ? q.whole : q.rest;
+    if (q.remainder.terms.empty()) return is_div ? q.quotient : q.remainder;
     Sum rest = linear_sum(e);
-    if (!is_nothing(q.whole)) {
-      Expr numerator_rest = to_expr(q.rest);
+    if (!is_nothing(q.quotient)) {
+      Expr numerator_rest = to_expr(q.remainder);
       if (!numerator_rest.defined()) return linear_sum(e);
       rest = linear_sum(binary_of(e.kind(), numerator_rest, *divisor));
     }
-    return is_div ? valid_or_atom(plus(q.whole, rest), e) : rest;
+    return is_div ? valid_or_atom(plus(q.quotient, rest), e) : rest;
   }
 
   static Expr binary_of(Kind kind, const Expr& a, int64_t b) {

@@ -126,26 +126,27 @@ class Point {
   Sum new_atom(const Expr& e) {
     if (depth_ == max_depth) return conditions_.unknown();
     depth_++;
-    const Sum sum = taken_apart(e);
+    const Sum sum = decompose(e);
     depth_--;
     return sum;
   }
 
-  Sum taken_apart(const Expr& e) {
+  Sum decompose(const Expr& e) {
     if (const Call* call = e.as<Call>())
-      return call->is_marker() ? of(call->args[0]) : of_type(e.type());
+      return call->is_marker() ? of(call->args[0]) : unknown_of_type(e.type());
     if (const Cast* cast = e.as<Cast>()) return converted(*cast);
     const Binary* op = e.as<Binary>();
-    if (!op || !has_linear_form(e.type())) return of_type(e.type());
+    if (!op || !has_linear_form(e.type())) return unknown_of_type(e.type());
     if (e.kind() == Kind::Min || e.kind() == Kind::Max) return extreme(*op, e.kind());
     const auto divisor = as_const_int(op->b);
     const bool divides = e.kind() == Kind::Div || e.kind() == Kind::Mod;
-    if (!divides || !divisor || *divisor <= 0 || *divisor > INT32_MAX) return of_type(e.type());
+    if (!divides || !divisor || *divisor <= 0 || *divisor > INT32_MAX)
+      return unknown_of_type(e.type());
     if (e.kind() == Kind::Div) return divided(op->a, *divisor);
     return plus(of(op->a), atom(binary(Kind::Div, op->a, op->b)), -*divisor);
   }
 
-  Sum of_type(Type type) {
+  Sum unknown_of_type(Type type) {
     const Sum sum = conditions_.unknown();
     if (!type.is_int_or_uint() || type.bits() > 32) return sum;
     conditions_.at_least_zero(plus(sum, number(type.min_int()), -1));
@@ -157,7 +158,7 @@ class Point {
   Sum converted(const Cast& cast) {
     const Type from = cast.value.type();
     const bool keeps = from.is_int_or_uint() && cast.type.can_represent(from);
-    return keeps ? of(cast.value) : of_type(cast.type);
+    return keeps ? of(cast.value) : unknown_of_type(cast.type);
   }
 
   // divisor * quotient <= e < divisor * (quotient + 1)

@@ -106,9 +106,9 @@ class Solver {
   }
 
   std::optional<Solution> solve_nonpositive(const Sum& form) {
-    Expr whole = to_expr(form);
-    if (!whole.defined()) return std::nullopt;
-    Expr largest = engine_.bounds(whole).max;
+    Expr sum = to_expr(form);
+    if (!sum.defined()) return std::nullopt;
+    Expr largest = engine_.bounds(sum).max;
     if (!largest.defined()) return std::nullopt;
     return isolate(linear_form(largest), most_levels);
   }

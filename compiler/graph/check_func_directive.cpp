@@ -153,9 +153,9 @@ void check(Memoize& memoize, const FuncContents& f) {
                text(key, " has type ", to_string(key.type())), "Convert it to uint64");
   }
   check_over_parameters(key, "the eviction key", asked);
-  if (const Expr& given = f.schedule.eviction_key; given.defined()) {
+  if (const Expr& earlier = f.schedule.eviction_key; earlier.defined()) {
     user_error(asked, "a Func has one eviction key",
-               text("it was given ", given, " before, and now ", key),
+               text("it was given ", earlier, " before, and now ", key),
                "Give the key once; combine two with arithmetic");
   }
 }

@@ -28,7 +28,7 @@ std::string loops_of(const StageLoops& schedule) {
 }
 
 // Tells what replaced a variable that is no longer a loop; empty when it never was one.
-std::string fate_of(const StageLoops& schedule, const std::string& var) {
+std::string replacement_of(const StageLoops& schedule, const std::string& var) {
   for (const Split& split : schedule.splits) {
     switch (split.kind) {
       case Split::Kind::Split:
@@ -102,7 +102,7 @@ void check_tail(TailStrategy tail, bool is_update, bool is_reduction, const std:
 
 // Whether the points past the end of a loop belong to no other iteration. Past the end of an inner
 // loop lie the points of the next iteration of the loop around it.
-bool ends_alone(const StageLoops& schedule, std::string loop) {
+bool has_free_end(const StageLoops& schedule, std::string loop) {
   for (auto split = schedule.splits.rbegin(); split != schedule.splits.rend(); ++split) {
     if (split->kind == Split::Kind::Fuse) {
       if (split->old_var == loop) loop = split->outer;
@@ -117,7 +117,7 @@ bool ends_alone(const StageLoops& schedule, std::string loop) {
 
 // Whether the loop is an inner loop of constant extent that the factor divides, so that it has no
 // tail.
-bool divides_inner(const StageLoops& schedule, const std::string& loop, const Expr& factor) {
+bool divides_inner_loop(const StageLoops& schedule, const std::string& loop, const Expr& factor) {
   const auto small = as_const_int(factor);
   for (auto split = schedule.splits.rbegin(); split != schedule.splits.rend(); ++split) {
     if (split->kind == Split::Kind::Rename || split->inner != loop) continue;
@@ -130,7 +130,7 @@ bool divides_inner(const StageLoops& schedule, const std::string& loop, const Ex
 
 void check_round_up(const StageLoops& schedule, const std::string& loop, const Expr& factor,
                     const std::string& asked) {
-  if (ends_alone(schedule, loop) || divides_inner(schedule, loop, factor)) return;
+  if (has_free_end(schedule, loop) || divides_inner_loop(schedule, loop, factor)) return;
   user_error(asked, "an update definition does not run a point twice",
              text("TailStrategy::RoundUp runs ", quoted(loop),
                   " past its end, into the points of the next iteration around it"),
@@ -296,14 +296,15 @@ bool has_concurrent_iterations(const Dim& loop) {
 // concurrently. Making it serial would not be what the user asked for.
 void check_fused_race(const SchedulePlace& at, const Dim& inner, const Dim& outer,
                       const std::string& asked) {
-  for (const Dim* given : {&inner, &outer}) {
-    if (!has_concurrent_iterations(*given)) continue;
-    const std::string as_given = text(asked, ", where ", quoted(given->var),
-                                      given->runs == ForType::Vectorized ? " is vectorized"
-                                      : is_gpu(given->runs)              ? " runs on a GPU"
-                                                                         : " is parallel");
+  for (const Dim* concurrent : {&inner, &outer}) {
+    if (!has_concurrent_iterations(*concurrent)) continue;
+    const std::string asked_with_reason =
+        text(asked, ", where ", quoted(concurrent->var),
+             concurrent->runs == ForType::Vectorized ? " is vectorized"
+             : is_gpu(concurrent->runs)              ? " runs on a GPU"
+                                                     : " is parallel");
     for (const Dim* loop : {&inner, &outer})
-      check_race_free(at, loop->var, given->runs == ForType::Vectorized, as_given,
+      check_race_free(at, loop->var, concurrent->runs == ForType::Vectorized, asked_with_reason,
                       text("Keep ", quoted(inner.var), " and ", quoted(outer.var), " apart"));
   }
 }
@@ -468,7 +469,7 @@ size_t loop_index(const SchedulePlace& place, const std::string& loop, const std
   for (size_t i = 0; i < now.dims.size(); i++) {
     if (now.dims[i].var == loop) return i;
   }
-  const std::string fate = fate_of(now, loop);
+  const std::string fate = replacement_of(now, loop);
   user_error(asked, text(quoted(loop), " must be a loop of this stage"),
              fate.empty() ? loops_of(now) : fate + "; " + loops_of(now), "Name one of its loops");
 }

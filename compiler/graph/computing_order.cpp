@@ -121,11 +121,11 @@ class Nests {
            }) >= many_callees;
   }
 
-  Order with_early(const Order& given) const {
-    Order order = given;
-    std::vector<size_t> place(given.size());
-    for (size_t p = 0; p < given.size(); ++p) {
-      const Nest& nest = nests_[given[p]];
+  Order with_early(const Order& base) const {
+    Order order = base;
+    std::vector<size_t> place(base.size());
+    for (size_t p = 0; p < base.size(); ++p) {
+      const Nest& nest = nests_[base[p]];
       size_t first = p;
       if (is_early(nest)) {
         first = 0;
@@ -135,8 +135,8 @@ class Nests {
         order[q] = order[q - 1];
         place[order[q]] = q;
       }
-      order[first] = given[p];
-      place[given[p]] = first;
+      order[first] = base[p];
+      place[base[p]] = first;
     }
     return order;
   }

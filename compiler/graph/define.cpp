@@ -330,21 +330,21 @@ void check_bounds(const Site& site, const FuncPtr& f, const ReductionDomainConte
 }
 
 Definition make_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> values,
-                       const DomainPtr& given) {
+                       const DomainPtr& declared) {
   Definition update;
   update.args = std::move(args);
   update.values = std::move(values);
-  DomainPtr domain = given;
-  if (given) {
-    given->frozen = true;
-    domain = domain_for(f, given);
+  DomainPtr domain = declared;
+  if (declared) {
+    declared->frozen = true;
+    domain = domain_for(f, declared);
     update.rvars = domain->vars;
     if (domain->predicate.defined())
       update.predicate = rebind_symbol(domain->predicate, SymbolRef(domain));
   }
   return map_exprs(update, [&](const Expr& e) {
     const Expr own = redirect_calls(e, f, f, true);
-    return domain == given ? own : rebind_symbol(own, given.get(), SymbolRef(domain));
+    return domain == declared ? own : rebind_symbol(own, declared.get(), SymbolRef(domain));
   });
 }
 
@@ -449,7 +449,7 @@ void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vec
 // The domain comes from the expressions as written; all other checks apply to the folded
 // expressions.
 void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
-                   const std::vector<Expr>& raw_values, const DomainPtr& given) {
+                   const std::vector<Expr>& raw_values, const DomainPtr& declared) {
   const Site site = site_of(*f, raw_args, true);
   if (!f->is_defined())
     user_error(site.asked, "a Func is updated after its first definition", "it has none",
@@ -468,7 +468,7 @@ void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
   check_values(site, raw_values);
   check_constants(site, with(raw_args, raw_values));
   check_types(site, raw_values, f->types, "the first definition");
-  const auto domain = domain_in(site, names_in(*f, with(raw_args, raw_values)), given);
+  const auto domain = domain_in(site, names_in(*f, with(raw_args, raw_values)), declared);
   std::vector<Expr> exprs = settled(with(update_coordinates(site, raw_args), raw_values));
   const auto first_value = exprs.begin() + static_cast<std::ptrdiff_t>(raw_args.size());
   const std::vector<Expr> args(exprs.begin(), first_value), values(first_value, exprs.end());

@@ -7,7 +7,7 @@ namespace retrograde::graph {
 namespace {
 
 // The schedule that a directive changes; it and every schedule around it count as scheduled.
-StageLoops& touch(const SchedulePlace& place) {
+StageLoops& mutable_schedule(const SchedulePlace& place) {
   StageLoops* result = &place.f->stage(place.stage).schedule;
   result->is_given = true;
   for (const int step : place.special) {
@@ -48,7 +48,7 @@ void give_level(ComputeWith with, const SchedulePlace& place) {
     const auto object = reinterpret_cast<uintptr_t>(with.from.get());
     with.level = {LoopLevel::Kind::At, "", std::to_string(object), -1};
   }
-  apply_directive(with, touch(place));
+  apply_directive(with, mutable_schedule(place));
   with.from->followers.push_back([weak = place.f->weak_from_this(), index = place.stage,
                                   align = with.align,
                                   last = with.level](const LoopLevel& now) mutable {
@@ -100,7 +100,7 @@ void give_directive(const SchedulePlace& place, Directive directive) {
         } else if constexpr (std::is_base_of_v<AtLevel, D>) {
           give_level(d, place.f);
         } else if (is_of_stage(directive)) {
-          apply_directive(directive, touch(place));
+          apply_directive(directive, mutable_schedule(place));
         } else {
           apply_directive(directive, *place.f);
         }
@@ -110,7 +110,7 @@ void give_directive(const SchedulePlace& place, Directive directive) {
 }
 
 void take_back_loops(FuncContents& f) {
-  std::erase_if(f.log, [](const LoggedDirective& given) { return given.stage >= 0; });
+  std::erase_if(f.log, [](const LoggedDirective& logged) { return logged.stage >= 0; });
   for (int s = 0; s < f.stage_count(); ++s) {
     Definition& stage = f.stage(s);
     stage.schedule = StageLoops();

@@ -10,7 +10,7 @@ namespace retrograde::graph {
 
 struct Line {
   int number = 0;
-  std::string word, rest, whole;  // "func", "blur(x, y) float32"
+  std::string word, rest, content;  // "func", "blur(x, y) float32"
 };
 
 std::vector<Line> lines_of(const std::string& text);  // the lines that are not empty

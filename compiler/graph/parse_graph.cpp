@@ -366,7 +366,7 @@ class GraphReader {
   // Parses the line as a directive of a stage, or of a Func, as requested; nothing if it is another
   // line.
   std::optional<Directive> directive_of(const Line& line, bool of_stage) const {
-    std::optional<Directive> directive = parse_directive(line.whole);
+    std::optional<Directive> directive = parse_directive(line.content);
     if (!directive || is_of_stage(*directive) != of_stage) return std::nullopt;
     Binder(names_, nullptr, nullptr)(*directive);
     return directive;

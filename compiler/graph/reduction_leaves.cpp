@@ -34,12 +34,12 @@ class LeafFinder {
     } else if (split.kind == Split::Kind::Rename) {
       leaf->loop = split.outer;
     } else {
-      cut(*leaf, split);
+      split_leaf(*leaf, split);
     }
   }
 
   // old == min + outer * factor + inner
-  void cut(Leaf& leaf, const Split& split) {
+  void split_leaf(Leaf& leaf, const Split& split) {
     const Expr factor = split.factor;
     Leaf outer{split.outer, unique_name("leaf"), 0, (leaf.extent + factor - 1) / factor};
     Leaf inner{split.inner, unique_name("leaf"), 0, factor};

@@ -168,7 +168,7 @@ class Factoring {
       partial.values.push_back(place(with_self_at(value, partial.args)));
     std::vector<Expr> conditions = mapped(leaves_.tails, place);
     append(conditions, mapped(conjuncts_, place));
-    partial.predicate = reading_last(conditions);
+    partial.predicate = guarded_conjunction(conditions);
     set_domain(partial, domain);
     partial.schedule = schedule_with(renames);
     for (Dim dim : update_.schedule.dims) {
@@ -186,7 +186,7 @@ class Factoring {
   // The conjunction of the conditions; undefined when there are none. Conditions that read memory
   // are evaluated only where the others hold, because past the end of a split there is nothing to
   // read.
-  static Expr reading_last(const std::vector<Expr>& conditions) {
+  static Expr guarded_conjunction(const std::vector<Expr>& conditions) {
     std::vector<Expr> plain, reading;
     for (const Expr& e : conditions)
       (reads_memory(e, MemoryReads::Functions) ? reading : plain).push_back(e);
@@ -337,12 +337,12 @@ FuncPtr factor_out(const SchedulePlace& place, const Preserved& preserved,
                "Factor the outermost reduction loops: reorder is legal only if it commutes");
   }
   Leaves leaves = leaves_of(place.definition(), schedule, asked);
-  const FuncPtr made =
+  const FuncPtr result =
       Factoring(place.f, place.stage, preserved, wanted.empty() ? f.name + "_intm" : wanted,
                 *proof.op, std::move(leaves))
           .run();
-  log_directive(place, FactorOut{made->name, preserved});
-  return made;
+  log_directive(place, FactorOut{result->name, preserved});
+  return result;
 }
 
 }  // namespace retrograde::graph

@@ -67,8 +67,9 @@ class CppPrinter {
   // The stage whose reduction variables a stage's loops are: follows created Funcs back to their
   // origin.
   Source source_of(Source of) const {
-    for (auto made = made_.find(of.func); made != made_.end(); made = made_.find(of.func))
-      of = {made->second.func, made->second.stage < 0 ? of.stage : made->second.stage};
+    for (auto created = created_.find(of.func); created != created_.end();
+         created = created_.find(of.func))
+      of = {created->second.func, created->second.stage < 0 ? of.stage : created->second.stage};
     return of;
   }
 
@@ -103,8 +104,8 @@ class CppPrinter {
     return name.find('.') != std::string::npos || reductions_.count(name);
   }
   // Loops derived from a reduction loop are reduction loops.
-  void note(const std::string& old, std::initializer_list<std::string> made) {
-    if (is_reduction(old)) reductions_.insert(made.begin(), made.end());
+  void note(const std::string& old, std::initializer_list<std::string> derived) {
+    if (is_reduction(old)) reductions_.insert(derived.begin(), derived.end());
   }
 
   // ---- statements ----
@@ -165,18 +166,18 @@ class CppPrinter {
     path.push_back(specializations_[special_name(entry_->special)]++);
     return text("Stage ", special_name(path), " = ", call(d.name, {cpp(d.condition)}));
   }
-  std::string statement(const Wrap& d) { return made_by(d.name, d.made, d.users); }
-  std::string statement(const Clone& d) { return made_by(d.name, d.made, d.users); }
-  std::string statement(const CopyInput& d) { return made_by(d.name, d.made, {d.image}); }
-  std::string made_by(const char* method, const std::string& made,
-                      const std::vector<NamedFunc>& users) {
-    made_[made] = {entry_->func, -1};
+  std::string statement(const Wrap& d) { return create_func(d.name, d.made, d.users); }
+  std::string statement(const Clone& d) { return create_func(d.name, d.made, d.users); }
+  std::string statement(const CopyInput& d) { return create_func(d.name, d.made, {d.image}); }
+  std::string create_func(const char* method, const std::string& created,
+                          const std::vector<NamedFunc>& users) {
+    created_[created] = {entry_->func, -1};
     std::vector<std::string> arguments;
     if (!users.empty()) arguments.push_back(users.size() == 1 ? cpp(users[0]) : cpp(users));
-    return text("Func ", identifiers_(made), " = ", call(method, arguments));
+    return text("Func ", identifiers_(created), " = ", call(method, arguments));
   }
   std::string statement(const FactorOut& d) {
-    made_[d.made] = here();
+    created_[d.made] = here();
     std::vector<std::string> pairs;
     for (const auto& [kept, variable] : d.preserved) {
       const std::string rvar = is_reduction(kept) ? cpp(kept) : text("RVar(\"", kept, "\")");
@@ -258,7 +259,7 @@ class CppPrinter {
   Identifiers identifiers_;
   std::set<std::string> declared_, reductions_;
   std::map<std::string, Source>
-      made_;  // the Func that each was created from; for rfactor, the stage
+      created_;  // the Func that each was created from; for rfactor, the stage
   std::map<std::string, int> specializations_;  // the number of specializations of each stage
   std::ostringstream declarations_, statements_;
 };

@@ -29,7 +29,7 @@ namespace {
 // The element with this name, or the only one whose name differs just by numbers; null when there
 // is none.
 template <typename Range, typename NameOf>
-auto meant(const Range& all, const std::string& name, const NameOf& name_of)
+auto find_by_name(const Range& all, const std::string& name, const NameOf& name_of)
     -> decltype(&*all.begin()) {
   decltype(&*all.begin()) found = nullptr;
   int count = 0;
@@ -58,7 +58,7 @@ class NameGroups {
   }
   // The name in `others` at the same position in its group; null unless the groups have equal
   // sizes.
-  const std::string* same_place(const std::string& name, const NameGroups& others) const {
+  const std::string* counterpart_of(const std::string& name, const NameGroups& others) const {
     const std::string plain = without_numbers(name);
     const auto mine = groups_.find(plain), theirs = others.groups_.find(plain);
     if (mine == groups_.end() || theirs == others.groups_.end() ||
@@ -92,10 +92,10 @@ class Replay {
     }
     for (const auto& parameter : graph.parameters)
       names_.parameters.emplace(parameter->name, parameter);
-    std::set<std::string> made;
+    std::set<std::string> created;
     for (const ScheduleLog::Entry& entry : log.entries) {
-      if (!made.count(entry.func)) in_log_.add(entry.func);
-      made.insert(made_by(entry.directive));
+      if (!created.count(entry.func)) in_log_.add(entry.func);
+      created.insert(made_by(entry.directive));
     }
   }
 
@@ -146,13 +146,13 @@ class Replay {
   }
 
   void make(const std::string& name, const FuncPtr& f) {
-    made_[name] = names_.funcs[name] = names_.funcs[f->name] = f;
+    created_[name] = names_.funcs[name] = names_.funcs[f->name] = f;
   }
 
   // If a new loop reuses the name of the loop that it derives from, it does so here too.
   static void keep_names(const SchedulePlace& place, Directive& directive) {
-    const auto keep = [&](std::string& made, const std::string& old) {
-      if (made == old) made = loop(place, old);
+    const auto keep = [&](std::string& created, const std::string& old) {
+      if (created == old) created = loop(place, old);
     };
     if (auto* split = std::get_if<SplitLoop>(&directive)) {
       keep(split->outer, split->old);
@@ -166,10 +166,10 @@ class Replay {
   }
 
   FuncPtr func_or_none(const std::string& name) {
-    if (const auto* made = find_or_null(made_, name)) return *made;
-    if (const std::string* same = in_log_.same_place(name, in_program_))
+    if (const auto* created = find_or_null(created_, name)) return *created;
+    if (const std::string* same = in_log_.counterpart_of(name, in_program_))
       return names_.funcs.at(*same);
-    if (const auto* found = meant(names_.funcs, name, [](const auto& f) { return f.first; }))
+    if (const auto* found = find_by_name(names_.funcs, name, [](const auto& f) { return f.first; }))
       return found->second;
     // The Func that reads an image, created at its first mention.
     for (const auto& [image, contents] : names_.parameters) {
@@ -185,7 +185,8 @@ class Replay {
                "Apply it to the program that it was taken from, or cut what is said of that Func");
   }
   ParameterPtr image(const std::string& name) const {
-    const auto* found = meant(names_.parameters, name, [](const auto& p) { return p.first; });
+    const auto* found =
+        find_by_name(names_.parameters, name, [](const auto& p) { return p.first; });
     return found && found->second->is_buffer ? found->second : nullptr;
   }
   ParameterPtr image_of_program(const std::string& name) const {
@@ -204,7 +205,8 @@ class Replay {
     return mapped(names, [&](const std::string& name) { return func(name); });
   }
   static std::string loop_of(const std::vector<std::string>& loops, const std::string& name) {
-    const std::string* found = meant(loops, name, [](const std::string& loop) { return loop; });
+    const std::string* found =
+        find_by_name(loops, name, [](const std::string& loop) { return loop; });
     return found ? *found : name;
   }
   static NamedLoop loop(const SchedulePlace& place, const std::string& name) {
@@ -236,7 +238,7 @@ class Replay {
   }
 
   NamedEntities names_;
-  std::map<std::string, FuncPtr> made_;  // by directives of the log
+  std::map<std::string, FuncPtr> created_;  // by directives of the log
   NameGroups in_log_, in_program_;
 };
 
@@ -256,8 +258,8 @@ ScheduleLog schedule_log(const std::vector<FuncPtr>& outputs) {
   std::multimap<uint64_t, ScheduleLog::Entry> ordered;
   for (const FuncPtr& f : functions_of(outputs)) {
     add_places(*f, log.places);
-    for (const LoggedDirective& given : f->log) {
-      ScheduleLog::Entry entry{f->name, given.stage, given.special, given.directive};
+    for (const LoggedDirective& logged : f->log) {
+      ScheduleLog::Entry entry{f->name, logged.stage, logged.special, logged.directive};
       std::visit(
           []<typename D>(D& d) {
             if constexpr (std::is_base_of_v<AtLevel, D>) {
@@ -266,7 +268,7 @@ ScheduleLog schedule_log(const std::vector<FuncPtr>& outputs) {
             }
           },
           entry.directive);
-      ordered.emplace(given.order, std::move(entry));
+      ordered.emplace(logged.order, std::move(entry));
     }
   }
   for (auto& [order, entry] : ordered) log.entries.push_back(std::move(entry));
@@ -313,13 +315,13 @@ bool take(std::string& rest, const std::string& word, int& number) {
 }
 
 ScheduleLog::Entry parse_entry(const Line& line) {
-  const size_t quote = line.whole[0] == '`' ? line.whole.find('`', 1) : 0;
-  const size_t dot = line.whole.find('.', quote == std::string::npos ? 0 : quote);
+  const size_t quote = line.content[0] == '`' ? line.content.find('`', 1) : 0;
+  const size_t dot = line.content.find('.', quote == std::string::npos ? 0 : quote);
   if (dot != std::string::npos && dot > 0) {
-    const bool is_quoted = line.whole[0] == '`';
+    const bool is_quoted = line.content[0] == '`';
     ScheduleLog::Entry entry{
-        is_quoted ? line.whole.substr(1, dot - 2) : line.whole.substr(0, dot), -1, {}, {}};
-    std::string rest = line.whole.substr(dot + 1);
+        is_quoted ? line.content.substr(1, dot - 2) : line.content.substr(0, dot), -1, {}, {}};
+    std::string rest = line.content.substr(dot + 1);
     int number = -1;
     take(rest, "update", number);
     for (int step = 0; take(rest, "specialization", step);) entry.special.push_back(step);
@@ -330,7 +332,7 @@ ScheduleLog::Entry parse_entry(const Line& line) {
     }
   }
   user_error("read the text of a schedule log", "every line is a directive of a Func",
-             text("line ", line.number, " says ", quoted(line.whole)),
+             text("line ", line.number, " says ", quoted(line.content)),
              "Write it as to_text() does");
 }
 
@@ -396,7 +398,7 @@ std::map<std::string, std::string> loops_without(const Directive& directive) {
 }
 
 // Returns whether everything that the directive names still exists.
-bool rename_loops(Directive& directive, const ScheduleLog::Entry& gone, bool is_stage,
+bool rename_loops(Directive& directive, const ScheduleLog::Entry& removed, bool is_stage,
                   const std::map<std::string, std::string>& loops) {
   bool is_whole = true;
   const auto rename = [&](std::string& name) {
@@ -415,7 +417,7 @@ bool rename_loops(Directive& directive, const ScheduleLog::Entry& gone, bool is_
                                       if (is_stage) rename(loop);
                                     },
                                     [&](graph::LoopLevel& level) {
-                                      if (level.func == gone.func) rename(level.var);
+                                      if (level.func == removed.func) rename(level.var);
                                     }});
   return is_whole;
 }
@@ -423,28 +425,28 @@ bool rename_loops(Directive& directive, const ScheduleLog::Entry& gone, bool is_
 }  // namespace
 
 ScheduleLog ScheduleLog::without(size_t index) const {
-  const Entry& gone = entries[index];
+  const Entry& removed = entries[index];
   ScheduleLog log = first(index);
-  const std::string made = made_by(gone.directive);
-  const bool is_factored = std::holds_alternative<FactorOut>(gone.directive);
-  const auto loops = loops_without(gone.directive);
+  const std::string created = made_by(removed.directive);
+  const bool is_factored = std::holds_alternative<FactorOut>(removed.directive);
+  const auto loops = loops_without(removed.directive);
   int special = -1;  // the index of the removed specialization
-  if (std::holds_alternative<Specialize>(gone.directive)) {
+  if (std::holds_alternative<Specialize>(removed.directive)) {
     special = static_cast<int>(std::ranges::count_if(log.entries, [&](auto& e) {
-      return e.directive.index() == gone.directive.index() && e.func == gone.func &&
-             e.stage == gone.stage && e.special == gone.special;
+      return e.directive.index() == removed.directive.index() && e.func == removed.func &&
+             e.stage == removed.stage && e.special == removed.special;
     }));
   }
   for (size_t i = index + 1; i < entries.size(); ++i) {
     Entry entry = entries[i];
-    const bool is_stage = is_below(entry, gone);
-    if (!made.empty() && (mentions(entry, made) || (is_factored && is_stage))) continue;
-    if (special >= 0 && is_stage && entry.special.size() > gone.special.size()) {
-      int& step = entry.special[gone.special.size()];
+    const bool is_stage = is_below(entry, removed);
+    if (!created.empty() && (mentions(entry, created) || (is_factored && is_stage))) continue;
+    if (special >= 0 && is_stage && entry.special.size() > removed.special.size()) {
+      int& step = entry.special[removed.special.size()];
       if (step == special) continue;
       if (step > special) --step;
     }
-    if (rename_loops(entry.directive, gone, is_stage, loops)) log.entries.push_back(entry);
+    if (rename_loops(entry.directive, removed, is_stage, loops)) log.entries.push_back(entry);
   }
   return log;
 }

@@ -44,7 +44,7 @@ struct IntervalOf {
   bool is_point() const { return EndOf<End>::are_same(min, max); }
   End extent() const { return max - min + 1; }  // of a bounded interval
   bool contains(End value) const { return min <= value && value <= max; }
-  bool is_within(const IntervalOf& whole) const { return min >= whole.min && max <= whole.max; }
+  bool is_within(const IntervalOf& outer) const { return min >= outer.min && max <= outer.max; }
   bool operator==(const IntervalOf&) const = default;
 };
 

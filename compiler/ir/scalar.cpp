@@ -107,8 +107,8 @@ Scalar float_binary(Kind kind, const Scalar& a, const Scalar& b) {
     case Kind::Div:
       return round(a.f / b.f);
     case Kind::Mod: {
-      const Scalar whole = round(b.f * std::floor(round(a.f / b.f).f));
-      return round(a.f - whole.f);
+      const Scalar multiple = round(b.f * std::floor(round(a.f / b.f).f));
+      return round(a.f - multiple.f);
     }
     default:
       return by_order(kind, a, b, &Scalar::f);

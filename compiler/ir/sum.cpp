@@ -189,19 +189,19 @@ Sum constant_sum(Type type, int64_t value) {
   return result;
 }
 
-SplitSum split_by(const Sum& sum, int64_t divisor) {
+DividedSum divide_terms(const Sum& sum, int64_t divisor) {
   const Sum none{sum.type, {}, 0, true, sum.is_linear};
-  SplitSum split{none, none};
-  split.whole.add_constant(euclidean_div(sum.constant, divisor));
-  split.rest.add_constant(euclidean_mod(sum.constant, divisor));
+  DividedSum divided{none, none};
+  divided.quotient.add_constant(euclidean_div(sum.constant, divisor));
+  divided.remainder.add_constant(euclidean_mod(sum.constant, divisor));
   for (const Term& term : sum.terms) {
     if (term.factor % divisor == 0) {
-      split.whole.add(term.atom, term.factor / divisor);
+      divided.quotient.add(term.atom, term.factor / divisor);
     } else {
-      split.rest.add(term.atom, term.factor);
+      divided.remainder.add(term.atom, term.factor);
     }
   }
-  return split;
+  return divided;
 }
 
 int64_t common_factor(const Sum& sum) {

@@ -66,12 +66,12 @@ Sum constant_sum(Type type, int64_t value);
 // Positive terms come first, then the constant. Linear sums are in structural order, plain ones in
 // the order of canonical_less. Undefined when a number of a linear sum does not fit the type.
 Expr to_expr(const Sum& sum);
-// sum = divisor * whole + rest, for divisor > 0. `whole` has the terms and the multiple of the
-// constant that the divisor divides; the constant of `rest` lies in [0, divisor).
-struct SplitSum {
-  Sum whole, rest;
+// sum = divisor * quotient + remainder, for divisor > 0. `quotient` has the terms and the multiple of the
+// constant that the divisor divides; the constant of `remainder` lies in [0, divisor).
+struct DividedSum {
+  Sum quotient, remainder;
 };
-SplitSum split_by(const Sum& sum, int64_t divisor);
+DividedSum divide_terms(const Sum& sum, int64_t divisor);
 // The greatest common divisor of the factors; 0 when there are none.
 int64_t common_factor(const Sum& sum);
 

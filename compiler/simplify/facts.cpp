@@ -89,11 +89,11 @@ ConstantRange modulo(const ConstantRange& a, const ConstantRange& b) {
 }
 
 ConstantRange wrapped(const ConstantRange& r, Type type) {
-  const ConstantRange whole = range_of(type);
-  if (is_index_type(type)) return intersection(r, whole);  // does not overflow
+  const ConstantRange all_values = range_of(type);
+  if (is_index_type(type)) return intersection(r, all_values);  // does not overflow
   // The largest uint64 exceeds int64, so the type's range has no upper end, and sums may wrap.
-  if (type.is_uint() && type.bits() == 64 && r.max == infinity) return whole;
-  return r.is_within(whole) ? r : whole;
+  if (type.is_uint() && type.bits() == 64 && r.max == infinity) return all_values;
+  return r.is_within(all_values) ? r : all_values;
 }
 
 }  // namespace
@@ -105,9 +105,9 @@ ConstantRange Facts::range(const Expr& e) {
   }
   if (!e.type().is_int_or_uint()) return {};
   return ranges_.get(e, [&] {
-    const ConstantRange whole = range_of(e.type());
-    const ConstantRange result = intersection(range_of_node(e), whole);
-    return result.min > result.max ? whole : result;  // contradictory facts: unreachable code
+    const ConstantRange all_values = range_of(e.type());
+    const ConstantRange result = intersection(range_of_node(e), all_values);
+    return result.min > result.max ? all_values : result;  // contradictory facts: unreachable code
   });
 }
 
@@ -123,15 +123,16 @@ ConstantRange Facts::range_of_variable(const Expr& e, const Variable& n) {
 }
 
 ConstantRange Facts::range_of_node(const Expr& e) {
-  const ConstantRange whole = range_of(e.type());
+  const ConstantRange all_values = range_of(e.type());
   return match(
       e, [&](const Variable& n) { return range_of_variable(e, n); },
       [&](const Cast& n) {
-        if (!n.value.type().is_int_or_uint() || n.type.is_bool()) return whole;
+        if (!n.value.type().is_int_or_uint() || n.type.is_bool()) return all_values;
         const ConstantRange source = range(n.value);
-        return source.is_within(whole) && !(n.value.type() == UInt(64) && source.max == infinity)
+        return source.is_within(all_values) &&
+                       !(n.value.type() == UInt(64) && source.max == infinity)
                    ? source
-                   : whole;
+                   : all_values;
       },
       [&](const Binary& n) { return range_of_binary(n); },
       [&](const Select& n) { return hull(range(n.when_true), range(n.when_false)); },
@@ -142,19 +143,19 @@ ConstantRange Facts::range_of_node(const Expr& e) {
       [&](const Broadcast& n) { return range(n.value); },
       [&](const Let& n) { return range(n.body); },
       [&](const VectorReduce& n) {
-        return n.op == Kind::Min || n.op == Kind::Max ? range(n.value) : whole;
+        return n.op == Kind::Min || n.op == Kind::Max ? range(n.value) : all_values;
       },
       [&](const Shuffle& n) {
         ConstantRange result = range(n.vectors[0]);
         for (const Expr& v : n.vectors) result = hull(result, range(v));
         return result;
       },
-      [&](const Call& n) { return range_of_call(n); }, [&](const ExprNode&) { return whole; });
+      [&](const Call& n) { return range_of_call(n); }, [&](const ExprNode&) { return all_values; });
 }
 
 ConstantRange Facts::range_of_binary(const Binary& n) {
-  const ConstantRange whole = range_of(n.type);
-  if (!n.a.type().is_int_or_uint() || n.type.is_bool()) return whole;
+  const ConstantRange all_values = range_of(n.type);
+  if (!n.a.type().is_int_or_uint() || n.type.is_bool()) return all_values;
   const ConstantRange a = range(n.a), b = range(n.b);
   switch (n.kind) {
     case Kind::Add:
@@ -172,20 +173,20 @@ ConstantRange Facts::range_of_binary(const Binary& n) {
     case Kind::Max:
       return {std::max(a.min, b.min), std::max(a.max, b.max)};
     default:
-      return whole;
+      return all_values;
   }
 }
 
 ConstantRange Facts::range_of_call(const Call& n) {
-  const ConstantRange whole = range_of(n.type);
-  if (n.call_type != CallType::Operator) return whole;
+  const ConstantRange all_values = range_of(n.type);
+  if (n.call_type != CallType::Operator) return all_values;
   switch (n.op) {
     case Op::promise_clamped:
     case Op::unsafe_promise_clamped:
       return intersection(range(n.args[0]), {range(n.args[1]).min, range(n.args[2]).max});
     case Op::bitwise_and: {  // at most a nonnegative constant operand
       const ConstantRange mask = range(n.args[1]);
-      return mask.min >= 0 ? ConstantRange{0, mask.max} : whole;
+      return mask.min >= 0 ? ConstantRange{0, mask.max} : all_values;
     }
     case Op::popcount:
     case Op::count_leading_zeros:
@@ -194,7 +195,7 @@ ConstantRange Facts::range_of_call(const Call& n) {
     case Op::if_then_else:
       return hull(range(n.args[1]), range(n.args[2]));
     default:
-      return n.is_marker() ? range(n.args[0]) : whole;
+      return n.is_marker() ? range(n.args[0]) : all_values;
   }
 }
 

@@ -33,14 +33,14 @@ bool is_steady(const Expr& value) {
 
 }  // namespace
 
-std::optional<Sum> Simplifier::find_meaning(const Expr& atom) {
+std::optional<Sum> Simplifier::find_definition(const Expr& atom) {
   const std::string& name = atom.as<Variable>()->name;
   const Expr value = value_or(replacements_, name, facts_.value_of(name));
   if (!value.defined() || value.type() != atom.type() || !is_steady(value)) return std::nullopt;
   const Sum sum = sum_of(value);
   Sum opened = constant_sum(atom.type(), sum.constant);
   for (const Term& term : sum.terms) {
-    const Sum* inner = meaning(term.atom);
+    const Sum* inner = definition_of(term.atom);
     inner ? opened.add(*inner, term.factor) : opened.add(term.atom, term.factor);
   }
   if (!opened.valid || opened.terms.size() > max_opened_terms) return std::nullopt;
@@ -48,13 +48,13 @@ std::optional<Sum> Simplifier::find_meaning(const Expr& atom) {
 }
 
 // The definition of a name in terms of names without one; null when the name has none.
-const Sum* Simplifier::meaning(const Expr& atom) {
+const Sum* Simplifier::definition_of(const Expr& atom) {
   const auto* variable = atom.as<Variable>();
   if (!variable || !is_index_type(atom.type()) || atom.type().is_vector()) return nullptr;
-  auto found = meanings_.find(variable->name);
-  if (found == meanings_.end()) {
-    std::optional<Sum> sum = find_meaning(atom);
-    found = meanings_.emplace(variable->name, std::move(sum)).first;
+  auto found = definitions_.find(variable->name);
+  if (found == definitions_.end()) {
+    std::optional<Sum> sum = find_definition(atom);
+    found = definitions_.emplace(variable->name, std::move(sum)).first;
   }
   return found->second ? &*found->second : nullptr;
 }
@@ -62,10 +62,11 @@ const Sum* Simplifier::meaning(const Expr& atom) {
 // Expands one name if fewer terms remain, or two names if some of their terms cancel.
 bool Simplifier::cancel_names(Sum& sum) {
   if (!is_index_type(sum.type) || sum.type.is_vector() || sum.terms.size() < 2) return false;
-  const auto named = filtered(sum.terms, [&](const Term& term) { return meaning(term.atom); });
+  const auto named =
+      filtered(sum.terms, [&](const Term& term) { return definition_of(term.atom); });
   const auto open = [&](Sum& in, const Term& term) {
     in.add(term.atom, -term.factor);
-    in.add(*meaning(term.atom), term.factor);
+    in.add(*definition_of(term.atom), term.factor);
   };
   const auto is_better = [&](const Sum& opened, size_t most_terms) {
     return opened.valid && opened.terms.size() <= most_terms;
@@ -77,8 +78,8 @@ bool Simplifier::cancel_names(Sum& sum) {
     for (size_t j = i + 1; j < named.size() && opened.valid; ++j) {
       Sum both = opened;
       open(both, named[j]);
-      const size_t apart = sum.terms.size() - 2 + meaning(named[i].atom)->terms.size() +
-                           meaning(named[j].atom)->terms.size();
+      const size_t apart = sum.terms.size() - 2 + definition_of(named[i].atom)->terms.size() +
+                           definition_of(named[j].atom)->terms.size();
       if (is_better(both, std::min(sum.terms.size(), apart - 1)))
         return sum = std::move(both), true;
     }
@@ -87,9 +88,9 @@ bool Simplifier::cancel_names(Sum& sum) {
 }
 
 // The constant that an enclosing branch determines for the name; undefined when there is none.
-Expr Simplifier::number_of(const Expr& variable) {
-  if (known_numbers_ == 0) return {};
-  const Sum* sum = meaning(variable);
+Expr Simplifier::constant_of(const Expr& variable) {
+  if (known_constants_ == 0) return {};
+  const Sum* sum = definition_of(variable);
   return sum && sum->is_constant() ? make_const(variable.type(), sum->constant) : Expr();
 }
 
@@ -112,7 +113,7 @@ std::optional<Equality> as_equality(const Expr& condition) {
 
 }  // namespace
 
-void Simplifier::learn_numbers(const Expr& condition, std::vector<std::string>& learned) {
+void Simplifier::learn_constants(const Expr& condition, std::vector<std::string>& learned) {
   std::vector<Expr> conjuncts;
   add_conjuncts(condition, conjuncts);
   for (const Expr& conjunct : conjuncts) {
@@ -122,15 +123,15 @@ void Simplifier::learn_numbers(const Expr& condition, std::vector<std::string>& 
       learned.push_back(equality->name);
   }
   if (learned.empty()) return;
-  ++known_numbers_;
-  meanings_.clear();
+  ++known_constants_;
+  definitions_.clear();
 }
 
-void Simplifier::unlearn_numbers(const std::vector<std::string>& learned) {
+void Simplifier::forget_constants(const std::vector<std::string>& learned) {
   if (learned.empty()) return;
   for (const std::string& name : learned) replacements_.erase(name);
-  --known_numbers_;
-  meanings_.clear();
+  --known_constants_;
+  definitions_.clear();
 }
 
 }  // namespace retrograde::simplification

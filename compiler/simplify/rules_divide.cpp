@@ -45,17 +45,17 @@ Expr Simplifier::div_by(const Expr& a, int64_t c) {
   if (const auto* line = a.as<Ramp>()) {
     if (Expr result = div_vector(*line, c); result.defined()) return result;
   }
-  SplitSum split = split_by(sum_of(a), c);
-  if (!split.whole.valid || !split.rest.valid) return binary(Kind::Div, a, constant(a, c));
+  DividedSum split = divide_terms(sum_of(a), c);
+  if (!split.quotient.valid || !split.remainder.valid) return binary(Kind::Div, a, constant(a, c));
   // (x + k) / c => x / c + (r + k) / c, when x is congruent to r
-  Sum terms = split.rest;
+  Sum terms = split.remainder;
   terms.constant = 0;
   if (const std::optional<int64_t> r = facts_.congruence(terms).modulo(c)) {
-    split.whole.add_constant(euclidean_div(*r + split.rest.constant, c));
-    split.rest.constant = 0;
+    split.quotient.add_constant(euclidean_div(*r + split.remainder.constant, c));
+    split.remainder.constant = 0;
   }
-  const Sum rest = sum_of(div_atom(split.rest, c));
-  return rebuild(plus(split.whole, rest), Kind::Div, a, constant(a, c));
+  const Sum rest = sum_of(div_atom(split.remainder, c));
+  return rebuild(plus(split.quotient, rest), Kind::Div, a, constant(a, c));
 }
 
 // The multiple of c at or below x, if the lower end of a variable in x determines it. For x between
@@ -129,7 +129,7 @@ Expr Simplifier::mod_by(const Expr& a, int64_t c) {
   if (const auto* line = a.as<Ramp>()) {
     if (Expr result = mod_vector(*line, c); result.defined()) return result;
   }
-  Sum rest = split_by(sum_of(a), c).rest;
+  Sum rest = divide_terms(sum_of(a), c).remainder;
   if (!rest.valid) return binary(Kind::Mod, a, constant(a, c));
   if (const std::optional<int64_t> known = facts_.congruence(rest).modulo(c))
     return constant(a, *known);
@@ -144,7 +144,7 @@ Expr Simplifier::mod_by(const Expr& a, int64_t c) {
     opened.add(term.atom, -term.factor);
     opened.add(sum_of(inner->a), term.factor);
     if (!opened.valid) continue;
-    return apply(Kind::Mod, rebuild(split_by(opened, c).rest), constant(a, c));
+    return apply(Kind::Mod, rebuild(divide_terms(opened, c).remainder), constant(a, c));
   }
   for (Term& term : rest.terms) {  // factors into (-c, c): -1 stays, 5 % 4 becomes 1
     if (term.factor >= c || term.factor <= -c) term.factor = euclidean_mod(term.factor, c);

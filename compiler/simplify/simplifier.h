@@ -84,12 +84,12 @@ class Simplifier {
   Expr constant(const Expr& like, int64_t value) const;
 
   // ---- names of index values (names.cpp) ----
-  std::optional<Sum> find_meaning(const Expr& atom);
-  const Sum* meaning(const Expr& atom);
+  std::optional<Sum> find_definition(const Expr& atom);
+  const Sum* definition_of(const Expr& atom);
   bool cancel_names(Sum& sum);
-  Expr number_of(const Expr& variable);
-  void learn_numbers(const Expr& condition, std::vector<std::string>& learned);
-  void unlearn_numbers(const std::vector<std::string>& learned);
+  Expr constant_of(const Expr& variable);
+  void learn_constants(const Expr& condition, std::vector<std::string>& learned);
+  void forget_constants(const std::vector<std::string>& learned);
 
   // ---- statements ----
   Stmt let_stmt(const Stmt& s);
@@ -117,12 +117,12 @@ class Simplifier {
   };
   friend class Binding;
   // Assumes a condition during its lifetime.
-  class Given {
+  class ScopedCondition {
    public:
-    Given(Simplifier& owner, const Expr& condition);
-    ~Given();
-    Given(const Given&) = delete;
-    Given& operator=(const Given&) = delete;
+    ScopedCondition(Simplifier& owner, const Expr& condition);
+    ~ScopedCondition();
+    ScopedCondition(const ScopedCondition&) = delete;
+    ScopedCondition& operator=(const ScopedCondition&) = delete;
 
    private:
     Simplifier& owner_;
@@ -142,8 +142,8 @@ class Simplifier {
   std::unordered_map<std::string, Expr> replacements_;
   std::unordered_set<std::string> seen_names_;
   std::unordered_set<std::string> varying_;  // names bound inside loops
-  std::unordered_map<std::string, std::optional<Sum>> meanings_;
-  int known_numbers_ = 0;  // enclosing branches that determine names to be constants
+  std::unordered_map<std::string, std::optional<Sum>> definitions_;
+  int known_constants_ = 0;  // enclosing branches that determine names to be constants
   int loops_around_ = 0;
   int depth_ = 0;  // of rules that call rules
 };

@@ -43,7 +43,7 @@ Simplifier::Simplifier(const BoundsMap& bounds) {
 Expr Simplifier::operator()(const Expr& e) {
   if (const auto* var = e.as<Variable>()) {
     if (const auto* found = find_or_null(replacements_, var->name)) return *found;
-    const Expr number = number_of(e);
+    const Expr number = constant_of(e);
     return number.defined() ? number : e;
   }
   if (e.kind() <= Kind::StringImm) return e;
@@ -143,7 +143,7 @@ Simplifier::Binding::Binding(Simplifier& owner, const std::string& name, const E
   // Results for the same name in another scope do not hold here.
   if (!owner.seen_names_.insert(name).second) {
     owner.forget();
-    owner.meanings_.erase(name);
+    owner.definitions_.erase(name);
   }
   if (owner.loops_around_ > 0) owner.varying_.insert(name);
   if (replacement.defined()) {
@@ -156,18 +156,18 @@ Simplifier::Binding::Binding(Simplifier& owner, const std::string& name, const E
 Simplifier::Binding::~Binding() {
   owner_.replacements_.erase(name_);
   owner_.facts_.unbind(name_);
-  owner_.meanings_.erase(name_);
+  owner_.definitions_.erase(name_);
 }
 
-Simplifier::Given::Given(Simplifier& owner, const Expr& condition)
+Simplifier::ScopedCondition::ScopedCondition(Simplifier& owner, const Expr& condition)
     : owner_(owner), assumption_(owner.facts_, condition) {
   if (condition.defined()) owner_.memo_.clear();
-  owner_.learn_numbers(condition, learned_);
+  owner_.learn_constants(condition, learned_);
 }
 
-Simplifier::Given::~Given() {
+Simplifier::ScopedCondition::~ScopedCondition() {
   owner_.memo_.clear();
-  owner_.unlearn_numbers(learned_);
+  owner_.forget_constants(learned_);
 }
 
 }  // namespace retrograde::simplification

@@ -64,7 +64,7 @@ Stmt Simplifier::loop(const Stmt& s, const For& n) {
   {
     const Binding binding(*this, n.name, min, sub(add(min, extent), make_one(min.type())), Expr());
     // Inside, the loop runs at least once.
-    const Given runs(*this, less(Kind::LT, make_zero(extent.type()), extent));
+    const ScopedCondition runs(*this, less(Kind::LT, make_zero(extent.type()), extent));
     body = (*this)(n.body);
   }
   --loops_around_;
@@ -91,7 +91,7 @@ Stmt Simplifier::launch(const Launch& n) {
 
 // The statements after an assert may rely on it, to the end of the block.
 Stmt Simplifier::block(const Stmt& s, const Block& n) {
-  const Given scope(*this, Expr());
+  const ScopedCondition scope(*this, Expr());
   std::vector<Stmt> stmts;
   bool changed = false;
   for (const Stmt& child : n.stmts) {
@@ -112,11 +112,11 @@ Stmt Simplifier::branches(const Stmt& s, const IfThenElse& n) {
   if (is_const(condition)) return (*this)(is_const_true(condition) ? n.when_true : n.when_false);
   Stmt when_true, when_false;
   {
-    const Given holds(*this, condition);
+    const ScopedCondition holds(*this, condition);
     when_true = (*this)(n.when_true);
   }
   if (n.when_false.defined()) {
-    const Given fails(*this, negate(condition));
+    const ScopedCondition fails(*this, negate(condition));
     when_false = (*this)(n.when_false);
   }
   if (condition.same_as(n.condition) && when_true.same_as(n.when_true) &&
