@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "diagnostics/error.h"
-#include "graph/directive_names.h"
+#include "graph/directive_fields.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 

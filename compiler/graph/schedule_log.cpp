@@ -8,7 +8,7 @@
 #include "diagnostics/error.h"
 #include "graph/binder.h"
 #include "graph/copy_graph.h"
-#include "graph/directive_names.h"
+#include "graph/directive_fields.h"
 #include "graph/directive_text.h"
 #include "graph/give_directive.h"
 #include "graph/graph.h"

@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "graph/directive_names.h"
+#include "graph/directive.h"
 #include "graph/graph.h"
 #include "ir/visit.h"
 #include "support/same_numbers.h"
