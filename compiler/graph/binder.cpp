@@ -12,9 +12,9 @@ namespace retrograde::graph {
 namespace {
 
 [[noreturn]] void unknown(const char* what, const std::string& name) {
-  user_error("read the text of a graph", "every Func and image that is read is of the graph",
+  user_error("read the text of a graph", "every Func and image that is read belongs to the graph",
              text("no ", what, " of it is called ", quoted(name)),
-             "Add its lines, or mend the name");
+             "Add its lines, or correct the name");
 }
 
 }  // namespace

@@ -205,7 +205,7 @@ void check_fuse_level(const SchedulePlace& at, const LoopLevel& level) {
                "the level is " + level_text(level), "Name a stage and one of its loops");
   }
   if (level.func == at.f->name && (at.stage == 0 || level.stage != at.stage - 1)) {
-    user_error(asked, "of its own Func, a stage joins the one before it",
+    user_error(asked, "within one Func, a stage joins the stage before it",
                text("the level is of ", level.stage < 0 ? std::string("no stage by name")
                                                         : quoted(stage_name(*at.f, level.stage))),
                at.stage == 0
@@ -379,7 +379,7 @@ void check(PrefetchData& prefetch, const SchedulePlace& at) {
   const size_t inner = loop_index(at, prefetch.at, asked);
   const size_t outer = loop_index(at, prefetch.from, asked);
   if (inner > outer) {
-    user_error(asked, "the loop it happens at is the one it counts from, or inside of it",
+    user_error(asked, "the prefetch happens at the loop it counts from, or inside that loop",
                text(quoted(prefetch.at), " is around ", quoted(prefetch.from)), "Swap them");
   }
   const Expr& offset = prefetch.offset;

@@ -89,7 +89,7 @@ void check_constants(const Site& site, const std::vector<Expr>& exprs) {
     const Expr part = overflowing_part(root);
     if (!part.defined()) continue;
     user_error(site.asked, "constants of int32 and int64 do not overflow",
-               text(part, " has no place in ", to_string(part.type())),
+               text(part, " does not fit ", to_string(part.type())),
                "Cast an operand to a wider type, or to an unsigned one, which wraps around");
   }
 }
@@ -97,9 +97,9 @@ void check_constants(const Site& site, const std::vector<Expr>& exprs) {
 void check_types(const Site& site, const std::vector<Expr>& values, const std::vector<Type>& types,
                  const char* whose) {
   if (values.size() != types.size()) {
-    user_error(site.asked, "all definitions of a Func have as many values",
+    user_error(site.asked, "all definitions of a Func have the same number of values",
                text(whose, " has ", types.size(), " and this one has ", values.size()),
-               "Give as many values");
+               "Give the same number of values");
   }
   for (size_t i = 0; i < types.size(); i++) {
     if (values[i].type() == types[i]) continue;
@@ -184,11 +184,11 @@ void check_free_variables(const Site& site, const Names& names,
                  text("it uses ", quoted(v->name)),
                  text("Write ", quoted(site.f.name), "(..., _) = ..."));
     }
-    user_error(
-        site.asked,
-        "every variable on the right-hand side stands on the left-hand side, or is of an RDom",
-        text(quoted(v->name), " stands on the right-hand side only"),
-        "Add it as an argument, or reduce over an RDom");
+    user_error(site.asked,
+               "every variable on the right-hand side appears on the left-hand side, or belongs to "
+               "an RDom",
+               text(quoted(v->name), " appears only on the right-hand side"),
+               "Add it as an argument, or reduce over an RDom");
   }
 }
 
@@ -234,8 +234,7 @@ std::vector<std::string> pure_names(const Site& site, const std::vector<Expr>& a
     }
     if (std::ranges::find(names, v->name) != names.end()) {
       user_error(site.asked, "the arguments of a first definition are different Vars",
-                 quoted(v->name) + " stands there twice",
-                 "Use a Var of its own for each dimension");
+                 quoted(v->name) + " appears twice", "Use a Var of its own for each dimension");
     }
     names.push_back(v->name);
   }
@@ -259,9 +258,9 @@ std::vector<Expr> with(std::vector<Expr> all, const std::vector<Expr>& more) {
 
 void check_update_arity(const Site& site, const std::vector<Expr>& args) {
   if (args.size() == site.f.args.size()) return;
-  user_error(site.asked, "all definitions of a Func have as many arguments",
+  user_error(site.asked, "all definitions of a Func have the same number of arguments",
              text("its first definition has ", site.f.args.size(), " and this one ", args.size()),
-             "Give as many arguments");
+             "Give the same number of arguments");
 }
 
 // The coordinates of the left-hand side as int32.
@@ -295,7 +294,7 @@ void check_self_calls(const Site& site, const Names& names, const std::vector<st
       const Variable* v = call->args[i].as<Variable>();
       if (v && v->name == pure[i]) continue;
       user_error(site.asked,
-                 "a pure variable stands at its own place in every reference of a Func to itself, "
+                 "a pure variable keeps its position in every reference of a Func to itself, "
                  "so that its "
                  "iterations are independent",
                  text("the right-hand side reads ", quoted(site.f.name), list(call->args),

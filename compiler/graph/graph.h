@@ -48,8 +48,8 @@ Graph graph_of(const std::vector<FuncPtr>& outputs);
 
 std::string to_text(const Graph& graph);
 // Creates new Funcs. Names in expressions refer to the Funcs, images and parameters of the text.
-// Requires: line …: … must stand here; it names its outputs; every Func and image that is read is
-// of the graph.
+// Requires: line …: … must stand here; it names its outputs; every Func and image that is read
+// belongs to the graph.
 Graph parse_graph(const std::string& text);
 
 // Describes the first difference between the texts of two graphs; empty when they are equal. Names

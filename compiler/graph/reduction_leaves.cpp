@@ -62,7 +62,7 @@ class LeafFinder {
     const Leaf* outer = find(split.outer);
     if (!inner && !outer) return leaves_.others.push_back(split);
     if (!inner || !outer) {
-      user_error(asked_, "reduction variables are fused with each other only",
+      user_error(asked_, "reduction variables are fused only with each other",
                  text(quoted(split.inner), " and ", quoted(split.outer),
                       " were fused, and one of them is a pure variable"),
                  "Call rfactor before that fuse");

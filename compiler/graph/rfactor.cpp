@@ -322,12 +322,12 @@ FuncPtr factor_out(const SchedulePlace& place, const Preserved& preserved,
     check_new_loop(place, var, loop, asked);
     if (!variables.insert(var).second || std::ranges::find(f.args, var) != f.args.end()) {
       user_error(asked, "the new variables differ from each other and from the Func's",
-                 quoted(var) + " is there already", "Use a new Var");
+                 quoted(var) + " already exists", "Use a new Var");
     }
   }
   const AssociativityProof proof = prove_associative(f, place.definition());
   if (!proof.op) {
-    user_error(asked, "partial results can be combined only of an associative update",
+    user_error(asked, "only an associative update has partial results that can be combined",
                proof.why_not,
                "Write it as f(x) = op(f(x), e) with an associative op, or keep its loops");
   }

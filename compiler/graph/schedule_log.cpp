@@ -140,8 +140,8 @@ class Replay {
       now = is_there ? &now->specializations[static_cast<size_t>(step)] : nullptr;
     }
     if (fits && (entry.special.empty() || now)) return;
-    user_error(asked, "what a directive is given to is there",
-               text(quoted(ScheduleLog{{entry}}.to_text()), " is given to nothing"),
+    user_error(asked, "the target of a directive exists",
+               text(quoted(ScheduleLog{{entry}}.to_text()), " has no target"),
                "Apply it to the program that it was taken from");
   }
 
@@ -180,9 +180,10 @@ class Replay {
   }
   FuncPtr func(const std::string& name) {
     if (const FuncPtr found = func_or_none(name)) return found;
-    user_error(asked, "every Func that it names is one of the program",
-               text("none is called ", quoted(name)),
-               "Apply it to the program that it was taken from, or cut what is said of that Func");
+    user_error(
+        asked, "every Func that it names is one of the program",
+        text("none is called ", quoted(name)),
+        "Apply it to the program that it was taken from, or remove the directives of that Func");
   }
   ParameterPtr image(const std::string& name) const {
     const auto* found =
@@ -191,9 +192,10 @@ class Replay {
   }
   ParameterPtr image_of_program(const std::string& name) const {
     if (const ParameterPtr found = image(name)) return found;
-    user_error(asked, "every image that it names is one of the program",
-               text("none is called ", quoted(name)),
-               "Apply it to the program that it was taken from, or cut what is said of that image");
+    user_error(
+        asked, "every image that it names is one of the program",
+        text("none is called ", quoted(name)),
+        "Apply it to the program that it was taken from, or remove the directives of that image");
   }
   // The source of a prefetch need not belong to the program.
   NamedFunc func_or_image(const std::string& name) {

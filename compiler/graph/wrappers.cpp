@@ -283,7 +283,7 @@ FuncPtr wrapper_of(const FuncPtr& handle, const std::vector<FuncPtr>& users,
     check_shared(*f, existing->second, keys, asked);
     if (clone == is_identity(*existing->second, *f)) {
       user_error(asked, "a user has either a wrapper or a clone",
-                 text(quoted(existing->second->name), " is there already"), "Keep that one");
+                 text(quoted(existing->second->name), " exists already"), "Keep that one");
     }
     return owning(handle, existing->second);
   }

@@ -339,7 +339,7 @@ struct Call : ExprNode {
   bool is_pure() const {
     return call_type != CallType::Operator || op_info(op).cls != OpClass::Effect;
   }
-  // The call of a C function. Requires: what is called by a name alone is a C function.
+  // The call of a C function. Requires: a call by name alone calls a C function.
   static Expr make(Type type, const std::string& name, const std::vector<Expr>& args,
                    CallType call_type = CallType::Extern);
   static Expr make(Type type, Op op, const std::vector<Expr>& args,

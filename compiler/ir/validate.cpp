@@ -204,7 +204,7 @@ class Validator {
   }
   void check_launch(const Stmt& s, const Launch& n) {
     only_in_flat(s);
-    require(!in_kernel_, s, "a kernel launches none");
+    require(!in_kernel_, s, "a kernel does not launch kernels");
     require(n.blocks.size() == 3 && n.threads.size() == 3, s, "grids and blocks have 3 dimensions");
     for (const Expr& count : n.blocks) {
       check(count);
@@ -279,7 +279,7 @@ class Validator {
   void check_offset(const Stmt& s, const Allocate& n) {
     const bool has_place = in_kernel_ && n.memory == MemoryType::GPUShared;
     require(n.offset.defined() == has_place, s,
-            "what lies in a kernel's shared memory, and nothing else, has a place there");
+            "an Allocate has an offset exactly if it lies in the shared memory of a kernel");
     if (!has_place) return;
     check(n.offset);
     require(n.offset.type() == Int(32), s, "an offset is an int32");

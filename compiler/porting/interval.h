@@ -100,7 +100,7 @@ class Scope {
   }
   [[noreturn]] static void refuse(const std::string& name) {
     user_error("look up " + retrograde::quoted(name) + " in a Scope",
-               "a name is pushed before it is looked up", "it is not there",
+               "a name is pushed before it is looked up", "it was not pushed",
                "Ask contains() first");
   }
   std::map<std::string, std::vector<Stored>> table_;

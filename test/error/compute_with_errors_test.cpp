@@ -69,11 +69,11 @@ TEST_F(ComputeWithErrors, TwoStagesOfOneFuncInOneNest) {
   expect_refused({"one after another"});
 }
 
-// rule: of its own Func, a stage joins the one before it
+// rule: within one Func, a stage joins the stage before it
 TEST_F(ComputeWithErrors, AStageThatIsNotTheOneBefore) {
   f(x, y) += 1;
   f(x, y) *= 2;
-  expect_error({"of its own Func, a stage joins the one before it", "update(0)"},
+  expect_error({"within one Func, a stage joins the stage before it", "update(0)"},
                [&] { f.update(1).compute_with(f, y); });
   expect_error({"Stages of one Func run in their order"}, [&] { f.compute_with(f.update(0), y); });
 }

@@ -166,7 +166,7 @@ TEST(DefinitionErrors, ArgumentsOfAFirstDefinitionAreDistinctVars) {
     Func g;
     g(3) = x;
   });
-  expect_error({"different Vars", "stands there twice"}, [&] {
+  expect_error({"different Vars", "appears twice"}, [&] {
     Func g;
     g(x, x) = x;
   });
@@ -179,13 +179,13 @@ TEST(DefinitionErrors, ArgumentsOfAFirstDefinitionAreDistinctVars) {
 
 TEST(DefinitionErrors, FreeVariables) {
   Setting s;
-  expect_error({"\"z\"", "stands on the left-hand side"}, [&] {
+  expect_error({"\"z\"", "appears on the left-hand side"}, [&] {
     Func g;
     g(s.x) = s.x + s.z;
   });
   s.f(s.x, s.y) = 1;
-  expect_error({"\"y\"", "stands on the left-hand side"}, [&] { s.f(s.x, 3) = s.y; });
-  expect_error({"stands on the left-hand side"}, [&] { s.f(s.x, s.z) = s.y; });
+  expect_error({"\"y\"", "appears on the left-hand side"}, [&] { s.f(s.x, 3) = s.y; });
+  expect_error({"appears on the left-hand side"}, [&] { s.f(s.x, s.z) = s.y; });
 }
 
 TEST(DefinitionErrors, ImplicitVariablesWithoutPlaceholder) {
@@ -232,14 +232,14 @@ TEST(DefinitionErrors, BoundsOfADomainThatReadTheFuncItself) {
   });
 }
 
-// rule: all definitions of a Func have as many values
+// rule: all definitions of a Func have the same number of values
 TEST(DefinitionErrors, UpdateOfAnotherTypeOrSize) {
   Setting s;
   expect_error({"same types", "int32", "float32"}, [&] { s.f(s.x, s.y) = 1.5f; });
   expect_error({"same types"}, [&] { s.f(s.x, s.y) += cast<uint64_t>(s.x); });
-  expect_error({"as many arguments"}, [&] { s.f(s.x) = 1; });
-  expect_error({"as many values"}, [&] { s.f(s.x, s.y) = Tuple(1, 2); });
-  expect_error({"as many values"}, [&] { s.f(s.x, s.y) += Tuple(1, 2); });
+  expect_error({"the same number of arguments"}, [&] { s.f(s.x) = 1; });
+  expect_error({"the same number of values"}, [&] { s.f(s.x, s.y) = Tuple(1, 2); });
+  expect_error({"the same number of values"}, [&] { s.f(s.x, s.y) += Tuple(1, 2); });
 }
 
 TEST(DefinitionErrors, UpdateAfterUse) {
@@ -262,8 +262,8 @@ TEST(DefinitionErrors, FloatCoordinateOnTheLeft) {
 
 TEST(DefinitionErrors, PureVariableOutOfItsPlace) {
   Setting s;
-  expect_error({"its own place", "Use an RDom"}, [&] { s.f(s.x, s.y) = s.f(s.x - 1, s.y); });
-  expect_error({"its own place"}, [&] { s.f(s.x, s.y) += s.f(s.y, s.x); });
+  expect_error({"keeps its position", "Use an RDom"}, [&] { s.f(s.x, s.y) = s.f(s.x - 1, s.y); });
+  expect_error({"keeps its position"}, [&] { s.f(s.x, s.y) += s.f(s.y, s.x); });
 }
 
 TEST(DefinitionErrors, RecurrenceWithoutFirstValue) {

@@ -19,20 +19,20 @@ struct Refused : testing::Test {
 // ---- constants that would wrap ----
 
 TEST_F(Refused, ClampToBoundsOfAnotherType) {
-  expect_error({"a bound is a value of the type", "255 has no place in int8"},
+  expect_error({"a bound is a value of the type", "255 does not fit int8"},
                [&] { clamp(i8, 0, 255); });
-  expect_error({"-1 has no place in uint8"}, [&] { clamp(u8, -1, 10); });
-  expect_error({"0.5 has no place in int32"}, [&] { clamp(x, 0.5f, 1); });
+  expect_error({"-1 does not fit uint8"}, [&] { clamp(u8, -1, 10); });
+  expect_error({"0.5 does not fit int32"}, [&] { clamp(x, 0.5f, 1); });
   expect_error({"int32 has values that uint8 has not"}, [&] { clamp(u8, x, 10); });
-  expect_error({"1e+300 has no place in float32"}, [&] { clamp(f32, 0, Expr(1e300)); });
+  expect_error({"1e+300 does not fit float32"}, [&] { clamp(f32, 0, Expr(1e300)); });
   EXPECT_EQ(clamp(u8, cast<int>(cast<uint8_t>(y)), 10).type(), UInt(8));
   EXPECT_EQ(clamp(f32, 0, x).type(), Float(32));
   EXPECT_EQ(clamp(x, 0.0f, 1.0f).type(), Int(32));
 }
 
 TEST_F(Refused, LerpOfEndsThatDoNotFit) {
-  expect_error({"a constant end", "300 has no place in uint8"}, [&] { lerp(u8, 300, 0.5f); });
-  expect_error({"-1 has no place in uint8"}, [&] { lerp(-1, u8, 0.5f); });
+  expect_error({"a constant end", "300 does not fit uint8"}, [&] { lerp(u8, 300, 0.5f); });
+  expect_error({"-1 does not fit uint8"}, [&] { lerp(-1, u8, 0.5f); });
   expect_error({"both values have one type", "uint8 and int8"}, [&] { lerp(u8, i8, 0.5f); });
   expect_error({"at most 32 bits", "int64"},
                [&] { lerp(cast<int64_t>(x), cast<int64_t>(y), 0.5f); });
@@ -96,9 +96,9 @@ TEST_F(Refused, IntegersThatAFloatWouldRound) {
 }
 
 TEST_F(Refused, MeansWithConstantsThatDoNotFit) {
-  expect_error({"300 has no place in uint8"}, [&] { halving_add(u8, 300); });
-  expect_error({"200 has no place in int8"}, [&] { rounding_halving_add(i8, 200); });
-  expect_error({"-3 has no place in uint8"}, [&] { halving_sub(u8, -3); });
+  expect_error({"300 does not fit uint8"}, [&] { halving_add(u8, 300); });
+  expect_error({"200 does not fit int8"}, [&] { rounding_halving_add(i8, 200); });
+  expect_error({"-3 does not fit uint8"}, [&] { halving_sub(u8, -3); });
   EXPECT_EQ(halving_add(u8, 3).type(), UInt(8));
 }
 
@@ -116,16 +116,16 @@ TEST_F(Refused, ExteriorsOfAnotherType) {
   const auto with = [&](const Expr& value) {
     return BoundaryConditions::constant_exterior(f, value, {{0, 10}});
   };
-  expect_error({"one of the type inside", "300 has no place in uint8"}, [&] { with(300); });
-  expect_error({"3.5 has no place in uint8"}, [&] { with(3.5f); });
+  expect_error({"one of the type inside", "300 does not fit uint8"}, [&] { with(300); });
+  expect_error({"3.5 does not fit uint8"}, [&] { with(3.5f); });
   EXPECT_EQ(with(255).type(), UInt(8));
 }
 
 TEST_F(Refused, LimitsThatAParamCannotHold) {
   Param<uint8_t> p("p");
   expect_error({"a value of the parameter's type", "300"}, [&] { p.set_range(0, 300); });
-  expect_error({"-1 has no place in uint8"}, [&] { p.set_min_value(-1); });
-  expect_error({"256 has no place in uint8"}, [&] { p.set_estimate(256); });
+  expect_error({"-1 does not fit uint8"}, [&] { p.set_min_value(-1); });
+  expect_error({"256 does not fit uint8"}, [&] { p.set_estimate(256); });
 }
 
 TEST_F(Refused, SizesAndCoordinatesBeyond32Bits) {
@@ -154,11 +154,11 @@ TEST_F(Refused, ConstantsThatOverflow) {
     return Buffer<>(f.realize({1})).type();
   };
   const std::initializer_list<std::string_view> phrases{
-      "constants of int32 and int64 do not overflow", "has no place in int32"};
+      "constants of int32 and int64 do not overflow", "does not fit int32"};
   expect_error(phrases, [&] { define(large * Expr(0x76543210)); });
   expect_error(phrases, [&] { define(x + select(x > 3, x, Expr(INT32_MAX) + 1)); });
   expect_error(phrases, [&] { define(Expr(INT32_MIN) - 1); });
-  expect_error({"has no place in int64"}, [&] { define(huge + huge); });
+  expect_error({"does not fit int64"}, [&] { define(huge + huge); });
   expect_error(phrases, [&] {
     Func f("f");
     f(x) = 0;

@@ -180,7 +180,7 @@ TEST_F(Rules, FusedBeforeFactoring) {
   g(y) += f(r.x, r.y);
   Var u("u"), t("t");
   g.update().reorder(r.x, y, r.y).fuse(r.x, y, t);
-  expect("reduction variables are fused with each other only", [&] { g.update().rfactor(r.y, u); });
+  expect("reduction variables are fused only with each other", [&] { g.update().rfactor(r.y, u); });
 }
 
 TEST_F(Rules, Wrappers) {

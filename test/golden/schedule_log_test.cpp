@@ -282,9 +282,9 @@ TEST(ScheduleLogs, SayWhatIsWrong) {
   expect_mentions(refused("k.compute_at(root)"),
                   {"every Func that it names is one of the program", "none is called \"k\""});
   expect_mentions(refused("f.update(0).run(x, Parallel)"),
-                  {"what a directive is given to is there", "f.update(0)"});
+                  {"the target of a directive exists", "f.update(0)"});
   expect_mentions(refused("f.specialization(0).run(x, Parallel)"),
-                  {"what a directive is given to is there"});
+                  {"the target of a directive exists"});
   expect_mentions(refused("f.run(z, Parallel)"), {"\"z\" must be a loop of this stage"});
 }
 

@@ -168,7 +168,7 @@ TEST(Nodes, HaveOperandsThatFit) {
   expect_error({"operands of a node are defined"}, [&] { Add::make(x, Expr()); });
   expect_error({"operands of a node have one type", "float32"}, [&] { Add::make(x, 1.0f); });
   expect_error({"the condition of a node is of type bool"}, [&] { Select::make(x, x, x); });
-  expect_error({"\"f\"", "what is called by a name alone is a C function"},
+  expect_error({"\"f\"", "a call by name alone calls a C function"},
                [&] { Call::make(Int(32), "f", {x}, Call::Halide); });
 }
 
@@ -483,12 +483,12 @@ TEST(Helpers, OfFilesAndText) {
   assert_file_exists(file);
   write_entire_file(file, std::vector<char>{'a', 'b'});
   EXPECT_EQ(read_entire_file(file), (std::vector<char>{'a', 'b'}));
-  expect_error({"the file is not there", file}, [&] { assert_no_file_exists(file); });
+  expect_error({"the file does not exist", file}, [&] { assert_no_file_exists(file); });
   ensure_no_file_exists(file);
   ensure_no_file_exists(file);
   assert_no_file_exists(file);
   EXPECT_FALSE(file_exists(file));
-  expect_error({"the file is there", file}, [&] { assert_file_exists(file); });
+  expect_error({"the file exists", file}, [&] { assert_file_exists(file); });
   expect_error({file, "the file system allows it"}, [&] { file_unlink(file); });
   const std::string folder = dir_make_temp();
   EXPECT_TRUE(file_exists(folder));

@@ -279,7 +279,7 @@ TEST_F(Directives, PrefetchNamesLoopsAndAnOffset) {
   ASSERT_EQ(g.get_schedule().prefetches.size(), 2u);
   EXPECT_EQ(g.get_schedule().prefetches[0].from, "y");
   EXPECT_EQ(g.get_schedule().prefetches[1].at, "y");
-  expect_refused([&] { g.prefetch(f, y, x, 2); }, {"inside of it", "Swap"});
+  expect_refused([&] { g.prefetch(f, y, x, 2); }, {"inside that loop", "Swap"});
   expect_refused([&] { g.prefetch(f, Var("z"), x, 2); }, {"\"z\"", "must be a loop"});
   expect_refused([&] { g.prefetch(f, x, x, 2.5f); }, {"integer"});
   Func undefined("undefined");
