@@ -197,7 +197,7 @@ TEST_F(ComputeWithErrors, ALevelThatIsNeverSet) {
   LoopLevel level;
   g.compute_with(level);
   expect_refused({"is set before the pipeline is compiled", "never was"});
-  expect_error({"of its own Func"}, [&] { level.set(LoopLevel(g, x)); });
+  expect_error({"within one Func"}, [&] { level.set(LoopLevel(g, x)); });
 }
 
 TEST_F(ComputeWithErrors, AProducerAtALoopOfTheGuest) {

@@ -327,7 +327,7 @@ TEST_F(Rfactor, RefusesWrongNames) {
   Stage update = f.update();
   expect_error({"must be a loop"}, [&] { update.rfactor(RVar("nowhere"), u); });
   expect_error({"named twice"}, [&] { update.rfactor({{r.x, u}, {r.x, v}}); });
-  expect_error({"there already"}, [&] { update.rfactor({{r.x, u}, {r.y, u}}); });
+  expect_error({"already exists"}, [&] { update.rfactor({{r.x, u}, {r.y, u}}); });
   expect_error({"\"x\""}, [&] { update.rfactor(r.x, x); });
 }
 
