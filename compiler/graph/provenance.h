@@ -32,7 +32,7 @@ struct AdjointTraits {
   bool levelled = false;
   // Infinite where it passed the pole of a partial; a factor may be 0 there, as in a norm at 0.
   bool singular = false;
-  // For tangents: infinite where an input value is infinite; a later partial may be 0 there.
+  // For tangents: infinite where a value on their path is infinite; a later partial may be 0 there.
   bool infinite = false;
   bool operator==(const AdjointTraits& other) const = default;
   void add(const AdjointTraits& other) {

@@ -18,7 +18,7 @@
 namespace retrograde {
 namespace {
 
-// What to show: the loops of Func::print_loop_nest, or the statement after this pass.
+// The text to show: the loops of Func::print_loop_nest, or the statement after this pass.
 using View = const char*;
 constexpr View Loops = nullptr, Storage = "simplify_storage", Branches = "fork_async",
                Lookups = "memoize", Cut = "partition_loops";

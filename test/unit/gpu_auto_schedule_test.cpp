@@ -527,7 +527,7 @@ TEST(GpuAutoSchedules, CutSumsOverDomainsOfAnySize) {
   }
 }
 
-// Of equal values the first wins, as on the CPU.
+// The first of equal values wins, as on the CPU.
 TEST(GpuAutoSchedules, FindTheFirstLeastOfMany) {
   Func least("least");
   RDom r(0, 90, 0, 100, "r");

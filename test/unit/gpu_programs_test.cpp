@@ -116,7 +116,7 @@ TEST_P(GpuPrograms, SurviveEachFailureOfTheDriver) {
   EXPECT_GT(failures, 5);
 }
 
-// Summing so many values serially in float is inaccurate, so the exact sum is the reference.
+// Summing this many values serially in float is inaccurate, so the exact sum is the reference.
 TEST(GpuReduction, OfManyValuesIsTheirSum) {
 #ifdef RETROGRADE_MANY_PROGRAMS
   constexpr int values = 1 << 24;
