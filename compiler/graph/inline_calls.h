@@ -8,7 +8,7 @@
 namespace retrograde::graph {
 
 // Replaces the calls of these Funcs in the stage's definition, including calls between them.
-// Requires: what is inlined has one pure definition; what is inlined has no schedule of its own.
+// Requires: an inlined Func has one pure definition; an inlined Func has no schedule of its own.
 void inline_into(const SchedulePlace& stage, const std::vector<FuncPtr>& inlined);
 
 }  // namespace retrograde::graph

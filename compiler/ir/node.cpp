@@ -77,7 +77,7 @@ Expr::Expr(double value) : Expr(ir::make_const(Float(64), value)) {}
 Expr::Expr(const std::string& text) : Ref(ir::make_node<ir::StringImm>(Handle(), text)) {}
 Expr::Expr(const char* text) {
   if (!text) {
-    user_error("make an Expr of a text", "a text is not null", "the pointer to it is null",
+    user_error("make an Expr from a text", "a text is not null", "the pointer to it is null",
                "Give it a text, or a number such as 0");
   }
   *this = Expr(std::string(text));

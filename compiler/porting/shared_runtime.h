@@ -13,7 +13,7 @@ struct JITSharedRuntime {
   static JITHandlers set_default_handlers(const JITHandlers& handlers);
   // Fills in a context for a call with `handlers`. Its custom_malloc and custom_free become
   // functions that handlers can call, unless others are set.
-  // Requires: there is a context.
+  // Requires: the context is not null.
   static void populate_jit_handlers(JITUserContext* context, const JITHandlers& handlers);
   // The capacity in bytes of the cache of memoized Funcs; 0: the default.
   static void memoization_cache_set_size(int64_t bytes);

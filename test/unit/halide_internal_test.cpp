@@ -375,9 +375,9 @@ TEST(EagerInline, TakesWhatHasNoScheduleOfItsOwn) {
   f(x) += 1;
   g(x) = x;
   h(x) = f(x) + g(x);
-  expect_error({"what is inlined has one pure definition", "update"}, [&] { h.eager_inline(f); });
+  expect_error({"an inlined Func has one pure definition", "update"}, [&] { h.eager_inline(f); });
   g.compute_root();
-  expect_error({"what is inlined has no schedule of its own"}, [&] { h.eager_inline(g); });
+  expect_error({"an inlined Func has no schedule of its own"}, [&] { h.eager_inline(g); });
 }
 
 TEST(NewDirectives, StreamingIsAHintThatChangesNoValue) {
@@ -550,7 +550,7 @@ TEST(SharedRuntime, HasHandlersForAllCalls) {
   ASSERT_NE(memory, nullptr);
   context.handlers.custom_free(&context, memory);
   EXPECT_EQ(context.handlers.custom_print, handlers.custom_print);
-  expect_error({"there is a context"},
+  expect_error({"the context is not null"},
                [&] { JITSharedRuntime::populate_jit_handlers(nullptr, handlers); });
   JITSharedRuntime::memoization_cache_set_size(1 << 16);
   JITSharedRuntime::memoization_cache_set_size(0);

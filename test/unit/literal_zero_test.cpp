@@ -111,7 +111,7 @@ TEST(NullText, IsAnError) {
   expect_null([&] { RVar v(none); }, "name an RVar");
   expect_null([&] { Func f(none); }, "name a Func");
   expect_null([&] { Param<int> p(none); }, "name a Param");
-  expect_null([&] { Expr e(none); }, "make an Expr of a text");
+  expect_null([&] { Expr e(none); }, "make an Expr from a text");
   expect_null([&] { Target t(none); }, "read a target");
 }
 

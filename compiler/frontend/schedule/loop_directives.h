@@ -434,7 +434,7 @@ class LoopDirectives {
   // rfactor, is what came of it. Other users of the Funcs still call them.
   //   g(x) = x * x                    g(x) = x * x
   //   f(x) = g(x) + g(x + 1)     =>   f(x) = x * x + (x + 1) * (x + 1)
-  // Requires: what is inlined has one pure definition; what is inlined has no schedule of its own.
+  // Requires: an inlined Func has one pure definition; an inlined Func has no schedule of its own.
   Self& eager_inline(const std::vector<Func>& funcs);
   template <std::same_as<Func>... Rest>
   Self& eager_inline(const Func& first, const Rest&... rest) {
