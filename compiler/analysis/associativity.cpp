@@ -1,4 +1,4 @@
-// associativity.cpp -- the proof of a whole update from those of its components.
+// associativity.cpp -- assembles the proof of an update from the proofs of its components.
 #include "analysis/associativity.h"
 
 #include <algorithm>
@@ -13,9 +13,9 @@ namespace retrograde::analysis {
 
 namespace {
 
-// ---- evidence ----
+// ---- explanations of failures ----
 
-// The first thing in the update that no law is known of; empty when there is none.
+// The first operation in the update for which no law is known; empty when there is none.
 std::string obstacle_in(const Component& c) {
   for (const Expr& value : c.update) {
     std::string found;
@@ -34,7 +34,7 @@ std::string obstacle_in(const Component& c) {
   return "";
 }
 
-// The form of the update, and what in it no law is known of.
+// The form of the update, and the operation in it for which no law is known.
 std::string why_not(const Component& c) {
   std::string form;
   for (size_t i = 0; i < c.size(); i++) form += text(i ? ", " : "", c.xs[i], " = ", c.update[i]);
@@ -104,8 +104,8 @@ class Prover {
   AssociativeOp op_;
   AssociativityProof proof_;
 
-  // A value that is left alone, and that no other value of its group depends on.
-  bool is_untouched(const std::vector<int>& group) const {
+  // Whether the value is unchanged and no other value of its group depends on it.
+  bool is_unchanged(const std::vector<int>& group) const {
     const Variable* v = values_[group[0]].as<Variable>();
     return group.size() == 1 && v && v->name == xs_[group[0]];
   }
@@ -131,7 +131,7 @@ class Prover {
   }
 
   bool prove_group(const std::vector<int>& group) {
-    if (is_untouched(group)) {
+    if (is_unchanged(group)) {
       op_.values[group[0]] = values_[group[0]];
       return true;
     }
@@ -159,7 +159,7 @@ class Prover {
     return true;
   }
 
-  // The group and all that have an unknown in common with it: x -> a x + b composes only as a pair.
+  // The group and all groups that share an unknown with it: x -> a x + b composes only as a pair.
   std::vector<int> with_sharing(const std::vector<std::vector<int>>& groups, size_t k) const {
     const auto components = mapped(groups, [&](const auto& group) { return component(group); });
     std::vector<bool> taken(groups.size());

@@ -17,7 +17,7 @@ Order reversed(Order order) {
   return order == Order::Greater ? Order::Less : order;
 }
 
-// a to c, when a stands in `ab` to b, and b in `bc` to c.
+// The order of a and c, from the orders of a and b and of b and c.
 Order composed(Order ab, Order bc) {
   if (ab == Order::Unknown || bc == Order::Unknown) return Order::Unknown;
   if (ab == Order::Equal) return bc;
@@ -86,7 +86,7 @@ bool CaseFacts::assume(const std::vector<Atom>& atoms, int a, int b, Order order
   return set(a, b, order) && close(atoms);
 }
 
-// Transitivity; nothing is above the highest or below the lowest.
+// Transitive closure; nothing is above the highest atom or below the lowest.
 bool CaseFacts::close(const std::vector<Atom>& atoms) {
   bool changed = true;
   while (changed) {
@@ -142,7 +142,7 @@ LawValue LawEvaluator::atom(int index, Atom::Kind kind) const {
 bool LawEvaluator::equal(const LawValue& a, const LawValue& b) const {
   if (a.is_truth != b.is_truth) return false;
   if (a.is_truth) return a.truth == b.truth;
-  // Values were made when less was assumed, but never under other assumptions: the case is fixed.
+  // Both values come from this case. Assumptions may have been added since, but none was revoked.
   return a.number == b.number;
 }
 

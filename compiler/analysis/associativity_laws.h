@@ -1,9 +1,8 @@
-// associativity_laws.h -- deciding equations between expressions by cases.
+// associativity_laws.h -- decides equations between expressions by case distinction.
 //
-// Values are polynomials with integer coefficients over atoms (unknown numbers), or truths. Where
-// an expression compares two atoms, or asks for the truth of an unknown condition, the proof
-// splits: an equation holds when it holds for every order and truth that do not contradict each
-// other.
+// Values are polynomials with integer coefficients over atoms (unknown numbers), or truth values.
+// Where an expression compares two atoms or needs the truth of an unknown condition, the proof
+// splits into cases. An equation holds when it holds in every consistent case.
 #pragma once
 
 #include <cstdint>
@@ -17,8 +16,8 @@
 
 namespace retrograde::analysis {
 
-// A sum of products of atoms, each with its coefficient. Coefficients wrap like integers do.
-using Monomial = std::vector<int>;  // atoms, sorted; with repetition
+// A sum of products of atoms with coefficients, which wrap like integers.
+using Monomial = std::vector<int>;  // atoms, sorted, possibly repeated
 using Polynomial = std::map<Monomial, int64_t>;
 
 struct LawValue {
@@ -33,12 +32,12 @@ struct Atom {
   Kind kind = Kind::Number;
 };
 
-// What is assumed of the atoms in one case.
+// The assumptions about the atoms in one case.
 class CaseFacts {
  public:
   enum class Order : int8_t { Unknown, Less, Equal, Greater };
   Order order(int a, int b) const;
-  // With all that follows. False when it contradicts what is assumed already.
+  // Adds an assumption and its consequences. False when it contradicts earlier ones.
   bool assume(const std::vector<Atom>& atoms, int a, int b, Order order);
   int representative(int atom) const;  // the smallest of the atoms that are equal to it
   std::map<int, bool> truths;
@@ -49,16 +48,16 @@ class CaseFacts {
   bool close(const std::vector<Atom>& atoms);
 };
 
-// What stops an evaluation: a question that splits the case, or something it cannot decide.
+// Thrown to stop an evaluation: a question on which the case must split, or an undecidable one.
 struct LawQuestion {
-  int a = -1, b = -1;   // the order of two atoms; of one, b is -1: its truth
-  std::string unknown;  // not empty: no case helps
+  int a = -1, b = -1;   // the order of two atoms; with b == -1 the truth of one
+  std::string unknown;  // if not empty, no case helps
 };
 
-// The value of an expression in one case. Throws LawQuestion.
+// Evaluates an expression in one case. Throws LawQuestion.
 class LawEvaluator {
  public:
-  // `bitwise`: numbers stand for one of their bits, which are truths.
+  // `bitwise`: each number represents one of its bits, as a truth value.
   LawEvaluator(const CaseFacts& facts, bool bitwise) : facts_(facts), bitwise_(bitwise) {}
   LawValue value(const Expr& e, const LawEnvironment& environment);
   LawValue atom(int index, Atom::Kind kind) const;
@@ -77,10 +76,10 @@ class LawEvaluator {
   LawValue constant(const Expr& e, double real, int64_t integer) const;
   bool truth(const Expr& e);
   const Polynomial& number(const Expr& e);
-  int compare(const Polynomial& a, const Polynomial& b) const;  // < 0, 0, > 0
+  int compare(const Polynomial& a, const Polynomial& b) const;  // negative, 0 or positive
 };
 
-// Whether `claim` holds in all cases. `ignore_ties`: atoms that are compared count as different.
+// Whether `claim` holds in all cases. `ignore_ties`: compared atoms are assumed to differ.
 using LawClaim = std::function<bool(LawEvaluator&)>;
 bool holds_always(const std::vector<Atom>& atoms, bool bitwise, bool ignore_ties,
                   const LawClaim& claim);

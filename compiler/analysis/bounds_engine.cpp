@@ -1,5 +1,5 @@
-// Sums are taken apart into linear form first, so that a variable that occurs twice counts once;
-// each atom of the sum then has its own rule below. What does not vary stands for itself.
+// Sums are decomposed into linear form first, so that a variable that occurs twice counts once.
+// Each atom of the sum has its own rule below. An expression that does not vary is its own bound.
 #include "analysis/bounds_engine.h"
 
 #include <algorithm>
@@ -56,12 +56,12 @@ Interval BoundsEngine::compute(const Expr& e) {
   if (!e.type().is_scalar()) return type_range(e.type());
   if (!varies(e)) return Interval::point(canonical(e));
   if (!has_linear_form(e.type())) return atom_bounds(e);
-  Sum form = joined(linear_form(e));
+  Sum form = join_correlated_terms(linear_form(e));
   bool is_atom = form.terms.size() == 1 && form.terms[0].atom.same_as(e);
   return is_atom ? bounds_of_atom(e) : sum_bounds(form);
 }
 
-// What linear_form called an atom is never taken apart again, so the recursion always descends.
+// Atoms of linear_form are never decomposed again, so the recursion always descends.
 Interval BoundsEngine::bounds_of_atom(const Expr& atom) {
   return atoms_.get(atom, [&] { return atom_bounds(atom); });
 }
@@ -78,12 +78,13 @@ Interval BoundsEngine::sum_bounds(const Sum& form) {
   if (!form.valid) return Interval::everything();
   const std::optional<Interval> known = bounds_by_facts(form);
   if (known) return *known;
-  const std::optional<Interval> apart = bounds_by_sides(form);
+  const std::optional<Interval> apart = bounds_by_distribution(form);
   return apart ? *apart : sum_of_bounds(form);
 }
 
-// What varies of a sum, with its sign; of minima and maxima, too, what is in either side, and what is divided, of which
-// a remainder may be left. Minima share their sides: the first few are enough.
+// Collects the varying atoms of a sum with their signs. It looks into both sides of minima and
+// maxima, and into dividends, of which a remainder may be left. Nested minima repeat their sides,
+// so the number is limited.
 void BoundsEngine::collect_varying(const Sum& form, bool negated,
                                    std::vector<std::pair<Expr, bool>>& found) {
   for (const Term& term : form.terms) {
@@ -102,8 +103,8 @@ void BoundsEngine::collect_varying(const Sum& form, bool negated,
   }
 }
 
-// Whether something that varies is in both, and less of it in their sum.
-bool BoundsEngine::shares_varying(const Sum& rest, const Sum& side, int64_t factor) {
+// Whether both contain a varying atom that partly cancels in their sum.
+bool BoundsEngine::may_cancel(const Sum& rest, const Sum& side, int64_t factor) {
   std::vector<std::pair<Expr, bool>> of_rest, of_side;
   collect_varying(side, factor < 0, of_side);
   if (of_side.empty()) return false;
@@ -115,29 +116,30 @@ bool BoundsEngine::shares_varying(const Sum& rest, const Sum& side, int64_t fact
   });
 }
 
-// 16*x + 8*min(d - 2*x, 1)  is  min(8*d, 16*x + 8): ends of x and of the minimum apart would add up
-// to more. The same of max. Each step takes one of them away; a few steps, since each doubles the work.
-std::optional<Interval> BoundsEngine::bounds_by_sides(const Sum& form) {
+// 16*x + 8*min(d - 2*x, 1)  is  min(8*d, 16*x + 8): bounding x and the minimum separately would be
+// too wide. The same holds for max. Each step removes one minimum or maximum, and doubles the work,
+// so the number of steps is limited.
+std::optional<Interval> BoundsEngine::bounds_by_distribution(const Sum& form) {
   for (const Term& term : form.terms) {
     const Expr& atom = term.atom;
     if (atom.kind() != Kind::Min && atom.kind() != Kind::Max) continue;
     const auto& op = *atom.as<Binary>();
     const Sum rest = plus(form, linear_form(atom), -term.factor);
     const Sum a = linear_form(op.a), b = linear_form(op.b);
-    if (!rest.valid || !a.valid || !b.valid || sides_taken_ >= most_sides) continue;
-    if (!shares_varying(rest, a, term.factor) && !shares_varying(rest, b, term.factor)) continue;
-    ++sides_taken_;
-    const Interval x = sum_bounds(joined(plus(rest, a, term.factor)));
-    const Interval y = sum_bounds(joined(plus(rest, b, term.factor)));
-    --sides_taken_;
+    if (!rest.valid || !a.valid || !b.valid || distributions_ >= most_distributions) continue;
+    if (!may_cancel(rest, a, term.factor) && !may_cancel(rest, b, term.factor)) continue;
+    ++distributions_;
+    const Interval x = sum_bounds(join_correlated_terms(plus(rest, a, term.factor)));
+    const Interval y = sum_bounds(join_correlated_terms(plus(rest, b, term.factor)));
+    --distributions_;
     const bool is_least = (atom.kind() == Kind::Min) == (term.factor > 0);
     return is_least ? interval_min(x, y) : interval_max(x, y);
   }
   return std::nullopt;
 }
 
-// Where x + y <= 29 is known, x + y + z lies below 29 + z. The ends of x and y apart, 29 - y and
-// 29 - x, would add up to more than that as soon as the loops over x and y are looked at.
+// If x + y <= 29 is known, x + y + z is at most 29 + z. The separate ends of x and y, 29 - y and 29
+// - x, would give a wider range once the loops over x and y are eliminated.
 std::optional<Interval> BoundsEngine::bounds_by_facts(const Sum& form) {
   std::optional<Interval> result;
   for (const Sum& fact : facts_) {
@@ -155,7 +157,7 @@ std::optional<Interval> BoundsEngine::bounds_by_facts(const Sum& form) {
   return result;
 }
 
-// Every end adds up on its own; the part that does not vary goes into both.
+// Adds the ends term by term; the part that does not vary is added to both.
 Interval BoundsEngine::sum_of_bounds(const Sum& form) {
   Sum fixed = linear_sum(form.type, form.constant);
   std::vector<std::pair<Interval, int64_t>> varying;
@@ -176,7 +178,7 @@ Interval BoundsEngine::sum_of_bounds(const Sum& form) {
     return to_expr(sum);
   };
   Interval result{end(false), end(true)};
-  // One handle for both ends where they are equal, so that is_point() holds.
+  // Equal ends share one handle, so that is_point() holds.
   if (result.is_bounded() && constant_difference(result.min, result.max) == 0)
     result.max = result.min;
   return result;
@@ -190,10 +192,10 @@ Expr canonical_cut(Kind kind, const Expr& a, const Expr& b) {
 
 }  // namespace
 
-// c*y - c*k*(y / k)  is  c*(y % k): two correlated terms become one. So do those of a part of y that
-// varies:  a + k*((b - a) / k), where the last of tiles begins, is  b - (b - a) % k, whatever a is.
-// And the difference of two clamps of one value becomes one clamp.
-Sum BoundsEngine::joined(Sum form) {
+// Joins correlated terms. c*y - c*k*(y / k)  is  c*(y % k). The same holds for a varying part of y:
+// a + k*((b - a) / k), the start of the last tile, is  b - (b - a) % k  for any a. The difference
+// of two clamps of one value becomes one clamp.
+Sum BoundsEngine::join_correlated_terms(Sum form) {
   for (const Term& term : std::vector<Term>(form.terms)) {
     const Div* div = term.atom.as<Div>();
     auto k = div ? as_const_int(div->b) : std::nullopt;
@@ -241,7 +243,7 @@ Interval BoundsEngine::atom_bounds(const Expr& e) {
       [&](const ExprNode& n) { return type_range(n.type); });
 }
 
-// int(abs(a)): ends of the unsigned value in between say nothing of the sign when they are symbols.
+// For int(abs(a)), symbolic ends of the unsigned value in between do not determine the sign.
 Interval BoundsEngine::cast_bounds(Type type, const Expr& value) {
   const auto* call = value.as<Call>();
   if (call && call->is_op(Op::abs, Op::absd) && call->args[0].type() == type && type.is_int()) {
@@ -253,7 +255,8 @@ Interval BoundsEngine::cast_bounds(Type type, const Expr& value) {
   if (!value.type().is_float() || v.min.defined() || !is_nonnegative_or_nan(value))
     return interval_cast(type, value.type(), v);
   if (v.max.defined()) return interval_cast(type, value.type(), {make_zero(value.type()), v.max});
-  // Where it may be NaN, too, the integer is kept from being negative (lower/nests/strict_indices.h).
+  // Where it may be NaN too, the integer is kept from being negative
+  // (lower/nests/strict_indices.h).
   Interval result = type_range(type);
   if (has_linear_form(type)) result.min = make_zero(type);
   return result;
@@ -328,7 +331,7 @@ BoundsEngine::Truth BoundsEngine::compare_truth(Kind kind, const Expr& a, const 
   if (a.type().is_bool() || !a.type().is_int_or_uint()) return Truth::Unknown;
   std::optional<int64_t> low, high;  // of a - b
   if (has_linear_form(a.type())) {
-    Interval d = sum_bounds(joined(plus(linear_form(a), linear_form(b), -1)));
+    Interval d = sum_bounds(join_correlated_terms(plus(linear_form(a), linear_form(b), -1)));
     low = constant_min(d);
     high = constant_max(d);
   } else if (a.type().bits() < 64) {
@@ -343,7 +346,7 @@ BoundsEngine::Truth BoundsEngine::compare_truth(Kind kind, const Expr& a, const 
     if (low && high && *low == 0 && *high == 0) return Truth::True;
     return (low && *low > 0) || (high && *high < 0) ? Truth::False : Truth::Unknown;
   }
-  int64_t limit = kind == Kind::LT ? -1 : 0;  // holds while a - b <= limit
+  int64_t limit = kind == Kind::LT ? -1 : 0;  // the comparison means a - b <= limit
   if (high && *high <= limit) return Truth::True;
   return low && *low > limit ? Truth::False : Truth::Unknown;
 }
@@ -380,7 +383,7 @@ void BoundsEngine::narrow(const Expr& condition, bool is_true, Narrowed& narrowe
   if (!op) return;
   Kind kind = condition.kind();
   if (kind == Kind::And || kind == Kind::Or) {
-    if (is_true != (kind == Kind::And)) return;  // "one of both" says nothing about either
+    if (is_true != (kind == Kind::And)) return;  // a disjunction implies neither operand
     narrow(op->a, is_true, narrowed);
     narrow(op->b, is_true, narrowed);
   } else if (is_true) {
@@ -428,7 +431,7 @@ void BoundsEngine::narrow_nonpositive(const Sum& form, Narrowed& narrowed) {
     if (!old) continue;
     ++loose;
     Sum rest = plus(form, linear_form(term.atom), -term.factor);
-    Expr least = sum_bounds(joined(rest)).min;
+    Expr least = sum_bounds(join_correlated_terms(rest)).min;
     if (!least.defined()) continue;
     int64_t c = term.factor;
     Sum limit = linear_form(least);  // c*v + limit <= 0
@@ -466,7 +469,7 @@ Interval BoundsEngine::value_of_func(const Call& call) {
   return it == shared_->values->end() ? type_range(call.type) : it->second;
 }
 
-// Operands that may be NaN, or infinite where that makes a NaN, leave everything open.
+// If an operand may be NaN, or infinite where that gives NaN, the value is unbounded.
 Interval BoundsEngine::bounds_within(const Call& call, const OpInfo& info) {
   if (info.real.nan == Nan::NanOutside) return Interval::everything();
   for (const Expr& arg : call.args) {
@@ -481,7 +484,7 @@ Interval BoundsEngine::bounds_within(const Call& call, const OpInfo& info) {
   return {end(info.values.low), end(info.values.high)};
 }
 
-// A function that rises and has a value at the lower end has one above it.
+// For an increasing function with a value at the lower end, all values are above that one.
 Interval BoundsEngine::bounds_at_ends(const Call& call, const OpInfo& info) {
   const Interval v = bounds(call.args[0]);
   if (info.real.nan == Nan::NanOutside) {

@@ -1,11 +1,11 @@
-// The machine behind bounds_of and footprints: one memoised answer per node, and child engines for
+// The engine behind bounds_of and footprints: one memoised interval per node, and child engines for
 // code that runs only under a condition.
 //
-// Meaning of an Interval here
-//   integers  every value lies between the ends that are defined
-//   floats    the same, and with at least one end defined the value is no NaN
-// Ends are built in canonical linear form (linear.h), so differences between ends cancel without a
-// simplifier.
+// Meaning of an Interval
+//   integers  every value lies between the defined ends
+//   floats    the same; with at least one defined end, the value is not NaN
+// Ends are built in canonical linear form (linear.h), so differences between ends cancel without
+// the simplifier.
 #pragma once
 
 #include <map>
@@ -28,23 +28,23 @@ class BoundsEngine {
   BoundsEngine(const Scope<Interval>& variables, const ValueBounds* values);
 
   Interval bounds(const Expr& e);
-  void bind(const Let& let);  // the body's variable ranges over the value
+  void bind(const Let& let);  // the variable of the body ranges over the value
 
   enum class Truth { False, True, Unknown };
   Truth truth(const Expr& condition);
-  bool varies(const Expr& e);  // mentions a variable of the scope, or a value that only the running
-                               // program knows
+  // Whether it mentions a variable of the scope, or a value known only at run time.
+  bool varies(const Expr& e);
 
-  // The engine for code that runs only where `condition` is (or is not) true: variables of the
-  // scope are narrowed by the comparisons in it. This engine itself when nothing is gained or too
-  // many engines exist.
+  // The engine for code that runs only where `condition` is true (or false): comparisons in it
+  // narrow the variables of the scope. Returns this engine when nothing is gained or too many
+  // engines exist.
   BoundsEngine& under(const Expr& condition, bool is_true);
 
  private:
   struct Shared {
     const ValueBounds* values;
     int engines_left =
-        16;  // contexts multiply with nested conditions: beyond this many, conditions are not used
+        16;  // nested conditions multiply engines; beyond this many, conditions are ignored
   };
   explicit BoundsEngine(BoundsEngine& outer);
 
@@ -53,10 +53,10 @@ class BoundsEngine {
   Interval sum_bounds(const Sum& form);
   Interval sum_of_bounds(const Sum& form);
   std::optional<Interval> bounds_by_facts(const Sum& form);
-  std::optional<Interval> bounds_by_sides(const Sum& form);
+  std::optional<Interval> bounds_by_distribution(const Sum& form);
   void collect_varying(const Sum& form, bool negated, std::vector<std::pair<Expr, bool>>& found);
-  bool shares_varying(const Sum& rest, const Sum& side, int64_t factor);
-  Sum joined(Sum form);
+  bool may_cancel(const Sum& rest, const Sum& side, int64_t factor);
+  Sum join_correlated_terms(Sum form);
   Interval bounds_of_atom(const Expr& atom);
   Interval atom_bounds(const Expr& e);
   Interval cast_bounds(Type type, const Expr& value);
@@ -70,7 +70,8 @@ class BoundsEngine {
   Interval bounds_by_rule(const Call& call);
   Interval value_of_func(const Call& call);
   Truth compare_truth(Kind kind, const Expr& a, const Expr& b);
-  // What a condition says of the variables of the scope: of each alone, and sums of several, <= 0.
+  // The consequences of a condition: ranges of single variables of the scope, and sums that are <=
+  // 0.
   struct Narrowed {
     std::map<std::string, Interval> variables;
     std::vector<Sum> facts;
@@ -81,13 +82,13 @@ class BoundsEngine {
 
   std::shared_ptr<Shared> shared_;
   Scope<Interval> scope_;
-  BoundsEngine* outer_ = nullptr;  // without the condition
-  std::vector<Sum> facts_;         // of the condition
-  static constexpr int most_sides = 3;
+  BoundsEngine* outer_ = nullptr;  // the engine without the condition
+  std::vector<Sum> facts_;         // implied by the condition, each <= 0
+  static constexpr int most_distributions = 3;
   static constexpr size_t most_varying = 32;
-  int sides_taken_ = 0;  // of minima and maxima, by who calls
+  int distributions_ = 0;  // nesting depth of bounds_by_distribution
   NodeMemo<Interval> memo_;
-  NodeMemo<Interval> atoms_;  // the same for what is no sum
+  NodeMemo<Interval> atoms_;  // for expressions that are not sums
   NodeMemo<bool> varies_;
   struct Child {
     Expr condition;

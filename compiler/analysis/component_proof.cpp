@@ -12,7 +12,7 @@ namespace {
 
 // ---- laws ----
 
-// The atoms of a claim, and environments made of them.
+// The atoms of a claim, and environments that bind operands to them.
 class Operands {
  public:
   std::vector<Atom> atoms;
@@ -87,7 +87,7 @@ class Laws {
       return same(e, update(e, x), op(e, x, update(e, identity(e))));
     });
   }
-  // The g that F_i(id, g) is, when nothing reaches the identity's extremes; -1: none.
+  // The g that equals F_i(id, g), unless the identity's extremes take part; -1 when there is none.
   int unknown_in(size_t i) const {
     int found = -1;
     prove(true, [&](LawEvaluator& e) {
@@ -99,7 +99,7 @@ class Laws {
     });
     return found;
   }
-  // Why the laws are not proven, after a proof failed.
+  // After a failed proof, the reason.
   const std::string& obstacle() const { return obstacle_; }
 
  private:
@@ -207,7 +207,8 @@ void add_single_operators(const Component& c, std::vector<Candidate>& candidates
   }
 }
 
-// The extreme of value `key`, and what else came with it. `later`: of equal ones the later wins.
+// Proposes the extreme of value `key` together with the other values at it. `later`: the later of
+// equal ones wins.
 void add_extremes(const Component& c, std::vector<Candidate>& candidates) {
   for (size_t key = 0; key < c.size(); key++) {
     if (c.type(key).is_bool()) continue;
@@ -225,7 +226,7 @@ void add_extremes(const Component& c, std::vector<Candidate>& candidates) {
   }
 }
 
-// The identities that may fit each value, by what the update does with it.
+// The identities that may fit each value, judging by how the update uses it.
 std::vector<std::vector<Unit>> possible_units(const Component& c) {
   std::vector<std::vector<Unit>> result;
   for (size_t i = 0; i < c.size(); i++) {
@@ -250,7 +251,7 @@ std::vector<std::vector<Unit>> possible_units(const Component& c) {
   return result;
 }
 
-// The update itself with y in the places of the g that it gives from an identity.
+// Proposes the update itself, with y in place of the g that it returns for an identity.
 void add_update_itself(const Component& c, const std::vector<Unit>& identity,
                        std::vector<Candidate>& candidates) {
   const Candidate probe{c.update, identity};

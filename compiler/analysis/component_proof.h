@@ -1,5 +1,5 @@
-// component_proof.h -- an associative operator for one component of an update: candidates are
-// proposed, and the laws of each are proven by cases (associativity_laws.h).
+// component_proof.h -- finds an associative operator for one component of an update: proposes
+// candidates and proves their laws by cases (associativity_laws.h).
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,11 @@
 
 namespace retrograde::analysis {
 
-// What an element of an identity may be.
+// The kinds of constants in an identity.
 enum class Unit : uint8_t { Zero, One, Highest, Lowest, True, False, Ones, Any };
 
 struct Candidate {
-  std::vector<Expr> values;  // over xs and ys
+  std::vector<Expr> values;  // op, over xs and ys
   std::vector<Unit> identity;
 };
 
@@ -24,9 +24,9 @@ struct Accepted {
   bool breaks_ties = false;
 };
 
-// The first candidate that is associative, has its identity, and that the update follows from:
-// F(x, g) == op(x, F(identity, g)). Ties: of equal extremes another may win than in the order of
-// the update; values stay the same.
+// The first candidate that is associative, has its identity, and represents the update: F(x, g) ==
+// op(x, F(identity, g)). Ties: another one of several equal extremes may win than in the order of
+// the update; the extreme itself is the same.
 std::optional<Accepted> prove(const Component& c);
 
 }  // namespace retrograde::analysis

@@ -1,4 +1,4 @@
-// Hulls and intersections, and the public face of the bounds engine.
+// Hulls and intersections, and the public interface of the bounds engine.
 #include "analysis/interval.h"
 
 #include "analysis/bounds_engine.h"
@@ -45,7 +45,7 @@ Interval bounds_of(const Expr& e, const Scope<Interval>& variables, const ValueB
 
 namespace {
 
-// Visits every node once per engine: a node under a condition is visited again only for the engine
+// Visits every node once per engine: a node under a condition is visited again only with the engine
 // of that condition.
 class FootprintCollector {
  public:

@@ -1,6 +1,6 @@
-// Symbolic interval arithmetic: between what two expressions does a value lie, when variables lie
-// in given intervals? Sound: the interval contains every value that occurs (integers are assumed
-// not to overflow at 32 bits and up).
+// Symbolic interval arithmetic: the range of an expression as two expressions, given the ranges of
+// its variables. It is sound: the interval contains every value that occurs (integers of 32 bits
+// and more are assumed not to overflow).
 #pragma once
 
 #include <map>
@@ -12,27 +12,29 @@
 
 namespace retrograde::analysis {
 
-Interval hull(const Interval& a, const Interval& b);  // smallest interval around both
+Interval hull(const Interval& a, const Interval& b);  // the smallest interval around both
 Interval intersection(const Interval& a, const Interval& b);
 
 // One interval per dimension, dimension 0 first.
 using Box = std::vector<Interval>;
-Box hull(const Box& a, const Box& b);  // an empty vector stands for "nothing yet"
+Box hull(const Box& a, const Box& b);  // an empty vector is an empty hull
 
-// Bounds of `e`. Variables in `variables` range over their interval (whose ends may mention other
-// variables); any other variable is a symbol and stands for itself. Loads and calls of Funcs:
-// `values` gives the range of a called value by Func name and value index when known, else the
-// range of the type (floats and integers of 32 bits and more: unbounded). Narrow integer types
-// (below 32 bits) that might wrap, and casts to them, give the type's range. A float interval with
-// an end says "not NaN" as well. Ends are canonical (linear.h). Correlated terms are handled where
-// cheap: x - x/2*2, clamp, min and max of shifted terms, select with a condition on its variable.
+// Bounds of `e`. Variables in `variables` range over their intervals, whose ends may mention other
+// variables; all other variables are symbols.
+// - Calls of Funcs take the range in `values`, by Func name and value index. Without one, and for
+//   loads, it is the range of the type (unbounded for floats and integers of 32 bits and more).
+// - Integer types below 32 bits that might wrap, and casts to them, give the range of the type.
+// - A float interval with a defined end also means "not NaN".
+// - Ends are canonical (linear.h). Correlated terms are handled where that is cheap: x - x/2*2,
+//   clamp, min and max of shifted terms, select with a condition on its variable.
 using ValueBounds = std::map<std::pair<std::string, int>, Interval>;
 Interval bounds_of(const Expr& e, const Scope<Interval>& variables,
                    const ValueBounds* values = nullptr);
 
-// For each Func, image and buffer called by `e` (by name): the hull of the coordinates read. A read
-// in an arm of `if_then_else` is narrowed by its condition; one in an arm of a select is not, since
-// both arms may be evaluated. Lets inside e are handled. Cost is linear in the DAG's size.
+// For each Func, image and buffer that `e` calls, by name: the hull of the coordinates read. Reads
+// in an arm of `if_then_else` are narrowed by its condition. Reads in an arm of a select are not,
+// since both arms may be evaluated. Lets inside `e` are handled. The cost is linear in the size of
+// the DAG.
 struct Footprint {
   Box box;
   bool is_image = false;

@@ -1,6 +1,6 @@
-// Two representations meet here. Ends of wide signed integers are expressions in canonical linear
-// form; ends of all other types are useful only where they fold to constants, or where the
-// operation keeps them as they are.
+// There are two representations of ends. For wide signed integers they are expressions in canonical
+// linear form. For all other types they are useful only if they fold to constants, or if the
+// operation keeps them unchanged.
 #include "analysis/interval_arithmetic.h"
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace {
 
 using Wide = __int128;
 
-// A constant end; nullopt when the type cannot hold it.
+// A constant end; undefined when the type cannot represent it.
 Expr wide_const(Type type, Wide value) {
   if (type.is_uint()) {
     if (value < 0 || value > static_cast<Wide>(type.max_uint())) return {};
@@ -27,11 +27,11 @@ Expr wide_const(Type type, Wide value) {
   return make_const(type, static_cast<int64_t>(value));
 }
 
-// Both ends constant, or unbounded where the type cannot hold them (then a narrow type falls back
-// to its range).
+// An interval with two constant ends. An end that the type cannot represent is unbounded; a narrow
+// type then falls back to its range.
 Interval wide_interval(Type type, Wide min, Wide max) {
   Interval v{wide_const(type, min), wide_const(type, max)};
-  if (has_linear_form(type)) return v;  // does not overflow: each end stands alone
+  if (has_linear_form(type)) return v;  // does not overflow, so each end holds by itself
   return v.is_bounded() ? v : type_range(type);
 }
 
@@ -53,7 +53,7 @@ std::optional<WidePair> wide_ends(const Interval& v) {
 
 Wide wide_floor_div(Wide a, Wide b) { return a / b - (a % b < 0); }
 
-// Hull of the four combinations of ends.
+// The hull of the four combinations of ends.
 template <class F>
 Interval combine_corners(Type type, const WidePair& a, const WidePair& b, F f) {
   std::array<Wide, 4> corners = {f(a.min, b.min), f(a.min, b.max), f(a.max, b.min),
@@ -94,7 +94,7 @@ Expr negate(const Expr& e) {
   return e.defined() ? canonical(binary(Kind::Sub, make_zero(e.type()), e)) : e;
 }
 
-// Of constant ends.
+// For constant ends.
 Interval float_corners(Kind kind, const Interval& a, const Interval& b) {
   Interval result;
   for (const Expr& x : {a.min, a.max}) {
@@ -108,7 +108,8 @@ Interval float_corners(Kind kind, const Interval& a, const Interval& b) {
   return result;
 }
 
-// v * factor or v / factor, where factor is one value: monotone, of floats as they are rounded, too.
+// v * factor or v / factor for a factor with one value: monotonic, and rounding of floats preserves
+// that.
 Interval scaled(Kind kind, const Interval& v, const Expr& factor) {
   const Interval result{end_op(kind, v.min, factor), end_op(kind, v.max, factor)};
   if (const auto c = as_scalar(factor)) {
@@ -180,7 +181,7 @@ Interval interval_mul(Type type, const Interval& a, const Interval& b) {
   return hull(scaled(Kind::Mul, a, b.min), scaled(Kind::Mul, a, b.max));
 }
 
-// Rounded once, and so monotone in the product and in c: extreme at corners of a and b.
+// Rounded once, so it is monotonic in the product and in c: the extremes lie at corners of a and b.
 Interval interval_fma(const Interval& a, const Interval& b, const Interval& c) {
   if (!a.is_bounded() || !b.is_bounded() || !c.is_bounded()) return Interval::everything();
   const auto ends = [](const Interval& v) {
@@ -210,7 +211,7 @@ Interval interval_div(Type type, const Interval& a, const Interval& b) {
   }
   auto low = wide_end(b.min), high = wide_end(b.max);
   if (low && high && *low == *high &&
-      *low != 0) {  // one constant: monotone, falling when it is negative
+      *low != 0) {  // one constant: monotonic, decreasing when it is negative
     Interval q{end_op(Kind::Div, a.min, b.min), end_op(Kind::Div, a.max, b.min)};
     return *low > 0 ? q : Interval{q.max, q.min};
   }
@@ -225,7 +226,7 @@ Interval interval_div(Type type, const Interval& a, const Interval& b) {
   }
   if (type.is_uint()) return {make_zero(type), a.max};
   if (!a.is_bounded()) return type_range(type);
-  // |a / b| <= |a| whatever b is; the narrow types' -128 / -1 wraps.
+  // a / b| <= |a| for any b; but -128 / -1 of a narrow type wraps.
   if (!has_linear_form(type)) return type_range(type);
   return {canonical_min(a.min, negate(a.max)), canonical_max(a.max, negate(a.min))};
 }
@@ -285,7 +286,7 @@ Expr either(Kind kind, const Expr& a, const Expr& b) {
   return both(kind, a, b);
 }
 
-// min and max keep a NaN of their second operand only.
+// min and max propagate only a NaN in their second operand.
 bool loses_bounds(const Interval& b) { return !b.min.defined() && !b.max.defined(); }
 
 }  // namespace
@@ -323,10 +324,10 @@ Interval float_to_int(Type to, const Interval& v) {
     if (!e.defined()) return {};
     auto value = as_const_float(e);
     if (!value) return has_linear_form(to) ? cast_to(to, e) : Expr();
-    double whole = std::trunc(*value);
-    return std::isfinite(whole) && to.can_represent(whole) ? cast_to(to, e) : Expr();
+    double truncated = std::trunc(*value);
+    return std::isfinite(truncated) && to.can_represent(truncated) ? cast_to(to, e) : Expr();
   };
-  // A value beyond the type is undefined: one unbounded end makes both unknown.
+  // Conversion of a value beyond the type is undefined, so one unbounded end makes both unknown.
   Interval ends{end(v.min), end(v.max)};
   return ends.is_bounded() ? ends : type_range(to);
 }
@@ -335,7 +336,7 @@ Interval int_to_int(Type to, Type from, const Interval& v) {
   if (to.can_represent(from)) return cast_ends(to, v);
   auto min = wide_end(v.min), max = wide_end(v.max);
   if (min && max) return wide_interval(to, *min, *max);
-  if (has_linear_form(to)) {  // does not overflow; a constant end that would is no end
+  if (has_linear_form(to)) {  // does not overflow; a constant end that would is dropped
     auto fits = [&](const Expr& e, const std::optional<Wide>& c) {
       return e.defined() && (!c || wide_const(to, *c).defined());
     };
@@ -393,7 +394,7 @@ Interval interval_bitwise(Op op, Type type, const Interval& a, const Interval& b
   auto x = wide_ends(a), y = wide_ends(b);
   bool a_positive = is_nonnegative(a), b_positive = is_nonnegative(b);
   Expr zero = make_zero(type);
-  if (op == Op::bitwise_and) {  // no larger than either operand that is not negative
+  if (op == Op::bitwise_and) {  // at most either operand that is not negative
     if (a_positive && b_positive) return {zero, either(Kind::Min, a.max, b.max)};
     if (a_positive) return {zero, a.max};
     if (b_positive) return {zero, b.max};
@@ -415,7 +416,7 @@ Interval interval_shift(Op op, Type type, const Interval& a, const Interval& amo
       return interval_mul(
           type, a, {make_const(type, int64_t{1} << *low), make_const(type, int64_t{1} << *high)});
     }
-    // By an amount that stays: the larger, the larger, whichever way it shifts.
+    // Shifting by a fixed amount is increasing, in either direction.
     if (amount.is_point() && !low && a.is_bounded() && type.is_int() && type.bits() >= 32)
       return {call_op(op, type, {a.min, amount.min}), call_op(op, type, {a.max, amount.max})};
     bool shrinks = op == Op::shift_right && low && *low >= 0 && is_nonnegative(a);

@@ -1,5 +1,5 @@
-// Interval arithmetic proper: the interval of an operation from the intervals of its operands.
-// The meaning of an Interval is the one of bounds_engine.h.
+// Interval arithmetic: the interval of an operation from the intervals of its operands, with the
+// meaning of an Interval in bounds_engine.h.
 #pragma once
 
 #include <optional>
@@ -10,12 +10,12 @@
 namespace retrograde::analysis {
 
 Interval type_range(
-    Type type);  // of an element: bool and integers below 32 bits are bounded, floats are not
+    Type type);  // of one lane: bounded for bool and integers below 32 bits, not for floats
 Interval constant_interval(Type type, int64_t min, int64_t max);
 
-std::optional<int64_t> constant_min(const Interval& v);  // of integers
+std::optional<int64_t> constant_min(const Interval& v);  // for integers
 std::optional<int64_t> constant_max(const Interval& v);
-bool is_nonnegative(const Interval& v);  // certainly
+bool is_nonnegative(const Interval& v);  // when proven
 
 Interval interval_add(Type type, const Interval& a, const Interval& b);
 Interval interval_sub(Type type, const Interval& a, const Interval& b);
@@ -32,7 +32,7 @@ Interval interval_absd(Type result, Type operand, const Interval& a, const Inter
 // and, or, xor of integers
 Interval interval_bitwise(Op op, Type type, const Interval& a, const Interval& b);
 Interval interval_shift(Op op, Type type, const Interval& a, const Interval& amount);
-// A function that never decreases and maps no number to NaN: both ends through it.
+// For a function that never decreases and maps no number to NaN: applies it to both ends.
 Interval interval_monotone(Op op, Type type, const Interval& v);
 
 }  // namespace retrograde::analysis

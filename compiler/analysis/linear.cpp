@@ -1,4 +1,5 @@
-// Collection is memoised by node: a DAG that shares sums costs its nodes, not its paths.
+// Collection is memoised by node, so a DAG of shared sums costs the number of its nodes, not its
+// paths.
 #include "analysis/linear.h"
 
 #include <algorithm>
@@ -10,12 +11,12 @@ namespace retrograde::analysis {
 
 namespace {
 
-// A form with more terms than this is an atom to the expressions around it: keeps collection linear
-// in the DAG.
+// A form with more terms than this is an atom in the expressions around it, which keeps collection
+// linear in the DAG.
 constexpr size_t most_terms = 32;
-// Operands of nested min (max) that are compared with each other.
+// How many operands of nested min (max) are compared with each other.
 constexpr size_t max_operands = 8;
-// Pairs of sums that are looked at to compare two.
+// The limit on pairs of sums visited in one comparison.
 constexpr int most_compared = 64;
 
 bool is_nothing(const Sum& f) { return f.terms.empty() && f.constant == 0; }
@@ -65,16 +66,16 @@ class Collector {
     auto divisor = as_const_int(binary.b);
     if (!divisor || *divisor <= 0) return linear_sum(e);
     Sum numerator = form(binary.a);
-    SplitSum q = split_by(numerator, *divisor);
+    DividedSum q = divide_terms(numerator, *divisor);
     bool is_div = e.kind() == Kind::Div;
-    if (q.rest.terms.empty()) return is_div ? q.whole : q.rest;
+    if (q.remainder.terms.empty()) return is_div ? q.quotient : q.remainder;
     Sum rest = linear_sum(e);
-    if (!is_nothing(q.whole)) {
-      Expr numerator_rest = to_expr(q.rest);
+    if (!is_nothing(q.quotient)) {
+      Expr numerator_rest = to_expr(q.remainder);
       if (!numerator_rest.defined()) return linear_sum(e);
       rest = linear_sum(binary_of(e.kind(), numerator_rest, *divisor));
     }
-    return is_div ? valid_or_atom(plus(q.whole, rest), e) : rest;
+    return is_div ? valid_or_atom(plus(q.quotient, rest), e) : rest;
   }
 
   static Expr binary_of(Kind kind, const Expr& a, int64_t b) {
@@ -97,7 +98,7 @@ class Collector {
 
 // ---- min and max ----
 
-// The operands of nested mins (or maxes) as forms: min(a, b) + 1 is a + 1, b + 1.
+// The operands of nested mins (or maxes) as sums: min(a, b) + 1 gives a + 1 and b + 1.
 void add_operands(Kind kind, const Sum& f, std::vector<Sum>& operands) {
   bool nested = f.terms.size() == 1 && f.terms[0].factor == 1 && f.terms[0].atom.kind() == kind;
   if (!nested || operands.size() >= max_operands) {
@@ -117,7 +118,7 @@ std::optional<int64_t> difference(const Sum& a, const Sum& b) {
   return d.valid && d.is_constant() ? std::optional(d.constant) : std::nullopt;
 }
 
-// p / k + c == (p + k*c) / k, for forms that are nothing else.
+// Forms that consist of one quotient and a constant: p / k + c == (p + k*c) / k.
 struct FloorQuotient {
   Sum numerator;
   int64_t divisor;
@@ -131,7 +132,7 @@ std::optional<FloorQuotient> as_quotient(const Sum& f) {
   return numerator.valid ? std::optional(FloorQuotient{numerator, *k}) : std::nullopt;
 }
 
-// Not positive: a <= b for certain.
+// A result <= 0 proves a <= b.
 std::optional<int64_t> sign_of_difference(const Sum& a, const Sum& b) {
   if (auto d = difference(a, b)) return d;
   auto x = as_quotient(a), y = as_quotient(b);
@@ -139,13 +140,13 @@ std::optional<int64_t> sign_of_difference(const Sum& a, const Sum& b) {
   return difference(x->numerator, y->numerator);
 }
 
-// What a sum is the smaller or the larger of, besides a constant; nothing: it is no such sum.
+// A sum that is a min or max of two sums, shifted by a constant; nothing for other sums.
 struct Extreme {
   Kind kind;
   Sum a, b;
 };
-// `end`: what a value is that is promised to lie in a range, the smaller of itself and the upper end
-// of it, or the larger of itself and the lower one.
+// `end` applies to promised values: a value promised to lie in a range equals the min of itself and
+// the upper end, and the max of itself and the lower end.
 std::optional<Extreme> as_extreme(const Sum& f, Kind end) {
   if (f.terms.size() != 1 || f.terms[0].factor != 1) return std::nullopt;
   const Expr& atom = f.terms[0].atom;
@@ -161,9 +162,9 @@ std::optional<Extreme> as_extreme(const Sum& f, Kind end) {
   return shifted(end, call->args[0], call->args[end == Kind::Min ? 2 : 1]);
 }
 
-// Whether a <= b for certain. A largest is at most b where all of its operands are, and a is at most
-// a smallest where it is at most all of its operands: nothing is lost by that, so that it comes
-// first. Then one operand of a smallest, or of a largest, is enough. (Whitman, Free lattices, 1941.)
+// Whether a <= b is proven. First the exact rules: a max is at most b if all its operands are, and
+// a is at most a min if it is at most all operands. Then the sufficient ones: one operand of a min,
+// or of a max, is enough. (Whitman, Free lattices, 1941.)
 bool is_at_most(const Sum& a, const Sum& b, int& budget) {
   if (--budget < 0) return false;
   if (const auto d = sign_of_difference(a, b)) return *d <= 0;
@@ -176,7 +177,8 @@ bool is_at_most(const Sum& a, const Sum& b, int& budget) {
          (of_b && (is_right(of_b->a) || is_right(of_b->b)));
 }
 
-// min(kept, dropped) == kept where kept <= dropped, max(kept, dropped) == kept where it is not below.
+// min(kept, dropped) == kept where kept <= dropped; max(kept, dropped) == kept where kept >=
+// dropped.
 bool makes_redundant(Kind kind, const Sum& kept, const Sum& dropped) {
   int budget = most_compared;
   return kind == Kind::Min ? is_at_most(kept, dropped, budget) : is_at_most(dropped, kept, budget);
@@ -192,7 +194,8 @@ void add_unless_redundant(Kind kind, const Sum& candidate, std::vector<Sum>& kep
 Expr canonical_extreme(Kind kind, const Expr& a, const Expr& b) {
   if (a.same_as(b)) return a;
   if (!has_linear_form(a.type())) return binary(kind, a, b);
-  // Those of one side have met when it was made: the union of n boxes takes n^2 steps, not n^3.
+  // Operands of one side were compared when it was built, so the union of n boxes takes n^2 steps,
+  // not n^3.
   std::vector<Sum> operands, more;
   add_operands(kind, linear_form(a), operands);
   add_operands(kind, linear_form(b), more);

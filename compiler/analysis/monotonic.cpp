@@ -1,4 +1,5 @@
-// Sums in linear form first, so that a variable that cancels is gone; then a rule for each atom.
+// Sums are brought to linear form first, so that cancelling variables disappear; then each atom has
+// a rule.
 #include "analysis/monotonic.h"
 
 #include "analysis/linear.h"
@@ -14,7 +15,7 @@ Monotonic reversed(Monotonic m) {
   return m == Monotonic::Decreasing ? Monotonic::Increasing : m;
 }
 
-// Of an operation that increases in both operands.
+// For an operation that increases in both operands.
 Monotonic both(Monotonic a, Monotonic b) {
   if (a == Monotonic::Constant) return b;
   return b == Monotonic::Constant || a == b ? a : Monotonic::Unknown;
@@ -42,7 +43,7 @@ class Direction {
     return result;
   }
 
-  // What linear_form called an atom is not taken apart again.
+  // Atoms of linear_form are not decomposed again.
   Monotonic of_term(const Expr& atom) {
     return memo_.get(atom, [&] { return of_atom(atom); });
   }
@@ -64,7 +65,7 @@ class Direction {
   }
 
   Monotonic constant_or_unknown(const Expr& e) const {
-    // What a Func holds may change from one iteration to the next.
+    // The contents of a Func may change from one iteration to the next.
     const bool reads = any_node(
         e, [](const Call& call) { return call.call_type == CallType::Func; },
         [](const Load&) { return true; });

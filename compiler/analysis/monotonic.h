@@ -1,8 +1,10 @@
-// monotonic -- does an integer expression only grow, or only shrink, as one variable grows?
+// monotonic -- decides whether an integer expression only increases or only decreases with one
+// variable.
 //
 //   in y:  min(likely(y * 8), n - 8) + 7  increasing     n - y  decreasing     y % 4  unknown
 //
-// What is constant does not mention the variable. Sound; an unknown may be monotone all the same.
+// A constant result means that the value does not depend on the variable. The analysis is sound,
+// but an expression with the result unknown may still be monotonic.
 #pragma once
 
 #include <string>

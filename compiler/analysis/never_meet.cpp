@@ -21,13 +21,13 @@ namespace retrograde::analysis {
 
 namespace {
 
-constexpr unsigned long most_operations = 1'000'000;  // of isl, about a second
+constexpr unsigned long most_operations = 1'000'000;  // isl's limit, about a second
 constexpr size_t most_unknowns = 40;
-constexpr int max_depth = 16;  // of divisions and minima inside one another
+constexpr int max_depth = 16;  // of nested divisions and minima
 
 Sum number(int64_t value) { return linear_sum(Int(64), value); }
 
-// Conditions on whole numbers, all of which hold.
+// A conjunction of conditions on integers.
 class Conditions {
  public:
   Sum unknown() {
@@ -35,7 +35,7 @@ class Conditions {
     numbers_.emplace(name, static_cast<int>(numbers_.size()));
     return linear_sum(variable(name, Int(64)));
   }
-  // What does not fit a sum is not known.
+  // A sum that overflowed gives no condition.
   void is_zero(const Sum& sum) {
     if (sum.valid) equalities_.push_back(sum);
   }
@@ -43,7 +43,7 @@ class Conditions {
     if (sum.valid) inequalities_.push_back(sum);
   }
 
-  // Whether there is certainly no solution.
+  // Whether the conditions certainly have no solution.
   bool contradict() const {
     if (numbers_.size() > most_unknowns) return false;
     std::unique_ptr<isl_ctx, void (*)(isl_ctx*)> ctx(isl_ctx_alloc(), isl_ctx_free);
@@ -63,7 +63,7 @@ class Conditions {
   }
 
  private:
-  std::unordered_map<std::string, int> numbers_;  // of the unknowns
+  std::unordered_map<std::string, int> numbers_;  // the numbers of the unknowns
   std::vector<Sum> equalities_, inequalities_;
 
   isl_basic_set* constrained(isl_basic_set* set, isl_constraint* constraint, const Sum& sum) const {
@@ -81,10 +81,10 @@ class Conditions {
 
 using Known = std::map<Expr, Sum, StructuralLess>;
 
-// Expressions at one of the two points, as sums over unknowns.
+// Translates expressions at one of the two points to sums over unknowns.
 class Point {
  public:
-  // `shared`: unknowns of what is the same at both points, as the variables in `fixed` are.
+  // `shared`: unknowns that are equal at both points, as are the variables in `fixed`.
   Point(Conditions& conditions, Known& shared, const MeetingPoints& points,
         const std::unordered_set<std::string>& fixed)
       : conditions_(conditions), shared_(shared) {
@@ -114,8 +114,8 @@ class Point {
   std::unordered_set<std::string> varying_;
   int depth_ = 0;
 
-  // Equal expressions are one unknown: nothing is stored between two reads at a point, and what
-  // does not vary is read from what is complete.
+  // Equal expressions are one unknown: no store happens between two reads at a point, and
+  // expressions that do not vary read data that is complete.
   Sum atom(const Expr& e) {
     Known& known = uses_any_variable(e, varying_) ? own_ : shared_;
     if (const auto* found = find_or_null(known, e)) return *found;
@@ -126,26 +126,27 @@ class Point {
   Sum new_atom(const Expr& e) {
     if (depth_ == max_depth) return conditions_.unknown();
     depth_++;
-    const Sum sum = taken_apart(e);
+    const Sum sum = decompose(e);
     depth_--;
     return sum;
   }
 
-  Sum taken_apart(const Expr& e) {
+  Sum decompose(const Expr& e) {
     if (const Call* call = e.as<Call>())
-      return call->is_marker() ? of(call->args[0]) : of_type(e.type());
+      return call->is_marker() ? of(call->args[0]) : unknown_of_type(e.type());
     if (const Cast* cast = e.as<Cast>()) return converted(*cast);
     const Binary* op = e.as<Binary>();
-    if (!op || !has_linear_form(e.type())) return of_type(e.type());
+    if (!op || !has_linear_form(e.type())) return unknown_of_type(e.type());
     if (e.kind() == Kind::Min || e.kind() == Kind::Max) return extreme(*op, e.kind());
     const auto divisor = as_const_int(op->b);
     const bool divides = e.kind() == Kind::Div || e.kind() == Kind::Mod;
-    if (!divides || !divisor || *divisor <= 0 || *divisor > INT32_MAX) return of_type(e.type());
+    if (!divides || !divisor || *divisor <= 0 || *divisor > INT32_MAX)
+      return unknown_of_type(e.type());
     if (e.kind() == Kind::Div) return divided(op->a, *divisor);
     return plus(of(op->a), atom(binary(Kind::Div, op->a, op->b)), -*divisor);
   }
 
-  Sum of_type(Type type) {
+  Sum unknown_of_type(Type type) {
     const Sum sum = conditions_.unknown();
     if (!type.is_int_or_uint() || type.bits() > 32) return sum;
     conditions_.at_least_zero(plus(sum, number(type.min_int()), -1));
@@ -153,11 +154,11 @@ class Point {
     return sum;
   }
 
-  // A conversion that keeps every value.
+  // A cast that preserves every value is looked through.
   Sum converted(const Cast& cast) {
     const Type from = cast.value.type();
     const bool keeps = from.is_int_or_uint() && cast.type.can_represent(from);
-    return keeps ? of(cast.value) : of_type(cast.type);
+    return keeps ? of(cast.value) : unknown_of_type(cast.type);
   }
 
   // divisor * quotient <= e < divisor * (quotient + 1)
@@ -177,7 +178,7 @@ class Point {
     return result;
   }
 
-  // Comparisons say something; of other conditions nothing is known.
+  // Comparisons give conditions; others are ignored.
   void require(const Expr& condition) {
     std::vector<Expr> conjuncts;
     add_conjuncts(condition, conjuncts);
@@ -202,8 +203,8 @@ class Point {
   }
 };
 
-// Variables that are a coordinate of both places: where the points meet, they are equal, and so is
-// what data say of them.
+// Variables that are the same coordinate in both accesses. They are equal where the points meet,
+// and so are the values read at them.
 std::unordered_set<std::string> common_coordinates(const std::string& loop,
                                                    const std::vector<Expr>& a,
                                                    const std::vector<Expr>& b) {
@@ -220,7 +221,7 @@ std::unordered_set<std::string> common_coordinates(const std::string& loop,
 bool can_prove_never_meet(const MeetingPoints& points, const std::string& loop,
                           const std::vector<Expr>& a, const std::vector<Expr>& b) {
   const std::unordered_set<std::string> fixed = common_coordinates(loop, a, b);
-  for (const int64_t later : {1, -1}) {  // the second point is on, or before
+  for (const int64_t later : {1, -1}) {  // the second point comes later, or earlier
     Conditions conditions;
     Known shared;
     Point first(conditions, shared, points, fixed), second(conditions, shared, points, fixed);

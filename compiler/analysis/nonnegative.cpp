@@ -57,7 +57,7 @@ class Signs {
            nonnegative(call.args[static_cast<size_t>(std::max(passed, 0))]);
   }
 
-  // Rises from what it is at 0.
+  // Increasing, with a nonnegative value at 0.
   static bool keeps_sign(Op op) {
     return op_info(op).bounds == BoundsRule::AtEnds &&
            eval_operator(op, {Scalar::of_float(Float(64), 0)}, Float(64))->f >= 0;

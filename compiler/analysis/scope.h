@@ -1,4 +1,4 @@
-// Names in scope, innermost binding last.
+// Names in scope with their values; the innermost binding of a name wins.
 #pragma once
 
 #include <string>

@@ -1,14 +1,14 @@
-// Solving a condition for one variable. Every comparison of integers becomes "form <= 0"; inner
-// variables are replaced by the end of their interval that makes the form largest; what remains is
-// solved for the variable atom by atom:
+// Solves a condition for one variable. Every comparison of integers becomes "form <= 0". Inner
+// variables are replaced by the end of their interval that maximises the form. The remaining form
+// is solved for the variable, atom by atom:
 //
 //   c*v + rest <= 0,  c > 0         v <= floor(-rest / c)
 //   c*v + rest <= 0,  c < 0         v >= ceil(rest / -c)
 //   c*max(p, q) + rest, c > 0       both forms with p and with q      (min with c < 0 alike)
-//   c*min(p, q) + rest, c > 0       one of the two is enough          (max with c < 0 alike)
+//   c*min(p, q) + rest, c > 0       one of the two suffices           (max with c < 0 alike)
 //   c*(p / k) + rest, c > 0, k > 0  p <= k*floor(-rest / c) + k - 1
 //   c*(p / k) + rest, c < 0, k > 0  p >= k*ceil(rest / -c)
-//   c*atom + rest                   the atom's largest value, when it has bounds whatever v is
+//   c*atom + rest                   the atom's largest value, if bounded independently of v
 #include <algorithm>
 
 #include "analysis/bounds_engine.h"
@@ -20,8 +20,7 @@ namespace retrograde::analysis {
 
 namespace {
 
-constexpr int most_levels =
-    8;  // of min, max and division inside one another; each level may try two forms
+constexpr int most_levels = 8;  // of nested min, max and division; each level may try two forms
 
 Sum without(const Sum& form, const Term& term) {
   return plus(form, linear_form(term.atom), -term.factor);
@@ -75,7 +74,7 @@ class Solver {
     return both;
   }
 
-  // Either is right; the one that needs no further condition is better.
+  // Either solution is correct; one without a further condition is preferred.
   static std::optional<Solution> one_of(const std::optional<Solution>& a,
                                         const std::optional<Solution>& b) {
     if (!a || !b) return a ? a : b;
@@ -107,14 +106,14 @@ class Solver {
   }
 
   std::optional<Solution> solve_nonpositive(const Sum& form) {
-    Expr whole = to_expr(form);
-    if (!whole.defined()) return std::nullopt;
-    Expr largest = engine_.bounds(whole).max;
+    Expr sum = to_expr(form);
+    if (!sum.defined()) return std::nullopt;
+    Expr largest = engine_.bounds(sum).max;
     if (!largest.defined()) return std::nullopt;
     return isolate(linear_form(largest), most_levels);
   }
 
-  // form <= 0, free of inner names.
+  // Solves form <= 0, which is free of inner names.
   std::optional<Solution> isolate(const Sum& form, int depth) {
     if (depth == 0 || !form.valid) return std::nullopt;
     const Term* direct = nullptr;

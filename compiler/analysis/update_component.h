@@ -1,5 +1,6 @@
-// update_component.h -- an update of several values, cut into components whose values depend on
-// each other, each as a function of the old values x and of unknowns g that are free of them.
+// update_component.h -- splits an update of several values into components of mutually dependent
+// values. Each component is a function of the old values x and of unknowns g that do not depend on
+// them.
 //
 //   f(x) = (f(x)[0] + a(x) - b(x), max(f(x)[1], c(x)))   =>   {x0 + g0}, {max(x0, g0)}
 #pragma once
@@ -16,15 +17,15 @@ namespace retrograde::analysis {
 
 bool is_bitwise(const Expr& e);
 
-// Sums and products with what is free of x gathered in one term or factor, and every largest part
-// that is free of x replaced by a variable: x + a - b becomes x + g.
+// Gathers the operands free of x in each sum and product, and replaces every maximal subexpression
+// free of x by a variable: x + a - b becomes x + g.
 class Abstraction {
  public:
   explicit Abstraction(const std::vector<std::string>& xs) : xs_(xs.begin(), xs.end()) {}
 
   Expr operator()(const Expr& e);
 
-  std::vector<std::pair<std::string, Expr>> unknowns;  // name -> what it stands for
+  std::vector<std::pair<std::string, Expr>> unknowns;  // name -> the expression that it replaces
 
  private:
   std::unordered_set<std::string> xs_;
@@ -40,11 +41,11 @@ class Abstraction {
   Expr product(const Expr& e);
 };
 
-// Sets of values that are connected by "the new i reads the old j".
+// The connected components of the relation "new value i reads old value j".
 std::vector<std::vector<int>> components_of(const std::vector<Expr>& values,
                                             const std::vector<std::string>& xs);
 
-// One component, with its variables renamed x0.., y0.., g0..
+// One component, with its variables renamed to x0.., y0.., g0..
 struct Component {
   std::vector<Expr> update;  // over xs and gs
   std::vector<std::string> xs, ys;

@@ -1,20 +1,20 @@
-// error.h -- the exceptions that the library throws, and the four parts that every message has.
+// error.h -- the exceptions that the library throws, and the four parts of every message.
 //
 //   UserError      the program, the schedule or the arguments are illegal
 //     CompileError   found while a pipeline is defined, scheduled or compiled
 //     RuntimeError   found while a compiled pipeline is called
 //   Unsupported    legal, but a known gap of this compiler
-//   InternalError  our own bug: carries the pass and the program before it
+//   InternalError  a bug of the compiler: carries the pass and the program before it
 //
-// A message says what was asked (user names in quotes), which rule that breaks, the concrete
+// A message tells what was attempted (user names in quotes), which rule that breaks, the concrete
 // evidence (bounds, loops, types), and what to write instead:
 //
 //   cannot vectorize "blur_x" over "r": iterations of a vectorized loop must be independent; its
 //   update definition reads "blur_x"(r - 1). Vectorize "x" instead.
 //
-// Headers say what a function asks of its callers in the words of these messages: after "Requires:"
-// stand rules, which throw CompileError where they are broken, or the kind in parentheses behind.
-// tools/api_table holds them against each other, and names the test of each in docs/api.md.
+// Headers state the requirements of a function in the words of these messages. Each rule after
+// "Requires:" throws CompileError when it is broken, or the kind of error in parentheses behind it.
+// tools/api_table compares headers with messages, and docs/api.md names the test of each rule.
 #pragma once
 
 #include <functional>
@@ -29,7 +29,7 @@
 namespace retrograde {
 
 // The four parts of a message. `asked` continues "cannot ..."; `rule` and `evidence` are clauses;
-// `instead` is a sentence. Only `asked` and `rule` must be given.
+// `instead` is a sentence. Only `asked` and `rule` are mandatory.
 struct Message {
   std::string asked;
   std::string rule;
@@ -40,13 +40,13 @@ struct Message {
   std::string render() const;
 };
 
-// Base of all: catch this to catch everything the library reports.
+// The base class: catch it to catch every error that the library reports.
 class Error : public std::runtime_error {
  public:
   explicit Error(Message message);
   explicit Error(const std::string& text);
 
-  // The parts. For an error made from plain text everything stands in `asked`.
+  // The four parts. An error made from plain text has all of it in `asked`.
   const Message& message() const noexcept { return *message_; }
 
  private:
@@ -65,7 +65,7 @@ class CompileError : public UserError {
 
 class RuntimeError : public UserError {
  public:
-  // `code` is what the generated code or the runtime returned, 0 when the check came before the
+  // `code` is the return value of the generated code or the runtime; 0 when the check preceded the
   // call.
   explicit RuntimeError(Message message, int code = 0);
   explicit RuntimeError(const std::string& text, int code = 0);
@@ -85,7 +85,7 @@ class InternalError : public Error {
  public:
   explicit InternalError(const std::string& what);
 
-  // What a bug report needs. `ir_before` is the program that the pass was given, as IR text.
+  // The contents of a bug report. `ir_before` is the input of the pass as IR text.
   InternalError(const std::string& what, const std::string& pass, const std::string& ir_before);
 
   const std::string& pass() const noexcept { return details_->pass; }
@@ -100,41 +100,41 @@ class InternalError : public Error {
 };
 
 namespace detail {
-// Told of every CompileError and Unsupported before it is thrown by the functions below; null: nobody.
-// By any thread. The one before comes back.
+// Sets a function that observes every CompileError and Unsupported before the functions below throw
+// it; null: none. It may be called on any thread. Returns the previous observer.
 using ErrorObserver = void (*)(const Error& error);
 ErrorObserver observe_errors(ErrorObserver observer);
-// Throws it, after the observer was told.
+// Throws the error after calling the observer.
 [[noreturn]] void throw_error(const CompileError& error);
 }  // namespace detail
 
-// Throws CompileError: a definition, schedule or compilation that cannot be.
+// Throws CompileError: an illegal definition, schedule or compilation.
 [[noreturn]] void user_error(std::string asked, std::string rule, std::string evidence = {},
                              std::string instead = {});
 
-// Throws RuntimeError: arguments of a call that do not fit.
+// Throws RuntimeError: illegal arguments of a call.
 [[noreturn]] void call_error(std::string asked, std::string rule, std::string evidence = {},
                              std::string instead = {}, int code = 0);
 
-// Throws Unsupported: legal, but not built yet.
+// Throws Unsupported: legal, but not implemented.
 [[noreturn]] void unsupported(std::string asked, std::string rule, std::string evidence = {},
                               std::string instead = {});
 
-// Throws InternalError with the place where it was called.
+// Throws InternalError with the location of the call.
 [[noreturn]] void internal_error(const std::string& what,
                                  std::source_location where = std::source_location::current());
 
-// A user's name in quotes, the way all messages show names: blur_x => "blur_x".
+// A user's name in quotes, as all messages show names: blur_x => "blur_x".
 std::string quoted(std::string_view name);
 
-// Everything streamable, put together: text("extent ", 3, " of ", quoted("x")).
+// Concatenates streamable values: text("extent ", 3, " of ", quoted("x")).
 template <typename... Parts>
 std::string text(const Parts&... parts) {
   std::ostringstream out;
   ((out << parts), ...);
   return std::move(out).str();
 }
-// "a, b, c": what `text_of` makes of each.
+// "a, b, c": the results of `text_of` for each element.
 template <class List, class TextOf = std::identity>
 requires requires(const List& list, const TextOf& text_of) { text_of(*list.begin()); }
 std::string listed(const List& list, const TextOf& text_of = {}) {
@@ -148,8 +148,8 @@ namespace detail {
                                    std::source_location where);
 }  // namespace detail
 
-// An invariant of ours, checked in every build. The parts after the condition explain the failure
-// and are put together only when it fails.
+// Checks an invariant of the compiler in every build. The parts after the condition explain the
+// failure and are formatted only when it fails.
 template <typename... Parts>
 void internal_assert(bool condition, const Parts&... parts) {
   if (!condition) [[unlikely]] {
@@ -159,8 +159,8 @@ void internal_assert(bool condition, const Parts&... parts) {
 
 }  // namespace retrograde
 
-// The same with the condition's text and place: RETROGRADE_ASSERT(extent > 0, "extent is ",
-// extent).
+// internal_assert with the condition's text and location: RETROGRADE_ASSERT(extent > 0, "extent is
+// ", extent).
 #define RETROGRADE_ASSERT(condition, ...)                                                 \
   do {                                                                                    \
     if (!(condition)) [[unlikely]] {                                                      \

@@ -11,7 +11,7 @@ namespace retrograde {
 
 namespace {
 
-// The log that the environment asks for.
+// The log requested by environment variables.
 class PassLog {
  public:
   PassLog() {

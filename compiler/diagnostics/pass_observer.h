@@ -1,11 +1,11 @@
-// pass_observer.h -- watching the compiler work: how long each pass took, and what it gave.
+// pass_observer.h -- observes the compiler: the time and the result of each pass.
 //
 //   PassObserver observer([](const PassReport& r) { times[r.pass] += r.seconds; });
 //   f.compile_jit();
 //
-// The same for programs that know nothing of it, by the environment: RETROGRADE_PASS_LOG=FILE
-// appends a line for every pass to a file, and RETROGRADE_DUMP_AFTER=PASS,... (or "all") what these
-// passes gave. `opt -- program` sets both and shows the file.
+// Environment variables do the same for unmodified programs. RETROGRADE_PASS_LOG=FILE appends a
+// line per pass to a file; RETROGRADE_DUMP_AFTER=PASS,... (or "all") adds the results of these
+// passes. `opt -- program` sets both and shows the file.
 #pragma once
 
 #include <functional>
@@ -14,14 +14,14 @@
 namespace retrograde {
 
 struct PassReport {
-  std::string pipeline;  // the function's name
+  std::string pipeline;  // the name of the compiled function
   std::string pass;
   double seconds = 0;
-  std::function<std::string()> text;  // the program after it; empty for passes inside LLVM
+  std::function<std::string()> text;  // the program after the pass; empty for passes inside LLVM
 };
 
-// While it lives, it is told of every pass of every compilation in the process, one at a time, on
-// whatever thread compiles. It must not compile anything itself.
+// While it lives, `observe` is called for every pass of every compilation in the process, one call
+// at a time, on the compiling thread. It must not compile anything itself.
 class PassObserver {
  public:
   explicit PassObserver(std::function<void(const PassReport&)> observe);
@@ -33,7 +33,7 @@ class PassObserver {
   const std::function<void(const PassReport&)> observe_;
 };
 
-// What the compiler calls; cheap when nobody observes.
+// Called by the compiler; cheap without observers.
 void tell_pass_observers(const PassReport& report);
 
 }  // namespace retrograde

@@ -1,4 +1,4 @@
-// text_hash.h -- a number for a text, the same on all machines: names of files, keys of tables.
+// text_hash.h -- a hash of a text that is the same on all machines, for file names and table keys.
 #pragma once
 
 #include <cstdint>

@@ -9,9 +9,9 @@ namespace retrograde::graph {
 
 namespace {
 
-// A reference of the update to f that is not to the value at the point that it writes.
+// A reference of the update to f other than to the element that it writes.
 Expr other_reference(const FuncContents& f, const Definition& update) {
-  Definition where;  // it writes, and whether
+  Definition where;  // only coordinates and predicate
   where.args = update.args;
   where.predicate = update.predicate;
   const std::vector<Expr> reads = own_reads(f, where);

@@ -1,4 +1,4 @@
-// associative_update.h -- what an update definition does to an element, as an operator on elements.
+// associative_update.h -- recognises update definitions that apply an associative operator.
 #pragma once
 
 #include "analysis/associativity.h"
@@ -6,8 +6,8 @@
 
 namespace retrograde::graph {
 
-// The update as f(x) = op(f(x), e): its references to f are all to the point that it writes, and op
-// is proven associative.
+// Writes the update as f(x) = op(f(x), e). The proof holds when the update references f only at the
+// point that it writes, and op is proven associative.
 AssociativityProof prove_associative(const FuncContents& f, const Definition& update);
 
 }  // namespace retrograde::graph

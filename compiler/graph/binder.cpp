@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "diagnostics/error.h"
-#include "graph/directive_names.h"
+#include "graph/directive_fields.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 
@@ -12,9 +12,9 @@ namespace retrograde::graph {
 namespace {
 
 [[noreturn]] void unknown(const char* what, const std::string& name) {
-  user_error("read the text of a graph", "every Func and image that is read is of the graph",
+  user_error("read the text of a graph", "every Func and image that is read belongs to the graph",
              text("no ", what, " of it is called ", quoted(name)),
-             "Add its lines, or mend the name");
+             "Add its lines, or correct the name");
 }
 
 }  // namespace
@@ -68,7 +68,7 @@ Expr Binder::bound(const Call& call, const Expr& e) const {
   return call_image(call.name, call.type, call.args, symbol);
 }
 
-// A Func owns its definitions and its wrappers, which must not own it in turn.
+// A Func owns its definitions and its wrappers, so they must not own it.
 bool Binder::owns_me(const FuncContents& callee) const {
   if (&callee == f_.get()) return true;
   return std::ranges::any_of(callee.wrappers, [&](const auto& w) { return w.second == f_; });

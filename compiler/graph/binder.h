@@ -1,4 +1,4 @@
-// binder.h -- gives the names in parsed expressions what they stand for.
+// binder.h -- binds the names in parsed expressions to Funcs, images and parameters.
 #pragma once
 
 #include <map>
@@ -12,29 +12,25 @@ namespace retrograde::graph {
 
 using ParameterPtr = std::shared_ptr<ParameterContents>;
 
-// The entities of a text.
+// The named entities of a text.
 struct NamedEntities {
   std::map<std::string, FuncPtr> funcs;
-  std::map<std::string, ParameterPtr> parameters, outputs;  // outputs: the buffers of Funcs
+  std::map<std::string, ParameterPtr> parameters, outputs;  // outputs: the output buffers of Funcs
 
-  // The buffer of a fact such as "input.extent.1"; null when the name is none.
+  // The buffer behind a metadata variable such as "input.extent.1"; null for other names.
   ParameterPtr buffer_of_fact(const std::string& name) const;
 };
 
-// The types that the text of a graph leaves out in mentions of a Func, an image or a parameter.
-void declare(const FuncContents& f, NameTypes& types);
-void declare(const ParameterContents& parameter, NameTypes& types);
-
-// Calls and variables of expressions in `f` (null: outside of Funcs) with their symbols: Funcs,
-// images, parameters, facts of buffers, and the variables of `domain` (may be null).
+// Attaches symbols to the calls and variables in expressions of `f` (null: outside of Funcs):
+// Funcs, images, parameters, buffer metadata, and the variables of `domain` (may be null).
 class Binder {
  public:
   Binder(const NamedEntities& names, FuncPtr f, DomainPtr domain)
       : names_(names), f_(std::move(f)), domain_(std::move(domain)) {}
 
-  // UserError when a Func or an image is not there (graph.h).
+  // UserError when a Func or an image does not exist (graph.h).
   Expr operator()(const Expr& e) const;
-  // The expressions of a directive, and what it prefetches.
+  // Binds the expressions of a directive, and the Func or image that it prefetches.
   void operator()(Directive& directive) const;
 
  private:

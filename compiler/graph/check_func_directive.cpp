@@ -1,5 +1,5 @@
-// check_func_directive.cpp -- the rules for directives of Funcs: where they are stored, how storage
-// is laid out, what is known of sizes.
+// check_func_directive.cpp -- legality rules for directives of Funcs: storage levels, storage
+// layout, bounds and estimates.
 #include <algorithm>
 
 #include "diagnostics/error.h"
@@ -27,7 +27,7 @@ void check_is_dimension(const FuncContents& f, const std::string& var, const std
 
 bool is_integer(const Expr& e) { return e.type().is_int_or_uint() && e.type().is_scalar(); }
 
-// An integer as int32; positive when it is known.
+// Converts an integer size to int32; checks that a constant is positive.
 void check_size(Expr& e, const char* what, const std::string& asked) {
   if (!e.defined())
     user_error(asked, text("the ", what, " must be a defined expression"), "it was never assigned",
@@ -45,7 +45,7 @@ void check_size(Expr& e, const char* what, const std::string& asked) {
   e = cast_to(Int(32), e);
 }
 
-// Promises about one variable that cannot hold together, where they are constants.
+// Rejects constant bounds and alignments of one variable that contradict each other.
 void check_alignment(const Bound& bound, const std::string& asked) {
   if (!bound.modulus.defined()) return;
   const auto constant = [](const Expr& e) { return e.defined() ? as_const_int(e) : std::nullopt; };
@@ -69,7 +69,7 @@ Bound bound_of(const std::vector<Bound>& bounds, const std::string& var) {
   return {};
 }
 
-// Of a bound or an estimate.
+// Checks the range of a bound or an estimate.
 void check_range(const FuncContents& f, const std::vector<Bound>& bounds, const std::string& var,
                  Expr& min, Expr& extent, const std::string& asked) {
   check_is_dimension(f, var, asked);
@@ -94,12 +94,12 @@ void check_range(const FuncContents& f, const std::vector<Bound>& bounds, const 
   check_alignment(changed, asked);
 }
 
-// ---- one function for each directive that has rules ----
+// ---- one function per directive with rules ----
 
 template <typename D>
 void check(D&, const FuncContents&) {}
 
-// Those that are not named keep their places.
+// Dimensions that are not named keep their positions.
 void check(ReorderStorage& reorder, const FuncContents& f) {
   const std::string asked = "reorder the storage of " + quoted(f.name);
   check_is_defined(f, asked);
@@ -153,9 +153,9 @@ void check(Memoize& memoize, const FuncContents& f) {
                text(key, " has type ", to_string(key.type())), "Convert it to uint64");
   }
   check_over_parameters(key, "the eviction key", asked);
-  if (const Expr& given = f.schedule.eviction_key; given.defined()) {
+  if (const Expr& earlier = f.schedule.eviction_key; earlier.defined()) {
     user_error(asked, "a Func has one eviction key",
-               text("it was given ", given, " before, and now ", key),
+               text("it was given ", earlier, " before, and now ", key),
                "Give the key once; combine two with arithmetic");
   }
 }

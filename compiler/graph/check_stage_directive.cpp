@@ -1,5 +1,5 @@
-// check_stage_directive.cpp -- the rules for directives of stages: each lists its conditions as
-// numbered checks.
+// check_stage_directive.cpp -- legality rules for directives of stages; each function lists its
+// conditions as numbered checks.
 #include <algorithm>
 #include <optional>
 #include <unordered_set>
@@ -27,8 +27,8 @@ std::string loops_of(const StageLoops& schedule) {
   return out.empty() ? "it has no loops" : "its loops are, outermost first, " + out;
 }
 
-// What became of a variable that is no loop any more; empty when it never was one.
-std::string fate_of(const StageLoops& schedule, const std::string& var) {
+// Tells what replaced a variable that is no longer a loop; empty when it never was one.
+std::string replacement_of(const StageLoops& schedule, const std::string& var) {
   for (const Split& split : schedule.splits) {
     switch (split.kind) {
       case Split::Kind::Split:
@@ -46,7 +46,7 @@ std::string fate_of(const StageLoops& schedule, const std::string& var) {
   return "";
 }
 
-// The reduction variables that a loop was made of.
+// The reduction variables that a loop derives from.
 std::unordered_set<std::string> reduction_roots(const Definition& definition,
                                                 const StageLoops& schedule,
                                                 const std::string& loop) {
@@ -100,9 +100,9 @@ void check_tail(TailStrategy tail, bool is_update, bool is_reduction, const std:
   }
 }
 
-// Whether what lies behind the end of a loop belongs to no other iteration. Behind the end of an
-// inner loop lie the points of the next iteration around it.
-bool ends_alone(const StageLoops& schedule, std::string loop) {
+// Whether the points past the end of a loop belong to no other iteration. Past the end of an inner
+// loop lie the points of the next iteration of the loop around it.
+bool has_free_end(const StageLoops& schedule, std::string loop) {
   for (auto split = schedule.splits.rbegin(); split != schedule.splits.rend(); ++split) {
     if (split->kind == Split::Kind::Fuse) {
       if (split->old_var == loop) loop = split->outer;
@@ -115,8 +115,9 @@ bool ends_alone(const StageLoops& schedule, std::string loop) {
   return true;
 }
 
-// Whether the loop is an inner one of constant extent that the factor divides: then it has no tail.
-bool divides_inner(const StageLoops& schedule, const std::string& loop, const Expr& factor) {
+// Whether the loop is an inner loop of constant extent that the factor divides, so that it has no
+// tail.
+bool divides_inner_loop(const StageLoops& schedule, const std::string& loop, const Expr& factor) {
   const auto small = as_const_int(factor);
   for (auto split = schedule.splits.rbegin(); split != schedule.splits.rend(); ++split) {
     if (split->kind == Split::Kind::Rename || split->inner != loop) continue;
@@ -129,21 +130,22 @@ bool divides_inner(const StageLoops& schedule, const std::string& loop, const Ex
 
 void check_round_up(const StageLoops& schedule, const std::string& loop, const Expr& factor,
                     const std::string& asked) {
-  if (ends_alone(schedule, loop) || divides_inner(schedule, loop, factor)) return;
+  if (has_free_end(schedule, loop) || divides_inner_loop(schedule, loop, factor)) return;
   user_error(asked, "an update definition does not run a point twice",
              text("TailStrategy::RoundUp runs ", quoted(loop),
                   " past its end, into the points of the next iteration around it"),
              "Use TailStrategy::GuardWithIf, or a factor that divides the loop's extent");
 }
 
-// Whoever stores beyond the range writes back what was there: to leave it alone is the same.
+// A blending strategy stores past the end but writes back the old values; guarding those stores has
+// the same effect.
 TailStrategy without_blending(TailStrategy tail) {
   const bool blends =
       tail == TailStrategy::RoundUpAndBlend || tail == TailStrategy::ShiftInwardsAndBlend;
   return blends ? TailStrategy::PredicateStores : tail;
 }
 
-// The variable that makes a loop's iterations depend on each other; empty when none does.
+// The reduction variable that makes a loop's iterations depend on each other; empty when none does.
 std::string dependent_root(const FuncContents& f, const Definition& definition,
                            const StageLoops& schedule, const std::string& loop) {
   for (const std::string& root : reduction_roots(definition, schedule, loop)) {
@@ -152,8 +154,8 @@ std::string dependent_root(const FuncContents& f, const Definition& definition,
   return "";
 }
 
-// Reduction loops keep their order, unless it does not matter: the update is proven to commute. A
-// loop whose iterations touch different elements may go anywhere.
+// Reduction loops keep their order unless the update is proven to commute. Loops whose iterations
+// access different elements may move freely.
 void check_reduction_order(const FuncContents& f, const Definition& definition,
                            const StageLoops& now, const std::vector<Dim>& dims,
                            const std::string& asked) {
@@ -177,8 +179,8 @@ void check_reduction_order(const FuncContents& f, const Definition& definition,
              "Keep the reduction loops in their order; pure loops may go anywhere");
 }
 
-// One element is updated as one, and no more: another iteration may write the others at any time.
-// Several points are updated under one lock.
+// An atomic update protects only the element that it writes; other iterations may write the others
+// at any time. An update of several points takes one lock for all of them.
 void check_atomic_reads(const FuncContents& f, const Definition& update, const std::string& asked) {
   if (point_number(update)) return;
   const Expr other = read_of_other_element(f, update);
@@ -194,7 +196,7 @@ std::string level_text(const LoopLevel& level) {
                                            : quoted("inlined");
 }
 
-// 1. The level is a loop. 2. It is of another Func, or of the stage before.
+// 1. The level is a loop. 2. It belongs to another Func, or to the stage before.
 void check_fuse_level(const SchedulePlace& at, const LoopLevel& level) {
   const std::string asked =
       text("compute ", quoted(stage_name(*at.f, at.stage)), " with ", level_text(level));
@@ -203,7 +205,7 @@ void check_fuse_level(const SchedulePlace& at, const LoopLevel& level) {
                "the level is " + level_text(level), "Name a stage and one of its loops");
   }
   if (level.func == at.f->name && (at.stage == 0 || level.stage != at.stage - 1)) {
-    user_error(asked, "of its own Func, a stage joins the one before it",
+    user_error(asked, "within one Func, a stage joins the stage before it",
                text("the level is of ", level.stage < 0 ? std::string("no stage by name")
                                                         : quoted(stage_name(*at.f, level.stage))),
                at.stage == 0
@@ -216,11 +218,11 @@ std::string list_of(const std::vector<NamedLoop>& names) {
   return listed(names, [](const NamedLoop& name) { return quoted(name); });
 }
 
-// Iterations that may touch the same element need atomic() of an update that is proven associative
-// and commutative, or stores one value there whichever comes last, atomic(true), or
-// allow_race_conditions(). Lanes of what atomic(true) vouches for
-// take turns, so that they may read each other's elements. `otherwise`: what to do instead; empty:
-// to take a pure loop.
+// Iterations that may access the same element need one of these: an associative and commutative
+// update with atomic(), an update that always stores the same value, atomic(true), or
+// allow_race_conditions(). Vector lanes under atomic(true) run one after the other, so they may
+// read each other's elements. `otherwise` is the advice in the message; empty: to choose a pure
+// loop.
 void check_race_free(const SchedulePlace& at, const std::string& loop, bool is_vectorized,
                      const std::string& asked, const std::string& otherwise = {}) {
   const Definition& stage = at.definition();
@@ -261,7 +263,7 @@ void check_not_closed(const StageLoops& schedule, const std::string& asked) {
              "specialize_fail was called already", "Specialize before specialize_fail");
 }
 
-// ---- one function for each directive that has rules: its conditions as numbered checks ----
+// ---- one function per directive with rules: its conditions as numbered checks ----
 
 template <typename D>
 void check(D&, const SchedulePlace&) {}
@@ -290,24 +292,25 @@ bool has_concurrent_iterations(const Dim& loop) {
   return runs_at_once(loop.runs) || loop.runs == ForType::Vectorized;
 }
 
-// Where one of the loops is parallel or vectorized, a fused loop that keeps this runs iterations of
-// both at the same time, and one that loses it is not what was asked for.
+// If one of the loops is parallel or vectorized, the fused loop would run iterations of both
+// concurrently. Making it serial would not be what the user asked for.
 void check_fused_race(const SchedulePlace& at, const Dim& inner, const Dim& outer,
                       const std::string& asked) {
-  for (const Dim* given : {&inner, &outer}) {
-    if (!has_concurrent_iterations(*given)) continue;
-    const std::string as_given = text(asked, ", where ", quoted(given->var),
-                                      given->runs == ForType::Vectorized ? " is vectorized"
-                                      : is_gpu(given->runs)              ? " runs on a GPU"
-                                                                         : " is parallel");
+  for (const Dim* concurrent : {&inner, &outer}) {
+    if (!has_concurrent_iterations(*concurrent)) continue;
+    const std::string asked_with_reason =
+        text(asked, ", where ", quoted(concurrent->var),
+             concurrent->runs == ForType::Vectorized ? " is vectorized"
+             : is_gpu(concurrent->runs)              ? " runs on a GPU"
+                                                     : " is parallel");
     for (const Dim* loop : {&inner, &outer})
-      check_race_free(at, loop->var, given->runs == ForType::Vectorized, as_given,
+      check_race_free(at, loop->var, concurrent->runs == ForType::Vectorized, asked_with_reason,
                       text("Keep ", quoted(inner.var), " and ", quoted(outer.var), " apart"));
   }
 }
 
-// 1. Both loops exist and differ. 2. The fused name is new. 3. Iterations that run at once touch
-// different elements. 4. The outer loop may stand directly around the inner one.
+// 1. Both loops exist and differ. 2. The fused name is new. 3. Iterations that run concurrently
+// access different elements. 4. The outer loop may move directly around the inner one.
 void check(FuseLoops& fuse, const SchedulePlace& at) {
   const std::string asked =
       text("fuse ", quoted(fuse.inner), " and ", quoted(fuse.outer), " of ", at.name());
@@ -331,8 +334,8 @@ void check(RenameLoop& rename, const SchedulePlace& at) {
   check_new_loop(at, rename.renamed, rename.old, asked);
 }
 
-// 1. Every loop exists. 2. None is named twice. 3. Reduction loops keep their order, unless it does
-// not matter.
+// 1. Every loop exists. 2. No loop is named twice. 3. Reduction loops keep their order, unless the
+// update commutes.
 void check(ReorderLoops& reorder, const SchedulePlace& at) {
   const std::string asked = text("reorder ", list_of(reorder.loops), " of ", at.name());
   for (const std::string& loop : reorder.loops) loop_index(at, loop, asked);
@@ -368,15 +371,15 @@ void check(PartitionLoop& partition, const SchedulePlace& at) {
              text("choose how to partition the loop ", quoted(partition.loop), " of ", at.name()));
 }
 
-// 1. Both loops exist, and `at` is `from` or inside of it. 2. The offset is an integer that is known
-// when a call begins.
+// 1. Both loops exist, and `at` is `from` or inside of it. 2. The offset is an integer that is
+// known when a call begins.
 void check(PrefetchData& prefetch, const SchedulePlace& at) {
   const std::string asked = text("prefetch ", quoted(prefetch.source), " for ", at.name(), " at ",
                                  quoted(prefetch.at), " from ", quoted(prefetch.from));
   const size_t inner = loop_index(at, prefetch.at, asked);
   const size_t outer = loop_index(at, prefetch.from, asked);
   if (inner > outer) {
-    user_error(asked, "the loop it happens at is the one it counts from, or inside of it",
+    user_error(asked, "the prefetch happens at the loop it counts from, or inside that loop",
                text(quoted(prefetch.at), " is around ", quoted(prefetch.from)), "Swap them");
   }
   const Expr& offset = prefetch.offset;
@@ -390,10 +393,10 @@ void check(PrefetchData& prefetch, const SchedulePlace& at) {
   prefetch.offset = int32_literal(offset, asked);
 }
 
-// 1. The level is a loop. 2. It is of another Func or of the stage before: now, or when the level is
-// set. 3. This stage has
-// no specializations and is no extern stage. Whether the loops agree and nothing depends on each
-// other is checked when the whole schedule is known.
+// 1. The level is a loop. 2. It belongs to another Func or to the stage before; if its LoopLevel is
+// not set yet, this is checked then. 3. This stage has no specializations and is not an extern
+// stage. Whether the loops agree, and whether the stages are independent, is checked at compile
+// time.
 void check(ComputeWith& with, const SchedulePlace& at) {
   const bool is_known = !with.from || with.from->defined;
   if (is_known) check_fuse_level(at, with.level);
@@ -411,7 +414,7 @@ void check(ComputeWith& with, const SchedulePlace& at) {
 }
 
 // 1. The condition is a scalar bool. 2. It is over parameters. 3. No specialize_fail came before.
-// 4. The stage does not join the loops of another.
+// 4. The stage is not fused with the loops of another.
 void check(Specialize& specialize, const SchedulePlace& at) {
   const std::string asked = "specialize " + at.name();
   const Expr& condition = specialize.condition;
@@ -466,7 +469,7 @@ size_t loop_index(const SchedulePlace& place, const std::string& loop, const std
   for (size_t i = 0; i < now.dims.size(); i++) {
     if (now.dims[i].var == loop) return i;
   }
-  const std::string fate = fate_of(now, loop);
+  const std::string fate = replacement_of(now, loop);
   user_error(asked, text(quoted(loop), " must be a loop of this stage"),
              fate.empty() ? loops_of(now) : fate + "; " + loops_of(now), "Name one of its loops");
 }

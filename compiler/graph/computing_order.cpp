@@ -9,21 +9,22 @@ namespace retrograde::graph {
 namespace {
 
 constexpr std::ptrdiff_t many_callees = 4;
-constexpr size_t image_dimensions = 2;  // what has fewer counts as no memory
-constexpr size_t most_outputs = 8;      // that are tried as the first
-// Of what the order of the graph keeps at once; it stays for less, as users expect it.
+constexpr size_t image_dimensions = 2;  // Funcs with fewer dimensions count as no memory
+constexpr size_t most_outputs = 8;      // how many outputs are tried as the first
+// Another order must keep at most this share of the graph's own order alive; otherwise the graph's
+// order stays, because users expect it.
 constexpr double worth_share = 0.9;
 
-// A Func at root with all that is computed in its loops.
+// A Func at root with all Funcs computed in its loops.
 struct Nest {
-  std::vector<size_t> funcs;  // in the order of the graph; the last: that at root
-  std::set<size_t> callees;   // nests
+  std::vector<size_t> funcs;  // in the order of the graph; last the one at root
+  std::set<size_t> callees;   // indices of nests
   size_t dimensions = 0;
   bool is_output = false;
 
   bool takes_memory() const { return !is_output && dimensions >= image_dimensions; }
 };
-using Order = std::vector<size_t>;  // nests
+using Order = std::vector<size_t>;  // indices of nests
 
 class Nests {
  public:
@@ -45,14 +46,14 @@ class Nests {
     for (size_t n = 0; n < nests_.size(); ++n) nests_[n].callees.erase(n);
   }
 
-  // That of the graph.
+  // The order of the graph.
   Order own_order() const {
     Order order(nests_.size());
     std::iota(order.begin(), order.end(), size_t(0));
     return with_early(order);
   }
-  // The same but for what an output needs, which comes first: of what a nest reads, the first in the
-  // order of the graph before the others, or the last.
+  // The order of the graph after the nests that `output` needs. Producers of a nest are visited in
+  // the order of the graph, or in reverse.
   Order order_from(size_t output, bool is_last_first) const {
     Order order;
     std::vector<char> seen(nests_.size());
@@ -68,7 +69,7 @@ class Nests {
     return result;
   }
 
-  // Images that are alive at once, at the most.
+  // The largest number of images alive at once.
   size_t most_alive(const Order& order) const {
     std::vector<size_t> last(nests_.size());
     for (size_t p = 0; p < order.size(); ++p) {
@@ -120,11 +121,11 @@ class Nests {
            }) >= many_callees;
   }
 
-  Order with_early(const Order& given) const {
-    Order order = given;
-    std::vector<size_t> place(given.size());
-    for (size_t p = 0; p < given.size(); ++p) {
-      const Nest& nest = nests_[given[p]];
+  Order with_early(const Order& base) const {
+    Order order = base;
+    std::vector<size_t> place(base.size());
+    for (size_t p = 0; p < base.size(); ++p) {
+      const Nest& nest = nests_[base[p]];
       size_t first = p;
       if (is_early(nest)) {
         first = 0;
@@ -134,13 +135,13 @@ class Nests {
         order[q] = order[q - 1];
         place[order[q]] = q;
       }
-      order[first] = given[p];
-      place[given[p]] = first;
+      order[first] = base[p];
+      place[base[p]] = first;
     }
     return order;
   }
 
-  std::vector<size_t> nest_of_;  // of each Func
+  std::vector<size_t> nest_of_;  // for each Func
   std::vector<Nest> nests_;
 };
 

@@ -7,7 +7,7 @@ namespace retrograde::graph {
 
 namespace {
 
-// One rewriter for all definitions, which remembers every node.
+// One rewriter for all definitions, so that shared nodes are copied once.
 class Copier : public Rewriter {
  public:
   GraphCopy run(const std::vector<FuncPtr>& outputs) {

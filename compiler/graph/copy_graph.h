@@ -1,5 +1,5 @@
-// copy_graph.h -- the same graph in another place, for passes from graph to graph: a Func of the
-// copy may be given another schedule or definition without its user's Func changing.
+// copy_graph.h -- copies a graph of Funcs for passes from graph to graph. A pass may schedule or
+// redefine a Func of the copy without changing the user's Func.
 #pragma once
 
 #include <unordered_map>
@@ -9,18 +9,19 @@
 
 namespace retrograde::graph {
 
-using FuncCopies = std::unordered_map<const FuncContents*, FuncPtr>;  // by what was copied
+using FuncCopies = std::unordered_map<const FuncContents*, FuncPtr>;  // keyed by the original
 
 struct GraphCopy {
   std::vector<FuncPtr> outputs;
   FuncCopies of;
 };
 
-// All Funcs that the outputs depend on; parameters and reduction domains are shared with the
-// original. Expressions that definitions share stay shared. Wrappers are to have been applied.
+// Copies all Funcs that the outputs depend on; parameters and reduction domains are shared with the
+// original. Sharing among the expressions of definitions is preserved. Wrappers must be applied
+// first.
 GraphCopy copy_graph(const std::vector<FuncPtr>& outputs);
 
-// What the Func prefetches of one that was copied is of the copy.
+// Redirects prefetches in `f` from copied Funcs to their copies.
 void redirect_prefetches(FuncContents& f, const FuncCopies& copies);
 
 }  // namespace retrograde::graph

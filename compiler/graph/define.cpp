@@ -1,9 +1,9 @@
 // define.cpp -- the rules for definitions.
 //
 // Checks of every definition, in this order: number of arguments, defined expressions, types, free
-// variables; for pure definitions that the arguments are distinct Vars; for updates that all
-// reduction variables are of one domain, that the Func is not frozen, and that a pure variable
-// keeps its place in every reference of the Func to itself.
+// variables. For pure definitions, the arguments must be distinct Vars. For updates, all reduction
+// variables must come from one domain, the Func must not be frozen, and a pure variable must keep
+// its position in every reference of the Func to itself.
 #include "graph/define.h"
 
 #include <algorithm>
@@ -28,7 +28,7 @@ std::string list(const std::vector<Expr>& exprs) {
   return "(" + listed(exprs, [](const Expr& e) { return text(e); }) + ")";
 }
 
-// What is being defined, for messages: "define "f"(x, r.x)".
+// The definition in question as messages show it: "define "f"(x, r.x)".
 struct Site {
   const FuncContents& f;
   std::string asked;
@@ -62,7 +62,8 @@ bool mentions_undef(const Expr& root) {
   return any_node(root, [](const Expr& e) { return is_undef(e); });
 }
 
-// Undef means that nothing is stored, which says nothing of where. `exprs`: of either side.
+// An undef value means that nothing is stored; an undef coordinate has no meaning. `exprs`: all
+// expressions of both sides.
 void check_coordinates(const Site& site, const std::vector<Expr>& args,
                        const std::vector<Expr>& exprs) {
   const auto refuse = [&](const Expr& coordinate, const std::string& where) {
@@ -82,13 +83,13 @@ void check_coordinates(const Site& site, const std::vector<Expr>& args,
   }
 }
 
-// `exprs`: as they were written, of either side.
+// `exprs`: all expressions of both sides, as the user wrote them.
 void check_constants(const Site& site, const std::vector<Expr>& exprs) {
   for (const Expr& root : exprs) {
     const Expr part = overflowing_part(root);
     if (!part.defined()) continue;
     user_error(site.asked, "constants of int32 and int64 do not overflow",
-               text(part, " has no place in ", to_string(part.type())),
+               text(part, " does not fit ", to_string(part.type())),
                "Cast an operand to a wider type, or to an unsigned one, which wraps around");
   }
 }
@@ -96,9 +97,9 @@ void check_constants(const Site& site, const std::vector<Expr>& exprs) {
 void check_types(const Site& site, const std::vector<Expr>& values, const std::vector<Type>& types,
                  const char* whose) {
   if (values.size() != types.size()) {
-    user_error(site.asked, "all definitions of a Func have as many values",
+    user_error(site.asked, "all definitions of a Func have the same number of values",
                text(whose, " has ", types.size(), " and this one has ", values.size()),
-               "Give as many values");
+               "Give the same number of values");
   }
   for (size_t i = 0; i < types.size(); i++) {
     if (values[i].type() == types[i]) continue;
@@ -109,7 +110,7 @@ void check_types(const Site& site, const std::vector<Expr>& values, const std::v
   }
 }
 
-// Everything in the definition that is a name: each variable once, lets inside excluded.
+// The names in a definition: each free variable once, without names bound by lets.
 struct Names {
   std::vector<const Variable*> free;
   std::vector<const Call*> self_calls;
@@ -142,13 +143,14 @@ Names names_in(const FuncContents& f, const std::vector<Expr>& roots) {
   return names;
 }
 
-// Plain Vars only: a parameter or reduction variable carries a symbol.
+// A plain Var, as opposed to a parameter or reduction variable, which carry a symbol.
 const Variable* as_plain_var(const Expr& e) {
   const Variable* v = e.as<Variable>();
   return v && !v->symbol.defined() && v->type == Int(32) ? v : nullptr;
 }
 
-// The reduction domain of a definition, null when it has none. `result`: known already.
+// The reduction domain of a definition, null when it has none. `result`: the domain, if already
+// known.
 DomainPtr domain_in(const Site& site, const Names& names, DomainPtr result = nullptr) {
   for (const Variable* v : names.free) {
     auto domain = domain_of(*v);
@@ -182,11 +184,11 @@ void check_free_variables(const Site& site, const Names& names,
                  text("it uses ", quoted(v->name)),
                  text("Write ", quoted(site.f.name), "(..., _) = ..."));
     }
-    user_error(
-        site.asked,
-        "every variable on the right-hand side stands on the left-hand side, or is of an RDom",
-        text(quoted(v->name), " stands on the right-hand side only"),
-        "Add it as an argument, or reduce over an RDom");
+    user_error(site.asked,
+               "every variable on the right-hand side appears on the left-hand side, or belongs to "
+               "an RDom",
+               text(quoted(v->name), " appears only on the right-hand side"),
+               "Add it as an argument, or reduce over an RDom");
   }
 }
 
@@ -232,8 +234,7 @@ std::vector<std::string> pure_names(const Site& site, const std::vector<Expr>& a
     }
     if (std::ranges::find(names, v->name) != names.end()) {
       user_error(site.asked, "the arguments of a first definition are different Vars",
-                 quoted(v->name) + " stands there twice",
-                 "Use a Var of its own for each dimension");
+                 quoted(v->name) + " appears twice", "Use a Var of its own for each dimension");
     }
     names.push_back(v->name);
   }
@@ -257,12 +258,12 @@ std::vector<Expr> with(std::vector<Expr> all, const std::vector<Expr>& more) {
 
 void check_update_arity(const Site& site, const std::vector<Expr>& args) {
   if (args.size() == site.f.args.size()) return;
-  user_error(site.asked, "all definitions of a Func have as many arguments",
+  user_error(site.asked, "all definitions of a Func have the same number of arguments",
              text("its first definition has ", site.f.args.size(), " and this one ", args.size()),
-             "Give as many arguments");
+             "Give the same number of arguments");
 }
 
-// Coordinates of the left-hand side as int32.
+// The coordinates of the left-hand side as int32.
 std::vector<Expr> update_coordinates(const Site& site, const std::vector<Expr>& args) {
   std::vector<Expr> result;
   for (const Expr& arg : args) {
@@ -275,8 +276,8 @@ std::vector<Expr> update_coordinates(const Site& site, const std::vector<Expr>& 
   return result;
 }
 
-// Dimensions in which the left-hand side is the pure variable itself: those are done independently
-// of each other.
+// Dimensions in which the left-hand side is the pure variable itself; their iterations are
+// independent.
 std::vector<std::string> pure_positions(const FuncContents& f, const std::vector<Expr>& args) {
   std::vector<std::string> result(args.size());
   for (size_t i = 0; i < args.size(); i++) {
@@ -293,7 +294,7 @@ void check_self_calls(const Site& site, const Names& names, const std::vector<st
       const Variable* v = call->args[i].as<Variable>();
       if (v && v->name == pure[i]) continue;
       user_error(site.asked,
-                 "a pure variable stands at its own place in every reference of a Func to itself, "
+                 "a pure variable keeps its position in every reference of a Func to itself, "
                  "so that its "
                  "iterations are independent",
                  text("the right-hand side reads ", quoted(site.f.name), list(call->args),
@@ -303,8 +304,8 @@ void check_self_calls(const Site& site, const Names& names, const std::vector<st
   }
 }
 
-// The domain as an update of f may own it: one with a predicate that reads f would own f in turn,
-// so that neither ever went away. Then a copy that does not.
+// The domain in a form that an update of f may own. If its predicate reads f, ownership would be
+// cyclic and leak both; such a domain is copied with weak references to f.
 DomainPtr domain_for(const FuncPtr& f, const DomainPtr& domain) {
   if (!domain->predicate.defined()) return domain;
   const Expr released = redirect_calls(domain->predicate, f, f, true);
@@ -328,21 +329,21 @@ void check_bounds(const Site& site, const FuncPtr& f, const ReductionDomainConte
 }
 
 Definition make_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> values,
-                       const DomainPtr& given) {
+                       const DomainPtr& declared) {
   Definition update;
   update.args = std::move(args);
   update.values = std::move(values);
-  DomainPtr domain = given;
-  if (given) {
-    given->frozen = true;
-    domain = domain_for(f, given);
+  DomainPtr domain = declared;
+  if (declared) {
+    declared->frozen = true;
+    domain = domain_for(f, declared);
     update.rvars = domain->vars;
     if (domain->predicate.defined())
       update.predicate = rebind_symbol(domain->predicate, SymbolRef(domain));
   }
   return map_exprs(update, [&](const Expr& e) {
     const Expr own = redirect_calls(e, f, f, true);
-    return domain == given ? own : rebind_symbol(own, given.get(), SymbolRef(domain));
+    return domain == declared ? own : rebind_symbol(own, declared.get(), SymbolRef(domain));
   });
 }
 
@@ -365,7 +366,7 @@ void make_outputs(FuncContents& f) {
 
 namespace {
 
-// Why an expression has no single value in a call; empty when it has.
+// Why an expression has no single value in a call; empty when it has one.
 std::string varying_part(const Expr& root) {
   std::string part;
   walk(root, [&](const Expr& e) {
@@ -444,10 +445,10 @@ void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vec
   f->version++;
 }
 
-// The domain is that of the expressions as they were written; all else is asked of what is left of
-// them after folding.
+// The domain comes from the expressions as written; all other checks apply to the folded
+// expressions.
 void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
-                   const std::vector<Expr>& raw_values, const DomainPtr& given) {
+                   const std::vector<Expr>& raw_values, const DomainPtr& declared) {
   const Site site = site_of(*f, raw_args, true);
   if (!f->is_defined())
     user_error(site.asked, "a Func is updated after its first definition", "it has none",
@@ -466,14 +467,14 @@ void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
   check_values(site, raw_values);
   check_constants(site, with(raw_args, raw_values));
   check_types(site, raw_values, f->types, "the first definition");
-  const auto domain = domain_in(site, names_in(*f, with(raw_args, raw_values)), given);
+  const auto domain = domain_in(site, names_in(*f, with(raw_args, raw_values)), declared);
   std::vector<Expr> exprs = settled(with(update_coordinates(site, raw_args), raw_values));
   const auto first_value = exprs.begin() + static_cast<std::ptrdiff_t>(raw_args.size());
   const std::vector<Expr> args(exprs.begin(), first_value), values(first_value, exprs.end());
   if (domain && domain->predicate.defined()) exprs.push_back(domain->predicate);
   check_coordinates(site, args, exprs);
   const Names names = names_in(*f, exprs);
-  domain_in(site, names, domain);  // the predicate may bring in another one
+  domain_in(site, names, domain);  // the predicate may mention another domain
   if (domain) check_bounds(site, f, *domain);
   const std::vector<std::string> pure = pure_positions(*f, args);
   check_free_variables(site, names, pure);

@@ -30,7 +30,7 @@ void give(const SplitLoop& split, StageLoops& schedule) {
   Dim outer = schedule.dims[at], inner = outer;
   outer.var = split.outer;
   inner.var = split.inner;
-  outer.is_in_call = false;  // each call computes what the inner loop would
+  outer.is_in_call = false;  // each call computes the points of the inner loop
   schedule.splits.push_back({Split::Kind::Split, split.old, split.outer, split.inner, split.factor,
                              split.tail, outer.is_reduction});
   schedule.dims[at] = std::move(inner);
@@ -38,7 +38,7 @@ void give(const SplitLoop& split, StageLoops& schedule) {
                        std::move(outer));
 }
 
-// The outer loop comes to stand directly around the inner one.
+// The outer loop moves directly around the inner one.
 void give(const FuseLoops& fuse, StageLoops& schedule) {
   const Dim inner = schedule.dims[place_of(schedule, fuse.inner)];
   const size_t outer_at = place_of(schedule, fuse.outer);
@@ -73,7 +73,7 @@ void give(const ReorderLoops& reorder, StageLoops& schedule) {
   for (size_t i = 0; i < sorted.size(); ++i) schedule.dims[sorted[i]] = before[places[i]];
 }
 
-// The outermost loop, which runs once, is there where a directive says how.
+// The outermost loop, which runs once, is added when a directive refers to it.
 void give(const RunLoop& run, StageLoops& schedule) {
   if (run.loop == outermost_loop && !has_outermost(schedule.dims))
     schedule.dims.push_back({outermost_loop});
@@ -102,7 +102,7 @@ void give(const ComputeWith& with, StageLoops& schedule) {
   schedule.fuse_alignment = {with.align.begin(), with.align.end()};
 }
 
-// It starts as a copy of the schedule so far.
+// A specialization starts as a copy of the schedule so far.
 void give(const Specialize& specialize, StageLoops& schedule) {
   StageLoops copy = schedule;
   copy.specializations.clear();
@@ -120,7 +120,7 @@ void give(const SpecializeFail& fail, StageLoops& schedule) {
 
 // ---- the Func ----
 
-// Storing follows computing, unless it was asked for elsewhere.
+// The storage level follows the compute level unless a directive set it.
 void give(const ComputeAt& compute, FuncPlacement& schedule) {
   const bool follows =
       !schedule.store_from && (schedule.store_level.kind == LoopLevel::Kind::Inlined ||
@@ -137,7 +137,7 @@ void give(const ReorderStorage& reorder, FuncPlacement& schedule) {
   schedule.storage_dims = reorder.dimensions;
 }
 
-// The entry for a dimension, made when there is none.
+// The entry for a dimension, created if necessary.
 template <typename Entry>
 Entry& entry_of(std::vector<Entry>& entries, const std::string& dimension) {
   const auto found =
@@ -165,7 +165,7 @@ void give(const Memoize& memoize, FuncPlacement& schedule) {
 }
 void give(const Async&, FuncPlacement& schedule) { schedule.async = true; }
 
-// What is known of sizes, and what is reported, is no schedule: it leaves a Func untouched.
+// Bounds, estimates and tracing are not part of the schedule: the Func still counts as unscheduled.
 void give(const BoundDimension& bound, FuncContents& f) {
   Bound& entry = entry_of(f.schedule.bounds, bound.dimension);
   entry.min = bound.min;
@@ -196,7 +196,7 @@ concept GivenTo = requires(const D& directive, Schedule& schedule) {
   give(directive, schedule);
 };
 
-// ---- and back ----
+// ---- schedules back to directives ----
 
 Directive directive_of(const Split& split) {
   switch (split.kind) {
@@ -289,7 +289,7 @@ void apply_directive(const Directive& directive, StageLoops& schedule) {
       directive);
 }
 
-// What is promised or guessed of sizes leaves open how they are computed.
+// Bounds and estimates do not decide how a Func is computed.
 template <typename D>
 constexpr bool is_of_sizes = std::is_same_v<D, BoundDimension> || std::is_same_v<D, AlignBounds> ||
                              std::is_same_v<D, Estimate>;

@@ -1,13 +1,13 @@
-// directive.h -- one scheduling directive as data, and schedules as what a log of them makes.
+// directive.h -- scheduling directives as data, and the schedules that a sequence of them builds.
 //
-// A directive is a struct of names, sizes and choices; `fields` lists them in the order in which
-// text gives them, so that printing, parsing and comparing are written once for all directives:
+// A directive is a struct of names, sizes and enumerators. `fields` lists them in the order of the
+// text, so printing, parsing and comparing are written once for all directives:
 //
 //   split(x, xo, xi, 8, GuardWithIf)
 //
-// Only primitive directives are here: tile, vectorize(x, 8) and their like are several of them.
-// What one may be given to is checked in give_directive.h; applying one here asserts nothing but
-// that its loops exist.
+// Only primitive directives are here: tile, vectorize(x, 8) and the like expand to several of them.
+// give_directive.h checks whether a directive is legal; applying one only requires that its loops
+// exist.
 #pragma once
 
 #include <string>
@@ -24,20 +24,20 @@ namespace retrograde::graph {
 struct Definition;
 struct FuncContents;
 
-// Names of what is there already; names that a directive makes up are strings.
+// Names of existing entities. Names that a directive introduces are plain strings.
 struct NamedLoop : std::string {
   NamedLoop(std::string name = "") : std::string(std::move(name)) {}
 };
-struct NamedFunc : std::string {  // of a Func or an image
+struct NamedFunc : std::string {  // a Func or an image
   NamedFunc(std::string name = "") : std::string(std::move(name)) {}
 };
 
-// Its name, and its fields.
+// The directive's name and its fields.
 #define RETROGRADE_DIRECTIVE(name_, ...)     \
   static constexpr const char* name = name_; \
   auto fields() { return std::tie(__VA_ARGS__); }
 
-// ---- of a stage ----
+// ---- directives of a stage ----
 
 struct SplitLoop {
   RETROGRADE_DIRECTIVE("split", old, outer, inner, factor, tail)
@@ -56,11 +56,11 @@ struct RenameLoop {
   NamedLoop old;
   std::string renamed;
 };
-struct ReorderLoops {  // innermost first; loops that are not named keep their places
+struct ReorderLoops {  // innermost first; unnamed loops keep their positions
   RETROGRADE_DIRECTIVE("reorder", loops)
   std::vector<NamedLoop> loops;
 };
-struct RunLoop {  // serial, parallel, vectorized, unrolled, or over parts of a GPU
+struct RunLoop {  // serial, parallel, vectorized, unrolled, or over blocks or threads of a GPU
   RETROGRADE_DIRECTIVE("run", loop, kind)
   NamedLoop loop;
   ForType kind = ForType::Serial;
@@ -72,7 +72,7 @@ struct PartitionLoop {
 };
 struct MakeAtomic {
   RETROGRADE_DIRECTIVE("atomic", vouched)
-  bool vouched = false;  // the user answers for its being associative
+  bool vouched = false;  // atomic(true): the user vouches that the update is associative
 };
 struct AllowRaces {
   RETROGRADE_DIRECTIVE("allow_race_conditions")
@@ -86,12 +86,12 @@ struct PrefetchData {
   NamedLoop at, from;
   Expr offset;
   PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf;
-  SymbolRef symbol = {};  // of the source
+  SymbolRef symbol = {};  // the contents of the source
 };
 // A loop of a Func, root, or inlined.
 struct AtLevel {
   LoopLevel level;
-  // The user's object that says so, also when it is set later; null: `level` is all.
+  // The user's LoopLevel object, which may be set later; null: `level` is final.
   std::shared_ptr<LoopLevelContents> from = {};
   auto fields() { return std::tie(level); }
 };
@@ -107,13 +107,13 @@ struct SpecializeFail {
   RETROGRADE_DIRECTIVE("specialize_fail", message)
   Expr message;
 };
-struct FactorOut {  // rfactor: `made` keeps these loops as these variables
+struct FactorOut {  // rfactor: keeps these loops as variables of the Func `made`
   RETROGRADE_DIRECTIVE("rfactor", made, preserved)
   std::string made;
   std::vector<std::pair<NamedLoop, std::string>> preserved;
 };
 
-// ---- of a Func ----
+// ---- directives of a Func ----
 
 struct ComputeAt : AtLevel {
   static constexpr const char* name = "compute_at";
@@ -167,7 +167,7 @@ struct BoundDimension {
 struct AlignBounds {
   RETROGRADE_DIRECTIVE("align_bounds", dimension, modulus, remainder)
   std::string dimension;
-  Expr modulus, remainder;  // remainder undefined: the min stays
+  Expr modulus, remainder;  // remainder undefined: the min stays as it is
 };
 struct Estimate {
   RETROGRADE_DIRECTIVE("set_estimate", dimension, min, extent)
@@ -192,7 +192,7 @@ struct DebugToFile {
   RETROGRADE_DIRECTIVE("debug_to_file", file)
   Expr file;
 };
-struct Wrap {  // no users: all that have no other wrapper
+struct Wrap {  // no users: wraps for all consumers without another wrapper
   RETROGRADE_DIRECTIVE("in", made, users)
   std::string made;
   std::vector<NamedFunc> users;
@@ -203,7 +203,7 @@ struct Clone {
   std::vector<NamedFunc> users;
 };
 
-struct CopyInput {  // of an image that this Func reads
+struct CopyInput {  // an image that this Func reads
   RETROGRADE_DIRECTIVE("copy_input", made, image)
   std::string made;
   NamedFunc image;
@@ -218,31 +218,32 @@ using Directive =
                  BoundStorage, FoldStorage, RingBuffer, Memoize, Async, BoundDimension, AlignBounds,
                  Estimate, TraceLoads, TraceStores, TraceRealizations, AddTraceTag, DebugToFile,
                  Wrap, Clone, CopyInput>;
-bool is_of_stage(const Directive& directive);  // not of the Func as a whole
+bool is_of_stage(const Directive& directive);  // false for directives of the Func as a whole
 const char* name_of(const Directive& directive);
 std::vector<std::string> directive_names();
-std::string made_by(const Directive& directive);  // the name of the Func that it makes; empty: none
+// The Func that the directive creates; empty for most.
+std::string made_by(const Directive& directive);
 
-// A directive that was given, and to what: the Func whose log it is in, or one of its stages.
+// A directive in the log of a Func, with the stage that it applies to.
 struct LoggedDirective {
   int stage = -1;            // -1: the Func
-  std::vector<int> special;  // of the stage's specializations: which, and of that one which
+  std::vector<int> special;  // path to a nested specialization: an index for each level
   Directive directive;
-  uint64_t order = 0;  // grows with each directive that this process gives
+  uint64_t order = 0;  // increases with each directive in this process
 };
 
-// The loops of a definition that nobody scheduled, innermost first: its reduction variables, then
-// its pure variables. `f`: whose.
+// The loops of an unscheduled definition of `f`, innermost first: its reduction variables, then its
+// pure variables.
 std::vector<Dim> first_loops(const FuncContents& f, const Definition& definition);
 
-// What the directive makes of a schedule. InternalError when a loop that it names is not there, and
-// for those that make Funcs.
+// Applies the directive to a schedule. InternalError when a loop that it names does not exist, and
+// for directives that create Funcs.
 void apply_directive(const Directive& directive, StageLoops& schedule);
 void apply_directive(const Directive& directive, FuncContents& f);
 
-// Directives that make this schedule out of the first loops, specializations aside.
+// The directives that turn the first loops into this schedule, specializations excluded.
 std::vector<Directive> directives_of(const StageLoops& schedule, const std::vector<Dim>& first);
-// Directives that make the schedule of the Func, stages aside, out of none.
+// The directives that build the schedule of the Func, stages excluded.
 std::vector<Directive> directives_of(const FuncContents& f);
 
 }  // namespace retrograde::graph

@@ -1,4 +1,4 @@
-// directive_choices.h -- the enumerators that directives choose among, as C++ has them.
+// directive_choices.h -- the names of the enumerators that directives take, as spelled in C++.
 #pragma once
 
 #include <array>
@@ -26,7 +26,7 @@ inline constexpr std::array memory_choices{"Auto",        "Heap",      "Stack",
 inline constexpr std::array align_choices{"AlignStart", "AlignEnd", "NoAlign", "Auto"};
 inline constexpr std::array prefetch_choices{"Clamp", "GuardWithIf", "NonFaulting"};
 
-// An enumeration: its name, and those of its enumerators.
+// An enumeration's name and the names of its enumerators.
 template <typename E>
 struct Choices;
 #define RETROGRADE_CHOICES(E, names_)            \

@@ -1,8 +1,9 @@
-// Arguments are read as expressions: names and enumerators are variables to that parser.
+// Arguments are parsed as expressions, in which names and enumerators appear as variables.
 #include "graph/directive_text.h"
 
 #include "diagnostics/error.h"
 #include "graph/directive_choices.h"
+#include "graph/directive_fields.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/parse.h"
@@ -28,14 +29,6 @@ std::string print_field(const LoopLevel& level) {
   const std::string stage = level.stage < 0 ? "" : text(", ", level.stage);
   return text("loop(", quote_name(level.func), ", ", quote_name(level.var), stage, ")");
 }
-template <typename A, typename B>
-std::string print_field(const std::pair<A, B>& both) {
-  return print_field(both.first) + ", " + print_field(both.second);
-}
-template <typename T>
-std::string print_field(const std::vector<T>& list) {
-  return listed(list, [](const T& one) { return print_field(one); });
-}
 
 // ---- parsing ----
 
@@ -47,7 +40,9 @@ class Reader {
   template <typename D>
   D read() {
     D directive;
-    std::apply([&](auto&... field) { (read(field), ...); }, directive.fields());
+    const auto read_field = [&](auto& field) { read(field); };
+    const auto has_more = [&] { return next_ < args_.size(); };
+    FieldVisitor{read_field, has_more}.fields_of(directive);
     if (next_ != args_.size()) fail("fewer arguments");
     return directive;
   }
@@ -99,15 +94,6 @@ class Reader {
     const std::string word = name_of(e, "root, inlined or loop(f, x)");
     level.kind = word == "root" ? LoopLevel::Kind::Root : LoopLevel::Kind::Inlined;
   }
-  template <typename A, typename B>
-  void read(std::pair<A, B>& both) {
-    read(both.first);
-    read(both.second);
-  }
-  template <typename T>
-  void read(std::vector<T>& list) {
-    while (next_ < args_.size()) read(list.emplace_back());
-  }
 
   std::string line_;
   std::vector<Expr> args_;
@@ -154,12 +140,9 @@ std::vector<Expr> parse_arguments(const std::string& line, const NameTypes& decl
 std::string to_text(const Directive& directive) {
   return std::visit(
       [](auto d) {
-        std::string out;
-        const auto add = [&](const std::string& field) {
-          if (!field.empty()) out += (out.empty() ? "" : ", ") + field;
-        };
-        std::apply([&](const auto&... field) { (add(print_field(field)), ...); }, d.fields());
-        return text(d.name, "(", out, ")");
+        std::vector<std::string> fields;
+        visit_fields(d, [&](const auto& field) { fields.push_back(print_field(field)); });
+        return text(d.name, "(", listed(fields), ")");
       },
       directive);
 }

@@ -11,14 +11,15 @@ namespace retrograde::graph {
 
 std::string to_text(const Directive& directive);
 
-// The directive in a line such as "split(x, xo, xi, 8, Auto)"; nothing when no directive has that
-// name. Requires: its arguments are those of directive.h.
+// Parses a line such as "split(x, xo, xi, 8, Auto)"; returns nothing when no directive has that
+// name.
+// Requires: its arguments are those of directive.h.
 std::optional<Directive> parse_directive(const std::string& line);
 
 bool equal(const Directive& a, const Directive& b);
 
-// The arguments of a line such as "name(a, b, _)": undefined where it says _.
-std::vector<Expr> parse_arguments(const std::string& line, const NameTypes& declared = {});
+// The arguments of a line such as "name(a, b, _)"; _ gives an undefined one.
+std::vector<Expr> parse_arguments(const std::string& line);
 std::string print_argument(const Expr& e);  // "_" when undefined
 
 }  // namespace retrograde::graph

@@ -156,7 +156,7 @@ std::vector<FuncPtr> direct_callees(const FuncContents& f) {
 
 namespace {
 
-// The expressions of a definition that are defined, to be changed where it may be.
+// Visits the defined expressions of a definition, mutably if the definition is mutable.
 template <class AnyDefinition, class Visit>
 void visit_exprs(AnyDefinition& definition, const Visit& visit) {
   const auto visit_defined = [&](auto& e) {
@@ -214,7 +214,7 @@ class ParameterCollector {
     });
   }
 
-  // Schedules and promises about sizes may mention parameters too.
+  // Schedules and bounds may mention parameters too.
   void add_schedule(const FuncContents& f) {
     for (const Bound& bound : f.schedule.bounds) {
       for (const Expr& e : {bound.min, bound.extent, bound.modulus, bound.remainder}) add_expr(e);
@@ -284,7 +284,7 @@ void check_names(const std::vector<ParameterPtr>& parameters) {
 
 std::vector<ParameterPtr> parameters_of(const std::vector<FuncPtr>& outputs) {
   ParameterCollector collector;
-  // What is said about an output's own buffer names that output, not an input.
+  // Constraints on an output's own buffer mention that output, which is not an input.
   for (const FuncPtr& output : outputs) {
     for (const ParameterPtr& parameter : output->outputs) collector.exclude(parameter);
   }

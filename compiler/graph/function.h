@@ -1,6 +1,6 @@
-// function.h -- what a Func is made of: plain data that the front end fills in, and that analysis,
-// autodiff, lowering and the interpreter read. The classes users meet (Func, Stage, RDom, Param,
-// ImageParam) are handles onto these.
+// function.h -- the contents of a Func, as plain data. The front end fills them in; analysis,
+// autodiff, lowering and the interpreter read them. The classes of the public API (Func, Stage,
+// RDom, Param, ImageParam) are handles to these.
 #pragma once
 
 #include <functional>
@@ -19,18 +19,19 @@
 
 namespace retrograde {
 
-// What a user gave for autodiff to use instead of the definitions (autodiff/custom_derivative.h).
+// The user's derivative rules that replace differentiation of the definitions
+// (autodiff/custom_derivative.h).
 namespace autodiff {
 struct CustomDerivatives;
 }
 
-// How the symbol of an extern stage is named. Default: as the target says (C, unless it has
-// c_plus_plus_name_mangling).
+// Name mangling of an extern stage's symbol. Default follows the target: C, unless it has
+// c_plus_plus_name_mangling.
 enum class NameMangling : uint8_t { Default, C, CPlusPlus };
 
 namespace graph {
 
-// Of one value of each type.
+// The bytes of one value of each type.
 int total_bytes(const std::vector<Type>& types);
 
 struct SourceLocation {
@@ -38,18 +39,17 @@ struct SourceLocation {
   int line = 0;
 };
 
-// One definition: for all points of the pure args (and the reduction variables), args <- values,
-// where predicate.
+// One definition: args <- values for all points of the pure args and the reduction variables at
+// which the predicate holds.
 struct Definition {
-  std::vector<Expr> args;  // pure definition: exactly the Func's args as Variables
-  std::vector<Expr>
-      values;      // one per Tuple element; all loads of one point happen before its stores
-  Expr predicate;  // undefined: always
+  std::vector<Expr> args;    // in a pure definition exactly the Func's args as Variables
+  std::vector<Expr> values;  // one per Tuple element; all loads of a point happen before its stores
+  Expr predicate;            // undefined: always true
   std::vector<ReductionVariable> rvars;
   StageLoops schedule;
 };
 
-// Func::define_extern: computed by a C function on buffers.
+// Func::define_extern: a stage that a C function computes on buffers.
 struct ExternArgument {
   enum class Kind : uint8_t { Func, Buffer, Expr };
   Kind kind = Kind::Expr;
@@ -58,47 +58,47 @@ struct ExternArgument {
   Expr expr;
 };
 struct ExternDefinition {
-  std::string function;  // the symbol
+  std::string function;  // the symbol's name
   std::vector<ExternArgument> args;
   NameMangling mangling = NameMangling::Default;
 };
 
-// Pipeline::add_requirement: calls fail with the message unless it holds.
+// Pipeline::add_requirement: calls fail with the message unless the condition holds.
 struct Requirement {
-  Expr condition;             // of parameters only
-  std::vector<Expr> message;  // put together
+  Expr condition;             // over parameters only
+  std::vector<Expr> message;  // parts, concatenated
 };
 
-// The contents of a Func. Symbol behind each Call to it.
+// The contents of a Func: the Symbol behind each Call to it.
 struct FuncContents : Symbol, std::enable_shared_from_this<FuncContents> {
   std::string name;                // unique in the process
-  SourceLocation declared_at;      // of the handle that made it
+  SourceLocation declared_at;      // where the user's handle was created
   std::vector<std::string> args;   // pure variables, dimension 0 first
-  std::vector<Type> types;         // of the values
+  std::vector<Type> types;         // of each value
   std::optional<Definition> pure;  // empty until defined
   std::vector<Definition> updates;
   FuncPlacement schedule;
-  std::vector<LoggedDirective> log;  // all that were given to it and its stages, in their order
+  std::vector<LoggedDirective> log;  // all directives of the Func and its stages, in order
   std::vector<std::shared_ptr<ParameterContents>>
-      outputs;                            // constraints on the buffers when it is an output
-  std::vector<Requirement> requirements;  // of calls, when it is an output
-  bool frozen = false;                    // used by another Func: no more updates
+      outputs;                            // constraints on its buffers when it is an output
+  std::vector<Requirement> requirements;  // on calls when it is an output
+  bool frozen = false;                    // another Func uses it: no more updates
   uint64_t version =
-      0;  // grows with every definition and directive: compiled code of an older one is stale
+      0;  // increases with every definition and directive; code compiled earlier is stale
   TraceSchedule trace;
-  std::string debug_file;  // debug_to_file: written after it is computed; empty: not
+  std::string debug_file;  // debug_to_file: the file to write after it is computed; empty: none
   // When set, `pure` has args but no values and no loops, and there are no updates.
   std::optional<ExternDefinition> extern_definition;
-  // Null: none; clones share it.
+  // Null when there are none; clones share it.
   std::shared_ptr<const autodiff::CustomDerivatives> custom_derivatives;
   // Func::in and clone_in: consumers named here read the wrapper instead; "" stands for all others.
   std::map<std::string, std::shared_ptr<FuncContents>> wrappers;
   // Func::copy_input: images named here are read through these Funcs.
   std::map<std::string, std::shared_ptr<FuncContents>> copied_inputs;
-  // Type the user asked for in the declaration (Func f(type, dims)), empty when none
+  // The types of the declaration Func f(type, dims); empty when not declared.
   std::vector<Type> required_types;
   int required_dimensions = -1;
-  std::optional<Provenance> made;  // empty: its user wrote it
+  std::optional<Provenance> made;  // empty for a Func that the user wrote
 
   bool is_defined() const { return pure.has_value(); }
   int dimensions() const { return static_cast<int>(args.size()); }
@@ -110,31 +110,32 @@ struct FuncContents : Symbol, std::enable_shared_from_this<FuncContents> {
 };
 using FuncPtr = std::shared_ptr<FuncContents>;
 
-// A Func that the compiler makes; its name and definitions are to come.
+// Creates a Func for the compiler; the caller adds its name and definitions.
 FuncPtr make_func(Role role);
-// The same with a name like `name` that no other Func has, made for the Func `of`.
+// Creates a Func for the compiler with a unique name like `name`, on behalf of the Func `of`.
 FuncPtr make_func(Role role, const std::string& name, const std::string& of = "");
 
-// Where the Func that is called comes from; null when its user wrote it, or no Func is called.
+// The provenance of the called Func; null when the user wrote it, or no Func is called.
 const Provenance* provenance_of(const Call& call);
-// The Func behind a Call (CallType::Func); throws InternalError when it is gone.
+// The Func behind a Call (CallType::Func); InternalError when it no longer exists.
 FuncPtr func_of(const Call& call);
 
-// Every Func that the outputs depend on (themselves too), producers before consumers; an order that
-// depends only on the program. UserError on recursion among Funcs and on undefined Funcs, naming
+// Every Func that the outputs depend on, outputs included, producers before consumers. The order
+// depends only on the program. UserError on recursion among Funcs and on undefined Funcs; it shows
 // the path.
 std::vector<FuncPtr> topological_order(const std::vector<FuncPtr>& outputs);
 // Funcs called directly by any stage of f (f itself excluded), in first-use order.
 std::vector<FuncPtr> direct_callees(const FuncContents& f);
-// The variable that numbers the points which an iteration updates at once; null: it updates one.
+// The variable that numbers the points which one iteration updates together; null for a single
+// point.
 const ReductionVariable* point_number(const Definition& definition);
 int number_of_points(const Definition& definition);
 // Visits every expression of a definition: args, values, predicate, rvar bounds.
 void for_each_expr(const Definition& definition, const std::function<void(const Expr&)>& visit);
-// The same of all definitions of a Func.
+// Visits every expression of all definitions of a Func.
 void for_each_expr(const FuncContents& f, const std::function<void(const Expr&)>& visit);
 Definition map_exprs(const Definition& definition, const std::function<Expr(const Expr&)>& map);
-// As of one expression (ir/visit.h), for all of a definition, and of a Func.
+// walk() of ir/visit.h for all expressions of a definition or a Func.
 template <class... Fs>
 void walk(const Definition& definition, Fs&&... fs) {
   for_each_expr(definition, [&](const Expr& root) { walk(root, fs...); });
@@ -150,7 +151,7 @@ bool any_node(const Definition& definition, Fs&&... fs) {
   return found;
 }
 
-// Scalar and buffer parameters reached from the outputs, in first-use order.
+// Scalar and buffer parameters that the outputs depend on, in first-use order.
 std::vector<std::shared_ptr<ParameterContents>> parameters_of(const std::vector<FuncPtr>& outputs);
 
 }  // namespace graph

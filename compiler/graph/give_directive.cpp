@@ -6,8 +6,8 @@ namespace retrograde::graph {
 
 namespace {
 
-// The schedule that a directive changes; every one on the way to it counts as scheduled.
-StageLoops& touch(const SchedulePlace& place) {
+// The schedule that a directive changes; it and every schedule around it count as scheduled.
+StageLoops& mutable_schedule(const SchedulePlace& place) {
   StageLoops* result = &place.f->stage(place.stage).schedule;
   result->is_given = true;
   for (const int step : place.special) {
@@ -17,16 +17,16 @@ StageLoops& touch(const SchedulePlace& place) {
   return *result;
 }
 
-// ---- levels, which may be set after they were given ----
+// ---- levels of LoopLevel objects, which may be set later ----
 
 using LevelSource = std::shared_ptr<LoopLevelContents> FuncPlacement::*;
 
-// Where the schedule of the Func keeps the object behind a level.
+// The member of the schedule that holds the object behind a level.
 LevelSource source_of(const ComputeAt&) { return &FuncPlacement::compute_from; }
 LevelSource source_of(const StoreAt&) { return &FuncPlacement::store_from; }
 LevelSource source_of(const HoistStorage&) { return &FuncPlacement::hoist_from; }
 
-// What the object says later, the schedule says, unless it was given another level since.
+// Setting the object later updates the schedule, unless it has another level by then.
 template <typename D>
 void give_level(D at, const FuncPtr& f) {
   const LevelSource source = source_of(at);
@@ -42,13 +42,13 @@ void give_level(D at, const FuncPtr& f) {
   });
 }
 
-// As long as the object is not set, the stage joins no loop of any Func.
+// Until the object is set, the stage is not fused with any loop.
 void give_level(ComputeWith with, const SchedulePlace& place) {
   if (!with.from->defined) {
     const auto object = reinterpret_cast<uintptr_t>(with.from.get());
     with.level = {LoopLevel::Kind::At, "", std::to_string(object), -1};
   }
-  apply_directive(with, touch(place));
+  apply_directive(with, mutable_schedule(place));
   with.from->followers.push_back([weak = place.f->weak_from_this(), index = place.stage,
                                   align = with.align,
                                   last = with.level](const LoopLevel& now) mutable {
@@ -100,7 +100,7 @@ void give_directive(const SchedulePlace& place, Directive directive) {
         } else if constexpr (std::is_base_of_v<AtLevel, D>) {
           give_level(d, place.f);
         } else if (is_of_stage(directive)) {
-          apply_directive(directive, touch(place));
+          apply_directive(directive, mutable_schedule(place));
         } else {
           apply_directive(directive, *place.f);
         }
@@ -110,7 +110,7 @@ void give_directive(const SchedulePlace& place, Directive directive) {
 }
 
 void take_back_loops(FuncContents& f) {
-  std::erase_if(f.log, [](const LoggedDirective& given) { return given.stage >= 0; });
+  std::erase_if(f.log, [](const LoggedDirective& logged) { return logged.stage >= 0; });
   for (int s = 0; s < f.stage_count(); ++s) {
     Definition& stage = f.stage(s);
     stage.schedule = StageLoops();

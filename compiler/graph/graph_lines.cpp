@@ -15,12 +15,12 @@ std::vector<Line> lines_of(const std::string& text) {
   for (int number = 1; std::getline(in, raw); ++number) {
     const size_t begin = raw.find_first_not_of(" \t");
     if (begin == std::string::npos) continue;
-    const std::string whole = raw.substr(begin);
-    const size_t end = whole.find_first_of(" (");
-    std::string rest = end == std::string::npos ? "" : whole.substr(end);
+    const std::string content = raw.substr(begin);
+    const size_t end = content.find_first_of(" (");
+    std::string rest = end == std::string::npos ? "" : content.substr(end);
     rest.erase(0, rest.find_first_not_of(' ') == std::string::npos ? rest.size()
                                                                    : rest.find_first_not_of(' '));
-    lines.push_back({number, whole.substr(0, end), std::move(rest), whole});
+    lines.push_back({number, content.substr(0, end), std::move(rest), content});
   }
   return lines;
 }
@@ -28,7 +28,7 @@ std::vector<Line> lines_of(const std::string& text) {
 void fail(const Line& line, const std::string& expected) {
   user_error("read the text of a graph",
              text("line ", line.number, ": ", expected, " must stand here"),
-             "it says " + quoted(line.whole), "Write it as graph.h shows");
+             "it says " + quoted(line.content), "Write it as graph.h shows");
 }
 
 std::string unquoted(const Line& line, const std::string& word) {

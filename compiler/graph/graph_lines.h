@@ -1,4 +1,4 @@
-// graph_lines.h -- the text of a graph as lines, and words in them.
+// graph_lines.h -- splits the text of a graph into lines and words.
 #pragma once
 
 #include <string>
@@ -10,15 +10,15 @@ namespace retrograde::graph {
 
 struct Line {
   int number = 0;
-  std::string word, rest, whole;  // "func", "blur(x, y) float32"
+  std::string word, rest, content;  // "func", "blur(x, y) float32"
 };
 
-std::vector<Line> lines_of(const std::string& text);  // those that say something
+std::vector<Line> lines_of(const std::string& text);  // the lines that are not empty
 
-// UserError: something else was expected here.
+// UserError at the line: `expected` should be here.
 [[noreturn]] void fail(const Line& line, const std::string& expected);
 
-// A name as quote_name writes it, without its back quotes.
+// Removes the back quotes of quote_name.
 std::string unquoted(const Line& line, const std::string& word);
 std::vector<Type> types_of(const Line& line, const std::string& list);  // "float32, int8"
 

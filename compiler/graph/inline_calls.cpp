@@ -13,7 +13,7 @@ void check(const FuncContents& f, const FuncContents& inlined) {
   const std::string asked =
       text("inline ", quoted(inlined.name), " into a definition of ", quoted(f.name));
   if (!inlined.is_defined() || !inlined.is_pure()) {
-    user_error(asked, "what is inlined has one pure definition",
+    user_error(asked, "an inlined Func has one pure definition",
                !inlined.is_defined() ? "it has none"
                : inlined.is_extern() ? "a C function computes it"
                                      : "it has update definitions",
@@ -22,7 +22,7 @@ void check(const FuncContents& f, const FuncContents& inlined) {
   if (inlined.schedule.compute_level.kind != LoopLevel::Kind::Inlined ||
       !inlined.pure->schedule.specializations.empty() || inlined.schedule.memoized ||
       inlined.schedule.async) {
-    user_error(asked, "what is inlined has no schedule of its own",
+    user_error(asked, "an inlined Func has no schedule of its own",
                "it is computed somewhere, or specialized", "Leave its schedule out");
   }
 }
@@ -43,7 +43,7 @@ Expr inline_calls(const Expr& e, const FuncContents& inlined) {
 void inline_into(const SchedulePlace& place, const std::vector<FuncPtr>& inlined) {
   FuncContents& f = *place.f;
   for (const FuncPtr& g : inlined) check(f, *g);
-  // Consumers first: what they call is then called here.
+  // Consumers first, because inlining them adds calls of their producers.
   std::vector<FuncPtr> order = topological_order(inlined);
   std::erase_if(order,
                 [&](const FuncPtr& g) { return std::ranges::find(inlined, g) == inlined.end(); });

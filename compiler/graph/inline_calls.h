@@ -1,4 +1,4 @@
-// inline_calls.h -- a definition with calls of other Funcs replaced by what these store.
+// inline_calls.h -- inlines other Funcs into one definition.
 #pragma once
 
 #include <vector>
@@ -7,9 +7,8 @@
 
 namespace retrograde::graph {
 
-// Replaces the calls of these Funcs in the definition of the stage, those of one that another of
-// them calls as well.
-// Requires: what is inlined has one pure definition; what is inlined has no schedule of its own.
+// Replaces the calls of these Funcs in the stage's definition, including calls between them.
+// Requires: an inlined Func has one pure definition; an inlined Func has no schedule of its own.
 void inline_into(const SchedulePlace& stage, const std::vector<FuncPtr>& inlined);
 
 }  // namespace retrograde::graph

@@ -28,7 +28,7 @@ FuncPtr InlinedSizes::largest_part(const FuncContents& f) const {
   const auto calls = func_calls(f);
   FuncPtr result;
   double most = 0;
-  for (const FuncPtr& callee : direct_callees(f)) {  // in the program's order
+  for (const FuncPtr& callee : direct_callees(f)) {  // in program order
     const auto found = nodes_.find(callee.get());
     const double part = found == nodes_.end() ? 0 : calls.at(callee.get()) * found->second;
     if (part <= most) continue;

@@ -1,5 +1,5 @@
-// inlined_size.h -- how large the expressions of Funcs become when others are inlined into them:
-// each call that is a node of its own makes a copy of the callee's body.
+// inlined_size.h -- estimates the size of Funcs after inlining: each distinct call node makes a
+// copy of the callee's body.
 #pragma once
 
 #include <unordered_map>
@@ -10,18 +10,18 @@ namespace retrograde::graph {
 
 class InlinedSizes {
  public:
-  // From now on its calls are copies of a body of so many nodes.
+  // From now on, each call of `f` counts as a copy of a body of `nodes` nodes.
   void inline_calls_of(const FuncContents& f, double nodes) { nodes_[&f] = nodes; }
-  // Nodes of the definitions of `f`, with what is inlined into them.
+  // The number of nodes in the definitions of `f`, with its inlined callees.
   double nodes(const FuncContents& f) const;
-  // Which of the Funcs that are inlined into `f` makes most of them; null: none is.
+  // The inlined callee that contributes the most nodes to `f`; null when none is inlined.
   FuncPtr largest_part(const FuncContents& f) const;
 
  private:
   std::unordered_map<const Symbol*, double> nodes_;
 };
 
-// Different nodes that are calls of other Funcs, by callee.
+// The number of distinct nodes that call other Funcs, by callee.
 std::unordered_map<const Symbol*, int> func_calls(const FuncContents& f);
 
 }  // namespace retrograde::graph

@@ -22,7 +22,8 @@ std::string as_identifier(std::string name) {
 
 enum class NameUse { Func, Parameter };
 
-// Who was given a name first. Names that contain '$' come from unique_name and need no entry.
+// Records the use of each claimed name. Names that contain '$' come from unique_name and need no
+// entry.
 class NameTable {
  public:
   std::string claim(const std::string& name, NameUse use) {

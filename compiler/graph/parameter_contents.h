@@ -1,5 +1,5 @@
-// parameter_contents.h -- what compiled code takes as an argument: a scalar (Param), an image
-// (ImageParam) or a Buffer that the program names.
+// parameter_contents.h -- the parameters of compiled code: scalars (Param), images (ImageParam),
+// and Buffers that the program embeds.
 #pragma once
 
 #include <memory>
@@ -15,33 +15,33 @@ struct halide_buffer_t;
 
 namespace retrograde::graph {
 
-// Parameter of the compiled function: scalar (Param), image (ImageParam), or an embedded Buffer.
+// The constraints on one dimension of a buffer, and its estimates.
 struct BufferConstraint {
   Expr min, extent, stride;  // undefined: unconstrained, but see any_stride
   Expr min_estimate, extent_estimate;
-  bool any_stride = false;  // set_stride(Expr()): lifts the promise that dimension 0 is dense
+  bool any_stride = false;  // set_stride(Expr()): dimension 0 need not be dense
 };
 struct FuncContents;
 struct ParameterContents : Symbol {
   std::string name;
   Type type;
   bool is_buffer = false;
-  // scalar
-  std::optional<Scalar> value;  // current value
+  // Scalars only.
+  std::optional<Scalar> value;  // the current value
   Expr min_value, max_value, estimate;
-  // buffer
+  // Buffers only.
   int dimensions = 0;
   std::vector<BufferConstraint> constraints;
   std::shared_ptr<void> buffer_owner;  // keeps `buffer` alive
-  halide_buffer_t* buffer = nullptr;   // currently bound; null when unset
-  bool is_literal = false;             // a Buffer named in the program, not an ImageParam
+  halide_buffer_t* buffer = nullptr;   // the bound buffer; null when unset
+  bool is_literal = false;             // a Buffer embedded in the program, not an ImageParam
   int host_alignment =
-      0;  // promise, in bytes, about the address of element min; 0: the type's size
-  bool is_finite = false;  // promise: no call's values are infinite or NaN
-  uint64_t version = 0;    // grows when anything but the value or the bound buffer changes
+      0;  // promised alignment in bytes of the address of element min; 0: the type's size
+  bool is_finite = false;  // promise: no call passes infinite values or NaN
+  uint64_t version = 0;    // increases when anything but the value or the bound buffer changes
   TraceSchedule trace;
-  // The Func that an ImageParam converts to: what reads the image reads it instead. Null when
-  // nobody asked for it.
+  // The Func that an ImageParam converts to; consumers of the image read that Func. Null until
+  // first requested.
   std::shared_ptr<FuncContents> func;
 };
 

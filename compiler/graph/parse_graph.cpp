@@ -1,5 +1,5 @@
-// Two passes over the lines: the first makes what has a name, so that the second may mention
-// anything from anywhere.
+// Parses in two passes over the lines: the first creates all named entities, so that the second may
+// refer to them in any order.
 #include <map>
 #include <optional>
 
@@ -33,7 +33,7 @@ class GraphReader {
   }
 
  private:
-  // ---- first: names ----
+  // ---- pass 1: names ----
 
   void name(const Line& line) {
     if (line.word == "image" || line.word == "buffer") make_buffer(line);
@@ -91,13 +91,13 @@ class GraphReader {
     for (const auto& output : f_->outputs) names_.outputs[output->name] = output;
     if (!names_.funcs.emplace(f_->name, f_).second) fail(line, "a name that is not taken");
   }
-  // A name in back quotes may hold a parenthesis.
+  // A name in back quotes may contain a parenthesis.
   static size_t opening(const std::string& s) {
     const size_t from = s[0] == '`' ? s.find('`', 1) : 0;
     return s.find('(', from);
   }
 
-  // ---- then: what is said of them ----
+  // ---- pass 2: contents ----
 
   void read(const Line& line) {
     link_wrappers();
@@ -288,7 +288,7 @@ class GraphReader {
     return true;
   }
 
-  // ---- definitions: bound to what they mention when they are complete ----
+  // ---- definitions: bound to their entities once complete ----
 
   void begin_definition(bool is_update) {
     finish_definition();
@@ -336,7 +336,7 @@ class GraphReader {
     }
     return true;
   }
-  // The one that directives go to: of the stage, or of a specialization that is open.
+  // The schedule that directives go to: the stage's, or an open specialization's.
   StageLoops& stage_schedule() {
     StageLoops* now = &definition_->schedule;
     if (now->dims.empty()) now->dims = first_loops(*f_, *definition_);
@@ -353,7 +353,7 @@ class GraphReader {
     Definition complete = map_exprs(*definition_, bind);
     if (domain) {
       domain->vars = complete.rvars;
-      // Its own variables weakly, lest the domain own itself.
+      // The domain refers to its own variables weakly, so that it does not own itself.
       if (complete.predicate.defined())
         domain->predicate =
             rebind_symbol(complete.predicate, domain.get(), SymbolRef::weak(domain));
@@ -365,9 +365,10 @@ class GraphReader {
     }
     definition_.reset();
   }
-  // The directive that the line is, when it is one of stages, or of Funcs, as is asked for.
+  // Parses the line as a directive of a stage, or of a Func, as requested; nothing if it is another
+  // line.
   std::optional<Directive> directive_of(const Line& line, bool of_stage) const {
-    std::optional<Directive> directive = parse_directive(line.whole);
+    std::optional<Directive> directive = parse_directive(line.content);
     if (!directive || is_of_stage(*directive) != of_stage) return std::nullopt;
     Binder(names_, nullptr, nullptr)(*directive);
     return directive;
@@ -425,13 +426,14 @@ class GraphReader {
   NamedEntities names_;
   NameTypes types_;  // of all that is declared
   std::vector<FuncPtr> outputs_;
-  // Where the line stands.
+  // The current position in the text.
   FuncPtr f_;
   ParameterPtr parameter_, output_;
   std::optional<Definition> definition_;
   bool is_update_ = false, scheduling_ = false;
   std::vector<size_t> specials_;
-  // Lines of wrappers and readers of images, whose Funcs may come later, and whose they are.
+  // Lines about wrappers and image readers, whose Funcs may be defined later, and the Funcs they
+  // belong to.
   std::vector<Line> pending_;
   std::vector<FuncPtr> owners_;
   std::vector<ParameterPtr> readers_;

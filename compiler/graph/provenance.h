@@ -1,4 +1,4 @@
-// provenance.h -- where a Func comes from that no user wrote, and what is known of its values.
+// provenance.h -- why the compiler created a Func, and which special values it may hold.
 #pragma once
 
 #include <cstdint>
@@ -17,21 +17,22 @@ inline constexpr int role_count = 0
 #define RETROGRADE_ROLE(Name, text) +1
 #include "graph/roles.def"
     ;
-const char* role_name(Role role);  // "adjoint", as IR text has it
+const char* role_name(Role role);  // the role in IR text: "adjoint"
 
-// What multiplies an adjoint, or a tangent, must beware of.
+// Special values of an adjoint or tangent that the factors multiplied with it must respect.
 struct AdjointTraits {
-  // Exactly 0 where a consumer chose another branch or reads nothing: a factor may be infinite or
-  // NaN there.
+  // Exactly 0 where a consumer selected another branch or reads nothing; a factor may be infinite
+  // or NaN there.
   bool masked = false;
-  // Exactly 0 where an operand of a consumer is infinite, as that of exp(-inf): a factor that may
-  // be infinite meets it there.
+  // Exactly 0 where an operand of a consumer is infinite, as for exp(-inf); a factor may be
+  // infinite there.
   bool vanished = false;
-  // The same within the expression that is swept: a product of reads may have overflowed there.
+  // Vanished, within the expression that is differentiated: a product of reads may have overflowed
+  // there.
   bool levelled = false;
-  // Infinite where it passed the pole of a partial: a factor may be 0 there, as in a norm at 0.
+  // Infinite where it passed the pole of a partial; a factor may be 0 there, as in a norm at 0.
   bool singular = false;
-  // Of tangents: infinite where a value that they passed is, and a later partial may be 0 there.
+  // For tangents: infinite where a value on their path is infinite; a later partial may be 0 there.
   bool infinite = false;
   bool operator==(const AdjointTraits& other) const = default;
   void add(const AdjointTraits& other) {
@@ -43,22 +44,22 @@ struct AdjointTraits {
   }
 };
 
-// A part of the iterations of an update: what each evaluates, and how often it runs at each point
-// of the pure dimensions.
+// The work of one group of an update's iterations: what each iteration evaluates, and how often it
+// runs at each point of the pure dimensions.
 struct AdjointWork {
-  std::vector<Expr> values;  // of each write: its place, then its values
-  std::vector<Expr> loops;   // extents
+  std::vector<Expr> values;  // for each write, its coordinates and its values
+  std::vector<Expr> loops;   // extents of the loops
 };
 
 struct Provenance {
   Role role = Role::Adjoint;
-  std::string of;  // the Func that it was made for; may be empty
+  std::string of;  // the Func that it was created for; may be empty
   AdjointTraits traits;
-  std::vector<AdjointWork> work;  // of its last update, where a table says what iterations do
-  int lanes = 0;  // of private parts: extent of the first dimension, in which lanes add apart
-  bool has_parts = false;  // of private parts: its last dimension numbers them
-  int blocks = 0;  // of a block, which adds few of the terms of a long sum: its last dimensions,
-                   // which number blocks
+  std::vector<AdjointWork> work;  // of its last update, if a table selects what each iteration does
+  int lanes = 0;  // privatised copies: extent of dimension 0, in which vector lanes add separately
+  bool has_parts = false;  // the last dimension numbers privatised copies
+  // Split sums: how many of the last dimensions number blocks, each of which adds few terms.
+  int blocks = 0;
 };
 
 }  // namespace retrograde::graph

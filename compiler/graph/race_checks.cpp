@@ -14,7 +14,7 @@ namespace retrograde::graph {
 
 namespace {
 
-// Pure variables stand at their own place on both sides: two points that meet have the same ones.
+// Pure variables keep their positions on both sides, so two conflicting points agree in them.
 MeetingPoints points_of(const Definition& update) {
   MeetingPoints points;
   for (const ReductionVariable& r : update.rvars) {
@@ -25,7 +25,7 @@ MeetingPoints points_of(const Definition& update) {
   return points;
 }
 
-// Whether no iteration writes where this call reads.
+// Whether no iteration writes the element that this call reads.
 bool is_never_written(const Call& call, const Definition& update) {
   Scope<Interval> domain;
   for (const ReductionVariable& r : update.rvars) {

@@ -10,13 +10,14 @@ namespace retrograde::graph {
 
 struct RandomState {
   int32_t streams = 0;
-  std::unordered_map<std::string, int> same_names;  // how many Funcs of each name draw
-  std::unordered_map<std::string, int32_t> tags;    // by unique name
+  std::unordered_map<std::string, int>
+      same_names;                                 // how many Funcs of each name draw random numbers
+  std::unordered_map<std::string, int32_t> tags;  // by unique name
 };
 
 namespace {
 
-// The sequence that is counted now.
+// The sequence in use.
 struct Current {
   std::mutex mutex;
   RandomState* state = new RandomState;  // the first one lives as long as the process
@@ -31,7 +32,7 @@ RandomState* exchange(RandomState* state) {
   return std::exchange(current().state, state);
 }
 
-// FNV-1a.
+// The FNV-1a hash.
 int32_t hash_of(const std::string& text) {
   uint32_t hash = 2166136261u;
   for (const unsigned char c : text) hash = (hash ^ c) * 16777619u;

@@ -1,9 +1,9 @@
-// random_sequence.h -- which random numbers a program draws.
+// random_sequence.h -- selects the random numbers that a program draws.
 //
-// A number depends on its seed, on the Func and stage that draw it, and on the point. A call without
-// a seed has a stream number for one; Funcs are told apart by their names, those of one name by the
-// order in which they draw. Both are counted as the program is written, so that a program that is
-// built again in a sequence of its own draws the same numbers.
+// A random number depends on its seed, on the Func and stage that draw it, and on the point. A call
+// without a seed gets a stream number instead. Funcs are distinguished by their names, and Funcs of
+// one name by the order in which they draw. Both are counted as the program is constructed, so a
+// program that is constructed again in a fresh RandomSequence draws the same numbers.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +12,12 @@
 namespace retrograde::graph {
 
 int32_t next_random_stream();
-// The tag of the Func with this name, which is unique in the process.
+// The tag of the Func with this unique name.
 int32_t random_tag(const std::string& func);
 
 struct RandomState;
 
-// Counts from the start while it lives, and then goes on where it was.
+// Restarts the counts during its lifetime, and then restores the earlier ones.
 class RandomSequence {
  public:
   RandomSequence();

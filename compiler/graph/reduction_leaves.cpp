@@ -34,19 +34,20 @@ class LeafFinder {
     } else if (split.kind == Split::Kind::Rename) {
       leaf->loop = split.outer;
     } else {
-      cut(*leaf, split);
+      split_leaf(*leaf, split);
     }
   }
 
   // old == min + outer * factor + inner
-  void cut(Leaf& leaf, const Split& split) {
+  void split_leaf(Leaf& leaf, const Split& split) {
     const Expr factor = split.factor;
     Leaf outer{split.outer, unique_name("leaf"), 0, (leaf.extent + factor - 1) / factor};
     Leaf inner{split.inner, unique_name("leaf"), 0, factor};
     const Expr offset = outer.value() * factor + inner.value();
     const auto extent = as_const_int(leaf.extent), step = as_const_int(factor);
     const bool divides = extent && step && *extent % *step == 0;
-    // Where the outer variable becomes a pure one its schedule may run it past both ends.
+    // The condition has both ends: if the outer variable becomes pure, its schedule may overrun
+    // either one.
     if (!divides) leaves_.tails.push_back(offset >= 0 && offset < leaf.extent);
     // The tail's condition holds wherever the variable is used.
     const Expr inside =
@@ -61,7 +62,7 @@ class LeafFinder {
     const Leaf* outer = find(split.outer);
     if (!inner && !outer) return leaves_.others.push_back(split);
     if (!inner || !outer) {
-      user_error(asked_, "reduction variables are fused with each other only",
+      user_error(asked_, "reduction variables are fused only with each other",
                  text(quoted(split.inner), " and ", quoted(split.outer),
                       " were fused, and one of them is a pure variable"),
                  "Call rfactor before that fuse");

@@ -1,17 +1,18 @@
-// Cutting an associative update into partial results and their combination:
+// Factors an associative update into partial results and their combination:
 //
 //   f(x) = init                           f_intm(x, u) = identity
 //   f(args(r, s)) = op(f(args), e(r, s))  f_intm(args(r, u), u) = op(f_intm(args, u), e(r, u))
 //                                    =>   f(x) = init
 //                                         f(x) = op(f(x), f_intm(x, s))
 //
-// Method: splits of reduction variables are carried out on the definition first, so that each
-// reduction loop is a variable of its own ("leaf"); those that are kept become pure variables of
-// the new Func and the domain of what is left of the update. Loops keep their names: a domain's
-// variables have fresh names, and a rename in the schedule gives the loop the user's.
+// Method: first apply the splits of reduction variables to the definition, so that each reduction
+// loop becomes a variable of its own ("leaf"). The preserved leaves become pure variables of the
+// new Func and the domain of the remaining update. Loops keep their names: the variables of a
+// domain have fresh names, and a rename in the schedule restores the user's.
 //
-// The left-hand side of the combination keeps the coordinates that depend on kept variables only;
-// the others (a histogram's bin) become the pure variables: all elements are combined.
+// The left-hand side of the combination keeps the coordinates that depend only on preserved
+// variables. The others (such as a histogram's bin) become the pure variables, so all elements are
+// combined.
 #include <algorithm>
 #include <map>
 #include <unordered_set>
@@ -70,16 +71,16 @@ class Factoring {
 
  private:
   const FuncPtr f_;
-  const Definition update_;  // as it was
+  const Definition update_;  // the original update
   const int stage_;
-  const std::string name_;  // that the new Func is to have
+  const std::string name_;  // of the new Func
   const AssociativeOp op_;
   const Leaves leaves_;
   std::map<std::string, std::string> kept_;  // loop -> pure variable of the intermediate Func
   std::vector<Leaf> kept_leaves_, removed_leaves_;
   std::unordered_set<std::string> removed_names_;
-  std::vector<Expr> kept_vars_;  // of kept_leaves_
-  Definition over_leaves_;       // the update with leaves in the place of reduction variables
+  std::vector<Expr> kept_vars_;  // variables of kept_leaves_
+  Definition over_leaves_;       // the update in terms of leaves
   std::vector<Expr> conjuncts_;  // of its predicate
   FuncPtr intermediate_;
 
@@ -87,7 +88,8 @@ class Factoring {
 
   Expr identity(size_t i) const {
     if (op_.identity[i].defined()) return op_.identity[i];
-    const Expr& init = f_->pure->values[i];  // any value does; this one keeps ties as they were
+    // Any value is correct; this one preserves the order of ties.
+    const Expr& init = f_->pure->values[i];
     return is_const(init) ? init : make_zero(f_->types[i]);
   }
 
@@ -130,7 +132,7 @@ class Factoring {
       domain->predicate = rebind_symbol(definition.predicate, SymbolRef::weak(domain));
   }
 
-  // What the original's schedule says that does not depend on which loops there are.
+  // The parts of the original schedule that do not depend on its list of loops.
   StageLoops schedule_with(const std::vector<Split>& renames) const {
     StageLoops schedule = update_.schedule;
     schedule.splits = leaves_.others;
@@ -166,7 +168,7 @@ class Factoring {
       partial.values.push_back(place(with_self_at(value, partial.args)));
     std::vector<Expr> conditions = mapped(leaves_.tails, place);
     append(conditions, mapped(conjuncts_, place));
-    partial.predicate = reading_last(conditions);
+    partial.predicate = guarded_conjunction(conditions);
     set_domain(partial, domain);
     partial.schedule = schedule_with(renames);
     for (Dim dim : update_.schedule.dims) {
@@ -181,9 +183,10 @@ class Factoring {
     return partial;
   }
 
-  // All conditions, or nothing where there are none. What is read for one of them is read only
-  // where those that read nothing hold: past the end of a split there is nothing to read.
-  static Expr reading_last(const std::vector<Expr>& conditions) {
+  // The conjunction of the conditions; undefined when there are none. Conditions that read memory
+  // are evaluated only where the others hold, because past the end of a split there is nothing to
+  // read.
+  static Expr guarded_conjunction(const std::vector<Expr>& conditions) {
     std::vector<Expr> plain, reading;
     for (const Expr& e : conditions)
       (reads_memory(e, MemoryReads::Functions) ? reading : plain).push_back(e);
@@ -193,7 +196,7 @@ class Factoring {
     return call_op(Op::if_then_else, Bool(), {conjunction(plain), last, const_false()});
   }
 
-  // References to f become references to the intermediate Func at `args`.
+  // Replaces references to f by references to the intermediate Func at `args`.
   Expr with_self_at(const Expr& value, const std::vector<Expr>& args) const {
     return map_calls_of(value, f_.get(), [&](const Call& call, const std::vector<Expr>&) {
       return call_func(intermediate_->name, call.type, args, call.component,
@@ -205,15 +208,15 @@ class Factoring {
 
   bool uses_removed(const Expr& e) const { return uses_any_variable(e, removed_names_); }
 
-  // Conditions that hold for a whole partial result.
+  // Conditions that hold for an entire partial result.
   std::vector<Expr> common_conditions() const {
     return filtered(conjuncts_, [&](const Expr& e) {
       return !uses_removed(e) && !reads_memory(e, MemoryReads::Functions);
     });
   }
 
-  // A coordinate may stand as it is when every value of the kept variables that passes the
-  // conditions has a partial result there.
+  // A coordinate may stay when every value of the preserved variables that satisfies the conditions
+  // has a partial result there.
   bool keeps_coordinate(const Expr& arg, bool all_conditions_common) const {
     return all_conditions_common && !uses_removed(arg) &&
            !reads_memory(arg, MemoryReads::Functions);
@@ -285,9 +288,9 @@ std::string as_list(const Preserved& preserved) {
 
 }  // namespace
 
-// 1. It is an update, not specialized and in no other's loops. 2. Every RVar is a reduction loop,
-// named once. 3. Every Var is new, named once. 4. The update is associative, with an identity. 5.
-// It commutes, unless the loops are the outermost ones.
+// 1. The stage is an update, not specialized and not fused with another. 2. Every RVar is a
+// reduction loop, named once. 3. Every Var is new, named once. 4. The update is associative, with
+// an identity. 5. It commutes, unless the loops are the outermost ones.
 FuncPtr factor_out(const SchedulePlace& place, const Preserved& preserved,
                    const std::string& wanted) {
   const FuncContents& f = *place.f;
@@ -319,12 +322,12 @@ FuncPtr factor_out(const SchedulePlace& place, const Preserved& preserved,
     check_new_loop(place, var, loop, asked);
     if (!variables.insert(var).second || std::ranges::find(f.args, var) != f.args.end()) {
       user_error(asked, "the new variables differ from each other and from the Func's",
-                 quoted(var) + " is there already", "Use a new Var");
+                 quoted(var) + " already exists", "Use a new Var");
     }
   }
   const AssociativityProof proof = prove_associative(f, place.definition());
   if (!proof.op) {
-    user_error(asked, "partial results can be combined only of an associative update",
+    user_error(asked, "only an associative update has partial results that can be combined",
                proof.why_not,
                "Write it as f(x) = op(f(x), e) with an associative op, or keep its loops");
   }
@@ -334,12 +337,12 @@ FuncPtr factor_out(const SchedulePlace& place, const Preserved& preserved,
                "Factor the outermost reduction loops: reorder is legal only if it commutes");
   }
   Leaves leaves = leaves_of(place.definition(), schedule, asked);
-  const FuncPtr made =
+  const FuncPtr result =
       Factoring(place.f, place.stage, preserved, wanted.empty() ? f.name + "_intm" : wanted,
                 *proof.op, std::move(leaves))
           .run();
-  log_directive(place, FactorOut{made->name, preserved});
-  return made;
+  log_directive(place, FactorOut{result->name, preserved});
+  return result;
 }
 
 }  // namespace retrograde::graph

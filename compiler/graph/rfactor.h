@@ -1,4 +1,4 @@
-// rfactor.h -- Stage::rfactor: the partial results of an update as a Func of its own.
+// rfactor.h -- Stage::rfactor: computes the partial results of an update in a Func of its own.
 #pragma once
 
 #include <string>
@@ -9,9 +9,9 @@
 
 namespace retrograde::graph {
 
-// The new Func, which reduces over the loops that are not named, separately for each value of those
-// that are: these become the variables beside them. `wanted`: its name, made unique; empty: that of
-// the Func with _intm.
+// Returns the new Func. It reduces over the loops that are not preserved, separately for each value
+// of the preserved ones, which become pure variables under the given names. `wanted` is its name,
+// made unique; when empty, that of the Func with _intm.
 FuncPtr factor_out(const SchedulePlace& place,
                    const std::vector<std::pair<NamedLoop, std::string>>& preserved,
                    const std::string& wanted = "");

@@ -1,4 +1,5 @@
-// A log as C++: declarations of the loops that it names, then a statement for each directive.
+// Prints a schedule log as C++: declarations of the loops that it names, then a statement for each
+// directive.
 #include <cctype>
 #include <map>
 #include <set>
@@ -20,7 +21,7 @@ namespace {
 
 using Entry = ScheduleLog::Entry;
 
-// Names as identifiers, each of its own.
+// Turns names into distinct C++ identifiers.
 class Identifiers {
  public:
   const std::string& operator()(const std::string& name) {
@@ -57,16 +58,18 @@ class CppPrinter {
   }
 
  private:
-  // ---- loops: declared when they are first named ----
+  // ---- loops: declared at their first mention ----
 
   struct Source {
     std::string func;
     int stage = 0;
   };
-  // Whose reduction variables the loops of a stage are: of what it was made from.
+  // The stage whose reduction variables a stage's loops are: follows created Funcs back to their
+  // origin.
   Source source_of(Source of) const {
-    for (auto made = made_.find(of.func); made != made_.end(); made = made_.find(of.func))
-      of = {made->second.func, made->second.stage < 0 ? of.stage : made->second.stage};
+    for (auto created = created_.find(of.func); created != created_.end();
+         created = created_.find(of.func))
+      of = {created->second.func, created->second.stage < 0 ? of.stage : created->second.stage};
     return of;
   }
 
@@ -88,7 +91,7 @@ class CppPrinter {
     }
     return id;
   }
-  // In its domain; empty: unknown.
+  // The position in its domain; empty when unknown.
   std::string index_of(const std::string& name) const {
     if (const auto place = log_.places.find(name); place != log_.places.end())
       return std::to_string(place->second);
@@ -100,9 +103,9 @@ class CppPrinter {
   bool is_reduction(const std::string& name) const {
     return name.find('.') != std::string::npos || reductions_.count(name);
   }
-  // What is made of a reduction loop is one.
-  void note(const std::string& old, std::initializer_list<std::string> made) {
-    if (is_reduction(old)) reductions_.insert(made.begin(), made.end());
+  // Loops derived from a reduction loop are reduction loops.
+  void note(const std::string& old, std::initializer_list<std::string> derived) {
+    if (is_reduction(old)) reductions_.insert(derived.begin(), derived.end());
   }
 
   // ---- statements ----
@@ -125,7 +128,7 @@ class CppPrinter {
   std::string call(const char* method, const std::vector<std::string>& arguments) {
     return text(receiver(), ".", method, "(", listed(arguments), ")");
   }
-  // Most directives are called as in text.
+  // Most directives have the same form in C++ as in text.
   template <typename D>
   std::string statement(D d) {
     std::vector<std::string> arguments;
@@ -163,18 +166,18 @@ class CppPrinter {
     path.push_back(specializations_[special_name(entry_->special)]++);
     return text("Stage ", special_name(path), " = ", call(d.name, {cpp(d.condition)}));
   }
-  std::string statement(const Wrap& d) { return made_by(d.name, d.made, d.users); }
-  std::string statement(const Clone& d) { return made_by(d.name, d.made, d.users); }
-  std::string statement(const CopyInput& d) { return made_by(d.name, d.made, {d.image}); }
-  std::string made_by(const char* method, const std::string& made,
-                      const std::vector<NamedFunc>& users) {
-    made_[made] = {entry_->func, -1};
+  std::string statement(const Wrap& d) { return create_func(d.name, d.made, d.users); }
+  std::string statement(const Clone& d) { return create_func(d.name, d.made, d.users); }
+  std::string statement(const CopyInput& d) { return create_func(d.name, d.made, {d.image}); }
+  std::string create_func(const char* method, const std::string& created,
+                          const std::vector<NamedFunc>& users) {
+    created_[created] = {entry_->func, -1};
     std::vector<std::string> arguments;
     if (!users.empty()) arguments.push_back(users.size() == 1 ? cpp(users[0]) : cpp(users));
-    return text("Func ", identifiers_(made), " = ", call(method, arguments));
+    return text("Func ", identifiers_(created), " = ", call(method, arguments));
   }
   std::string statement(const FactorOut& d) {
-    made_[d.made] = here();
+    created_[d.made] = here();
     std::vector<std::string> pairs;
     for (const auto& [kept, variable] : d.preserved) {
       const std::string rvar = is_reduction(kept) ? cpp(kept) : text("RVar(\"", kept, "\")");
@@ -243,7 +246,7 @@ class CppPrinter {
     const std::string digits = print(e);
     return text("cast(", type_of(e.type()), ", ", digits.substr(0, digits.find('_')), ")");
   }
-  // A Param, or a fact of a buffer: input.extent.1
+  // A Param, or buffer metadata: input.extent.1
   std::string parameter(const std::string& name) {
     const size_t last = name.rfind('.'), fact = last ? name.rfind('.', last - 1) : last;
     if (last == std::string::npos || fact == std::string::npos) return identifiers_(name);
@@ -255,8 +258,9 @@ class CppPrinter {
   const Entry* entry_ = nullptr;
   Identifiers identifiers_;
   std::set<std::string> declared_, reductions_;
-  std::map<std::string, Source> made_;          // from which Func; of rfactor, from which stage
-  std::map<std::string, int> specializations_;  // how many, by what is specialized
+  std::map<std::string, Source>
+      created_;  // the Func that each was created from; for rfactor, the stage
+  std::map<std::string, int> specializations_;  // the number of specializations of each stage
   std::ostringstream declarations_, statements_;
 };
 

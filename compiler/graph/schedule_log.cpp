@@ -8,7 +8,7 @@
 #include "diagnostics/error.h"
 #include "graph/binder.h"
 #include "graph/copy_graph.h"
-#include "graph/directive_names.h"
+#include "graph/directive_fields.h"
 #include "graph/directive_text.h"
 #include "graph/give_directive.h"
 #include "graph/graph.h"
@@ -26,9 +26,10 @@ namespace graph {
 
 namespace {
 
-// The one of these that is meant: itself, or the only one with other numbers; null: there is none.
+// The element with this name, or the only one whose name differs just by numbers; null when there
+// is none.
 template <typename Range, typename NameOf>
-auto meant(const Range& all, const std::string& name, const NameOf& name_of)
+auto find_by_name(const Range& all, const std::string& name, const NameOf& name_of)
     -> decltype(&*all.begin()) {
   decltype(&*all.begin()) found = nullptr;
   int count = 0;
@@ -41,7 +42,7 @@ auto meant(const Range& all, const std::string& name, const NameOf& name_of)
   return count == 1 ? found : nullptr;
 }
 
-// Those that the process put into it, in the order in which it made names.
+// The numbers that make the name unique, in order.
 std::vector<uint64_t> numbers_of(const std::string& name) {
   std::vector<uint64_t> numbers;
   for (size_t at = name.find('$'); at != std::string::npos; at = name.find('$', at + 1))
@@ -49,14 +50,15 @@ std::vector<uint64_t> numbers_of(const std::string& name) {
   return numbers;
 }
 
-// Names by what they are without numbers, those that differ by these alone in their order.
+// Groups names by their text without numbers; within a group, orders them by their numbers.
 class NameGroups {
  public:
   void add(const std::string& name) {
     groups_[without_numbers(name)].emplace(numbers_of(name), name);
   }
-  // Of `others`, the one that stands where `name` stands here; null unless there are as many.
-  const std::string* same_place(const std::string& name, const NameGroups& others) const {
+  // The name in `others` at the same position in its group; null unless the groups have equal
+  // sizes.
+  const std::string* counterpart_of(const std::string& name, const NameGroups& others) const {
     const std::string plain = without_numbers(name);
     const auto mine = groups_.find(plain), theirs = others.groups_.find(plain);
     if (mine == groups_.end() || theirs == others.groups_.end() ||
@@ -90,10 +92,10 @@ class Replay {
     }
     for (const auto& parameter : graph.parameters)
       names_.parameters.emplace(parameter->name, parameter);
-    std::set<std::string> made;
+    std::set<std::string> created;
     for (const ScheduleLog::Entry& entry : log.entries) {
-      if (!made.count(entry.func)) in_log_.add(entry.func);
-      made.insert(made_by(entry.directive));
+      if (!created.count(entry.func)) in_log_.add(entry.func);
+      created.insert(made_by(entry.directive));
     }
   }
 
@@ -125,7 +127,7 @@ class Replay {
  private:
   static constexpr const char* asked = "apply a schedule log";
 
-  // 1. It is given to a stage, or to a Func, as it must be. 2. That stage is there.
+  // 1. A stage directive applies to a stage, a Func directive to a Func. 2. That stage exists.
   static void check(const SchedulePlace& place, const ScheduleLog::Entry& entry) {
     const bool fits = is_of_stage(entry.directive)
                           ? entry.stage >= 0 && entry.stage < place.f->stage_count()
@@ -138,19 +140,19 @@ class Replay {
       now = is_there ? &now->specializations[static_cast<size_t>(step)] : nullptr;
     }
     if (fits && (entry.special.empty() || now)) return;
-    user_error(asked, "what a directive is given to is there",
-               text(quoted(ScheduleLog{{entry}}.to_text()), " is given to nothing"),
+    user_error(asked, "the target of a directive exists",
+               text(quoted(ScheduleLog{{entry}}.to_text()), " has no target"),
                "Apply it to the program that it was taken from");
   }
 
   void make(const std::string& name, const FuncPtr& f) {
-    made_[name] = names_.funcs[name] = names_.funcs[f->name] = f;
+    created_[name] = names_.funcs[name] = names_.funcs[f->name] = f;
   }
 
-  // A loop that has the name of one that it is made of keeps that name here.
+  // If a new loop reuses the name of the loop that it derives from, it does so here too.
   static void keep_names(const SchedulePlace& place, Directive& directive) {
-    const auto keep = [&](std::string& made, const std::string& old) {
-      if (made == old) made = loop(place, old);
+    const auto keep = [&](std::string& created, const std::string& old) {
+      if (created == old) created = loop(place, old);
     };
     if (auto* split = std::get_if<SplitLoop>(&directive)) {
       keep(split->outer, split->old);
@@ -164,12 +166,12 @@ class Replay {
   }
 
   FuncPtr func_or_none(const std::string& name) {
-    if (const auto* made = find_or_null(made_, name)) return *made;
-    if (const std::string* same = in_log_.same_place(name, in_program_))
+    if (const auto* created = find_or_null(created_, name)) return *created;
+    if (const std::string* same = in_log_.counterpart_of(name, in_program_))
       return names_.funcs.at(*same);
-    if (const auto* found = meant(names_.funcs, name, [](const auto& f) { return f.first; }))
+    if (const auto* found = find_by_name(names_.funcs, name, [](const auto& f) { return f.first; }))
       return found->second;
-    // What reads an image, where nobody has asked for it yet.
+    // The Func that reads an image, created at its first mention.
     for (const auto& [image, contents] : names_.parameters) {
       if (contents->is_buffer && image + "_im" == without_numbers(name))
         return names_.funcs[name] = func_of_image(contents);
@@ -178,21 +180,24 @@ class Replay {
   }
   FuncPtr func(const std::string& name) {
     if (const FuncPtr found = func_or_none(name)) return found;
-    user_error(asked, "every Func that it names is one of the program",
-               text("none is called ", quoted(name)),
-               "Apply it to the program that it was taken from, or cut what is said of that Func");
+    user_error(
+        asked, "every Func that it names is one of the program",
+        text("none is called ", quoted(name)),
+        "Apply it to the program that it was taken from, or remove the directives of that Func");
   }
   ParameterPtr image(const std::string& name) const {
-    const auto* found = meant(names_.parameters, name, [](const auto& p) { return p.first; });
+    const auto* found =
+        find_by_name(names_.parameters, name, [](const auto& p) { return p.first; });
     return found && found->second->is_buffer ? found->second : nullptr;
   }
   ParameterPtr image_of_program(const std::string& name) const {
     if (const ParameterPtr found = image(name)) return found;
-    user_error(asked, "every image that it names is one of the program",
-               text("none is called ", quoted(name)),
-               "Apply it to the program that it was taken from, or cut what is said of that image");
+    user_error(
+        asked, "every image that it names is one of the program",
+        text("none is called ", quoted(name)),
+        "Apply it to the program that it was taken from, or remove the directives of that image");
   }
-  // What is prefetched need not be of the program.
+  // The source of a prefetch need not belong to the program.
   NamedFunc func_or_image(const std::string& name) {
     if (const ParameterPtr found = image(name)) return found->name;
     const FuncPtr found = func_or_none(name);
@@ -202,14 +207,15 @@ class Replay {
     return mapped(names, [&](const std::string& name) { return func(name); });
   }
   static std::string loop_of(const std::vector<std::string>& loops, const std::string& name) {
-    const std::string* found = meant(loops, name, [](const std::string& loop) { return loop; });
+    const std::string* found =
+        find_by_name(loops, name, [](const std::string& loop) { return loop; });
     return found ? *found : name;
   }
   static NamedLoop loop(const SchedulePlace& place, const std::string& name) {
     return loop_of(mapped(place.schedule().dims, &Dim::var), name);
   }
   void find(LoopLevel& level) {
-    // What is said of a level that is not there is said when the pipeline is compiled.
+    // A level that does not exist is reported when the pipeline is compiled.
     const FuncPtr f = level.kind == LoopLevel::Kind::At ? func_or_none(level.func) : nullptr;
     if (!f) return;
     level.func = f->name;
@@ -220,7 +226,7 @@ class Replay {
     level.var = loop_of(loops, level.var);
   }
 
-  // Parameters that only the schedule reads are the log's own; from text they are new.
+  // Parameters that only the schedule reads belong to the log; those parsed from text are new.
   void note_parameters(const Expr& e) {
     if (!e.defined()) return;
     walk(e, [&](const Variable& v) {
@@ -234,7 +240,7 @@ class Replay {
   }
 
   NamedEntities names_;
-  std::map<std::string, FuncPtr> made_;  // by directives of the log
+  std::map<std::string, FuncPtr> created_;  // by directives of the log
   NameGroups in_log_, in_program_;
 };
 
@@ -254,8 +260,8 @@ ScheduleLog schedule_log(const std::vector<FuncPtr>& outputs) {
   std::multimap<uint64_t, ScheduleLog::Entry> ordered;
   for (const FuncPtr& f : functions_of(outputs)) {
     add_places(*f, log.places);
-    for (const LoggedDirective& given : f->log) {
-      ScheduleLog::Entry entry{f->name, given.stage, given.special, given.directive};
+    for (const LoggedDirective& logged : f->log) {
+      ScheduleLog::Entry entry{f->name, logged.stage, logged.special, logged.directive};
       std::visit(
           []<typename D>(D& d) {
             if constexpr (std::is_base_of_v<AtLevel, D>) {
@@ -264,7 +270,7 @@ ScheduleLog schedule_log(const std::vector<FuncPtr>& outputs) {
             }
           },
           entry.directive);
-      ordered.emplace(given.order, std::move(entry));
+      ordered.emplace(logged.order, std::move(entry));
     }
   }
   for (auto& [order, entry] : ordered) log.entries.push_back(std::move(entry));
@@ -290,7 +296,7 @@ namespace {
 
 using namespace graph;
 
-// blur.update(0).specialization(1).
+// The prefix "blur.update(0).specialization(1)."
 std::string place_text(const ScheduleLog::Entry& entry) {
   std::string out = quote_name(entry.func) + ".";
   if (entry.stage > 0) out += text("update(", entry.stage - 1, ").");
@@ -298,7 +304,7 @@ std::string place_text(const ScheduleLog::Entry& entry) {
   return out;
 }
 
-// Takes "word(7)." off the beginning.
+// Consumes "word(7)." at the beginning.
 bool take(std::string& rest, const std::string& word, int& number) {
   if (rest.rfind(word + "(", 0) != 0) return false;
   const size_t begin = word.size() + 1, end = rest.find(").", begin);
@@ -311,13 +317,13 @@ bool take(std::string& rest, const std::string& word, int& number) {
 }
 
 ScheduleLog::Entry parse_entry(const Line& line) {
-  const size_t quote = line.whole[0] == '`' ? line.whole.find('`', 1) : 0;
-  const size_t dot = line.whole.find('.', quote == std::string::npos ? 0 : quote);
+  const size_t quote = line.content[0] == '`' ? line.content.find('`', 1) : 0;
+  const size_t dot = line.content.find('.', quote == std::string::npos ? 0 : quote);
   if (dot != std::string::npos && dot > 0) {
-    const bool is_quoted = line.whole[0] == '`';
+    const bool is_quoted = line.content[0] == '`';
     ScheduleLog::Entry entry{
-        is_quoted ? line.whole.substr(1, dot - 2) : line.whole.substr(0, dot), -1, {}, {}};
-    std::string rest = line.whole.substr(dot + 1);
+        is_quoted ? line.content.substr(1, dot - 2) : line.content.substr(0, dot), -1, {}, {}};
+    std::string rest = line.content.substr(dot + 1);
     int number = -1;
     take(rest, "update", number);
     for (int step = 0; take(rest, "specialization", step);) entry.special.push_back(step);
@@ -328,7 +334,7 @@ ScheduleLog::Entry parse_entry(const Line& line) {
     }
   }
   user_error("read the text of a schedule log", "every line is a directive of a Func",
-             text("line ", line.number, " says ", quoted(line.whole)),
+             text("line ", line.number, " says ", quoted(line.content)),
              "Write it as to_text() does");
 }
 
@@ -379,7 +385,7 @@ bool is_below(const ScheduleLog::Entry& entry, const ScheduleLog::Entry& place) 
          std::equal(place.special.begin(), place.special.end(), entry.special.begin());
 }
 
-// What becomes of loops whose directive goes: the loop that was there before, or none ("").
+// Maps each loop that a removed directive creates to the loop that it replaced, or to none ("").
 std::map<std::string, std::string> loops_without(const Directive& directive) {
   std::map<std::string, std::string> loops;
   if (const auto* split = std::get_if<SplitLoop>(&directive)) {
@@ -393,8 +399,8 @@ std::map<std::string, std::string> loops_without(const Directive& directive) {
   return loops;
 }
 
-// Whether all that it names is still there.
-bool rename_loops(Directive& directive, const ScheduleLog::Entry& gone, bool is_stage,
+// Returns whether everything that the directive names still exists.
+bool rename_loops(Directive& directive, const ScheduleLog::Entry& removed, bool is_stage,
                   const std::map<std::string, std::string>& loops) {
   bool is_whole = true;
   const auto rename = [&](std::string& name) {
@@ -413,7 +419,7 @@ bool rename_loops(Directive& directive, const ScheduleLog::Entry& gone, bool is_
                                       if (is_stage) rename(loop);
                                     },
                                     [&](graph::LoopLevel& level) {
-                                      if (level.func == gone.func) rename(level.var);
+                                      if (level.func == removed.func) rename(level.var);
                                     }});
   return is_whole;
 }
@@ -421,28 +427,28 @@ bool rename_loops(Directive& directive, const ScheduleLog::Entry& gone, bool is_
 }  // namespace
 
 ScheduleLog ScheduleLog::without(size_t index) const {
-  const Entry& gone = entries[index];
+  const Entry& removed = entries[index];
   ScheduleLog log = first(index);
-  const std::string made = made_by(gone.directive);
-  const bool is_factored = std::holds_alternative<FactorOut>(gone.directive);
-  const auto loops = loops_without(gone.directive);
-  int special = -1;  // the number of the specialization that goes
-  if (std::holds_alternative<Specialize>(gone.directive)) {
+  const std::string created = made_by(removed.directive);
+  const bool is_factored = std::holds_alternative<FactorOut>(removed.directive);
+  const auto loops = loops_without(removed.directive);
+  int special = -1;  // the index of the removed specialization
+  if (std::holds_alternative<Specialize>(removed.directive)) {
     special = static_cast<int>(std::ranges::count_if(log.entries, [&](auto& e) {
-      return e.directive.index() == gone.directive.index() && e.func == gone.func &&
-             e.stage == gone.stage && e.special == gone.special;
+      return e.directive.index() == removed.directive.index() && e.func == removed.func &&
+             e.stage == removed.stage && e.special == removed.special;
     }));
   }
   for (size_t i = index + 1; i < entries.size(); ++i) {
     Entry entry = entries[i];
-    const bool is_stage = is_below(entry, gone);
-    if (!made.empty() && (mentions(entry, made) || (is_factored && is_stage))) continue;
-    if (special >= 0 && is_stage && entry.special.size() > gone.special.size()) {
-      int& step = entry.special[gone.special.size()];
+    const bool is_stage = is_below(entry, removed);
+    if (!created.empty() && (mentions(entry, created) || (is_factored && is_stage))) continue;
+    if (special >= 0 && is_stage && entry.special.size() > removed.special.size()) {
+      int& step = entry.special[removed.special.size()];
       if (step == special) continue;
       if (step > special) --step;
     }
-    if (rename_loops(entry.directive, gone, is_stage, loops)) log.entries.push_back(entry);
+    if (rename_loops(entry.directive, removed, is_stage, loops)) log.entries.push_back(entry);
   }
   return log;
 }

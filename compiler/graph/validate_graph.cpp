@@ -1,4 +1,4 @@
-// The rules of the algorithm IR, each with its name, checked Func by Func.
+// Checks the rules of the algorithm IR, each of which has a name, Func by Func.
 #include <algorithm>
 #include <unordered_set>
 
@@ -63,9 +63,10 @@ class GraphValidator {
   }
 
   void check(const FuncContents& f, const Definition& stage, bool is_update) const {
-    require(stage.args.size() == f.args.size(), f, "a definition has a place for each dimension");
+    require(stage.args.size() == f.args.size(), f,
+            "a definition has a coordinate for each dimension");
     for (const Expr& place : stage.args)
-      require(place.type() == Int(32), f, "places are of type int32", place);
+      require(place.type() == Int(32), f, "coordinates are of type int32", place);
     if (is_update || !f.is_extern()) {
       require(stage.values.size() == f.types.size(), f, "a definition has a value for each type");
       for (size_t i = 0; i < stage.values.size(); ++i)
@@ -92,16 +93,16 @@ class GraphValidator {
     }
   }
 
-  // Every variable is bound by its definition or a let, or stands for a parameter or a fact.
+  // Every variable is bound by its definition or a let, or is a parameter or buffer metadata.
   void check_names(const FuncContents& f, const Expr& root,
                    std::unordered_set<std::string> bound) const {
     walk(root, [&](const Let& let) { bound.insert(let.name); });
     walk(root, [&](const Expr& e) {
       if (const Variable* v = e.as<Variable>()) {
-        require(
-            bound.count(v->name) || (v->symbol.defined() && known_.count(v->symbol.raw())), f,
-            "a variable is of its definition, of its reduction domain, or a parameter of the graph",
-            e);
+        require(bound.count(v->name) || (v->symbol.defined() && known_.count(v->symbol.raw())), f,
+                "a variable belongs to its definition or its reduction domain, or is a parameter "
+                "of the graph",
+                e);
       }
       if (const Call* call = e.as<Call>()) check(f, *call, e);
       return true;
@@ -113,7 +114,7 @@ class GraphValidator {
       require(known_.count(call.symbol.raw()) != 0, f,
               "an image that is read is a parameter of the graph", e);
     if (call.call_type != CallType::Func) return;
-    require(known_.count(call.symbol.raw()) != 0, f, "a Func that is read is of the graph", e);
+    require(known_.count(call.symbol.raw()) != 0, f, "a Func that is read belongs to the graph", e);
     const auto& callee = *static_cast<const FuncContents*>(call.symbol.raw());
     require(callee.name == call.name, f, "a call has the name of its Func", e);
     require(callee.args.size() == call.args.size(), f, "a call has a coordinate for each dimension",
@@ -124,7 +125,7 @@ class GraphValidator {
             "a call has the type of the value that it reads", e);
   }
 
-  // A schedule's loops are what its directives make of the first ones.
+  // A schedule's loops are the result of its directives on the first loops.
   void check(const FuncContents& f, const StageLoops& schedule,
              const std::vector<Dim>& first) const {
     StageLoops built;

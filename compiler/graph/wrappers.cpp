@@ -25,8 +25,8 @@ bool is_wrapper_of(const FuncContents* candidate, const FuncContents& f) {
                              [&](const auto& entry) { return entry.second.get() == candidate; });
 }
 
-// What `user` reads where it is written as f: follows wrappers of wrappers. `visit` is told each
-// step. Wrappers of f read f itself.
+// The Func that `user` reads for a reference to f, through wrappers of wrappers. Calls `visit` at
+// each step. Wrappers of f read f itself.
 const FuncContents* resolve(const FuncContents* f, const FuncContents& user,
                             FunctionRef<void(const FuncContents&)> visit) {
   while (f != &user && !is_wrapper_of(&user, *f)) {
@@ -39,8 +39,8 @@ const FuncContents* resolve(const FuncContents* f, const FuncContents& user,
   return f;
 }
 
-// The Func that stands for an image in what `user` reads; null when it reads the image itself, as
-// that Func does and its copies do.
+// The Func that `user` reads instead of an image. Null when it reads the image itself, as that Func
+// and its copies do.
 FuncPtr reader_of_image(const Call& call, const FuncContents& user) {
   const auto* image = static_cast<const ParameterContents*>(call.symbol.raw());
   if (const FuncPtr* copy = find_or_null(user.copied_inputs, image->name)) return *copy;
@@ -66,7 +66,7 @@ class Wrapping {
   FuncCopies copies_;
   std::vector<const FuncContents*> queue_;
   std::set<std::pair<const FuncContents*, std::string>>
-      used_;  // Func and the user it is wrapped in
+      used_;  // pairs of a Func and the consumer it is wrapped in
 
   const FuncPtr& copy_of(const FuncContents* f) {
     FuncPtr& copy = copies_[f];
@@ -127,7 +127,7 @@ class Wrapping {
   }
 };
 
-// The Funcs that stand for images which f reads.
+// The Funcs that f reads instead of images.
 std::vector<FuncPtr> image_readers(const FuncContents& f) {
   std::vector<FuncPtr> readers;
   for (int s = 0; s < f.stage_count(); s++) {
@@ -152,7 +152,7 @@ FuncPtr clone_of(const FuncPtr& f, const std::string& name) {
   clone->name = claim_name(name);
   clone->wrappers.clear();
   clone->copied_inputs.clear();
-  clone->log.clear();  // it starts with the schedule so far
+  clone->log.clear();  // the clone's log starts empty, with the schedule so far as its base
   clone->outputs.clear();
   make_outputs(*clone);
   for (int s = 1; s < f->stage_count(); s++) {
@@ -236,7 +236,7 @@ bool reads(const FuncContents& user, const FuncContents& f) {
   return found;
 }
 
-// 1. f has a definition. 2. It is not wrapped in itself. 3. A user that is complete reads it.
+// 1. f has a definition. 2. It is not wrapped in itself. 3. Every completed user reads it.
 void check_users(const FuncPtr& f, const std::vector<FuncPtr>& users, const std::string& asked) {
   if (!f->is_defined())
     user_error(asked, quoted(f->name) + " needs a definition first", "it has none", "Define it");
@@ -252,7 +252,7 @@ void check_users(const FuncPtr& f, const std::vector<FuncPtr>& users, const std:
   }
 }
 
-// All of `users` have this wrapper, and nobody else.
+// Exactly `users` share this wrapper.
 void check_shared(const FuncContents& f, const FuncPtr& wrapper,
                   const std::vector<std::string>& users, const std::string& asked) {
   std::vector<std::string> sharing;
@@ -283,7 +283,7 @@ FuncPtr wrapper_of(const FuncPtr& handle, const std::vector<FuncPtr>& users,
     check_shared(*f, existing->second, keys, asked);
     if (clone == is_identity(*existing->second, *f)) {
       user_error(asked, "a user has either a wrapper or a clone",
-                 text(quoted(existing->second->name), " is there already"), "Keep that one");
+                 text(quoted(existing->second->name), " exists already"), "Keep that one");
     }
     return owning(handle, existing->second);
   }
@@ -295,7 +295,7 @@ FuncPtr wrapper_of(const FuncPtr& handle, const std::vector<FuncPtr>& users,
                "Give each its own");
   }
   FuncPtr wrapper = clone ? clone_of(f, name) : identity_of(f, name);
-  f->frozen = wrapper->frozen = true;  // wrappers change no values, now or later
+  f->frozen = wrapper->frozen = true;  // wrappers never change values
   for (const std::string& key : keys) f->wrappers[key] = wrapper;
   const auto named = mapped(users, [](const FuncPtr& user) { return NamedFunc(user->name); });
   log_directive(
@@ -337,7 +337,7 @@ FuncPtr copied_input(const FuncPtr& handle, const std::shared_ptr<ParameterConte
   FuncPtr& copy = user->copied_inputs[image->name];
   if (!copy) {
     copy = reader_of(image, name, SymbolRef(image));
-    user->frozen = true;  // what it reads stays what it is
+    user->frozen = true;  // its reads are final
     log_directive({user}, CopyInput{copy->name, image->name});
   }
   return owning(handle, copy);

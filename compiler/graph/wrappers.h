@@ -1,15 +1,15 @@
-// wrappers.h -- the Funcs that Func::in and clone_in put between a Func and its users.
+// wrappers.h -- the Funcs that Func::in and clone_in insert between a Func and its consumers.
 //
 //   g reads f, f.in(g) is w       =>      g reads w, w reads f
 //
-// A user's definitions never change: `f` keeps its wrappers by the names of the users, and
-// compiling starts by copying the graph with all references redirected. Values stay the same, so
-// what evaluates or differentiates definitions need not know of wrappers.
+// The user's definitions never change. `f` records its wrappers by the names of their consumers,
+// and compilation starts from a copy of the graph with all references redirected. Wrappers do not
+// change values, so the interpreter and differentiation may ignore them.
 //
-// Images have no place for that, since programs share them: a user keeps by their names what it reads
-// in their stead (copied_inputs).
+// Programs share images, so images record no wrappers. Each consumer records by their names the
+// Funcs that it reads instead of images (copied_inputs).
 //
-// Ownership: f owns its wrappers, and they refer to f weakly. The handles that users get own both.
+// Ownership: f owns its wrappers, which refer to f weakly. The handles that users get own both.
 #pragma once
 
 #include <string>
@@ -19,26 +19,27 @@
 
 namespace retrograde::graph {
 
-// `outputs` as they are when nothing is wrapped; otherwise outputs of a copy of the graph, in which
-// users read wrappers. CompileError when a Func is wrapped in another that does not read it.
+// Returns `outputs` unchanged when nothing is wrapped; otherwise outputs of a copy of the graph in
+// which consumers read wrappers. CompileError when a Func is wrapped in another that does not read
+// it.
 std::vector<FuncPtr> apply_wrappers(const std::vector<FuncPtr>& outputs);
 
-// Every Func that compiling the outputs looks at, wrappers included; in no particular order.
+// Every Func that compiling the outputs reads, wrappers included, in no particular order.
 std::vector<FuncPtr> functions_of(const std::vector<FuncPtr>& outputs);
 
-// The wrapper of f that all of `users` share, made when there is none; no users: all that have no
-// other. `clone`: a copy of f instead of a Func that reads it.
+// The wrapper of f that all of `users` share, created if necessary. No users: the wrapper for all
+// consumers without another one. `clone`: a copy of f instead of a Func that reads it.
 FuncPtr wrapper_of(const FuncPtr& f, const std::vector<FuncPtr>& users, const std::string& name,
                    bool clone);
 
-// The same definitions and schedule under another name.
+// A copy of the definitions and schedule under another name.
 FuncPtr clone_of(const FuncPtr& f, const std::string& name);
 
-// The Func through which `user` reads the image, made when there is none.
+// The Func through which `user` reads the image, created if necessary.
 FuncPtr copied_input(const FuncPtr& user, const std::shared_ptr<ParameterContents>& image,
                      const std::string& name);
 
-// The Func that reads an image point by point, the same for each call.
+// The Func that reads an image point by point; the same one for each call.
 FuncPtr func_of_image(const std::shared_ptr<ParameterContents>& image);
 
 }  // namespace retrograde::graph

@@ -38,7 +38,8 @@ bool is_own_load(const Expr& e, const Store& store) {
   return load && load->name == store.name && equal(load->index, store.index);
 }
 
-// The two operands of a commutative or subtracting operation; none when `e` is no such thing.
+// The two operands of a commutative or subtracting operation; nothing when `e` is another
+// expression.
 struct Operation {
   Kind kind;
   Op op = Op::none;

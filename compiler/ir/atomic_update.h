@@ -1,5 +1,5 @@
-// atomic_update.h -- the form of a store that changes an element by one operation: what lowering
-// keeps as a vector, and code generation makes an instruction of.
+// atomic_update.h -- recognises stores that combine an element with a value by one operation.
+// Lowering keeps such stores as vectors; code generation emits an atomic instruction for them.
 #pragma once
 
 #include <optional>
@@ -18,31 +18,31 @@ struct UpdateChain {
     Expr value;       // reads nothing of f
     bool is_negated;  // Add: subtracted
   };
-  std::vector<Term> terms;  // the last first
+  std::vector<Term> terms;  // the last applied comes first
 };
-// Follows the operand that loads f[i] down; everything beside the way is a term. None when the
-// store has another form.
+// Follows the operand chain down to the load of f[i]; every other operand on the way is a term.
+// Returns nothing for a store of another form.
 std::optional<UpdateChain> find_update_chain(const Store& store);
 
 // f[i] = f[i] op operand
 struct AtomicUpdate {
-  Kind kind;  // as of a chain
+  Kind kind;  // as in UpdateChain
   Op op = Op::none;
   Expr operand;             // reads nothing of f
   bool is_negated = false;  // f[i] - operand
 };
 
-// Of integers also a chain of one associative operation: the operands are put together. None when
-// the store has another form.
+// For integers this also accepts a chain of one associative operation, whose operands are combined.
+// Returns nothing for a store of another form.
 std::optional<AtomicUpdate> find_atomic_update(const Store& store);
-// What the element `old` becomes by it, with `operand` in place of its own.
+// The new value of an element that holds `old`, with `operand` in place of update.operand.
 Expr updated(const AtomicUpdate& update, const Expr& old, const Expr& operand);
 
-// Whether one instruction can exchange a value of the type.
+// Whether one atomic instruction can exchange a value of the type.
 bool is_one_word(Type type);
 
-// Whether the body of an Atomic stores to several elements of a buffer, or reads one of a buffer that
-// it stores to elsewhere: such updates meet wherever they are.
+// Whether the body of an Atomic stores to several elements of a buffer, or reads an element of a
+// buffer that it stores to elsewhere. Such updates conflict even between different iterations.
 bool touches_several_elements(const Stmt& update);
 
 bool loads_from(const Expr& e, const std::string& buffer);

@@ -43,7 +43,7 @@ Expr splat(Expr value, int lanes) {
   return make_node<Broadcast>(type, std::move(value), lanes);
 }
 
-// Every NaN becomes the one quiet NaN that the printer knows.
+// Every NaN becomes the one quiet NaN that the printer can print.
 Expr float_const(Type scalar, double value) {
   if (std::isnan(value)) value = std::numeric_limits<double>::quiet_NaN();
   return make_node<FloatImm>(scalar, round_to_type(scalar, value));
@@ -166,8 +166,8 @@ bool is_negative_zero(const Expr& e) {
   return value && *value == 0 && std::signbit(*value);
 }
 
-// x + -0.0, x - 0.0, x * 1.0 and x / 1.0 are x for every x, NaN, infinities and -0.0 among them. x
-// + 0.0 is not.
+// x + -0.0, x - 0.0, x * 1.0 and x / 1.0 equal x for every x, including NaN, infinities and -0.0. x
+// + 0.0 does not.
 Expr fold_float(Kind kind, const Expr& a, const Expr& b) {
   switch (kind) {
     case Kind::Add:
@@ -221,9 +221,9 @@ Expr fold_logical(Kind kind, const Expr& a, const Expr& b) {
   return a.same_as(b) ? a : Expr();
 }
 
-// The value of an expression over constants with functions in it that only code generation folds:
-// for integers and conditions that depend on it, as extents of loops do. Small ones: nodes that
-// are shared are visited again.
+// Evaluates an expression over constants that calls functions which only code generation folds.
+// Used for integers and conditions that depend on them, such as loop extents. `budget` limits the
+// size, because shared nodes are visited again.
 std::optional<Scalar> value_over_constants(const Expr& e, int& budget) {
   if (--budget < 0) return std::nullopt;
   if (auto known = as_scalar(e)) return known;
@@ -249,7 +249,7 @@ std::optional<Scalar> value_over_constants(const Expr& e) {
   return value_over_constants(e, budget);
 }
 
-// Whether folding to `result` would lose a name of the operand.
+// Whether folding to `result` would drop a loose name of the operand.
 bool loses_names(const Expr& result, const Expr& operand) {
   return operand->has_loose_names && !operand.same_as(result);
 }
@@ -292,7 +292,7 @@ Expr logical_not(Expr a) {
 
 namespace {
 
-// What a float out of an integer type's range becomes is left to the machine, so it is not folded.
+// A float outside an integer type's range converts as the machine does, so it is not folded.
 bool cast_is_defined(Type to, const Scalar& from) {
   if (!from.type.is_float() || to.is_float() || to.is_bool()) return true;
   return std::isfinite(from.f) && to.can_represent(std::trunc(from.f));
@@ -414,8 +414,8 @@ Expr make_vector_reduce(Kind op, Expr value, int result_lanes) {
 
 namespace {
 
-// Generated code has functions of its own for these, whose last bit may be another one: code
-// generation folds them (codegen/constant_math.h).
+// Generated code implements these functions itself, and may differ in the last bit. Code generation
+// folds them (codegen/constant_math.h).
 bool is_rounded_otherwise(Op op) { return op_info(op).real.error.kind == OpError::Kind::Library; }
 
 bool is_zero_or_one(const Scalar& s) { return s.f == 0 || s.f == 1; }
@@ -428,7 +428,7 @@ Expr fold_operator(Op op, Type type, const std::vector<Expr>& args) {
     values.push_back(*value);
   }
   const Scalar result = *eval_operator(op, values, type.element_of());
-  // cos(0), log(1) and their kin are exact.
+  // Exact cases: cos(0), log(1) and the like.
   const bool is_exact = !is_rounded_otherwise(op) ||
                         (is_zero_or_one(result) && std::ranges::all_of(values, is_zero_or_one));
   return is_exact ? constant(result, type.lanes()) : Expr();
@@ -508,7 +508,7 @@ void add_conjuncts(const Expr& e, std::vector<Expr>& conjuncts) {
 
 void add_term(Expr& sum, const Expr& term) { sum = sum.defined() ? sum + term : term; }
 
-// ---- statements. An undefined body is the empty statement; what wraps it is empty too. ----
+// ---- statements: an undefined body is the empty statement; its wrapper is empty too ----
 
 Stmt make_let(const std::string& name, Expr value, Stmt body) {
   return body.defined() ? Stmt(make_node<LetStmt>(name, std::move(value), std::move(body)))

@@ -1,6 +1,6 @@
-// Building IR: checks types, folds constants and the few identities that always hold, and nothing
-// else. Also the C++ operators on Expr with Halide's promotion rules (operators between namespaces'
-// users and passes alike).
+// Node builders: they check types, fold constants and apply the few identities that always hold,
+// and do no other simplification. Also declares the C++ operators on Expr, with Halide's promotion
+// rules.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,7 @@ namespace retrograde {
 
 namespace ir {
 
-Expr make_const(Type type, int64_t value);  // broadcast when the type has lanes
+Expr make_const(Type type, int64_t value);  // broadcast when the type has several lanes
 Expr make_const(Type type, double value);
 inline Expr make_const(Type type, int value) {
   return make_const(type, static_cast<int64_t>(value));
@@ -27,7 +27,7 @@ Expr const_true(int lanes = 1);
 Expr const_false(int lanes = 1);
 
 std::optional<int64_t> as_const_int(
-    const Expr& e);  // Int or UInt immediate (or broadcast) that fits int64
+    const Expr& e);  // when `e` is an Int or UInt immediate (or a broadcast of one) that fits int64
 std::optional<double> as_const_float(const Expr& e);
 bool is_const(const Expr& e);
 bool is_zero(const Expr& e);  // +0.0 and -0.0 both
@@ -37,32 +37,34 @@ bool is_const_false(const Expr& e);
 bool is_const_int(const Expr& e, int64_t value);
 
 Expr variable(const std::string& name, Type type = Int(32), SymbolRef symbol = {});
-// A variable that no definition has claimed yet, as users write reduction variables. Folding keeps
-// every operand that mentions one: r * 0 is no constant, because the definition that it ends up in
-// runs over the domain of r. `settled` is for the definition: the same expression over plain
-// variables, folded.
+// A variable that no definition owns yet: a reduction variable as users write it. Folding keeps
+// every operand that mentions one. For example r * 0 is not folded, because the definition that
+// eventually contains it runs over the domain of r. `settled` is called by that definition and
+// returns the same expressions over plain variables, folded.
 Expr loose_variable(const std::string& name, Type type = Int(32), SymbolRef symbol = {});
-std::vector<Expr> settled(std::vector<Expr> exprs);  // what they share stays shared
-// An int32 variable for each name: the arguments of a Func as its definition names them.
+std::vector<Expr> settled(std::vector<Expr> exprs);  // sharing is preserved
+// An int32 variable for each name: the arguments in a Func's definition.
 std::vector<Expr> variables_of(const std::vector<std::string>& names);
-// `a` and `b` already of one type (lanes too, but a scalar is broadcast).
+// `a` and `b` must already have one type; a scalar beside a vector is broadcast.
 Expr binary(Kind kind, Expr a, Expr b);
 Expr logical_not(Expr a);
-Expr cast_to(Type type,
-             Expr value);  // keeps or broadcasts lanes; folds; nothing when already of the type
+// Keeps or broadcasts lanes; folds; returns `value` when it has the type already.
+Expr cast_to(Type type, Expr value);
 Expr reinterpret_as(Type type, Expr value);
-Expr make_select(Expr condition, Expr when_true, Expr when_false);  // arms of one type
+Expr make_select(Expr condition, Expr when_true, Expr when_false);  // arms must have one type
 Expr make_load(Type type, const std::string& name, Expr index, Expr predicate = {},
                SymbolRef symbol = {});
 Expr make_ramp(Expr base, Expr stride, int lanes);
 Expr make_broadcast(Expr value, int lanes);
 Expr make_let(const std::string& name, Expr value, Expr body);
 Expr make_shuffle(std::vector<Expr> vectors, std::vector<int> indices);
-Expr make_interleaved(const std::vector<Expr>& vectors);  // of one width: a0 b0 ... a1 b1 ...
+// Vectors of one width, as lanes a0 b0 ... a1 b1 ...
+Expr make_interleaved(const std::vector<Expr>& vectors);
 Expr make_vector_reduce(Kind op, Expr value, int result_lanes);
-// An operator with its result type given; the one-argument form takes the first argument's type.
+// An operator with an explicit result type; the overload without one uses the first argument's
+// type.
 Expr call_op(Op op, Type type, std::vector<Expr> args);
-Expr call_op(Op op, std::vector<Expr> args);  // with the type of the first
+Expr call_op(Op op, std::vector<Expr> args);  // has the first argument's type
 Expr call_extern(const std::string& name, Type type, std::vector<Expr> args, bool is_pure = false);
 Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int component,
                SymbolRef symbol);
@@ -70,13 +72,13 @@ Expr call_image(const std::string& name, Type type, std::vector<Expr> args, Symb
 // Requires: every operand must be a defined expression.
 Expr likely(Expr e);
 Expr conjunction(const std::vector<Expr>& terms);  // true when empty
-// Appends the conditions that all hold where e does; none where e is undefined.
+// Appends the operands of the conjunction `e`; appends nothing when `e` is undefined.
 void add_conjuncts(const Expr& e, std::vector<Expr>& conjuncts);
-// One more term of a sum, which is undefined as long as it has none.
+// Adds a term to a sum. An empty sum is undefined.
 void add_term(Expr& sum, const Expr& term);
 
 Stmt make_let(const std::string& name, Expr value, Stmt body);
-// Names and what they are bound to, the outermost first, around the body.
+// Names and the values bound to them, outermost first, wrapped around a body.
 using Lets = std::vector<std::pair<std::string, Expr>>;
 Expr make_lets(const Lets& lets, Expr body);
 Stmt make_lets(const Lets& lets, Stmt body);
@@ -95,10 +97,10 @@ Stmt make_realize(const std::string& name, std::vector<Type> types, MemoryType m
 Stmt make_allocate(const std::string& name, Type type, MemoryType memory, Expr elements, Stmt body,
                    Expr offset = {});
 Stmt make_free(const std::string& name);
-Stmt make_block(std::vector<Stmt>
-                    stmts);  // flattens, drops undefined; undefined when empty; the one when single
+// Flattens nested blocks, drops undefined ones; undefined when empty; unwraps a single one.
+Stmt make_block(std::vector<Stmt> stmts);
 Stmt make_if(Expr condition, Stmt when_true, Stmt when_false = {});
-// `old` with other parts; itself when they are its own.
+// `old` with new children; returns `old` itself when they are unchanged.
 Stmt with_parts(const IfThenElse& old, Expr condition, Stmt when_true, Stmt when_false);
 Stmt make_evaluate(Expr value);
 Stmt make_atomic(const std::string& name, Stmt body);
@@ -106,19 +108,20 @@ Stmt make_fork(Stmt first, Stmt rest);
 Stmt make_prefetch(const std::string& name, Type type, std::vector<Range> bounds,
                    SymbolRef symbol = {});
 
-// Halide's promotion: to floats over integers, to the wider, to signed when signs mix; scalars to
-// vectors. Throws UserError naming `what` (the operation) when there is no common type.
+// Applies Halide's promotion: integers become floats beside floats, types widen, mixed signs become
+// signed, scalars are broadcast to vectors. Throws UserError that names the operation `what` when
+// there is no common type.
 void match_types(Expr& a, Expr& b, const char* what);
-// Constant `value` in `type`, or UserError when it does not fit.
+// The constant `value` in the type of `other`; UserError when it does not fit.
 Expr constant_like(const Expr& other, int64_t value, const char* what);
 
 }  // namespace ir
 
 // ---- C++ operators on Expr ----
 
-// A C++ integer beside an Expr takes the Expr's type, and must fit it (UserError). A template,
-// because a plain `int` parameter would also swallow `e + 0.5f`. C++ floats become Exprs of their
-// own type.
+// A C++ integer beside an Expr takes the Expr's type, and must fit it (UserError). This is a
+// template because a plain `int` parameter would also accept `e + 0.5f`. C++ floats become Exprs of
+// their own type.
 template <class T>
 concept IntegerConstant = std::is_integral_v<T> && !std::is_same_v<T, bool>;
 

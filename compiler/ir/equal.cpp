@@ -1,5 +1,5 @@
-// Structural order, equality and hash. The hash is kept in the node, so unequal trees are told
-// apart at once and equal ones are compared once per pair of nodes.
+// Structural order, equality and hash. The hash is cached in the node, so unequal trees differ at
+// once, and equal ones are compared once per pair of nodes.
 #include "ir/equal.h"
 
 #include <bit>
@@ -17,8 +17,8 @@ int order(const T& a, const T& b) {
   return a < b ? -1 : b < a ? 1 : 0;
 }
 
-// Compares two trees, remembering the pairs of expressions that were equal: linear in the product
-// of sharing.
+// Compares two trees and remembers the pairs of expressions found equal, so the cost is linear in
+// the number of distinct pairs.
 class Comparer {
  public:
   int compare(const Expr& a, const Expr& b) {
@@ -39,7 +39,7 @@ class Comparer {
   }
 
  private:
-  // Of one kind.
+  // For two nodes of one kind.
   template <class Handle>
   int compare_nodes(const Handle& a, const Handle& b) {
     return match(a, [&]<class N>(const N& n) {
@@ -100,7 +100,7 @@ uint64_t mix(uint64_t seed, uint64_t value) {
 
 uint64_t text_hash(const std::string& s) { return std::hash<std::string_view>()(s); }
 
-// What a node says beyond its kind, type and children.
+// The data of a node besides kind, type and children.
 uint64_t payload(const Expr& e) {
   return match(
       e, [](const IntImm& n) { return static_cast<uint64_t>(n.value); },

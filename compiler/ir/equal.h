@@ -1,5 +1,5 @@
-// Structural equality, order and hash. DAG-aware: shared nodes are compared once. Symbols compare
-// by name.
+// Structural equality, order and hash of expressions and statements. Shared nodes are compared
+// once; Symbols compare by name.
 #pragma once
 
 #include <cstddef>
@@ -9,12 +9,12 @@
 namespace retrograde::ir {
 bool equal(const Expr& a, const Expr& b);
 bool equal(const Stmt& a, const Stmt& b);
-int compare(const Expr& a, const Expr& b);  // a total order: < 0, 0, > 0
+int compare(const Expr& a, const Expr& b);  // a total order: negative, 0 or positive
 size_t hash(const Expr& e);
 struct StructuralLess {
   bool operator()(const Expr& a, const Expr& b) const { return compare(a, b) < 0; }
 };
-// For unordered containers keyed by value.
+// Hash functor for unordered containers keyed by value.
 struct StructuralHash {
   size_t operator()(const Expr& e) const { return hash(e); }
 };

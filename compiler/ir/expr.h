@@ -1,7 +1,7 @@
 // Expr and Stmt: handles to immutable, reference-counted nodes; and the node types themselves.
-// Kinds are listed in kinds.def, operators and their facts in operators.h. Nodes are built by the functions of
-// build.h, which check types; a node's children never change. Two handles to one node share it:
-// expressions are DAGs.
+// kinds.def lists the node kinds, operators.def the operators and their properties. The functions
+// of build.h make nodes and check types; a node's children never change. Two handles to one node
+// share it, so expressions are DAGs.
 #pragma once
 
 #include <atomic>
@@ -40,16 +40,17 @@ struct Node {
 };
 struct ExprNode : Node {
   ExprNode(Kind kind, Type type) : Node(kind), type(type) {}
-  // Whether it mentions a name that no definition has claimed yet (build.h, loose_variable).
+  // Whether the expression mentions a name that no definition owns yet (loose_variable in build.h).
   mutable bool has_loose_names = false;
   const Type type;
-  mutable std::atomic<uint64_t> hash{0};  // structural (equal.h); 0 until asked for
+  mutable std::atomic<uint64_t> hash{0};  // structural (equal.h); 0 until first computed
 };
 struct StmtNode : Node {
   using Node::Node;
 };
 
-// Deletes as what it is, without recursing on the C++ stack: chains of a million nodes are legal.
+// Deletes the node by its dynamic kind, without recursing on the C++ stack: chains of a million
+// nodes are legal.
 void release(const Node* node) noexcept;
 
 template <class T>
@@ -72,7 +73,7 @@ class Ref {
   const T* get() const { return node_; }
   const T* operator->() const { return node_; }
   Kind kind() const { return node_->kind; }
-  // The node as a concrete type (ir::Select, ...), or null when it is of another kind.
+  // The node as a concrete type (ir::Select, ...), or null when it has another kind.
   template <class N>
   const N* as() const {
     return node_ && N::is_kind(node_->kind) ? static_cast<const N*>(static_cast<const Node*>(node_))
@@ -94,7 +95,7 @@ class Expr : public ir::Ref<ir::ExprNode> {
  public:
   using Ref::Ref;
   Expr() = default;
-  // A bool and nothing else, so that no pointer turns into a condition.
+  // Accepts only a real bool, so that pointers do not convert to conditions.
   template <typename T>
   requires std::same_as<T, bool> Expr(T value) : Expr(of_bool(value)) {}
   Expr(int8_t value);
@@ -112,11 +113,11 @@ class Expr : public ir::Ref<ir::ExprNode> {
   Expr(long long value) : Expr(static_cast<int64_t>(value)) {}
   Expr(unsigned long long value) : Expr(static_cast<uint64_t>(value)) {}
   Expr(const std::string& text);
-  // Explicit, so that functions of a text or an Expr take a literal as the text.
+  // Explicit, so that an overload set of a string and an Expr takes a literal as the string.
   // Requires: a text is not null.
   explicit Expr(const char* text);
   Type type() const { return get()->type; }
-  // Calls the visitor's function for the node's type: see ir/visitor.h.
+  // Calls the visitor's function for the node's type; see ir/visitor.h.
   void accept(ir::IRVisitor* visitor) const;
 
  private:
@@ -128,7 +129,7 @@ class Stmt : public ir::Ref<ir::StmtNode> {
   using Ref::Ref;
 };
 
-struct ExprCompare {  // by identity, not by value
+struct ExprCompare {  // compares identity, not value
   bool operator()(const Expr& a, const Expr& b) const { return a.get() < b.get(); }
 };
 
@@ -137,7 +138,8 @@ struct Range {
   Expr min, extent;
 };
 
-// GpuBlock, GpuThread and GpuLane: iterations are blocks of a grid, threads of a block, lanes of a warp.
+// With GpuBlock, GpuThread and GpuLane, iterations are blocks of a grid, threads of a block and
+// lanes of a warp.
 enum class ForType : uint8_t {
   Serial,
   Parallel,
@@ -149,11 +151,13 @@ enum class ForType : uint8_t {
 };
 constexpr bool is_gpu(ForType type) { return type >= ForType::GpuBlock; }
 constexpr bool is_gpu_thread(ForType type) { return type > ForType::GpuBlock; }
-// Whether iterations may run at the same time, each on its own.
+// Whether iterations may run concurrently.
 constexpr bool runs_at_once(ForType type) { return type == ForType::Parallel || is_gpu(type); }
-// Whether a loop is cut into a steady state without boundary tests and the parts around it.
+// Whether a loop is partitioned into a steady state without boundary tests, a prologue and an
+// epilogue.
 enum class Partition : uint8_t { Auto, Never, Always };
-// Register and GPUShared are memories of a GPU's kernels; those of accelerators parse and are refused.
+// Register and GPUShared are memories of GPU kernels. Those of other accelerators parse, but
+// compiling for them is an error.
 enum class MemoryType : uint8_t {
   Auto,
   Heap,
@@ -168,14 +172,14 @@ enum class MemoryType : uint8_t {
 
 namespace ir {
 
-// What a name in the IR stands for when it is more than a name: a Func, a parameter, a buffer, a
-// reduction domain. Layers above derive their contents from it; the IR only carries it along.
+// The entity behind a name in the IR: a Func, a parameter, a buffer or a reduction domain. Higher
+// layers derive their contents from it; the IR only carries the reference.
 struct Symbol {
   virtual ~Symbol() = default;
 };
 
-// A reference to a Symbol. A Func's own update definitions refer to it weakly, so that no cycle
-// owns itself.
+// A reference to a Symbol. A Func's own update definitions hold a weak one, so that no reference
+// cycle keeps itself alive.
 class SymbolRef {
  public:
   SymbolRef() = default;
@@ -188,7 +192,7 @@ class SymbolRef {
   }
   bool defined() const { return raw_ != nullptr; }
   bool is_weak() const { return raw_ && !strong_; }
-  Symbol* raw() const { return raw_; }  // identity; may dangle when weak
+  Symbol* raw() const { return raw_; }  // for identity; may dangle when the reference is weak
   std::shared_ptr<Symbol> lock() const { return strong_ ? strong_ : weak_.lock(); }
 
  private:
@@ -199,14 +203,15 @@ class SymbolRef {
 
 // ---- expressions ----
 
-// What a node says besides its kind and type is listed once, as its fields: names and numbers, then
-// children in evaluation order. Comparison and walks stand on the list. Symbols only go along.
-// Nodes have no constructors: make_node gives the members in the order of the struct.
+// Each node type lists its data besides kind and type once, as its fields: names and numbers, then
+// children in evaluation order. Comparison and walks use that list. Symbols are carried along but
+// never compared. Nodes have no constructors: make_node takes the members in the order of the
+// struct.
 //
-// make() builds a node, as the functions of build.h do: it folds constants, so that what it gives may
-// be of another kind.
-// Requires: operands of a node are defined; operands of a node have one type; the condition of a node
-// is of type bool.
+// make() builds a node through the functions of build.h. These fold constants, so the result may
+// have another kind.
+// Requires: operands of a node are defined; operands of a node have one type; the condition of a
+// node is of type bool.
 #define RETROGRADE_FIELDS(...) \
   auto fields() const { return std::tie(__VA_ARGS__); }
 #define RETROGRADE_NODE(Name, ...)                                      \
@@ -224,7 +229,7 @@ struct UIntImm : ExprNode {
   static Expr make(Type type, uint64_t value);
   const uint64_t value;
 };
-struct FloatImm : ExprNode {  // value already rounded to the type
+struct FloatImm : ExprNode {  // the value is already rounded to the type
   RETROGRADE_NODE(FloatImm, value)
   static Expr make(Type type, double value);
   const double value;
@@ -234,8 +239,8 @@ struct StringImm : ExprNode {
   static Expr make(const std::string& text) { return Expr(text); }
   const std::string value;
 };
-// A pure variable, loop variable, let-bound name, scalar parameter, reduction variable, or a fact
-// of a buffer ("input.min.0", "input.extent.1", "input.stride.0").
+// A pure variable, loop variable, let-bound name, scalar parameter, reduction variable, or buffer
+// metadata ("input.min.0", "input.extent.1", "input.stride.0").
 struct Variable : ExprNode {
   RETROGRADE_NODE(Variable, name)
   static Expr make(Type type, const std::string& name);
@@ -264,7 +269,7 @@ struct Binary : ExprNode {
     has_loose_names = this->a->has_loose_names || this->b->has_loose_names;
   }
 };
-// Binary nodes of one kind, for as<>(): e.as<Add>()->a
+// Binary nodes of one kind, for use with as<>(): e.as<Add>()->a
 template <Kind K>
 struct BinaryOf : Binary {
   static constexpr bool is_kind(Kind kind) { return kind == K; }
@@ -284,13 +289,13 @@ struct Select : ExprNode {
   static Expr make(Expr condition, Expr when_true, Expr when_false);
   const Expr condition, when_true, when_false;
 };
-// FlatStorage phase. Element number `index` of the allocation or buffer `name`.
+// FlatStorage phase: element number `index` of the allocation or buffer `name`.
 struct Load : ExprNode {
   RETROGRADE_NODE(Load, name, index, predicate)
   const std::string name;
   const Expr index,
-      predicate;  // predicate: bool with the load's lanes; lanes that are off give any value
-  const SymbolRef symbol;  // the parameter or buffer, undefined for internal allocations
+      predicate;           // bool with the load's lanes; disabled lanes have an unspecified value
+  const SymbolRef symbol;  // the parameter or buffer; undefined for internal allocations
 };
 struct Ramp
     : ExprNode {  // base, base + stride, ...; base may be a vector: then lanes are base-major
@@ -309,7 +314,7 @@ enum class CallType : uint8_t {
   Operator,  // `op`, see operators.def
   Func,      // a value of another Func at integer coordinates; symbol: the Func's contents
   Image,     // an element of an ImageParam or Buffer at integer coordinates; symbol: the parameter
-  Extern,    // a C function `name` by value
+  Extern,    // a C function `name` that takes its arguments by value
 };
 struct Call : ExprNode {
   RETROGRADE_NODE(Call, call_type, op, name, component, args)
@@ -318,7 +323,7 @@ struct Call : ExprNode {
     return call_type == CallType::Operator && ((op == which) || ...);
   }
   bool is_marker() const { return op_info(op).cls == OpClass::Marker; }
-  // What visitors call these: an operator is an intrinsic, named by its enumerator (Call::likely).
+  // Visitors see an operator as an intrinsic, named by its enumerator (Call::likely).
   using enum Op;
   static constexpr CallType Halide = CallType::Func, Image = CallType::Image,
                             Extern = CallType::Extern, PureExtern = CallType::Extern,
@@ -327,27 +332,27 @@ struct Call : ExprNode {
   template <class... Ops>
   requires(sizeof...(Ops) >= 1) bool is_intrinsic(Ops... which) const { return is_op(which...); }
   bool is_extern() const { return call_type == CallType::Extern; }
-  // Of a C function that depends on its arguments alone and does nothing else: loops call it once for what
-  // does not change in them.
+  // Whether this calls a C function whose result depends on its arguments alone and that has no
+  // side effects. Such calls are hoisted out of loops in which their arguments do not change.
   bool is_pure_extern() const { return is_extern() && component == pure_extern; }
   static constexpr int pure_extern = 1;
   bool is_pure() const {
     return call_type != CallType::Operator || op_info(op).cls != OpClass::Effect;
   }
-  // The call of a C function. Requires: what is called by a name alone is a C function.
+  // The call of a C function. Requires: a call by name alone calls a C function.
   static Expr make(Type type, const std::string& name, const std::vector<Expr>& args,
                    CallType call_type = CallType::Extern);
   static Expr make(Type type, Op op, const std::vector<Expr>& args,
                    CallType call_type = CallType::Operator);
   bool is_likely() const { return is_op(Op::likely, Op::likely_if_innermost); }
   const CallType call_type;
-  const Op op;             // Op::none unless Operator
-  const std::string name;  // of the Func, image or C function; the operator's name for operators
+  const Op op;             // Op::none unless call_type is Operator
+  const std::string name;  // the Func, image or C function; for an operator, its name
   const std::vector<Expr> args;
-  const int component;  // which value of a Tuple-valued Func; of a C function: pure_extern, or 0
+  const int component;  // Funcs: which value of a Tuple; C functions: pure_extern or 0
   const SymbolRef symbol;
 };
-// The call of one of these operators; null when `e` is none.
+// `e` as a call of one of the operators `which`; null when it is not.
 template <class... Ops>
 const Call* as_op(const Expr& e, Ops... which) {
   const Call* call = e.as<Call>();
@@ -369,7 +374,7 @@ struct Shuffle : ExprNode {  // lane i = lane indices[i] of the concatenated vec
   const std::vector<Expr> vectors;
   const std::vector<int> indices;
 };
-// Groups of neighbouring lanes combined, to type.lanes() lanes, by Add, Mul, Min, Max, And or Or.
+// Combines groups of neighbouring lanes into type.lanes() lanes by Add, Mul, Min, Max, And or Or.
 struct VectorReduce : ExprNode {
   RETROGRADE_NODE(VectorReduce, op, value)
   const Kind op;
@@ -384,9 +389,9 @@ struct LetStmt : StmtNode {
   const Expr value;
   const Stmt body;
 };
-// When the condition is false the function returns `error` (an int32, see Op::error; 0 leaves early
-// and well). Op::undef says that it cannot be false, which an earlier check has seen to: this is a
-// fact, and no code.
+// When the condition is false, the function returns `error` (an int32, see Op::error; 0 means an
+// early return without error). With Op::undef as the error, the condition is a fact that an earlier
+// check has established: it emits no code.
 struct Assert : StmtNode {
   RETROGRADE_NODE(Assert, condition, error)
   const Expr condition, error;
@@ -411,8 +416,8 @@ struct Store : StmtNode {
   const Expr value, index, predicate;
   const SymbolRef symbol;
 };
-struct Provide : StmtNode {  // Loops phase: store to a point of a Func; one value per Tuple
-                             // element, stored together
+// Loops phase: stores a point of a Func, one value per Tuple element, all at once.
+struct Provide : StmtNode {
   RETROGRADE_NODE(Provide, name, values, args, predicate)
   const std::string name;
   const std::vector<Expr> values, args;
@@ -433,11 +438,11 @@ struct Allocate
   const Type type;
   const MemoryType memory;
   const Expr elements;
-  const Expr offset;  // GPUShared in a Launch: in bytes, where in the shared memory; else undefined
+  const Expr offset;  // GPUShared in a Launch: byte offset into shared memory; else undefined
   const Stmt body;
 };
-struct Free : StmtNode {  // no use of the allocation follows; at most one on every path of its
-                          // Allocate's body
+// No use of the allocation follows; at most one on each path of its Allocate's body.
+struct Free : StmtNode {
   RETROGRADE_NODE(Free, name)
   const std::string name;
 };
@@ -455,16 +460,16 @@ struct Evaluate : StmtNode {
   const Expr value;
 };
 
-struct Atomic : StmtNode {  // what body reads and writes of one element of `name` is indivisible
+struct Atomic : StmtNode {  // body's reads and writes of one element of `name` are indivisible
   RETROGRADE_NODE(Atomic, name, body)
   const std::string name;
   const Stmt body;
 };
-struct Fork : StmtNode {  // both may run at once; ends when both have ended
+struct Fork : StmtNode {  // both may run concurrently; ends when both have ended
   RETROGRADE_NODE(Fork, first, rest)
   const Stmt first, rest;
 };
-struct Prefetch : StmtNode {  // Loops phase: fetch a box of a Func or image into the cache
+struct Prefetch : StmtNode {  // Loops phase: fetches a box of a Func or image into the cache
   RETROGRADE_NODE(Prefetch, name, type, bounds)
   const std::string name;
   const Type type;
@@ -472,10 +477,11 @@ struct Prefetch : StmtNode {  // Loops phase: fetch a box of a Func or image int
   const SymbolRef symbol;  // the image; undefined for a Func
 };
 
-// FlatStorage and Vector: runs a kernel, `threads` of which, in each of x, y, z, are a block, and blocks
-// a grid. The body is that of every thread, which knows its place by the names of launch_index; what it
-// uses of its surroundings, variables and memory, are the kernel's arguments. `shared_bytes` (int32): of
-// memory that the threads of a block share; the body's allocations of GPUShared lie there.
+// FlatStorage and Vector phases: runs a kernel over a grid of `blocks`, each of `threads`, both
+// given for x, y and z. The body is the code of one thread, which finds its position in the
+// variables of thread_index and block_index. The variables and memory that it uses from outside are
+// the kernel's arguments. `shared_bytes` (int32) is the size of the memory that the threads of a
+// block share; the body's GPUShared allocations lie there.
 struct Launch : StmtNode {
   RETROGRADE_NODE(Launch, name, blocks, threads, shared_bytes, body)
   const std::string name;
@@ -484,7 +490,8 @@ struct Launch : StmtNode {
   const Expr shared_bytes;
   const Stmt body;
 };
-// Variables (int32) of a launch's body: where the thread stands in its block, or its block in the grid.
+// Variables (int32) of a launch's body: the position of the thread in its block, or of the block in
+// the grid.
 std::string thread_index(const std::string& kernel, int dimension);
 std::string block_index(const std::string& kernel, int dimension);
 
@@ -498,7 +505,7 @@ inline bool has_loose_names(const std::vector<Expr>& all) {
   return false;
 }
 template <class Field>
-constexpr bool has_loose_names(const Field&) {  // of a name or a number
+constexpr bool has_loose_names(const Field&) {  // for a name or a number
   return false;
 }
 

@@ -1,11 +1,11 @@
-// Closed intervals, one form for every kind of end.
+// Closed intervals, one template for every type of end.
 //
-// Ends are expressions where an interval is computed with the program (analysis/interval.h), whole
-// numbers where it is what the simplifier knows of a node (simplify/facts.h), and doubles where it
-// is what a value can be (autodiff/rules/value_range.h). One template, and not expressions for all:
-// the simplifier asks for the range of every node, where numbers cost nothing. What intervals are is
-// here; what arithmetic makes of their ends differs (numbers saturate, doubles round, expressions
-// fold) and stands beside each kind.
+// Ends are expressions for symbolic intervals (analysis/interval.h), integers for the constant
+// range of a node in the simplifier (simplify/facts.h), and doubles for the range of a value
+// (autodiff/rules/value_range.h). Expressions alone would not do: the simplifier needs the range of
+// every node, where integers cost nothing. This file defines the intervals; arithmetic on them
+// differs for each kind of end (integers saturate, doubles round, expressions fold) and lives
+// beside each use.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 
 namespace retrograde::ir {
 
-// Where there is no end, and whether two are one.
+// The representation of an unbounded end, and equality of ends.
 template <class End>
 struct EndOf {
   using Limits = std::numeric_limits<End>;
@@ -42,18 +42,18 @@ struct IntervalOf {
   bool has_upper_bound() const { return EndOf<End>::is_bound(max); }
   bool is_bounded() const { return has_lower_bound() && has_upper_bound(); }
   bool is_point() const { return EndOf<End>::are_same(min, max); }
-  End extent() const { return max - min + 1; }  // of a bounded one
+  End extent() const { return max - min + 1; }  // of a bounded interval
   bool contains(End value) const { return min <= value && value <= max; }
-  bool is_within(const IntervalOf& whole) const { return min >= whole.min && max <= whole.max; }
+  bool is_within(const IntervalOf& outer) const { return min >= outer.min && max <= outer.max; }
   bool operator==(const IntervalOf&) const = default;
 };
 
-// An undefined end is unbounded.
+// An undefined end means unbounded.
 using Interval = IntervalOf<Expr>;
 // The extremes of int64 mean unbounded.
 using ConstantRange = IntervalOf<int64_t>;
 
-// The smallest interval around both, and what is in both; of expressions: analysis/interval.h.
+// Hull and intersection of numeric intervals; analysis/interval.h has those of expressions.
 template <class End>
 requires std::is_arithmetic_v<End> IntervalOf<End> hull(const IntervalOf<End>& a,
                                                         const IntervalOf<End>& b) {

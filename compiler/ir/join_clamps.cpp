@@ -1,5 +1,5 @@
-// A clamp is a function of its value that rises by 1 between its ends and by 0 elsewhere. The difference of two rises
-// where one of them does and the other does not.
+// Method: a clamp as a function of its value rises by 1 between its ends and by 0 elsewhere. The
+// difference of two clamps therefore rises exactly where one of them rises and the other does not.
 #include "ir/join_clamps.h"
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace {
 
 constexpr __int128 infinite = __int128{1} << 100;
 
-// The places between two ends.
+// The interval between two ends.
 struct Span {
   __int128 low = -infinite, high = infinite;
   bool operator==(const Span& other) const { return low == other.low && high == other.high; }
@@ -21,7 +21,7 @@ struct Span {
   __int128 finite_end() const { return low > -infinite ? low : high; }
 };
 
-// min(max(base + shift, low), high), by the values of `base`.
+// min(max(base + shift, low), high) as a function of `base`.
 struct Clamp {
   Sum base;  // without a constant
   int64_t shift = 0;
@@ -76,7 +76,7 @@ std::optional<Clamp> as_clamp(const Expr& e) {
   return result;
 }
 
-// What is in `outer` and not in `inner`, if that is one span at an end of `outer`.
+// `outer` minus `inner`, if that is one interval at an end of `outer`.
 std::optional<Span> without(const Span& outer, const Span& inner) {
   if (outer.low == inner.low && inner.high < outer.high) return Span{inner.high, outer.high};
   if (outer.high == inner.high && inner.low > outer.low) return Span{outer.low, inner.low};

@@ -1,4 +1,4 @@
-// Words of IR text.
+// The lexer of IR text.
 #include "ir/lexer.h"
 
 #include <cctype>
@@ -71,7 +71,7 @@ void Lexer::read_quoted_name(Token& token) {
       fail(Token{Token::Kind::End, {}, false, line_, column_}, "a closing back quote");
     if (peek() == '`') {
       advance();
-      if (peek() != '`') return;  // two stand for one inside
+      if (peek() != '`') return;  // two back quotes inside a name stand for one
     }
     token.text += peek();
   }

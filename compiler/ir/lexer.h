@@ -1,4 +1,4 @@
-// Words of IR text (print.cpp shows the language).
+// The lexer of IR text (print.cpp shows the language).
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,8 @@ namespace retrograde::ir {
 struct Token {
   enum class Kind : uint8_t { Name, Number, String, Shared, Punctuation, End };
   Kind kind = Kind::End;
-  std::string text;     // a name without its back quotes, a string without quotes and escapes
-  bool quoted = false;  // a name in back quotes is no keyword
+  std::string text;     // a name without its back quotes; a string without quotes and escapes
+  bool quoted = false;  // a name in back quotes is never a keyword
   int line = 1, column = 1;
 };
 

@@ -1,4 +1,4 @@
-// Lists made of lists, and what a map knows. With expr.h: whoever works on expressions has them.
+// Helpers that map and filter lists and look up keys of maps. expr.h includes this file.
 #pragma once
 
 #include <functional>
@@ -7,7 +7,7 @@
 
 namespace retrograde::ir {
 
-// What `f`, a function or a member, gives of each, in order.
+// `f` (a function or a member) applied to each element, in order.
 template <class List, class F>
 auto mapped(const List& list, F&& f) {
   std::vector<std::decay_t<decltype(std::invoke(f, *list.begin()))>> result;
@@ -24,7 +24,7 @@ auto numbered(Count count, F&& f) {
   return result;
 }
 
-// Those of which `f`, a function or a member, is true, in order.
+// The elements for which `f` (a function or a member) is true, in order.
 template <class List, class F>
 auto filtered(const List& list, F&& f) {
   std::vector<std::decay_t<decltype(*list.begin())>> result;
@@ -34,7 +34,7 @@ auto filtered(const List& list, F&& f) {
   return result;
 }
 
-// The first of which `f`, a function or a member, is true; null when there is none.
+// The first element for which `f` (a function or a member) is true; null when there is none.
 template <class List, class F>
 auto first_where(List& list, F&& f) -> decltype(&*list.begin()) {
   for (auto& one : list) {
@@ -53,14 +53,14 @@ auto keys_of(const Map& map) {
   return mapped(map, &Map::value_type::first);
 }
 
-// The value of the key in the map; null when it has none.
+// The value of the key in the map; null when the key is absent.
 template <class Map>
 auto find_or_null(Map& map, const typename Map::key_type& key) {
   const auto found = map.find(key);
   return found == map.end() ? nullptr : &found->second;
 }
 
-// The same, or `otherwise`.
+// The value of the key in the map; `otherwise` when the key is absent.
 template <class Map>
 typename Map::mapped_type value_or(const Map& map, const typename Map::key_type& key,
                                    const typename Map::mapped_type& otherwise) {

@@ -1,4 +1,4 @@
-// Which constants keep their value in another type.
+// Decides which constants keep their value in another type.
 #include "ir/literal.h"
 
 #include <cmath>
@@ -29,7 +29,7 @@ Expr literal_in(Type type, Expr e, const std::string& asked, const std::string& 
   const std::optional<Scalar> value = as_scalar(e);
   if (value && !holds_value(type.element_of(), *value)) {
     const std::string name = to_string(type.element_of());
-    user_error(asked, rule, text(literal_text(*value), " has no place in ", name),
+    user_error(asked, rule, text(literal_text(*value), " does not fit ", name),
                text("Give a value of ", name, ", or cast both sides to a wider type"));
   }
   return cast_to(type, std::move(e));

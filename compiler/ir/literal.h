@@ -1,7 +1,8 @@
-// literal.h -- constants that are given the type of what stands beside them.
+// literal.h -- converts constants to the type of the operand beside them, and rejects those that do
+// not fit.
 //
-// An explicit cast wraps, as in C++. Where the library converts on its own, a constant must keep
-// its value: clamp(f(x), 0, 255) of int8 means no clamp to -1.
+// An explicit cast wraps, as in C++. Where the library converts implicitly, a constant must keep
+// its value: clamp(f(x), 0, 255) of an int8 must not become a clamp to -1.
 #pragma once
 
 #include <string>
@@ -10,18 +11,17 @@
 
 namespace retrograde::ir {
 
-// Whether `type` has the value: floats up to the rounding of fractions; an integer exactly.
+// Whether `type` can represent the value: integers exactly, floats up to the rounding of fractions.
 bool holds_value(Type type, const Scalar& value);
 
-// `e` in `type`. CompileError when it is a constant that the type does not hold: "cannot <asked>:
-// <rule>; ...". What is no constant is converted.
+// `e` in `type`. A constant that the type cannot represent is a CompileError: "cannot <asked>:
+// <rule>; ...". Non-constant expressions are cast.
 Expr literal_in(Type type, Expr e, const std::string& asked, const std::string& rule);
 
 // The same for sizes and coordinates, which are int32.
 Expr int32_literal(Expr e, const std::string& asked);
 
-// Whether every value of `e` has its place in `type`. A cast from a narrower type is looked
-// through.
+// Whether `type` can represent every value of `e`. Looks through a cast from a narrower type.
 bool always_fits(Type type, const Expr& e);
 
 // A constant as the user wrote it: 300, -0.5.

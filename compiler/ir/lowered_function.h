@@ -1,4 +1,4 @@
-// What lowering hands to code generation: one function with a flat body.
+// The result of lowering and the input of code generation: one function with a flat body.
 #pragma once
 
 #include <functional>
@@ -15,8 +15,7 @@ struct LoweredArgument {
   Kind kind = Kind::Scalar;
   Type type;           // of the scalar, or of the buffer's elements
   int dimensions = 0;  // of the buffer
-  SymbolRef
-      symbol;  // the parameter or buffer behind it, for binding at a JIT call; may be undefined
+  SymbolRef symbol;    // the parameter or buffer that a JIT call binds here; may be undefined
   bool is_buffer() const { return kind != Kind::Scalar; }
 };
 
@@ -33,8 +32,8 @@ struct LoweredFunction {
   std::string name;
   std::vector<LoweredArgument> args;
   Stmt body;
-  // The loops of the schedule as text, as it was when the function was lowered. Made when asked
-  // for: the regions of a deep nest take longer to write than to compile.
+  // The loop nest of the schedule as text, as it was when the function was lowered. Built on
+  // demand: for a deep nest the regions take longer to print than to compile.
   std::function<std::string()> loop_nest;
 };
 

@@ -1,20 +1,20 @@
-// Whether an expression reads memory: a store or a loop in between may change its value.
+// Whether an expression reads memory, so that a store or loop in between may change its value.
 #pragma once
 
 #include "ir/expr.h"
 
 namespace retrograde::ir {
 
-// What counts; each counts what stands before it, too.
+// Kinds of memory reads. Each enumerator includes those before it.
 enum class MemoryReads : uint8_t {
-  Loads,      // of flat storage
-  Storage,    // Funcs and images, before they are loads
-  Functions,  // calls of C functions, which may read anything
+  Loads,      // Load nodes, in flat storage
+  Storage,    // calls of Funcs and images, before they become loads
+  Functions,  // calls of C functions, which may read any memory
   Calls,      // every call: operators may have effects
 };
 bool reads_memory(const Expr& e, MemoryReads what);
 
-// Whether it calls the Func, or reads the image. Undefined: no.
+// Whether `e` calls the Func or reads the image; false when `e` is undefined.
 bool calls(const Expr& e, const Symbol* f);
 
 }  // namespace retrograde::ir

@@ -1,4 +1,4 @@
-// What is converted from at most 16 bits, or is constant, fits them.
+// A factor fits 16 bits when it is converted from at most 16 bits, or is a small enough constant.
 #include "ir/narrow_product.h"
 
 #include "ir/build.h"
@@ -12,7 +12,7 @@ bool fits_int16(Type type) {
   return (type.is_int() && type.bits() <= 16) || (type.is_uint() && type.bits() == 8);
 }
 
-// The same numbers as int16; undefined when they may not fit.
+// The same values as int16; undefined when they may not fit.
 Expr narrowed(const Expr& e) {
   const Type narrow = Int(16, e.type().lanes());
   if (const auto constant = as_const_int(e)) {

@@ -39,9 +39,9 @@ void destroy(const Node* node) {
 
 }  // namespace
 
-// A deleted node drops its children, which may end here again: those are queued in the outermost
-// call, on whose stack the queue lives. (A thread_local queue with a destructor would be gone
-// before the last static Expr is.)
+// Deleting a node drops its children, which may call this function again: the outermost call queues
+// those, and owns the queue on its stack. (A thread_local queue with a destructor would be
+// destroyed before the last static Expr.)
 void release(const Node* node) noexcept {
   thread_local std::vector<const Node*>* pending = nullptr;
   if (pending) {
@@ -77,7 +77,7 @@ Expr::Expr(double value) : Expr(ir::make_const(Float(64), value)) {}
 Expr::Expr(const std::string& text) : Ref(ir::make_node<ir::StringImm>(Handle(), text)) {}
 Expr::Expr(const char* text) {
   if (!text) {
-    user_error("make an Expr of a text", "a text is not null", "the pointer to it is null",
+    user_error("make an Expr from a text", "a text is not null", "the pointer to it is null",
                "Give it a text, or a number such as 0");
   }
   *this = Expr(std::string(text));

@@ -1,4 +1,4 @@
-// What was found out about expressions, by node.
+// A memo table of facts about expressions, keyed by node.
 #pragma once
 
 #include <unordered_map>
@@ -11,7 +11,8 @@ namespace retrograde::ir {
 template <class T>
 class NodeMemo {
  public:
-  // What is known of the node, or else what `find_out` gives, which may ask for others.
+  // The memoised value of the node; computes it with `find_out` at the first request. `find_out`
+  // may request other nodes.
   template <class FindOut>
   T get(const Expr& e, const FindOut& find_out) {
     if (const auto* found = find_or_null(known_, e.get())) return found->second;
@@ -22,7 +23,7 @@ class NodeMemo {
   void clear() { known_.clear(); }
 
  private:
-  // Keys are kept alive so that their addresses stay their own.
+  // Holds the keys alive, so that no other node gets their addresses.
   std::unordered_map<const ExprNode*, std::pair<Expr, T>> known_;
 };
 

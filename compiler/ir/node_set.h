@@ -1,5 +1,5 @@
-// node_set.h -- which nodes a walk has seen. Walks are many and most are short: the first few nodes
-// need no allocation, and none needs one of its own.
+// node_set.h -- the set of nodes that a walk has visited. Most walks are short, so the first few
+// nodes lie in the set itself and need no allocation; no node is allocated singly.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@ struct Node;
 // A hash table with open addressing, at most half full.
 class NodeSet {
  public:
-  // Whether the node is new.
+  // Inserts the node; returns whether it is new.
   bool insert(const Node* node) {
     if (2 * (count_ + 1) > size_) grow();
     if (!put(node)) return false;
@@ -25,12 +25,12 @@ class NodeSet {
  private:
   static constexpr size_t first_size = 32;
   std::array<const Node*, first_size> first_{};
-  std::vector<const Node*> more_;  // instead of `first_`, once that is too small
+  std::vector<const Node*> more_;  // replaces `first_` once that is too small
   size_t count_ = 0, size_ = first_size;
 
   const Node** slots() { return more_.empty() ? first_.data() : more_.data(); }
 
-  // Nodes lie at multiples of 16 bytes; a product spreads what is left of an address upwards.
+  // Nodes are aligned to 16 bytes; the multiplication spreads the remaining address bits upwards.
   static size_t hash(const Node* node) {
     return (reinterpret_cast<uintptr_t>(node) >> 4) * 0x9e3779b97f4a7c15u >> 32;
   }

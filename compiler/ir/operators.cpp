@@ -1,5 +1,5 @@
-// The table of operators, and what they do to scalars. Floats narrower than 64 bits are computed in
-// double and rounded once, so these are the exact functions that vector math approximates.
+// The table of operators and their evaluation on scalars. Floats narrower than 64 bits are computed
+// in double and rounded once, so these are the exact functions that vector math approximates.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -28,7 +28,7 @@ Scalar shift(const Scalar& a, int64_t left) {
   return type.is_int() ? Scalar::of_int(type, a.i >> -left) : Scalar::of_uint(type, a.u >> -left);
 }
 
-// An unsigned amount beyond int64 shifts everything out, like any amount of at least the width.
+// An unsigned amount beyond int64 shifts out every bit, like any amount of at least the width.
 int64_t shift_amount(const Scalar& b) {
   constexpr int64_t far = 128;
   if (b.type.is_uint()) return b.u > static_cast<uint64_t>(far) ? far : static_cast<int64_t>(b.u);
@@ -55,9 +55,9 @@ double unit_weight(const Scalar& weight) {
   return static_cast<double>(weight.u) / static_cast<double>(weight.type.max_uint());
 }
 
-// A weight is first brought to the width of the values, rounding down: 0.5 of 8 bits is 127 / 255.
-// The product is one of floats, so that the weight k / 65535.0f is k. (A narrower one is the same
-// fraction of its own range and can stay.)
+// A weight is first converted to the width of the values, rounding down: 0.5 with 8 bits is 127 /
+// 255. The product is computed in floats, so that the weight k / 65535.0f becomes k. (A narrower
+// weight is the same fraction of its own range and needs no conversion.)
 Scalar fixed_point_weight(const Scalar& weight, Type values) {
   const Type fixed = UInt(values.bits());
   if (weight.type.is_float()) {
@@ -75,7 +75,7 @@ Scalar lerp_integers(const Scalar& a, const Scalar& b, const Scalar& weight) {
   const auto widen = [](const Scalar& s) { return s.type.is_int() ? Wide{s.i} : Wide{s.u}; };
   const Wide max = Wide{weight.type.max_uint()};
   const Wide w = Wide{weight.u};
-  if (a.type.bits() >= 64) return w * 2 > max ? b : a;  // not reached: build rejects 64-bit lerps
+  if (a.type.bits() >= 64) return w * 2 > max ? b : a;  // unreachable: build rejects 64-bit lerps
   const Wide sum = widen(a) * (max - w) + widen(b) * w;
   const Wide half = max / 2;
   const Wide rounded = sum >= 0 ? (sum + half) / max : -((-sum + half) / max);
@@ -93,9 +93,9 @@ Scalar interpolate(const Scalar& a, const Scalar& b, const Scalar& weight, Type 
 
 // ---- fma ----
 
-// Of numbers whose product is exact in double. A sum that double has to round keeps that something
-// was cut off in its last bit, so that rounding it to a type of half as many digits rounds the
-// exact sum (Boldo and Melquiond, 2008).
+// For operands whose product is exact in double. Rounding to odd records in the last bit that
+// digits were cut off. Rounding the result to a type of half as many digits then rounds the exact
+// sum (Boldo and Melquiond, 2008).
 double sum_rounded_to_odd(double product, double c) {
   const double sum = product + c;
   const double taken = sum - product;
@@ -119,8 +119,8 @@ Scalar saturated(Type type, const Scalar& a) {
     const double largest = 65504;
     return Scalar::of_float(type, std::clamp(a.as_double(), -largest, largest));
   }
-  if (type.is_float()) return eval_cast(type, a);    // the ends of its range are infinities
-  if (a.type.is_float()) return eval_cast(type, a);  // saturates already
+  if (type.is_float()) return eval_cast(type, a);    // the ends of a float's range are infinities
+  if (a.type.is_float()) return eval_cast(type, a);  // this cast saturates already
   if (a.type.is_int() ? type.can_represent(a.i) : type.can_represent(a.u))
     return eval_cast(type, a);
   const bool negative = a.type.is_int() && a.i < 0;
@@ -159,7 +159,7 @@ using enum Conduct;
 using Real = RealFacts;
 
 constexpr double inf = std::numeric_limits<double>::infinity();
-constexpr Values anything{-inf, inf}, positive{0, inf}, truth{0, 1};  // positive: or 0
+constexpr Values anything{-inf, inf}, positive{0, inf}, truth{0, 1};  // `positive` includes 0
 
 constexpr OpError exact{.kind = OpError::Kind::Exact};
 constexpr OpError arithmetic{.kind = OpError::Kind::Arithmetic};
@@ -173,7 +173,7 @@ constexpr Real steps = same;
 constexpr Real discrete{Turns, StaysFinite, NoNan, NeverLevel, NoPoles, exact};
 
 constexpr Work no_work{0, 0, 0}, one_add{1, 0, 0}, two_adds{2, 0, 0};
-// A function that takes as long as so many additions.
+// A function that costs as much as `adds` additions.
 constexpr Work function(int adds) { return {0, 0, 1, adds}; }
 
 constexpr OpInfo op_table[] = {

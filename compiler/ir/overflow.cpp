@@ -1,4 +1,4 @@
-// overflow.cpp -- constants as int64, whose own overflow the compiler's builtins tell.
+// overflow.cpp -- evaluates constants in int64, with overflow detected by compiler builtins.
 #include "ir/overflow.h"
 
 #include <optional>

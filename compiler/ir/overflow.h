@@ -1,17 +1,19 @@
-// overflow.h -- arithmetic of constants that overflows.
+// overflow.h -- detects integer overflow in constant arithmetic.
 //
-// Int(32) and Int(64) do not overflow in the language. Sums, differences and products of constants
-// that would are not folded by the operators on Expr, so that a definition can be refused for them.
+// Int(32) and Int(64) never overflow in the language. The operators on Expr leave constant sums,
+// differences and products that would overflow unfolded, so that a definition can be rejected for
+// them.
 #pragma once
 
 #include "ir/expr.h"
 
 namespace retrograde::ir {
 
-// a + b, a - b or a * b, folded unless it overflows. Operands of one type.
+// a + b, a - b or a * b, folded unless that overflows. Operands must have one type.
 Expr arithmetic(Kind kind, Expr a, Expr b);
 
-// A part of `root` that overflows, whatever the values of its variables; undefined when none does.
+// A subexpression of `root` that overflows for all values of its variables; undefined when there is
+// none.
 Expr overflowing_part(const Expr& root);
 
 }  // namespace retrograde::ir

@@ -1,4 +1,5 @@
-// A recursive-descent parser of IR text; print.cpp shows the language.
+// Recursive descent over IR text; print.cpp shows the language. Also accepts operators without
+// parentheses, with C's precedence.
 #include "ir/parse.h"
 
 #include <algorithm>
@@ -17,14 +18,14 @@ namespace retrograde::ir {
 
 namespace {
 
-// The C++ stack bounds how deep a text may nest.
+// The C++ stack limits the nesting depth of a text.
 constexpr int max_depth = 2000;
 
 constexpr ForType for_types[] = {ForType::Serial,   ForType::Parallel, ForType::Vectorized,
                                  ForType::Unrolled, ForType::GpuBlock, ForType::GpuThread,
                                  ForType::GpuLane};
 
-// The type that a suffix names: "_u8", "_f64", or "f" for float32.
+// The type of a suffix: "_u8", "_f64", or "f" for float32.
 std::optional<Type> suffix_type(const std::string& suffix) {
   if (suffix == "f") return Float(32);
   static const std::pair<const char*, const char*> prefixes[] = {
@@ -116,7 +117,7 @@ class Parser {
     return result;
   }
 
-  // Runs a builder whose complaint is about the text.
+  // Runs a builder and reports its error at the position in the text.
   template <class F>
   auto build(const Token& at, F make) {
     try {
@@ -250,7 +251,7 @@ class Parser {
     return ahead_is("(") ? call(CallType::Func) : load(take().text);
   }
   Expr keyword_call(const Token& keyword) {
-    // A copy: the current token, which `keyword` may refer to, moves on.
+    // A copy, because `keyword` may refer to the current token, which advances.
     const Token at = keyword;  // NOLINT(performance-unnecessary-copy-initialization)
     Type type_name;
     if (read_type(at.text, type_name)) {
@@ -339,7 +340,7 @@ class Parser {
     expect(")");
     return build(at, [&] { return make_vector_reduce(*op, value, lanes); });
   }
-  // What stands before, or behind, a mark.
+  // An expression followed, or preceded, by a mark.
   Expr expr_before(const char* mark) {
     Expr e = expr();
     expect(mark);

@@ -1,4 +1,4 @@
-// Reads IR text back. Symbols are not text: parsed Funcs, images and parameters are known by name
+// Parses IR text. Text holds no symbols: parsed Funcs, images and parameters are known by name
 // only.
 #pragma once
 
@@ -7,9 +7,7 @@
 #include "ir/expr.h"
 
 namespace retrograde::ir {
-class NameTypes;
-
-// UserError with line, column, what was expected and what was found.
+// Throws UserError with line, column, the expected and the found token.
 Expr parse_expr(const std::string& text);
 // With the types of names that the text itself does not declare.
 Expr parse_expr(const std::string& text, const NameTypes& declared);

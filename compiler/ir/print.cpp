@@ -74,8 +74,8 @@ std::string string_text(const std::string& value) {
   return out + '"';
 }
 
-// Small trees are printed as trees, however shared. In a large one every node used twice gets a
-// name, lest the text be exponential in the size of the DAG.
+// Small expressions are printed as trees even when nodes are shared. In a large one every node that
+// is used twice gets a name; otherwise the text could be exponential in the size of the DAG.
 class Sharing {
  public:
   // The nodes to name, children first.
@@ -94,7 +94,7 @@ class Sharing {
  private:
   static constexpr double large_tree = 400, named_tree = 4;
   struct Fact {
-    double tree_size = 1;  // a double: it may be astronomical
+    double tree_size = 1;  // a double, because it may be astronomical
     int uses = 0;
   };
   void count(const Expr& e) {
@@ -111,12 +111,7 @@ class Sharing {
   std::vector<Expr> order_;
 };
 
-bool is_comparison(Kind kind) {
-  const InfixOperator* op = infix_operator(kind);
-  return op->precedence > infix_operator(Kind::And)->precedence && op->precedence < sum_precedence;
-}
-
-// Appends text and expressions, one after the other.
+// Appends text and expressions in turn.
 class ExprPrinter {
  public:
   ExprPrinter(std::string& out, NameTypes& types) : out_(out), types_(types) {}
@@ -248,7 +243,7 @@ class ExprPrinter {
   std::unordered_map<const ExprNode*, std::string> names_;
 };
 
-// The same for statements, line by line.
+// Appends statements, line by line.
 class StmtPrinter {
  public:
   explicit StmtPrinter(std::string& out) : out_(out) {}
@@ -353,7 +348,7 @@ class StmtPrinter {
     (put(parts), ...);
   }
   std::string margin() const { return std::string(2 * indent_, ' '); }
-  // A let that is not last would swallow what follows it: it gets braces.
+  // A let that is not the last statement needs braces, or its body would include what follows.
   void print_block(const Block& n) {
     for (size_t i = 0; i < n.stmts.size(); ++i) {
       if (n.stmts[i].kind() == Kind::LetStmt && i + 1 < n.stmts.size()) {

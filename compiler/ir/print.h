@@ -1,5 +1,5 @@
-// IR text. The printer is the specification: parse(print(x)) is structurally equal to x (see
-// parse.h, equal.h).
+// Prints IR as text. The printer is the specification of the language: parse(print(x)) is
+// structurally equal to x (see parse.h, equal.h).
 #pragma once
 
 #include <iosfwd>
@@ -12,10 +12,8 @@ std::ostream& operator<<(std::ostream& out, const Type& type);
 std::ostream& operator<<(std::ostream& out, const Expr& e);
 std::ostream& operator<<(std::ostream& out, const Stmt& s);
 namespace ir {
-class NameTypes;
-
-// An object, not functions: argument-dependent lookup must not find it where a user writes
-// print(e), which is an operator of the language.
+// A function object rather than functions: argument-dependent lookup must not find it where a user
+// writes print(e), an operator of the language.
 struct PrintFunction {
   std::string operator()(const Expr& e) const;
   std::string operator()(const Stmt& s) const;

@@ -1,4 +1,4 @@
-// Promotion of operands, and the C++ operators that users write.
+// Promotion of operand types, and the C++ operators on Expr.
 #include "ir/build.h"
 #include "ir/literal.h"
 #include "ir/overflow.h"
@@ -150,7 +150,7 @@ Expr operator!(Expr a) {
   return ir::logical_not(std::move(a));
 }
 
-// -0.0 - x negates every float, the zeros too; 0.0 - 0.0 would be +0.0.
+// -0.0 - x negates every float, including zeros; 0.0 - 0.0 would be +0.0.
 Expr operator-(Expr a) {
   ir::check_operand(a, "operator-");
   const Type type = a.type();
@@ -193,7 +193,7 @@ bool is_int_literal(const Expr& e) {
   return e.type() == Int(32) && ir::as_const_int(e).has_value();
 }
 
-// An integer literal beside another value is of that value's type: select(c, f(x), 0).
+// An integer literal takes the type of the value beside it: select(c, f(x), 0).
 void match_literals(Expr& a, Expr& b, const char* what) {
   ir::check_operand(a, what);
   ir::check_operand(b, what);
@@ -216,7 +216,7 @@ Expr select(Expr condition, Expr when_true, Expr when_false) {
 
 namespace {
 
-// Integers of another type would wrap, and clamp to something else. Floats only round.
+// A bound in another integer type would wrap and clamp to a wrong value. Floats only round.
 Expr clamp_bound(const Expr& value, Expr bound) {
   const std::string asked = text("clamp ", value, " with the bound ", bound);
   const std::string rule = "a bound is a value of the type that is clamped";

@@ -42,7 +42,7 @@ Scalar of_pattern(Type type, uint64_t bits) {
                        : Scalar::of_uint(type, bits);
 }
 
-// What the order of numbers decides.
+// Operations that depend only on the order of the operands.
 template <class T>
 Scalar by_order(Kind kind, const Scalar& a, const Scalar& b, T Scalar::*number) {
   const T x = a.*number, y = b.*number;
@@ -93,8 +93,8 @@ Scalar integer_binary(Kind kind, const Scalar& a, const Scalar& b) {
   }
 }
 
-// Each of + - * / in double, rounded once, is the correctly rounded result of the narrower type (53
-// >= 2 p + 2). Modulus rounds at each of its steps, as machine code in the narrower type does.
+// Computing + - * / in double and rounding once gives the correctly rounded result of the narrower
+// type (53 >= 2 p + 2). Modulus rounds at each step, as machine code in the narrower type does.
 Scalar float_binary(Kind kind, const Scalar& a, const Scalar& b) {
   const auto round = [&](double value) { return Scalar::of_float(a.type, value); };
   switch (kind) {
@@ -107,15 +107,15 @@ Scalar float_binary(Kind kind, const Scalar& a, const Scalar& b) {
     case Kind::Div:
       return round(a.f / b.f);
     case Kind::Mod: {
-      const Scalar whole = round(b.f * std::floor(round(a.f / b.f).f));
-      return round(a.f - whole.f);
+      const Scalar multiple = round(b.f * std::floor(round(a.f / b.f).f));
+      return round(a.f - multiple.f);
     }
     default:
       return by_order(kind, a, b, &Scalar::f);
   }
 }
 
-// Out of range the IR leaves the value open; here it saturates, and NaN gives 0.
+// The IR leaves out-of-range conversions unspecified; here they saturate, and NaN gives 0.
 Scalar float_to_integer(Type type, double value) {
   if (std::isnan(value)) return of_pattern(type, 0);
   const double limit = std::ldexp(1.0, type.is_int() ? type.bits() - 1 : type.bits());
@@ -125,7 +125,7 @@ Scalar float_to_integer(Type type, double value) {
   return Scalar::of_uint(type, static_cast<uint64_t>(std::trunc(value)));
 }
 
-// From 64-bit integers to double and then to float32 would round twice.
+// A 64-bit integer converted to double and then to float32 would round twice.
 double integer_to_float(Type type, const Scalar& value) {
   if (type.bits() == 32 && type.code() == TypeCode::Float) {
     return value.type.is_int() ? static_cast<float>(value.i) : static_cast<float>(value.u);

@@ -1,5 +1,5 @@
-// Scalar values and the one definition of what every operation does to them. The constant folder,
-// the interpreter and the tests of the code generator all stand on this.
+// Scalar values, and the only definition of each operation on them. The constant folder, the
+// interpreter and the tests of the code generator all use this.
 #pragma once
 
 #include <optional>
@@ -28,21 +28,20 @@ struct Scalar {
 
 double round_to_type(Type type, double value);
 int64_t wrap_int(int bits, int64_t value);  // to a signed integer
-// Rounds so that the remainder is never negative; by 0: 0.
+// Rounds so that the remainder is never negative; division by 0 gives 0.
 int64_t euclidean_div(int64_t a, int64_t b);
 int64_t euclidean_mod(int64_t a, int64_t b);
 
-// Both operands of one scalar type. Comparisons give bool.
+// Both operands have one scalar type. Comparisons give bool.
 Scalar eval_binary(Kind kind, const Scalar& a, const Scalar& b);
 Scalar eval_not(const Scalar& a);
 Scalar eval_cast(Type type, const Scalar& value);
 Scalar eval_reinterpret(Type type, const Scalar& value);
-// Pure and Marker operators (operators.def). `type` is the call's type. nullopt for Effect and
-// Internal ones. Floats narrower than 64 bits are computed in double and rounded once.
+// Evaluates Pure and Marker operators (operators.def); nullopt for Effect and Internal ones. `type`
+// is the call's type. Floats narrower than 64 bits are computed in double and rounded once.
 std::optional<Scalar> eval_operator(Op op, const std::vector<Scalar>& args, Type type);
 
-std::optional<Scalar> as_scalar(
-    const Expr& e);  // of an immediate (or a Broadcast of one: its lane)
+std::optional<Scalar> as_scalar(const Expr& e);  // an immediate, or the lane of a Broadcast of one
 Expr to_expr(const Scalar& value);
 
 }  // namespace retrograde::ir

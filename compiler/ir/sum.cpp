@@ -1,4 +1,4 @@
-// Gathering and rebuilding sums.
+// Gathers expressions into sums and rebuilds expressions from them.
 #include "ir/sum.h"
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace retrograde::ir {
 
 namespace {
 
-// Adds factor * e; false when that takes too many steps or terms.
+// Adds factor * e to the sum; fails when that takes too many steps or terms.
 class Gatherer {
  public:
   explicit Gatherer(Sum& sum) : sum_(sum) {}
@@ -45,7 +45,7 @@ class Gatherer {
 
 }  // namespace
 
-// Structural order would be nicer to read, but may look at all of both trees.
+// Structural order would read better, but may have to look at both trees entirely.
 bool canonical_less(const Expr& a, const Expr& b) {
   if (a->kind != b->kind) return a->kind < b->kind;
   if (const auto* x = a.as<Variable>()) return x->name < b.as<Variable>()->name;
@@ -107,8 +107,8 @@ int64_t Sum::factor_of(const std::string& variable) const {
   return 0;
 }
 
-// Puts `value` into the type: wraps, or makes the sum invalid. Every number of a linear sum has a
-// negation.
+// Fits `value` to the type: wraps it or makes the sum invalid. Every number in a linear sum can be
+// negated.
 int64_t Sum::fit(__int128 value) {
   const int64_t wrapped = wrap_int(is_linear ? 64 : type.bits(), static_cast<int64_t>(value));
   if (is_linear) {
@@ -164,7 +164,7 @@ Sum sum_of(const Expr& e) {
   Sum sum;
   sum.type = e.type();
   if (Gatherer(sum).gather(e, 1) && sum.valid) return sum;
-  Sum atom;  // too large or overflowing: taken as a whole
+  Sum atom;  // too large or overflowing: the expression becomes one atom
   atom.type = e.type();
   atom.terms.push_back({e, 1});
   return atom;
@@ -189,19 +189,19 @@ Sum constant_sum(Type type, int64_t value) {
   return result;
 }
 
-SplitSum split_by(const Sum& sum, int64_t divisor) {
+DividedSum divide_terms(const Sum& sum, int64_t divisor) {
   const Sum none{sum.type, {}, 0, true, sum.is_linear};
-  SplitSum split{none, none};
-  split.whole.add_constant(euclidean_div(sum.constant, divisor));
-  split.rest.add_constant(euclidean_mod(sum.constant, divisor));
+  DividedSum divided{none, none};
+  divided.quotient.add_constant(euclidean_div(sum.constant, divisor));
+  divided.remainder.add_constant(euclidean_mod(sum.constant, divisor));
   for (const Term& term : sum.terms) {
     if (term.factor % divisor == 0) {
-      split.whole.add(term.atom, term.factor / divisor);
+      divided.quotient.add(term.atom, term.factor / divisor);
     } else {
-      split.rest.add(term.atom, term.factor);
+      divided.remainder.add(term.atom, term.factor);
     }
   }
-  return split;
+  return divided;
 }
 
 int64_t common_factor(const Sum& sum) {

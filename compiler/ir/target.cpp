@@ -36,7 +36,7 @@ constexpr Named<Target::Arch> arch_names[] = {{"arch_unknown", Target::ArchUnkno
                                               {"powerpc", Target::POWERPC},
                                               {"wasm", Target::WebAssembly},
                                               {"riscv", Target::RISCV}};
-// As they stand behind "tune_": LLVM's names, but for dashes.
+// Processor names after "tune_": LLVM's names with underscores for dashes.
 constexpr Named<Target::Processor> processor_names[] = {{"generic", Target::ProcessorGeneric},
                                                         {"k8", Target::K8},
                                                         {"k8_sse3", Target::K8_SSE3},
@@ -92,7 +92,7 @@ std::vector<std::string> split_at_dashes(const std::string& text) {
   return words;
 }
 
-// Which of the three parts every target needs have been read.
+// Which of the three required parts of a target have been read.
 struct Parts {
   bool arch = false, bits = false, os = false;
   bool all() const { return arch && bits && os; }
@@ -138,7 +138,7 @@ bool read_word(const std::string& word, Target& target, Parts& parts) {
   return read_option(word, target) || read_feature(word, target);
 }
 
-// The first word that is out of place; "" also when a part is missing, see `parts`.
+// Returns the first unexpected word. "" may also mean that a part is missing; see `parts`.
 std::string read_words(const std::string& text, Target& target, Parts& parts) {
   bool first = true;
   for (const std::string& word : split_at_dashes(text)) {
@@ -266,7 +266,8 @@ bool Target::features_all_of(const std::vector<Feature>& features) const {
 
 namespace {
 
-// A feature and what every processor that has it has too, each line of what stands below it.
+// A feature and those that it implies. Each row comes before the rows of the features that it
+// implies.
 struct Implication {
   Target::Feature feature;
   std::vector<Target::Feature> implied;
@@ -358,7 +359,7 @@ int Target::natural_vector_size(Type type) const {
     user_error("ask a target for the length of its vectors", "the target is known",
                text("it is ", quoted(to_string())),
                "Take get_host_target(), or name one: Target(\"x86-64-linux-avx2\")");
-  // AVX alone has instructions of 32 bytes for floats, of 16 for integers.
+  // AVX alone has 32-byte instructions for floats but only 16-byte ones for integers.
   const int bytes = type.is_float() && has_feature(AVX) ? std::max(ir::vector_bytes(*this), 32)
                                                         : ir::vector_bytes(*this);
   return bytes / std::max(type.bytes(), 1);
@@ -419,7 +420,7 @@ constexpr DeviceAPI gpus[] = {DeviceAPI::Metal,         DeviceAPI::OpenCL,      
                               DeviceAPI::OpenGLCompute, DeviceAPI::D3D12Compute, DeviceAPI::Vulkan,
                               DeviceAPI::WebGPU};
 
-// The first of them that the target has, else `otherwise`.
+// The first of the devices that the target has, else `otherwise`.
 template <size_t N>
 DeviceAPI first_of(const DeviceAPI (&devices)[N], const Target& target, DeviceAPI otherwise) {
   for (DeviceAPI device : devices) {
@@ -462,7 +463,8 @@ int Target::cuda_capability() const {
 
 bool Target::get_runtime_compatible_target(const Target& other, Target& result) const {
   if (arch != other.arch || os != other.os || bits != other.bits) return false;
-  // What changes the functions that a runtime offers. The rest is code that the runtime never sees.
+  // Features that change the functions a runtime offers. The others only affect code that the
+  // runtime never sees.
   const std::vector<Feature> either = {CUDA, OpenCL, Metal, D3D12Compute, OpenGLCompute, HVX_128};
   const std::vector<Feature> same = {Debug, SoftFloatABI, MSAN, TSAN, ASAN};
   Target common(os, arch, bits);

@@ -1,4 +1,4 @@
-// What machine code is generated for: operating system, architecture, width, and features by
+// Target: the operating system, architecture, vector width and features to generate code for, under
 // Halide's names.
 #pragma once
 
@@ -26,8 +26,8 @@ enum class DeviceAPI {
   WebGPU,
 };
 
-// A feature, architecture or system that no code is generated for has a name all the same: programs
-// ask for it, and compiling for it is an error that says so.
+// Features, architectures and systems without code generation are named too. Programs may mention
+// them; compiling for them is an error that names the part.
 struct Target {
   enum OS {
     OSUnknown = 0,
@@ -52,9 +52,11 @@ struct Target {
     RISCV
   } arch = ArchUnknown;
   int bits = 0;
-  // Length of the vectors where the instruction set leaves it open: "vector_bits_256"; 0: not said.
+  // Vector length in bits where the instruction set leaves it open: "vector_bits_256"; 0:
+  // unspecified.
   int vector_bits = 0;
-  // Whose pipeline instructions are scheduled for: "tune_znver3". Never changes which are used.
+  // The processor whose pipeline model schedules instructions: "tune_znver3". It never changes
+  // which instructions are used.
   enum Processor {
     ProcessorGeneric,
     K8,
@@ -71,8 +73,8 @@ struct Target {
     ZnVer3,
     ZnVer4
   } processor_tune = ProcessorGeneric;
-  // The first ones have the positions of halide_target_feature_t. AVX512 is F and CD;
-  // AVX512_Skylake adds VL, BW, DQ.
+  // The first enumerators have the positions of halide_target_feature_t. AVX512 means F and CD;
+  // AVX512_Skylake adds VL, BW and DQ.
   enum Feature {
 #define RETROGRADE_FEATURE(enumerator, name, generated) enumerator,
 #include "ir/target_features.def"
@@ -91,7 +93,7 @@ struct Target {
   explicit Target(const std::string& text);
   explicit Target(const char* text);  // UserError when it is null
   explicit Target(std::nullptr_t) = delete;
-  // Whether it is the text of a target, all of whose parts are known.
+  // Whether the text is a target whose parts are all known.
   static bool validate_target_string(const std::string& text);
 
   // Every target has FeatureEnd.
@@ -109,13 +111,13 @@ struct Target {
   }
   bool features_any_of(const std::vector<Feature>& features) const;
   bool features_all_of(const std::vector<Feature>& features) const;
-  // Adds what a processor with its features has too (AVX2: AVX, FMA, F16C, SSE4.1); the other one
-  // leaves out what the features that stay imply.
+  // Adds the features that the present ones imply (AVX2 implies AVX, FMA, F16C and SSE4.1). The
+  // other function removes every feature that the remaining ones imply.
   void set_implied_features();
   void unset_implied_features();
-  // Length of SME's vectors by sme_svl128 to sme_svl2048; 0 without one.
+  // The vector length of SME, from sme_svl128 to sme_svl2048; 0 without one.
   int sme_streaming_vector_bits() const;
-  static Feature sme_svl_feature_from_bits(int bits);  // FeatureEnd: there is none
+  static Feature sme_svl_feature_from_bits(int bits);  // FeatureEnd when there is none
 
   // Lanes in 64 bytes with AVX-512, 32 with AVX2, else 16. Requires: the target is known.
   int natural_vector_size(Type type) const;
@@ -136,39 +138,42 @@ struct Target {
     return supports_type(type) && supports_device_api(device);
   }
   bool supports_device_api(DeviceAPI device) const;
-  // A device that its features ask for, any one of several; None without.
+  // A GPU API that the features select (any one, if several); None without.
   DeviceAPI get_required_device_api() const;
-  // What kernels are compiled for: 75 for cuda_capability_75, the highest that it says; 75 when none.
+  // The compute capability that kernels are compiled for: 75 for cuda_capability_75. The highest
+  // one if the target has several, 75 if it has none.
   int cuda_capability() const;
-  int get_cuda_capability_lower_bound() const;  // 75 for cuda_capability_75; 20 when it says none
-  // The first part that no code can be generated for, such as "cuda"; empty when there is none.
+  // 75 for cuda_capability_75; 20 when the target has none.
+  int get_cuda_capability_lower_bound() const;
+  // The first part without code generation, such as "cuda"; empty when there is none.
   std::string unsupported_part() const;
   bool supported() const { return unsupported_part().empty(); }
-  // Whether one runtime serves code for both; `result` is then its target.
+  // Whether one runtime serves code for both targets; if so, `result` is that runtime's target.
   bool get_runtime_compatible_target(const Target& other, Target& result) const;
   std::string processor_name() const;  // "znver3"; empty for ProcessorGeneric
-  // arch-bits-os, then features by name; round-trips through the constructor
+  // arch-bits-os, then features by name; round-trips through the constructor.
   std::string to_string() const;
   const std::bitset<FeatureEnd>& get_features_bitset() const { return features_; }
   static std::string feature_to_name(Feature feature);
-  static Feature feature_from_name(const std::string& name);  // FeatureEnd: there is none
+  static Feature feature_from_name(const std::string& name);  // FeatureEnd when there is none
   friend bool operator==(const Target& a, const Target& b) {
     return a.os == b.os && a.arch == b.arch && a.bits == b.bits && a.vector_bits == b.vector_bits &&
            a.processor_tune == b.processor_tune && a.features_ == b.features_;
   }
 
  private:
-  static Feature checked(Feature feature);  // UserError when there is no such one
+  static Feature checked(Feature feature);  // UserError when the feature does not exist
   std::bitset<FeatureEnd> features_;
 };
 
-Target get_host_target();              // this machine, by cpuid
+Target get_host_target();              // this machine, detected by cpuid
 Target get_target_from_environment();  // RG_TARGET or HL_TARGET, else host
 // RG_JIT_TARGET or HL_JIT_TARGET, else host, plus JIT.
 // Requires: the target of HL_JIT_TARGET is one that this machine can run.
 Target get_jit_target_from_environment();
-Target::Feature target_feature_for_device_api(DeviceAPI device);  // FeatureEnd: no single one
-// What DeviceAPI::Default_GPU means for the target; Host where it has no GPU.
+// FeatureEnd when there is no single feature.
+Target::Feature target_feature_for_device_api(DeviceAPI device);
+// The meaning of DeviceAPI::Default_GPU for the target; Host when it has no GPU.
 DeviceAPI get_default_device_api_for_target(const Target& target);
 bool host_supports_target_device(const Target& target);
 

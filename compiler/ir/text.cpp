@@ -1,4 +1,4 @@
-// Words that the printer and the parser share.
+// Keywords, type names and operators of IR text, shared by the printer and the parser.
 #include "ir/text.h"
 
 #include <algorithm>
@@ -33,7 +33,7 @@ std::string kind_word(Kind op) {
 
 namespace {
 
-// With C's precedence; sum_precedence is that of + and -.
+// Precedences are C's.
 constexpr InfixOperator infix_operators[] = {
     {Kind::Or, "||", 0}, {Kind::And, "&&", 1}, {Kind::EQ, "==", 2}, {Kind::NE, "!=", 2},
     {Kind::LT, "<", 3},  {Kind::LE, "<=", 3},  {Kind::GT, ">", 3},  {Kind::GE, ">=", 3},

@@ -1,4 +1,4 @@
-// Words that the printer and the parser share.
+// Keywords, type names and operators of IR text, shared by the printer and the parser.
 #pragma once
 
 #include <string>
@@ -13,20 +13,19 @@ const char* for_name(ForType type);
 const char* partition_name(Partition partition);
 const char* memory_name(MemoryType memory);
 std::string kind_word(Kind op);
-// An operator that is written between its operands, and how tightly it binds them.
+// An operator written between its operands, and its precedence.
 struct InfixOperator {
   Kind kind;
   const char* symbol;
   int precedence;
 };
-constexpr int sum_precedence = 4, prefix_precedence = 6;
-// Null when it is none.
+// Null when `kind` is not an infix operator.
 const InfixOperator* infix_operator(Kind kind);
 const InfixOperator* infix_operator(const std::string& symbol);
-bool is_reserved(const std::string& word);  // a keyword, a type or an operator
-// The type of that name ("float32x8"); nothing when it is none.
+bool is_reserved(const std::string& word);  // whether it is a keyword, a type or an operator
+// Reads a type name ("float32x8"); returns false for other words.
 bool read_type(const std::string& word, Type& type);
-// As it is, or in back quotes when it is not an identifier or is reserved.
+// The name, in back quotes when it is no identifier or is reserved.
 std::string quote_name(const std::string& name);
 
 // What a mention of a name names: a variable, the elements of a buffer, the values of a Func or C function.

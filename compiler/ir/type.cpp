@@ -1,4 +1,4 @@
-// Ranges of types, their names, and the 16-bit float formats.
+// Value ranges and names of types, and the 16-bit float formats.
 #include "ir/type.h"
 
 #include <cmath>
@@ -7,7 +7,7 @@ namespace retrograde {
 
 namespace {
 
-// A binary interchange format of 16 bits: sign, exponent, fraction.
+// A 16-bit binary interchange format: sign, exponent, fraction.
 struct FloatFormat {
   int exponent_bits, fraction_bits;
   int bias() const { return (1 << (exponent_bits - 1)) - 1; }
@@ -17,7 +17,7 @@ struct FloatFormat {
 constexpr FloatFormat half_format{5, 10};
 constexpr FloatFormat brain_format{8, 7};
 
-// One rounding, to nearest even, whatever the distance between the formats. Relies on the default
+// Rounds once, to nearest even, for any distance between the formats. Relies on the default
 // rounding mode.
 uint16_t encode(const FloatFormat& format, double value) {
   const int sign = std::signbit(value) ? 0x8000 : 0;
@@ -31,9 +31,9 @@ uint16_t encode(const FloatFormat& format, double value) {
   const int clamped = std::max(exponent, format.min_exponent());
   const int steps = static_cast<int>(
       std::nearbyint(std::ldexp(std::fabs(value), format.fraction_bits - clamped)));
-  // Denormals have the biased exponent 0 and no hidden bit; a carry out of the fraction moves into
-  // the exponent, which is what rounding up to the next power of two, to the first normal, or to
-  // infinity means.
+  // Denormals have the biased exponent 0 and no hidden bit. A carry out of the fraction moves into
+  // the exponent, which correctly rounds up to the next power of two, to the first normal, or to
+  // infinity.
   const int biased = exponent < format.min_exponent() ? 0 : clamped + format.bias() - 1;
   return sign | ((biased << format.fraction_bits) + steps);
 }
@@ -129,7 +129,7 @@ bool Type::is_min(uint64_t value) const {
 }
 
 uint32_t type_word(Type type) {
-  // The runtime's handle stands before its bfloat.
+  // In the runtime's type codes, handle comes before bfloat.
   const uint32_t code = type.is_bfloat()   ? 4
                         : type.is_handle() ? 3
                                            : static_cast<uint32_t>(type.code());

@@ -1,4 +1,4 @@
-// Types of expressions: a scalar code and width, times a number of lanes.
+// Types of expressions: a scalar type code and width, and a number of lanes.
 #pragma once
 
 #include <compare>
@@ -17,7 +17,7 @@ class Expr;
 
 enum class TypeCode : uint8_t { Int, UInt, Float, BFloat, Handle };
 
-// A float of 16 bits with a sign, an exponent and so many bits of mantissa.
+// A 16-bit float: a sign, an exponent and `mantissa` bits of mantissa.
 template <class Self, int mantissa>
 struct SmallFloat {
   static constexpr int mantissa_bits = mantissa;
@@ -46,7 +46,7 @@ struct SmallFloat {
   float as_float() const { return static_cast<float>(static_cast<const Self&>(*this)); }
 };
 
-// A 16-bit IEEE half; arithmetic happens in float32 and rounds to nearest even at each operation.
+// A 16-bit IEEE half. Arithmetic is in float32 and rounds to nearest even at each operation.
 struct float16_t : SmallFloat<float16_t, 10> {
   float16_t() = default;
   explicit float16_t(float value);
@@ -100,7 +100,8 @@ class Type {
                             BFloat = TypeCode::BFloat, Handle = TypeCode::Handle;
 
   constexpr Type() = default;
-  // The types of the runtime's buffers; defined by frontend/data/buffer.cpp, which knows them.
+  // Conversion from the runtime's buffer types; defined by frontend/data/buffer.cpp, which knows
+  // them.
   Type(const halide_type_t& type);
   operator halide_type_t() const;
   Type(halide_type_code_t code, int bits, int lanes = 1);
@@ -126,16 +127,16 @@ class Type {
   constexpr Type with_bits(int bits) const { return Type(code_, bits, lanes_); }
   constexpr Type with_code(TypeCode code) const { return Type(code, bits_, lanes_); }
   constexpr Type element_of() const { return with_lanes(1); }
-  // Twice and half as many bits; those of a bool are 1 and those of a byte 8.
+  // The type with twice or half the bits; bool widens to 8 bits, 8 bits narrow to bool.
   constexpr Type widen() const { return with_bits(bits_ == 1 ? 8 : 2 * bits_); }
   constexpr Type narrow() const { return with_bits(bits_ == 8 ? 1 : bits_ / 2); }
   // Whether arithmetic beyond the range wraps around.
   constexpr bool can_overflow_int() const { return is_int() && bits_ <= 16; }
   constexpr bool can_overflow() const { return is_uint() || can_overflow_int(); }
-  // Handles are all alike: what they point to is not known.
+  // Always true: handle types do not record their pointee.
   constexpr bool same_handle_type(const Type&) const { return true; }
 
-  // Largest and smallest finite values, for scalar integer types as 64-bit patterns.
+  // The smallest and largest finite value of scalar integer types, as 64-bit patterns.
   int64_t min_int() const;
   int64_t max_int() const;
   uint64_t max_uint() const;

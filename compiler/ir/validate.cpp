@@ -1,4 +1,4 @@
-// The rules of each phase, checked in one walk over the statement.
+// Checks the rules of each phase in one walk over the statement.
 #include "ir/validate.h"
 
 #include <list>
@@ -87,7 +87,7 @@ class Validator {
 
   // ---- names ----
 
-  // A name bound while this lives.
+  // Binds a name during its lifetime.
   class Binding {
    public:
     template <class Tree>
@@ -98,7 +98,7 @@ class Validator {
     }
     ~Binding() {
       v_.visible_.erase(name_);
-      v_.checked_.clear();  // what mentions the name is wrong from now on
+      v_.checked_.clear();  // expressions that mention the name are invalid from now on
     }
 
    private:
@@ -106,7 +106,7 @@ class Validator {
     const std::string name_;
   };
 
-  // ---- expressions: every node once while the names in scope stay the same ----
+  // ---- expressions: each node is checked once while the names in scope are unchanged ----
   void check(const Expr& e) {
     if (!checked_.insert(e.get()).second) return;
     check_node(e);
@@ -204,7 +204,7 @@ class Validator {
   }
   void check_launch(const Stmt& s, const Launch& n) {
     only_in_flat(s);
-    require(!in_kernel_, s, "a kernel launches none");
+    require(!in_kernel_, s, "a kernel does not launch kernels");
     require(n.blocks.size() == 3 && n.threads.size() == 3, s, "grids and blocks have 3 dimensions");
     for (const Expr& count : n.blocks) {
       check(count);
@@ -252,7 +252,7 @@ class Validator {
     only_in_loops(s);
     require(!n.types.empty(), s, "a Realize has types");
     check_bounds(s, n.bounds);
-    // Facts of the storage, which flattening gives values.
+    // Metadata of the storage, which flattening gives values.
     std::vector<std::string> facts;
     for (size_t d = 0; d < n.bounds.size(); d++) {
       for (const char* what : {".min.", ".extent.", ".stride."})
@@ -279,7 +279,7 @@ class Validator {
   void check_offset(const Stmt& s, const Allocate& n) {
     const bool has_place = in_kernel_ && n.memory == MemoryType::GPUShared;
     require(n.offset.defined() == has_place, s,
-            "what lies in a kernel's shared memory, and nothing else, has a place there");
+            "an Allocate has an offset exactly if it lies in the shared memory of a kernel");
     if (!has_place) return;
     check(n.offset);
     require(n.offset.type() == Int(32), s, "an offset is an int32");
@@ -287,7 +287,7 @@ class Validator {
   void check_free(const Stmt& s, const Free& n) {
     only_in_flat(s);
     require(live_.erase(n.name) > 0, s, "a Free ends an allocation that is alive");
-    checked_.clear();  // loads seen before are wrong from now on
+    checked_.clear();  // loads checked before are invalid from now on
   }
   void check_bounds(const Stmt& s, const std::vector<Range>& bounds) {
     for (const Range& r : bounds) {
@@ -297,7 +297,7 @@ class Validator {
               "bounds of a Realize are int32");
     }
   }
-  // A Free on one path ends the allocation for what follows both.
+  // A Free in one branch ends the allocation for everything after both branches.
   void check_branches(const IfThenElse& n) {
     const auto before = live_;
     check(n.when_true);

@@ -1,4 +1,4 @@
-// What must hold in each phase of lowering; run after every pass in tests and debug builds.
+// Checks the invariants of each lowering phase; runs after every pass in tests and debug builds.
 #pragma once
 
 #include <string>
@@ -8,16 +8,17 @@
 
 namespace retrograde::ir {
 enum class Phase : uint8_t {
-  Loops,        // Realize, Provide, calls to Funcs and images
-  FlatStorage,  // Allocate, Store, Load; no calls to Funcs or images
-  Vector,       // as FlatStorage, and no Vectorized or Unrolled loops are left
+  Loops,        // Realize, Provide, calls of Funcs and images
+  FlatStorage,  // Allocate, Store, Load; no calls of Funcs or images
+  Vector,       // like FlatStorage, without Vectorized or Unrolled loops
 };
-// Throws InternalError that names the pass, the rule, the node and the IR around it. `free_names`:
-// names bound outside (arguments of the lowered function). `before`: what the pass was given, which
-// the error brings along; undefined: nothing was. Checks: types of operands agree, every
-// variable is bound once and before use, names are unique, every allocation's loads and stores lie
-// inside its Allocate and before its Free, kinds belong to the phase, predicates are bool with
-// matching lanes, operator arities.
+// Throws InternalError that names the pass, the rule, the node and the IR around it. `free_names`
+// are bound outside (arguments of the lowered function). `before` is the input of the pass, which
+// the error shows; undefined when there is none. Checks:
+// - types of operands agree; predicates are bool with matching lanes; operators have their arity
+// - every variable is bound once and before use; names are unique
+// - loads and stores of an allocation lie inside its Allocate and before its Free
+// - node kinds belong to the phase
 void validate(const Stmt& s, Phase phase, const std::string& after_pass,
               const std::vector<std::string>& free_names = {}, const Stmt& before = {});
 }  // namespace retrograde::ir

@@ -14,7 +14,7 @@ namespace {
 
 bool is_leaf(const Expr& e) { return e.kind() == Kind::Variable || e.kind() <= Kind::StringImm; }
 
-// Finds the children among the fields of a node.
+// Visits the child expressions and statements among the fields of a node.
 struct ChildVisit {
   ExprVisit on_expr;
   StmtVisit on_stmt;
@@ -42,12 +42,12 @@ struct ChildVisit {
   }
 };
 
-// Replaces children, and names where asked to, and says whether any changed.
+// Replaces children, and names if requested, and records whether any changed.
 struct ChildMap {
   ExprMap map_expr;
   StmtMap map_stmt;
   const NameMap* names = nullptr;
-  Kind kind = Kind::IntImm;  // of the node at hand
+  Kind kind = Kind::IntImm;  // of the current node
   std::string own_name = {};
   bool changed = false;
 
@@ -72,7 +72,7 @@ struct ChildMap {
     return other;
   }
 
-  // What `make` makes of the fields with children replaced, in the order of evaluation; `node` if
+  // Calls `make` with the fields after replacing children in evaluation order; returns `node` if
   // nothing changed.
   template <class Handle, class Make, class... Fields>
   Handle of(const Handle& node, const Make& make, const Fields&... fields) {
@@ -221,7 +221,7 @@ Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt, NameMap names) {
   return map_children(s, ChildMap{map, map_stmt, &names});
 }
 
-// ---- walks: an explicit stack, so that their depth is not bounded by the C++ stack ----
+// ---- walks: with an explicit stack, so that the C++ stack does not limit their depth ----
 
 namespace {
 

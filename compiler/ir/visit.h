@@ -1,11 +1,11 @@
 // Walking and rewriting the IR with lambdas.
 //
-//   match(e, [&](const ir::Select& s) {...}, [&](const ir::Binary& b) {...}, [&](const
-//   ir::ExprNode& n) {default});
+//   match(e, [&](const ir::Select& s) {...}, [&](const ir::Binary& b) {...},
+//            [&](const ir::ExprNode& n) {default});
 //
-// calls the lambda of the node's type, else the default, which every match states. Expressions are
-// DAGs: `walk` and `Rewriter` visit a shared node once. A hand-written recursion must do the same
-// or take exponential time.
+// calls the lambda for the node's type, or the default, which every match states. Expressions are
+// DAGs: `walk` and `Rewriter` visit a shared node once. A hand-written recursion must do the same,
+// or it takes exponential time.
 #pragma once
 
 #include <functional>
@@ -19,7 +19,7 @@
 
 namespace retrograde::ir {
 
-// A non-owning reference to a callable; lives only as long as the callable.
+// A non-owning reference to a callable; it must not outlive the callable.
 template <class Signature>
 class FunctionRef;
 template <class R, class... Args>
@@ -82,15 +82,15 @@ using ExprMap = FunctionRef<Expr(const Expr&)>;
 using StmtMap = FunctionRef<Stmt(const Stmt&)>;
 using NameMap = FunctionRef<std::string(Kind, const std::string&)>;
 
-// The direct children, in evaluation order; undefined optional children are skipped.
+// Visits the direct children in evaluation order; skips undefined optional children.
 void for_each_child(const Expr& e, ExprVisit on_expr);
 void for_each_child(const Stmt& s, ExprVisit on_expr, StmtVisit on_stmt);
 
-// The same node with its children replaced; the same handle when none changed.
+// The node with its children replaced; the same handle when none changed.
 Expr map_children(const Expr& e, ExprMap map);
 Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt);
-Stmt map_children(const Stmt& s, StmtMap map_stmt);  // its statements alone
-// And with its own name replaced, which it binds, stores to or loads from. Calls keep theirs.
+Stmt map_children(const Stmt& s, StmtMap map_stmt);  // replaces only the child statements
+// Also replaces the name that the node binds, stores to or loads from. Names of calls are kept.
 Expr map_children(const Expr& e, ExprMap map, NameMap names);
 Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt, NameMap names);
 
@@ -99,13 +99,13 @@ void walk(const Expr& e, FunctionRef<bool(const Expr&)> enter);
 void walk(const Stmt& s, FunctionRef<bool(const Expr&)> enter_expr,
           FunctionRef<bool(const Stmt&)> enter_stmt);
 
-// Whether it holds of a node. Undefined trees have none.
+// Whether `holds` is true for any node; false for an undefined tree.
 bool any_node(const Expr& e, FunctionRef<bool(const Expr&)> holds);
 bool any_node(const Stmt& s, FunctionRef<bool(const Expr&)> expr_holds,
               FunctionRef<bool(const Stmt&)> stmt_holds);
-bool any_stmt(const Stmt& s, FunctionRef<bool(const Stmt&)> holds);  // looks at no expressions
+bool any_stmt(const Stmt& s, FunctionRef<bool(const Stmt&)> holds);  // ignores expressions
 
-// The same with lambdas of nodes, as those of `match`, which all nodes of their types are given:
+// Overloads with lambdas of node types, as in `match`; each is called for all nodes of its type:
 //
 //   walk(s, [&](const Variable& v) { names.insert(v.name); }, [&](const Let& n) {...});
 //   any_node(s, [&](const Load& n) { return n.name == buffer; });
@@ -149,8 +149,8 @@ bool any_node(const Stmt& s, Fs&&... fs) {
       s, [&](const Expr& node) -> bool { return match(node, fs..., no_expr); }, stmt_holds);
 }
 
-// A context-free rewriting, memoised by node identity. Derive, and override `rewrite` for the kinds
-// of interest, ending in `return children(e)`. Call the object on children to recurse.
+// A context-free rewriting, memoised by node identity. Derive and override `rewrite` for the kinds
+// of interest, ending in `return children(e)`. Call the object itself on children to recurse.
 class Rewriter {
  public:
   virtual ~Rewriter() = default;
@@ -162,15 +162,16 @@ class Rewriter {
   virtual Stmt rewrite(const Stmt& s) { return children(s); }
   Expr children(const Expr& e);
   Stmt children(const Stmt& s);
-  // To be called when the answer for a node may have changed (entering a scope).
+  // Drops memoised results; call it when the result for a node may have changed (on entering a
+  // scope).
   void forget() { memo_.clear(); }
 
  private:
   NodeMemo<Expr> memo_;
 };
 
-// Rewriting with a lambda: f(e, recurse) gives the new node, or none where only the children are
-// rewritten; `recurse` rewrites a child, so that `map_children(e, recurse)` is e with all children
+// Rewriting with a lambda: f(e, recurse) returns the new node, or an undefined one to rewrite only
+// the children. `recurse` rewrites a child, so `map_children(e, recurse)` is e with all children
 // rewritten.
 using RewriteStep =
     std::function<Expr(const Expr&, const std::function<Expr(const Expr&)>& recurse)>;
@@ -190,7 +191,7 @@ class StepRewriter : public Rewriter {
 Expr rewrite(const Expr& e, RewriteStep step);
 Stmt rewrite(const Stmt& s, RewriteStep step);
 
-// Names are unique: a let or loop inside `e` never rebinds a name of the map.
+// Relies on unique names: no let or loop inside `e` rebinds a name of the map.
 using Substitution = std::map<std::string, Expr>;
 Expr substitute(const Expr& e, const Substitution& values);
 Stmt substitute(const Stmt& s, const Substitution& values);

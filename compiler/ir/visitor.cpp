@@ -145,7 +145,7 @@ Expr Let::make(const std::string& name, Expr value, Expr body) {
 Expr Call::make(Type type, const std::string& name, const std::vector<Expr>& args,
                 CallType call_type) {
   if (call_type != CallType::Extern) {
-    user_error("make a call of " + quoted(name), "what is called by a name alone is a C function",
+    user_error("make a call of " + quoted(name), "a call by name alone calls a C function",
                "its call type is another",
                "Call a Func or an image with (), an operator by its own function");
   }

@@ -1,6 +1,6 @@
-// visitor.h -- visitors and mutators of expressions as classes: derive, and override `visit` for the
-// node types of interest. For programs that bring such classes along; the compiler itself uses the
-// lambdas of visit.h.
+// visitor.h -- visitors and mutators of expressions as classes: derive, and override `visit` for
+// the node types of interest. They exist for user programs that define such classes; the compiler
+// itself uses the lambdas of visit.h.
 //
 //   struct Names : IRGraphVisitor {
 //     using IRGraphVisitor::visit;
@@ -15,9 +15,9 @@
 //   };
 //   e = Doubled().mutate(e);
 //
-// A visitor that is not overridden visits the children; a mutator rebuilds the node where a child
-// changed. IRVisitor and IRMutator look at a shared node once for each use, which takes exponential
-// time on expressions with much sharing; IRGraphVisitor and IRGraphMutator look at it once.
+// A `visit` that is not overridden visits the children; in a mutator it rebuilds the node if a
+// child changed. IRVisitor and IRMutator visit a shared node once for each use, which takes
+// exponential time on heavily shared expressions; IRGraphVisitor and IRGraphMutator visit it once.
 #pragma once
 
 #include <unordered_set>
@@ -52,13 +52,13 @@ class IRGraphVisitor : public IRVisitor {
  private:
   void visit_child(const Expr& e) override { include(e); }
   std::unordered_set<const ExprNode*> seen_;
-  std::vector<Expr> kept_;  // a node's address is its identity only while it lives
+  std::vector<Expr> kept_;  // keeps nodes alive, so that their addresses stay unique
 };
 
 class IRMutator {
  public:
   virtual ~IRMutator() = default;
-  // The expression that `visit` makes of it; an undefined one stays undefined.
+  // Returns the result of `visit`; an undefined expression stays undefined.
   virtual Expr mutate(const Expr& e);
   std::vector<Expr> mutate(const std::vector<Expr>& es);
   Expr operator()(const Expr& e) { return mutate(e); }

@@ -1,4 +1,4 @@
-// expressions.h -- expressions for programs that build and inspect them: constants, simplification,
+// expressions.h -- Halide's helpers that build and inspect expressions: constants, simplification,
 // substitution, and the node types with their visitors (ir/visitor.h).
 #pragma once
 
@@ -24,7 +24,7 @@ using ir::IRVisitor;
 
 // ---- constants ----
 
-// The value in the type, where an integer wraps; one for each lane.
+// The value in the type, repeated for each lane; integers wrap.
 template <typename T>
 requires std::is_arithmetic_v<T> Expr make_const(Type type, T value) {
   if constexpr (std::is_floating_point_v<T>)
@@ -43,7 +43,7 @@ inline Expr make_bool(bool value, int lanes = 1) {
   return value ? ir::const_true(lanes) : ir::const_false(lanes);
 }
 
-// An immediate, or a Broadcast of one.
+// Whether `e` is an immediate, or a Broadcast of one.
 using ir::is_const;
 inline bool is_const(const Expr& e, int64_t value) {
   return e.defined() && ir::is_const_int(e, value);
@@ -53,20 +53,21 @@ inline bool is_const_one(const Expr& e) { return e.defined() && ir::is_one(e); }
 bool is_positive_const(const Expr& e);
 bool is_negative_const(const Expr& e);
 std::optional<int> is_const_power_of_two_integer(const Expr& e);  // its exponent
-// None where it is no constant of that kind. as_const_int: of an unsigned type, too, if it fits.
+// Nothing unless `e` is a constant of that kind. as_const_int also takes an unsigned constant that
+// fits.
 using ir::as_const_float;
 using ir::as_const_int;
 std::optional<uint64_t> as_const_uint(const Expr& e);
 
 // ---- whole expressions ----
 
-using ir::equal;  // the same structure
+using ir::equal;  // structural equality
 inline bool graph_equal(const Expr& a, const Expr& b) { return equal(a, b); }
 bool expr_uses_var(const Expr& e, const std::string& name);
-bool is_pure(const Expr& e);  // no effects, and no identity beyond its value
+bool is_pure(const Expr& e);  // has no effects, and no identity beyond its value
 Expr simplify(const Expr& e);
-bool can_prove(const Expr& condition);  // false: it is not known
-// The variable of that name, or the expression `find`, replaced.
+bool can_prove(const Expr& condition);  // false means unknown
+// Replaces the variable of that name, or the subexpression `find`.
 Expr substitute(const std::string& name, const Expr& replacement, const Expr& e);
 inline Expr substitute(const char* name, const Expr& replacement, const Expr& e) {
   return substitute(std::string(name), replacement, e);
@@ -82,7 +83,7 @@ inline Expr graph_substitute(const char* name, const Expr& replacement, const Ex
 inline Expr graph_substitute(const Expr& find, const Expr& replacement, const Expr& e) {
   return substitute(find, replacement, e);
 }
-// What occurs more than once becomes a Let around it; and the other way.
+// Binds repeated subexpressions in Lets around the expression; the second function expands Lets.
 Expr common_subexpression_elimination(const Expr& e);
 Expr substitute_in_all_lets(const Expr& e);
 

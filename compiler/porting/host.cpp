@@ -22,7 +22,8 @@ namespace {
 
 void remove_at(const std::string& name) {
   std::error_code error;
-  if (!fs::remove(name, error)) refuse("remove", name, error ? error.message() : "it is not there");
+  if (!fs::remove(name, error))
+    refuse("remove", name, error ? error.message() : "it does not exist");
 }
 
 std::string temporary_pattern(const std::string& prefix, const std::string& suffix) {
@@ -38,14 +39,14 @@ bool file_exists(const std::string& name) {
 
 void assert_file_exists(const std::string& name) {
   if (file_exists(name)) return;
-  user_error("go on without the file " + retrograde::quoted(name), "the file is there", "it is not",
+  user_error("go on without the file " + retrograde::quoted(name), "the file exists", "it does not",
              "Write it first");
 }
 
 void assert_no_file_exists(const std::string& name) {
   if (!file_exists(name)) return;
-  user_error("go on with the file " + retrograde::quoted(name), "the file is not there", "it is",
-             "Remove it first");
+  user_error("go on with the file " + retrograde::quoted(name), "the file does not exist",
+             "it does", "Remove it first");
 }
 
 void ensure_no_file_exists(const std::string& name) {

@@ -1,4 +1,4 @@
-// host.h -- files, environment, text and numbers, for programs that bring calls of such helpers along.
+// host.h -- Halide's helpers for files, environment, text and numbers.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +11,15 @@
 
 namespace retrograde::porting {
 
-// ---- files; what cannot be done throws CompileError ----
+// ---- files; failures throw CompileError ----
 bool file_exists(const std::string& name);
 void assert_file_exists(const std::string& name);
 void assert_no_file_exists(const std::string& name);
-void ensure_no_file_exists(const std::string& name);  // removes it
+void ensure_no_file_exists(const std::string& name);  // removes the file if it exists
 void file_unlink(const std::string& name);
 void dir_rmdir(const std::string& name);
-std::string file_make_temp(const std::string& prefix, const std::string& suffix);  // an empty one
+// Creates an empty one.
+std::string file_make_temp(const std::string& prefix, const std::string& suffix);
 std::string dir_make_temp();
 std::vector<char> read_entire_file(const std::string& name);
 void write_entire_file(const std::string& name, const void* data, size_t bytes);
@@ -27,7 +28,7 @@ inline void write_entire_file(const std::string& name, const std::vector<char>& 
 }
 
 // ---- environment ----
-std::string get_env_variable(const char* name);  // empty where there is none
+std::string get_env_variable(const char* name);  // empty when unset
 int get_llvm_version();                          // 191 for 19.1
 
 // ---- text ----
@@ -50,7 +51,7 @@ std::string join_strings(const List& list, const std::string& delimiter) {
 
 // ---- numbers ----
 
-// Division rounds so that the remainder is never negative; by 0 both are 0. As / and % of Exprs.
+// Division rounds so that the remainder is never negative; by 0 both are 0, like / and % of Exprs.
 template <typename T>
 requires std::is_integral_v<T> T mod_imp(T a, T b) {
   if (b == 0) return 0;
@@ -71,13 +72,13 @@ requires std::is_integral_v<T> T div_imp(T a, T b) {
 }
 int64_t gcd(int64_t a, int64_t b);
 int64_t lcm(int64_t a, int64_t b);
-// Whether the result does not fit an integer of that many bits.
+// Whether the result overflows an integer of that many bits.
 bool add_would_overflow(int bits, int64_t a, int64_t b);
 bool sub_would_overflow(int bits, int64_t a, int64_t b);
 bool mul_would_overflow(int bits, int64_t a, int64_t b);
 
-// A conversion of numbers that is defined for every value: integers wrap, a float is truncated and
-// clamped to the range of the integer, NaN is 0.
+// A conversion of numbers that is defined for every value: integers wrap; floats are truncated and
+// clamped to the range of the integer; NaN gives 0.
 template <typename To, typename From>
 To safe_numeric_cast(From value) {
   if constexpr (std::is_floating_point_v<From> && std::is_integral_v<To>) {
@@ -90,7 +91,7 @@ To safe_numeric_cast(From value) {
   return static_cast<To>(value);
 }
 
-// Large stacks are what compiling has by itself: calls f here.
+// Compilation provides a large stack itself, so this calls f directly.
 template <typename F>
 auto run_with_large_stack(const F& f) {
   return f();

@@ -1,4 +1,4 @@
-// internal.h -- all that Halide.h brings into Halide::Internal.
+// internal.h -- everything that Halide.h brings into Halide::Internal.
 #pragma once
 
 #include "porting/expressions.h"

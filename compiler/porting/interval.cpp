@@ -6,7 +6,7 @@
 
 namespace retrograde::porting {
 
-// Names that no program gives, and one node each: ends are compared by identity.
+// No program uses these names. Each end is a single node, because ends are compared by identity.
 Expr Interval::pos_inf() {
   static const Expr end = ir::variable("pos_inf", Handle());
   return end;

@@ -1,4 +1,4 @@
-// interval.h -- closed intervals of expressions, names in scope, and what an expression lies between.
+// interval.h -- Halide's Interval, Scope and bounds_of_expr_in_scope.
 #pragma once
 
 #include <map>
@@ -11,7 +11,7 @@
 
 namespace retrograde::porting {
 
-// [min, max]; an end that is no bound is neg_inf() or pos_inf(). nothing() is empty.
+// [min, max]; an unbounded end is neg_inf() or pos_inf(). nothing() is empty.
 struct Interval {
   Expr min = pos_inf(), max = neg_inf();
 
@@ -35,7 +35,7 @@ struct Interval {
   bool same_as(const Interval& other) const {
     return min.same_as(other.min) && max.same_as(other.max);
   }
-  bool operator==(const Interval& other) const;  // by structure
+  bool operator==(const Interval& other) const;  // structural
   void include(const Interval& other) { *this = make_union(*this, other); }
   void include(const Expr& e) { include(single_point(e)); }
 
@@ -45,7 +45,7 @@ struct Interval {
   static Interval make_intersection(const Interval& a, const Interval& b);
 };
 
-// Values by name; of a name that is pushed twice the last one counts.
+// Maps names to values; the last value pushed for a name wins.
 template <typename T = void>
 class Scope {
  public:
@@ -54,7 +54,7 @@ class Scope {
     static const Scope empty;
     return empty;
   }
-  // Names that are not here are looked up there, as long as that scope lives.
+  // Names that are not in this scope are looked up in `outer`, which must outlive it.
   void set_containing_scope(const Scope* outer) { outer_ = outer; }
 
   template <typename... Value>
@@ -83,7 +83,7 @@ class Scope {
   const auto* find(const std::string& name) const requires(!std::is_void_v<T>) {
     return found(name);
   }
-  // Every name, with its last value.
+  // Visits every name with its last value.
   template <typename Visit>
   void for_each(const Visit& visit) const requires(!std::is_void_v<T>) {
     if (outer_) outer_->for_each(visit);
@@ -100,14 +100,14 @@ class Scope {
   }
   [[noreturn]] static void refuse(const std::string& name) {
     user_error("look up " + retrograde::quoted(name) + " in a Scope",
-               "a name is pushed before it is looked up", "it is not there",
+               "a name is pushed before it is looked up", "it was not pushed",
                "Ask contains() first");
   }
   std::map<std::string, std::vector<Stored>> table_;
   const Scope* outer_ = nullptr;
 };
 
-// Pushes a name while it lives.
+// Binds a name during its lifetime.
 template <typename T = void>
 class ScopedBinding {
  public:
@@ -125,8 +125,8 @@ class ScopedBinding {
   const std::string name_;
 };
 
-// Between what the expression lies where variables lie in these intervals; other variables stand
-// for themselves. With `constant_bounds` an end that is no constant is none.
+// The range of the expression when variables range over the intervals in `scope`; all other
+// variables are symbols. With `constant_bounds`, an end that is not constant becomes unbounded.
 Interval bounds_of_expr_in_scope(const Expr& e, const Scope<Interval>& scope,
                                  bool constant_bounds = false);
 Expr simplify(const Expr& e, const Scope<Interval>& bounds);

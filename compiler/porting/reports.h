@@ -1,5 +1,5 @@
-// reports.h -- messages put together with <<, for programs that bring user_assert and its kin along;
-// and who is told of warnings and errors.
+// reports.h -- messages composed with <<, as user_assert and the like in Halide programs need; and
+// handlers of warnings and errors.
 #pragma once
 
 #include <sstream>
@@ -7,8 +7,8 @@
 
 namespace retrograde::porting {
 
-// Throws CompileError, or InternalError for a fault of the library, with what was written to it, when
-// its full expression ends; a warning is told.
+// Collects a message until its full expression ends. Then it throws CompileError, or InternalError
+// for a bug of the library; a warning is reported.
 class ErrorReport {
  public:
   enum class Kind { User, Internal, Warning };
@@ -26,29 +26,29 @@ class ErrorReport {
 
  private:
   const Kind kind_;
-  const int exceptions_;  // being thrown when it was made: none is thrown on top of them
+  const int exceptions_;  // exceptions in flight at construction: none is thrown on top of them
   std::string asked_;
   std::ostringstream text_;
 };
 
-// Lower than <<, higher than ?: -- so that the report of a condition that holds is never made.
+// Binds weaker than << and tighter than ?:, so the report of a true condition is never constructed.
 struct Voidifier {
   void operator&(ErrorReport&) const {}
 };
 
-// Writes "Warning: <text>" to the standard error stream. Performance notes are no warnings.
+// Writes "Warning: <text>" to standard error. Performance notes are not warnings.
 void print_warning(const std::string& warning);
-// Has warnings printed that nobody else is told of, unless a handler is set.
+// Prints the warnings for which no handler is set.
 bool print_warnings_by_default();
 
-// Who is told of errors before they are thrown, and of warnings in place of those who print them.
+// Receives errors before they are thrown, and warnings instead of their being printed.
 class CompileTimeErrorReporter {
  public:
   virtual ~CompileTimeErrorReporter() = default;
   virtual void warning(const char* text) = 0;
   virtual void error(const char* text) = 0;  // when it returns, the error is thrown
 };
-// Null: nobody, and warnings are printed.
+// Null: no reporter; warnings are printed.
 void set_custom_compile_time_error_reporter(CompileTimeErrorReporter* reporter);
 
 }  // namespace retrograde::porting

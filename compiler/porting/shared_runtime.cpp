@@ -28,7 +28,7 @@ void release(JITUserContext*, void* memory) { std::free(memory); }
 
 void JITSharedRuntime::populate_jit_handlers(JITUserContext* context, const JITHandlers& handlers) {
   if (!context) {
-    user_error("fill in the handlers of a context", "there is a context", "it is null",
+    user_error("fill in the handlers of a context", "the context is not null", "it is null",
                "Give the address of a JITUserContext");
   }
   JITHandlers own;

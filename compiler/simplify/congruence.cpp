@@ -1,12 +1,12 @@
-// Congruences: what is known of an index expression modulo a constant. Lets carry them to their
-// names, so that what align_bounds promises survives in loops far below.
+// Congruences: the value of an index expression modulo a constant. Lets pass them on to their
+// names, so that a promise of align_bounds is still known deep inside loops.
 //
-// Set in which x lies => set of the result, m * Z + r being {m, r} and a constant {0, value}:
+// Sets of operands => set of the result, where {m, r} is m * Z + r, and {0, value} a constant:
 //   {m, r} + {n, s}  {gcd(m, n), r + s}
 //   {m, r} * {n, s}  {gcd(m n, m s, n r), r s}
 //   {m, r} / c       {m / c, floor(r / c)}, when c divides m
 //   either of two    {gcd(m, n, r - s), r}
-// Products beyond int64 make it unknown, {1, 0}.
+// Products beyond int64 give the unknown {1, 0}.
 #include <algorithm>
 #include <numeric>
 
@@ -81,7 +81,7 @@ void Facts::assume_congruent(const Expr& remainder, const Expr& value) {
       {variable->name, {*divisor, euclidean_mod(*known - sum.constant, *divisor)}});
 }
 
-// What a condition says of a variable is also true of what lets around the condition made of it.
+// A condition on a variable also applies to enclosing lets that derive from the variable.
 Congruence Facts::congruence_of_variable(const Variable& n) {
   const auto is_it = [&](const Congruent& c) { return c.name == n.name; };
   const auto assumed = std::ranges::find_if(congruent_, is_it);

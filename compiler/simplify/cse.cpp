@@ -1,5 +1,5 @@
-// Common sub-expressions by hash-consing: structurally equal nodes become one node, and nodes with
-// several parents become Lets, in the order in which they are needed.
+// Finds common subexpressions by hash-consing: structurally equal nodes become one node, and nodes
+// with several parents become Lets, in dependence order.
 #include "simplify/cse.h"
 
 #include <unordered_map>
@@ -13,8 +13,8 @@ namespace retrograde::simplification {
 
 namespace {
 
-// Makes structurally equal nodes identical. Children are unique before their parent is looked up,
-// so that each comparison stops one level down.
+// Makes structurally equal nodes identical. Children are made unique before their parent is looked
+// up, so each comparison looks only one level deep.
 class HashCons : public Rewriter {
  protected:
   using Rewriter::rewrite;
@@ -24,7 +24,8 @@ class HashCons : public Rewriter {
   std::unordered_set<Expr, StructuralHash, StructuralEqual> unique_;
 };
 
-// Reporting an error is no value, and undef is any value.
+// Nodes that a Let must not bind, such as reported errors, which are no values, and undef, which is
+// any value.
 bool must_stay(const Expr& e) {
   const auto* call = e.as<Call>();
   if (!call || call->call_type != CallType::Operator) return false;
@@ -32,7 +33,7 @@ bool must_stay(const Expr& e) {
   return conduct == Conduct::InPlace || conduct == Conduct::ActsInPlace;
 }
 
-// Cheaper to repeat than to name: leaves, and what costs no instruction on a leaf.
+// Cheaper to repeat than to name: leaves, and operations on leaves that cost no instruction.
 bool is_trivial(const Expr& e) {
   if (e.kind() == Kind::Variable || is_const(e) || e.kind() == Kind::StringImm) return true;
   if (const auto* splat = e.as<Broadcast>()) return is_trivial(splat->value);
@@ -41,10 +42,10 @@ bool is_trivial(const Expr& e) {
   return e.type().is_handle() || (e.kind() == Kind::Call && e.as<Call>()->args.empty());
 }
 
-// What a strict_float rounds stays inside of it: named outside, it might be contracted there.
+// The argument of strict_float stays inside it: in a Let outside, it might be contracted.
 bool is_strict(const Expr& e) { return as_op(e, Op::strict_float); }
 
-// Counts the parents of each node among what is evaluated for certain.
+// Counts the parents of each node among the nodes that are evaluated unconditionally.
 class UseCounter {
  public:
   explicit UseCounter(const std::vector<Expr>& es) {
@@ -56,7 +57,7 @@ class UseCounter {
   void count(const Expr& e) {
     if (uses_[e.get()]++ > 0) return;
     if (const Call* branch = as_op(e, Op::if_then_else)) {
-      count(branch->args[0]);  // the arms run only when chosen
+      count(branch->args[0]);  // the arms run only when selected
     } else if (!is_strict(e)) {
       for_each_child(e, [&](const Expr& child) { count(child); });
     }
@@ -64,7 +65,7 @@ class UseCounter {
   std::unordered_map<const ExprNode*, int> uses_;
 };
 
-// The first value, inside its Lets.
+// The first value, wrapped in its Lets.
 Expr wrap(const SharedLets& shared) { return make_lets(shared.lets, shared.values[0]); }
 
 SharedLets make_lets(const std::vector<Expr>& es);
@@ -82,7 +83,7 @@ class LetMaker : public Rewriter {
   }
 
  private:
-  // What stands for e in the expression, which has become `rebuilt`.
+  // The replacement of e, whose children have been replaced in `rebuilt`.
   Expr name(const Expr& e, Expr rebuilt) {
     if (!gets_name(e)) return rebuilt;
     const std::string name = unique_name("t");
@@ -90,14 +91,14 @@ class LetMaker : public Rewriter {
     return variable(name, rebuilt.type());
   }
 
-  // What only an arm shares is bound inside the arm, under names of its own: both arms may have the
-  // same inner if_then_else.
+  // Values shared within one arm are bound inside it, under names of its own: both arms may contain
+  // the same inner if_then_else.
   Expr branch(const Call& e) {
     const auto arm = [&](const Expr& value) { return wrap(make_lets({named_(value)})); };
     return call_op(e.op, e.type, {(*this)(e.args[0]), arm(e.args[1]), arm(e.args[2])});
   }
-  // What is evaluated for certain becomes its name; all else stays, so that an arm inside an arm is
-  // bound once, by the arm around it.
+  // Replaces unconditionally evaluated nodes by their names. Arms are left to their own Lets, so
+  // that an arm inside an arm is bound once, by the arm around it.
   class Namer : public Rewriter {
    public:
     explicit Namer(LetMaker& maker) : maker_(maker) {}
@@ -121,7 +122,7 @@ class LetMaker : public Rewriter {
   Namer named_{*this};
 };
 
-// Values of the enclosing Lets stand for their names. Names are unique, so one memo serves all
+// Replaces names by the values of the enclosing Lets. Names are unique, so one memo serves all
 // scopes.
 class LetExpander : public Rewriter {
  protected:
@@ -139,7 +140,7 @@ class LetExpander : public Rewriter {
   std::unordered_map<std::string, Expr> values_;
 };
 
-// Of expressions without Lets.
+// Expects expressions without Lets.
 SharedLets make_lets(const std::vector<Expr>& es) {
   HashCons unique;
   const auto shared = mapped(es, [&](const Expr& e) { return unique(e); });

@@ -1,5 +1,5 @@
-// Lets whose names are not used. One walk from the inside out: names are unique, so what was seen
-// so far is what the rest of the program uses.
+// Removes lets whose names are not used. One walk from the inside out suffices: names are unique,
+// so the names seen so far are all that the body uses.
 #include <unordered_set>
 
 #include "ir/build.h"
@@ -15,7 +15,7 @@ class DeadLets : public Rewriter {
   using Rewriter::operator();
 
  protected:
-  // Handles chains of lets in a loop.
+  // Handles chains of lets in a loop, not by recursion.
   Expr rewrite(const Expr& e) override {
     if (const auto* var = e.as<Variable>()) {
       used_.insert(var->name);
@@ -42,7 +42,7 @@ class DeadLets : public Rewriter {
     Stmt body = (*this)(n->body);
     if (!is_needed(n->name, n->value)) return body;
     Expr value = (*this)(n->value);
-    if (!body.defined()) return make_evaluate(std::move(value));  // it has an effect
+    if (!body.defined()) return make_evaluate(std::move(value));  // the value has an effect
     if (value.same_as(n->value) && body.same_as(n->body)) return s;
     return make_let(n->name, std::move(value), std::move(body));
   }

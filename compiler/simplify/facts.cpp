@@ -1,9 +1,9 @@
 // Constant ranges of expressions, and bounds of sums by elimination.
 //
-// To bound a sum from above, terms are replaced one by one by something that is never less: a
-// variable by its upper end, c * (x / c) by x, a minimum by either operand, a maximum or a select
-// by the worse of both. What cancels after a replacement makes the bound tight. Each replacement
-// costs one unit of a fixed budget.
+// To bound a sum from above, terms are replaced one by one by an upper bound: a variable by its
+// upper end, c * (x / c) by x, a minimum by either operand, a maximum or a select by the worse of
+// its operands. Cancellation after a replacement makes the bound tight. Each replacement costs one
+// unit of a fixed budget.
 #include "simplify/facts.h"
 
 #include <algorithm>
@@ -33,7 +33,7 @@ int64_t add_ends(int64_t a, int64_t b) {
   return is_infinite(b) ? b : saturate(__int128{a} + b);
 }
 
-// With 0 * infinity = 0.
+// Uses 0 * infinity = 0.
 int64_t multiply_ends(int64_t a, int64_t b) {
   if (a == 0 || b == 0) return 0;
   if (is_infinite(a) || is_infinite(b)) return (a < 0) == (b < 0) ? INT64_MAX : INT64_MIN;
@@ -62,8 +62,9 @@ ConstantRange multiply(const ConstantRange& a, const ConstantRange& b) {
   return hull(a * b.min, a * b.max);
 }
 
-// Division by b > 0 rounds down and is monotonic in both operands' corners; otherwise only |a / b|
-// <= |a| is used.
+// Division by b > 0 rounds down and is monotonic in each operand, so the corners suffice. Otherwise
+// only
+// a / b| <= |a| is used.
 ConstantRange divide(const ConstantRange& a, const ConstantRange& b) {
   if (b.min > 0) {
     const int64_t high = b.max == infinity ? infinity : b.max;
@@ -88,26 +89,25 @@ ConstantRange modulo(const ConstantRange& a, const ConstantRange& b) {
 }
 
 ConstantRange wrapped(const ConstantRange& r, Type type) {
-  const ConstantRange whole = range_of(type);
-  if (is_index_type(type)) return intersection(r, whole);  // does not overflow
-  // The largest value of uint64 is not an int64: its range has no upper end, and sums of it may
-  // wrap.
-  if (type.is_uint() && type.bits() == 64 && r.max == infinity) return whole;
-  return r.is_within(whole) ? r : whole;
+  const ConstantRange all_values = range_of(type);
+  if (is_index_type(type)) return intersection(r, all_values);  // does not overflow
+  // The largest uint64 exceeds int64, so the type's range has no upper end, and sums may wrap.
+  if (type.is_uint() && type.bits() == 64 && r.max == infinity) return all_values;
+  return r.is_within(all_values) ? r : all_values;
 }
 
 }  // namespace
 
 ConstantRange Facts::range(const Expr& e) {
   if (const std::optional<int64_t> value =
-          as_const_int(e)) {  // the extremes of int64 also stand for infinity
+          as_const_int(e)) {  // the extremes of int64 also represent infinity
     return {*value == INT64_MAX ? *value - 1 : *value, *value == INT64_MIN ? *value + 1 : *value};
   }
   if (!e.type().is_int_or_uint()) return {};
   return ranges_.get(e, [&] {
-    const ConstantRange whole = range_of(e.type());
-    const ConstantRange result = intersection(range_of_node(e), whole);
-    return result.min > result.max ? whole : result;  // contradictory facts: unreachable code
+    const ConstantRange all_values = range_of(e.type());
+    const ConstantRange result = intersection(range_of_node(e), all_values);
+    return result.min > result.max ? all_values : result;  // contradictory facts: unreachable code
   });
 }
 
@@ -123,15 +123,16 @@ ConstantRange Facts::range_of_variable(const Expr& e, const Variable& n) {
 }
 
 ConstantRange Facts::range_of_node(const Expr& e) {
-  const ConstantRange whole = range_of(e.type());
+  const ConstantRange all_values = range_of(e.type());
   return match(
       e, [&](const Variable& n) { return range_of_variable(e, n); },
       [&](const Cast& n) {
-        if (!n.value.type().is_int_or_uint() || n.type.is_bool()) return whole;
+        if (!n.value.type().is_int_or_uint() || n.type.is_bool()) return all_values;
         const ConstantRange source = range(n.value);
-        return source.is_within(whole) && !(n.value.type() == UInt(64) && source.max == infinity)
+        return source.is_within(all_values) &&
+                       !(n.value.type() == UInt(64) && source.max == infinity)
                    ? source
-                   : whole;
+                   : all_values;
       },
       [&](const Binary& n) { return range_of_binary(n); },
       [&](const Select& n) { return hull(range(n.when_true), range(n.when_false)); },
@@ -142,19 +143,19 @@ ConstantRange Facts::range_of_node(const Expr& e) {
       [&](const Broadcast& n) { return range(n.value); },
       [&](const Let& n) { return range(n.body); },
       [&](const VectorReduce& n) {
-        return n.op == Kind::Min || n.op == Kind::Max ? range(n.value) : whole;
+        return n.op == Kind::Min || n.op == Kind::Max ? range(n.value) : all_values;
       },
       [&](const Shuffle& n) {
         ConstantRange result = range(n.vectors[0]);
         for (const Expr& v : n.vectors) result = hull(result, range(v));
         return result;
       },
-      [&](const Call& n) { return range_of_call(n); }, [&](const ExprNode&) { return whole; });
+      [&](const Call& n) { return range_of_call(n); }, [&](const ExprNode&) { return all_values; });
 }
 
 ConstantRange Facts::range_of_binary(const Binary& n) {
-  const ConstantRange whole = range_of(n.type);
-  if (!n.a.type().is_int_or_uint() || n.type.is_bool()) return whole;
+  const ConstantRange all_values = range_of(n.type);
+  if (!n.a.type().is_int_or_uint() || n.type.is_bool()) return all_values;
   const ConstantRange a = range(n.a), b = range(n.b);
   switch (n.kind) {
     case Kind::Add:
@@ -172,20 +173,20 @@ ConstantRange Facts::range_of_binary(const Binary& n) {
     case Kind::Max:
       return {std::max(a.min, b.min), std::max(a.max, b.max)};
     default:
-      return whole;
+      return all_values;
   }
 }
 
 ConstantRange Facts::range_of_call(const Call& n) {
-  const ConstantRange whole = range_of(n.type);
-  if (n.call_type != CallType::Operator) return whole;
+  const ConstantRange all_values = range_of(n.type);
+  if (n.call_type != CallType::Operator) return all_values;
   switch (n.op) {
     case Op::promise_clamped:
     case Op::unsafe_promise_clamped:
       return intersection(range(n.args[0]), {range(n.args[1]).min, range(n.args[2]).max});
-    case Op::bitwise_and: {  // with a constant that is not negative, at most that constant
+    case Op::bitwise_and: {  // at most a nonnegative constant operand
       const ConstantRange mask = range(n.args[1]);
-      return mask.min >= 0 ? ConstantRange{0, mask.max} : whole;
+      return mask.min >= 0 ? ConstantRange{0, mask.max} : all_values;
     }
     case Op::popcount:
     case Op::count_leading_zeros:
@@ -194,7 +195,7 @@ ConstantRange Facts::range_of_call(const Call& n) {
     case Op::if_then_else:
       return hull(range(n.args[1]), range(n.args[2]));
     default:
-      return n.is_marker() ? range(n.args[0]) : whole;
+      return n.is_marker() ? range(n.args[0]) : all_values;
   }
 }
 
@@ -224,7 +225,7 @@ Expr Facts::value_of(const std::string& name) const {
 
 namespace {
 
-// Of the terms in any order; factors are taken relative to `divisor`.
+// A hash of the terms in any order, with factors relative to `divisor`.
 uint64_t terms_key(const std::vector<Term>& terms, int64_t divisor) {
   uint64_t key = terms.size();
   for (const Term& term : terms) {
@@ -268,8 +269,8 @@ bool Facts::is_older(const Expr& e, int order) const {
   });
 }
 
-// low + gap <= high, where low is a loop's variable: a new upper end. The old one stays beside it,
-// as it may be the tighter one.
+// low + gap <= high, where low is a loop's variable, gives it a new upper end. The old one is kept,
+// as it may be tighter.
 void Facts::narrow(const Expr& low, const Expr& high, int64_t gap) {
   const auto* name = low.as<Variable>();
   const auto found = name ? variables_.find(name->name) : variables_.end();
@@ -394,8 +395,7 @@ int64_t Facts::bound_by_ranges(const Sum& sum) {
   int64_t result = sum.constant;
   for (const Term& term : sum.terms) {
     const int64_t end = (range(term.atom) * term.factor).max;
-    // The ends of the type say nothing about a difference: x - y of int32 may be anything as far as
-    // ranges tell.
+    // The ends of the type do not bound a difference: x - y of two int32 may have any value.
     if (end == infinity) return infinity;
     result = add_ends(result, end);
   }
@@ -436,7 +436,7 @@ int64_t Facts::eliminate_division(const Sum& sum, const Term& term, const Div& n
 
 namespace {
 
-// A term that is one of two values: `either` bounds it, or only both together do.
+// A term that is one of two values. Either value bounds it (`either`), or only both together.
 struct Choice {
   Expr a, b;
   bool either;
@@ -455,9 +455,10 @@ std::optional<Choice> choice_of(const Term& term) {
 
 }  // namespace
 
-// Replaces the first term with something to look through or to choose from. Where both values must
-// do, nothing is lost, so that these come first: max(e, 0) - max(e + 1, 0) is at most 0 because
-// e - max(e + 1, 0) is and 0 - max(e + 1, 0) is, by another value of the second each.
+// Replaces the first term that can be looked through or that is a choice of two values. Choices
+// that need both values lose nothing, so they come first. For example, max(e, 0) - max(e + 1, 0) is
+// at most 0: both e - max(e + 1, 0) and 0 - max(e + 1, 0) are, by different values of the second
+// maximum.
 int64_t Facts::eliminate_structure(const Sum& sum, int& budget) {
   for (const Term& term : sum.terms) {
     const auto* call = term.atom.as<Call>();
@@ -472,7 +473,7 @@ int64_t Facts::eliminate_structure(const Sum& sum, int& budget) {
       return either ? std::min(a, b) : std::max(a, b);
     }
   }
-  for (const Term& term : sum.terms) {  // last: what is inside of the others may cancel it
+  for (const Term& term : sum.terms) {  // last, because the terms inside the others may cancel it
     const auto* n = term.atom.as<Div>();
     const int64_t bound = n ? eliminate_division(sum, term, *n, budget) : infinity;
     if (bound != infinity) return bound;
@@ -480,7 +481,7 @@ int64_t Facts::eliminate_structure(const Sum& sum, int& budget) {
   return infinity;
 }
 
-// Replaces the innermost variable whose end on the right side is an expression.
+// Replaces the innermost variable whose relevant end is an expression.
 int64_t Facts::eliminate_variable(const Sum& sum, int& budget) {
   const Term* innermost = nullptr;
   const Bounds* bounds = nullptr;

@@ -1,5 +1,5 @@
-// What is known while simplifying: bounds of variables, conditions that hold, and what follows for
-// a sum.
+// Facts known during simplification: bounds of variables, conditions that hold, and the bounds of
+// sums that follow from them.
 #pragma once
 
 #include <optional>
@@ -13,31 +13,31 @@
 
 namespace retrograde::simplification {
 
-// Of the values of a type.
+// The range of values of a type.
 ConstantRange range_of(Type type);
 ConstantRange operator+(const ConstantRange& a, const ConstantRange& b);
 ConstantRange operator*(const ConstantRange& a, int64_t factor);
 
-// Of an integer: modulus * k + remainder, for some k; modulus 0 makes it that number, modulus 1
-// says nothing.
+// An integer known to be modulus * k + remainder for some k. Modulus 0 means the constant
+// `remainder`; modulus 1 means that nothing is known.
 struct Congruence {
   int64_t modulus = 1, remainder = 0;
-  // The value modulo a positive divisor, when all that it may be agree on that.
+  // The value modulo a positive divisor, if it is the same for all possible values.
   std::optional<int64_t> modulo(int64_t divisor) const;
 };
 
 class Facts {
  public:
-  // Simplified ends; undefined: unknown. Later variables may mention earlier ones in their bounds,
-  // not vice versa.
+  // Declares a variable with simplified ends (undefined: unknown). The ends of later variables may
+  // mention earlier ones, but not vice versa.
   void bind(const std::string& name, Expr min, Expr max);
   void unbind(const std::string& name);
-  // Of a name whose ends are the same; else undefined.
+  // The value of a name whose ends are equal; else undefined.
   Expr value_of(const std::string& name) const;
-  // The lower end of a name; undefined where unknown.
+  // The lower end of a name; undefined when unknown.
   Expr min_of(const std::string& name) const;
 
-  // While alive, the condition (simplified) holds. Takes conjunctions apart.
+  // Assumes a simplified condition during its lifetime. Splits conjunctions.
   class Assumption {
    public:
     Assumption(Facts& facts, const Expr& condition);
@@ -49,19 +49,19 @@ class Facts {
     Facts& facts_;
     size_t first_, first_congruent_, first_narrowed_;
   };
-  // Until the end of time (or of an enclosing Assumption).
+  // Assumes the condition until the enclosing Assumption ends, or forever.
   void assume(const Expr& condition);
-  // Whether the condition itself, or its negation, was assumed.
+  // The truth of the condition if it or its negation was assumed.
   std::optional<bool> decided(const Expr& condition) const;
 
   ConstantRange range(const Expr& e);
   // See congruence.cpp.
   Congruence congruence(const Expr& e);
   Congruence congruence(const Sum& sum);
-  // The tightest constants found around a sum of an index type.
+  // The tightest constant bounds found for a sum of an index type.
   int64_t upper_bound(const Sum& sum);
   int64_t lower_bound(const Sum& sum);
-  // Ranges of expressions are remembered; to be called when variables or conditions change.
+  // Drops the memoised ranges; call it when variables or conditions change.
   void forget() {
     ranges_.clear();
     congruences_.clear();
@@ -71,21 +71,21 @@ class Facts {
   struct Bounds : Interval {
     ConstantRange range;
     Congruence congruence;  // of a variable with one value
-    int order;              // of binding: inner variables are eliminated first
+    int order;              // order of binding; inner variables are eliminated first
   };
-  // A fact is a sum that is at most `bound`, or a condition known to be true or false.
+  // A known fact: a sum is at most `bound`, or a condition is true or false.
   struct Known {
     std::vector<Term> terms;
     int64_t bound = 0;
     Expr condition;
     bool value = true;
   };
-  // What was known of a variable before a condition said more.
+  // The earlier bounds of a variable that a condition has narrowed.
   struct Narrowed {
     std::string name;
     Bounds before;
   };
-  // A variable that a condition says so of.
+  // A congruence of a variable that a condition implies.
   struct Congruent {
     std::string name;
     Congruence congruence;

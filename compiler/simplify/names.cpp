@@ -1,11 +1,12 @@
-// Names of index values: what they stand for, where that says more than the name does.
+// Replaces names of index values by their definitions where that simplifies.
 //
-//   let m = t*64 - q in  .. x + t*64 - m ..    =>    x + q          (what cancels)
-//   if (s == 1) { .. i*s .. }                  =>    i              (what a branch knows)
+//   let m = t*64 - q in  .. x + t*64 - m ..    =>    x + q          (terms cancel)
+//   if (s == 1) { .. i*s .. }                  =>    i              (the branch determines s)
 //
-// Lets keep the text of bounds small, so names are opened only where that makes no more terms. What
-// a branch knows of a value goes into what lets outside of it derive from that. Loop variables, and
-// what depends on them, keep their names in branches: lanes of `if (x == 3) f[x]` stay a vector.
+// Lets keep the text of bounds small, so a name is expanded only if the number of terms does not
+// grow. A value that a branch determines is propagated into lets outside of the branch that derive
+// from it. Loop variables, and values derived from them, keep their names in branches: lanes of `if
+// (x == 3) f[x]` stay a vector.
 #include <algorithm>
 
 #include "ir/build.h"
@@ -16,10 +17,10 @@ namespace retrograde::simplification {
 
 namespace {
 
-// Larger sums stay behind their names.
+// Names of larger sums are not expanded.
 constexpr size_t max_opened_terms = 8;
 
-// Whether the value is the same wherever its name is in scope, and may be computed again there.
+// Whether the value is the same wherever its name is in scope, and may be recomputed there.
 bool is_steady(const Expr& value) {
   return !any_node(value, [](const Expr& node) {
     const auto* call = node.as<Call>();
@@ -32,40 +33,40 @@ bool is_steady(const Expr& value) {
 
 }  // namespace
 
-std::optional<Sum> Simplifier::find_meaning(const Expr& atom) {
+std::optional<Sum> Simplifier::find_definition(const Expr& atom) {
   const std::string& name = atom.as<Variable>()->name;
   const Expr value = value_or(replacements_, name, facts_.value_of(name));
   if (!value.defined() || value.type() != atom.type() || !is_steady(value)) return std::nullopt;
   const Sum sum = sum_of(value);
   Sum opened = constant_sum(atom.type(), sum.constant);
   for (const Term& term : sum.terms) {
-    const Sum* inner = meaning(term.atom);
+    const Sum* inner = definition_of(term.atom);
     inner ? opened.add(*inner, term.factor) : opened.add(term.atom, term.factor);
   }
   if (!opened.valid || opened.terms.size() > max_opened_terms) return std::nullopt;
   return opened;
 }
 
-// What a name stands for, in terms of those that have no such meaning; null when it has none
-// itself.
-const Sum* Simplifier::meaning(const Expr& atom) {
+// The definition of a name in terms of names without one; null when the name has none.
+const Sum* Simplifier::definition_of(const Expr& atom) {
   const auto* variable = atom.as<Variable>();
   if (!variable || !is_index_type(atom.type()) || atom.type().is_vector()) return nullptr;
-  auto found = meanings_.find(variable->name);
-  if (found == meanings_.end()) {
-    std::optional<Sum> sum = find_meaning(atom);
-    found = meanings_.emplace(variable->name, std::move(sum)).first;
+  auto found = definitions_.find(variable->name);
+  if (found == definitions_.end()) {
+    std::optional<Sum> sum = find_definition(atom);
+    found = definitions_.emplace(variable->name, std::move(sum)).first;
   }
   return found->second ? &*found->second : nullptr;
 }
 
-// Opens one name where fewer terms remain, or two of which something cancels.
+// Expands one name if fewer terms remain, or two names if some of their terms cancel.
 bool Simplifier::cancel_names(Sum& sum) {
   if (!is_index_type(sum.type) || sum.type.is_vector() || sum.terms.size() < 2) return false;
-  const auto named = filtered(sum.terms, [&](const Term& term) { return meaning(term.atom); });
+  const auto named =
+      filtered(sum.terms, [&](const Term& term) { return definition_of(term.atom); });
   const auto open = [&](Sum& in, const Term& term) {
     in.add(term.atom, -term.factor);
-    in.add(*meaning(term.atom), term.factor);
+    in.add(*definition_of(term.atom), term.factor);
   };
   const auto is_better = [&](const Sum& opened, size_t most_terms) {
     return opened.valid && opened.terms.size() <= most_terms;
@@ -77,8 +78,8 @@ bool Simplifier::cancel_names(Sum& sum) {
     for (size_t j = i + 1; j < named.size() && opened.valid; ++j) {
       Sum both = opened;
       open(both, named[j]);
-      const size_t apart = sum.terms.size() - 2 + meaning(named[i].atom)->terms.size() +
-                           meaning(named[j].atom)->terms.size();
+      const size_t apart = sum.terms.size() - 2 + definition_of(named[i].atom)->terms.size() +
+                           definition_of(named[j].atom)->terms.size();
       if (is_better(both, std::min(sum.terms.size(), apart - 1)))
         return sum = std::move(both), true;
     }
@@ -86,14 +87,14 @@ bool Simplifier::cancel_names(Sum& sum) {
   return false;
 }
 
-// The number that a name is where a branch has decided it.
-Expr Simplifier::number_of(const Expr& variable) {
-  if (known_numbers_ == 0) return {};
-  const Sum* sum = meaning(variable);
+// The constant that an enclosing branch determines for the name; undefined when there is none.
+Expr Simplifier::constant_of(const Expr& variable) {
+  if (known_constants_ == 0) return {};
+  const Sum* sum = definition_of(variable);
   return sum && sum->is_constant() ? make_const(variable.type(), sum->constant) : Expr();
 }
 
-// ---- what branches know ----
+// ---- values that branches determine ----
 
 namespace {
 
@@ -112,7 +113,7 @@ std::optional<Equality> as_equality(const Expr& condition) {
 
 }  // namespace
 
-void Simplifier::learn_numbers(const Expr& condition, std::vector<std::string>& learned) {
+void Simplifier::learn_constants(const Expr& condition, std::vector<std::string>& learned) {
   std::vector<Expr> conjuncts;
   add_conjuncts(condition, conjuncts);
   for (const Expr& conjunct : conjuncts) {
@@ -122,15 +123,15 @@ void Simplifier::learn_numbers(const Expr& condition, std::vector<std::string>& 
       learned.push_back(equality->name);
   }
   if (learned.empty()) return;
-  ++known_numbers_;
-  meanings_.clear();
+  ++known_constants_;
+  definitions_.clear();
 }
 
-void Simplifier::unlearn_numbers(const std::vector<std::string>& learned) {
+void Simplifier::forget_constants(const std::vector<std::string>& learned) {
   if (learned.empty()) return;
   for (const std::string& name : learned) replacements_.erase(name);
-  --known_numbers_;
-  meanings_.clear();
+  --known_constants_;
+  definitions_.clear();
 }
 
 }  // namespace retrograde::simplification

@@ -1,4 +1,4 @@
-// Comparisons. Of index types everything becomes a question about one sum: sum < 0 or sum == 0.
+// Comparisons. On index types every comparison becomes sum < 0 or sum == 0 for one sum.
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/scalar.h"
@@ -26,7 +26,7 @@ Sides sides_of(const Sum& sum) {
 
 bool is_scalar_index(const Expr& e) { return is_index_type(e.type()) && e.type().is_scalar(); }
 
-// Divides by the greatest common divisor of the factors, `constant` rounding down.
+// Divides by the greatest common divisor of the factors; the constant rounds down.
 void divide_by_common_factor(Sum& sum) {
   const int64_t g = common_factor(sum);
   if (g <= 1) return;
@@ -78,7 +78,7 @@ Expr Simplifier::equals(const Expr& a, const Expr& b) {
     return binary(Kind::EQ, a, b);
   Sum left = sides.left, right = sides.right;
   if (left.is_constant()) std::swap(left, right), sum.constant = -sum.constant;
-  // A constant stands on the right: x == y + 3.
+  // The constant goes to the right: x == y + 3.
   if (right.is_constant() || sum.constant < 0)
     right.add_constant(-sum.constant);
   else
@@ -131,8 +131,8 @@ Expr Simplifier::less_than_zero(Sum sum) {
   return result;
 }
 
-// min(x, y) < z => x < z || y < z, when one of the two is decided; so for max with &&, and for a
-// select between constants.
+// min(x, y) < z => x < z || y < z, when one of the two is decided; max with && and a select between
+// constants alike.
 Expr Simplifier::distribute_comparison(const Sum& sum) {
   if (depth_ > 8) return {};
   for (const Term& term : sum.terms) {
@@ -141,7 +141,7 @@ Expr Simplifier::distribute_comparison(const Sum& sum) {
       replaced.add(term.atom, -term.factor);
       replaced.add(sum_of(operand), term.factor);
       if (!replaced.valid || replaced.terms.size() > sum.terms.size() + 1) return Expr();
-      depth_ += 4;  // a nest of these is explored only a little way
+      depth_ += 4;  // limits how deep nests of these are explored
       Expr result = less_than_zero(replaced);
       depth_ -= 4;
       return result;
@@ -196,7 +196,7 @@ Expr Simplifier::compare_sides(const Sum& sum) {
   return binary(kind, rebuild(left), rebuild(right));
 }
 
-// Vectors compare lane by lane: only what holds for all lanes is decided.
+// Vectors compare lane by lane: the result is decided only if it is the same for all lanes.
 Expr Simplifier::compare_vectors(Kind kind, const Expr& a, const Expr& b) {
   if (!is_index_type(a.type()) || a.type().is_scalar()) return {};
   const bool lines = (a.kind() == Kind::Ramp || a.kind() == Kind::Broadcast) &&

@@ -1,5 +1,6 @@
-// Division and modulus by a constant c > 1. Terms that c divides leave the quotient; the rest
-// shrinks by common factors, is decided by its range, or merges with an inner division.
+// Division and modulus by a constant c > 1. Terms that c divides move out of the quotient. The
+// remaining ones are reduced by common factors, decided by their range, or merged with an inner
+// division.
 #include <numeric>
 
 #include "ir/build.h"
@@ -44,21 +45,21 @@ Expr Simplifier::div_by(const Expr& a, int64_t c) {
   if (const auto* line = a.as<Ramp>()) {
     if (Expr result = div_vector(*line, c); result.defined()) return result;
   }
-  SplitSum split = split_by(sum_of(a), c);
-  if (!split.whole.valid || !split.rest.valid) return binary(Kind::Div, a, constant(a, c));
+  DividedSum split = divide_terms(sum_of(a), c);
+  if (!split.quotient.valid || !split.remainder.valid) return binary(Kind::Div, a, constant(a, c));
   // (x + k) / c => x / c + (r + k) / c, when x is congruent to r
-  Sum terms = split.rest;
+  Sum terms = split.remainder;
   terms.constant = 0;
   if (const std::optional<int64_t> r = facts_.congruence(terms).modulo(c)) {
-    split.whole.add_constant(euclidean_div(*r + split.rest.constant, c));
-    split.rest.constant = 0;
+    split.quotient.add_constant(euclidean_div(*r + split.remainder.constant, c));
+    split.remainder.constant = 0;
   }
-  const Sum rest = sum_of(div_atom(split.rest, c));
-  return rebuild(plus(split.whole, rest), Kind::Div, a, constant(a, c));
+  const Sum rest = sum_of(div_atom(split.remainder, c));
+  return rebuild(plus(split.quotient, rest), Kind::Div, a, constant(a, c));
 }
 
-// The multiple of c at or below x, when the lower end of a variable in x gives it: of x between
-// 8 k + 2 and 8 k + 7, that is 8 k.
+// The multiple of c at or below x, if the lower end of a variable in x determines it. For x between
+// 8 k + 2 and 8 k + 7 it is 8 k.
 std::optional<Sum> Simplifier::multiple_below(const Sum& x, int64_t c) {
   for (const Term& term : x.terms) {
     const auto* variable = term.atom.as<Variable>();
@@ -78,7 +79,7 @@ std::optional<Sum> Simplifier::multiple_below(const Sum& x, int64_t c) {
   return std::nullopt;
 }
 
-// rest / c, where no term is divisible and the constant lies in [0, c).
+// rest / c, where c divides no term and the constant lies in [0, c).
 Expr Simplifier::div_atom(const Sum& rest, int64_t c) {
   const auto as_constant = [&](int64_t value) { return make_const(rest.type, value); };
   if (rest.is_constant()) return as_constant(0);
@@ -128,7 +129,7 @@ Expr Simplifier::mod_by(const Expr& a, int64_t c) {
   if (const auto* line = a.as<Ramp>()) {
     if (Expr result = mod_vector(*line, c); result.defined()) return result;
   }
-  Sum rest = split_by(sum_of(a), c).rest;
+  Sum rest = divide_terms(sum_of(a), c).remainder;
   if (!rest.valid) return binary(Kind::Mod, a, constant(a, c));
   if (const std::optional<int64_t> known = facts_.congruence(rest).modulo(c))
     return constant(a, *known);
@@ -143,7 +144,7 @@ Expr Simplifier::mod_by(const Expr& a, int64_t c) {
     opened.add(term.atom, -term.factor);
     opened.add(sum_of(inner->a), term.factor);
     if (!opened.valid) continue;
-    return apply(Kind::Mod, rebuild(split_by(opened, c).rest), constant(a, c));
+    return apply(Kind::Mod, rebuild(divide_terms(opened, c).remainder), constant(a, c));
   }
   for (Term& term : rest.terms) {  // factors into (-c, c): -1 stays, 5 % 4 becomes 1
     if (term.factor >= c || term.factor <= -c) term.factor = euclidean_mod(term.factor, c);
@@ -166,7 +167,7 @@ Expr Simplifier::mod_by(const Expr& a, int64_t c) {
   return binary(Kind::Mod, to_expr(rest), constant(a, c));
 }
 
-// A ramp whose stride c divides is divided lane by lane; one that stays inside a multiple of c
+// A ramp whose stride c divides is divided lane by lane; one that stays between two multiples of c
 // gives one quotient.
 Expr Simplifier::div_vector(const Ramp& a, int64_t c) {
   const std::optional<int64_t> stride = as_const_int(a.stride);

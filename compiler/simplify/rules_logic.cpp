@@ -1,4 +1,4 @@
-// Conditions: conjunctions, disjunctions, negations, selects.
+// Conditions: conjunctions, disjunctions, negations and selects.
 
 #include "ir/build.h"
 #include "ir/equal.h"
@@ -14,7 +14,7 @@ bool is_negation(const Expr& a, const Expr& b) {
   return (not_a && equal(not_a->a, b)) || (not_b && equal(not_b->a, a));
 }
 
-// The sum that the comparison says is negative.
+// The sum that is negative where the comparison holds.
 std::optional<Sum> negative_sum(const Expr& e) {
   if (e.kind() != Kind::LT && e.kind() != Kind::LE) return std::nullopt;
   const auto* n = e.as<Binary>();
@@ -26,8 +26,8 @@ std::optional<Sum> negative_sum(const Expr& e) {
 
 }  // namespace
 
-// Two conditions of a conjunction or disjunction: gives the constant that decides the whole, or
-// says which is implied.
+// Combines two operands of a conjunction or disjunction: returns the constant result, or tells
+// which operand is implied.
 Expr Simplifier::combine_conditions(Kind kind, const Expr& a, const Expr& b, bool& drop_a,
                                     bool& drop_b) {
   const bool is_and = kind == Kind::And;
@@ -80,7 +80,7 @@ Expr Simplifier::logical(Kind kind, const Expr& a, const Expr& b) {
   return result;
 }
 
-// Floats: !(a < b) also holds for NaNs, so it stays.
+// For floats, !(a < b) also holds for NaNs, so it stays.
 Expr Simplifier::negate(const Expr& a) {
   if (const auto* splat = a.as<Broadcast>(); splat && !is_const(a))
     return broadcast(negate(splat->value), splat->lanes);

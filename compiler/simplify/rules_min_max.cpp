@@ -1,4 +1,4 @@
-// Minimum and maximum: operands that are never chosen go, common terms move out.
+// Minimum and maximum: drops operands that are never selected, and moves common terms out.
 #include <algorithm>
 
 #include "ir/build.h"
@@ -9,14 +9,14 @@ namespace retrograde::simplification {
 
 namespace {
 
-// Beyond this many terms nothing is expected to decide a difference.
+// Differences with more terms than this are unlikely to be decided and are not tried.
 constexpr size_t max_compared_terms = 8;
-// Beyond this many operands nests are not looked through.
+// Nests with more operands than this are not inspected.
 constexpr size_t most_leaves = 9;
 
 Expr nest(Kind kind, std::vector<Expr> operands) {
   std::ranges::stable_sort(operands, [](const Expr& a, const Expr& b) {
-    if (is_const(a) != is_const(b)) return is_const(b);  // the constant last
+    if (is_const(a) != is_const(b)) return is_const(b);  // the constant comes last
     return canonical_less(a, b);
   });
   Expr result = operands[0];
@@ -24,7 +24,7 @@ Expr nest(Kind kind, std::vector<Expr> operands) {
   return result;
 }
 
-// What all operands have in common; removed from them.
+// Removes the terms that all operands have in common, and returns them.
 Sum take_common(std::vector<Sum>& sums) {
   Sum common = constant_sum(sums[0].type, 0);
   for (const Term& term : sums[0].terms) {
@@ -44,7 +44,7 @@ bool is_shifted(const Sum& sum, Kind kind) {
   return sum.terms.size() == 1 && sum.terms[0].factor == 1 && sum.terms[0].atom.kind() == kind;
 }
 
-// The operands of nested minima and maxima, as far as `most`.
+// Counts the operands of nested minima and maxima, up to `most`.
 size_t leaves(const Expr& e, size_t most) {
   const Sum sum = sum_of(e);
   if (most <= 1 || (!is_shifted(sum, Kind::Min) && !is_shifted(sum, Kind::Max))) return 1;
@@ -55,8 +55,8 @@ size_t leaves(const Expr& e, size_t most) {
 
 }  // namespace
 
-// max(min(max(x, 0), 9) - 1, 0) => min(max(x - 1, 0), 8): clamps inside of clamps are one, where
-// fewer operands remain. Undefined: nothing is gained.
+// max(min(max(x, 0), 9) - 1, 0) => min(max(x - 1, 0), 8): merges nested clamps when fewer operands
+// remain. Undefined when nothing is gained.
 Expr Simplifier::distribute_min_max(Kind kind, const std::vector<Expr>& operands) {
   const Kind other = kind == Kind::Min ? Kind::Max : Kind::Min;
   size_t before = 0;
@@ -78,7 +78,7 @@ Expr Simplifier::distribute_min_max(Kind kind, const std::vector<Expr>& operands
   return {};
 }
 
-// Whether x is never chosen over y: always at least (min) or at most (max) y.
+// Whether x is never selected over y: always at least y (min) or at most y (max).
 bool Simplifier::is_dominated(Kind kind, const Expr& x, const Expr& y) {
   if (equal(x, y)) return true;
   const bool is_min = kind == Kind::Min;
@@ -99,8 +99,8 @@ void Simplifier::add_operand(Kind kind, const Expr& operand, std::vector<Expr>& 
   operands.push_back(operand);
 }
 
-// Those of a nest, and of what is a nest besides a constant: max(max(x, 0) - 1, y) is
-// max(x - 1, -1, y).
+// The operands of a nest, also of one that is shifted by a constant: max(max(x, 0) - 1, y) is max(x
+// - 1, -1, y).
 std::vector<Expr> Simplifier::shifted_operands(Kind kind, const Expr& e) {
   if (!is_index_type(e.type()) || e.type().is_vector()) return operands_of(kind, e);
   std::vector<Expr> result;

@@ -23,7 +23,7 @@ Expr Simplifier::cast(Type type, const Expr& value) {
   }
   if (const auto* inner = value.as<Cast>()) {
     const Type origin = inner->value.type();
-    // The inner cast keeps every value: it can be left out. (Exactly one rounding remains.)
+    // The inner cast preserves every value, so it is dropped. (Exactly one rounding remains.)
     if (!from.is_bool() && from.can_represent(origin) && (from.is_float() || !type.is_bool())) {
       return cast(type, inner->value);
     }
@@ -46,7 +46,7 @@ Expr Simplifier::ramp(const Expr& base, const Expr& stride, int lanes) {
 
 Expr Simplifier::broadcast(const Expr& value, int lanes) { return make_broadcast(value, lanes); }
 
-// The same operation in all lanes is one scalar operation.
+// One operation on equal lanes becomes a scalar operation.
 Expr Simplifier::distribute_broadcast(Kind kind, const Expr& a, const Expr& b) {
   const auto* x = a.as<Broadcast>();
   const auto* y = b.as<Broadcast>();
@@ -56,7 +56,7 @@ Expr Simplifier::distribute_broadcast(Kind kind, const Expr& a, const Expr& b) {
 
 namespace {
 
-// Whether a mask holds in any lane, where one lane decides: of x + i s < y it is the first or last.
+// Whether a mask holds in any lane, if one lane decides: for x + i s < y the first or the last.
 Expr holds_anywhere(const Expr& mask) {
   const auto* op = mask.as<Binary>();
   if (!op) return {};
@@ -109,7 +109,7 @@ bool is_pure_operator(const Call& n) {
   return n.call_type == CallType::Operator && op_info(n.op).cls == OpClass::Pure;
 }
 
-// A vector operator whose arguments are all broadcasts of scalars: the scalar arguments.
+// The scalar arguments of a vector operator whose arguments are all broadcasts of scalars.
 std::vector<Expr> scalar_arguments(const std::vector<Expr>& args) {
   std::vector<Expr> scalars;
   for (const Expr& arg : args) {
@@ -120,7 +120,7 @@ std::vector<Expr> scalar_arguments(const std::vector<Expr>& args) {
   return scalars;
 }
 
-// x when e is op(x, 0) or the like, with nothing to do.
+// x when e is op(x, 0) or another identity.
 Expr bit_identity(Op op, const std::vector<Expr>& args) {
   switch (op) {
     case Op::bitwise_or:
@@ -156,7 +156,7 @@ Expr Simplifier::call(const Expr& e, const Call& n) {
   if (hint && is_const(args[0])) return args[0];
   if (hint && args[0].kind() == Kind::Call && args[0].as<Call>()->is_op(n.op)) return args[0];
   const bool promise = n.op == Op::promise_clamped || n.op == Op::unsafe_promise_clamped;
-  if (promise && args[0].type().is_int_or_uint()) {  // kept only while it says something new
+  if (promise && args[0].type().is_int_or_uint()) {  // kept only while it adds information
     if (is_const(args[0])) return args[0];
     const Expr inside =
         apply(Kind::And, apply(Kind::LE, args[1], args[0]), apply(Kind::LE, args[0], args[2]));
@@ -187,7 +187,7 @@ bool is_trivial_value(const Expr& e) {
   return false;
 }
 
-// Nested lets are handled in a loop: their number is not bounded by the C++ stack.
+// Nested lets are handled in a loop: their depth is not bounded by the C++ stack.
 Expr Simplifier::let(const Expr& e) {
   Lets kept;
   std::vector<std::unique_ptr<Binding>> bindings;

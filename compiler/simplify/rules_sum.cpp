@@ -1,5 +1,5 @@
-// Sums: gather like terms; x / c * c + x % c is x; what cancels against an operand of min or max
-// moves into it.
+// Sums: gathers like terms; x / c * c + x % c becomes x; a sum moves into an operand of min or max
+// if terms cancel there.
 #include <cmath>
 
 #include "ir/build.h"
@@ -16,7 +16,7 @@ std::optional<int64_t> constant_divisor(const Expr& e, Kind kind) {
   return c && *c > 1 ? c : std::nullopt;
 }
 
-// Whether factor * (the terms of x, without its constant) is part of the sum.
+// Whether the sum contains factor * x, apart from the constant of x.
 bool contains(const Sum& sum, const Sum& x, int64_t factor) {
   for (const Term& term : x.terms) {
     const Term* found = sum.find(term.atom);
@@ -65,7 +65,7 @@ Expr Simplifier::mul(const Expr& a, const Expr& b) {
   return canonical_less(b, a) ? binary(Kind::Mul, b, a) : binary(Kind::Mul, a, b);
 }
 
-// The sum, or the plain node when it has become too large or would overflow.
+// The sum as an expression; the plain node when the sum is too large or would overflow.
 Expr Simplifier::rebuild(Sum sum, Kind kind, const Expr& a, const Expr& b) {
   if (!sum.valid || sum.terms.size() > max_terms) return binary(kind, a, b);
   return rebuild(std::move(sum));
@@ -86,7 +86,7 @@ Expr Simplifier::rebuild(Sum sum) {
 }
 
 // n * c * (x / c) + n * (x % c) => n * x, and n * x - n * c * (x / c) => n * (x % c). Both follow
-// from x == x / c * c + x % c. A remainder that is known: n * c * (x / c) => n * x - n * remainder.
+// from x == x / c * c + x % c. With a known remainder: n * c * (x / c) => n * x - n * remainder.
 bool Simplifier::join_divisions(Sum& sum) {
   for (const Term& quotient : sum.terms) {
     const std::optional<int64_t> c = constant_divisor(quotient.atom, Kind::Div);
@@ -123,7 +123,7 @@ bool Simplifier::join_divisions(Sum& sum) {
   return false;
 }
 
-// (x + 1) * y - x * y => y: a product of a sum is multiplied out when fewer terms remain.
+// (x + 1) * y - x * y => y: expands a product of a sum when fewer terms remain.
 bool Simplifier::expand_product(Sum& sum) {
   if (sum.terms.size() < 2) return false;
   for (const Term& term : sum.terms) {
@@ -223,7 +223,7 @@ Expr Simplifier::gather_vectors(const Sum& sum) {
   return rest.is_constant() ? line : binary(Kind::Add, to_expr(rest), line);
 }
 
-// Exact for every value: operands of + and * commute; adding -x is subtracting x.
+// Exact for every value: + and * commute, and adding -x is subtracting x.
 Expr Simplifier::float_arithmetic(Kind kind, const Expr& a, const Expr& b) {
   const auto negated = [](const Expr& e) {  // x, when e is -0.0 - x
     const auto* n = e.as<Sub>();

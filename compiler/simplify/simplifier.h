@@ -1,12 +1,12 @@
-// The simplifier: one bottom-up, memoised walk. Each operator has a rule function that takes
-// simplified operands and gives a simplified result; rules call each other on smaller things.
-//   rules_sum.cpp      + - *, and what cancels inside sums
+// The simplifier: one bottom-up, memoised walk. Each operator has a rule function from simplified
+// operands to a simplified result; rules call each other on smaller expressions.
+//   rules_sum.cpp      + - *, and cancellation inside sums
 //   rules_divide.cpp   / %
 //   rules_min_max.cpp  min max
 //   rules_compare.cpp  == != < <=
 //   rules_logic.cpp    && || ! select
 //   rules_other.cpp    casts, vectors, operators, lets
-//   names.cpp          what names of index values stand for
+//   names.cpp          values of names bound to index expressions
 //   simplify_stmt.cpp  statements
 #pragma once
 
@@ -29,7 +29,7 @@ class Simplifier {
   Stmt operator()(const Stmt& s);
 
  private:
-  // ---- rules: operands simplified, of one type ----
+  // ---- rules: operands are simplified and have one type ----
   Expr apply(Kind kind, const Expr& a, const Expr& b);
   Expr add(const Expr& a, const Expr& b);
   Expr sub(const Expr& a, const Expr& b);
@@ -84,12 +84,12 @@ class Simplifier {
   Expr constant(const Expr& like, int64_t value) const;
 
   // ---- names of index values (names.cpp) ----
-  std::optional<Sum> find_meaning(const Expr& atom);
-  const Sum* meaning(const Expr& atom);
+  std::optional<Sum> find_definition(const Expr& atom);
+  const Sum* definition_of(const Expr& atom);
   bool cancel_names(Sum& sum);
-  Expr number_of(const Expr& variable);
-  void learn_numbers(const Expr& condition, std::vector<std::string>& learned);
-  void unlearn_numbers(const std::vector<std::string>& learned);
+  Expr constant_of(const Expr& variable);
+  void learn_constants(const Expr& condition, std::vector<std::string>& learned);
+  void forget_constants(const std::vector<std::string>& learned);
 
   // ---- statements ----
   Stmt let_stmt(const Stmt& s);
@@ -102,7 +102,7 @@ class Simplifier {
   Stmt allocate(const Allocate& n, const Stmt& simplified);
   Stmt children(const Stmt& s);
 
-  // A name bound while this lives; `replacement`, when defined, stands for it.
+  // Binds a name during its lifetime; `replacement`, when defined, replaces the name.
   class Binding {
    public:
     Binding(Simplifier& owner, const std::string& name, const Expr& min, const Expr& max,
@@ -116,18 +116,18 @@ class Simplifier {
     const std::string name_;
   };
   friend class Binding;
-  // A condition that holds while this lives.
-  class Given {
+  // Assumes a condition during its lifetime.
+  class ScopedCondition {
    public:
-    Given(Simplifier& owner, const Expr& condition);
-    ~Given();
-    Given(const Given&) = delete;
-    Given& operator=(const Given&) = delete;
+    ScopedCondition(Simplifier& owner, const Expr& condition);
+    ~ScopedCondition();
+    ScopedCondition(const ScopedCondition&) = delete;
+    ScopedCondition& operator=(const ScopedCondition&) = delete;
 
    private:
     Simplifier& owner_;
     Facts::Assumption assumption_;
-    std::vector<std::string> learned_;  // names that are numbers here
+    std::vector<std::string> learned_;  // names known to be constants here
   };
   void forget() {
     memo_.clear();
@@ -135,23 +135,23 @@ class Simplifier {
   }
 
   struct Entry {
-    Expr key, value;  // the key is kept alive so that its address stays its own
+    Expr key, value;  // the key is kept alive so that its address stays unique
   };
   Facts facts_;
   std::unordered_map<const ExprNode*, Entry> memo_;
   std::unordered_map<std::string, Expr> replacements_;
   std::unordered_set<std::string> seen_names_;
-  std::unordered_set<std::string> varying_;  // bound inside loops
-  std::unordered_map<std::string, std::optional<Sum>> meanings_;
-  int known_numbers_ = 0;  // branches around that have made names numbers
+  std::unordered_set<std::string> varying_;  // names bound inside loops
+  std::unordered_map<std::string, std::optional<Sum>> definitions_;
+  int known_constants_ = 0;  // enclosing branches that determine names to be constants
   int loops_around_ = 0;
-  int depth_ = 0;  // of rules calling rules
+  int depth_ = 0;  // of rules that call rules
 };
 
-bool has_effect(const Expr& e);  // beyond its value
-// Cheap enough to stand wherever its name does.
+bool has_effect(const Expr& e);  // besides its value
+// Whether the value is cheap enough to replace every use of its name.
 bool is_trivial_value(const Expr& e);
-// Drops lets whose names are not used.
+// Removes lets whose names are not used.
 Expr drop_dead_lets(const Expr& e);
 Stmt drop_dead_lets(const Stmt& s);
 

@@ -22,8 +22,7 @@ bool can_prove(const Expr& condition, const BoundsMap& bounds) {
   return is_const_true(simplify(condition, bounds));
 }
 
-// An end of a variable's bounds may mention another variable only when that one's bounds come
-// first.
+// Orders variables so that the bounds of each mention only earlier ones.
 Simplifier::Simplifier(const BoundsMap& bounds) {
   std::unordered_set<std::string> done;
   const std::function<void(const std::string&)> bind = [&](const std::string& name) {
@@ -44,7 +43,7 @@ Simplifier::Simplifier(const BoundsMap& bounds) {
 Expr Simplifier::operator()(const Expr& e) {
   if (const auto* var = e.as<Variable>()) {
     if (const auto* found = find_or_null(replacements_, var->name)) return *found;
-    const Expr number = number_of(e);
+    const Expr number = constant_of(e);
     return number.defined() ? number : e;
   }
   if (e.kind() <= Kind::StringImm) return e;
@@ -83,7 +82,7 @@ Expr Simplifier::node(const Expr& e) {
 
 Expr Simplifier::apply(Kind kind, const Expr& a, const Expr& b) {
   if (Expr splat = distribute_broadcast(kind, a, b); splat.defined()) return splat;
-  if (++depth_ > 60) {  // rules must not run away on rules' results
+  if (++depth_ > 60) {  // limits the recursion of rules on the results of rules
     --depth_;
     return binary(kind, a, b);
   }
@@ -141,10 +140,10 @@ Expr Simplifier::constant(const Expr& like, int64_t value) const {
 Simplifier::Binding::Binding(Simplifier& owner, const std::string& name, const Expr& min,
                              const Expr& max, const Expr& replacement)
     : owner_(owner), name_(name) {
-  // What was found for a name of another scope does not hold for this one.
+  // Results for the same name in another scope do not hold here.
   if (!owner.seen_names_.insert(name).second) {
     owner.forget();
-    owner.meanings_.erase(name);
+    owner.definitions_.erase(name);
   }
   if (owner.loops_around_ > 0) owner.varying_.insert(name);
   if (replacement.defined()) {
@@ -157,18 +156,18 @@ Simplifier::Binding::Binding(Simplifier& owner, const std::string& name, const E
 Simplifier::Binding::~Binding() {
   owner_.replacements_.erase(name_);
   owner_.facts_.unbind(name_);
-  owner_.meanings_.erase(name_);
+  owner_.definitions_.erase(name_);
 }
 
-Simplifier::Given::Given(Simplifier& owner, const Expr& condition)
+Simplifier::ScopedCondition::ScopedCondition(Simplifier& owner, const Expr& condition)
     : owner_(owner), assumption_(owner.facts_, condition) {
   if (condition.defined()) owner_.memo_.clear();
-  owner_.learn_numbers(condition, learned_);
+  owner_.learn_constants(condition, learned_);
 }
 
-Simplifier::Given::~Given() {
+Simplifier::ScopedCondition::~ScopedCondition() {
   owner_.memo_.clear();
-  owner_.unlearn_numbers(learned_);
+  owner_.forget_constants(learned_);
 }
 
 }  // namespace retrograde::simplification

@@ -1,4 +1,4 @@
-// Statements: loop bounds, conditions and asserts are known inside what they guard.
+// Statements: loop bounds, conditions and asserts are known inside the code that they guard.
 #include <algorithm>
 #include <list>
 
@@ -56,7 +56,7 @@ Stmt Simplifier::let_stmt(const Stmt& s) {
 Stmt Simplifier::loop(const Stmt& s, const For& n) {
   const Expr min = (*this)(n.min), extent = (*this)(n.extent);
   if (is_const_true(less(Kind::LE, extent, make_zero(extent.type())))) return {};
-  // The grid and its blocks keep their shape.
+  // Loops over blocks and threads keep their shape.
   if (is_const_int(extent, 1) && !is_gpu(n.runs))
     return let_stmt(Stmt(make_node<LetStmt>(n.name, min, n.body)));
   Stmt body;
@@ -64,7 +64,7 @@ Stmt Simplifier::loop(const Stmt& s, const For& n) {
   {
     const Binding binding(*this, n.name, min, sub(add(min, extent), make_one(min.type())), Expr());
     // Inside, the loop runs at least once.
-    const Given runs(*this, less(Kind::LT, make_zero(extent.type()), extent));
+    const ScopedCondition runs(*this, less(Kind::LT, make_zero(extent.type()), extent));
     body = (*this)(n.body);
   }
   --loops_around_;
@@ -89,9 +89,9 @@ Stmt Simplifier::launch(const Launch& n) {
                      std::move(body));
 }
 
-// What follows an assert may rely on it, to the end of the block.
+// The statements after an assert may rely on it, to the end of the block.
 Stmt Simplifier::block(const Stmt& s, const Block& n) {
-  const Given scope(*this, Expr());
+  const ScopedCondition scope(*this, Expr());
   std::vector<Stmt> stmts;
   bool changed = false;
   for (const Stmt& child : n.stmts) {
@@ -112,11 +112,11 @@ Stmt Simplifier::branches(const Stmt& s, const IfThenElse& n) {
   if (is_const(condition)) return (*this)(is_const_true(condition) ? n.when_true : n.when_false);
   Stmt when_true, when_false;
   {
-    const Given holds(*this, condition);
+    const ScopedCondition holds(*this, condition);
     when_true = (*this)(n.when_true);
   }
   if (n.when_false.defined()) {
-    const Given fails(*this, negate(condition));
+    const ScopedCondition fails(*this, negate(condition));
     when_false = (*this)(n.when_false);
   }
   if (condition.same_as(n.condition) && when_true.same_as(n.when_true) &&
@@ -127,12 +127,12 @@ Stmt Simplifier::branches(const Stmt& s, const IfThenElse& n) {
 
 namespace {
 
-// What is at most as large may lie on the stack, at its largest size (codegen/statements.cpp).
+// Allocations up to this size may lie on the stack, at their maximum size (codegen/statements.cpp).
 constexpr int64_t most_stack_bytes = int64_t{16} << 10;
 
 }  // namespace
 
-// At most that many elements; more than any allocation has where that is unknown.
+// An upper bound on the number of elements; larger than any allocation when unknown.
 int64_t Simplifier::most_elements(const Expr& count) {
   if (const auto* product = count.as<Mul>()) {
     const int64_t a = most_elements(product->a), b = most_elements(product->b);
@@ -144,8 +144,8 @@ int64_t Simplifier::most_elements(const Expr& count) {
   return std::max<int64_t>(facts_.upper_bound(sum_of(value)), 0);
 }
 
-// allocate a[min(n, 8)] => allocate a[8]: a small block of known size costs nothing, and may stay
-// in registers; one of run-time size is asked for in each iteration of the loops around.
+// allocate a[min(n, 8)] => allocate a[8]: a small block of constant size costs nothing and may stay
+// in registers; one of run-time size is allocated in each iteration of the loops around it.
 Stmt Simplifier::allocate(const Allocate& n, const Stmt& simplified) {
   const auto* a = simplified.defined() ? simplified.as<Allocate>() : nullptr;
   if (!a || is_const(a->elements) || n.memory == MemoryType::Heap || loops_around_ == 0)
@@ -156,7 +156,7 @@ Stmt Simplifier::allocate(const Allocate& n, const Stmt& simplified) {
                        a->offset);
 }
 
-// A Store or Provide.
+// For a Store or Provide.
 Stmt Simplifier::write(const Stmt& s, const Expr& predicate) {
   if (predicate.defined() && is_const_false((*this)(predicate))) return {};
   return children(s);

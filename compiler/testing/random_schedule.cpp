@@ -13,7 +13,7 @@
 
 #include "diagnostics/error.h"
 #include "frontend/data/param.h"
-#include "graph/directive_names.h"
+#include "graph/directive.h"
 #include "graph/names.h"
 #include "graph/wrappers.h"
 #include "ir/visit.h"

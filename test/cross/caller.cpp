@@ -1,5 +1,5 @@
-// Calls functions that were compiled for another processor; built by its cross compiler, run by an
-// emulator. 0 when everything is right.
+// Calls functions that were compiled for another processor. Built by that processor's cross
+// compiler, run by an emulator; returns 0 when everything is right.
 #include <HalideBuffer.h>
 #include <HalideRuntime.h>
 
@@ -40,7 +40,8 @@ static void test_blur() {
   });
   expect(is_right, "its result is right");
   Buffer<uint8_t, 2> query(nullptr, 0, 0);
-  expect(aot_blur_alone(query, 5, out) == 0 && query.dim(0).extent() == 66, "a bounds query answers");
+  expect(aot_blur_alone(query, 5, out) == 0 && query.dim(0).extent() == 66,
+         "a bounds query answers");
   halide_set_error_handler([](void*, const char* message) { last_error = message; });
   Buffer<uint8_t, 2> small(65, 34);
   expect(aot_blur_alone(small, 5, out) == halide_error_code_access_out_of_bounds &&
@@ -59,7 +60,7 @@ static void test_arguments() {
   expect(aot_scalars(true, -100, 200, -30000, 60000, -2000000000, 4000000000u, -(1LL << 60),
                      uint64_t{1} << 63, 1.5f, -2.25, nullptr, out) == 0,
          "scalars of every type arrive");
-  const double wanted[] = {1,   -100, 200, -30000, 60000, -2e9, 4e9, -0x1p60, 0x1p63, 1.5, -2.25};
+  const double wanted[] = {1, -100, 200, -30000, 60000, -2e9, 4e9, -0x1p60, 0x1p63, 1.5, -2.25};
   for (int i = 0; i < 11; i++) expect(out(i) == wanted[i], "a scalar has its value");
   Buffer<float, 1> in(8), first(8);
   Buffer<int32_t, 1> second(8);

@@ -1,8 +1,8 @@
-// The same pipelines in Halide 14, in Retrograde's machine code and in its interpreter.
+// Compares the same pipelines in Halide 14, in Retrograde's machine code and in its interpreter.
 //
-// Types must be the same; integers, and floats whose arithmetic happens to be exact, bit for bit;
-// other floats within twice the error bound that the interpreter derives for each element from the
-// roundings a compiler may move (testing/tracked_value.h).
+// Types must agree. Integers, and floats whose arithmetic happens to be exact, must agree bit for
+// bit. Other floats must agree within twice the error bound that the interpreter derives for each
+// element from the roundings that a compiler may move (testing/tracked_value.h).
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -16,10 +16,10 @@ namespace {
 using retrograde::oracle::Array;
 using retrograde::oracle::Comparison;
 
-// What may be left uncompared: elements whose discrete choices hang on a rounding.
+// How many elements may be left uncompared because a discrete choice depends on rounding.
 constexpr double max_unstable_fraction = 0.05;
 
-// When `who` throws, the others are compared all the same.
+// When `who` throws, the others are still compared.
 void expect_agreement(const std::vector<Array>& expected, const std::string& who,
                       const std::function<std::vector<HostBuffer>()>& run) {
   std::vector<HostBuffer> actual;
@@ -40,15 +40,16 @@ void expect_agreement(const std::vector<Array>& expected, const std::string& who
   }
 }
 
-// Numbers of fresh variables ("v3") count what each library made of them before; and Halide writes
-// a dot behind a loop along which something slides.
+// Removes differences in naming: numbers of fresh variables ("v3") depend on earlier ones in each
+// library, and Halide writes a dot after a loop along which a Func slides.
 std::string comparable(const std::string& nest) {
   const std::string numbered = std::regex_replace(nest, std::regex("\\bv[0-9]+"), "v#");
   return std::regex_replace(numbered, std::regex("\\.(:| in )"), "$1");
 }
 
-// These come first, in each process: what is made of a Func holds its name, of which Halide shows
-// nothing when it has a number, as it has when a name of the other cases falls on the same counter.
+// These tests run first in each process. Names of Funcs created for another Func contain its name,
+// and Halide prints none of them when it has a number, as happens when names of other cases use up
+// the counter.
 class LoopNests : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(LoopNests, AreShownAsHalideShowsThem) {

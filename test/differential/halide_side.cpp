@@ -9,8 +9,8 @@ namespace differential {
 namespace in_halide {
 using namespace Halide;
 
-// Halide 14 takes any AVX512-BF16 machine for a Sapphire Rapids, and emits instructions that others
-// lack.
+// Halide 14 treats any machine with AVX512-BF16 as a Sapphire Rapids, and emits instructions that
+// others lack.
 static Target jit_target() {
   return get_jit_target_from_environment().without_feature(Target::AVX512_SapphireRapids);
 }

@@ -1,4 +1,4 @@
-// The two languages seen from the test: the same pipelines, built and run by each.
+// The interface between the test and the two languages: the same pipelines, built and run by each.
 #pragma once
 
 #include <HalideBuffer.h>
@@ -19,13 +19,13 @@ std::vector<std::string> case_names();
 std::vector<HostBuffer> run_in_halide(const std::string& name, bool scheduled);
 // The same source compiled against Retrograde.
 std::vector<HostBuffer> run_in_retrograde(const std::string& name, bool scheduled);
-// The same definitions evaluated by the interpreter, with the error that Halide's freedom to
-// reassociate allows.
+// The same definitions evaluated by the interpreter, with error bounds that allow for Halide's
+// reassociation.
 std::vector<retrograde::oracle::Array> interpret(const std::string& name);
 
-// Names of the schedules whose loops are shown.
+// Names of the schedules whose loop nests are printed.
 std::vector<std::string> nest_names();
-// print_loop_nest() of one, to the standard error stream.
+// print_loop_nest() of one of them, to standard error.
 void print_nest_in_halide(const std::string& name);
 void print_nest_in_retrograde(const std::string& name);
 

@@ -1,4 +1,4 @@
-// What compiling to files refuses, and that it leaves nothing behind.
+// Errors of ahead-of-time compilation, which must leave no files behind.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -77,7 +77,7 @@ TEST_F(AotErrors, PathThatIsAFolder) {
   expect_error({"a.h\"", "Is a directory"}, [&] {
     f.compile_to_file(path("a"), {in, gain}, "a", host);
   });
-  EXPECT_FALSE(fs::exists(path("a.o")));  // nothing of a call that fails is written
+  EXPECT_FALSE(fs::exists(path("a.o")));  // a failing call writes no file
 }
 
 TEST_F(AotErrors, AFileThatCannotBeWrittenLeavesTheOthersAsTheyWere) {
@@ -114,7 +114,7 @@ TEST_F(AotErrors, BufferWithoutData) {
   expect_error({"is embedded with its data"}, [&] { g.compile_to_file(path("a"), {}, "a", host); });
 }
 
-// ---- what cannot be compiled to, or for ----
+// ---- unsupported outputs and targets ----
 
 TEST_F(AotErrors, SourceCodeInC) {
   expect_error<Unsupported>({"c_source", "there is no writer", "Write an object"}, [&] {

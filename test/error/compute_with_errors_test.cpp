@@ -1,4 +1,4 @@
-// Stages that cannot share loops are refused before anything is lowered, by messages that say why.
+// Illegal uses of compute_with are rejected before lowering, with messages that give the reason.
 #include <gtest/gtest.h>
 
 #include "retrograde/retrograde.h"
@@ -69,11 +69,11 @@ TEST_F(ComputeWithErrors, TwoStagesOfOneFuncInOneNest) {
   expect_refused({"one after another"});
 }
 
-// rule: of its own Func, a stage joins the one before it
+// rule: within one Func, a stage joins the stage before it
 TEST_F(ComputeWithErrors, AStageThatIsNotTheOneBefore) {
   f(x, y) += 1;
   f(x, y) *= 2;
-  expect_error({"of its own Func, a stage joins the one before it", "update(0)"},
+  expect_error({"within one Func, a stage joins the stage before it", "update(0)"},
                [&] { f.update(1).compute_with(f, y); });
   expect_error({"Stages of one Func run in their order"}, [&] { f.compute_with(f.update(0), y); });
 }
@@ -197,7 +197,7 @@ TEST_F(ComputeWithErrors, ALevelThatIsNeverSet) {
   LoopLevel level;
   g.compute_with(level);
   expect_refused({"is set before the pipeline is compiled", "never was"});
-  expect_error({"of its own Func"}, [&] { level.set(LoopLevel(g, x)); });
+  expect_error({"within one Func"}, [&] { level.set(LoopLevel(g, x)); });
 }
 
 TEST_F(ComputeWithErrors, AProducerAtALoopOfTheGuest) {

@@ -1,4 +1,4 @@
-// define_extern: one test for each message of its own, by kind and key phrase.
+// define_extern: one test for each of its messages, by kind and key phrase.
 #include <gtest/gtest.h>
 
 #include "retrograde/retrograde.h"
@@ -48,7 +48,7 @@ TEST_F(ExternErrors, ThereIsAValue) {
 
 TEST_F(ExternErrors, VariablesDiffer) {
   expect_mentions(definition_error("g", {}, {Int(32)}, {x, y, x}),
-                  {"its arguments are different Vars", "\"x\" stands there twice"});
+                  {"its arguments are different Vars", "\"x\" appears twice"});
 }
 
 TEST_F(ExternErrors, FuncsAmongTheArgumentsAreDefined) {

@@ -166,7 +166,7 @@ TEST(DefinitionErrors, ArgumentsOfAFirstDefinitionAreDistinctVars) {
     Func g;
     g(3) = x;
   });
-  expect_error({"different Vars", "stands there twice"}, [&] {
+  expect_error({"different Vars", "appears twice"}, [&] {
     Func g;
     g(x, x) = x;
   });
@@ -179,13 +179,13 @@ TEST(DefinitionErrors, ArgumentsOfAFirstDefinitionAreDistinctVars) {
 
 TEST(DefinitionErrors, FreeVariables) {
   Setting s;
-  expect_error({"\"z\"", "stands on the left-hand side"}, [&] {
+  expect_error({"\"z\"", "appears on the left-hand side"}, [&] {
     Func g;
     g(s.x) = s.x + s.z;
   });
   s.f(s.x, s.y) = 1;
-  expect_error({"\"y\"", "stands on the left-hand side"}, [&] { s.f(s.x, 3) = s.y; });
-  expect_error({"stands on the left-hand side"}, [&] { s.f(s.x, s.z) = s.y; });
+  expect_error({"\"y\"", "appears on the left-hand side"}, [&] { s.f(s.x, 3) = s.y; });
+  expect_error({"appears on the left-hand side"}, [&] { s.f(s.x, s.z) = s.y; });
 }
 
 TEST(DefinitionErrors, ImplicitVariablesWithoutPlaceholder) {
@@ -232,14 +232,14 @@ TEST(DefinitionErrors, BoundsOfADomainThatReadTheFuncItself) {
   });
 }
 
-// rule: all definitions of a Func have as many values
+// rule: all definitions of a Func have the same number of values
 TEST(DefinitionErrors, UpdateOfAnotherTypeOrSize) {
   Setting s;
   expect_error({"same types", "int32", "float32"}, [&] { s.f(s.x, s.y) = 1.5f; });
   expect_error({"same types"}, [&] { s.f(s.x, s.y) += cast<uint64_t>(s.x); });
-  expect_error({"as many arguments"}, [&] { s.f(s.x) = 1; });
-  expect_error({"as many values"}, [&] { s.f(s.x, s.y) = Tuple(1, 2); });
-  expect_error({"as many values"}, [&] { s.f(s.x, s.y) += Tuple(1, 2); });
+  expect_error({"the same number of arguments"}, [&] { s.f(s.x) = 1; });
+  expect_error({"the same number of values"}, [&] { s.f(s.x, s.y) = Tuple(1, 2); });
+  expect_error({"the same number of values"}, [&] { s.f(s.x, s.y) += Tuple(1, 2); });
 }
 
 TEST(DefinitionErrors, UpdateAfterUse) {
@@ -262,8 +262,8 @@ TEST(DefinitionErrors, FloatCoordinateOnTheLeft) {
 
 TEST(DefinitionErrors, PureVariableOutOfItsPlace) {
   Setting s;
-  expect_error({"its own place", "Use an RDom"}, [&] { s.f(s.x, s.y) = s.f(s.x - 1, s.y); });
-  expect_error({"its own place"}, [&] { s.f(s.x, s.y) += s.f(s.y, s.x); });
+  expect_error({"keeps its position", "Use an RDom"}, [&] { s.f(s.x, s.y) = s.f(s.x - 1, s.y); });
+  expect_error({"keeps its position"}, [&] { s.f(s.x, s.y) += s.f(s.y, s.x); });
 }
 
 TEST(DefinitionErrors, RecurrenceWithoutFirstValue) {
@@ -273,7 +273,7 @@ TEST(DefinitionErrors, RecurrenceWithoutFirstValue) {
 }
 
 TEST(DefinitionErrors, RecursionAmongFuncs) {
-  // Cannot be written with Funcs; contents put together by hand are checked too.
+  // Cannot be written with Funcs; contents assembled by hand are checked too.
   Var x("x");
   Func a("circle_a"), b("circle_b");
   a(x) = x;
@@ -521,7 +521,7 @@ TEST(BufferErrors, Sizes) {
                [] { Buffer<double> b(1 << 30, 1 << 30); });
 }
 
-// Dimension 2 would begin 2^31 elements on, which int32 takes for a negative number.
+// Dimension 2 would begin at element 2^31, which is negative as an int32.
 TEST(BufferErrors, StridesThatOverflow) {
   const int n = 1 << 16, half = 1 << 15;
   static uint8_t memory[4];  // never touched
@@ -540,7 +540,7 @@ TEST(BufferErrors, StridesThatOverflow) {
                [&] { Buffer<uint8_t>::make_interleaved(memory, n, 3, half); });
   expect_error({"strides must fit 31 bits"},
                [&] { Buffer<>::make_interleaved(UInt(8), n, 3, half); });
-  // All elements are one: its shape is, and a dense Buffer of it would not be.
+  // All strides are 0 here: the shape is legal, but a dense Buffer of it would not be.
   const halide_dimension_t shape[] = {{0, n, 0}, {0, half, 0}, {0, 2, 0}};
   Buffer<uint8_t> same(memory, 3, shape);
   expect_error(words, [&] { Buffer<float>::make_with_shape_of(same); });
@@ -641,7 +641,7 @@ TEST(PipelineErrors, Outputs) {
   expect_error({"needs a definition"}, [] { Func("undefined_output").realize({3}); });
 }
 
-// ---- arguments of calls: found before anything is compiled ----
+// ---- arguments of calls: checked before compilation ----
 
 TEST(CallArguments, Sizes) {
   Setting s;

@@ -1,4 +1,4 @@
-// What a generator's author or a build file can do wrong.
+// Errors of generator authors and build files.
 #include <gtest/gtest.h>
 
 #include <sstream>
@@ -134,7 +134,7 @@ class Contradicting : public Generator<Contradicting> {
   void generate() {}
 };
 
-// Realizes what depends on an input that has no value before the function is called.
+// Realizes a Func that depends on an input before the input has a value.
 class Premature : public Generator<Premature> {
  public:
   Input<Buffer<float, 1>> in{"in"};
@@ -462,7 +462,7 @@ TEST(GeneratorProgram, RefusesPluginsAndSchedulersThatAreNotThere) {
                  "\"Li2018\"");
 }
 
-// What the generator itself does wrong is no fault of the command line.
+// Errors of the generator itself are not reported as wrong usage of the command line.
 TEST(GeneratorProgram, ReportsAGeneratorsErrorsWithoutUsage) {
   const Outcome result = run({"-g", "simple_for_errors", "-o", ".", "target=host"});
   EXPECT_EQ(result.status, 1);

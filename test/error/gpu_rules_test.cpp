@@ -1,4 +1,4 @@
-// Schedules that no GPU can run are refused when the pipeline is lowered, in the words of the user.
+// Schedules that no GPU can run are rejected during lowering, in terms of the user's program.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -78,7 +78,7 @@ TEST_F(GpuRules, NumbersOfThreadsDoNotDependOnData) {
   g(x) = 0;
   g(x) += r;
   g.update().gpu_blocks(x).allow_race_conditions().gpu_threads(r);
-  // What is computed is refused no more than it must be: the domain is constant, the condition is not.
+  // The check is no stricter than necessary: the domain is constant, although the condition is not.
   EXPECT_NO_THROW(g.compile_to_module({counts}, "g", gpu));
 }
 

@@ -1,5 +1,5 @@
-// Programs that mean nothing, or not what they say: each is refused with all four parts of a
-// message.
+// Programs without a meaning, or that do not mean what they say: each is rejected by a message with
+// all four parts.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -19,20 +19,20 @@ struct Refused : testing::Test {
 // ---- constants that would wrap ----
 
 TEST_F(Refused, ClampToBoundsOfAnotherType) {
-  expect_error({"a bound is a value of the type", "255 has no place in int8"},
+  expect_error({"a bound is a value of the type", "255 does not fit int8"},
                [&] { clamp(i8, 0, 255); });
-  expect_error({"-1 has no place in uint8"}, [&] { clamp(u8, -1, 10); });
-  expect_error({"0.5 has no place in int32"}, [&] { clamp(x, 0.5f, 1); });
+  expect_error({"-1 does not fit uint8"}, [&] { clamp(u8, -1, 10); });
+  expect_error({"0.5 does not fit int32"}, [&] { clamp(x, 0.5f, 1); });
   expect_error({"int32 has values that uint8 has not"}, [&] { clamp(u8, x, 10); });
-  expect_error({"1e+300 has no place in float32"}, [&] { clamp(f32, 0, Expr(1e300)); });
+  expect_error({"1e+300 does not fit float32"}, [&] { clamp(f32, 0, Expr(1e300)); });
   EXPECT_EQ(clamp(u8, cast<int>(cast<uint8_t>(y)), 10).type(), UInt(8));
   EXPECT_EQ(clamp(f32, 0, x).type(), Float(32));
   EXPECT_EQ(clamp(x, 0.0f, 1.0f).type(), Int(32));
 }
 
 TEST_F(Refused, LerpOfEndsThatDoNotFit) {
-  expect_error({"a constant end", "300 has no place in uint8"}, [&] { lerp(u8, 300, 0.5f); });
-  expect_error({"-1 has no place in uint8"}, [&] { lerp(-1, u8, 0.5f); });
+  expect_error({"a constant end", "300 does not fit uint8"}, [&] { lerp(u8, 300, 0.5f); });
+  expect_error({"-1 does not fit uint8"}, [&] { lerp(-1, u8, 0.5f); });
   expect_error({"both values have one type", "uint8 and int8"}, [&] { lerp(u8, i8, 0.5f); });
   expect_error({"at most 32 bits", "int64"},
                [&] { lerp(cast<int64_t>(x), cast<int64_t>(y), 0.5f); });
@@ -50,7 +50,7 @@ TEST_F(Refused, LerpOfConstantsOfDifferentTypes) {
   EXPECT_EQ(lerp(1.0, f32, 0.5f).type(), Float(32));
 }
 
-// A call that C++20's lerp of doubles would take, too.
+// A call that also matches C++20's std::lerp of doubles.
 TEST_F(Refused, LerpOfNumbersIsTheLanguagesOwn) {
   const Expr whole = lerp(42, 69, 0.25f);
   EXPECT_EQ(whole.type(), Int(32));
@@ -96,9 +96,9 @@ TEST_F(Refused, IntegersThatAFloatWouldRound) {
 }
 
 TEST_F(Refused, MeansWithConstantsThatDoNotFit) {
-  expect_error({"300 has no place in uint8"}, [&] { halving_add(u8, 300); });
-  expect_error({"200 has no place in int8"}, [&] { rounding_halving_add(i8, 200); });
-  expect_error({"-3 has no place in uint8"}, [&] { halving_sub(u8, -3); });
+  expect_error({"300 does not fit uint8"}, [&] { halving_add(u8, 300); });
+  expect_error({"200 does not fit int8"}, [&] { rounding_halving_add(i8, 200); });
+  expect_error({"-3 does not fit uint8"}, [&] { halving_sub(u8, -3); });
   EXPECT_EQ(halving_add(u8, 3).type(), UInt(8));
 }
 
@@ -116,16 +116,16 @@ TEST_F(Refused, ExteriorsOfAnotherType) {
   const auto with = [&](const Expr& value) {
     return BoundaryConditions::constant_exterior(f, value, {{0, 10}});
   };
-  expect_error({"one of the type inside", "300 has no place in uint8"}, [&] { with(300); });
-  expect_error({"3.5 has no place in uint8"}, [&] { with(3.5f); });
+  expect_error({"one of the type inside", "300 does not fit uint8"}, [&] { with(300); });
+  expect_error({"3.5 does not fit uint8"}, [&] { with(3.5f); });
   EXPECT_EQ(with(255).type(), UInt(8));
 }
 
 TEST_F(Refused, LimitsThatAParamCannotHold) {
   Param<uint8_t> p("p");
   expect_error({"a value of the parameter's type", "300"}, [&] { p.set_range(0, 300); });
-  expect_error({"-1 has no place in uint8"}, [&] { p.set_min_value(-1); });
-  expect_error({"256 has no place in uint8"}, [&] { p.set_estimate(256); });
+  expect_error({"-1 does not fit uint8"}, [&] { p.set_min_value(-1); });
+  expect_error({"256 does not fit uint8"}, [&] { p.set_estimate(256); });
 }
 
 TEST_F(Refused, SizesAndCoordinatesBeyond32Bits) {
@@ -154,17 +154,17 @@ TEST_F(Refused, ConstantsThatOverflow) {
     return Buffer<>(f.realize({1})).type();
   };
   const std::initializer_list<std::string_view> phrases{
-      "constants of int32 and int64 do not overflow", "has no place in int32"};
+      "constants of int32 and int64 do not overflow", "does not fit int32"};
   expect_error(phrases, [&] { define(large * Expr(0x76543210)); });
   expect_error(phrases, [&] { define(x + select(x > 3, x, Expr(INT32_MAX) + 1)); });
   expect_error(phrases, [&] { define(Expr(INT32_MIN) - 1); });
-  expect_error({"has no place in int64"}, [&] { define(huge + huge); });
+  expect_error({"does not fit int64"}, [&] { define(huge + huge); });
   expect_error(phrases, [&] {
     Func f("f");
     f(x) = 0;
     f(large * 16) += 1;
   });
-  // Elsewhere there is room, or arithmetic wraps around.
+  // In a wider type there is room, and unsigned arithmetic wraps around.
   EXPECT_EQ(define(cast<int64_t>(large) * Expr(0x76543210)), halide_type_of<int64_t>());
   EXPECT_EQ(define(cast<uint32_t>(large) * cast<uint32_t>(0x76543210)), halide_type_of<uint32_t>());
   EXPECT_EQ(define(cast<int16_t>(32767) + cast<int16_t>(1)), halide_type_of<int16_t>());
@@ -269,7 +269,7 @@ TEST_F(Refused, LoopsThatRaceWhenTheyAreOne) {
   expect_error({"where \"x\" runs on a GPU"},
                [&] { update([&](Stage s) { s.gpu_blocks(x).fuse(r, x, t); }); });
   expect_error(parallel, [&] { update([&](Stage s) { s.parallel(x).fuse(r, x, t).serial(t); }); });
-  // Pure loops, serial ones, and updates that are atomic are as before.
+  // Pure loops, serial loops and atomic updates are not affected.
   update([&](Stage s) { s.parallel(y).fuse(x, y, Var("t")); });
   update([&](Stage s) { s.fuse(r, x, t).parallel(y); });
   update([&](Stage s) { s.atomic().parallel(x).fuse(r, x, t); });

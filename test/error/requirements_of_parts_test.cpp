@@ -1,5 +1,5 @@
-// Requirements of handles, compiled functions, schedules and derivatives that no other test breaks
-// by their words: one short program against each.
+// Requirements of handles, compiled functions, schedules and derivatives whose words no other test
+// expects: one short program against each.
 #include "error/rules.h"
 
 namespace retrograde {

@@ -1,5 +1,5 @@
-// A program against a rule: the kind of its error, words of its rule, and that all four parts are
-// there.
+// Checks that a program breaks a rule: the kind of its error, words of its rule, and that the
+// message has all four parts.
 #pragma once
 
 #include <gtest/gtest.h>

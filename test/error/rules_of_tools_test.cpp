@@ -1,4 +1,4 @@
-// Rules of modules, targets, derivatives and generators that no test of a part mentions.
+// Rules of modules, targets, derivatives and generators that no other test covers.
 #include <cstdlib>
 #include <filesystem>
 #include <sstream>

@@ -1,5 +1,5 @@
-// Rules of the language and its schedules that no test of a part mentions: one short program
-// against each.
+// Rules of the language and its schedules that no other test covers: one short program against
+// each.
 #include "error/rules.h"
 
 #include <limits>
@@ -180,7 +180,7 @@ TEST_F(Rules, FusedBeforeFactoring) {
   g(y) += f(r.x, r.y);
   Var u("u"), t("t");
   g.update().reorder(r.x, y, r.y).fuse(r.x, y, t);
-  expect("reduction variables are fused with each other only", [&] { g.update().rfactor(r.y, u); });
+  expect("reduction variables are fused only with each other", [&] { g.update().rfactor(r.y, u); });
 }
 
 TEST_F(Rules, Wrappers) {
@@ -295,7 +295,7 @@ TEST_F(Rules, SizesOfArraysFitTheirNumbers) {
   Func reads("reads");
   RDom r(0, 1 << 16, 0, 1 << 15);
   reads(x) = sum(cast<int>(in(r.x, r.y, x)));
-  try {  // of the runtime, whose messages are one text
+  try {  // from the runtime, whose messages are a single text
     reads.infer_input_bounds({2});
     ADD_FAILURE() << "no error";
   } catch (const RuntimeError& error) {
@@ -367,7 +367,7 @@ TEST_F(Rules, FuncsInACircle) {
   Func a("a"), b("b");
   a(x) = 0;
   b(x) = a(x);
-  a.function()->pure->values[0] = b(x);  // what no definition can say
+  a.function()->pure->values[0] = b(x);  // cannot be written as a definition
   expect("Funcs may not depend on each other in a circle", [&] { b.realize({4}); });
   a.function()->pure->values[0] = 0;
 }
@@ -376,7 +376,7 @@ TEST_F(Rules, ParamsOfTypesThatAreNoNumber) {
   expect("its type is a scalar", [&] { Param<> p(Int(32, 4)); });
 }
 
-// ---- what is left ----
+// ---- miscellaneous ----
 
 TEST_F(Rules, BuffersAndTheirDimensions) {
   Buffer<int> b(4, 4);
@@ -406,7 +406,7 @@ TEST_F(Rules, CallsOfFuncsWithoutDefinition) {
   const Func nobody("nobody");
   Func g("g");
   g(x) = x;
-  g.function()->pure->values[0] =  // what no definition can say
+  g.function()->pure->values[0] =  // cannot be written as a definition
       ir::call_func("nobody", Int(32), {x}, 0, ir::SymbolRef(nobody.function()));
   expect("every Func that is used needs a definition", [&] { g.realize({4}); });
   expect("a Func is updated after its first definition",

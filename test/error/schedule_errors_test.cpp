@@ -1,4 +1,4 @@
-// Schedules that lowering refuses, and what it says.
+// Schedules that lowering rejects, and the messages.
 #include <gtest/gtest.h>
 
 #include "retrograde/retrograde.h"
@@ -66,7 +66,7 @@ TEST_F(ScheduleErrors, promised_bounds_that_are_too_small) {
   expect_mentions(message<RuntimeError>(), {"bounded to [0, 3]", "need [0, 8]"});
 }
 
-// ---- directives for what is inlined ----
+// ---- directives for inlined Funcs ----
 
 struct InlinedErrors : ScheduleErrors {
   void expect_refused(std::initializer_list<std::string_view> phrases) {

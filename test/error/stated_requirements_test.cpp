@@ -1,6 +1,6 @@
-// Requirements that the headers state of operands, sizes and handles: one short program against
-// each. Before they were checked, these programs crashed, reported a bug of ours, or computed
-// something else.
+// Requirements that the headers state for operands, sizes and handles: one short program against
+// each. Without the checks these programs crashed, reported an internal error, or computed wrong
+// values.
 #include "error/rules.h"
 
 #include "support/errors.h"
@@ -39,8 +39,7 @@ TEST_F(StatedRequirements, WideResultsHaveSixtyFourBitsAtMost) {
   const Expr wide = cast<int64_t>(x);
   expect("its result has at most 64 bits", [&] { widening_mul(wide, wide); });
   expect("its result has at most 64 bits", [&] { widening_add(wide, x); });
-  expect("its result has at most 64 bits",
-         [&] { widening_sub(cast<double>(x), cast<double>(x)); });
+  expect("its result has at most 64 bits", [&] { widening_sub(cast<double>(x), cast<double>(x)); });
   expect("its result has at most 64 bits", [&] { saturating_add(wide, wide); });
   expect("its result has at most 64 bits", [&] { saturating_sub(x, wide); });
 }
@@ -98,7 +97,7 @@ TEST_F(StatedRequirements, MessagesOfRequirementsAreOverParameters) {
          [&] { pipeline.add_requirement(gain > 0, "not", Expr()); });
 }
 
-// Loops and strides divide by these sizes: 0 or less left points out.
+// Loops and strides are divided by these sizes; 0 or less would skip points.
 TEST_F(StatedRequirements, SizesOfRunTimeArePositive) {
   for (const int bad : {0, -2}) {
     Param<int> size("size", bad);
@@ -114,8 +113,7 @@ TEST_F(StatedRequirements, SizesOfRunTimeArePositive) {
                     {"a factor is at least 1", "it is"});
     expect_mentions(call([&](Func& g) { g.align_storage(x, size); }),
                     {"the alignment is at least 1"});
-    expect_mentions(call([&](Func& g) { g.align_bounds(x, size); }),
-                    {"the modulus is at least 1"});
+    expect_mentions(call([&](Func& g) { g.align_bounds(x, size); }), {"the modulus is at least 1"});
     EXPECT_EQ(call([&](Func& g) { g.specialize(size > 0).split(x, xo, xi, size); }), "no error");
   }
   Param<int> size("size", 3);
@@ -133,8 +131,9 @@ TEST_F(StatedRequirements, BoxesOfBordersAreIntegers) {
   expect("bounds are integers", [&] { repeat_edge(line, {{0.0f, 4.0f}}); });
   expect("an extent is not negative", [&] { mirror_image(line, {{0, -1}}); });
   expect("an extent is not negative", [&] { constant_exterior(line, Expr(0), {{0, -1}}); });
-  expect("the value outside is a defined expression",
-         [&] { constant_exterior(line, Expr(), {{0, 4}}); });
+  expect("the value outside is a defined expression", [&] {
+    constant_exterior(line, Expr(), {{0, 4}});
+  });
 }
 
 // ---- handles ----

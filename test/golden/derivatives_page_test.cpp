@@ -1,5 +1,5 @@
-// The tables of docs/derivatives.md are written here from the rule table itself, so that the page
-// cannot state a convention that the code does not have.
+// Generates the tables of docs/derivatives.md from the rule table, so that the page agrees with the
+// code.
 #include <gtest/gtest.h>
 
 #include <map>

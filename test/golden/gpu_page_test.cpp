@@ -1,6 +1,6 @@
-// The part of docs/gpu.md that schedules a convolution is written here: after each directive the loops and
-// kernels as the compiler has them, and what the simulated device counts. RETROGRADE_UPDATE_GOLDEN=1 writes
-// it; read the difference before you commit it.
+// Generates the part of docs/gpu.md that schedules a convolution: after each directive, the
+// compiler's loops and kernels and the counts of the simulated device. RETROGRADE_UPDATE_GOLDEN=1
+// writes it; read the difference before you commit it.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -20,12 +20,12 @@
 namespace retrograde {
 namespace {
 
-// Before anything asks for a device.
+// Must be set before the first use of a device.
 [[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
 
 constexpr int width = 256, height = 128;
 
-// Not this machine's: what is shown must be the same everywhere.
+// A fixed target, so that the page is the same on every machine.
 Target with_gpu() {
   return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
 }
@@ -84,16 +84,16 @@ const std::vector<Step>& steps() {
   return all;
 }
 
-// With the first directives of the steps.
+// The program with the first `count` directives.
 Convolution scheduled(size_t count) {
   Convolution c;
   for (size_t i = 0; i < count; ++i) steps()[i].give(c);
   return c;
 }
 
-// ---- what is shown ----
+// ---- contents ----
 
-// Names count up within a process.
+// The numbers in names depend on the process.
 std::string without_numbers(const std::string& text) {
   return std::regex_replace(text, std::regex("\\.?\\$\\d+"), "");
 }

@@ -1,5 +1,5 @@
 // Every golden/graph/<pass>/<case>.in, the text of a graph, through its pass must give <case>.out.
-// Where there is a <case>.log, the pass is to give its directives (opt --graph --log=FILE).
+// If there is a <case>.log, its directives are applied by the pass (opt --graph --log=FILE).
 // RETROGRADE_UPDATE_GOLDEN=1 writes the .out files instead; read the difference before you commit
 // it.
 #include <gtest/gtest.h>

@@ -48,7 +48,7 @@ std::vector<GoldenCase> find_cases() {
   return cases;
 }
 
-// A pass that must refuse its input has the message as its output.
+// The expected output of a pass that must reject its input is the message.
 std::string outcome(const StatementPass& pass, const std::string& source) {
   try {
     return print(pass.run(parse_stmt(source)));
@@ -86,7 +86,7 @@ INSTANTIATE_TEST_SUITE_P(Cases, LowerGolden, testing::ValuesIn(find_cases()), []
   return name;
 });
 
-// What was parsed prints as what was parsed: golden inputs double as tests of the printer.
+// Parsed inputs print as they were written, so golden inputs also test the printer.
 TEST_P(LowerGolden, InputRoundTrips) {
   Stmt program = parse_stmt(read_file(GetParam().input));
   EXPECT_TRUE(equal(program, parse_stmt(print(program))));

@@ -1,7 +1,7 @@
-// Every golden/pipeline/<pass>/<case>.in, the text of a graph, lowered up to its pass: <case>.out has
-// the program before the pass and after it. A first line "target ..." says for what it is lowered.
-// RETROGRADE_UPDATE_GOLDEN=1 writes the .out files instead; read the difference before you commit
-// it.
+// Every golden/pipeline/<pass>/<case>.in, the text of a graph, is lowered up to its pass:
+// <case>.out holds the program before and after the pass. A first line "target ..." sets the
+// target. RETROGRADE_UPDATE_GOLDEN=1 writes the .out files instead; read the difference before you
+// commit it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -37,7 +37,7 @@ std::vector<fs::path> find_cases() {
   return cases;
 }
 
-// Before the pass and after it.
+// The program before the pass and after it.
 std::string lowered_by(const std::string& pass, std::string source) {
   LowerOptions options{Target("x86-64-linux-avx2"), true, {}, pass};
   if (source.rfind("target ", 0) == 0) {
@@ -74,13 +74,14 @@ INSTANTIATE_TEST_SUITE_P(Cases, PipelineGolden, testing::ValuesIn(find_cases()),
                                   info.param.stem().string();
                          });
 
-// Each pass of the compiler, and each that opt runs by itself, has a case: as one from statement to
-// statement, or of what it makes of a graph.
+// Each pass of the compiler, and each that opt can run alone, has a case: either from statement to
+// statement, or from a graph.
 TEST(PassesOfThePipeline, AreAllTested) {
   std::vector<std::string> names = pass_names();
   for (const StatementPass& pass : statement_passes()) names.push_back(pass.name);
   for (const std::string& name : names) {
-    const bool is_simplify = name.rfind("simplify", 0) == 0;  // of storage, of vectors: the same
+    const bool is_simplify =
+        name.rfind("simplify", 0) == 0;  // of storage, of vectors: the same pass
     const std::string folder = is_simplify ? "simplify" : name;
     EXPECT_TRUE(fs::exists(golden / "lower" / folder) || fs::exists(golden / "pipeline" / folder))
         << name << " has no golden test";

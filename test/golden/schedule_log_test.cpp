@@ -1,7 +1,7 @@
-// Every directive of golden/schedule_log/directives.in, each log given to one program: the log as
-// text, what it says in the graph, and the same as C++. RETROGRADE_UPDATE_GOLDEN=1 writes the .out
-// file instead, and statements.inc, which is compiled here: it must give the log that it was
-// printed from.
+// Applies each log of golden/schedule_log/directives.in, which together have every directive, to
+// one program. The .out file holds the log as text, its effect on the graph, and the log as C++.
+// RETROGRADE_UPDATE_GOLDEN=1 writes the .out file instead, and statements.inc, which is compiled
+// here and must produce the log that it was printed from.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -75,7 +75,7 @@ std::vector<ScheduleLog> logs() {
   return result;
 }
 
-// Lines that the graph did not have, below what they are of.
+// Lines that are new in the graph, below the entity that contains them.
 std::string news(const std::string& before, const std::string& after) {
   std::multiset<std::string> known;
   for (const std::string& line : lines_of(before)) known.insert(line);
@@ -121,7 +121,7 @@ TEST(ScheduleLogs, EveryDirectiveHasACase) {
   for (const std::string& name : missing) ADD_FAILURE() << name;
 }
 
-// All logs that can be given one after another, as a program gives them.
+// Applies all logs that can be applied one after another, as a program would.
 TEST(ScheduleLogs, TheirCppGivesThem) {
   const char* const schedule = R"(f.clone_in(f_clone_in_h, h)
 f_clone_in_h.compute_at(root)
@@ -208,7 +208,7 @@ TEST(ScheduleLogs, AreCut) {
   EXPECT_EQ(log.without(3), log.first(3));
 }
 
-// What hangs on a directive goes with it.
+// Directives that depend on a removed directive are removed with it.
 TEST(ScheduleLogs, LoseADirective) {
   const ScheduleLog log = ScheduleLog::parse(R"(f.in(w, g)
 f.split(x, xo, xi, 8, Auto)
@@ -254,7 +254,7 @@ TEST(ScheduleLogs, FollowLevelsThatAreSetLater) {
             "f.compute_at(loop(g, x, 1))\ng.compute_at(root)\n");
 }
 
-// Directives that change nothing are no part of it, and a stage without loops stays unis_given.
+// Directives without effect are not logged, and a stage without loops stays unscheduled.
 TEST(ScheduleLogs, HoldWhatWasGiven) {
   Program p;
   Func scalar("scalar");
@@ -282,13 +282,13 @@ TEST(ScheduleLogs, SayWhatIsWrong) {
   expect_mentions(refused("k.compute_at(root)"),
                   {"every Func that it names is one of the program", "none is called \"k\""});
   expect_mentions(refused("f.update(0).run(x, Parallel)"),
-                  {"what a directive is given to is there", "f.update(0)"});
+                  {"the target of a directive exists", "f.update(0)"});
   expect_mentions(refused("f.specialization(0).run(x, Parallel)"),
-                  {"what a directive is given to is there"});
+                  {"the target of a directive exists"});
   expect_mentions(refused("f.run(z, Parallel)"), {"\"z\" must be a loop of this stage"});
 }
 
-// What is drawn for a program, given to a fresh one.
+// Replays the random schedule of a program on a fresh copy.
 TEST(ScheduleLogs, RandomSchedulesAreReplayed) {
   for (uint64_t seed = 1; seed <= 150; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));

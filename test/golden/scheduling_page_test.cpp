@@ -1,6 +1,6 @@
-// docs/scheduling.md is written here: every directive with the code that gives it, and the loops
-// before and after as the compiler prints them. So the page cannot say what the compiler does not
-// do. RETROGRADE_UPDATE_GOLDEN=1 writes the page; read the difference before you commit it.
+// Generates docs/scheduling.md: every directive with its code, and the compiler's loops before and
+// after, so that the page agrees with the compiler. RETROGRADE_UPDATE_GOLDEN=1 writes the page;
+// read the difference before you commit it.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -18,7 +18,7 @@
 namespace retrograde {
 namespace {
 
-// What is shown: the loops of Func::print_loop_nest, or the statement after this pass.
+// The text to show: the loops of Func::print_loop_nest, or the statement after this pass.
 using View = const char*;
 constexpr View Loops = nullptr, Storage = "simplify_storage", Branches = "fork_async",
                Lookups = "memoize", Cut = "partition_loops";
@@ -33,7 +33,8 @@ struct Directive {
 
 #define PLAIN(...) __VA_ARGS__
 #define AS_TEXT(...) #__VA_ARGS__
-// The algorithm defines the Funcs and adds the outputs to `outputs`; both parts in parentheses.
+// The algorithm defines the Funcs and adds the outputs to `outputs`; both code arguments are in
+// parentheses.
 #define DIRECTIVE(name, meaning, view, algorithm, schedule)                           \
   {                                                                                   \
     name, meaning, view, AS_TEXT algorithm, AS_TEXT schedule,                         \
@@ -196,7 +197,7 @@ std::string replaced(const std::string& text, const char* pattern, const char* b
   return std::regex_replace(text, std::regex(pattern), by);
 }
 
-// "a; b" on two lines, without the blanks that stringification leaves.
+// Splits "a; b" into two lines, without the spaces that stringification leaves.
 std::string as_code(const char* text) {
   return replaced(replaced(text, ";\\s*$", ""), ";\\s*", ";\n") + ";\n";
 }
@@ -207,13 +208,13 @@ std::string statement_text(const std::vector<Func>& outputs, View view) {
   std::string result;
   lower::LowerOptions options;
   options.stop_after = view;
-  // Loops that no directive speaks of stay as they are.
+  // Loops without directives stay as they are.
   options.target = Target("x86-64-linux-disable_llvm_loop_opt");
   ir::LoweredFunction lowered = lower::lower("f", funcs, lower::infer_arguments(funcs), options);
   return ir::print(lowered.body);
 }
 
-// Whether a line begins the part that is shown.
+// Whether a line begins the part to show.
 bool is_beginning(const std::string& line, size_t first) {
   for (const char* word : {"allocate", "realize", "produce"}) {
     if (line.find(word) == first) return true;
@@ -221,7 +222,7 @@ bool is_beginning(const std::string& line, size_t first) {
   return false;
 }
 
-// The first allocation or computation with its body: what is around it are checks of the arguments,
+// The first allocation or computation with its body. The code around it checks arguments, which is
 // the same for every pipeline.
 std::string first_computation(const std::string& text) {
   std::istringstream lines(text);
@@ -243,7 +244,8 @@ std::string view_of(const Directive& directive, bool is_scheduled) {
   const std::string text = directive.view == Loops
                                ? Pipeline(outputs).loop_nest()
                                : first_computation(statement_text(outputs, directive.view));
-  // Names count up within a process; a key of the cache holds them letter by letter, and its hash.
+  // The numbers in names depend on the process; a cache key contains the names letter by letter,
+  // and their hash.
   const std::string keys = replaced(text, "\\d+, (\\d+_u8, )+", "..., ");
   return replaced(replaced(keys, "(_key:handle), \\d+", "$1, ..."), "\\$\\d+", "");
 }

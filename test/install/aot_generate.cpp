@@ -1,4 +1,4 @@
-// A program of a user that compiles a pipeline to files: <folder> is where they go.
+// A user's program that compiles a pipeline to files in <folder>.
 #include <retrograde/retrograde.h>
 
 #include <string>

@@ -1,4 +1,4 @@
-// A program of a user: fits nothing, but asks for one gradient and checks it by hand.
+// A user's program that computes one gradient and checks it by hand.
 #include <retrograde/retrograde.h>
 
 #include <cmath>

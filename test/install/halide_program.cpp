@@ -1,4 +1,4 @@
-// A program written for Halide: only the include path decides which compiler it meets.
+// A program written for Halide; the include path decides which compiler it uses.
 #include "Halide.h"
 
 #include <algorithm>

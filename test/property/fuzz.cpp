@@ -8,7 +8,7 @@
 // A random schedule may well ask for a thousand times the work: a few may compute for too long.
 #include <algorithm>
 
-#include "graph/directive_names.h"
+#include "graph/directive.h"
 #include "support/fuzz.h"
 #include "testing/check_program.h"
 

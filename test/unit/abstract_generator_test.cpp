@@ -1,5 +1,5 @@
-// Generators of other front ends, generators by the questions that all of them answer, and
-// generators run from C++.
+// Tests user-defined subclasses of AbstractGenerator, the AbstractGenerator interface of
+// Generator<>, and running generators from C++.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -21,7 +21,7 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-// out(x) = scale * (in_0(x) + ... + in_n(x)) + offset, whose inputs it holds as plain parameters.
+// out(x) = scale * (in_0(x) + ... + in_n(x)) + offset, with its inputs as plain parameters.
 class Weighted : public AbstractGenerator {
  public:
   explicit Weighted(const GeneratorContext& context) : context_(context) {
@@ -164,7 +164,7 @@ TEST(AbstractGenerators, KeepWhatTheySay) {
   expect_error({"a generator is defined"}, [] { Internal::as_generator_base(nullptr); });
 }
 
-// ---- Generator<> by the same questions ----
+// ---- Generator<> through the AbstractGenerator interface ----
 
 class Plain : public Halide::Generator<Plain> {
  public:
@@ -286,7 +286,7 @@ TEST_F(ExecuteGenerator, ServesSeveralTargetsAndRuntimes) {
   EXPECT_TRUE(std::filesystem::exists(folder.path() / "the_runtime.a"));
 }
 
-// A scheduler of Halide's, by name: ours answers.
+// Names an autoscheduler of Halide; the built-in one is used instead.
 TEST_F(ExecuteGenerator, NamesAScheduler) {
   Names warnings;
   retrograde::WarningScope scope([&](const std::string& text) { warnings.push_back(text); });

@@ -1,5 +1,5 @@
-// Calls functions that were compiled ahead of time, as a program does that was written for Halide's
-// headers alone: this program links their objects and the static runtime, and no compiler.
+// Calls functions compiled ahead of time from a program written only for Halide's headers. It links
+// their objects and the static runtime, but not the compiler.
 #include <HalideBuffer.h>
 #include <HalideRuntime.h>
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@
 #include "aot_tuple.h"
 #include "aot_variants.h"
 
-// Declared by releases later than the header's.
+// Declared by later releases of the header.
 extern "C" int halide_get_num_threads();
 
 using Halide::Runtime::Buffer;
@@ -344,7 +344,7 @@ static std::atomic<int> allocations{0}, releases{0};
 TEST_F(Aot, MemoryComesFromTheHandlers) {
   Buffer<uint8_t, 2> in = make_input();
   Buffer<uint16_t, 2> out(64, 32);
-  // The least that malloc may align to.
+  // The weakest alignment that malloc may return.
   halide_set_custom_malloc([](void*, size_t bytes) -> void* {
     allocations++;
     return static_cast<char*>(malloc(bytes + 8)) + 8;

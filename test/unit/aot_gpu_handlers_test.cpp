@@ -1,5 +1,5 @@
-// A program that defines Halide's functions of contexts and streams itself: the static library that a
-// generator wrote, with the runtime in it, calls these.
+// A program that defines Halide's functions for contexts and streams itself. The static library
+// that a generator wrote, with the runtime inside, must call these.
 #include <HalideBuffer.h>
 #include <HalideRuntimeCuda.h>
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ namespace {
 
 cuda::Context context_made = nullptr;
 cuda::Stream stream_made = nullptr;
-std::vector<void*> users;  // of each context that was asked for
+std::vector<void*> users;  // the user context of each request
 int streams_given = 0, contexts_held = 0;
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Calls functions with kernels that a generator compiled ahead of time, as a program does that was written
-// for Halide's headers alone: this program links their objects and the static runtime, and no compiler.
+// Calls functions with kernels that a generator compiled ahead of time, from a program written only
+// for Halide's headers. It links their objects and the static runtime, but not the compiler.
 #include <HalideBuffer.h>
 #include <HalideRuntimeCuda.h>
 #include <gtest/gtest.h>
@@ -57,7 +57,7 @@ TEST_F(AotGpu, ResultsOnTheDeviceAreInputsWithoutACopy) {
   ASSERT_EQ(gpu_filter(in, 1.0f, out), 0) << errors;
   const int64_t copies = retrograde_simt_call_count("cuMemcpyHtoDAsync_v2");
   ASSERT_EQ(gpu_filter(in, 1.0f, out), 0) << errors;
-  // The host's sums of columns alone.
+  // Only the host's column sums are copied.
   EXPECT_EQ(retrograde_simt_call_count("cuMemcpyHtoDAsync_v2"), copies + 1)
       << "what is there is not copied again";
   ASSERT_EQ(gpu_filter(between, 1.0f, out), 0) << errors;
@@ -86,7 +86,7 @@ TEST_F(AotGpu, ArgumentsAsAnArray) {
   EXPECT_NE(std::string(gpu_filter_metadata()->target).find("-cuda-"), std::string::npos);
 }
 
-// ---- Halide's functions of devices ----
+// ---- Halide's device functions ----
 
 TEST_F(AotGpu, MemoryIsKeptForTheNextCallUnlessThatIsForbidden) {
   const auto run = [] {
@@ -135,7 +135,7 @@ TEST_F(AotGpu, MemoryOfTheProgramIsWrapped) {
   expect_filtered(in, 1.0f, out);
 }
 
-// What HalideRuntime.h and HalideRuntimeCuda.h declare of devices is there under its name.
+// Every device function declared in HalideRuntime.h and HalideRuntimeCuda.h exists under its name.
 TEST_F(AotGpu, EveryFunctionOfDevicesHasItsName) {
   const void* const functions[] = {
       reinterpret_cast<void*>(halide_cuda_device_interface),

@@ -1,4 +1,4 @@
-// Modules and the files that they become. (What callers meet: aot_call_test.)
+// Modules and the files that they are compiled to. (aot_call_test covers the callers' view.)
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -24,7 +24,7 @@ bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-// A folder that goes with the test, and a pipeline.
+// A fixture with a temporary folder and a pipeline.
 class AotFiles : public testing::Test {
  protected:
   AotFiles() : in(UInt(8), 2, "in"), gain("gain", 2.0f), x("x"), y("y"), out("brighter") {
@@ -42,7 +42,7 @@ class AotFiles : public testing::Test {
   int shell(const std::string& command) const {
     return std::system((command + " >" + path("log") + " 2>&1").c_str());
   }
-  // main.cpp with these and the system's libraries, no more.
+  // Links main.cpp with these files and the system's libraries only.
   int link(const std::vector<std::string>& files) const {
     std::string command = "c++ -std=c++17 " RETROGRADE_TEST_COMPILE_FLAGS " -I" + folder.string() +
                           " " + path("main.cpp");
@@ -137,7 +137,7 @@ TEST_F(AotFiles, HeaderIsReadByCAndByCpp) {
       << read_file(path("log"));
 }
 
-// Read by a compiler: with the HalideRuntime.h of Halide 14, which has no such types, ...
+// Compiles it against the HalideRuntime.h of Halide 14, which has no such types, ...
 TEST_F(AotFiles, FunctionInfoIsConstant) {
   Func pair("pair");
   pair(x, y) = Tuple(cast<float16_t>(in(x, y)), cast<int64_t>(in(x, y)));
@@ -163,7 +163,7 @@ static_assert(copy.kind == HalideFunctionInfo::OutputBuffer);
   const std::string compile = "c++ -std=c++17 -Wall -Wextra -Werror -fsyntax-only ";
   const std::string file = path("main.cpp");
   EXPECT_EQ(shell(compile + RETROGRADE_TEST_COMPILE_FLAGS " " + file), 0) << read_file(path("log"));
-  // ... and with one of a release that has them.
+  // ... and against that of a release that has them.
   std::ofstream(path("HalideRuntime.h")) << R"(#pragma once
 #include_next "HalideRuntime.h"
 #define HALIDE_VERSION_MAJOR 21
@@ -177,7 +177,7 @@ struct ArgumentInfo { std::string_view name; ArgumentKind kind; int32_t dimensio
   EXPECT_TRUE(has(read_file(path("log")), "function_info headers need C++17"));
 }
 
-// What it does with tensors: test/install/torch_op.
+// test/install/torch_op tests its use with tensors.
 TEST_F(AotFiles, WrapperForPyTorchTakesTensorsAndNumbers) {
   out.compile_to({{OutputFileType::pytorch_wrapper, path("a.pytorch.h")}}, {in, gain}, "brighter");
   const std::string text = read_file(path("a.pytorch.h"));
@@ -189,7 +189,7 @@ TEST_F(AotFiles, WrapperForPyTorchTakesTensorsAndNumbers) {
   EXPECT_TRUE(has(text, "(Tensor in, float gain) -> Tensor"));
 }
 
-// What it does with arrays: test/python/python_extension_test.py.
+// test/python/python_extension_test.py tests its use with arrays.
 TEST_F(AotFiles, PythonModuleDeclaresWhatItCalls) {
   out.compile_to({{OutputFileType::python_extension, path("a.py.cpp")}}, {in, gain}, "brighter");
   const std::string text = read_file(path("a.py.cpp"));
@@ -236,7 +236,7 @@ TEST_F(AotFiles, RuntimeByItself) {
   EXPECT_FALSE(fs::exists(path("runtime.h")));
 }
 
-// The way of Halide's build files: the caller knows the library, the system's libraries, no more.
+// As in Halide's build files, the caller links only this library and the system's libraries.
 TEST_F(AotFiles, LibraryLinksWithNothingElse) {
   out.compile_to_static_library(path("a"), {in, gain}, "a", Target("host"));
   std::ofstream(path("main.cpp"))
@@ -249,11 +249,11 @@ TEST_F(AotFiles, LibraryLinksWithNothingElse) {
          "  return a(in, 3.0f, out) == 0 && out(63, 15) == 150 ? 0 : 1;\n}\n";
   ASSERT_EQ(link({"a.a"}), 0) << read_file(path("log"));
   EXPECT_EQ(shell(path("main")), 0);
-  // A program's own halide_error is called in place of the library's.
+  // A program's own halide_error replaces the library's.
   EXPECT_EQ(WEXITSTATUS(shell(path("main") + " null")), 7);
 }
 
-// A program that does not look at the code must not take what was never computed for a result.
+// A program that ignores error codes must not mistake uncomputed memory for a result.
 TEST_F(AotFiles, AnErrorEndsAProgramThatSetsNoHandler) {
   out.compile_to_static_library(path("a"), {in, gain}, "a", Target("host"));
   std::ofstream(path("main.cpp"))
@@ -293,7 +293,7 @@ TEST_F(AotFiles, SeveralTargetsDrawTheSameRandomNumbers) {
   EXPECT_NE(drawn[0][0], drawn[0][1]);
 }
 
-// Objects bring the runtime, too, and any number of them can be linked together.
+// Objects contain the runtime too, and any number of them can be linked together.
 TEST_F(AotFiles, ObjectsLinkWithNothingElse) {
   Func twice("twice");
   twice(x, y) = in(x, y) + in(x, y);
@@ -392,11 +392,11 @@ TEST_F(AotFiles, ParametersBecomeArguments) {
   EXPECT_FALSE(a == b);
 }
 
-// Large programs are compiled in parts at the same time; what the parts call of each other is seen
-// by nobody else, so that the same program may be linked twice.
+// Large programs are compiled in parallel parts. Symbols that the parts share are local, so the
+// same program may be linked twice.
 TEST_F(AotFiles, PartsOfAProgramAreOneObject) {
   ImageParam samples(Float(32), 1, "samples");
-  Buffer<float> ones(6);  // embedded, without a name among the symbols
+  Buffer<float> ones(6);  // embedded, without a public symbol
   ones.fill(1.0f);
   const auto stages = [&] {
     std::vector<Func> chain;

@@ -1,4 +1,5 @@
-// What the prover of associativity accepts, with which identity, and what it refuses.
+// The updates that the associativity prover accepts, with their identities, and those that it
+// refuses.
 #include "analysis/associativity.h"
 
 #include <gtest/gtest.h>

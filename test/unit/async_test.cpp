@@ -1,4 +1,4 @@
-// async(): a producer on a thread of its own, with every way in which it can be stored.
+// async(): a producer on a thread of its own, with every kind of storage.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -143,7 +143,7 @@ TEST_P(Async, AChainOfThreeAsyncFuncs) {
   result.for_each_element([&](int i, int j) { ASSERT_EQ(result(i, j), 8 * (i + j)); });
 }
 
-// The storage of f lies in the loops that both branches keep; only the branch of g needs it.
+// The storage of f lies in the loops common to both branches; only g's branch needs it.
 TEST_P(Async, StorageThatOnlyTheProducerNeedsIsAllocatedThereAlone) {
   Var x("x"), y("y"), xo("xo"), xi("xi");
   Func f("f"), g("g"), out("out");
@@ -173,7 +173,7 @@ TEST_P(Async, AnAsyncFuncThatReadsAnotherOfTheSameLoopsInOrder) {
   result.for_each_element([&](int i, int j) { ASSERT_EQ(result(i, j), 2 + 6 * i + 6 * j + 6); });
 }
 
-// ---- what both branches read ----
+// ---- Funcs that both branches read ----
 
 // out(x, y) = g(x, y) + g(x, y + 1) + f(x, y) over f(x, y) = x + y, g(x, y) = 2 f(x, y) + 1.
 int shared_value(int x, int y) { return 5 * (x + y) + 4; }
@@ -210,8 +210,8 @@ TEST_P(Async, AFuncStoredBesideTheAsyncOneHasStorageInBothBranches) {
   program.expect();
 }
 
-// In one loop nest: `first` is read by the async Func alone, `second` by what is computed after it,
-// or the other way round.
+// In one loop nest, only the async Func reads `first` and only its consumer reads `second`, or vice
+// versa.
 TEST_P(Async, FuncsComputedTogetherOfWhichEachBranchReadsOne) {
   for (const auto& [turned, traced] :
        {std::pair(false, false), {true, false}, {false, true}, {true, true}}) {
@@ -227,7 +227,7 @@ TEST_P(Async, FuncsComputedTogetherOfWhichEachBranchReadsOne) {
     first.compute_root();
     second.compute_root().compute_with(first, x);
     ahead.compute_at(out, y).store_root().async();
-    if (traced) {  // events stand between the two
+    if (traced) {  // trace events come between the two
       first.trace_realizations();
       second.trace_realizations();
     }
@@ -267,8 +267,8 @@ TEST_P(Async, TwoBranchesReadAThirdAsyncFunc) {
   for (int round = 0; round < 5; round++) program.expect();
 }
 
-// Reads that came after the wait before they had a thread of their own: those of `out` after those of
-// `g`, and those of `g` after those of `between`.
+// Reads used to come after the wait until they ran on their own thread: those of `out` after those
+// of `g`, and those of `g` after those of `between`.
 TEST_P(Async, EachBranchThatReadsAnAsyncFuncWaitsForIt) {
   for (bool is_between : {false, true}) {
     Var x("x"), y("y");
@@ -314,7 +314,7 @@ TEST_P(Async, ThreeBranchesReadAFoldedAsyncFunc) {
   }
 }
 
-// f is made once, before the loops in which g runs ahead of its consumer.
+// f is computed once, before the loops in which g runs ahead of its consumer.
 TEST_P(Async, BranchesInLoopsReadAnAsyncFuncThatIsComputedBeforeThem) {
   SharedInput program;
   program.f.compute_root().async();
@@ -341,7 +341,7 @@ TEST_P(Async, AMemoizedAsyncFuncWaitsForWhatItReads) {
   }
 }
 
-// Its second call finds g in the cache: nobody would take what f makes.
+// The second call finds g in the cache, so nothing would consume f.
 TEST(AsyncErrors, LoopsOfAMemoizedFunc) {
   Var x("x"), y("y");
   Func f("f"), g("g"), out("out");
@@ -381,7 +381,7 @@ TEST_P(Async, StorageMayBeHoisted) {
   }
 }
 
-// f keeps its rows over the loop over tiles, g only inside of a tile: there is one storage of f.
+// f keeps its rows over the loop over tiles, g only inside a tile, but f has a single storage.
 // rule: what an async Func and its consumer both read is stored no further out than the async Func
 TEST(AsyncErrors, AFuncThatBothBranchesReadAndThatIsStoredFurtherOut) {
   Var x("x"), y("y"), yo("yo"), yi("yi");
@@ -397,9 +397,8 @@ TEST(AsyncErrors, AFuncThatBothBranchesReadAndThatIsStoredFurtherOut) {
     FAIL() << "nothing was thrown";
   } catch (const UserError& error) {
     const std::string message = error.what();
-    expect_mentions(message,
-                    {"compute \"" + g.name() + "\" async",
-                     "\"" + f.name() + "\" is computed in these loops and stored around"});
+    expect_mentions(message, {"compute \"" + g.name() + "\" async",
+                              "\"" + f.name() + "\" is computed in these loops and stored around"});
   }
 }
 
@@ -419,8 +418,7 @@ TEST(AsyncErrors, LoopsBetweenStorageAndComputationThatAreNotSerial) {
 
 // ---- failures ----
 
-// The first reader is not computed when its result is in the cache; the second one waits all the
-// same.
+// The first consumer is skipped when its result is in the cache; the second one must still wait.
 TEST_P(Async, WhatAMemoizedFuncReadsIsWaitedForWithoutIt) {
   Var x("x");
   Func f("f"), g("g"), out("out");
@@ -454,8 +452,8 @@ TEST_P(Async, AnErrorOfTheProducerReleasesTheConsumer) {
   }
 }
 
-// A Func that the async producer and its consumer both read is computed in both branches; each branch
-// checks the bound of its storage.
+// A Func that the async producer and its consumer both read is computed in both branches; each
+// branch checks its storage bound.
 TEST_P(Async, RoomForWhatBothBranchesReadIsCheckedInBoth) {
   Var x("x");
   Func shared("shared"), f("f"), out("out");

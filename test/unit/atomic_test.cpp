@@ -1,4 +1,4 @@
-// atomic(): parallel and vectorized reductions whose iterations meet in one element.
+// atomic(): parallel and vectorized reductions whose iterations update the same elements.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ Buffer<int> indices() {
   return in;
 }
 
-// The loop over the reduction variable `index` runs as `type`, under atomic().
+// Runs the loop over the reduction variable `index` as `type`, with atomic().
 void atomic(Func& f, ForType type, int index = 0) {
   graph::Definition& update = f.function()->updates[0];
   update.schedule.atomic = true;
@@ -124,7 +124,7 @@ TEST(Atomic, TuplesAreUpdatedAsOne) {
   }
 }
 
-// Lanes of one vector hit the same element.
+// Lanes of one vector update the same element.
 TEST(Atomic, VectorizedUpdatesWithConflictingLanesAreExact) {
   Buffer<int> in = indices();
   std::vector<int> expected(bins, 0);
@@ -143,7 +143,8 @@ TEST(Atomic, VectorizedUpdatesWithConflictingLanesAreExact) {
   for (int i = 0; i < bins; i++) EXPECT_EQ(out(i), expected[i]) << i;
 }
 
-// Neighbouring lanes meet in an element whose place has a pattern: no pass may take it apart.
+// Pairs of neighbouring lanes update the same element, at an index with a pattern that passes might
+// exploit.
 TEST(Atomic, LanesThatMeetInPairsAreExact) {
   constexpr int width = 4, height = 6;
   Var x("x");
@@ -157,7 +158,7 @@ TEST(Atomic, LanesThatMeetInPairsAreExact) {
   for (int i = 0; i < height; i++) EXPECT_EQ(out(i), 1 + width * (width + 1) / 2) << i;
 }
 
-// All lanes go to one element: they are added up first.
+// All lanes update one element: they are added up first.
 TEST(Atomic, OneElementTakesVectorsFromAllThreads) {
   for (int threads : {1, 2, 8}) {
     RVar ro("ro"), ri("ri");
@@ -200,7 +201,7 @@ TEST(Atomic, VectorizedOverPointsAndParallelOverTheReduction) {
   }
 }
 
-// Whichever comes last: an element gets what each of its iterations stores.
+// Each element gets the same value from all its iterations, so their order does not matter.
 TEST(Atomic, OneValueMayBeStoredInAnyOrder) {
   Buffer<int> in = indices();
   Var x("x"), b("b");

@@ -1,4 +1,4 @@
-// Pipeline::auto_schedule() without a plugin: what it inlines, stores and leaves alone.
+// Pipeline::auto_schedule() without a plugin: its decisions on inlining and storage.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -47,7 +47,7 @@ TEST_F(BuiltInScheduler, InlinesWhatIsCheapAndStoresTheRest) {
   EXPECT_EQ(innermost(heavy), ForType::Vectorized);
 }
 
-// Sums over windows for each of several shifts, of which only their sum is wanted.
+// Sums over windows for each of several shifts; only the sum over all shifts is an output.
 struct Shifted {
   explicit Shifted(int shifts, int read_at_once = 1) {
     RDom r(-1, 3), each(0, shifts), near(-1, 3, 0, read_at_once);
@@ -101,7 +101,7 @@ TEST(SlicesOfAFunc, AreNotWhereAnIterationReadsTwo) {
   EXPECT_EQ(Shifted(11, 2).place_of_rows().kind, graph::LoopLevel::Kind::Root);
 }
 
-// A histogram of each tile of several pictures, blurred along its bins, then along rows of tiles.
+// Histograms of tiles of several pictures, blurred along their bins and along rows of tiles.
 struct BlurredHistograms {
   BlurredHistograms() {
     const RDom pixel(0, 4, 0, 4), near(-1, 3);
@@ -121,7 +121,7 @@ struct BlurredHistograms {
   Func counts{"counts"}, deep{"deep"}, wide{"wide"}, out{"out"};
 };
 
-// Each bin of `wide` reads one of `deep`, but all of a histogram is made at once.
+// Each bin of `wide` reads one of `deep`, but a histogram is computed all at once.
 TEST(SlicesOfAFunc, AreNotWhereWhatIsInsideThemWouldBeComputedAgain) {
   BlurredHistograms scheduled, plain;
   scheduled.out.set_estimates({{0, 12}, {0, 12}, {0, 24}, {0, 16}});
@@ -136,7 +136,7 @@ TEST(SlicesOfAFunc, AreNotWhereWhatIsInsideThemWouldBeComputedAgain) {
   expected.for_each_element([&](const int* at) { EXPECT_EQ(found(at), expected(at)); });
 }
 
-// A window around each pixel for each of many shifts, of which the sum at two places is wanted.
+// A window around each pixel for each of many shifts; the output needs their sum at two places.
 struct ShiftedWindows {
   explicit ShiftedWindows(int shifts, int apart = 1) {
     RDom near(-1, 3), each(0, shifts, 0, shifts);
@@ -197,7 +197,7 @@ TEST(SlicesOfAReduction, AreNotWhereSeveralReadThem) {
   EXPECT_EQ(program.place_of_windows().kind, graph::LoopLevel::Kind::Root);
 }
 
-// Two sums over what both would load from memory, or compute again.
+// Two sums over a Func that both would load from memory or recompute.
 struct TwoSums {
   explicit TwoSums(int shifts) {
     RDom each(0, shifts, 0, shifts);
@@ -239,7 +239,7 @@ TEST(SumsOverALargeFunc, RunTogether) {
 
 TEST(SumsOverALargeFunc, RunApartWhereItIsSmall) { EXPECT_FALSE(TwoSums(3).run_together()); }
 
-// Two sums over planes that are kept.
+// Two sums over stored planes.
 struct Planes {
   explicit Planes(int planes) {
     RDom near(-1, 3), each(0, planes);
@@ -256,7 +256,7 @@ struct Planes {
       for (int px = 0; px < side; px++) picture(px, py) = static_cast<float>((px * 5 + py * 3) % 9);
     }
   }
-  // Innermost first: whether each is one over planes.
+  // For each loop, innermost first: whether it runs over planes.
   std::vector<bool> loops_of_sums() {
     Pipeline(out).auto_schedule(get_host_target());
     std::vector<bool> result;
@@ -290,7 +290,7 @@ TEST(SumsOverPlanes, KeepTheirSumsInRegistersWhereThereAreFew) {
   EXPECT_EQ(Planes(8).loops_of_sums(), (std::vector<bool>{true, false, false, false}));
 }
 
-// A heavy image, and what reads it.
+// An expensive image and its consumer.
 struct Rows {
   using Read = std::function<Expr(const Func& image, const Var& x, const Var& y)>;
   explicit Rows(const Read& read, int side = 1024) {
@@ -398,7 +398,7 @@ TEST(StripsOfRows, AreThoseOfAChainAsLongAsItsWindowsFit) {
   EXPECT_LE(at_root, 8);
 }
 
-// Several sums over a window, of planes that a next one mixes, on to what a pure Func reads.
+// Several sums over a window of planes, which later Funcs mix, up to a pure consumer.
 struct WindowSums {
   explicit WindowSums(int taps = 3, int side = 1024) {
     const auto at = [&](const Expr& px, const Expr& py) {
@@ -456,7 +456,7 @@ TEST(StripsOfRows, ComputeSumsOneRowAtATime) {
   }
 }
 
-// Planes of several images, whose strips are tasks of their own.
+// Planes of several images, whose strips are separate parallel chunks.
 TEST(StripsOfRows, ComputeSumsOneElementOfAllThatIsOutsideAtATime) {
   const auto stencil_of = [](Func& around) {
     Var x("x"), y("y"), c("c"), n("n");
@@ -484,7 +484,8 @@ TEST(StripsOfRows, LeaveSumsOverLargeWindowsWhoseRowsAreDear) {
   EXPECT_FALSE(sums.is_in_strips(sums.around));
 }
 
-// Steps from an image to how far the last of them is from zero, and the gradient by the image.
+// A chain of steps from an image to a loss (the last step's distance from zero), and the gradient
+// by the image.
 struct Steps {
   using Step =
       std::function<Expr(const Func& state, const Func& image, const Var& x, const Var& y)>;
@@ -545,8 +546,8 @@ TEST(StripsOfRows, AreThoseOfTheAdjointsOfAChain) {
   });
 }
 
-// The gradient by the image reads the adjoints of all steps: one that is not in its strips, nor any
-// before it, would be held as a whole image.
+// The gradient by the image reads the adjoints of all steps. An adjoint outside of its strips would
+// be stored as a whole image, and so would all before it.
 TEST(StripsOfRows, AreThoseOfAllStepsThatASumReads) {
   expect_adjoints_in_strips(
       14, 13, [](const Func& state, const Func& image, const Var& x, const Var& y) {
@@ -555,7 +556,7 @@ TEST(StripsOfRows, AreThoseOfAllStepsThatASumReads) {
       });
 }
 
-// Sums down the columns of an image and back up, turned.
+// Sums down the columns of an image and back up, transposed.
 struct TurnedScan {
   explicit TurnedScan(int columns, int rows) {
     RDom down(1, rows - 1);

@@ -1,5 +1,5 @@
-// Target::CheckedAccesses: an access that leaves its storage is an error that names Func, stage, element and extent,
-// before it happens; a program whose accesses all lie inside is what it was.
+// Target::CheckedAccesses: an access outside of its storage is an error before it happens, which
+// names Func, stage, element and extent. Programs without such accesses behave as before.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -34,7 +34,7 @@ class CheckedAccesses : public testing::Test {
       EXPECT_NE(message.find(part), std::string::npos) << part << " is not in: " << message;
   }
 
-  // table(0 .. 9), read where `places` says.
+  // table(0 .. 9), read at the indices in `places`.
   Func reader() {
     table(x) = x * 7;
     table.compute_root();
@@ -119,8 +119,8 @@ TEST_F(CheckedAccesses, StayWithNoAsserts) {
                {"checked_accesses"});
 }
 
-// Lanes of a lock's update run in turn, each under the condition of the split: what is promised of a lane beyond it is
-// not looked at.
+// Lanes of an atomic update run in turn, each under the tail condition of the split. Promises of
+// disabled lanes are not checked.
 TEST_F(CheckedAccesses, LetPromisesOfLanesThatAreOffBe) {
   RVar outer("outer"), inner("inner");
   RDom r(0, 5);
@@ -144,7 +144,7 @@ TEST_F(CheckedAccesses, LetWhatIsNotComputedBe) {
   EXPECT_EQ(error_of(out, {8}), "");
 }
 
-// The end of a loop's steady state is computed before the guard under which what it promises holds.
+// The end of a loop's steady state is computed before the guard under which its promise holds.
 TEST_F(CheckedAccesses, TakePromisesBeforeSeveralGuardsAsTheyAreUnderThem) {
   Var x("x"), block("block"), i("i"), group("group"), j("j"), both("both"), k("k"), xo("xo"),
       xi("xi"), xio("xio"), lane("lane");
@@ -175,7 +175,8 @@ TEST_F(CheckedAccesses, TakePromisesBeforeSeveralGuardsAsTheyAreUnderThem) {
   }
 }
 
-// A place is computed before the condition of its store, which turns all its lanes off beyond the domain.
+// The index of a store is computed before its condition, which disables all lanes beyond the
+// domain.
 TEST_F(CheckedAccesses, LetPlacesOfStoresThatDoNotHappenBe) {
   Var u("u"), yo("yo"), yi("yi");
   RVar outer("outer"), inner("inner");
@@ -199,7 +200,8 @@ TEST_F(CheckedAccesses, LetPlacesOfStoresThatDoNotHappenBe) {
     for (int i = 0; i < 5; i++) EXPECT_EQ(found(i, j), expected(i, j)) << i << ", " << j;
 }
 
-// The end of a steady state stands before the guard that encloses its loop, and storage is freed behind the guard.
+// The end of the steady state is computed before the guard around its loop, and storage is freed
+// after the guard.
 TEST_F(CheckedAccesses, TakePromisesBeforeAGuardInsideAllocationsAsTheyAreUnderIt) {
   Var outer("outer"), inner("inner"), group("group"), member("member"), tile("tile"), i("i"),
       half("half"), j("j"), third("third"), k("k"), lane("lane");
@@ -232,7 +234,7 @@ TEST_F(CheckedAccesses, TakePromisesBeforeAGuardInsideAllocationsAsTheyAreUnderI
   }
 }
 
-// Where one of two stages that share loops does not run, what its splits promise chooses nothing.
+// Where one of two fused stages does not run, the promises of its splits must not select anything.
 TEST_F(CheckedAccesses, LetWhatIsNotChosenBe) {
   Func f("f"), g("g"), copy("copy");
   Var outer("outer"), inner("inner");

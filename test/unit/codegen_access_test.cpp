@@ -1,5 +1,5 @@
-// Loads and stores with every shape of index, against plain loops. Buffers begin or end, at a page
-// that cannot be touched, exactly where the lowest or highest access does.
+// Loads and stores with every form of index, compared with plain loops. Buffers begin or end
+// exactly at the lowest or highest access, next to a protected page.
 #include "unit/codegen_testing.h"
 
 namespace retrograde::testing_codegen {
@@ -38,7 +38,7 @@ std::vector<Shape> shapes(int lanes, Expr base) {
                             binary(Kind::Mod, binary(Kind::Mul, ramp(1), make_broadcast(3, lanes)),
                                    make_broadcast(11, lanes))),
                     [](int i) { return (3 * i) % 11; }});
-  // Held inside of an image, as at its borders: from the third lane on, up to it, between the two.
+  // Clamped to an image as at its borders: from the third lane on, up to it, and between the two.
   const auto held = [&](int low, int high) {
     const auto bound = [&](int to) { return make_broadcast(base + to, lanes); };
     const Expr inside = binary(Kind::Max, binary(Kind::Min, ramp(1), bound(high)), bound(low));
@@ -70,7 +70,7 @@ struct Span {
 };
 bool is_on(int lane) { return lane % 3 != 1; }
 
-// Of the lanes that are on.
+// The range of the enabled lanes.
 Span span_of(const Shape& shape, int lanes, bool masked) {
   Span span{shape.at(0), shape.at(0)};
   for (int i = 0; i < lanes; i++) {
@@ -86,7 +86,7 @@ Scalar nth_value(Type type, int64_t n) {
                         : eval_cast(type, Scalar::of_int(Int(64), n % 120));
 }
 
-// A mask with lanes on and off, loaded so that no pass can see through it.
+// A mask with enabled and disabled lanes, loaded from memory so that no pass can see its value.
 Expr mask_of(int lanes) { return make_load(Bool(lanes), "mask", make_ramp(0, 1, lanes)); }
 
 void fill_mask(Array& mask) {
@@ -135,7 +135,7 @@ void check_store(const Shape& shape, Type type, int lanes, bool masked, const Ta
   fill_mask(mask);
   std::vector<Scalar> expected;
   for (size_t i = 0; i < size; i++) expected.push_back(out.get(i));
-  for (int i = 0; i < lanes; i++) {  // of equal indices the last lane stays
+  for (int i = 0; i < lanes; i++) {  // at equal indices the last lane wins
     if (!masked || is_on(i))
       expected[static_cast<size_t>(shape.at(i) - span.low)] = in.get(static_cast<size_t>(i));
   }
@@ -202,8 +202,7 @@ TEST(CodegenAccess, ScalarPredicates) {
   for (int k = 0; k < 4; k++) EXPECT_EQ(out.data<int32_t>()[k], 10 * k + 1);
 }
 
-// A let hides that an index is dense: the elements are read and written all the same as by its
-// name.
+// A let hides that an index is dense; elements must still be read and written densely.
 TEST(CodegenAccess, NamedRamps) {
   LoweredFunction f;
   f.name = "named_ramps";

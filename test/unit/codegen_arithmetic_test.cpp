@@ -1,5 +1,5 @@
-// Machine code of arithmetic against the one definition of scalars, on random and extreme operands,
-// in every type and in widths that fit the machine's vectors and widths that do not.
+// Machine code of arithmetic compared with the definition on scalars, on random and extreme
+// operands, in every type, at widths that fit the machine's vectors and widths that do not.
 #include "unit/codegen_testing.h"
 
 namespace retrograde::testing_codegen {
@@ -10,7 +10,7 @@ const int widths[] = {1, 2, 3, 4, 5, 8, 12, 16, 20};
 const Type number_types[] = {Int(8),   Int(16),  Int(32),   Int(64),    UInt(8),   UInt(16),
                              UInt(32), UInt(64), Float(16), BFloat(16), Float(32), Float(64)};
 
-// Something to compute from the operands, in machine code and by the scalar definitions.
+// An operation on the operands, as machine code and by the scalar definitions.
 struct Case {
   std::string name;
   Type result;
@@ -110,7 +110,7 @@ TEST(CodegenArithmetic, BinaryOperatorsInEveryTypeAndWidth) {
   }
 }
 
-// Processors of several ages, all of which this one can stand in for.
+// Older processors of several generations, whose instructions this machine can run, too.
 std::vector<Target> older_targets() {
   std::vector<Target> targets;
   const Target host = get_host_target();
@@ -154,9 +154,9 @@ TEST(CodegenArithmetic, BooleansAndSelect) {
   }
 }
 
-// A sum with a strong product may fuse, so its value is compared where the zero decides: nothing is
-// added then, whatever the other factor is, but to the sign of a zero. Elsewhere it is no number
-// only where a part is none.
+// A sum with a strong product may fuse, so its value is compared only where the strong zero
+// applies. There, nothing is added except for the sign of a zero, whatever the other factor is.
+// Elsewhere the sum may be NaN only if an operand is.
 TEST(CodegenArithmetic, SumsOfStrongProducts) {
   const auto is_zero = [](const Expr& e) { return binary(Kind::EQ, e, make_zero(e.type())); };
   std::vector<Target> targets = older_targets();
@@ -222,8 +222,7 @@ TEST(CodegenArithmetic, DivisionByConstants) {
   }
 }
 
-// Where a quotient of floats is nearest to the next integer: large multiples of the divisor and
-// their neighbours.
+// Quotients of floats close to an integer: large multiples of the divisor and their neighbours.
 TEST(CodegenArithmetic, DivisionNextToWholeQuotients) {
   std::mt19937_64 random(1);
   for (Type type : {Int(8), UInt(8), Int(16), UInt(16), Int(32), UInt(32)}) {
@@ -255,7 +254,7 @@ TEST(CodegenArithmetic, MostNegativeByMinusOne) {
   }
 }
 
-// Out of range, and for NaN, the IR leaves the integer open.
+// Whether the IR leaves the integer unspecified: out of range, or NaN.
 bool is_open(Type to, const Scalar& from) {
   if (!from.type.is_float() || to.is_float() || to.is_bool()) return false;
   const double whole = std::trunc(from.f);
@@ -263,7 +262,7 @@ bool is_open(Type to, const Scalar& from) {
            whole < std::ldexp(1.0, to.is_int() ? to.bits() - 1 : to.bits()));
 }
 
-// The cast, or zero where its result is open.
+// The cast, or zero where its result is unspecified.
 Expr defined_cast(Type to, const Expr& value) {
   const Type from = value.type();
   const int lanes = from.lanes();
@@ -329,8 +328,8 @@ TEST(CodegenArithmetic, IntegerOperators) {
   }
 }
 
-// Products that lie between two numbers or cancel with what is added, and additions that are far
-// smaller than what double keeps of the product.
+// Products halfway between two numbers or that cancel with the addend, and addends far smaller than
+// the precision that double keeps of the product.
 Operands near_ties(Type type) {
   Operands operands;
   for (int k = 0; k < 3; ++k) operands.push_back(std::make_unique<Array>(type, count));
@@ -390,7 +389,7 @@ TEST(CodegenArithmetic, LerpWithFloatWeights) {
   }
 }
 
-// A float lerp may fuse, so it is only near its definition; at the ends it is exact.
+// A float lerp may fuse, so it only approximates its definition; at the ends it is exact.
 TEST(CodegenArithmetic, FloatLerpIsExactAtTheEnds) {
   Cases cases;
   for (double end : {0.0, 1.0}) {

@@ -1,7 +1,7 @@
-// What machine code looks like where its speed depends on it: shuffles instead of gathers,
-// accumulators in registers. Each test compiles for AVX2 or AVX-512, whatever it runs on, and looks
-// at the assembly; what the code computes is tested elsewhere. Small loops are unrolled: a block
-// has two or four of their iterations.
+// Instruction patterns on which speed depends: shuffles instead of gathers, accumulators in
+// registers. Each test compiles for AVX2 or AVX-512 on any machine and inspects the assembly; other
+// tests check the results. Small loops are unrolled, so a block holds two or four of their
+// iterations.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -39,7 +39,7 @@ size_t count(const std::vector<std::string>& lines, const std::string& what) {
   }));
 }
 
-// The lines between labels with the most of `what`: the hottest block.
+// The lines of the block between labels that contains `what` most often: the hottest block.
 std::vector<std::string> block_with_most(const std::vector<std::string>& lines,
                                          const std::string& what) {
   std::vector<std::string> best, block;
@@ -66,7 +66,7 @@ TEST(CodegenIdioms, NeighbouringStridedLoadsAreShuffles) {
   EXPECT_GE(count(code, "vshufps"), 2u);
 }
 
-// What only code generation knows to be a constant: the name of one.
+// The name of a constant that only code generation can evaluate.
 TEST(CodegenIdioms, MathOfConstantsCallsNothing) {
   if (get_host_target().arch != Target::X86) GTEST_SKIP() << "the functions of x86 do not run here";
   const Type type = Float(32);
@@ -112,8 +112,8 @@ TEST(CodegenIdioms, AlternatingArmsAreInterleaved) {
   EXPECT_GE(count(code, "vperm") + count(code, "vunpck"), 2u);
 }
 
-// Both phases of a stretched signal, made beside each other: (2 x) / 2 and (2 x + 1) / 2 are ramps
-// whatever is known of the ends of x.
+// Both phases of an upsampled signal, computed together: (2 x) / 2 and (2 x + 1) / 2 are ramps for
+// any range of x.
 TEST(CodegenIdioms, DividedRampsAreDense) {
   ImageParam a(Float(32), 1, "a");
   Var x("x"), xi("xi");
@@ -150,8 +150,8 @@ TEST(CodegenIdioms, BlocksAreTransposedInRegisters) {
   EXPECT_EQ(count(code, "gather"), 0u);
 }
 
-// By unpacking lanes within chunks of 16 bytes and moving such chunks: no tables of indices. Whole
-// registers are stored, never chunks.
+// Unpacks lanes within chunks of 16 bytes and moves such chunks, without tables of indices. Stores
+// are of full registers, never of chunks.
 TEST(CodegenIdioms, SquaresAreTransposedChunkByChunk) {
   for (const auto& [target, lanes] : {std::pair{avx2, 8}, std::pair{avx512, 16}}) {
     ImageParam in(Float(32), 2, "in");
@@ -186,9 +186,8 @@ TEST(CodegenIdioms, AccumulatorsOfAMatrixProductStayInRegisters) {
   EXPECT_EQ(count(inner, "(%rsp"), 0u) << "a spilled accumulator";
 }
 
-// Tiles with guarded tails begin at multiples of their size, so that panels of that size are read
-// as vectors.
-// Of a tile of an output, whose strides nobody knows.
+// Tiles with guarded tails begin at multiples of their size, so panels of that size are read as
+// vectors. The tile is one of an output with unknown strides.
 TEST(CodegenIdioms, AccumulatorsOfAnUpdateStayInRegisters) {
   ImageParam in(Float(32), 3, "in"), weights(Float(32), 2, "weights");
   Var x("x"), y("y"), c("c"), xi("xi"), ci("ci");
@@ -254,7 +253,7 @@ TEST(CodegenIdioms, TilesThatFillTheRegistersAreNotSpilled) {
   EXPECT_EQ(count(inner, "(%rsp"), 0u);
 }
 
-// Vectors that reach past the end are accumulated in registers, too, and not by masked stores.
+// Vectors that reach past the end are accumulated in registers too, not by masked stores.
 TEST(CodegenIdioms, TilesAtTheBorderStayInRegisters) {
   const auto code = assembly(tiled_product(Float(32), 8), avx2);
   const auto masked_on_stack = std::count_if(code.begin(), code.end(), [](const std::string& line) {
@@ -264,7 +263,7 @@ TEST(CodegenIdioms, TilesAtTheBorderStayInRegisters) {
   EXPECT_EQ(masked_on_stack, 0);
 }
 
-// The steps of an unrolled sum are no stores, where its place is no constant.
+// The steps of an unrolled sum do not store, even if the index is not constant.
 TEST(CodegenIdioms, AnUnrolledSumIsStoredOnce) {
   ImageParam in(Float(32), 1, "in"), taps(Float(32), 1, "taps");
   Var x("x"), y("y");
@@ -278,8 +277,8 @@ TEST(CodegenIdioms, AnUnrolledSumIsStoredOnce) {
   EXPECT_EQ(count(inner, "ps\t%ymm"), 0u) << "a store between the steps";
 }
 
-// A loop that runs as often as some vectors have lanes, over what they have left in memory, is no
-// loop: nothing goes through memory.
+// A loop over the lanes that some vectors have left in memory is unrolled, and nothing goes through
+// memory.
 TEST(CodegenIdioms, LanesOfAnAccumulatorAreSummedInRegisters) {
   const auto check = [](const char* target, int width, int lanes) {
     ImageParam in(Float(32), 1, "in");
@@ -301,8 +300,8 @@ TEST(CodegenIdioms, LanesOfAnAccumulatorAreSummedInRegisters) {
   check(avx512, 16, 64);
 }
 
-// Lanes are combined behind the loop. Each iteration waits for the sum of the one before, so that
-// copies of the body would gain nothing.
+// Lanes are combined after the loop. Each iteration depends on the sum of the one before, so copies
+// of the body would gain nothing.
 TEST(CodegenIdioms, SumsAreCarriedAsVectors) {
   ImageParam a(Float(32), 1, "a"), b(Float(32), 1, "b");
   RDom r(0, 4096, "r");
@@ -330,7 +329,7 @@ TEST(CodegenIdioms, ProductsOf16BitsAreAddedInPairs) {
   EXPECT_EQ(count(narrow, "vpmull"), 0u);
 }
 
-// Taps of a filter: one multiplication for two of them.
+// Filter taps: one multiplication for two of them.
 TEST(CodegenIdioms, TapsOf16BitsAreAddedInPairs) {
   ImageParam a(Int(16), 1, "a");
   Param<int16_t> k("k");
@@ -344,7 +343,7 @@ TEST(CodegenIdioms, TapsOf16BitsAreAddedInPairs) {
   EXPECT_EQ(count(loop, "vpmovsxwd") + count(loop, "vpmull"), 0u);
 }
 
-// The pairs lie side by side in the innermost dimension, the sums in another.
+// The pairs are adjacent in the innermost dimension, the sums in another.
 TEST(CodegenIdioms, PairsBelongToTheSumsOfSeveralLanes) {
   ImageParam a(Int(16), 2, "a"), b(Int(16), 1, "b");
   Var x("x");
@@ -370,7 +369,7 @@ TEST(CodegenIdioms, BordersOfBytesAreCompact) {
   EXPECT_EQ(count(assembly(f, avx2), "vpinsrb"), 0u);
 }
 
-// What bounds hold inside of an image lies within one vector of memory, wherever the border is.
+// Clamped coordinates lie within one vector of memory, wherever the border is.
 TEST(CodegenIdioms, HeldCoordinatesAreLoadedDensely) {
   const auto code_for = [](Type type, int lanes, const std::string& target) {
     ImageParam in(type, 1, "in");
@@ -393,7 +392,7 @@ TEST(CodegenIdioms, HeldCoordinatesAreLoadedDensely) {
       << "where no lane is held";
 }
 
-// What a scan computed in the iteration before is not read back from memory.
+// The value that a scan computed in the previous iteration is not reloaded from memory.
 TEST(CodegenIdioms, ScansCarryTheirLastValueInARegister) {
   ImageParam in(Float(32), 1, "in");
   RDom t(1, 99, "t");
@@ -409,7 +408,7 @@ TEST(CodegenIdioms, ScansCarryTheirLastValueInARegister) {
   EXPECT_EQ(count(loop, "(%r"), 0u) << "nothing is loaded before the step";
 }
 
-// The last part of a reduction in lanes is masked, the others are not.
+// Only the last vector of a reduction in lanes is masked.
 TEST(CodegenIdioms, FactoredReductionsAreMaskedOnlyAtTheirEnd) {
   ImageParam in(Float(32), 1, "in");
   RDom r(0, in.dim(0).extent(), "r");
@@ -426,7 +425,7 @@ TEST(CodegenIdioms, FactoredReductionsAreMaskedOnlyAtTheirEnd) {
   EXPECT_EQ(count(loop, "(%r"), 1u) << "a load of the input";
 }
 
-// The loop of a small reduction inside of a vector is straight code.
+// A small reduction loop inside a vector loop is fully unrolled.
 TEST(CodegenIdioms, ReductionsOverAFewElementsAreUnrolled) {
   ImageParam in(UInt(8), 2, "in");
   RDom r(-2, 5, -2, 5, "r");
@@ -437,7 +436,7 @@ TEST(CodegenIdioms, ReductionsOverAFewElementsAreUnrolled) {
   EXPECT_GE(count(block_with_most(assembly(f, avx2), "vpminub"), "vpminub"), 24u);
 }
 
-// A loop over at most three elements, however many of them an image has.
+// A loop over at most three elements in an image of unknown extent.
 TEST(CodegenIdioms, LoopsOfFewIterationsAreNotUnrolled) {
   const auto adds = [](int most) {
     ImageParam in(Int(32), 2, "in");
@@ -462,8 +461,8 @@ TEST(CodegenIdioms, ShortVectorLoopsAreUnrolled) {
   EXPECT_EQ(count(block_with_most(assembly(f, avx2), "vpaddw"), "vpaddw"), 4u);
 }
 
-// The last vector of a row is moved back into it, so that no pointer grows by the same each time.
-// What rows and buffers add to an index is added before the loop all the same.
+// The last vector of a row is moved back into it, so pointers do not advance by a constant. Row and
+// buffer offsets must still be added before the loop.
 TEST(CodegenIdioms, MovedVectorsAddNothingToTheirPointers) {
   ImageParam in(Float(32), 2, "in");
   Var x("x"), y("y");
@@ -478,8 +477,8 @@ TEST(CodegenIdioms, MovedVectorsAddNothingToTheirPointers) {
   EXPECT_LE(count(body, "\tadd") + count(body, "\tsub") + count(body, "\tlea"), 3u);
 }
 
-// LLVM's scheduler takes time quadratic in a block's accesses, but for fences, which are no
-// instructions.
+// LLVM's scheduler takes time quadratic in the accesses of a block. Fences, which emit no
+// instructions, split the block.
 TEST(CodegenIdioms, LongStraightCodeIsFenced) {
   const auto fences_of = [](int statements) {
     ImageParam in(Float(32), 1, "in");
@@ -497,8 +496,7 @@ TEST(CodegenIdioms, LongStraightCodeIsFenced) {
   EXPECT_EQ(fences_of(400), 6u) << "one after each 64 stores";
 }
 
-// Pieces of one function, which threads compile at the same time.
-// 16 numbers each.
+// Pieces of one function that threads compile concurrently, with 16 numbers each.
 TEST(CodegenIdioms, SaturatingCastsOfVectorsAreVectors) {
   for (const Type from : {Float(32), Float(64)}) {
     for (const Type to : {UInt(8), Int(8), UInt(16), Int(16), Int(32)}) {
@@ -516,8 +514,8 @@ TEST(CodegenIdioms, SaturatingCastsOfVectorsAreVectors) {
   }
 }
 
-// A tile beyond the end computes nothing; the others begin at a multiple of 16, so that what is packed
-// by 16 is read in a row.
+// A tile beyond the end computes nothing; the others begin at a multiple of 16, so data packed by
+// 16 is read densely.
 TEST(CodegenIdioms, PackedReadsUnderAGuardAreDense) {
   ImageParam in(Float(32), 2, "in"), other(Float(32), 2, "other");
   Var x("x"), y("y"), k("k"), xo("xo"), yo("yo");
@@ -537,7 +535,7 @@ TEST(CodegenIdioms, PackedReadsUnderAGuardAreDense) {
   EXPECT_EQ(count(code, "gather"), 0u);
 }
 
-// LLVM's code generator takes quadratic time for a block in which many values live for long.
+// LLVM's code generator takes quadratic time for a block with many long-lived values.
 TEST(CodegenIdioms, NoBlockGrowsWithTheStatementsOfAProgram) {
   ImageParam in(Float(32), 1, "in");
   Var x("x");
@@ -576,7 +574,7 @@ TEST(CodegenIdioms, LongFunctionsAreCutBetweenTheirLoops) {
   EXPECT_GE(count(code, ".loop0:"), 1u);
 }
 
-// A call and what is computed for it anew would be half the time of loops that may run once.
+// A call and its setup would take half the time of loops that may run only once.
 TEST(CodegenIdioms, LoopsOfUnknownLengthInsideOfOthersAreNotCut) {
   ImageParam in(Float(32), 3, "in"), filter(Float(32), 3, "filter");
   Var c("c"), x("x"), xi("xi");
@@ -595,7 +593,8 @@ TEST(CodegenIdioms, LoopsOfUnknownLengthInsideOfOthersAreNotCut) {
   EXPECT_EQ(count(assembly(f, avx2), ".loop0:"), 0u);
 }
 
-// The sums are registers while r runs: its loops stay beside what begins and ends them.
+// The sums stay in registers while r runs, so its loops remain in one function with their
+// initialisation and final stores.
 TEST(CodegenIdioms, LoopsThatShareRegistersStayInOneFunction) {
   ImageParam in(Float(32), 2, "in");
   Var x("x"), xo("xo");
@@ -631,7 +630,7 @@ TEST(CodegenIdioms, LoopsOverLargeTilesStayBesideTheirAccumulators) {
   EXPECT_EQ(count(inner, "vmovups\t%zmm") + count(inner, "vmovaps\t%zmm"), 0u) << "a store";
 }
 
-// What each iteration of such a loop begins anew goes with it, and may be registers there.
+// Memory that each iteration of such a loop initialises moves with it, and may become registers.
 TEST(CodegenIdioms, LoopsThatAreCutTakeTheirMemoryAlong) {
   ImageParam in(Float(32), 2, "in");
   Var x("x"), xo("xo"), y("y"), yi("yi");

@@ -1,6 +1,6 @@
-// Vector math against the errors that math_table.h promises, in every width; and that a function's
-// bits do not depend on the width. float32 is judged in double, float64 in long double, which has
-// at least 11 bits more.
+// Vector math compared with the errors that math_table.h promises, in every width. Also checks that
+// a function's bits do not depend on the width. float32 is judged in double, float64 in long
+// double, which has at least 11 bits more.
 #include <algorithm>
 
 #include "codegen/math_table.h"
@@ -79,7 +79,8 @@ template <typename Number>
 using WideOf = std::conditional_t<std::is_same_v<Number, float>, double, long double>;
 
 // Distance in units of the last place of the exact result. Results that should be infinite, NaN or
-// beyond the largest number must be just that; the largest number and infinity are neighbours.
+// beyond the largest number must match exactly; the largest number and infinity count as
+// neighbours.
 template <typename Number>
 double ulp_error(Number got, WideOf<Number> exact) {
   using Limits = std::numeric_limits<Number>;
@@ -261,8 +262,8 @@ TEST(CodegenMath, PowOfEveryPairOfSpecialValuesFollowsC99) {
   }
 }
 
-// Exponents of all sizes, with bases whose powers are ordinary, denormal, 0 and infinite, by a
-// little and by far.
+// Exponents of all sizes, with bases whose powers are ordinary, denormal, 0 or infinite, narrowly
+// or by far.
 TEST(CodegenMath, PowersThatOverflowOrVanishDoSoAtAnyScale) {
   std::vector<float> x, y;
   for (int scale = -60; scale <= 60; scale += 2) {
@@ -289,7 +290,7 @@ TEST(CodegenMath, PowersThatOverflowOrVanishDoSoAtAnyScale) {
   }
 }
 
-// The lanes of argument `uniform` all hold the first one's number.
+// All lanes of argument `uniform` hold the first lane's number.
 std::vector<float> pow_with_uniform(int uniform, int lanes, const std::vector<float>& x,
                                     const std::vector<float>& y) {
   LoweredFunction f;
@@ -328,7 +329,7 @@ TEST(CodegenMath, PowsBitsDoNotDependOnWhichArgumentIsUniform) {
   }
 }
 
-// The function of constants that only code generation knows, in vectors and alone.
+// The function applied to constants that only code generation evaluates, as vectors and scalars.
 template <typename Number>
 void check_constants(Op op, const Target& target) {
   constexpr size_t values = 48;
@@ -343,7 +344,8 @@ void check_constants(Op op, const Target& target) {
     const int lanes = i % 2 ? 4 : 1;
     std::vector<Expr> args;
     for (int k = 0; k < arity_of(op); k++) {
-      const Expr named = variable(text("c", i, ".", k), type);  // else the IR's builders know it
+      // Otherwise the IR's builders would fold it.
+      const Expr named = variable(text("c", i, ".", k), type);
       args.push_back(lanes == 1 ? named : make_broadcast(named, lanes));
     }
     Stmt store = make_store("out", call_op(op, type.with_lanes(lanes), args),
@@ -374,8 +376,8 @@ TEST(CodegenMath, ConstantsGiveTheBitsOfTheRunTimeFunction) {
 }
 
 TEST(CodegenMath, EveryOperatorHasCode) {
-  // Totality: what is neither a simple operator nor in a table would throw. Effects and internals
-  // have tests of their own.
+  // Totality: an operator that is neither simple nor in a table would throw. Effect and Internal
+  // operators have tests of their own.
   for (int i = 0; i < op_count; i++) {
     const Op op = static_cast<Op>(i);
     const OpInfo& info = op_info(op);

@@ -12,7 +12,7 @@
 namespace retrograde::testing_codegen {
 namespace {
 
-// A context that counts memory, refuses from the n-th request on, and keeps messages.
+// A context that counts memory, fails from the n-th request on, and records messages.
 struct Host {
   Host() {
     context.user_data = this;
@@ -130,7 +130,7 @@ TEST(CodegenStatement, TypedEntryPointTakesArgumentsByValue) {
 
 // ---- allocations ----
 
-// out[i] = tmp[i] + 1 with tmp[i] = 2 i, through memory of `memory`.
+// out[i] = tmp[i] + 1 with tmp[i] = 2 i, where tmp is in `memory`.
 LoweredFunction through_memory(MemoryType memory, Expr elements, bool frees, int fail_code = 0) {
   LoweredFunction f;
   f.name = "through_memory";
@@ -196,7 +196,7 @@ TEST(CodegenStatement, ImpossibleAllocationsAreErrors) {
   EXPECT_EQ(code_for(INT64_MAX / 2, 9, &message), retrograde_error_allocation_too_large);
 }
 
-// for x: allocate a, b; fail at x == 3. Each iteration's blocks must go.
+// for x: allocate a, b; fail at x == 3. Each iteration's blocks must be freed.
 Stmt two_blocks(ForType type, Expr fail_at) {
   const Expr x = variable("x");
   const Expr n = make_const(Int(64), 100);

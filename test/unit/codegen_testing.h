@@ -1,5 +1,5 @@
-// Helpers of the code generator's tests: a function that stores expressions over its input buffers,
-// called through the JIT on plain arrays.
+// Helpers for tests of the code generator: a function that stores expressions over its input
+// buffers, called through the JIT on plain arrays.
 #pragma once
 
 #include <HalideRuntime.h>
@@ -38,7 +38,7 @@ inline std::shared_ptr<const jit::CompiledFunction> compile_test(
   return jit::compile(function, target);
 }
 
-// Calls with buffers only; gives the error code.
+// Calls a function whose arguments are all buffers; returns the error code.
 inline int call(const LoweredFunction& function, std::vector<Array*> arrays,
                 retrograde_context* context = nullptr, const Target& target = test_target()) {
   std::vector<void*> args;
@@ -50,7 +50,7 @@ inline Expr lanes_at(Expr base, int lanes) {
   return lanes == 1 ? base : make_ramp(std::move(base), make_const(Int(32), 1), lanes);
 }
 
-// A scalar of any type: mostly small, sometimes extreme.
+// Random scalars of any type: mostly small, sometimes extreme.
 class RandomScalars {
  public:
   explicit RandomScalars(uint32_t seed) : engine_(seed) {}
@@ -89,7 +89,7 @@ class RandomScalars {
   std::mt19937_64 engine_;
 };
 
-// Equal bits; NaNs are all equal.
+// Bitwise equality; all NaNs are equal.
 inline bool same(const Scalar& a, const Scalar& b) {
   if (!a.type.is_float()) return a.u == b.u;
   if (std::isnan(a.f) || std::isnan(b.f)) return std::isnan(a.f) && std::isnan(b.f);

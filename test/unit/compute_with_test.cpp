@@ -1,5 +1,5 @@
-// Stages that share loops: the nests that compute_with makes, and that values stay what they are.
-// Oracles: nests written by hand; the same Funcs computed apart.
+// compute_with: the loop nests of fused stages, whose values must not change. Oracles: nests
+// written by hand; the same Funcs without fusion.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -20,14 +20,14 @@ class ComputeWith : public testing::Test {
   Var x{"x"}, y{"y"}, xo{"xo"}, xi{"xi"}, yo{"yo"}, yi{"yi"};
   static constexpr int width = 21, height = 18;
 
-  // `make(true)` computes together what `make(false)` computes apart.
+  // `make(true)` fuses the stages that `make(false)` computes separately.
   static void expect_same(const std::function<Func(bool)>& make, int w = width, int h = height) {
     Buffer<int> apart = make(false).realize({w, h}), together = make(true).realize({w, h});
     together.for_each_element(
         [&](int i, int j) { ASSERT_EQ(together(i, j), apart(i, j)) << i << " " << j; });
   }
 
-  // Names as in the test, without what makes them unique.
+  // Loop nests with the test's names, without the numbers that make them unique.
   static std::string nest_of(const Func& f) {
     return std::regex_replace(lower::loop_nest_text({f.function()}), std::regex("\\$[0-9]+"), "");
   }
@@ -90,7 +90,7 @@ TEST_F(ComputeWith, ChainsShareEachWhatTheySay) {
               g(...) = ...
               h(...) = ...
 )"});
-  // What g does not share with f it cannot hand on.
+  // g cannot pass on loops that it does not share with f.
   g.compute_with(f, x);
   h.compute_with(g, y);
   expect_mentions(nest_of(out), {R"(
@@ -231,7 +231,8 @@ TEST_F(ComputeWith, ProducersInsideComputeNoMoreThanRuns) {
   f.compute_root();
   g.compute_root().compute_with(f, y);
   p.compute_at(f, y);
-  // The row of both stages is one; where only one of them runs, it is not joined to another row.
+  // Both stages run in one copy of the row; a row where only one of them runs is not merged with
+  // another.
   EXPECT_EQ(count(h, "simplify_storage",
                   [&](const Stmt& s) {
                     const ir::For* loop = s.as<ir::For>();
@@ -392,7 +393,7 @@ TEST_F(ComputeWith, TheFirstStageMayBeSpecialized) {
   }
 }
 
-// ---- an update in the loops of the stage before it ----
+// ---- an update fused with the stage before it ----
 
 TEST_F(ComputeWith, AnUpdateStartsInItsTile) {
   Func f("f"), out("out");
@@ -440,7 +441,7 @@ TEST_F(ComputeWith, TilesOfAnUpdateEndTogether) {
   });
 }
 
-// What slides is computed once by both stages.
+// A sliding window is computed once by both stages.
 TEST_F(ComputeWith, AnUpdateThatSlidesStartsInItsPart) {
   expect_same([&](bool together) {
     Func f("f"), out("out");
@@ -473,7 +474,7 @@ TEST_F(ComputeWith, AnUpdateFollowsItsFuncIntoOtherLoops) {
   });
 }
 
-// A tile that needs something computed in it, for either stage or for the update alone.
+// A tile with a producer computed in it, for both stages or for the update alone.
 TEST_F(ComputeWith, ProducersInTilesOfAnUpdateAlone) {
   expect_same([&](bool together) {
     Func p("p"), f("f"), out("out");

@@ -1,4 +1,4 @@
-// The order in which loop nests run: producers first, and little alive at once.
+// The order of loop nests at root: producers first, and few images alive at once.
 #include "graph/computing_order.h"
 
 #include <gtest/gtest.h>
@@ -30,16 +30,17 @@ TEST(ComputingOrder, LoopsOfAHostStayBeforeIt) {
   EXPECT_EQ(computing_order(funcs), (std::vector<size_t>{0, 2, 3, 1, 4}));
 }
 
-// Adjoints of linear steps need no values: made first, all of them wait for the steps' values.
+// Adjoints of linear steps need no values. Computed first, they would all stay alive until the
+// steps' values are there.
 TEST(ComputingOrder, AnotherOutputComesFirstWhereThatKeepsFewer) {
   std::vector<ComputedFunc> funcs;
   const size_t steps = 12;
   for (size_t i = 0; i < steps; ++i)
     funcs.push_back(image(i ? std::vector{i - 1} : std::vector<size_t>()));
-  funcs.push_back(output({steps - 1}));  // of the adjoints alone
+  funcs.push_back(output({steps - 1}));  // needs only the adjoints
   for (size_t i = 0; i < steps; ++i)
     funcs.push_back(image(i ? std::vector{steps + i} : std::vector<size_t>()));
-  // Sums of an adjoint and a value, of the last step first.
+  // Sums of an adjoint and a value, beginning with the last step.
   size_t sum = 0;
   for (size_t i = 0; i < steps; ++i) {
     std::vector<size_t> reads = {i, 2 * steps - i};
@@ -53,7 +54,7 @@ TEST(ComputingOrder, AnotherOutputComesFirstWhereThatKeepsFewer) {
   for (size_t f = 0; f < funcs.size(); ++f) {
     for (const size_t callee : funcs[f].callees) EXPECT_LT(place[callee], place[f]);
   }
-  EXPECT_LT(place[2 * steps], place[1]);  // the last value, the second adjoint
+  EXPECT_LT(place[2 * steps], place[1]);  // the last value comes before the second adjoint
 }
 
 }  // namespace

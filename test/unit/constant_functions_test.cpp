@@ -1,5 +1,5 @@
-// Functions of constants have the bits that they have at run time; and integers and conditions that
-// depend on them are still constants.
+// Functions of constants give the same bits as at run time, and integers and conditions that depend
+// on them are still constants.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -49,7 +49,7 @@ Buffer<T> samples(const Function& f) {
   std::uniform_real_distribution<double> between(f.low, f.high);
   Buffer<T> result(60);
   result.for_each_value([&](T& v) { v = static_cast<T>(between(random)); });
-  for (int i = 0; i < 2; ++i) {  // where the result may be exact
+  for (int i = 0; i < 2; ++i) {  // cases where the result may be exact
     if (f.low <= i && i <= f.high) result(i) = static_cast<T>(i);
   }
   return result;

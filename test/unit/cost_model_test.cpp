@@ -1,4 +1,5 @@
-// The cost model: what it counts on programs whose answer is known; the machine's figures as text.
+// The cost model: its counts for programs with known costs, and the text form of machine
+// parameters.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -51,7 +52,8 @@ TEST(CostModel, AProductThatIsAddedIsOneOperationOfEachVector) {
   f.vectorize(x, 16);
   in.dim(0).set_estimate(0, 1024);
   const Work work = counted(f, {1024}).total();
-  EXPECT_NEAR(work.operations, 64, 1);  // and what a size that is not whole vectors takes
+  // And the overhead of a size that is no multiple of the vector width.
+  EXPECT_NEAR(work.operations, 64, 1);
   EXPECT_EQ(work.loads, 64);
   EXPECT_EQ(work.stores, 64);
 }
@@ -78,7 +80,7 @@ TEST(CostModel, FunctionsCountByThemselves) {
   EXPECT_EQ(work.exps, 10);
   EXPECT_EQ(work.roots, 10);
   EXPECT_EQ(work.pows, 10);
-  EXPECT_EQ(work.loads, 10);  // of one place once
+  EXPECT_EQ(work.loads, 10);  // one place is loaded once
 }
 
 TEST(CostModel, PlacesThatDataDecideAreGatheredLaneByLane) {
@@ -171,9 +173,10 @@ TEST(CostModel, WhatStaysInACacheIsLoadedOnce) {
     return bytes;
   };
   const double plane = 4.0 * 1024 * 1024;
-  // in and f (twice: it is stored) by one stage; f and out (twice) by the other; rows are reused.
+  // One stage reads in and writes f (twice: it is stored); the other reads f and writes out
+  // (twice). Rows are reused.
   EXPECT_NEAR(sum(traffic.behind(1 << 20)), 6 * plane, 0.1 * plane);
-  EXPECT_EQ(sum(traffic.behind(1 << 26)), 0);  // of many calls
+  EXPECT_EQ(sum(traffic.behind(1 << 26)), 0);  // over many calls
 }
 
 TEST(CostModel, ThreadsShareLoopsAsFarAsThereAreIterations) {
@@ -185,7 +188,7 @@ TEST(CostModel, ThreadsShareLoopsAsFarAsThereAreIterations) {
   const WorkTree tree = program.tree(2);
   double speedup = 1;
   for (const tuning::WorkNode& node : tree.nodes) speedup = std::max(speedup, node.speedup);
-  EXPECT_EQ(speedup, 1.5);  // 2 tasks, then 1
+  EXPECT_EQ(speedup, 1.5);  // 2 chunks, then 1
 }
 
 TEST(CostModel, ASumInMemoryWaitsForItself) {
@@ -220,7 +223,7 @@ TEST(CostModel, SizesAreOfEachDimension) {
                [&] { tuning::output_shapes({f.function()}, {{3}}); });
 }
 
-// ---- figures of a machine ----
+// ---- machine parameters ----
 
 TEST(Machine, RoundTripsAsJson) {
   Machine m = machine();

@@ -1,5 +1,5 @@
-// Choices with an arm that takes long (codegen/costly_arms.cpp): the bits are those of choosing among
-// values that are computed everywhere. That there is a branch: jit_test.
+// Selects with a costly arm (codegen/costly_arms.cpp) give the same bits as selecting between
+// values that are computed everywhere. jit_test checks that there is a branch.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -14,7 +14,7 @@ namespace {
 constexpr int count = 96;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-// Bases and exponents, ordinary and not.
+// Bases and exponents, ordinary and special.
 Buffer<float> values(int step) {
   const float special[] = {0.0f, -0.0f, infinity, -infinity, NAN, 1e-40f, 3e38f, -2.0f};
   Buffer<float> result(count);
@@ -23,7 +23,7 @@ Buffer<float> values(int step) {
   return result;
 }
 
-// Which lanes want the arm: none, all, every third, one, those of the second half.
+// The lanes that select the arm: none, all, every third, one, the second half.
 const std::function<bool(int)> patterns[] = {
     [](int) { return false; }, [](int) { return true; }, [](int i) { return i % 3 == 0; },
     [](int i) { return i == 41; }, [](int i) { return i > count / 2; }};
@@ -36,8 +36,8 @@ void expect_same_bits(const Buffer<float>& a, const Buffer<float>& b, const std:
   }
 }
 
-// `choose`(c, x, y, power, logarithm): an expression that reads the two functions. Once as it stands,
-// once from values that were stored.
+// `choose`(c, x, y, power, logarithm) is an expression that reads the two functions. It runs once
+// inline, and once on stored values.
 template <typename Choose>
 void check_choice(const Choose& choose) {
   const Buffer<float> base = values(7), exponent = values(11);

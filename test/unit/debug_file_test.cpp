@@ -1,4 +1,4 @@
-// debug_to_file: what a Func held, in a file.
+// debug_to_file: writes the values of a Func to a file.
 #include <gtest/gtest.h>
 
 #include <cstdio>

@@ -1,5 +1,5 @@
-// Buffers of the front end with memory on a device, which is the simulated one: copies where the dirty
-// flags ask for them, crops and slices, and what is refused where the runtime would end the process.
+// Front-end Buffers with memory on the simulated device: copies according to the dirty flags, crops
+// and slices, and errors where the runtime would end the process.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -11,7 +11,7 @@
 namespace retrograde {
 namespace {
 
-// Before anything asks for a device.
+// Must be set before the first use of a device.
 [[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
 
 int64_t uploads() { return retrograde_simt_call_count("cuMemcpyHtoDAsync_v2"); }
@@ -25,7 +25,7 @@ Buffer<int> ramp(int width, int height) {
   return b;
 }
 
-// As a kernel would: the device holds `b` as it is, and the host's elements are old.
+// Imitates a kernel: the device holds the contents of `b`, and the host's elements are stale.
 void move_to_device(Buffer<int>& b) {
   b.copy_to_device();
   auto& host = *b.get();

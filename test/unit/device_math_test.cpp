@@ -1,6 +1,6 @@
-// The mathematical functions of kernels, on the simulated device, which has the bits of any other: their
-// errors against the C library in long double are at most those that codegen/math_table.h and docs/gpu.md
-// state, over floats of all sizes and those where programs mostly are.
+// The mathematical functions of kernels on the simulated device, which has the same bits as any
+// other device. Their errors against the C library in long double must not exceed those stated by
+// codegen/math_table.h and docs/gpu.md, over floats of all sizes and in typical ranges.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -23,7 +23,7 @@ void PrintTo(const MathFunction& function, std::ostream* out) { *out << function
 
 namespace {
 
-// Before anything asks for a device.
+// Must be set before the first use of a device.
 [[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
 
 using ir::Op;
@@ -80,7 +80,7 @@ long double exact(Op op, long double x, long double y) {
 
 // ---- operands ----
 
-// Any number: all exponents alike.
+// Any number, with all exponents equally likely.
 template <typename T>
 T of_any_size(std::mt19937_64& engine) {
   using Bits = std::conditional_t<sizeof(T) == 4, uint32_t, uint64_t>;
@@ -90,7 +90,7 @@ T of_any_size(std::mt19937_64& engine) {
   }
 }
 
-// A third of them anything, a third up to 10, a third near the places where functions turn or end.
+// One third arbitrary, one third up to 10, one third near the points where functions turn or end.
 template <typename T>
 T operand(std::mt19937_64& engine, int i) {
   const auto between = [&](double low, double high) {
@@ -114,7 +114,7 @@ T operand(std::mt19937_64& engine, int i) {
 
 // ---- errors ----
 
-// In units of the last place that the type has at the exact value.
+// In units of the last place of the type at the exact value.
 template <typename T>
 double error_in_ulp(T got, long double wanted) {
   using Limits = std::numeric_limits<T>;
@@ -195,7 +195,8 @@ TEST_P(DeviceMath, ErrorsAreAtMostThoseStated) {
 INSTANTIATE_TEST_SUITE_P(Functions, DeviceMath, testing::ValuesIn(codegen::math_functions),
                          [](const auto& f) { return std::string(f.param.stem); });
 
-// Random programs on the simulated device are compared with what any correct implementation may give.
+// Random programs on the simulated device are compared with the bounds for any correct
+// implementation.
 TEST(DeviceMathTable, ErrorsAreThoseOfACorrectImplementation) {
   for (const codegen::MathFunction& f : codegen::math_functions) {
     const int allowed = ir::op_info(f.op).real.error.ulp_elsewhere;

@@ -1,5 +1,5 @@
-// Compiled functions kept on disk: used again in later runs, and never when they are not exactly
-// what was written.
+// The disk cache of compiled functions: entries are reused in later runs, but never when they
+// differ from what was written.
 #include "jit/disk_cache.h"
 
 #include <sys/stat.h>
@@ -37,7 +37,7 @@ class DiskCache : public testing::Test {
   ~DiskCache() override { set_compile_cache_directory(""); }
   std::string folder(const std::string& name = "cache") const { return root / name; }
 
-  // As a later run of the program does: nothing is remembered but what is on disk.
+  // Imitates a later run of the program: only the disk contents remain.
   static void start_again(const std::string& where) {
     jit::clear_cache();
     set_compile_cache_directory(where);
@@ -67,11 +67,11 @@ class DiskCache : public testing::Test {
     std::ifstream in(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(in), {}};
   }
-  // In place: the mode stays.
+  // Writes in place, so the file mode is unchanged.
   static void write_file(const fs::path& path, const std::string& text) {
     std::ofstream(path, std::ios::binary | std::ios::trunc) << text;
   }
-  // The entry was there, was not used, and was replaced by one that is.
+  // Expects that the entry existed, was not used, and was replaced by a valid one.
   void expect_rebuilt() {
     start_again(folder());
     expect_runs(scaled(3), 3);
@@ -90,7 +90,7 @@ class DiskCache : public testing::Test {
   const fs::path& root = temporary.path();
 };
 
-// First in this file: the environment is looked at once.
+// Must be the first test in this file: the environment is read once.
 TEST_F(DiskCache, TheEnvironmentNamesAFolder) {
   setenv("RETROGRADE_CACHE_DIR", folder().c_str(), 1);
   jit::clear_cache();
@@ -158,10 +158,10 @@ TEST_F(DiskCache, EverythingIsPrivate) {
     EXPECT_EQ(status.st_mode & 07777, 0600u) << entry.path();
     files++;
   }
-  EXPECT_EQ(files, 2);  // the key and the entry; nothing unfinished
+  EXPECT_EQ(files, 2);  // the key and the entry; no unfinished files
 }
 
-// ---- entries that are not what was written ----
+// ---- modified entries ----
 
 TEST_F(DiskCache, ATruncatedEntryIsRebuilt) {
   write_entry();
@@ -228,7 +228,7 @@ TEST_F(DiskCache, ALostKeyMeansRebuilding) {
   expect_rebuilt();
 }
 
-// ---- folders that are refused ----
+// ---- folders that are rejected ----
 
 void expect_refused(const std::string& path, const std::string& why) {
   try {
@@ -262,7 +262,7 @@ TEST_F(DiskCache, AFolderThatCannotBeMadeIsRefused) {
   expect_refused(folder("file"), "cannot be opened");
 }
 
-// ---- several at once ----
+// ---- concurrent processes ----
 
 // ---- size ----
 
@@ -274,7 +274,7 @@ TEST_F(DiskCache, WhatWasNotUsedForLongestGoesFirst) {
     jit::clear_cache();
     set_compile_cache_directory(folder(), 4 * one + one / 2);
   };
-  // Clocks of files are coarse: what was just written is said to be hours old.
+  // File timestamps are coarse, so this sets them hours back.
   const auto age = [&](int hours) {
     const auto now = fs::file_time_type::clock::now();
     for (const fs::path& entry : entries(folder())) {
@@ -287,7 +287,7 @@ TEST_F(DiskCache, WhatWasNotUsedForLongestGoesFirst) {
   age(2);
   expect_runs(scaled(5), 5);
   age(1);
-  // 3 is the oldest, and then used again.
+  // 3 is the oldest entry, and is then used again.
   start_small();
   expect_runs(scaled(3), 3);
   EXPECT_EQ(statistics().hits, 1u);

@@ -1,4 +1,4 @@
-// Images without elements, as inputs and as results.
+// Images without elements, as inputs and as outputs.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -59,7 +59,7 @@ TEST(EmptyImages, AskForNothing) {
   }
 }
 
-// What a loss over all elements adds up, and its reads at and beyond the borders.
+// The terms of a loss over all elements, with reads at and beyond the borders.
 using Term = Expr (*)(const ImageParam& im, const RDom& r);
 const std::vector<Term> terms = {
     [](const ImageParam& im, const RDom& r) { return im(r.x, r.y) * im(r.x, r.y); },

@@ -1,4 +1,5 @@
-// Sums that one Func alone reads, at the same place: tile by tile in its loops.
+// Autoscheduling of sums with a single pointwise consumer: they are computed in the consumer's
+// tiles.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -17,7 +18,7 @@ struct Sizes {
   int width = 70, height = 50, channels = 12, images = 3, kernel = 3;
 };
 
-// A convolution of several images, and what reads it.
+// A convolution of several images, and its consumer.
 struct Layer {
   using Reading = std::function<Expr(const Layer&)>;
 
@@ -40,7 +41,7 @@ struct Layer {
   }
   Expr here() const { return convolved(x, y, c, n); }
   const graph::LoopLevel& level() const { return convolved.function()->schedule.compute_level; }
-  // In the innermost of the loops over tiles.
+  // Whether it is computed in the innermost of the loops over tiles.
   bool is_in_tiles() const {
     return level().kind == graph::LoopLevel::Kind::At && level().func == result.name() &&
            level().var == "x";
@@ -72,7 +73,7 @@ TEST(Epilogues, AreComputedWithTheirTiles) {
       {"smooth, of its place",
        [](const Layer& l) { return l.here() / (1.0f + exp(-l.here())) + l.x; }}};
   for (const auto& [name, read] : readings) {
-    // All vectors whole; rests of every dimension; rows shorter than a vector.
+    // Sizes: all vectors full; tails in every dimension; rows shorter than a vector.
     for (const Sizes& sizes : {Sizes{64, 48, 16, 2}, Sizes{70, 50, 11, 3}, Sizes{9, 50, 7, 5}}) {
       Layer layer(read, sizes), plain(read, sizes);
       layer.schedule();
@@ -94,7 +95,7 @@ TEST(Epilogues, ArePartOfTheSchedulesText) {
     EXPECT_NE(text.find(directive), std::string::npos) << directive << " in\n" << text;
 }
 
-// Where it ends in the output, or in what sums of many terms read.
+// The chain ends in the output, or in a Func that long sums read.
 TEST(Epilogues, OfASumOfFewTerms) {
   const Sizes few{.width = 70, .height = 50, .channels = 3};
   Layer layer(positive, few), plain(positive, few);
@@ -119,7 +120,7 @@ TEST(Epilogues, AreNotOfAFewTermsMore) {
   EXPECT_FALSE(layer.is_in_tiles());
 }
 
-// All of it runs in strips together.
+// The whole program runs in strips.
 TEST(Epilogues, AreNotOfSumsOfFewTermsBehindWhichAStencilGoesOn) {
   Layer layer(positive, {.width = 300, .height = 300, .channels = 3});
   Func edges("edges");
@@ -131,7 +132,7 @@ TEST(Epilogues, AreNotOfSumsOfFewTermsBehindWhichAStencilGoesOn) {
   EXPECT_EQ(layer.level().func, edges.name());
 }
 
-// The blur of rows runs in strips with that of columns, which it reads.
+// The row blur runs in strips with the column blur, which it reads.
 TEST(Epilogues, AreNotOfStencilsThatReadWhatIsComputed) {
   Buffer<float> image(300, 300);
   Layer::fill(image, 0.5f);
@@ -167,7 +168,7 @@ TEST(Epilogues, AreNotWhereTwoReadThem) {
   EXPECT_EQ(layer.level().kind, graph::LoopLevel::Kind::Root);
 }
 
-// Of two sums one is in the tiles of the reader, which has its loops from then on.
+// One of two sums is computed in the consumer's tiles; the consumer's loops are then fixed.
 TEST(Epilogues, OfTwoSumsThatOneReads) {
   const auto both = [](Layer& layer) {
     Func second("second");
@@ -208,7 +209,7 @@ TEST(Epilogues, OfAProductOfMatrices) {
   expect_same(found.realize({n, n}), expected.realize({n, n}), "product");
 }
 
-// The gradient by an image is the padded image's, where the image is.
+// The gradient by an image is that of the padded image, inside the image.
 TEST(Epilogues, AreThoseOfAGradientThroughABoundaryCondition) {
   Layer layer(positive), plain(positive);
   const auto gradient = [](Layer& of) {

@@ -1,10 +1,10 @@
-// Every error code of HalideRuntime.h that code for a CPU can give: a program whose generated code
+// Every error code of HalideRuntime.h that CPU code can return: a program whose generated code
 // returns it, called without the checks of the front end.
 //
-// Not here, because they are of devices, which this runtime has none of: -14 to -19, -23, -32, -33,
-// -36 to -42; of the Matlab interface: -20, -21; of an earlier version: -29, -30. Nothing returns
-// generic_error (-1) itself: C functions do, and it is passed on. What internal_error (-22) and
-// bad_fold (-25), bad_extern_fold (-35) would say is a CompileError here.
+// Not covered: the codes of devices, -14 to -19, -23, -32, -33 and -36 to -42, as these programs
+// use none; of the Matlab interface, -20 and -21; of an earlier version, -29 and -30. No code here
+// returns generic_error (-1) itself: C functions do, and it is passed on. The conditions of
+// internal_error (-22), bad_fold (-25) and bad_extern_fold (-35) are CompileErrors here.
 #include <HalideRuntime.h>
 #include <gtest/gtest.h>
 
@@ -20,10 +20,10 @@ struct Answer {
   std::string message;
 };
 
-// Arguments as generated code takes them: inputs in the order of their first use, then outputs.
+// Arguments in the order of generated code: inputs by first use, then outputs.
 Answer call(const Func& f, const std::vector<void*>& argv, const CallContext& given = {}) {
-  const auto code = default_compiler().compile({f.name(), {f.function()}},
-                                               get_jit_target_from_environment());
+  const auto code =
+      default_compiler().compile({f.name(), {f.function()}}, get_jit_target_from_environment());
   EXPECT_EQ(code->arguments().size(), argv.size());
   CallContext context = given;
   JITUserContext nobody;
@@ -36,7 +36,8 @@ void expect_code(halide_error_code_t code, const Answer& answer,
                  std::initializer_list<const char*> phrases) {
   EXPECT_EQ(answer.code, code) << answer.message;
   for (const char* phrase : phrases)
-    EXPECT_NE(answer.message.find(phrase), std::string::npos) << phrase << " in: " << answer.message;
+    EXPECT_NE(answer.message.find(phrase), std::string::npos)
+        << phrase << " in: " << answer.message;
 }
 
 // out(x) = in(x) + in(x + 1)
@@ -80,7 +81,8 @@ TEST(ErrorCodes, ExplicitBoundsTooSmall) {
   g.compute_root().bound(x, 0, 4);
   f(x) = g(x);
   Buffer<int> out(8);
-  expect_code(halide_error_code_explicit_bounds_too_small, call(f, {out.raw_buffer()}), {"bounded"});
+  expect_code(halide_error_code_explicit_bounds_too_small, call(f, {out.raw_buffer()}),
+              {"bounded"});
 }
 
 TEST(ErrorCodes, BadType) {
@@ -101,7 +103,7 @@ TEST(ErrorCodes, AccessOutOfBounds) {
   expect_code(halide_error_code_access_out_of_bounds, p.run(), {"[0, 8]", "[0, 7]"});
 }
 
-// Strides whose elements lie too far apart to be numbered in 31 bits, with extents that are small.
+// Strides so large that element offsets exceed 31 bits, with small extents.
 TEST(ErrorCodes, BufferAllocationTooLarge) {
   ImageParam in(Int(32), 2, "wide");
   Func f("f");
@@ -177,8 +179,8 @@ TEST(ErrorCodes, OutOfMemory) {
 
 TEST(ErrorCodes, BufferArgumentIsNull) {
   Pair p;
-  expect_code(halide_error_code_buffer_argument_is_null, call(p.f, {nullptr, p.output.raw_buffer()}),
-              {"pair_in"});
+  expect_code(halide_error_code_buffer_argument_is_null,
+              call(p.f, {nullptr, p.output.raw_buffer()}), {"pair_in"});
 }
 
 TEST(ErrorCodes, DebugToFileFailed) {
@@ -219,7 +221,8 @@ TEST(ErrorCodes, RequirementFailed) {
   f(x) = require(n > 2, x, "n is too small:", n);
   Buffer<int> out(4);
   int two = 2;
-  expect_code(halide_error_code_requirement_failed, call(f, {&two, out.raw_buffer()}), {"too small"});
+  expect_code(halide_error_code_requirement_failed, call(f, {&two, out.raw_buffer()}),
+              {"too small"});
 }
 
 TEST(ErrorCodes, BufferExtentsNegative) {
@@ -239,7 +242,7 @@ TEST(ErrorCodes, SpecializeFail) {
   expect_code(halide_error_code_specialize_fail, call(f, {&no, out.raw_buffer()}), {"only wide"});
 }
 
-// Data that are on a device only.
+// The data are only on a device.
 TEST(ErrorCodes, HostIsNull) {
   Pair p;
   halide_buffer_t away = *p.input.raw_buffer();

@@ -1,4 +1,4 @@
-// The four parts of a message, how they are rendered, and which class each helper throws.
+// The four parts of a message, their rendering, and the class that each helper throws.
 #include <gtest/gtest.h>
 
 #include <type_traits>

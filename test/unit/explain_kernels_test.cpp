@@ -1,4 +1,4 @@
-// What explain_kernels says, and notes of arrays in local memory.
+// The output of explain_kernels, and notes about arrays in local memory.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -16,7 +16,7 @@ Target with_gpu() {
 
 class ExplainKernels : public testing::Test {
  protected:
-  // A sum of three rows, a tile of which lies in shared memory.
+  // A sum of three rows, with a tile in shared memory.
   Func tiled() {
     Func rows("rows"), out("out");
     rows(x, y) = cast<float>(x * y);
@@ -25,7 +25,7 @@ class ExplainKernels : public testing::Test {
     rows.compute_at(out, x).gpu_threads(x, y);
     return out;
   }
-  // A table of each thread, read at places that data decide.
+  // A per-thread table, read at data-dependent indices.
   Func with_table() {
     Func table("table"), out("out");
     table(k) = in(k, 0) * in(k, 1);
@@ -112,7 +112,7 @@ TEST_F(ExplainKernels, WhoListensForWarningsHearsOfThemWhereverCodeComesFrom) {
   Func again = with_table();
   again.compile_jit(with_gpu());
   EXPECT_EQ(told.size(), 2u);
-  // Ahead of time.
+  // Compiled ahead of time.
   out.compile_to_module({in}, "with_table", with_gpu());
   EXPECT_EQ(told.size(), 3u);
 }

@@ -20,7 +20,7 @@ int& element(halide_buffer_t* b, int x, int y = 0) {
 }
 }  // namespace
 
-// value, and one more call of `which`
+// Returns value and counts a call of `which`.
 namespace {
 std::atomic<int> calls[4];
 }
@@ -56,7 +56,7 @@ EXPORTED int extern_test_stencil(halide_buffer_t* in, halide_buffer_t* out) {
   return 0;
 }
 
-// Both values of a Tuple.
+// Computes both values of a Tuple.
 EXPORTED int extern_test_divide(halide_buffer_t* in, int by, halide_buffer_t* quotient,
                                 halide_buffer_t* remainder) {
   if (is_query(in)) {
@@ -91,7 +91,7 @@ EXPORTED int extern_test_blocks(halide_buffer_t* out) {
   return 0;
 }
 
-// out(x) = in(x) + x, in blocks of 17 only; it never reads beyond the region that it is given.
+// out(x) = in(x) + x, in blocks of 17 only; never reads beyond the given region.
 EXPORTED int extern_test_rounds(halide_buffer_t* in, halide_buffer_t* out) {
   if (is_query(in) || is_query(out)) {
     if (is_query(out)) out->dim[0].extent = (out->dim[0].extent + 16) / 17 * 17;
@@ -108,7 +108,7 @@ EXPORTED int extern_test_rounds(halide_buffer_t* in, halide_buffer_t* out) {
   return 0;
 }
 
-// Asks for more of its input the less it is asked for.
+// Requires more of its input the less of its output is requested.
 EXPORTED int extern_test_insatiable(halide_buffer_t* in, halide_buffer_t* out) {
   if (is_query(in)) {
     in->dim[0].min = 0;
@@ -257,7 +257,8 @@ TEST(ExternStage, MayComputeMoreThanIsNeededInEachIteration) {
   }
 }
 
-// What is computed outside of the loop is all that the function asks for in any iteration.
+// A producer computed outside of the loop covers everything that the function requires in any
+// iteration.
 TEST(ExternStage, InALoopReadsWhatIsComputedOutside) {
   Var x("x"), y("y");
   Func base("base"), in("in"), f("f"), out("out");
@@ -302,7 +303,7 @@ TEST(ExternStage, IsCalledOnSlicesInItsOwnLoops) {
         in.compute_at(f, xo);
       else
         in.compute_root();
-      // Where tiles do not divide it, the last ones move inwards.
+      // If tiles do not divide the extent, the last ones move inwards.
       const Buffer<int> result = (is_output ? f : out).realize({33, 22});
       result.for_each_element(
           [&](int i, int j) { ASSERT_EQ(result(i, j), i * j + i) << i << " " << j; });

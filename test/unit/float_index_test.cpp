@@ -1,5 +1,5 @@
-// Coordinates computed from floats: what is computed or asked for is what is read, however the
-// processor may fuse products and sums.
+// Coordinates computed from floats: the region that is computed or required must be the one that is
+// read, even if the processor fuses products and sums.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace {
 
 Var x("x"), y("y");
 
-// Each operation rounds: volatile keeps the host compiler from fusing them.
+// Rounds each operation: volatile keeps the host compiler from fusing them.
 int strict_place(int at, float scale) {
   volatile float moved = static_cast<float>(at) + 0.5f;
   volatile float scaled = moved * scale;
@@ -23,7 +23,7 @@ int strict_place(int at, float scale) {
 
 Expr position(const Expr& scale) { return (cast<float>(x) + 0.5f) * scale - 0.5f; }
 
-// Scales that put a place just below a power of two, where a fused product and sum round to
+// Scales that put a coordinate just below a power of two, where a fused product and sum round to
 // another integer; and some others.
 std::vector<float> hard_scales() {
   std::vector<float> scales{0.3f, -0.3f, 1.0f / 3, -2.0f / 7, 1.9f};
@@ -40,7 +40,7 @@ std::vector<float> hard_scales() {
   return scales;
 }
 
-// `f` returns where it read, and its input is as large as it asked for.
+// `f` returns the coordinate that it read, and its input is as large as the required region.
 void expect_strict_places(Func f, ImageParam in, Param<float> scale) {
   f.vectorize(x, 8, TailStrategy::GuardWithIf);
   const std::vector<float> scales = hard_scales();
@@ -72,7 +72,7 @@ TEST(FloatIndex, TheRegionAskedForIsTheOneRead) {
   expect_strict_places(f, in, scale);
 }
 
-// The rest of the position, which is computed outside of the place too, is less than 1.
+// The fraction of the position, which is computed outside of the index too, is less than 1.
 TEST(FloatIndex, AlsoWhenThePlaceSharesItsPositionWithAWeight) {
   ImageParam in(Int(32), 1, "in");
   Param<float> scale("scale");
@@ -115,7 +115,7 @@ TEST(FloatIndex, QuotientsAndConstantsBoundWhatIsComputedInATile) {
   }
 }
 
-// In the definition of an update: the histogram of a slice by position.
+// In an update definition: the histogram of a slice by position.
 TEST(FloatIndex, WhereAnUpdateStores) {
   Func h("h"), f("f");
   RDom r(0, 30);

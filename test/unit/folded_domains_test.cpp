@@ -1,6 +1,6 @@
-// A reduction domain belongs to its definition: an update runs over all of its domain, though nothing
-// of the variables is left once the two sides are folded. So does the number of dimensions that _
-// stands for.
+// A reduction domain belongs to its definition: an update runs over its whole domain, even if
+// folding removes all reduction variables from both sides. The same holds for the dimensions of the
+// placeholder _.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -96,7 +96,7 @@ TEST(FoldedDomains, OfPlacesOnTheLeft) {
   const Buffer<int> result = f.realize({4});
   EXPECT_EQ(result(2), 10);
   EXPECT_EQ(result(1), 0);
-  // What is left is the pure variable: the update is for all of its values.
+  // Only the pure variable remains, so the update covers all of its values.
   Func g("g");
   g(x) = 0;
   g(x + r * 0) += x;
@@ -199,7 +199,7 @@ TEST(FoldedDomains, AreRefusedWhereTheyWouldBeUnfolded) {
   expect_error({"bounds must be known before any loop starts"}, [&] { RDom t(0, r * 0 + 3); });
 }
 
-// Definitions are folded as ever: nothing slower is left of them.
+// Folding still applies: no slower code remains.
 TEST(FoldedDomains, LeaveFoldedDefinitions) {
   RDom r(0, 10);
   Func f("f");

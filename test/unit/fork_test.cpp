@@ -1,5 +1,5 @@
-// Forks and semaphores of the runtime alone, without a compiler: who waits for whom, what error is
-// told, and which threads there are, by what the kernel lists.
+// Forks and semaphores of the runtime without the compiler: who waits for whom, which error is
+// reported, and which threads exist according to the kernel.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -91,7 +91,7 @@ TEST(Fork, OneAfterTheOtherUsesOneThread) {
   EXPECT_EQ(threads.count(gettid()), 0u);
 }
 
-// Forks inside of both branches; everybody on the way down waits for the innermost.
+// Forks inside both branches; every outer level waits for the innermost.
 struct Nest {
   uint64_t bottom = 0;
   int depth = 0;
@@ -115,7 +115,7 @@ int32_t go_down(retrograde_context* context, int32_t, uint8_t* closure) {
   Level below{here.nest, here.depth - 1};
   void* semaphores[] = {&here.nest->bottom};
   auto* next = reinterpret_cast<uint8_t*>(&below);
-  // The way down is on the borrowed thread at every other level.
+  // The outer level is on the borrowed thread at every other level.
   return here.depth % 2 == 0
              ? retrograde_fork(context, wait_for_bottom, next, go_down, next, semaphores, 1)
              : retrograde_fork(context, go_down, next, wait_for_bottom, next, semaphores, 1);
@@ -167,7 +167,7 @@ TEST(Fork, ThreadsThatAreKeptAreFewAndEndWhenAsked) {
   EXPECT_GE(kept, 1);
   EXPECT_LE(kept, 16);
   runtime::end_spare_threads();
-  // The kernel lists a joined thread for a moment longer.
+  // The kernel lists a joined thread for a short time after it ended.
   for (int i = 0; i < 5000 && threads_of_this_process() > before; i++) usleep(1000);
   EXPECT_EQ(threads_of_this_process(), before);
   Handshake h;
@@ -175,7 +175,7 @@ TEST(Fork, ThreadsThatAreKeptAreFewAndEndWhenAsked) {
   EXPECT_EQ(run(nullptr, h), 0);
 }
 
-// The race detector allows no threads in such a process.
+// The race detector does not support threads in such a process.
 #ifndef __SANITIZE_THREAD__
 TEST(Fork, RunsInAChildProcessThatHasNoneOfTheThreads) {
   Handshake h;

@@ -1,6 +1,7 @@
-// What the built-in autoscheduler does with forward programs: choices along small dimensions, rows along
-// long ones, chains behind transposed reads, slices that a reduction reads through what is inline,
-// parts of sums at places that data decide, rows that tiles read through boundary conditions.
+// The built-in autoscheduler on forward programs: selects along small dimensions, rows along long
+// ones, chains behind transposed reads, slices that a reduction reads through inlined Funcs, split
+// reductions at data-dependent indices, and rows packed for tiles that read through boundary
+// conditions.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -29,7 +30,7 @@ struct Source {
   Buffer<float> picture = some_picture(300, 280);
 };
 
-// A program by itself and under the autoscheduler.
+// A program without a schedule and under the autoscheduler.
 template <class Program>
 struct Scheduled {
   Scheduled() { Pipeline(program.out).auto_schedule(get_host_target()); }
@@ -71,7 +72,7 @@ struct Opponents {
   Func opponent{"opponent"}, out{"out"};
 };
 
-// Sums and differences of pairs, put beside each other again.
+// Sums and differences of pairs, interleaved again.
 struct Pairs {
   Pairs() {
     const Expr a = source(2 * x, y), b = source(2 * x + 1, y);
@@ -83,7 +84,7 @@ struct Pairs {
   Func halves{"halves"}, out{"out"};
 };
 
-// By data, which a clamp keeps among a few.
+// Levels selected by data, which a clamp keeps within a few.
 struct Levels {
   Levels() {
     level(x, y, k) = select(k < 2, exp(-source(x, y)) * k, sqrt(source(x, y) + k));
@@ -143,7 +144,7 @@ struct Taps {
   Func taps{"taps"}, out{"out"};
 };
 
-// Two numbers of each pixel, beside each other.
+// Two values for each pixel, side by side.
 struct Slopes {
   Slopes() {
     slope(c, x, y) = sqrt(abs(source(x + c, y + 1 - c) - source(x, y)) + 0.5f) * exp(-source(x, y));
@@ -187,7 +188,7 @@ TEST(LaneDimensions, AreTheFirstWhereReadersRunAlongIt) {
   EXPECT_EQ(program.taps.function()->schedule.storage_dims[0], "k");
 }
 
-// Columns of each picture of a batch, in another order, as rows.
+// Columns of each picture of a batch, permuted, as rows.
 struct Turned {
   Turned() {
     heavy(x, y, n) = exp(-source(x + n, y)) + sqrt(source(x, y + n) + 1.0f);
@@ -200,7 +201,7 @@ struct Turned {
   Func heavy{"heavy"}, shuffled{"shuffled"}, out{"out"};
 };
 
-// Column sums of blocks of rows, of which the columns become rows.
+// Column sums of blocks of rows, transposed.
 struct TurnedSums {
   TurnedSums() {
     part(x, i, k) = exp(-source(x, 8 * i + k)) + source(x, 8 * i + k + 1);
@@ -222,7 +223,7 @@ TEST(ChainsBehindTiles, RunInTheRowsOfTiles) {
   sums.expect_same_values({512, 700});
 }
 
-// How alike windows around two pixels are, by offset: what is inline stands between.
+// Similarity of windows around two pixels, by offset, through inlined Funcs.
 struct Likenesses {
   Likenesses() {
     const RDom each(0, 8, 0, 8);
@@ -240,7 +241,7 @@ struct Likenesses {
   Func difference{"difference"}, windows{"windows"}, weight{"weight"}, out{"out"};
 };
 
-// The cost of each of many depths, of which a soft minimum is taken.
+// The costs of many depths, and their soft minimum.
 struct Depths {
   Depths() {
     const RDom depth(0, 64);
@@ -265,8 +266,8 @@ TEST(SlicesReadThroughInlinedFuncs, AreComputedInTheReductionWithTheirChain) {
   depths.expect_same_values({280, 270});
 }
 
-// How many pixels have a brightness below that of this one, and the mean of what pixels as bright
-// have beside them.
+// For each pixel, the number of pixels that are darker, and the mean of the neighbours of equally
+// bright pixels.
 struct Histograms {
   Histograms() {
     const RDom r(0, 300, 0, 280), up(1, 63);
@@ -299,7 +300,7 @@ TEST(ScattersToFewElements, HavePrivateParts) {
   histograms.expect_same_values({64});
 }
 
-// A layer of a network: what a tile of sums reads through a boundary condition, many times over.
+// A layer of a network: a tile of sums reads its input through a boundary condition, many times.
 using Boundary = Func (*)(const Func&, const Region&);
 Func zeros_around(const Func& f, const Region& box) {
   return BoundaryConditions::constant_exterior(f, 0.0f, box);
@@ -316,7 +317,7 @@ class RowCopies : public ::testing::Test {
  protected:
   static constexpr int planes = 6;
 
-  // Of `image`, and the weights; its sizes are known, or only when it runs.
+  // A layer over `image` and the weights, with sizes known at compile time or only at run time.
   Func layer_of(const Layer& layer, ImageParam& image, ImageParam& weights) {
     Var x("x"), y("y"), c("c");
     const Func source = lambda(x, y, c, image(x, y, c));
@@ -333,7 +334,8 @@ class RowCopies : public ::testing::Test {
     return result;
   }
 
-  // The log of its schedule. Its values are those of the layer without one, for sizes with rests too.
+  // Returns the log of the layer's schedule, and checks its values against the unscheduled layer,
+  // also for sizes with tails.
   std::string log_of(const Layer& layer) {
     ImageParam image(Float(32), 3, "image"), weights(Float(32), 4, "weights");
     const Func plain = layer_of(layer, image, weights);
@@ -386,7 +388,7 @@ TEST_F(RowCopies, OfOtherBoundaries) {
                       const Region& box) { return BoundaryConditions::mirror_image(f, box); },
        .outputs = 16}));
 }
-// One tap: each tile reads an element once, and few tiles do.
+// One tap: each tile reads an element once, and there are few tiles.
 TEST_F(RowCopies, NotOfWhatFewTilesRead) {
   EXPECT_FALSE(copies({.taps = 1}));
   EXPECT_FALSE(copies({.taps = 1, .has_known_sizes = false}));

@@ -1,5 +1,5 @@
-// Calls of compiled code: what the front end passes, checks and reports, with a compiler of our own
-// that records it.
+// Calls of compiled code: what the front end passes, checks and reports, recorded by a mock
+// compiler.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -10,7 +10,7 @@ using namespace retrograde;
 
 namespace {
 
-// Stands for compiled code. `body` sees the arguments by name.
+// A mock of compiled code. `body` gets the arguments by name.
 struct FakePipeline : CompiledPipeline {
   std::vector<ir::LoweredArgument> args;
   std::function<int(const std::map<std::string, void*>&, CallContext&)> body;
@@ -91,7 +91,7 @@ TEST_F(Calls, ScalarsArePassedByTheirBytes) {
     return 0;
   };
   f.realize({4});
-  EXPECT_EQ(calls, 2);  // what must the output be, and the run
+  EXPECT_EQ(calls, 2);  // a bounds query for the output, and the run
 }
 
 TEST_F(Calls, OutputsAreAllocatedWithTheSizesGiven) {
@@ -106,7 +106,7 @@ TEST_F(Calls, OutputsAreAllocatedWithTheSizesGiven) {
     return 0;
   };
   Realization r = f.realize({7, 3});
-  EXPECT_EQ(has_memory, (std::vector<bool>{false, true}));  // what must they be, and the run
+  EXPECT_EQ(has_memory, (std::vector<bool>{false, true}));  // a bounds query for both, and the run
   ASSERT_EQ(r.size(), 2u);
   EXPECT_EQ(r[0].type(), Int(32));
   EXPECT_EQ(r[1].type(), Float(32));
@@ -149,7 +149,7 @@ TEST_F(Calls, SeveralOutputsShareACall) {
   both.realize({a, b});
   Realization r = both.realize({4});
   EXPECT_EQ(r.size(), 2u);
-  EXPECT_EQ(calls, 3);  // one with buffers; for sizes what the outputs must be, and the run
+  EXPECT_EQ(calls, 3);  // one with buffers; for sizes, a bounds query of the outputs and the run
   EXPECT_THROW(both.realize({b, a}), RuntimeError);
 }
 

@@ -1,4 +1,4 @@
-// What expressions and definitions written by users become.
+// Translation of users' expressions and definitions to IR.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -228,7 +228,7 @@ TEST(Definitions, TuplesHoldSeveralValues) {
   f(x)[1] += 2.0f;
   g(x) = f(x);
   EXPECT_EQ(g.outputs(), 2);
-  // The first value is written back as it was.
+  // The first value is written back unchanged.
   const Tuple values = f.update_values();
   const ir::Call* kept = values[0].as<ir::Call>();
   ASSERT_TRUE(kept);
@@ -353,7 +353,7 @@ TEST(Parameters, AreFoundInFirstUseOrder) {
   std::vector<std::string> names;
   for (const auto& p : graph::parameters_of({g.function()})) names.push_back(p->name);
   EXPECT_EQ(names, (std::vector<std::string>{"in_p", "gain_p", "table_p"}));
-  EXPECT_EQ(g.infer_arguments().size(), 2u);  // the table is part of the program
+  EXPECT_EQ(g.infer_arguments().size(), 2u);  // the table is embedded in the program
 }
 
 TEST(Parameters, HoldValuesOfTheirType) {
@@ -377,7 +377,7 @@ TEST(Parameters, FactsOfShapesAreExprs) {
   EXPECT_GT(in.parameter()->version, before);
 }
 
-// ---- made inside expressions ----
+// ---- Funcs created inside expressions ----
 
 TEST(InlineReductions, ExtremesStartFromTheLimitsOfTheType) {
   RDom r(0, 5);

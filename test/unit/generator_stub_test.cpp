@@ -1,5 +1,5 @@
-// A generator inside another one, by the header that it writes of itself (-e cpp_stub). The header
-// is made by the build; values are compared with plain C++.
+// A generator inside another one, through the header that it writes (-e cpp_stub). The build makes
+// the header; values are compared with plain C++.
 #include <gtest/gtest.h>
 
 #include "Halide.h"
@@ -61,7 +61,7 @@ TEST(GeneratorStub, HasParamsWithTheirDefaults) {
 TEST(GeneratorStub, HasEachNameOnce) {
   InnerStub::GeneratorParams params;
   EXPECT_EQ(params.scaled_type, Int(32));  // the param
-  EXPECT_EQ(params.scaled_type_, Type());  // what the output "scaled" leaves open
+  EXPECT_EQ(params.scaled_type_, Type());  // unset, because the declaration leaves it open
   params.scaled_type_ = Int(16);
   const auto map = params.to_generator_params_map();
   EXPECT_EQ(map.at("scaled.type").text, "int16");
@@ -101,7 +101,7 @@ TEST(GeneratorStub, HasWhatConfigureAddsAndIsItsOnlyOutput) {
 }
 
 // api: GeneratorBase::emit_schedule
-// stub_inner.schedule.h (-e schedule): given to the same Funcs without a schedule.
+// stub_inner.schedule.h (-e schedule), applied to the same Funcs without a schedule.
 TEST(GeneratorSchedule, AppliesToFreshFuncs) {
   const GeneratorContext context(get_jit_target_from_environment());
   const auto make = [&] {

@@ -58,7 +58,7 @@ TEST(Generator, RunsFromCpp) {
     for (int r = -2; r <= 2; r++) sum += at(in, i + r) * 3.0f * 0.5f;
     ASSERT_EQ(out(i), sum) << i;
   }
-  // The output is a Func like any other.
+  // The output is an ordinary Func.
   Func doubled("doubled");
   Var x;
   doubled(x) = 2.0f * blur->out(x);
@@ -80,7 +80,7 @@ class Leveled : public Generator<Leveled> {
   void schedule() { inner.compute_at(level); }
 };
 
-// The loop of an output exists only when generate() has run.
+// The loops of an output exist only after generate() has run.
 TEST(Generator, LoopLevelsAreSetBeforeAndAfterGenerate) {
   const GeneratorContext context(get_jit_target_from_environment());
   auto early = context.create<Leveled>(), late = context.create<Leveled>();
@@ -130,8 +130,8 @@ TEST(Generator, ParamsStandForTheirValuesInArithmetic) {
   EXPECT_EQ(evaluate<int>(lambda(x, x + 1)(a)), 8);
 }
 
-// Arrays, scalars of open type, images of open type and dimensions, a Tuple output, an output with
-// no dimensions.
+// Arrays, scalars of unspecified type, images of unspecified type and dimensions, a Tuple output,
+// an output without dimensions.
 class Mixed : public Generator<Mixed> {
  public:
   Input<Buffer<int32_t>[3]> images { "images", 1 };
@@ -225,8 +225,8 @@ std::vector<std::string> argument_names(const Module& module) {
   return names;
 }
 
-// What generators name without a using directive, inputs as arguments of a C function, and outputs
-// of several types.
+// Names that a generator uses without a using directive, inputs as arguments of a C function, and
+// outputs of several types.
 class Outside : public retrograde::Generator<Outside> {
  public:
   Input<Buffer<int32_t, 1>> image{"image"};
@@ -335,7 +335,7 @@ TEST(Generator, ModulesTakeInputsAndThenOutputs) {
   const GeneratorContext context(Target("x86-64-linux"));
   EXPECT_EQ(argument_names(context.create<BoxBlur>()->build_module("blur")),
             (Names{"in", "gain", "out"}));
-  // Another one in this process has the same names.
+  // Another generator in this process has the same names.
   EXPECT_EQ(argument_names(context.create<BoxBlur>()->build_module("blur")),
             (Names{"in", "gain", "out"}));
   auto mixed = context.create<Mixed>();
@@ -345,7 +345,7 @@ TEST(Generator, ModulesTakeInputsAndThenOutputs) {
                    "offset", "sums.0", "sums.1", "count", "copies_0", "copies_1"}));
 }
 
-// What a declaration leaves open is known once the output is defined.
+// Properties that a declaration leaves open are known once the output is defined.
 class Late : public Generator<Late> {
  public:
   Output<Func> late{"late"};
@@ -369,7 +369,7 @@ TEST(Generator, OutputsKnowTheTypesOfTheirDefinitions) {
   EXPECT_EQ(late->dimensions, 2);
 }
 
-// out = in * in * w + table: every image gets a gradient, scalars none.
+// out = in * in * w + table: every image gets a gradient, scalars do not.
 class Square : public Generator<Square> {
  public:
   Input<Buffer<float, 1>> in{"in"};
@@ -399,7 +399,7 @@ TEST(Generator, GradientModuleHasHalidesArguments) {
   EXPECT_FALSE(square->scheduled);
 }
 
-// Outputs of several types: each float gets a gradient of its own type, integers stand still.
+// Outputs of several types: each float output gets a gradient of its own type; integers have none.
 class Several : public Generator<Several> {
  public:
   Input<Buffer<float, 1>> in{"in"};
@@ -454,7 +454,7 @@ TEST(Generator, SeparateGradientsAreOfEachInputOfFloatsAndOfAll) {
   EXPECT_EQ(argument_names(module),
             (Names{"in", "table", "unused", "w", "_grad_loss_for_out", "_grad_loss_wrt_w"}));
 
-  // One function, where there is one input; seeds are of outputs of floats.
+  // A single input gives one function; only float outputs have seeds.
   const Module alone = context.create<Several>()->build_separate_gradients("several");
   EXPECT_EQ(alone.functions().size(), 1u);
   EXPECT_EQ(argument_names(alone),

@@ -1,5 +1,5 @@
-// Machine code that a program has for kernels: it is loaded in place of what the driver would compile, and
-// where there is none, or none that the driver takes, nothing is lost.
+// Precompiled machine code of kernels: it is loaded instead of code compiled by the driver. Without
+// it, or if the driver rejects it, everything still works.
 #include "gpu/assembler.h"
 
 #include <string>
@@ -16,7 +16,7 @@ struct Asked {
   int32_t capability, driver_version;
 };
 std::vector<Asked> requests;
-Image* other = nullptr;  // what is given
+Image* other = nullptr;  // the image that is supplied
 
 void assemble(const retrograde_assembler_request* request,
               void (*use)(void* closure, const void* code, size_t bytes), void* closure) {

@@ -1,5 +1,5 @@
-// Pipeline::auto_schedule for a GPU, on the simulated device: programs and gradients that nobody
-// scheduled become kernels, one launch of each for a run, and give what the CPU gives.
+// Pipeline::auto_schedule for a GPU, on the simulated device: unscheduled programs and gradients
+// become kernels, each launched once per run, and give the CPU's results.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -17,7 +17,7 @@
 namespace retrograde {
 namespace {
 
-// Before anything asks for a device.
+// Must be set before the first use of a device.
 [[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
 
 Target with_gpu() {
@@ -31,7 +31,7 @@ void set_order(int order) {
   retrograde_simt_set_options(&options);
 }
 
-// Outputs, each of floats or of integers, and their sizes.
+// Outputs of floats or integers, and their sizes.
 struct Program {
   std::vector<Func> outputs;
   std::vector<std::vector<int>> sizes;
@@ -71,7 +71,7 @@ struct Program {
 struct Case {
   std::string name;
   std::function<Program()> build;
-  bool is_exact = false;  // no sum changes its order, and no product and sum may be one FMA
+  bool is_exact = false;  // no sum is reordered, and no product and sum may become an FMA
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
@@ -86,7 +86,7 @@ Buffer<float> picture(int width, int height, int channels = 0) {
   return image;
 }
 
-// A loss of what is made of an image, and its gradient by that.
+// A loss of the result of `make` on an image, and its gradient by the image.
 Program gradient_of(const std::function<Func(Func)>& make, int width, int height) {
   const Buffer<float> in = picture(width, height);
   Func image("image"), loss("loss");
@@ -139,7 +139,7 @@ Program gather() {
   return {{loss, propagate_adjoints(loss)(table)}, {{}, {50, 3}}};
 }
 
-// Of counts, and of numbers: how often a bin is met, and the sum of what is.
+// Counts and sums: how often each bin occurs, and the sum of its values.
 Program histogram() {
   const Buffer<float> in = picture(120, 90);
   Func counts("counts"), sums("sums");
@@ -239,7 +239,7 @@ Program down_and_up() {
       44, 36);
 }
 
-// Velocities carry a density, and a few sweeps make them free of sources.
+// Velocities advect a density, and a few sweeps make them divergence-free.
 Program fluid_step() {
   return gradient_of(
       [](const Func& density) {
@@ -320,7 +320,7 @@ void check(const Case& c, bool with_estimates) {
   SCOPED_TRACE(source);
   const auto first = program.run(with_gpu());
   expect_close(first, expected, c.is_exact);
-  // The same bits each time, whatever thread comes first, and a launch for each kernel: the host runs
+  // The bits are the same for every thread order, and each kernel is launched once: the host runs
   // no loop over launches.
   set_order(retrograde_simt_reverse);
   const int64_t before = retrograde_simt_call_count("cuLaunchKernel");
@@ -335,13 +335,13 @@ void check(const Case& c, bool with_estimates) {
 TEST_P(GpuAutoSchedule, GivesWhatTheCpuGives) { check(GetParam(), true); }
 TEST_P(GpuAutoSchedule, GivesItForSizesThatAreNotKnown) { check(GetParam(), false); }
 
-// Partial sums have new numbers in their names.
+// Names of partial sums contain new numbers.
 std::string unnumbered(const std::string& text) {
   static const std::regex number("[$_][0-9]+");
   return std::regex_replace(text, number, "");
 }
 
-// The log of the schedule is the schedule.
+// Replaying the log reproduces the schedule.
 TEST_P(GpuAutoSchedule, IsReplayedByItsLog) {
   Program program = GetParam().build();
   program.estimate();
@@ -361,7 +361,7 @@ TEST_P(GpuAutoSchedule, IsReplayedByItsLog) {
 INSTANTIATE_TEST_SUITE_P(Programs, GpuAutoSchedule, testing::ValuesIn(cases()),
                          [](const auto& program) { return program.param.name; });
 
-// ---- what stays on the host, and what stays as it is ----
+// ---- stages that stay on the host or keep their schedule ----
 
 std::string kernels_of(const Pipeline& pipeline, const Target& target = with_gpu()) {
   std::string result;
@@ -439,7 +439,7 @@ TEST(GpuAutoSchedules, AreNotSearched) {
   EXPECT_NE(results.schedule_source.find("gpu"), std::string::npos) << results.schedule_source;
 }
 
-// A grid has 65,535 blocks in all dimensions but one.
+// A grid has at most 65,535 blocks in all dimensions but one.
 TEST(GpuAutoSchedules, HaveGridsForAnySize) {
   Func out("out");
   Var z("z");
@@ -466,7 +466,7 @@ TEST(GpuAutoSchedules, HaveThreeDimensionsOfBlocks) {
   EXPECT_EQ(found(4, 3, 2, 1, 5), (((4 * 7 + 3) * 7 + 2) * 7 + 1) * 7 + 5);
 }
 
-// Loops of a reduction whose iterations are independent are threads, too.
+// Reduction loops with independent iterations become threads, too.
 TEST(GpuAutoSchedules, RunIndependentReductionsInParallel) {
   Func out("out");
   RDom r(0, 1000, "r");
@@ -480,7 +480,8 @@ TEST(GpuAutoSchedules, RunIndependentReductionsInParallel) {
   EXPECT_EQ(found(1999), 0);
 }
 
-// Sums of floats at places that data decide are atomic updates where bits may differ, of integers always.
+// Sums of floats at data-dependent indices are atomic updates only if bits may differ; sums of
+// integers always are.
 TEST(GpuAutoSchedules, UpdateAtomicallyWhatBitsAllow) {
   for (const bool deterministic : {true, false}) {
     Func counts("counts"), sums("sums");
@@ -526,7 +527,7 @@ TEST(GpuAutoSchedules, CutSumsOverDomainsOfAnySize) {
   }
 }
 
-// Of equals the first, as on the CPU.
+// The first of equal values wins, as on the CPU.
 TEST(GpuAutoSchedules, FindTheFirstLeastOfMany) {
   Func least("least");
   RDom r(0, 90, 0, 100, "r");

@@ -1,5 +1,5 @@
-// Barriers as the simulated device counts them: a warp's own in place of the block's where that is enough, and
-// none where iterations of a loop take turns in two parts of an array.
+// Barriers counted by the simulated device: warp barriers replace block barriers where they
+// suffice, and loops that alternate between two halves of an array need none in between.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -11,7 +11,7 @@
 namespace retrograde {
 namespace {
 
-// Before anything asks for a device.
+// Must be set before the first use of a device.
 [[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
 
 constexpr int width = 128, height = 8;
@@ -37,7 +37,7 @@ class GpuBarriers : public testing::Test {
     retrograde_simt_set_options(&options);
   }
 
-  // Right in all orders of threads; the counts of one run.
+  // Checks the result in all thread orders; returns the counts of one run.
   static retrograde_simt_profile counted(const std::function<Func(bool on_gpu)>& build,
                                          const std::vector<int>& sizes) {
     const Buffer<float> expected = build(false).realize(sizes, get_host_target());
@@ -58,7 +58,7 @@ class GpuBarriers : public testing::Test {
   Buffer<float> in;
 };
 
-// Rows of 32 points, each turned around.
+// Rows of 32 points, each reversed.
 TEST_F(GpuBarriers, RowsOfWarpsWaitForTheirOwnWarp) {
   const auto build = [&](bool on_gpu) {
     Func line("line"), out("out");
@@ -92,7 +92,7 @@ TEST_F(GpuBarriers, ABlockOfOneWarpHasNoOthers) {
   EXPECT_EQ(counts.warp_barriers, width / 16 * height);
 }
 
-// A sum over rows that each block keeps in shared memory, one or two at a time.
+// A sum over rows in each block's shared memory, one or two rows at a time.
 TEST_F(GpuBarriers, TwoRowsInTurnTakeHalfOfTheBarriers) {
   const auto build = [&](int rows) {
     return [this, rows](bool on_gpu) {

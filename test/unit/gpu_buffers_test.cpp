@@ -1,4 +1,4 @@
-// Buffers on the simulated device, by HalideRuntime.h: memory, copies, views.
+// Buffers on the simulated device through HalideRuntime.h: memory, copies, views.
 #include <utility>
 
 #include "support/gpu_testing.h"

@@ -1,4 +1,4 @@
-// How tools/gpu_check compares what two devices gave.
+// How tools/gpu_check compares the results of two devices.
 #include "records.h"
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ TEST(GpuCheckRecords, AreReadAsTheyWereWritten) {
     EXPECT_EQ(read[i].state, written[i].state);
     EXPECT_EQ(read[i].bytes, written[i].bytes);
   }
-  // A process that ended in the middle of a record leaves those before it.
+  // If a process ends in the middle of a record, the earlier records stay valid.
   std::filesystem::resize_file(file, std::filesystem::file_size(file) - 10);
   EXPECT_LT(read_records(file).size(), 3u);
   EXPECT_EQ(read_records(file).at(0).bytes, written[0].bytes);

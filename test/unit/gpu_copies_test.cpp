@@ -1,5 +1,6 @@
-// What a pipeline copies between the host and the simulated device, in bytes: of an output that its kernels
-// store whole nothing goes to the device, whatever its flags say; else all that the host has.
+// The bytes that a pipeline copies between the host and the simulated device. An output that its
+// kernels store entirely is never copied to the device, whatever its flags; otherwise all of the
+// host's data is.
 #include <HalideRuntime.h>
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
@@ -11,7 +12,7 @@
 namespace retrograde {
 namespace {
 
-// Before anything asks for a device.
+// Must be set before the first use of a device.
 [[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
 
 constexpr int width = 64, height = 8;
@@ -34,7 +35,7 @@ class GpuCopies : public testing::Test {
     result.fill(-1.0f);
   }
 
-  // How many bytes go to the device when the result is made.
+  // How many bytes are copied to the device while the result is computed.
   int64_t bytes_for(Func f) {
     const int64_t before = copied_to_device();
     f.realize(result, with_gpu());
@@ -135,7 +136,7 @@ TEST_F(GpuCopies, ValuesOfATupleAreEachTheirOwn) {
   EXPECT_EQ(second(3, 2), in(3, 2) + 1.0f);
 }
 
-// A kernel that did not start has stored nothing: the host's elements are the newest ones.
+// A kernel that did not start has stored nothing, so the host's elements are still current.
 TEST_F(GpuCopies, AnOutputOfAKernelThatDidNotStartKeepsItsElements) {
   Func out = doubled();
   out.compile_jit(with_gpu());

@@ -1,4 +1,4 @@
-// What the GPU runtime refuses and how it says so; threads; which driver it takes.
+// Errors of the GPU runtime and their messages; threads; the choice of the driver.
 #include <atomic>
 #include <cstdio>
 #include <cstring>
@@ -181,10 +181,10 @@ TEST_F(GpuRuntime, CodeThatComesToTheSamePlaceIsLoadedAnew) {
   retrograde_gpu_forget_kernels(place);
 }
 
-// ---- which driver ----
+// ---- choice of the driver ----
 
 TEST_F(GpuRuntime, TheDriverIsChosenNotGuessed) {
-  // In processes of their own: the driver is opened once.
+  // Runs in separate processes, because the driver is opened once.
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(
       {

@@ -1,5 +1,5 @@
-// Each call of each driver function fails once, in a program that uses them all: it is an error code
-// each time, nothing is left behind, and the next run is as right as the first.
+// Lets each call of each driver function fail once, in a program that uses them all. Each failure
+// must give an error code, leak nothing, and leave the next run correct.
 #include <HalideBuffer.h>
 #include <HalideRuntimeCuda.h>
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ using Halide::Runtime::Buffer;
 std::string errors;
 const halide_device_interface_t* device() { return halide_cuda_device_interface(); }
 
-// Frees what is on the device, whatever happens, as generated code does.
+// Frees device memory on every path, as generated code does.
 struct OnDevice {
   halide_buffer_t* buffer;
   int& code;
@@ -125,7 +125,7 @@ std::vector<std::string> driver_functions() {
   return names;
 }
 
-// How often a program calls each function, from nothing to nothing.
+// How often a program calls each function, from start to clean-up.
 template <typename Run>
 std::map<std::string, int64_t> calls_of(Run run) {
   std::map<std::string, int64_t> calls;
@@ -136,7 +136,7 @@ std::map<std::string, int64_t> calls_of(Run run) {
   return calls;
 }
 
-// Those that say what went wrong: their failing is no failure.
+// Functions that describe errors: their own failure is not an error.
 const std::set<std::string> only_text = {"cuGetErrorName", "cuGetErrorString"};
 
 void expect_nothing_left() {
@@ -148,7 +148,7 @@ void expect_nothing_left() {
   EXPECT_EQ(live.pending, 0);
 }
 
-// The nth call of the function gives `result`.
+// Makes the nth call of the function return `result`.
 void fail_once(Program& program, const std::string& function, int64_t nth, int result) {
   SCOPED_TRACE(function + " " + std::to_string(nth) + " gives " + std::to_string(result));
   errors.clear();
@@ -183,7 +183,7 @@ void fail_each_call(Program& program, int result) {
   }
 }
 
-// First in this file: the driver is opened once.
+// Must be the first test in this file: the driver is opened once.
 TEST_F(GpuFailures, TheDriverIsInitializedAgainAfterAFailure) {
   errors.clear();
   Buffer<float> b(8, 8);
@@ -224,7 +224,7 @@ TEST_F(GpuFailures, TheProgramUsesMostOfTheDriver) {
       << "what is listed here fails in tests of its own";
 }
 
-// ---- the functions that this program has no use for ----
+// ---- functions that this program does not use ----
 
 void expect_failure(const char* function, int code, int expected) {
   EXPECT_EQ(code, expected) << errors;
@@ -271,7 +271,7 @@ TEST_F(GpuFailures, FunctionsForGivenStreams) {
     expect_failure("cuMemcpyDtoDAsync_v2", halide_buffer_copy(nullptr, a, device(), b),
                    halide_error_code_device_buffer_copy_failed);
     ASSERT_EQ(halide_buffer_copy(nullptr, a, device(), b), 0) << errors;
-    // The stream's memory is used by another one: it must wait.
+    // Another stream uses the stream's memory, so it must wait.
     ASSERT_EQ(a.copy_to_host(), 0);
     ASSERT_EQ(a.device_free(), 0);
     halide_set_cuda_get_stream(nullptr);
@@ -316,7 +316,7 @@ TEST_F(GpuFailures, FunctionsForSeveralDevices) {
   expect_nothing_left();
 }
 
-// ---- failures of work, and of giving back ----
+// ---- failures of launches, and of clean-up ----
 
 TEST_F(GpuFailures, AKernelThatFailsLosesTheDeviceAndNoData) {
   Program program;

@@ -1,6 +1,6 @@
-// Programs with GPU schedules on the simulated device: in every order of threads they give what the CPU
-// gives and race nowhere, those that stream ask for few sectors of memory, and whatever call of the driver
-// fails, it is an error, nothing is left behind, and the next run is right.
+// Programs with GPU schedules on the simulated device. They must give the CPU's results in every
+// thread order, without races; streaming programs must request few sectors of memory. Any failing
+// driver call must give an error, leak nothing, and leave the next run correct.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +13,7 @@ namespace {
 
 using namespace retrograde;
 
-// Before anything asks for a device.
+// Must be set before the first use of a device.
 [[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
 
 constexpr int invalid_value = 1, out_of_memory = 2;  // CUresult
@@ -30,7 +30,7 @@ void set(int order, bool profile) {
   retrograde_simt_set_options(&options);
 }
 
-// Both round differently: other orders of sums, other functions.
+// The two sides round differently: other orders of sums, other functions.
 void expect_close(const Buffer<float>& got, const Buffer<float>& expected) {
   ASSERT_EQ(got.number_of_elements(), expected.number_of_elements());
   for (size_t i = 0; i < got.number_of_elements(); ++i) {
@@ -81,7 +81,7 @@ int64_t live_bytes() {
 TEST_P(GpuPrograms, SurviveEachFailureOfTheDriver) {
   Func f = GetParam().build(true);
   const Buffer<float> expected = f.realize(GetParam().sizes, with_gpu());
-  // What is kept for later runs is let go of, so that it is not taken for what was left behind.
+  // Releases memory kept for later runs, so that it does not count as a leak.
   const auto kept = [] {
     const auto* device = get_device_interface_for_device_api(DeviceAPI::CUDA);
     device->device_release(nullptr, device);
@@ -100,7 +100,7 @@ TEST_P(GpuPrograms, SurviveEachFailureOfTheDriver) {
       retrograde_simt_fail_call(function, nth, nth % 2 ? invalid_value : out_of_memory);
       try {
         const Buffer<float> got = f.realize(GetParam().sizes, with_gpu());
-        expect_close(got, expected);  // what is asked of a device may be done without
+        expect_close(got, expected);  // optional requests may fail without an error
       } catch (const RuntimeError& error) {
         EXPECT_NE(std::string(error.what()).find(function), std::string::npos) << error.what();
         ++failures;
@@ -116,7 +116,7 @@ TEST_P(GpuPrograms, SurviveEachFailureOfTheDriver) {
   EXPECT_GT(failures, 5);
 }
 
-// In a float, one after the other, so many values are no sum: the exact one is.
+// Summing this many values serially in float is inaccurate, so the exact sum is the reference.
 TEST(GpuReduction, OfManyValuesIsTheirSum) {
 #ifdef RETROGRADE_MANY_PROGRAMS
   constexpr int values = 1 << 24;

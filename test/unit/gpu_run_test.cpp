@@ -1,4 +1,4 @@
-// Pipelines with GPU schedules, run by the simulated device, give what the CPU gives.
+// Pipelines with GPU schedules, run by the simulated device, give the CPU's results.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -9,7 +9,7 @@
 namespace retrograde {
 namespace {
 
-// Before anything asks for a device.
+// Must be set before the first use of a device.
 [[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
 
 Target with_gpu() {
@@ -22,7 +22,7 @@ Buffer<float> ramp(int width, int height) {
   return image;
 }
 
-// A pipeline is built twice, scheduled for the GPU once.
+// Builds a pipeline twice, once scheduled for the GPU.
 using Build = std::function<Func(bool on_gpu)>;
 void agrees(const Build& build, const std::vector<int>& sizes) {
   Buffer<float> expected = build(false).realize(sizes, get_host_target());
@@ -180,7 +180,7 @@ TEST_F(GpuRun, OneThreadDoesAll) {
       {40});
 }
 
-// What a call says of the device, and how often it was asked.
+// A call's context that selects the device, and counts the queries.
 struct Caller : JITUserContext {
   Caller() {
     handlers.custom_cuda_get_stream = [](JITUserContext* self, void* context, void** stream) {
@@ -255,7 +255,7 @@ TEST_F(GpuRun, GradientsRunOnGpus) {
       {66, 34});
 }
 
-// The profiler counts the time of the host, in its memory.
+// The profiler measures the host's time, in the host's memory.
 TEST_F(GpuRun, KernelsDoNotTellTheProfiler) {
   Func rows("rows"), out("out");
   rows(x, y) = cast<float>(x * y);
@@ -266,7 +266,7 @@ TEST_F(GpuRun, KernelsDoNotTellTheProfiler) {
   EXPECT_EQ(found(31, 15), 31.0f * 15 + 31.0f * 16);
 }
 
-// ---- the bits of a device, on whatever this is ----
+// ---- device arithmetic, bit for bit, on any machine ----
 
 template <typename T>
 std::vector<uint8_t> bytes_of(const Buffer<T>& buffer) {
@@ -290,7 +290,8 @@ TEST_F(GpuRun, BitsDoNotDependOnTheProcessorOfTheHost) {
   EXPECT_EQ(on(with_gpu().to_string()), plain);
 }
 
-// PTX ISA, cvt: the nearest integer that there is; of NaN 0, or the sign's bit with 64 bits on a side.
+// PTX ISA, cvt: the nearest representable integer; NaN gives 0, or the sign bit if one side has 64
+// bits.
 TEST_F(GpuRun, FloatsThatNoIntegerHoldsConvertAsOnADevice) {
   Buffer<double> in(4);
   in(0) = 1e30;

@@ -1,4 +1,4 @@
-// The GPU runtime over the simulated driver: devices, streams, the pool of memory, capture.
+// The GPU runtime over the simulated driver: devices, streams, the memory pool, capture.
 #include "support/gpu_testing.h"
 
 namespace {
@@ -187,7 +187,7 @@ TEST_F(GpuRuntime, ARunIsCapturedOnceItHasRun) {
     return code ? code : freed;
   };
   ASSERT_EQ(saxpy.run(x, y, 0.0f), 0) << errors;
-  x.set_device_dirty();  // the run is to read the device's elements
+  x.set_device_dirty();  // the run must read the device's elements
   ASSERT_EQ(run_with_temporary(), 0) << errors;
   cuda::Graph graph = nullptr;
   cuda::GraphExec exec = nullptr;
@@ -195,7 +195,7 @@ TEST_F(GpuRuntime, ARunIsCapturedOnceItHasRun) {
   EXPECT_EQ(run_with_temporary(), 0) << errors;
   ASSERT_EQ(cuda::cuStreamEndCapture(user_stream, &graph), cuda::success);
   ASSERT_EQ(cuda::cuGraphInstantiateWithFlags(&exec, graph, 0), cuda::success);
-  // The graph's memory is nobody else's: other buffers of this size do not disturb it.
+  // The graph's memory is exclusive: other buffers of this size do not disturb it.
   Buffer<float> others[3];
   for (Buffer<float>& other : others) {
     other = Buffer<float>(300, 1);

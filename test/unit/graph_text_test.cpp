@@ -1,5 +1,6 @@
-// The text of graphs: parse_graph(to_text(g)) is g, for programs written for it, for random ones
-// under random schedules, and for gradients (gradient_suite_test); what breaks a rule is named.
+// The text of graphs: parse_graph(to_text(g)) equals g, for programs written for this test, for
+// random ones under random schedules, and for gradients (gradient_suite_test). Violated rules are
+// named.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -170,7 +171,7 @@ TEST(GraphText, BadTextSaysWhere) {
 }
 
 TEST(GraphText, WhatIsReadIsThere) {
-  const char* const rule = "every Func and image that is read is of the graph";
+  const char* const rule = "every Func and image that is read belongs to the graph";
   expect_error({rule, "no image of it is called \"other\""},
                [] { parse_graph(with("image input(x, y)", "image other(x, y)")); });
   expect_error({rule, "no Func of it is called \"other\""},
@@ -187,7 +188,7 @@ TEST(GraphText, BrokenGraphsAreBlamedOnThePass) {
   expect_broken(with("in32((x + r.x), y)", "in32((x + r.x))"), "a coordinate for each dimension");
   expect_broken(with("in32((x + r.x), y):float32", "float32(in32((x + r.x), y))"),
                 "the type of the value that it reads");
-  expect_broken(with("(r.x < y)", "(r.x < z)"), "a variable is of its definition");
+  expect_broken(with("(r.x < y)", "(r.x < z)"), "a variable belongs to its definition");
   expect_broken(with("where (r.x < y)", "where r.x"), "predicates are of type bool");
 }
 

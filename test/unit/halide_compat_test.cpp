@@ -1,5 +1,5 @@
-// Programs in the manner of Halide's users, with Halide.h and namespace Halide: each compiles,
-// runs, and is compared with plain C++.
+// Programs in the style of Halide's users, with Halide.h and namespace Halide: each compiles, runs,
+// and is compared with plain C++.
 #include "Halide.h"
 #include "support/errors.h"
 
@@ -16,7 +16,7 @@ using retrograde::Unsupported;
 
 namespace {
 
-// With every name said in full, and no names given to Funcs and Vars.
+// All names are qualified, and Funcs and Vars have no names.
 TEST(HalideCompat, BoardOfSquares) {
   Halide::Func board;
   Halide::Var column, rank;
@@ -57,7 +57,8 @@ TEST(HalideCompat, WhiteBalanceWithParams) {
   });
 }
 
-// A closing: the least of the largest values around. Both windows are cut at the picture's edge.
+// A morphological closing: the minimum of the maxima in a neighbourhood. Both windows are clipped
+// at the picture's edge.
 TEST(HalideCompat, ClosingInFusedTiles) {
   const int width = 53, height = 38;
   Buffer<uint16_t> heights(width, height);
@@ -87,8 +88,8 @@ TEST(HalideCompat, ClosingInFusedTiles) {
   });
 }
 
-// A picture of labels: how many pixels bear each, where their columns are on average, and where
-// each label begins in a list sorted by label.
+// A picture of labels: the number of pixels of each label, their mean column, and the offset of
+// each label in a list sorted by label.
 TEST(HalideCompat, AreasAndOffsetsOfLabels) {
   const int labels = 19;
   Buffer<uint8_t> picture(31, 26);
@@ -176,8 +177,8 @@ TEST(HalideCompat, MomentsInOnePassByATuple) {
   EXPECT_NEAR(deviations(), squares, 1e-3);
 }
 
-// A number and its slope, as a type of the user's: Newton's method for cube roots, whose steps are
-// a dimension of the Func.
+// Dual numbers as a user-defined type: Newton's method for cube roots, with its steps as a
+// dimension of the Func.
 TEST(HalideCompat, UserTypesThatActLikeTuples) {
   struct Dual {
     Expr value, slope;
@@ -338,7 +339,7 @@ TEST(HalideCompat, IntegerArithmeticWithItsWidthSaid) {
   }
 }
 
-// Names of targets that no code is generated for compile, and say so when they are used.
+// Targets without code generation can be named, and give an error when they are used.
 TEST(HalideCompat, WhatIsNotGeneratedSaysSo) {
   Var x("x"), y("y");
   Func f("f");

@@ -1,6 +1,6 @@
-// Features of targets, generators and calls under Halide's names: each does what it says.
+// Features of targets, generators and calls under Halide's names, with their documented effects.
 //
-// Only Halide.h: what programs rely on comes with it.
+// Includes only Halide.h, which must bring everything that programs rely on.
 #include "Halide.h"
 
 #include <gtest/gtest.h>
@@ -469,7 +469,7 @@ TEST(Warnings, SpareProgramsThatMeanWhatTheySay) {
   Var x("x"), y("y");
   RDom r(0, 4);
   f(x, y) = undef<int>();
-  f(x, y) = x + y;  // all of it: undef said that nothing was before
+  f(x, y) = x + y;  // everything: undef contributed nothing before
   g(x, y) = f(x, y);
   g(x, 3) = f(x, 3);  // one row
   g(x, y) += f(x, y);
@@ -602,7 +602,8 @@ TEST(Generators, TakeLoopLevelsAfterTheyHaveRun) {
   EXPECT_LT(nest.find("for y"), nest.find("middle")) << nest;
 }
 
-// Two C functions in one generator: of its image, and of a Func or what the first one gives.
+// Two C functions in one generator: one reads its image, the other a Func or the result of the
+// first.
 class Externs : public Halide::Generator<Externs> {
  public:
   Input<Buffer<int, 1>> image{"image"};

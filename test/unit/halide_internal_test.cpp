@@ -1,5 +1,5 @@
-// What programs written for Halide take from Halide::Internal, and names of its newer releases: each
-// does what it says; and what Halide does not have is not in its namespace.
+// The parts of Halide::Internal that Halide programs use, and names of newer Halide releases, with
+// their effects. Names that Halide does not have must not be in its namespace.
 #include "Halide.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 
 #include "support/errors.h"
 
-// A program's own names, which Halide does not have: no declaration of ours may be in the way.
+// A program's own names, which Halide does not have: no declaration of ours may conflict.
 namespace Halide {
 struct Compression {
   int level = 3;
@@ -168,7 +168,7 @@ TEST(Nodes, HaveOperandsThatFit) {
   expect_error({"operands of a node are defined"}, [&] { Add::make(x, Expr()); });
   expect_error({"operands of a node have one type", "float32"}, [&] { Add::make(x, 1.0f); });
   expect_error({"the condition of a node is of type bool"}, [&] { Select::make(x, x, x); });
-  expect_error({"\"f\"", "what is called by a name alone is a C function"},
+  expect_error({"\"f\"", "a call by name alone calls a C function"},
                [&] { Call::make(Int(32), "f", {x}, Call::Halide); });
 }
 
@@ -289,7 +289,7 @@ TEST(Functions, AnswerWhatFuncsDo) {
   EXPECT_EQ(of_image.function().required_types(), std::vector<Type>{UInt(8)});
 }
 
-// A program that schedules what it did not write.
+// A program that schedules Funcs which it did not write.
 TEST(Functions, LoopsSayWhatTheyAre) {
   Var x("x"), y("y");
   Func f("f");
@@ -375,9 +375,9 @@ TEST(EagerInline, TakesWhatHasNoScheduleOfItsOwn) {
   f(x) += 1;
   g(x) = x;
   h(x) = f(x) + g(x);
-  expect_error({"what is inlined has one pure definition", "update"}, [&] { h.eager_inline(f); });
+  expect_error({"an inlined Func has one pure definition", "update"}, [&] { h.eager_inline(f); });
   g.compute_root();
-  expect_error({"what is inlined has no schedule of its own"}, [&] { h.eager_inline(g); });
+  expect_error({"an inlined Func has no schedule of its own"}, [&] { h.eager_inline(g); });
 }
 
 TEST(NewDirectives, StreamingIsAHintThatChangesNoValue) {
@@ -417,7 +417,7 @@ TEST(Targets, WithAProcessor) {
 int64_t saturated(int64_t value, int64_t low, int64_t high) {
   return value < low ? low : value > high ? high : value;
 }
-// Shifted to the right, halves up; a negative amount to the left.
+// A right shift that rounds halves up; a negative amount shifts left.
 int64_t rounded_right(int64_t value, int amount) {
   if (amount <= 0) return value << -amount;
   return (value + (int64_t{1} << (amount - 1))) >> amount;
@@ -483,12 +483,12 @@ TEST(Helpers, OfFilesAndText) {
   assert_file_exists(file);
   write_entire_file(file, std::vector<char>{'a', 'b'});
   EXPECT_EQ(read_entire_file(file), (std::vector<char>{'a', 'b'}));
-  expect_error({"the file is not there", file}, [&] { assert_no_file_exists(file); });
+  expect_error({"the file does not exist", file}, [&] { assert_no_file_exists(file); });
   ensure_no_file_exists(file);
   ensure_no_file_exists(file);
   assert_no_file_exists(file);
   EXPECT_FALSE(file_exists(file));
-  expect_error({"the file is there", file}, [&] { assert_file_exists(file); });
+  expect_error({"the file exists", file}, [&] { assert_file_exists(file); });
   expect_error({file, "the file system allows it"}, [&] { file_unlink(file); });
   const std::string folder = dir_make_temp();
   EXPECT_TRUE(file_exists(folder));
@@ -550,7 +550,7 @@ TEST(SharedRuntime, HasHandlersForAllCalls) {
   ASSERT_NE(memory, nullptr);
   context.handlers.custom_free(&context, memory);
   EXPECT_EQ(context.handlers.custom_print, handlers.custom_print);
-  expect_error({"there is a context"},
+  expect_error({"the context is not null"},
                [&] { JITSharedRuntime::populate_jit_handlers(nullptr, handlers); });
   JITSharedRuntime::memoization_cache_set_size(1 << 16);
   JITSharedRuntime::memoization_cache_set_size(0);

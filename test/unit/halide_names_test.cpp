@@ -1,5 +1,5 @@
-// Names of Halide's API that programs use less often: each does what it says, compared with plain
-// C++; and what cannot be done says so.
+// Less common names of Halide's API: effects are compared with plain C++, and unsupported uses give
+// errors.
 #include "Halide.h"
 
 #include <gtest/gtest.h>
@@ -239,7 +239,7 @@ TEST(Targets, SayTheirDevices) {
   EXPECT_EQ(get_default_device_api_for_target(plain), DeviceAPI::Host);
 }
 
-// ---- loops whose names are used again, as Halide takes them ----
+// ---- loops that reuse names, as Halide allows ----
 
 // f(x, y) = x + 10 * y under a schedule
 template <typename Schedule>
@@ -249,7 +249,7 @@ void expect_same_values(Schedule&& schedule) {
   f(x, y) = x + 10 * y;
   schedule(f);
   Buffer<int> out(85, 53);
-  out.fill(-1);  // what an earlier run left in memory must not pass for a result
+  out.fill(-1);  // stale memory of an earlier run must not pass for a result
   f.realize(out);
   int wrong = 0;
   out.for_each_element([&](int i, int j) { wrong += out(i, j) != i + 10 * j; });
@@ -289,7 +289,7 @@ TEST(LoopNames, OfLevelsMayHaveDots) {
   EXPECT_EQ(out(1), 1 + 2 + 3 + 4 + 5);
 }
 
-// ---- a predicate that reads the Func which it guards ----
+// ---- a predicate that reads the Func that it guards ----
 
 TEST(Predicates, MayReadWhatTheyGuard) {
   Var x("x");
@@ -302,7 +302,7 @@ TEST(Predicates, MayReadWhatTheyGuard) {
   for (int i = 0; i < 8; ++i) EXPECT_EQ(of_f(i), i > 2 ? 11 * i : i);
 }
 
-// ---- choices and targets as text ----
+// ---- enumerations and targets as text ----
 
 template <typename T>
 std::string shown(const T& value) {
@@ -445,7 +445,7 @@ TEST(Copies, ChangeNothing) {
                   {"it has no definition"});
 }
 
-// ---- what is refused ----
+// ---- unsupported uses ----
 
 // rule: buffers of arguments are memory of the CPU
 // rule: storage lies in the memory of the CPU

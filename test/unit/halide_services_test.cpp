@@ -1,5 +1,5 @@
-// Trace files, the cache of memoized results and parallel tasks of the static runtime, called as
-// HalideRuntime.h says, without generated code.
+// Trace files, the cache of memoized results and parallel tasks of the static runtime, called
+// through HalideRuntime.h without generated code.
 #include <HalideBuffer.h>
 #include <HalideRuntime.h>
 #include <fcntl.h>
@@ -78,7 +78,7 @@ void expect_packets(const std::string& path, const std::vector<std::string>& fun
   EXPECT_EQ(at, bytes.size());
 }
 
-// First in this file: the environment is looked at once.
+// Must be the first test in this file: the environment is read once.
 TEST_F(HalideServices, TheEnvironmentNamesATraceFile) {
   const TemporaryFolder folder;
   const std::string path = folder.path() / "trace";
@@ -216,7 +216,7 @@ void release(Buffer<int>& buffer, Buffer<float>& second) {
   }
 }
 
-// Buffers with a shape and no memory, as a lookup takes them.
+// Buffers with a shape but no memory, as a lookup takes them.
 struct Results {
   Buffer<int> a;
   Buffer<float> b;
@@ -316,7 +316,7 @@ int run_tasks(Pipe& pipe) {
   halide_semaphore_init(&pipe.space, 1);
   auto* closure = reinterpret_cast<uint8_t*>(&pipe);
   halide_semaphore_acquire_t space{&pipe.space, 1}, ready{&pipe.ready, 1};
-  // The consumer first: it waits until the others have run.
+  // The consumer is listed first: it waits until the others have run.
   halide_parallel_task_t tasks[] = {
       {consume, closure, "consume", &ready, 1, 0, 500, 1, true},
       {produce, closure, "produce", &space, 1, 0, 500, 1, true},

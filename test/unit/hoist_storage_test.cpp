@@ -1,4 +1,4 @@
-// Storage whose memory is allocated further out: once, as large as it ever gets.
+// hoist_storage: memory is allocated once, in an outer loop, at its maximum size.
 #include <gtest/gtest.h>
 
 #include "ir/build.h"
@@ -20,7 +20,7 @@ class HoistStorage : public testing::Test {
         [&](int i, int j) { ASSERT_EQ(found(i, j), value(i, j)) << i << " " << j; });
   }
 
-  // Loops around the only allocation, and its elements when constant.
+  // The number of loops around the only allocation, and its elements when constant.
   static std::pair<int, int64_t> allocation(const Func& output) {
     std::pair<int, int64_t> result{-1, -1};
     lower::LowerOptions options;

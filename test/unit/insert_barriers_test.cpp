@@ -1,6 +1,6 @@
-// Where barriers stand between the steps of a block, and which: of kernels as text. The order of a body is
-// shown as the names that its steps store, | for a barrier of the block, ~ for one of warps, [ ] around a loop
-// and ( ) around a branch.
+// The placement and scope of barriers between the steps of a block, for kernels as text. The order
+// of a body is shown as the names that its steps store, with | for a block barrier, ~ for a warp
+// barrier, [ ] around a loop and ( ) around a branch.
 #include <gtest/gtest.h>
 
 #include "diagnostics/error.h"
@@ -189,8 +189,8 @@ TEST(InsertBarriers, StandWhereAnIterationReadsWhatTheOneBeforeStored) {
       << "two iterations before, with no barrier in between";
 }
 
-// That an iteration meets the end of the one before moves the barrier between b and c to before b, behind
-// which c and b are left for the next iteration: b meets a there.
+// An iteration conflicts with the end of the previous one, which moves the barrier between b and c
+// to before b. After it, c and b remain for the next iteration, where b conflicts with a.
 TEST(InsertBarriers, StandForWhatOtherBarriersLeaveBehind) {
   EXPECT_EQ(order_of(R"(
     for (r, 0, n) {

@@ -1,5 +1,5 @@
-// The oracle itself: order of evaluation, demand, error bounds. Expected values are worked out by
-// hand or by plain loops.
+// The interpreter itself: order of evaluation, demand, error bounds. Expected values are computed
+// by hand or by plain loops.
 #include "testing/interpreter.h"
 #include "support/errors.h"
 
@@ -164,7 +164,7 @@ TEST(TrackedValue, BoundCoversContractionIntoAnOperator) {
   EXPECT_LE(std::fabs(contracted - value.scalar.f), value.error);
 }
 
-// LLVM computes the product in float32, where it is the same, and fuses it with the sum.
+// LLVM computes the product in float32, where it has the same value, and fuses it with the sum.
 TEST(TrackedValue, BoundCoversContractionAcrossANarrowingCast) {
   const float a = 1.1f, b = 3.3f, c = -3.63f;
   Func f;
@@ -176,7 +176,7 @@ TEST(TrackedValue, BoundCoversContractionAcrossANarrowingCast) {
   EXPECT_EQ(value_at(f, 0, Rounding::Strict).error, 0);
 }
 
-// The larger operand decides, of either sign.
+// The larger operand determines the bound, with either sign.
 TEST(TrackedValue, BoundCoversTheRoundingOfALerpOfNegatives) {
   Func f("f");
   f(x) = lerp(Expr(-0.514f), select(x == 0, -0.01f, -0.02f), 0.25f);

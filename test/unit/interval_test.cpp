@@ -1,5 +1,5 @@
-// Tightness of interval arithmetic on the index expressions that pipelines are made of. Soundness:
-// see property/interval_property_test.cpp.
+// Tightness of interval arithmetic on typical index expressions.
+// property/interval_property_test.cpp checks soundness.
 #include "analysis/interval.h"
 
 #include <gtest/gtest.h>
@@ -53,14 +53,14 @@ TEST_F(IntervalTest, CorrelatedTermsCancel) {
   EXPECT_EQ(bounds((x + i) * 2 - x * 2), "[0, 14]");
 }
 
-// The last vector of the last tile begins within what the tiles cover.
+// The last vector of the last tile begins within the tiles.
 TEST_F(IntervalTest, SidesOfAMinimumCancelWithWhatStandsBesideIt) {
   EXPECT_EQ(bounds(i * 16 + min(40 - i * 16, 8)), "[8, 40]");
   EXPECT_EQ(bounds(i * 16 + max(min(5 - i * 2, 1), 0) * 8), "[8, 112]");
   EXPECT_EQ(bounds(i - max(i - 3, 0)), "[0, 3]");
   EXPECT_EQ(bounds(min(i, 5) - max((i - 2) / 2, 0) * 2), "[0, 3]");
   EXPECT_EQ(bounds(i + max(i, 3)), "[3, 14]");  // they do not cancel
-  // Nor does either stand alone: rows of a seed below tap rows that begin where the seed does.
+  // Both operands vary: rows of a seed below tap rows that begin where the seed does.
   EXPECT_EQ(bounds(min(i, 5) - max(i - 3, 0)), "[0, 3]");
   EXPECT_EQ(bounds(min(i, 5) - max((i - 2) / 2, 0) * 2), "[0, 3]");
 }
@@ -81,7 +81,7 @@ TEST_F(IntervalTest, RemainderWithinOnePeriodIsTight) {
   EXPECT_EQ(bounds(var("near") % 8), "[2, 5]");
 }
 
-// Of tiles from a to b, each of 16, the last begins at or before b, wherever they begin.
+// Tiles of 16 from a to b: the last one begins at or before b, for any a.
 TEST_F(IntervalTest, TheLastOfTilesBeginsBeforeTheirEnd) {
   scope.push("a", {0, 48});
   scope.push("b", {n + 15, n + 63});
@@ -101,7 +101,7 @@ TEST_F(IntervalTest, ClampBoundsTheUnbounded) {
             "[0, 7]");
 }
 
-// The ends are rounded as the value is: 4097 * 4097 - 16785408 is 1, of rounded products 0.
+// The ends round like the value: 4097 * 4097 - 16785408 is 1, but 0 with a rounded product.
 TEST_F(IntervalTest, FmaLiesBetweenItsCorners) {
   Expr whole = cast(Float(32), i);  // 0 to 7
   EXPECT_EQ(bounds(cast(Int(32), call_op(Op::fma, {whole, Expr(-2.0f), Expr(3.0f)}))), "[-11, 3]");
@@ -205,7 +205,7 @@ TEST_F(IntervalTest, LinearFormsGatherTerms) {
   EXPECT_FALSE(decompose(x * x, {"x"}));
 }
 
-// One bounds the other through operands of both.
+// The two are comparable through the operands of both.
 TEST_F(IntervalTest, MinAndMaxOfClampsKeepTheOneThatDecides) {
   const Expr below = canonical_max(n - 2, 0), above = canonical_max(n - 1, 0);
   EXPECT_EQ(print(canonical_min(above, below)), print(below));
@@ -218,7 +218,7 @@ TEST_F(IntervalTest, MinAndMaxOfClampsKeepTheOneThatDecides) {
   EXPECT_EQ(print(canonical_min(above, max(xmin - 2, 0))), print(min(above, max(xmin - 2, 0))));
 }
 
-// Where a number would not fit 64 bits nothing is known, and nothing overflows.
+// If a number does not fit 64 bits, the bounds are unknown; nothing overflows.
 TEST_F(IntervalTest, NumbersAtTheEndOfInt64) {
   constexpr int64_t most = INT64_MAX;
   const Expr a = variable("a", Int(64)), b = variable("b", Int(64));

@@ -270,7 +270,7 @@ TEST(Select, LiteralsTakeTheTypeOfTheOtherArm) {
   EXPECT_EQ(select(c, cast(UInt(8), 255), 0).type(), UInt(8));
   EXPECT_EQ(select(c, 0, variable("x", UInt(16))).type(), UInt(16));
   EXPECT_EQ(select(c, 1, 2).type(), Int(32));
-  EXPECT_EQ(select(c, 300, variable("x", UInt(8))).type(), Int(32));  // it would not fit
+  EXPECT_EQ(select(c, 300, variable("x", UInt(8))).type(), Int(32));  // 300 would not fit uint8
 }
 
 TEST(SmallFloats, RoundAfterEachOperation) {

@@ -1,4 +1,4 @@
-// What operations do to scalars: the definition that the folder and the interpreter share.
+// Scalar operations: the definitions that the constant folder and the interpreter share.
 #include "ir/scalar.h"
 
 #include <gtest/gtest.h>
@@ -88,8 +88,8 @@ TEST(Scalar, HalvesRoundToNearestEvenOnce) {
   EXPECT_EQ(half(2.980232238769531e-08), 0);                      // half of it: a tie, to even
   EXPECT_EQ(half(2.98023223876953125e-08 * 1.0001), 5.960464477539063e-08);
   EXPECT_TRUE(std::signbit(half(-1e-30)));
-  // Just above a tie in double; rounding to float first would land on the tie and then on the wrong
-  // side.
+  // Just above a tie in double; rounding to float first would hit the tie and then round to the
+  // wrong side.
   EXPECT_EQ(half(1 + 0x1p-11 + 0x1p-40), 1 + 0x1p-10);
   EXPECT_EQ(brain(1 + 0x1p-8 + 0x1p-40), 1 + 0x1p-7);
   EXPECT_EQ(brain(1 + 0x1p-8), 1);
@@ -142,7 +142,7 @@ TEST(Operator, FmaRoundsOnce) {
   const auto f64 = [](double v) { return Scalar::of_float(Float(64), v); };
   EXPECT_EQ(run(Op::fma, {f64(1 + e * e * e), f64(1 + e * e * e), f64(-1)}, Float(64)).f,
             2 * e * e * e + std::ldexp(1.0, -72));
-  // The product lies halfway between two numbers; what is added is too small for double, and decides.
+  // The product lies halfway between two numbers; the addend, too small for double, decides.
   const auto bf16 = [](double v) { return Scalar::of_float(BFloat(16), v); };
   const double tiny = std::ldexp(1.0, -100);
   EXPECT_EQ(run(Op::fma, {bf16(9), bf16(29 / 256.0), bf16(tiny)}, BFloat(16)).f, 131 / 128.0);
@@ -166,7 +166,7 @@ TEST(Operator, LerpOfIntegersIsExactlyRounded) {
     }
   }
   EXPECT_EQ(run(Op::lerp, {i8(-128), i8(127), u8(255)}, Int(8)).i, 127);
-  // As Halide 14 gives: a wider weight loses its low bits first.
+  // Agrees with Halide 14: a wider weight loses its low bits first.
   EXPECT_EQ(run(Op::lerp, {u8(4), u8(207), Scalar::of_uint(UInt(16), 39037)}, UInt(8)).u, 124u);
   EXPECT_EQ(run(Op::lerp, {u8(42), u8(69), f32(0.5)}, UInt(8)).u, 55u);
   EXPECT_EQ(run(Op::lerp, {f32(10), f32(20), f32(0.25)}, Float(32)).f, 12.5);

@@ -1,4 +1,4 @@
-// parse(print(x)) equals x; bad text is a UserError with its place.
+// parse(print(x)) equals x; malformed text is a UserError with its position.
 #include <gtest/gtest.h>
 
 #include "diagnostics/large_stack.h"

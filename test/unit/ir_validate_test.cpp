@@ -1,4 +1,4 @@
-// Every rule of the validator: one program that keeps it, one that breaks it.
+// Every rule of the validator, with one program that satisfies it and one that violates it.
 #include "ir/validate.h"
 
 #include <gtest/gtest.h>

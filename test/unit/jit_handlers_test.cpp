@@ -1,5 +1,5 @@
-// Handlers of the JIT: memory, errors, prints, tasks and loops of compiled code; and that a failing
-// allocation, wherever it is, gives an error and leaks nothing.
+// JIT handlers for memory, errors, prints, tasks and loops. A failing allocation anywhere must give
+// an error and leak nothing.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -12,7 +12,7 @@
 namespace retrograde {
 namespace {
 
-// An allocator that counts, and fails when it is told to.
+// An allocator that counts, and fails on request.
 struct Counting : JITUserContext {
   std::atomic<int> allocations{0}, live{0}, tasks{0}, loops{0};
   int fail_at = -1;

@@ -16,7 +16,7 @@
 namespace retrograde::testing_codegen {
 namespace {
 
-// out[x] = x * factor, under chosen names.
+// out[x] = x * factor, with selectable names.
 LoweredFunction scaled(int factor, const std::string& suffix = "", Type type = Int(32)) {
   LoweredFunction f;
   f.name = "scaled" + suffix;
@@ -124,7 +124,7 @@ TEST(Jit, RunHandsPrintsOn) {
   EXPECT_EQ(lines, 100);
 }
 
-// Three parallel loops, so four functions; the first reads text that the others read, too.
+// Three parallel loops, so four functions; the first reads a text that the others read, too.
 LoweredFunction three_loops() {
   LoweredFunction f;
   f.name = "three_loops";
@@ -290,7 +290,7 @@ TEST(Codegen, StrongMultiplicationIsMasked) {
   expect_mentions(assembly, {"{z}"});
 }
 
-// What no lane wants is jumped over, where it takes long.
+// A costly arm that no lane selects is skipped by a branch.
 TEST(Codegen, CostlyArmsAreBehindABranch) {
   LoweredFunction f = vector_sum();
   const Expr index = make_ramp(variable("x") * 16, 1, 16);
@@ -306,7 +306,7 @@ TEST(Codegen, CostlyArmsAreBehindABranch) {
   EXPECT_FALSE(tests_a_mask(in * in + 1.0f));
 }
 
-// acc + strong_mul(a, b) and acc - strong_mul(a, b): no multiplication of its own.
+// acc + strong_mul(a, b) and acc - strong_mul(a, b) need no separate multiplication.
 TEST(Codegen, SumsOfStrongProductsFuse) {
   LoweredFunction f = vector_sum();
   const Expr index = make_ramp(variable("x") * 16, 1, 16);
@@ -325,7 +325,7 @@ TEST(Codegen, SumsOfStrongProductsFuse) {
   }
 }
 
-// Of two products that are equal nothing may remain, not even the rounding of one of them.
+// The difference of two equal products must be zero, without even a rounding error of one of them.
 TEST(Codegen, DifferencesOfStrongProductsDoNotFuse) {
   LoweredFunction f = vector_sum();
   const Expr index = make_ramp(variable("x") * 16, 1, 16);
@@ -354,8 +354,8 @@ TEST(Codegen, PartsAreAnArchiveAndDeterministic) {
   EXPECT_EQ(codegen::compile_object(three_loops(), options).object, object);
 }
 
-// A long block is compiled as several functions: values, masks and products that fuse pass between
-// them. Beside the same statements in Funcs of 100, whose blocks are short.
+// A long block is compiled as several functions; values, masks and fused products pass between
+// them. The reference has the same statements in Funcs of 100, whose blocks are short.
 TEST(Codegen, LongStraightCodeGivesTheNumbersOfShortCode) {
   constexpr int statements = 3000, width = 64;
   Buffer<float> in(width + statements), whole_out, parts_out;

@@ -1,5 +1,5 @@
-// What the PTX of kernels has: 32-bit addresses of shared memory, products of indices in one instruction,
-// accesses of 16 bytes where buffers are aligned; and that unaligned buffers are right, too.
+// Properties of the PTX of kernels: 32-bit addresses of shared memory, fused index products,
+// 16-byte accesses to aligned buffers. Unaligned buffers must give correct results, too.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -14,7 +14,7 @@
 namespace retrograde {
 namespace {
 
-// Before anything asks for a device.
+// Must be set before the first use of a device.
 [[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
 
 Target with_gpu() {
@@ -61,7 +61,7 @@ TEST(KernelText, StreamingProgramsKeepNothingInLocalMemory) {
 
 class KernelVectors : public testing::Test {
  protected:
-  // Twice the image, a thread for each four points of a row.
+  // Doubles the image, with one thread for four points of a row.
   template <typename T>
   Func twice(const Buffer<T>& in, int lanes) {
     Var x("x"), y("y"), xi("xi"), yi("yi");

@@ -1,6 +1,6 @@
-// Programs that are legal though a simple rule would turn them away: outputs larger than was asked
-// for, updates whose iterations never meet, loops whose extent is bounded but not known, promises
-// that speak of themselves. Each is compared with itself unscheduled, or with what it must give.
+// Legal programs that a simpler rule would reject: outputs larger than requested, updates whose
+// iterations never conflict, loops whose extent is bounded but not constant, promises that depend
+// on themselves. Each is compared with its unscheduled form, or with known values.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,7 +29,7 @@ std::vector<int> doubled(int n) {
   return values;
 }
 
-// ---- realize(sizes) gives that size, whatever the schedule or a promise makes of it ----
+// ---- realize(sizes) returns that size, whatever the schedule or a promise does to it ----
 
 Func twice() {
   Func f("f");
@@ -124,9 +124,9 @@ TEST(RealizedSizes, SmallerPromisesAreRefused) {
   expect_error<RuntimeError>({"promised to be 8", "it is 10"}, [&] { f.realize({10}); });
 }
 
-// ---- the stride of a dimension with one element or none may be anything: libraries of arrays leave it ----
+// ---- arbitrary strides of dimensions with at most one element, as array libraries leave them ----
 
-// What in(x, y) + out's own coordinates is, of buffers with these extents and strides.
+// Checks in(x, y) plus out's own coordinates, for buffers with these extents and strides.
 void expect_any_strides(const std::function<void(Func&, ImageParam&)>& promise, int width,
                         int height, int stride_x, int stride_y) {
   ImageParam in(Int(32), 2, "in");
@@ -150,7 +150,7 @@ void expect_any_strides(const std::function<void(Func&, ImageParam&)>& promise, 
 TEST(StridesOfOneElement, MayBeAnything) {
   const auto nothing = [](Func&, ImageParam&) {};
   const auto vectors = [](Func& f, ImageParam&) { f.vectorize(x, 4, TailStrategy::GuardWithIf); };
-  const auto rows = [](Func& f, ImageParam& in) {  // of 8 elements, said twice
+  const auto rows = [](Func& f, ImageParam& in) {  // of 8 elements, stated twice
     in.dim(1).set_stride(8 * in.dim(0).stride());
     f.output_buffer().dim(1).set_stride(8);
   };
@@ -183,9 +183,9 @@ TEST(StridesOfOneElement, OfMoreAreStillChecked) {
                              [&] { f.realize(of_low); });
 }
 
-// ---- updates whose iterations never touch the same element ----
+// ---- updates whose iterations never access the same element ----
 
-// The update scheduled and not.
+// Compares the update with and without its schedule.
 void expect_same(const std::vector<int>& sizes, const std::function<Func()>& define,
                  const std::function<void(Func&)>& schedule) {
   Func plain = define(), scheduled = define();
@@ -289,7 +289,7 @@ TEST(DistinctWrites, OfPlacesThatDataMove) {
   EXPECT_NO_THROW(f.update().parallel(r.y));
 }
 
-// ---- updates whose order does not matter, or is said not to ----
+// ---- updates whose order does not matter, or is declared not to ----
 
 TEST(Orders, OfAScatteredConstant) {
   RDom r(0, 8, 0, 8);
@@ -321,7 +321,7 @@ TEST(Orders, OfLanesThatReadWhatOthersStore) {
   }
 }
 
-// ---- loops whose extent has a bound that the loops around them tell ----
+// ---- loops whose extent has a bound that follows from the loops around them ----
 
 // Halves of a vector at the end of a guarded loop, and the first part of a window.
 TEST(BoundedLoops, AreVectorizedUnderTheirBound) {
@@ -360,7 +360,7 @@ TEST(BoundedLoops, OfWindowsAreUnrolled) {
   }
 }
 
-// f is needed over [min(min, 0), max(max, 0)], which the condition makes three coordinates.
+// f is required over [min(min, 0), max(max, 0)], which the condition limits to three coordinates.
 TEST(BoundedLoops, OfHullsAreUnrolledWhereTheConditionSaysSo) {
   Func f("f"), out("out");
   f(x, c) = x + 10 * c;
@@ -396,7 +396,7 @@ TEST(BoundedLoops, AreUnrolledUnderTheirBound) {
   expect_error({"constant above it"}, [&] { g.realize({5}); });
 }
 
-// ---- stages that share the outermost loop only ----
+// ---- stages that share only the outermost loop ----
 
 TEST(Outermost, StagesComputedTogetherThere) {
   Func f("f"), g("g"), h("h");
@@ -453,14 +453,15 @@ TEST(Coordinates, FromAbsoluteValuesAreNotNegative) {
   EXPECT_EQ(out(2), 400);
 }
 
-// ---- what is needed of inputs ----
+// ---- required regions of inputs ----
 
 int inferred_extent(Func f, ImageParam in, int size) {
   f.infer_input_bounds({size});
   return in.get().width();
 }
 
-// What a loop that rounds up reads of a Func beyond its domain need not be right, only there.
+// Values that a rounded-up loop reads of a Func beyond its domain may be wrong, but must be
+// allocated.
 TEST(InputRegions, AreThoseOfTheLoopsThatReadThem) {
   ImageParam in(Int(32), 1);
   Func direct("direct"), g("g"), h("h"), f("f");
@@ -495,7 +496,8 @@ TEST(InputRegions, StayWhereValuesArePlaces) {
   EXPECT_EQ(inferred_extent(f, in, 12), 16);
 }
 
-// a(x) = in(x) * 2, at root; `schedule` is given b; the input is asked for what is needed alone.
+// a(x) = in(x) * 2, at root; `schedule` applies to b; only the required region of the input is
+// requested.
 void expect_exact_region(const std::function<Func(Func a)>& define, int size, int reach) {
   ImageParam in(Int(32), 1, "in");
   Func a("a");
@@ -531,7 +533,7 @@ TEST(InputRegions, EndWithWhatIsNeededOfVectorsThatShift) {
   }
 }
 
-// The same, with a Func between b and a that is computed inside of the loops of b.
+// The same, with a Func between b and a that is computed inside the loops of b.
 TEST(InputRegions, EndWithWhatFuncsInsideOfSuchLoopsNeed) {
   for (const TailStrategy tail : {TailStrategy::RoundUp, TailStrategy::ShiftInwards}) {
     for (const int size : {4, 15, 16, 40}) {
@@ -550,8 +552,8 @@ TEST(InputRegions, EndWithWhatFuncsInsideOfSuchLoopsNeed) {
   }
 }
 
-// b slides along y by tiles of two rows, and keeps them: of these rows all that is needed of x is right. The vectors
-// along x run beyond, and ask for no more.
+// b slides along y in tiles of two rows and keeps them; the required part of these rows along x
+// must be right. The vectors along x run beyond it, and must not require more of the input.
 TEST(InputRegions, EndWithWhatIsNeededOfTilesThatAreKept) {
   for (const int size : {16, 40}) {
     ImageParam in(Int(32), 2, "in");
@@ -581,7 +583,7 @@ TEST(InputRegions, EndWithWhatIsNeededOfTilesThatAreKept) {
   }
 }
 
-// What loops read beyond a region has room, also where two stages share the loops around.
+// Storage has room for reads beyond a region, also if two stages share the outer loops.
 TEST(InputRegions, HaveRoomForVectorsInsideOfSharedLoops) {
   Func a("a"), inside("inside"), one("one"), other("other");
   Var y("y");
@@ -599,7 +601,7 @@ TEST(InputRegions, HaveRoomForVectorsInsideOfSharedLoops) {
   others.for_each_element([&](int i, int j) { EXPECT_EQ(others(i, j), i + 3 * j + 1); });
 }
 
-// A table is read inside of its bounds, whatever the values beyond are.
+// A table is read inside its bounds, whatever the values beyond the region are.
 TEST(InputRegions, EndWithThemWhereCoordinatesAreClamped) {
   for (const int size : {4, 16, 40}) {
     const auto define = [&](const Func& a) {
@@ -656,7 +658,7 @@ TEST(Promises, MaySpeakOfThemselves) {
   EXPECT_EQ(line(wide), doubled(16));
 }
 
-// The buffers of a Tuple cover one region, so that what is promised of one holds for all.
+// The buffers of a Tuple cover one region, so a promise about one holds for all.
 TEST(Promises, OfTheSecondBufferOfATuple) {
   Func f("f");
   f(x) = Tuple(2 * x, cast<float>(x));
@@ -673,7 +675,7 @@ TEST(Promises, OfTheSecondBufferOfATuple) {
   }
 }
 
-// ---- what Halide refuses ----
+// ---- programs that Halide rejects ----
 
 TEST(RealizedFuncs, TakeMoreUpdates) {
   Func f("f");
@@ -703,7 +705,7 @@ TEST(Splits, ArePredicatedAlsoWhereTheyAreSplitAgain) {
   }
 }
 
-// Tails that blend store the old values beyond the end elsewhere, and nothing here.
+// Blending tails store the old values beyond the end in Halide; here they store nothing.
 TEST(Splits, OfParallelUpdatesMayBlend) {
   const Var xo("xo"), xi("xi");
   using Schedule = std::function<void(Stage)>;
@@ -774,7 +776,7 @@ TEST(SharedLoops, OfAnUpdateAndItsPureDefinition) {
   for (int i = 0; i < 100; i++) EXPECT_EQ(out(i % 10, i / 10), i % 10 + i / 10 + 2);
 }
 
-// "a" is needed by the update alone, the others by the first definition alone.
+// Only the update reads "a", and only the pure definition reads the others.
 TEST(SharedLoops, OfFuncsThatDifferentStagesRead) {
   Func a("a"), b("b"), d("d"), f("f");
   a(x, y) = x + y;

@@ -1,5 +1,5 @@
-// A clamped index is read as a boundary condition is: densely, away from the limits; and wherever
-// the limits lie, with the same values. Oracles: repeat_edge's code, and plain loops.
+// A clamped index is read densely away from its limits, like a boundary condition, and gives the
+// same values wherever the limits lie. Oracles: repeat_edge, and plain loops.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 
 Var x("x"), y("y");
 
-// Loads of vectors of "in" in the code for f, of consecutive indices and of others.
+// Vector loads of "in" in the code for f, with consecutive and with other indices.
 struct Loads {
   int dense = 0, gathered = 0;
 };
@@ -69,14 +69,14 @@ TEST(LikelyClamps, NotWhereDataOrMovingLimitsDecide) {
   Func by_data("by_data"), moving("moving");
   by_data(x) = in(clamp(at(x), 0, 9));
   moving(x, y) = in(clamp(x, y - 5, y + 5));
-  // A loop that may not go beyond its end would be cut for that.
+  // A loop that may not run past its end would be partitioned for that.
   by_data.vectorize(x, 8, TailStrategy::RoundUp), moving.vectorize(x, 8, TailStrategy::RoundUp);
   EXPECT_EQ(vector_loads(by_data).dense, 0);
   EXPECT_EQ(vector_loads(moving).dense, 0);
 }
 
-// What an update's own index reads stays as it is in the place that is stored to: else an atomic update
-// would read the element beside the exchange, and lose others' sums.
+// Reads inside an update's own index stay in the index of the store. Otherwise an atomic update
+// would read the element outside of the atomic exchange, and lose concurrent sums.
 TEST(LikelyClamps, NotInTheIndicesByWhichAnUpdateAccumulates) {
   ImageParam in(Int(32), 1, "in");
   constexpr int samples = 100000;
@@ -86,7 +86,7 @@ TEST(LikelyClamps, NotInTheIndicesByWhichAnUpdateAccumulates) {
   sums(x) = 0;
   sums(clamp(bin, 0, 4)) += bin;
   sums.update().atomic().parallel(r);
-  int updates = 0, others = 0;  // of each part of the loop
+  int updates = 0, others = 0;  // in each part of the loop
   const std::vector<graph::FuncPtr> outputs = {sums.function()};
   const ir::LoweredFunction code =
       lower::lower("sums", outputs, lower::infer_arguments(outputs), lower::LowerOptions());

@@ -1,5 +1,5 @@
-// A literal 0 is a pointer, too: where a user means a number it must not become the null name of a
-// Var, and where it can mean nothing it does not compile. Pointers that are null say so.
+// A literal 0 is also a null pointer. Where a user means a number, it must not become the null name
+// of a Var, and where it has no meaning, it must not compile. Null pointers are reported.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -111,7 +111,7 @@ TEST(NullText, IsAnError) {
   expect_null([&] { RVar v(none); }, "name an RVar");
   expect_null([&] { Func f(none); }, "name a Func");
   expect_null([&] { Param<int> p(none); }, "name a Param");
-  expect_null([&] { Expr e(none); }, "make an Expr of a text");
+  expect_null([&] { Expr e(none); }, "make an Expr from a text");
   expect_null([&] { Target t(none); }, "read a target");
 }
 

@@ -1,4 +1,4 @@
-// Loop nests that schedules ask for, as text.
+// The loop nests of schedules as text.
 #include <gtest/gtest.h>
 
 #include "lower/lower.h"
@@ -116,7 +116,7 @@ TEST(LoopNest, computes_a_reduction_in_the_innermost_loop_of_its_consumer) {
             "      g(...) = ...\n");
 }
 
-// The memory of temp is free before that of other is needed.
+// The memory of temp is freed before that of other is allocated.
 TEST(LoopNest, computes_an_output_as_soon_as_what_it_reads_is_there) {
   Func temp("temp"), other("other"), early("early"), late("late");
   Var x("x");

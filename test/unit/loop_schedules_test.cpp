@@ -1,5 +1,5 @@
-// Schedules that exercise the passes over loops, end to end: the scheduled pipeline gives what the
-// unscheduled one gives, bit for bit. Sizes are odd, so that every split has a tail.
+// Schedules that exercise the loop passes end to end: the scheduled pipeline gives the bits of the
+// unscheduled one. Sizes are odd, so every split has a tail.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -82,7 +82,7 @@ TEST_F(LoopSchedules, TilesOfEveryBoundaryCondition) {
   }
 }
 
-// A vector that is bound in two parts is read where four are asked for.
+// A vector with different bounds in its two halves, read by a four-part one.
 TEST_F(LoopSchedules, LanesThatAlternateInTwoWays) {
   Var x("x"), y("y"), xo("xo"), xi("xi"), xoo("xoo"), xoi("xoi"), t("t");
   Func f("f"), g("g");
@@ -107,7 +107,7 @@ TEST_F(LoopSchedules, LanesThatAlternateInTwoWays) {
   }
 }
 
-// The predicate is never true, which only an analysis of its range tells: g is computed nowhere.
+// The predicate is never true, which only range analysis can prove: g is not computed anywhere.
 TEST_F(LoopSchedules, AnUpdateThatNeverRunsReadsNothing) {
   for (const bool is_scalar : {false, true}) {
     Var x("x"), y("y");
@@ -128,7 +128,8 @@ TEST_F(LoopSchedules, AnUpdateThatNeverRunsReadsNothing) {
   }
 }
 
-// No iteration, of which a condition asks for one: the region of s in y ends 4 before it begins.
+// No iteration runs, although a condition mentions one: the region of s in y ends 4 before it
+// begins.
 TEST_F(LoopSchedules, AFuncThatNoIterationReadsTakesNoMemory) {
   Var x("x"), y("y");
   Func f("f"), s("s");
@@ -141,7 +142,7 @@ TEST_F(LoopSchedules, AFuncThatNoIterationReadsTakesNoMemory) {
   EXPECT_EQ(Buffer<int>(f.realize({5}))(1), 7);
 }
 
-// One that may run reads and writes all the same, in no dimension too.
+// An update that may run still reads and writes, also without dimensions.
 TEST_F(LoopSchedules, AnUpdateOfAScalarThatRunsSometimes) {
   Var x("x");
   Func f("f"), g("g");
@@ -235,7 +236,7 @@ TEST_F(LoopSchedules, StencilWithHoles) {
   });
 }
 
-// What is needed of f in the last tile, or by a choice, is less than in the others.
+// The last tile, or a select, requires less of f than the other tiles do.
 TEST_F(LoopSchedules, SmallStorageOfAnySizeIsNoHeapMemory) {
   struct Counting : JITUserContext {
     int allocations = 0;
@@ -282,7 +283,7 @@ TEST_F(LoopSchedules, NarrowTypesWrapTheSame) {
   });
 }
 
-// 24 lanes behind a predicate: the machine's gathers are of 8 or 16.
+// 24 lanes behind a predicate; the machine's gathers have 8 or 16.
 TEST_F(LoopSchedules, GathersOfOddWidth) {
   Func values("values"), squares("squares"), f("f");
   Var z("z"), yo("yo"), yi("yi"), yoo("yoo"), yoi("yoi");

@@ -1,4 +1,4 @@
-// Funcs that are computed at several places keep their names apart.
+// Funcs that are computed in several places get distinct names.
 #include <gtest/gtest.h>
 
 #include "ir/parse.h"
@@ -30,7 +30,7 @@ TEST(MakeNamesUnique, LeavesNamesOfArgumentsToThem) {
   expect_mentions(text, {"let code.$1 = 3", "assert((code.$1 == 0), code.$1)", "out(0) = {code}"});
 }
 
-// The checks of arguments have a name of their own for what they give.
+// The results of argument checks have names of their own.
 TEST(MakeNamesUnique, AParameterMayBeCalledCode) {
   Param<int> code("code", 113);
   Var x("x");

@@ -232,7 +232,7 @@ TEST_F(Memoize, AnOutputCannotBeMemoized) {
   expect_error({"an output is computed by every call"}, [&] { f.compile_jit(); });
 }
 
-// The entry must not be found again for another region that needs the same storage.
+// The entry must not be found for another region that needs the same storage.
 TEST_F(Memoize, StorageLargerThanWhatIsComputed) {
   for (const int how : {0, 1, 2}) {
     Var x("x");
@@ -252,7 +252,8 @@ TEST_F(Memoize, StorageLargerThanWhatIsComputed) {
   }
 }
 
-// What RoundUp computes beyond what is read are no values of the Func: its producer is not computed there.
+// Points that RoundUp computes beyond the required region are not values of the Func: its producer
+// is not computed there.
 TEST_F(Memoize, StorageThatASplitRoundsUp) {
   Var x("x"), xo("xo"), xi("xi");
   Func source("source"), f("f"), g("g");

@@ -1,12 +1,12 @@
-// Minima of minima in PTX: see codegen/nested_minima.h.
-#include "codegen/nested_minima.h"
+// Nested minima in PTX: see codegen/part_minima.h.
+#include "codegen/part_minima.h"
 
 #include <gtest/gtest.h>
 
 namespace retrograde::codegen {
 namespace {
 
-// A function of these lines, and nothing else.
+// A function that consists of these lines.
 std::string function(const std::string& lines) { return ".entry f()\n{\n" + lines + "}\n"; }
 
 size_t count(const std::string& text, const std::string& part) {
@@ -48,8 +48,8 @@ TEST(PartMinima, EverythingElseIsAsItWas) {
       "\tmin.s32 \t%r2, %r1, 255;\n\tmax.s32 \t%r3, %r2, 0;\n\tmin.u32 \t%r4, %r1, %r2;\n"
       "\tmin.u32 \t%r5, %r4, %r2;\n\tmin.f32 \t%f2, %f1, %f1;\n\tmin.f32 \t%f3, %f2, %f1;\n"
       "\tmin.s64 \t%rd2, %rd1, %rd1;\n\tmin.s64 \t%rd3, %rd2, %rd1;\n";
-  EXPECT_EQ(rewrite_nested_minima(function(clamp)), function(clamp));
-  // Names of registers are those of one function.
+  EXPECT_EQ(part_minima(function(clamp)), function(clamp));
+  // Register names are local to a function.
   const std::string two =
       function("\tmin.s32 \t%r2, %r1, 255;\n") + function("\tmin.s32 \t%r3, %r2, 255;\n");
   EXPECT_EQ(rewrite_nested_minima(two), two);

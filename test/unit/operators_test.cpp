@@ -1,4 +1,4 @@
-// The table of operators: total in every column, and each column against the values themselves.
+// The table of operators: complete in every column, and each column consistent with the values.
 #include "ir/operators.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ Table table() {
   return rows;
 }
 
-// "operator: column" of everything that a table leaves out.
+// "operator: column" for each omission of a table.
 std::vector<std::string> left_out(const Table& rows) {
   std::vector<std::string> result;
   for (const OpInfo& row : rows) {
@@ -88,8 +88,9 @@ TEST(Operators, ColumnsAgreeWithEachOther) {
 
 // ---- the columns of real functions against their values ----
 
-const std::vector<double> samples = {-inf, -1e300, -1e10, -800, -10, -2.5, -1,   -0.5,  -1e-300, 0,
-                                     1e-300, 0.5, 1, 2.5, 10, 800, 1e10, 1e300, inf};
+const std::vector<double> samples = {-inf, -1e300,  -1e10, -800,   -10, -2.5, -1,
+                                     -0.5, -1e-300, 0,     1e-300, 0.5, 1,    2.5,
+                                     10,   800,     1e10,  1e300,  inf};
 
 bool takes_numbers(const OpInfo& row) {
   return row.cls == OpClass::Pure && row.work.adds + row.work.mults + row.work.functions > 0;

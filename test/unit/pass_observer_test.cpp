@@ -1,4 +1,4 @@
-// Watching the compiler: in the program, and with tools/opt.
+// Observing the compiler, from a program and with tools/opt.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -69,7 +69,7 @@ TEST(PassObserver, SeesAheadOfTimeCompilationToo) {
 
 class Opt : public testing::Test {
  protected:
-  // Standard output and error together.
+  // Standard output and error combined.
   std::string opt(const std::string& arguments, int wanted_status = 0) {
     const fs::path out = folder / "out";
     const int status = std::system(

@@ -1,4 +1,4 @@
-// prefetch: what is asked for in advance, and that results do not change.
+// prefetch: the prefetched regions, and unchanged results.
 #include <gtest/gtest.h>
 
 #include "frontend/include/retrograde/retrograde.h"
@@ -68,7 +68,7 @@ TEST(Prefetch, EveryBoundStrategyKeepsTheResult) {
   }
 }
 
-// What a split promises of an iteration's coordinates says nothing of those that are fetched early.
+// A split's promises about the current iteration's coordinates do not hold for prefetched ones.
 TEST(Prefetch, LaterCoordinatesKeepNoPromises) {
   for (auto strategy : {PrefetchBoundStrategy::Clamp, PrefetchBoundStrategy::GuardWithIf,
                         PrefetchBoundStrategy::NonFaulting}) {

@@ -67,7 +67,7 @@ TEST(Profiler, TimeGoesToTheFuncThatTakesIt) {
   EXPECT_GE(stats->time, 240000000u);
   EXPECT_STREQ(stats->funcs[1].name, "a");
   EXPECT_GT(stats->funcs[1].time, stats->funcs[2].time);
-  EXPECT_GE(stats->funcs[2].time, 30000000u);  // half; looks come at random
+  EXPECT_GE(stats->funcs[2].time, 30000000u);  // half of it; samples come at random
   EXPECT_EQ(stats->funcs[1].memory_peak, 1000u);
   EXPECT_EQ(stats->funcs[2].num_allocs, 1);
   EXPECT_EQ(stats->memory_peak, 1500u);
@@ -109,7 +109,7 @@ TEST(Profiler, ThreadsShareTheTimeAndWhoWaitsForWorkOfItsOwnHasNone) {
   other.join();
   retrograde_profiler_leave(nullptr, inner);
   EXPECT_EQ(std::atomic_ref(*outer).load(), 1);
-  // Work of another run inside: its place is another one, and this one waits.
+  // A nested run has a state of its own, and the outer one waits.
   void* other_run = retrograde_profiler_begin(nullptr, "other", "overhead");
   int32_t* elsewhere = retrograde_profiler_thread(nullptr, other_run, 0);
   EXPECT_LT(std::atomic_ref(*outer).load(), 0);
@@ -137,7 +137,7 @@ TEST(Profiler, RunsShorterThanTheTimeBetweenLooksAreSeen) {
     const auto* stats = retrograde_profiler_pipeline("short");
     return stats && stats->funcs[func].time > stats->time / 8;
   };
-  // On a busy machine the thread that looks waits for its turn: then for longer.
+  // On a busy machine the sampling thread waits for its turn, so this runs longer then.
   for (int n = 0; n < 1000 || !is_seen(1) || !is_seen(2); ++n) {
     if (std::chrono::steady_clock::now() - begin > std::chrono::seconds(20)) break;
     void* run = retrograde_profiler_begin(nullptr, "short", "overhead\nfirst\nsecond");

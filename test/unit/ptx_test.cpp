@@ -1,5 +1,5 @@
-// PTX of everything that the language can ask of a device, for every chip that we name: LLVM's back end does
-// not end the process, ptxas takes it, and the code rounds as the executor does.
+// PTX of everything that the language can express on a device, for every supported chip. LLVM's
+// back end must not abort, ptxas must accept the PTX, and the code must round as the executor does.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -66,7 +66,8 @@ TEST_P(Ptx, OfEverythingIsTakenByPtxas) {
   }
 }
 
-// What PTX leaves unrounded, ptxas fuses as it likes; what is approximate, the executor has not.
+// ptxas may fuse operations that PTX leaves without a rounding mode, and the executor has no
+// approximate instructions.
 TEST(PtxOfEverything, RoundsEveryFloatAsTheExecutorDoes) {
   const auto function = every_kernel::of_everything(1, every_kernel::types());
   int rounded = 0;
@@ -94,7 +95,7 @@ TEST(PtxOfEverything, WhatOnlyAHostCanDoIsRefused) {
 
 // ---- FMA ----
 
-// A kernel of x, which stores the values side by side.
+// A kernel of x that stores the values side by side.
 std::vector<std::string> kernel_of(const std::vector<Expr>& values, bool is_strict = false) {
   std::vector<Stmt> stores;
   for (size_t i = 0; i < values.size(); ++i)

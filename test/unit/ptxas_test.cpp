@@ -1,5 +1,5 @@
-// NVIDIA's assembler: what it says of kernels, and its machine code in the compile cache. Where it is not
-// installed a program of ours that only counts how often it runs stands in; what wants the real one is
+// NVIDIA's assembler: its report on kernels, and its machine code in the compile cache. Where it is
+// not installed, a stub that only counts its runs replaces it, and tests of the real one are
 // skipped.
 #include "jit/ptxas.h"
 
@@ -37,7 +37,7 @@ constexpr const char* scaling = R"(.version 7.8
 }
 )";
 
-// One variable of the environment, as it was before when the test ends.
+// Sets an environment variable, and restores it when the test ends.
 class Variable {
  public:
   Variable(const char* name, const std::string& value) : name_(name) {
@@ -134,7 +134,7 @@ TEST_F(RealPtxas, WhatItRefusesIsToldInItsWords) {
 class KernelImages : public testing::Test {
  protected:
   KernelImages() {
-    // Its last argument but one is where the machine code goes.
+    // Its last argument but one is the output file for the machine code.
     std::ofstream(program) << "#!/bin/sh\necho run >> " << runs
                            << "\nwhile [ $# -gt 2 ]; do shift; done\necho code > \"$1\"\n";
     chmod(program.c_str(), 0700);

@@ -1,4 +1,4 @@
-// Small names of the public headers: accessors, aliases and switches that no other test needs.
+// Small parts of the public headers: accessors, aliases and switches that no other test needs.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "graph/directive_names.h"
+#include "graph/directive.h"
 #include "graph/graph.h"
 #include "ir/visit.h"
 #include "support/same_numbers.h"
@@ -28,8 +28,8 @@ Drawn draw(Choices choices, const Style& style = Style::pipelines()) {
   return {program, schedule, choices.taken()};
 }
 
-// Of the Funcs that the outputs need: how many nodes of each kind, calls of each operator, Funcs
-// that are called alike, updates, predicates.
+// Counts over the Funcs that the outputs need: nodes of each kind, calls of each operator, Funcs of
+// equal name, updates, predicates.
 Counts counts_of(const RandomProgram& program) {
   Counts counts;
   for (const graph::FuncPtr& f : graph::topological_order(outputs_of(program))) {
@@ -48,7 +48,7 @@ Counts counts_of(const RandomProgram& program) {
   return counts;
 }
 
-// A generator that silently stopped making something would leave it untested.
+// A construct that the generator silently stopped producing would be untested.
 void expect_all(const Style& style, uint64_t programs, const std::vector<std::string>& wanted) {
   Counts seen;
   for (uint64_t seed = 0; seed < programs; ++seed) {
@@ -62,9 +62,9 @@ const std::vector<std::string> structures{"Func f",         "Func level",  "Func
                                           "Func looked_up", "Func scan",   "Func wave", "Func best",
                                           "Func band",      "Func around", "Func loop"};
 
-// How many Funcs are each computed in loops of the next.
+// The longest chain of Funcs that are each computed in loops of the next.
 size_t longest_nesting(const ScheduleLog& schedule) {
-  std::map<std::string, std::string> around;  // the Func in whose loops one is computed
+  std::map<std::string, std::string> around;  // the Func in whose loops each is computed
   for (const ScheduleLog::Entry& entry : schedule.entries) {
     const auto* at = std::get_if<graph::ComputeAt>(&entry.directive);
     if (at && at->level.kind == graph::LoopLevel::Kind::At) around[entry.func] = at->level.func;
@@ -149,7 +149,7 @@ TEST(RandomPrograms, CoverEveryDirectiveAndPlacement) {
       ++seen[name + (entry.special.empty() ? "" : " of a specialization")];
     }
   }
-  // What changes nothing that a program computes.
+  // Directives that do not change the computation.
   const std::set<std::string> without{"unscheduled",   "set_estimate", "add_trace_tag",
                                       "debug_to_file", "run",          "compute_at"};
   std::vector<std::string> wanted = graph::directive_names();
@@ -160,7 +160,7 @@ TEST(RandomPrograms, CoverEveryDirectiveAndPlacement) {
   for (const std::string& name : wanted) EXPECT_GT(seen[name], 5) << name;
 }
 
-// Whatever a definition names is there where it stands: variables, Funcs, images, parameters.
+// Everything that a definition names exists at that point: variables, Funcs, images, parameters.
 TEST(RandomPrograms, AreValidGraphs) {
   for (const Style& style : {Style::pipelines(), Style::gradients(), Style::pieces()}) {
     for (uint64_t seed = 0; seed < 300; ++seed) {
@@ -174,7 +174,7 @@ TEST(RandomPrograms, AreValidGraphs) {
 
 TEST(RandomPrograms, AreReproducible) {
   for (uint64_t seed = 0; seed < 20; ++seed) {
-    draw(Choices(seed));  // the first one of a process has no numbers behind its names
+    draw(Choices(seed));  // the first program of a process has no numbers in its names
     const Drawn a = draw(Choices(seed)), b = draw(Choices(a.taken));
     EXPECT_EQ(same_numbers(to_text(a.program, a.schedule)),
               same_numbers(to_text(b.program, b.schedule)));

@@ -1,4 +1,4 @@
-// Nothing is stored where undef is chosen.
+// undef: nothing is stored where it is selected.
 #include <gtest/gtest.h>
 
 #include "retrograde/retrograde.h"
@@ -56,7 +56,7 @@ TEST(ResolveUndef, WithAPredicateOfTheDomainAndVectors) {
   for (int i = 0; i < 8; ++i) in(i) = i;
   Func f("f");
   RDom r(0, 16);
-  r.where(r < 8);  // what lies behind is not read
+  r.where(r < 8);  // the elements beyond are not read
   f(x) = 0;
   f(r) = select(in(r) % 3 == 0, in(r) + 20, undef<int>());
   f.update().vectorize(r, 4);
@@ -96,7 +96,7 @@ TEST(ResolveUndef, AnElementUpdatedAloneSpeaksForAll) {
   EXPECT_EQ(values_of(all[2]), (Ints{3, 3, 3, 3}));
 }
 
-// What was never stored may hold anything, so it bounds no coordinate.
+// An element that was never stored may hold any value, so it bounds no coordinate.
 TEST(ResolveUndef, PartlyStoredValuesBoundNothing) {
   Func index("index"), table("table"), out("out");
   index(x) = select(x == 0, 3, undef<int>());

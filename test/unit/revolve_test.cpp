@@ -1,5 +1,5 @@
-// Schedules of kept states: run on a model of the loop that checks every action, and counted
-// against the optimum, which dynamic programming finds without the closed form.
+// Checkpoint schedules (revolve): run on a model of the loop that checks every action, and counted
+// against the optimum found by dynamic programming without the closed form.
 #include "autodiff/time/revolve.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ namespace {
 
 using Kind = RevolveAction::Kind;
 
-// Runs the actions; gives the number of advances, or -1 where an action is not possible.
+// Runs the actions; returns the number of advances, or -1 when an action is illegal.
 int64_t run(int steps, int states) {
   int current = 0, next_reversal = steps - 1;
   int64_t advances = 0;

@@ -1,5 +1,4 @@
-// rfactor: what it makes of updates, and that results stay what they were, in the interpreter and
-// in machine code.
+// rfactor: the resulting definitions, and unchanged results in the interpreter and in machine code.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -18,7 +17,7 @@ class Rfactor : public testing::Test {
         [&](int i, int j) { input(i, j) = (i * 37 + j * 11 + i * i * j) % 101; });
   }
 
-  // The program with and without its schedule: interpreted, compiled, all equal.
+  // Compares the program with and without its schedule, interpreted and compiled.
   static void expect_same(const std::function<Func(bool)>& make, const std::vector<int>& size) {
     const Func plain = make(false);
     Func scheduled = make(true);
@@ -79,8 +78,8 @@ TEST_F(Rfactor, SplitsWithTails) {
   }
 }
 
-// The variables behind the tail's condition are promised to lie in their domain: at points of the
-// pure variable that no iteration had, nothing may be read or written.
+// The tail's condition promises that the variables lie in their domain. At points of the pure
+// variable without an iteration, nothing may be read or written.
 TEST_F(Rfactor, ThePreservedLoopMayRunPastItsEnds) {
   expect_same(
       [&](bool scheduled) {
@@ -98,7 +97,7 @@ TEST_F(Rfactor, ThePreservedLoopMayRunPastItsEnds) {
       {6});
 }
 
-// What the condition reads lies where the domain does, not where a rounded loop goes.
+// The operands of the condition are read inside the domain, not where a rounded-up loop runs.
 TEST_F(Rfactor, ConditionsReadNothingPastTheEnds) {
   expect_same(
       [&](bool scheduled) {
@@ -189,7 +188,7 @@ TEST_F(Rfactor, KeptCoordinatesStay) {
       {4, height});
 }
 
-// A kept coordinate that the predicate keeps inside must not leave the output.
+// A kept coordinate that the predicate limits must not leave the output.
 TEST_F(Rfactor, CoordinatesStayInsideWhatThePredicateAllows) {
   expect_same(
       [&](bool scheduled) {
@@ -328,7 +327,7 @@ TEST_F(Rfactor, RefusesWrongNames) {
   Stage update = f.update();
   expect_error({"must be a loop"}, [&] { update.rfactor(RVar("nowhere"), u); });
   expect_error({"named twice"}, [&] { update.rfactor({{r.x, u}, {r.x, v}}); });
-  expect_error({"there already"}, [&] { update.rfactor({{r.x, u}, {r.y, u}}); });
+  expect_error({"already exists"}, [&] { update.rfactor({{r.x, u}, {r.y, u}}); });
   expect_error({"\"x\""}, [&] { update.rfactor(r.x, x); });
 }
 

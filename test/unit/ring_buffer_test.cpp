@@ -23,7 +23,7 @@ void expect_values(Func f, const std::function<int(int, int)>& value) {
   }
 }
 
-// Elements of what is allocated outside of all loops.
+// The number of elements allocated outside of all loops.
 int64_t elements_outside(const Func& output) {
   lower::LowerOptions options;
   options.stop_after = "simplify_storage";
@@ -41,7 +41,7 @@ int64_t elements_outside(const Func& output) {
   return result;
 }
 
-// g in tiles of 8 by 4, with f computed for each.
+// g in tiles of 8 by 4, with f computed for each tile.
 struct Tiles {
   Func f{"f"}, g{"g"};
   Tiles() {
@@ -123,7 +123,7 @@ TEST(RingBuffer, OfUpdates) {
   }
 }
 
-// a and b run ahead, b reads a; so does the output, or another Func.
+// a and b run ahead, b reads a; the output or another Func reads it too.
 TEST(RingBuffer, OfAsyncFuncsThatReadEachOther) {
   for (int variant = 0; variant < 12; ++variant) {
     SCOPED_TRACE(variant);
@@ -203,7 +203,7 @@ TEST(RingBuffer, OfAsyncFuncsIsUsedAsAWhole) {
   });
 }
 
-// Each y needs more of g: its tiles are as many as y says, and f is computed for each.
+// Each y needs more of g, so the number of its tiles depends on y; f is computed for each tile.
 TEST(RingBuffer, OfAsyncFuncsTakesTurnsInLoopsOfFixedExtent) {
   for (bool runs_ahead : {false, true}) {
     Func f("f"), g("g"), h("h");

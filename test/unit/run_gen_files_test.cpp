@@ -1,4 +1,4 @@
-// Pictures that programs with RunGenMain read and write.
+// Image files that programs with RunGenMain read and write.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 
 const halide_type_t bytes(halide_type_uint, 8), floats(halide_type_float, 32);
 
-// Smooth, so that JPEG keeps it.
+// Smooth, so that JPEG preserves it.
 Image picture(int width, int height, int channels) {
   auto image = Halide::Runtime::Buffer<uint8_t>(width, height, channels);
   image.for_each_element([&](int x, int y, int c) {
@@ -92,7 +92,7 @@ TEST_P(RunGenFiles, CutOffFilesAreRefused) {
   }
 }
 
-// A function of an image, which reads nothing and is never called but for its sizes.
+// A function of an image that reads nothing; it is called only in bounds queries.
 TEST(RunGenShapes, WithTooManyElementsAreRefused) {
   halide_filter_argument_t arguments[2] = {};
   arguments[0].name = "in", arguments[0].kind = halide_argument_kind_input_buffer;

@@ -146,7 +146,7 @@ TEST(Memory, LargeBlocksAreUsedAgain) {
   void* first = retrograde_pool_malloc(1 << 20);
   retrograde_pool_free(first);
   EXPECT_GE(retrograde_pool_bytes(), size_t{1} << 20);
-  void* other = retrograde_pool_malloc(4 << 20);  // too large for the block that is there
+  void* other = retrograde_pool_malloc(4 << 20);  // too large for the free block
   EXPECT_NE(other, first);
   void* second = retrograde_pool_malloc(1000000);
   EXPECT_EQ(second, first);
@@ -208,7 +208,7 @@ TEST(Memory, ImpossibleRequestsGiveNullAndAReason) {
   EXPECT_NE(reports[0].message.find("\"f\""), std::string::npos);
 }
 
-// ---- what functions check of their buffers ----
+// ---- checks of buffer arguments ----
 
 struct Image {
   halide_dimension_t dims[2] = {{3, 4, 1}, {-1, 5, 8}};
@@ -283,7 +283,7 @@ TEST(BufferChecks, MemoryAndStridesAreChecked) {
   image.dims[0].stride = 2;
   EXPECT_EQ(check(image, 0, 1), 0);
   EXPECT_EQ(check(image, retrograde_region_is_dense, 1), retrograde_error_constraint_violated);
-  for (int extent : {0, 1}) {  // no other element is there for the stride to lead to
+  for (int extent : {0, 1}) {  // there is no other element for the stride to reach
     for (int stride : {0, 2, -7, INT32_MIN}) {
       Image narrow = image;
       narrow.buffer.dim = narrow.dims;

@@ -1,4 +1,4 @@
-// What directives write into schedules, and which uses of them are refused at the call.
+// Effects of directives on schedules, and uses that are rejected immediately.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -210,7 +210,7 @@ TEST_F(Directives, SpecializeFailIsTheLast) {
   f.specialize_fail("no such size");
   expect_refused([&] { f.specialize(n > 2); }, {"last", "before specialize_fail"});
   expect_refused([&] { f.specialize_fail("again"); }, {"last"});
-  f.specialize(n > 1).parallel(y);  // one that is there already
+  f.specialize(n > 1).parallel(y);  // an existing one
   EXPECT_EQ(f.get_schedule().specializations[1].failure, "no such size");
   expect_refused([&] { g.specialize_fail(""); }, {"message"});
 }
@@ -266,7 +266,7 @@ TEST_F(Directives, ComputeWithNamesALoopOfAnotherFunc) {
   h.compute_with(LoopLevel(f, x), LoopAlignStrategy::AlignStart);
   EXPECT_EQ(h.get_schedule().fuse_alignment.size(), 2u);
   expect_refused([&] { h.compute_with(LoopLevel::root()); }, {"down to a loop", "root"});
-  expect_refused([&] { h.compute_with(h, y); }, {"of its own Func"});
+  expect_refused([&] { h.compute_with(h, y); }, {"within one Func"});
   Param<bool> p("p");
   expect_refused([&] { h.specialize(p); }, {"joins the loops", "compute_with"});
   f.specialize(p);
@@ -279,7 +279,7 @@ TEST_F(Directives, PrefetchNamesLoopsAndAnOffset) {
   ASSERT_EQ(g.get_schedule().prefetches.size(), 2u);
   EXPECT_EQ(g.get_schedule().prefetches[0].from, "y");
   EXPECT_EQ(g.get_schedule().prefetches[1].at, "y");
-  expect_refused([&] { g.prefetch(f, y, x, 2); }, {"inside of it", "Swap"});
+  expect_refused([&] { g.prefetch(f, y, x, 2); }, {"inside that loop", "Swap"});
   expect_refused([&] { g.prefetch(f, Var("z"), x, 2); }, {"\"z\"", "must be a loop"});
   expect_refused([&] { g.prefetch(f, x, x, 2.5f); }, {"integer"});
   Func undefined("undefined");
@@ -351,7 +351,7 @@ TEST_F(Directives, ExternStagesKeepTheirArguments) {
                Unsupported);
 }
 
-// ---- what is reported ----
+// ---- tracing ----
 
 TEST_F(Directives, TracingIsKept) {
   f.trace_loads().trace_stores().add_trace_tag("one").add_trace_tag("two");

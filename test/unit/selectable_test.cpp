@@ -1,4 +1,5 @@
-// What codegen/selectable.h lists, LLVM's back end for NVPTX compiles; what it refuses would end the process.
+// LLVM's back end for NVPTX compiles everything that codegen/selectable.h lists; the rest would
+// abort the process.
 #include "codegen/selectable.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +20,7 @@ Machine nvptx(Target::Feature capability) {
   return device_machine(machine_for(target, false), Machine::Device::Nvptx);
 }
 
-// The types that each intrinsic is tried with.
+// The types to try each intrinsic with.
 std::vector<llvm::Type*> types_of(llvm::Intrinsic::ID id, llvm::LLVMContext& context) {
   llvm::SmallVector<Intrinsic::IITDescriptor> table;
   Intrinsic::getIntrinsicInfoTableEntries(id, table);
@@ -44,7 +45,7 @@ std::vector<llvm::Type*> types_of(llvm::Intrinsic::ID id, llvm::LLVMContext& con
   return integers;
 }
 
-// A function of the intrinsic's arguments that calls it.
+// Adds a function of the intrinsic's arguments that calls it.
 void call_in(llvm::Module& module, llvm::Function* intrinsic, int number) {
   llvm::FunctionType* type = intrinsic->getFunctionType();
   auto* caller = llvm::Function::Create(type, llvm::GlobalValue::ExternalLinkage,
@@ -94,7 +95,7 @@ std::vector<llvm::Type*> overloads(Intrinsic::ID id, llvm::Type* type) {
 std::vector<Intrinsic::ID> of_values() {
   std::vector<Intrinsic::ID> ids;
   for (const Intrinsic::ID id : selectable_intrinsics()) {
-    // These say something of memory, and are tried by every kernel.
+    // These describe memory, and every kernel uses them.
     switch (id) {
       case Intrinsic::lifetime_start:
       case Intrinsic::lifetime_end:

@@ -116,7 +116,7 @@ TEST(SeveralPoints, HaveGradients) {
 
 // ---- over an RDom, of a Func that reads itself ----
 
-// What the interpreter makes of f, as integers, the first dimension innermost.
+// The interpreter's values of f, as integers, the first dimension innermost.
 std::vector<int64_t> interpreted(const Func& f, const oracle::Region& region, int value = 0) {
   oracle::Interpreter interpreter;
   const oracle::Array array = interpreter.realize(f.function(), region)[static_cast<size_t>(value)];
@@ -135,7 +135,7 @@ std::vector<int64_t> numbers(const Buffer<T>& buffer) {
 
 constexpr int wires = 6, columns = 20;
 
-// A network of exchanges that sorts six numbers: by odd and even pairs, in six rounds.
+// A sorting network for six numbers: odd and even exchanges, in six rounds.
 std::vector<std::pair<int, int>> network() {
   std::vector<std::pair<int, int>> links;
   for (int round = 0; round < wires; ++round) {
@@ -227,7 +227,7 @@ TEST(SeveralPoints, RotateASquareInPlace) {
     RDom r(0, (n + 1) / 2, 0, n / 2);
     f(x, y) = x + 10 * y;
     const Expr last = n - 1;
-    // A corner of each quarter, against the clock; each takes what stood at the one before.
+    // A corner of each quarter, anticlockwise: each takes the value of the one before.
     const std::vector<Expr> xs{r.x, r.y, last - r.x, last - r.y};
     const std::vector<Expr> ys{r.y, last - r.x, last - r.y, r.x};
     const auto before = [](std::vector<Expr> all) {
@@ -277,7 +277,7 @@ TEST(SeveralPoints, MultiplyComplexNumbers) {
 }
 
 TEST(SeveralPoints, IterationsThatShareAPointTakeTurns) {
-  // Threads move what elements hold to their neighbours: all of it stays.
+  // Threads move values to neighbouring elements; no value may be lost.
   constexpr int n = 16, moves = 4000;
   Func f("f");
   RDom r(0, moves);
@@ -401,7 +401,7 @@ struct Turn {
   }
 };
 
-TEST(SeveralPoints, HaveTangents) {  // a turn by (0 + 1 + 2) angle
+TEST(SeveralPoints, HaveTangents) {  // a rotation by (0 + 1 + 2) angle
   Turn t;
   Func one("one");
   one() = 1.0f;

@@ -28,7 +28,7 @@ void check(std::initializer_list<Rule> rules) {
     EXPECT_TRUE(equal(simplify(after), after)) << "not stable: " << rule.before;
   }
 }
-// What must not change.
+// Texts that must not change.
 void keep(std::initializer_list<const char*> texts) {
   for (const char* text : texts) check({{text, text}});
 }
@@ -290,7 +290,7 @@ TEST(SimplifyStmt, BranchesKnowNumbers) {
              twice + "if (n == 3) { a[6] = 6 } else { a[t] = t }");
   check_stmt("if (n != 3) { a[n] = 1 } else { a[n] = 2 }",
              "if (n != 3) { a[n] = 1 } else { a[3] = 2 }");
-  // Lanes of a loop stay lanes.
+  // Lanes of a loop remain lanes.
   check_stmt("for (x, 0, n) { if (x == 3) { a[x] = 1 } }",
              "for (x, 0, n) { if (x == 3) { a[x] = 1 } }");
 }
@@ -305,7 +305,7 @@ TEST(SimplifyStmt, BranchesKnowMultiples) {
   check_stmt("if ((n + 3) % 4 == 0) { a[n] = n % 2 }", "if ((n + 3) % 4 == 0) { a[n] = 1 }");
 }
 
-// They need not be asked for in each iteration.
+// So that they are not allocated in each iteration.
 TEST(SimplifyStmt, SmallBlocksInLoopsHaveTheirLargestSize) {
   const auto in_loop = [](const std::string& elements, const char* memory = "auto") {
     return "for (x, 0, n) { let l = min(m, x*2 + 1)\n allocate b[" + elements + "]:float32 " +
@@ -320,7 +320,7 @@ TEST(SimplifyStmt, SmallBlocksInLoopsHaveTheirLargestSize) {
   check_stmt(in_loop(two, "heap"), in_loop(two, "heap"));
 }
 
-// What lies between a multiple and the next one.
+// Values between one multiple and the next.
 TEST(SimplifyStmt, DividesInsideTiles) {
   const std::string tile = "let m = min(k, l)*8\n";
   check_stmt(tile + "for (i, m, 8) { a[i/8] = i % 8 }", tile + "for (i, m, 8) { a[m/8] = i - m }");
@@ -336,7 +336,7 @@ TEST(SimplifyStmt, GivesTheSameHandleWhenNothingChanges) {
   EXPECT_TRUE(simplify(once).same_as(once));
 }
 
-// A rule that doubled its work at each level would never end here.
+// If a rule doubled its work at each level, this would not end.
 TEST(SimplifyCost, SharedTowersOfEveryOperator) {
   for (const Kind kind :
        {Kind::Add, Kind::Sub, Kind::Mul, Kind::Min, Kind::Max, Kind::Div, Kind::Mod}) {

@@ -61,7 +61,7 @@ void store_number(Thread* t, int32_t* data, int32_t n) {
   store(t, data + 1 + at, n, 2);
 }
 
-// The order in which work that was asked for in turns on two streams has run.
+// The order in which work submitted alternately to two streams has run.
 std::vector<int32_t> order_of_two(Function f, Address data, Stream a, Stream b) {
   for (int32_t i = 0; i < 8; i++) {
     int32_t n = i;
@@ -204,7 +204,7 @@ TEST_F(Simt, ARelaxedThreadMayAllocateDuringACapture) {
   EXPECT_EQ(cuThreadExchangeStreamCaptureMode(&mode), invalid_value);
 }
 
-// ---- what the driver checks ----
+// ---- the driver's checks ----
 
 TEST_F(Simt, ChecksCalls) {
   const Image image{saxpy_kernel()};

@@ -1,4 +1,4 @@
-// Kernels on the simulated device: orders of threads, and what it finds wrong.
+// Kernels on the simulated device: thread orders, and the errors that it detects.
 #include <algorithm>
 #include <numeric>
 
@@ -167,7 +167,7 @@ TEST_F(Simt, StoresOfOneValueByTwoThreadsAreNoRace) {
   ASSERT_EQ(run<store_the_same>(false, {1, 1, 8, 1, 0}, 8), success);
   EXPECT_EQ(left[3], 7);
 }
-// Bytes that nobody stored before do change.
+// The stores do change these bytes, which nothing had stored before.
 TEST_F(Simt, StoresThatOverlapInEqualValuesAreNoRace) {
   ASSERT_EQ(run<store_in_part_the_same>(false, {1, 1, 4, 1, 0}, 8), success);
   EXPECT_EQ(left[4], 7);
@@ -223,7 +223,7 @@ TEST_F(Simt, BarriersOfAWarpOrderTheWarpAlone) {
                                         {"\"third statement\""});
 }
 
-// One thread stores, and another loads when the warp has waited n times.
+// One thread stores; another loads after the warp has waited n times.
 void wait_often(Thread* t, int32_t* data, int32_t n) {
   if (t->thread[0] == 0) store(t, data, 7, 0);
   for (int32_t i = 0; i < n; i++) t->calls->warp_barrier(t, 1);
@@ -236,7 +236,7 @@ TEST_F(Simt, BarriersOfAWarpOrderHoweverManyThereAre) {
         << times << retrograde_simt_last_finding();
 }
 
-// ---- barriers and shuffles that not all reach ----
+// ---- barriers and shuffles that some threads do not reach ----
 
 void barrier_of_half(Thread* t, int32_t*, int32_t) {
   if (t->thread[0] < 16) barrier(t, 1);

@@ -1,4 +1,4 @@
-// Funcs that nothing reads are not computed: counted by what they call, trace and look up.
+// Funcs that nothing reads are not computed; the tests count calls, trace events and lookups.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -42,7 +42,7 @@ class SkipStages : public testing::Test {
     q.set(false);
     n.set(0);
   }
-  // Calls by which each Func was computed.
+  // The number of calls while each Func was computed.
   void expect_calls(const std::vector<int>& expected) {
     for (size_t i = 0; i < expected.size(); i++) EXPECT_EQ(calls[i], expected[i]) << "Func " << i;
   }
@@ -186,7 +186,7 @@ TEST_F(SkipStages, SumsThatAreWantedInPlaces) {
   expect_calls({15});
 }
 
-// The condition is what the C function says, which the select asks anyway.
+// The condition is the result of the C function, which the select calls anyway.
 TEST_F(SkipStages, ConvolutionsThatAreWantedWhereAFunctionSaysSo) {
   RDom r(0, 5);
   out(x) = select(counted(0, x % 3) > 0, sum(counted(1, x + r)), 0);
@@ -276,9 +276,9 @@ TEST_F(SkipStages, MemoizedFuncsAreLookedUpWhereTheyAreRead) {
   retrograde_memoization_cleanup();
 }
 
-// ---- what is computed all the same ----
+// ---- Funcs that must still be computed ----
 
-// Both arms of a select are evaluated: values that no one computed must not be places in memory.
+// Both arms of a select are evaluated: values that were not computed must not be used as addresses.
 TEST_F(SkipStages, RowsByAValueThatIsComputedBefore) {
   for (const bool at_root : {true, false}) {
     Func flag("flag"), doubled("doubled");

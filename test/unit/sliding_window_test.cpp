@@ -1,5 +1,5 @@
-// Funcs that are stored further out than they are computed: every point is computed once, storage
-// wraps around, and results are those of the unscheduled pipeline.
+// Sliding windows: Funcs stored in an outer loop of the one that computes them. Every point is
+// computed once, storage is folded, and results equal those of the unscheduled pipeline.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -16,7 +16,7 @@
 namespace retrograde {
 namespace {
 
-// Points computed, by Func: each definition under test prints its name.
+// Points computed, by Func: each tested definition prints its name.
 std::map<std::string, int> computed;
 std::mutex lock;
 void count_line(void*, const char* text) {
@@ -26,7 +26,7 @@ void count_line(void*, const char* text) {
   computed[line.substr(line.rfind(' ') + 1)]++;
 }
 
-// Elements allocated for a Func, when that is a constant.
+// Elements allocated for a Func, when constant.
 int64_t stored_elements(const Func& output, const std::string& name) {
   int64_t elements = -1;
   lower::LowerOptions options;
@@ -52,8 +52,7 @@ class SlidingWindow : public testing::Test {
  protected:
   void SetUp() override { computed.clear(); }
 
-  // `make(false)` is the program without a schedule.
-  // Gives the scheduled program.
+  // `make(false)` is the program without a schedule. Returns the scheduled program.
   static Func expect_same(const std::function<Func(bool)>& make, int w = width, int h = height) {
     Buffer<int> expected = make(false).realize({w, h});
     Func scheduled = make(true);
@@ -81,7 +80,7 @@ TEST_F(SlidingWindow, ComputesEachRowOnce) {
   EXPECT_EQ(stored_elements(g, "f"), width * 4);  // three rows are alive
 }
 
-// Choices between a loop's first iteration and others that are left at the end.
+// Selects between a loop's first iteration and the others that remain after lowering.
 int choices_left(const Func& output) {
   lower::LowerOptions options;
   options.stop_after = "simplify_vectors";
@@ -94,8 +93,9 @@ int choices_left(const Func& output) {
   return choices;
 }
 
-// The first row of a strip computes three rows of f, each other one its last: no iteration along the
-// row asks which it is. Where the body is large, a second copy costs more than that.
+// The first row of a strip computes three rows of f, every other row just its last one: no
+// iteration along the row tests which it is. For a large body, a second copy would cost more than
+// that test.
 TEST_F(SlidingWindow, FirstRowsOfStripsAreLoopsOfTheirOwn) {
   const auto strips = [&](int taps) {
     ImageParam in(Int(32), 2, "in");
@@ -112,8 +112,8 @@ TEST_F(SlidingWindow, FirstRowsOfStripsAreLoopsOfTheirOwn) {
   EXPECT_GT(choices_left(strips(300)), 0);
 }
 
-// The loop of a split that stays within 5 of its 8 iterations: those before them, in which the window
-// is filled, know nothing of where the others lie.
+// The loop of a split that stays within 5 of its 8 iterations. The iterations before them fill the
+// window, and know nothing of where the others lie.
 TEST_F(SlidingWindow, FillsTheWindowBeforeASplitThatStaysInside) {
   for (const auto& [extent, is_twice] :
        {std::pair(5, false), {9, false}, {16, false}, {5, true}, {9, true}, {16, true}}) {
@@ -141,8 +141,8 @@ TEST_F(SlidingWindow, FillsTheWindowBeforeASplitThatStaysInside) {
   }
 }
 
-// Where all of them stay inside of an image, the first rows and the last are read again and again. In
-// strips of 8 rows, a strip computes anew what it needs beyond itself, and no row twice.
+// If all Funcs are clamped to an image, the first and last rows are read repeatedly. In strips of 8
+// rows, a strip recomputes the rows that it needs beyond itself, and no row twice.
 TEST_F(SlidingWindow, ClampedChainsInStripsComputeEachRowOnceAStrip) {
   Func out = expect_same([&](bool scheduled) {
     Func f("f"), g("g"), h("h"), out("out");
@@ -321,7 +321,7 @@ TEST_F(SlidingWindow, UpdatesThatStayInTheirRow) {
   EXPECT_EQ(computed["u"], width * (height + 2) * 5);
 }
 
-// Where the part of a row is empty, no stage may run: the first one would undo the update.
+// Where the new part of a row is empty, no stage may run: the first one would undo the update.
 TEST_F(SlidingWindow, PartsThatAreEmptyForUpdatesAreEmptyForAllStages) {
   expect_same([&](bool scheduled) {
     Var z("z"), zo("zo"), zi("zi");
@@ -358,7 +358,7 @@ TEST_F(SlidingWindow, SharedByConsumersThatStartAtDifferentTimes) {
     Func f("f"), g("g"), h("h"), out("out");
     f(x, y) = counted("f", x * 3 + y * y);
     g(x, y) = counted("g", f(x, y) * 2 + f(x, y - 5));
-    h(x, y) = counted("h", f(x, y) + f(x, y + 2));  // wanted only by the current row
+    h(x, y) = counted("h", f(x, y) + f(x, y + 2));  // used only by the current row
     out(x, y) = g(x, y) + g(x, y - 4) + h(x, y);
     if (scheduled) {
       g.store_root().compute_at(out, y);
@@ -427,7 +427,7 @@ TEST_F(SlidingWindow, FoldsBesideVectorsButNotAlongThem) {
   });
 }
 
-// ---- what users say of storage ----
+// ---- storage directives ----
 
 class StorageDirectives : public SlidingWindow {
  protected:
@@ -490,7 +490,8 @@ TEST_F(StorageDirectives, AlignsTheStorage) {
   expect_values(g);
 }
 
-// ---- Funcs beside those that slide, in the iterations that run for these alone: every access is checked ----
+// ---- Funcs beside sliding ones, in warm-up iterations that run only for these: every access is
+// checked ----
 
 void expect_same_and_inside(const std::function<Func(bool)>& make,
                             std::initializer_list<int> sizes = {1, 2, 3, 7, 13, 50, 64}) {
@@ -533,7 +534,7 @@ TEST_F(SlidingWindow, WarmUpLeavesVectorsAlongTheWindowInside) {
   });
 }
 
-// l4 runs from the loop's first iteration on, l3 from twelve before it, and l1 is read by both.
+// l4 runs from the loop's first iteration on, l3 from twelve before it, and both read l1.
 TEST_F(SlidingWindow, NamesOfWhatStartsLaterAreNotReadBeforeIt) {
   Var outer("outer"), inner("inner"), block("block"), lane("lane"), group("group"), rest("rest"),
       t("t");
@@ -559,7 +560,7 @@ TEST_F(SlidingWindow, NamesOfWhatStartsLaterAreNotReadBeforeIt) {
   });
 }
 
-// A part of the window is empty in two of three iterations; what is computed from its ends is not.
+// A part of the window is empty in two of three iterations; values computed from its ends are not.
 TEST_F(SlidingWindow, EmptyPartsAskForNothingOutside) {
   expect_same_and_inside([&](bool scheduled) {
     Func f("f"), g("g"), h("h"), out("out");
@@ -578,7 +579,8 @@ TEST_F(SlidingWindow, EmptyPartsAskForNothingOutside) {
   });
 }
 
-// Tiles of s4 that shift inwards compute again what an earlier iteration left in its storage: they need its operands.
+// Tiles of s4 that shift inwards recompute points that an earlier iteration stored, so they need
+// their operands.
 TEST_F(SlidingWindow, TilesThatShiftInwardsHaveTheOperandsOfWhatTheyRepeat) {
   expect_same(
       [&](bool scheduled) {
@@ -606,7 +608,8 @@ TEST_F(SlidingWindow, TilesThatShiftInwardsHaveTheOperandsOfWhatTheyRepeat) {
       23, 11);
 }
 
-// Past the end of a guarded split the window has nothing to add; what is computed in its loops is not computed.
+// Past the end of a guarded split the window adds nothing, so producers in its loops are not
+// computed.
 TEST_F(SlidingWindow, WhatIsComputedInTheLoopsOfAnEmptyPartStaysInside) {
   Var block("block"), row("row"), a("a"), b("b"), c("c"), d("d"), e("e"), f("f"), lane("lane");
   const auto make = [&](bool scheduled) {
@@ -638,7 +641,8 @@ TEST_F(SlidingWindow, WhatIsComputedInTheLoopsOfAnEmptyPartStaysInside) {
   }
 }
 
-// In the early iterations, far from 0, f(y - 2) and f(y / 2 + 2) are further apart than in those of the loop.
+// In the warm-up iterations, far from 0, f(y - 2) and f(y / 2 + 2) are further apart than in the
+// loop itself.
 TEST_F(SlidingWindow, FoldedStorageHoldsTheWindowsOfEarlyIterations) {
   const auto make = [&](bool slides) {
     Func f("f"), g("g"), h("h"), out("out");
@@ -661,7 +665,7 @@ TEST_F(SlidingWindow, FoldedStorageHoldsTheWindowsOfEarlyIterations) {
   for (int i = -4; i < 2; ++i) EXPECT_EQ(expected(i), found(i)) << i;
 }
 
-// g's tile of 8 ends where the part of h that is new does, and begins far before what h ever reads.
+// g's tile of 8 ends with the new part of h, and begins far before anything that h reads.
 TEST_F(SlidingWindow, TilesMovedInwardsRunOverAllThatAnIterationNeeds) {
   Var outer("outer"), inner("inner"), a("a"), b("b");
   const Target target = get_jit_target_from_environment().with_feature(Target::CheckedAccesses);
@@ -689,7 +693,7 @@ TEST_F(SlidingWindow, TilesMovedInwardsRunOverAllThatAnIterationNeeds) {
   for (int i = -5; i < 24; ++i) EXPECT_EQ(expected(i), found(i)) << i;
 }
 
-// A tile of g begins in columns to the left, whose rows are kept for the rows of h that follow.
+// A tile of g begins in columns to the left, whose rows are kept for the following rows of h.
 TEST_F(SlidingWindow, WhatTilesComputeAgainInKeptStorageIsRight) {
   Var column("column"), block("block"), z("z"), a("a"), b("b"), c("c"), d("d");
   const auto make = [&](bool slides) {
@@ -716,8 +720,8 @@ TEST_F(SlidingWindow, WhatTilesComputeAgainInKeptStorageIsRight) {
   });
 }
 
-// A tile that begins before its region would give back their first values to elements that an update
-// has finished, and that are kept for other columns.
+// A tile that begins before its region would reset elements that an update has finished, and that
+// are kept for other columns, to their initial values.
 TEST_F(SlidingWindow, UpdatesOfKeptElementsAreNotUndoneByTiles) {
   expect_same(
       [&](bool slides) {
@@ -767,7 +771,8 @@ TEST_F(SlidingWindow, HoistedStorageHasRoomForEarlyIterations) {
       [&](int i, int j) { EXPECT_EQ(expected(i, j), found(i, j)) << i << " " << j; });
 }
 
-// The room counts iterations before the first, although a split promises coordinates from the first on.
+// The allocation covers the warm-up iterations, although a split promises coordinates from the
+// first iteration on.
 TEST_F(SlidingWindow, HoistedStorageHasRoomForIterationsBeforeASplit) {
   const auto make = [&](bool slides) {
     Var tile("tile"), in_tile("in_tile"), block("block"), column("column");

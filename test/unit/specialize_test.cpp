@@ -1,4 +1,5 @@
-// Specializations: each branch runs its own loops over its own definition, and all give the same.
+// Specializations: each branch runs its own loops over its own definition, and all give the same
+// values.
 #include <gtest/gtest.h>
 
 #include "retrograde/retrograde.h"
@@ -130,7 +131,7 @@ TEST_F(Specialize, ConditionsAreFactsInTheirBranches) {
   }
 }
 
-// Also those that are tried after others, which have changed what is left.
+// Later branches too, where the failure of the earlier conditions is known.
 TEST_F(Specialize, CompoundConditionsAreFactsInLaterBranches) {
   struct Counting : JITUserContext {
     int loads = 0;

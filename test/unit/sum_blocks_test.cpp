@@ -1,4 +1,5 @@
-// Sums in tiles that one Func alone reads: a block at a time in its loops.
+// Autoscheduling of tiled sums with a single consumer: computed block by block in the consumer's
+// loops.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -16,7 +17,7 @@ namespace {
 
 using Reading = std::function<Expr(const Func& sum, const Var& x, const Var& y, const Var& c)>;
 
-// A convolution of all channels of an image, and what reads it.
+// A convolution over all channels of an image, and its consumer.
 struct Layer {
   explicit Layer(const Reading& read, int size = 200, int channels = 16)
       : size(size), image(size, size, channels), weights(3, 3, channels, channels) {
@@ -40,7 +41,7 @@ struct Layer {
   }
   bool is_in_blocks(const Func& f) const {
     return level(f).kind == graph::LoopLevel::Kind::At && level(f).func == result.name() &&
-           level(f).var == "y";  // a slice is of a channel
+           level(f).var == "y";  // a slice is one channel
   }
   void schedule() { Pipeline(result).auto_schedule(get_host_target()); }
   Buffer<float> found(int rows) { return result.realize({size, rows, image.channels()}); }
@@ -57,7 +58,7 @@ void expect_same(const Buffer<float>& found, const Buffer<float>& expected, cons
     ASSERT_NEAR(found.data()[i], expected.data()[i], 1e-4f) << of << ", element " << i;
 }
 
-// Of one place alone sums are computed in tiles (epilogues_test.cpp).
+// Sums at the same place are computed in tiles instead (epilogues_test.cpp).
 Expr largest(const Func& sum, const Var& x, const Var& y, const Var& c) {
   return max(sum(x, y, c), sum(x + 1, y, c));
 }
@@ -108,7 +109,7 @@ TEST(SumBlocks, AreNotWhereTwoReadThem) {
   EXPECT_EQ(Layer::level(layer.convolved).kind, graph::LoopLevel::Kind::Root);
 }
 
-// Blocks of the one may be those of the other or not; what both give is.
+// The two may or may not use the same blocks; the values are checked.
 TEST(SumBlocks, OfTwoSumsThatOneReads) {
   const auto both = [](Layer& layer, Func& second) {
     RDom k(0, 5, 0, 16, "k");

@@ -1,4 +1,4 @@
-// The static runtime's own threads.
+// The static runtime's thread pool.
 #include "thread_pool.h"
 
 #include <gtest/gtest.h>
@@ -100,12 +100,12 @@ TEST_F(ThreadPool, StartsAgainAfterItsEnd) {
   }
 }
 
-// Threads spin for a while before they sleep: both ways to wait must see what comes.
+// Threads spin for a while before they sleep; both ways of waiting must notice new work.
 TEST_F(ThreadPool, WorkersThatSleptTakeLoops) {
   for (int repeat = 0; repeat < 8; repeat++) {
     std::atomic<int> inside{0};
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-    run(2, 0, [&](int64_t begin, int64_t end) {  // ends only when a worker has come
+    run(2, 0, [&](int64_t begin, int64_t end) {  // ends only when a worker has arrived
       inside += static_cast<int>(end - begin);
       while (inside < 2 && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
     });
@@ -128,13 +128,13 @@ TEST_F(ThreadPool, StartersThatSleepAreWoken) {
   }
 }
 
-// The starter's iteration ends as soon as a worker is in the other one.
+// The starter's iteration ends as soon as a worker runs the other one.
 TEST_F(ThreadPool, StartersThatWaitHelpInTheLoopsInsideOfTheirs) {
   using namespace std::chrono_literals;
   set_thread_count(2);
   const auto starter = std::this_thread::get_id();
   for (const auto pause :
-       {0ms, 20ms}) {  // until the inner loop starts: the starter spins, or sleeps
+       {0ms, 20ms}) {  // before the inner loop starts: the starter spins, or sleeps
     std::atomic<bool> worker_is_there{false}, starter_helps{false};
     run(2, 0, [&](int64_t, int64_t) {
       if (std::this_thread::get_id() == starter) {
@@ -152,7 +152,7 @@ TEST_F(ThreadPool, StartersThatWaitHelpInTheLoopsInsideOfTheirs) {
   }
 }
 
-// They may take long.
+// Other loops may take long.
 TEST_F(ThreadPool, StartersThatWaitLeaveOtherLoopsAlone) {
   using namespace std::chrono_literals;
   set_thread_count(2);

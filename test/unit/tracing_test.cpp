@@ -1,4 +1,4 @@
-// trace_loads, trace_stores, trace_realizations: which events there are, and their text.
+// trace_loads, trace_stores, trace_realizations: their events, and the text of these.
 #include <HalideRuntime.h>
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 namespace retrograde {
 namespace {
 
-// What the default handler prints, one string a line; names without their numbers.
+// The output of the default handler, one string per line, with names without their numbers.
 std::vector<std::string> trace_of(Func& f, const std::vector<int32_t>& sizes,
                                   const Target& target = Target()) {
   std::string all;

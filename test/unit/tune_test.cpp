@@ -1,4 +1,4 @@
-// Measured tuning: what is kept and gone on from, files that are no database, fitted figures.
+// Measured tuning: the database of results and its reuse, invalid files, fitted machine parameters.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -37,7 +37,7 @@ std::string contents_of(const std::string& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-// A product of matrices and what becomes of it: several schedules. Of one text, since names have
+// A matrix product and a consumer, which have several schedules. Built once, since names contain
 // numbers.
 const std::string& program() {
   static const std::string text = [] {
@@ -92,7 +92,7 @@ TEST_F(Tune, ASecondRunGoesOnWhereTheFirstWasStopped) {
   EXPECT_EQ(third.before, first.left + 2);
 }
 
-// The copies that a schedule makes have names of their own in each graph.
+// The copies that a schedule creates have different names in each graph.
 std::string without_numbers(const std::string& log) {
   return std::regex_replace(log, std::regex("\\$[0-9]+"), "");
 }
@@ -158,7 +158,7 @@ TEST_F(Tune, MeasurementsFitTheModelAndHalfOfTheProgramsTestIt) {
   expect_mentions(out.str(), {"all: 3 schedules", "arithmetic", "launch"});
 }
 
-// ---- fitted figures ----
+// ---- fitted machine parameters ----
 
 std::vector<FitSample> synthetic(const Machine& truth) {
   std::vector<FitSample> samples;

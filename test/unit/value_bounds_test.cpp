@@ -1,4 +1,4 @@
-// Funcs as coordinates of other Funcs: the range of their values bounds what is read.
+// Funcs as coordinates of other Funcs: the range of their values bounds the region that is read.
 #include <gtest/gtest.h>
 
 #include "lower/nests/inline_functions.h"

@@ -1,5 +1,4 @@
-// What becomes of numbers where the language converts them: weights of lerp, saturating casts,
-// division by bytes.
+// Conversions of numbers in the language: weights of lerp, saturating casts, division by bytes.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -12,14 +11,14 @@ namespace {
 
 using Wide = __int128;
 
-// ---- means of 64 bits ----
+// ---- averages of 64-bit values ----
 
 template <typename T>
 std::vector<T> ends();
 
 Wide floor_half(Wide sum) { return (sum - (sum & 1)) / 2; }
 
-// All pairs of the ends of the range, beside 128 bits.
+// All pairs of values at the ends of the range, compared with 128-bit arithmetic.
 template <typename T>
 void expect_means() {
   const std::vector<T> values = ends<T>();
@@ -206,7 +205,7 @@ To nearest_integer(From value) {
   return value >= static_cast<From>(high) ? high : static_cast<To>(value);
 }
 
-// The ends of the type and their neighbours, in vectors and one by one.
+// The ends of the type and their neighbours, as vectors and as scalars.
 template <typename To, typename From>
 void expect_saturated() {
   const From inf = std::numeric_limits<From>::infinity();

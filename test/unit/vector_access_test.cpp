@@ -1,7 +1,7 @@
-// Vectorized reads at divided coordinates give what a point alone reads, and touch nothing else:
-// for every phase of the division, ends below zero, all ways to treat a tail, and inputs that begin
-// or end at a page that cannot be touched. Oracle: floor division in plain C++. Loops that no
-// schedule says anything about get lanes where that is known to be right.
+// Vectorized reads at divided coordinates give the values of scalar reads, and access nothing else.
+// Covers every phase of the division, negative ends, all tail strategies, and inputs that begin or
+// end at a protected page. Oracle: floor division in plain C++. Unscheduled loops are vectorized
+// where that is known to be right.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -20,7 +20,7 @@ using testing_codegen::Array;
 int floor_div(int a, int b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
 int floor_mod(int a, int b) { return a - floor_div(a, b) * b; }
 
-// in((s x + o) / c) + 1000 ((s x + o) % c), of an input whose values are its coordinates.
+// in((s x + o) / c) + 1000 ((s x + o) % c), for an input whose values are its coordinates.
 struct DividedAccess {
   int stride, divisor;
   int at(int x, int offset) const { return floor_div(stride * x + offset, divisor); }
@@ -87,7 +87,7 @@ TEST(VectorAccess, DividedCoordinates) {
   }
 }
 
-// The same without a schedule: the compiler takes lanes by itself, and a scalar loop for the rest.
+// The same without a schedule: the compiler vectorizes, with a scalar loop for the tail.
 TEST(VectorAccess, DividedCoordinatesUnscheduled) {
   for (const DividedAccess access :
        {DividedAccess{1, 1}, {1, 2}, {2, 1}, {2, 2}, {1, 3}, {3, 2}, {4, 1}, {2, 4}, {1, 16}}) {
@@ -135,7 +135,7 @@ TEST(VectorAccess, OnlyPureVariablesGetLanesUnasked) {
   EXPECT_FALSE(has_vectors(looked_up, target));
 }
 
-// Both phases of a stretched signal beside each other, as inverse wavelets have them.
+// Both phases of an upsampled signal interleaved, as inverse wavelet transforms have them.
 TEST(VectorAccess, BothPhasesUnrolled) {
   ImageParam in(Int(32), 1, "in");
   Var x("x"), xi("xi");

@@ -1,7 +1,7 @@
-// Reductions over vectorized variables give what their declared order gives: all operators and
-// types, lanes and tails, several dimensions, empty domains, and the extremes of products in pairs.
-// Oracles: the interpreter for whole pipelines, plain loops for products; floats hold integers
-// small enough that every order of their sums is exact.
+// Reductions over vectorized variables give the values of their declared order: all operators and
+// types, lanes and tails, several dimensions, empty domains, and the extremes of paired products.
+// Oracles: the interpreter for whole pipelines, plain loops for products. Floats hold integers so
+// small that sums are exact in every order.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -69,7 +69,7 @@ TEST(VectorReduction, EveryOperatorOfIntegers) {
   check_every_step<uint16_t>();
 }
 
-// The order of the loops, and which of them are lanes, must not matter.
+// The order of the loops, and which of them are vectorized, must not matter.
 TEST(VectorReduction, SeveralDimensions) {
   const Buffer<int32_t> in = numbers<int32_t>();
   for (int variant = 0; variant < 5; ++variant) {
@@ -109,7 +109,7 @@ TEST(VectorReduction, GuardedAndEmptyDomains) {
   }
 }
 
-// Two elements of one Func in one loop, and a loop that reads what it sums.
+// Two elements of one Func in one loop, and a loop that reads the sums it updates.
 TEST(VectorReduction, SumsThatMeetAndSumsThatAreRead) {
   const Buffer<float> in = numbers<float>();
   Var x("x");
@@ -147,7 +147,7 @@ void check_products(int lanes) {
     a(i) = static_cast<A>(i * 2731 + 77);
     b(i) = static_cast<B>(i * 3307 + 15);
   }
-  // Extreme neighbours, whose sums still fit.
+  // Neighbours with extreme values, whose sums still fit.
   a(0) = a(2) = std::numeric_limits<A>::min();
   b(0) = b(2) = std::numeric_limits<B>::min();
   a(1) = a(3) = std::numeric_limits<A>::max();
@@ -177,7 +177,7 @@ TEST(VectorReduction, NarrowProducts) {
   }
 }
 
-// Sums of scaled numbers, even and odd many, with terms of other kinds and factors that do not fit.
+// Sums of scaled numbers, with even and odd counts, other terms and factors that do not fit.
 TEST(VectorReduction, SumsOfScaledNumbers) {
   const Buffer<int16_t> a = numbers<int16_t>();
   const Buffer<uint8_t> b = numbers<uint8_t>();

@@ -1,4 +1,4 @@
-// Func::in, clone_in and ImageParam::in: who reads whom once a pipeline is compiled.
+// Func::in, clone_in and ImageParam::in: which Funcs read which wrappers in the compiled pipeline.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -10,7 +10,7 @@
 namespace retrograde {
 namespace {
 
-// The names of what `reader` reads in the graph that is compiled for `output`.
+// The names of the Funcs and images that `reader` reads in the graph compiled for `output`.
 std::vector<std::string> read_by(const Func& output, const std::string& reader) {
   const auto outputs = graph::apply_wrappers({output.function()});
   for (const graph::FuncPtr& f : graph::topological_order(outputs)) {
@@ -32,7 +32,7 @@ struct Wrappers : testing::Test {
     g(x, y) = f(x, y) + f(x + 1, y);
     h(x, y) = f(x, y) * g(x, y);
   }
-  // h as it is without wrappers.
+  // Expects the values of h without wrappers.
   void expect_right(int w = 9, int height = 7) {
     const Buffer<int> result = h.realize({w, height});
     result.for_each_element([&](int i, int j) {
@@ -46,7 +46,8 @@ TEST_F(Wrappers, OneUser) {
   EXPECT_EQ(read_by(h, g.name()), Names{w.name()});
   EXPECT_EQ(read_by(h, w.name()), Names{f.name()});
   EXPECT_EQ(read_by(h, h.name()), (Names{f.name(), g.name()}));
-  EXPECT_EQ(graph::direct_callees(*g.function())[0]->name, f.name());  // the user's own stays
+  EXPECT_EQ(graph::direct_callees(*g.function())[0]->name,
+            f.name());  // the user's Func is unchanged
   f.compute_root();
   g.compute_root();
   w.compute_at(g, y).vectorize(x, 4);
@@ -119,7 +120,7 @@ TEST_F(Wrappers, UpdatesOfTheUserReadTheWrapper) {
   RDom r(0, 4);
   k(x, y) = f(x, y);
   Func w = f.in(k);
-  k(x, r) += f(x, r);  // given after the wrapper
+  k(x, r) += f(x, r);  // called after the wrapper exists
   w.compute_root();
   EXPECT_EQ(read_by(k, k.name()), Names{w.name()});
   const Buffer<int> result = k.realize({3, 6});
@@ -174,7 +175,7 @@ TEST_F(Wrappers, AWrapperGivenAfterCompilingTakesEffect) {
   expect_right();
 }
 
-// A wrapper's handle keeps the wrapped Func alive, and nothing keeps itself alive.
+// A wrapper's handle keeps the wrapped Func alive; there is no reference cycle.
 TEST_F(Wrappers, Ownership) {
   std::weak_ptr<graph::FuncContents> wrapped, wrapper;
   {
@@ -217,7 +218,7 @@ TEST_F(Wrappers, AWrapperInAnotherPipelineIsLeftAlone) {
   expect_right();
 }
 
-// Two readers of an image, of which one reads a copy that is laid out in columns.
+// Two consumers of an image, one of which reads a copy laid out in columns.
 struct CopiedInput : testing::Test {
   ImageParam image{Int(32), 2, "image"};
   Buffer<int> table{8};
@@ -257,7 +258,7 @@ TEST_F(CopiedInput, OfABufferThatTheProgramNames) {
   expect_right();
 }
 
-// Who reads the image through its own Func does so in the copy, too.
+// A consumer that reads the image through its own Func does so in the copy, too.
 TEST_F(CopiedInput, ReadsTheFuncOfTheImage) {
   Func all = image.in();
   all.compute_root();

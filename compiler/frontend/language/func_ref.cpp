@@ -112,9 +112,10 @@ Stage FuncRef::update(const std::vector<Expr>& values, int initial, Combine comb
   FuncRef here(func_, left_args(values));
   define_initial(here.args_, values, initial);
   if (values.size() != func_->types.size()) {
-    user_error("update " + quoted(func_->name), "all definitions of a Func have as many values",
+    user_error("update " + quoted(func_->name),
+               "all definitions of a Func have the same number of values",
                text("it has ", func_->types.size(), " and the right-hand side ", values.size()),
-               "Give as many values");
+               "Give the same number of values");
   }
   return here.define(ir::numbered(values.size(), [&](size_t i) {
     return combine(here.element(static_cast<int>(i)), values[i]);

@@ -21,23 +21,23 @@ class FuncRef {
   FuncRef(graph::FuncPtr func, std::vector<Expr> args)
       : func_(std::move(func)), args_(std::move(args)) {}
 
-  // Requires: every argument on the left-hand side must be a defined expression; a definition
-  // has at least one value; the right-hand side must be a defined expression; a Func is
-  // defined once; a first definition has no reduction
-  // variables; the arguments of a first definition are Vars; the arguments of a first
-  // definition are different Vars; a definition has the dimensions that the Func was declared
-  // with; a right-hand side that uses _ needs _ on the left-hand side; every variable on the
-  // right-hand side stands on the left-hand side, or is of an RDom; a parameter and a pure
-  // variable of one definition have different names; constants of int32 and int64 do not overflow.
+  // Requires: every argument on the left-hand side must be a defined expression; a definition has
+  // at least one value; the right-hand side must be a defined expression; a Func is defined once; a
+  // first definition has no reduction variables; the arguments of a first definition are Vars; the
+  // arguments of a first definition are different Vars; a definition has the dimensions that the
+  // Func was declared with; a right-hand side that uses _ needs _ on the left-hand side; every
+  // variable on the right-hand side appears on the left-hand side, or belongs to an RDom; a
+  // parameter and a pure variable of one definition have different names; constants of int32 and
+  // int64 do not overflow.
   Stage operator=(const Expr& value);
   Stage operator=(const Tuple& values);
   Stage operator=(const FuncRef& value);
   FuncRef(const FuncRef&) = default;
-// Requires: a Func is updated after its first definition; all definitions of a Func have as many
-// arguments; coordinates are integers; all definitions of a Func have as many values; all
-// definitions of a Func have the same types; all reduction variables of one definition come from
-// one RDom; a pure variable stands at its own place in every reference of a Func to itself, so that
-// its iterations are independent; the bounds of a reduction domain are known before its update
+// Requires: a Func is updated after its first definition; all definitions of a Func have the same
+// number of arguments; coordinates are integers; all definitions of a Func have the same number of
+// values; all definitions of a Func have the same types; all reduction variables of one definition
+// come from one RDom; a pure variable keeps its position in every reference of a Func to itself, so
+// that its iterations are independent; the bounds of a reduction domain are known before its update
 // runs; a Func that a C function computes has no updates; a Func is complete when another Func uses
 // it.
 #define RETROGRADE_UPDATE(op)      \

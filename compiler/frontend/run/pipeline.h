@@ -95,8 +95,7 @@ class Pipeline : public Runnable<Pipeline> {
   ScheduleLog schedule_log() const;  // what was given to its Funcs, in the order given
   // Gives all of a log to the Funcs of the same names.
   // Requires: every Func that it names is one of the program; every image that it names is one of
-  // the program; what a directive is given to is
-  // there.
+  // the program; the target of a directive exists.
   void apply_schedule(const ScheduleLog& log);
 
   // ---- what a schedule costs; see schedule_report.h ----

@@ -232,18 +232,19 @@ class LoopDirectives {
   // common loop covers both, shifted as `align` says, and each runs only within its own:
   // AlignStart lets the ranges begin together, AlignEnd end together, NoAlign and Auto shift
   // nothing. The stage that joins has no specializations.
-  // Requires: a stage joins the loops of another one down to a loop; of its own Func, a
-  // stage joins the one before it; stages of one Func that share loops touch the same elements in
-  // each iteration; the stage has loops; a stage that joins the loops of another one has no specializations;
-  // the loop level is set before the pipeline is compiled; both stages belong to the pipeline and
-  // are computed somewhere; both stages have loops; both stages are computed at one place; both
-  // stages are computed at the same place; compute_with names one stage; the level is a loop of
-  // both stages; both stages have the same loops down to the level; loops that run as one are of
-  // one kind; loops that run as one are partitioned alike; what is prefetched in shared loops is
-  // prefetched by the stage whose loops they are; one of the stages that share loops is the first;
-  // Funcs that share loops do not depend on each other; the stages of a Func run one after another,
-  // also where others run with them; what is computed together is computed after all that any of it
-  // reads; Funcs that share loops are computed whenever any of them is needed (Unsupported).
+  // Requires: a stage joins the loops of another one down to a loop; within one Func, a stage joins
+  // the stage before it; stages of one Func that share loops touch the same elements in each
+  // iteration; the stage has loops; a stage that joins the loops of another one has no
+  // specializations; the loop level is set before the pipeline is compiled; both stages belong to
+  // the pipeline and are computed somewhere; both stages have loops; both stages are computed at
+  // one place; both stages are computed at the same place; compute_with names one stage; the level
+  // is a loop of both stages; both stages have the same loops down to the level; loops that run as
+  // one are of one kind; loops that run as one are partitioned alike; what is prefetched in shared
+  // loops is prefetched by the stage whose loops they are; one of the stages that share loops is
+  // the first; Funcs that share loops do not depend on each other; the stages of a Func run one
+  // after another, also where others run with them; what is computed together is computed after all
+  // that any of it reads; Funcs that share loops are computed whenever any of them is needed
+  // (Unsupported).
   Self& compute_with(const LoopLevel& level,
                      const std::vector<std::pair<VarOrRVar, LoopAlignStrategy>>& align) {
     graph::ComputeWith with{{{}, level.contents()}};
@@ -287,8 +288,8 @@ class LoopDirectives {
   //   for x:                for x:
   //     g(x) = 2 * f(x)  =>   prefetch(f[x + 2])
   //                           g(x) = 2 * f(x)
-  // Requires: it needs a definition first; it is a Func or an image that is prefetched; the loop it
-  // happens at is the one it counts from, or inside of it; the offset is an integer.
+  // Requires: it needs a definition first; it is a Func or an image that is prefetched; the
+  // prefetch happens at the loop it counts from, or inside that loop; the offset is an integer.
   Self& prefetch(const Func& f, const VarOrRVar& at, const VarOrRVar& from, Expr offset = 1,
                  PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf) {
     return give(frontend::prefetch_of(place(), f,
@@ -433,7 +434,7 @@ class LoopDirectives {
   // rfactor, is what came of it. Other users of the Funcs still call them.
   //   g(x) = x * x                    g(x) = x * x
   //   f(x) = g(x) + g(x + 1)     =>   f(x) = x * x + (x + 1) * (x + 1)
-  // Requires: what is inlined has one pure definition; what is inlined has no schedule of its own.
+  // Requires: an inlined Func has one pure definition; an inlined Func has no schedule of its own.
   Self& eager_inline(const std::vector<Func>& funcs);
   template <std::same_as<Func>... Rest>
   Self& eager_inline(const Func& first, const Rest&... rest) {

@@ -38,10 +38,10 @@ class Stage : public LoopDirectives<Stage> {
   // the variables are the outermost reduction loops. Where op is min or max with payload (argmin),
   // any of several equal extremes may win.
   // Requires: only an update that reduces is factored; only reduction loops are factored; each loop
-  // is named once; the new variables differ from each other and from the Func's; partial results
-  // can be combined only of an associative update; partial results over inner loops change the
-  // order of the reduction; a specialized stage keeps its definition; a stage in the loops of
-  // another one keeps its own; reduction variables are fused with each other only.
+  // is named once; the new variables differ from each other and from the Func's; only an
+  // associative update has partial results that can be combined; partial results over inner loops
+  // change the order of the reduction; a specialized stage keeps its definition; a stage in the
+  // loops of another one keeps its own; reduction variables are fused only with each other.
   Func rfactor(const std::vector<std::pair<RVar, Var>>& preserved);
   Func rfactor(const RVar& r, const Var& v);
 

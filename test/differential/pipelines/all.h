@@ -1,7 +1,8 @@
-// All pipelines. Include inside a namespace that sees a language, and has a function jit_target().
+// All pipelines. Include this inside a namespace that sees one of the languages and has a function
+// jit_target().
 #include "differential/pipelines/common.h"
 
-// Not to be sorted above.
+// These must follow common.h.
 #include "differential/pipelines/arithmetic.h"
 #include "differential/pipelines/functions.h"
 #include "differential/pipelines/images.h"
@@ -9,8 +10,8 @@
 #include "differential/pipelines/schedules.h"
 #include "differential/pipelines/updates.h"
 
-// Not realized, only shown.
+// Only printed, not realized.
 #include "differential/pipelines/loop_nests.h"
 
-// Nor this.
+// Must stay last.
 #include "differential/realize.h"

@@ -17,7 +17,7 @@ PIPELINE(arithmetic_uint16) { return integer_arithmetic<uint16_t>(); }
 PIPELINE(arithmetic_uint32) { return integer_arithmetic<uint32_t>(); }
 PIPELINE(arithmetic_uint64) { return integer_arithmetic<uint64_t>(); }
 
-// Chains of minima and maxima, of negations among others; by a loop, too.
+// Chains of minima and maxima, some of negations; also as a loop.
 template <typename T>
 Built minima() {
   Buffer<T> a = edges<T>({61, 7}, 1), b = edges<T>({61, 7}, 2), c = edges<T>({61, 7}, 3);
@@ -118,7 +118,7 @@ PIPELINE(bit_counts_int16) { return bit_counts<int16_t>(); }
 PIPELINE(bit_counts_uint32) { return bit_counts<uint32_t>(); }
 PIPELINE(bit_counts_uint64) { return bit_counts<uint64_t>(); }
 
-// The type of every result is compared as well: that is what this case is about.
+// The result types are compared, too; they are the point of this case.
 PIPELINE(promotion) {
   Buffer<uint8_t> u8 = noise<uint8_t>({64}, 1);
   Buffer<int8_t> i8 = noise<int8_t>({64}, 2);
@@ -191,7 +191,7 @@ PIPELINE(absolute_differences) {
   return {{f}, {{128}}, {}};
 }
 
-// Weights no wider than the values: there Halide rounds exactly, as it documents.
+// Weights no wider than the values: Halide rounds these exactly, as documented.
 PIPELINE(lerp_integers) {
   Buffer<uint8_t> a = edges<uint8_t>({128}, 1), b = edges<uint8_t>({128}, 2),
                   w = edges<uint8_t>({128}, 3);
@@ -204,7 +204,7 @@ PIPELINE(lerp_integers) {
   return {{f}, {{128}}, {}};
 }
 
-// Weights that are shares of the range of 16 bits, and weights wider than the values.
+// Weights that are fractions of the 16-bit range, and weights wider than the values.
 PIPELINE(lerp_weights) {
   Buffer<uint16_t> p = edges<uint16_t>({4096}, 1), q = edges<uint16_t>({4096}, 2),
                    v = noise<uint16_t>({4096}, 3);

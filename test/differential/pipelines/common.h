@@ -1,7 +1,7 @@
-// What every pipeline of the differential tests uses. Included inside a namespace of its own, after
-// the language (Halide or Retrograde) has been made visible there: nothing here names it.
+// Helpers of all pipelines of the differential tests. Included inside a namespace of its own, in
+// which the language (Halide or Retrograde) is visible; this file names neither.
 
-// One pipeline: its outputs, and the box that each is realized over.
+// A pipeline: its outputs, and the box over which each is realized.
 struct Built {
   std::vector<Func> outputs;
   std::vector<std::vector<int>> extents;
@@ -22,7 +22,7 @@ struct Registered {
   Registered(const char* name, Built (*build)(bool)) { cases().push_back({name, build}); }
 };
 
-// PIPELINE(name) { ... return Built{...}; }   `scheduled`: apply the schedule, too.
+// PIPELINE(name) { ... return Built{...}; }   `scheduled`: also apply the schedule.
 #define PIPELINE(name)                                    \
   static Built name(bool scheduled);                      \
   static const Registered registered_##name(#name, name); \
@@ -38,8 +38,8 @@ inline uint32_t hash_of(uint32_t a, uint32_t b, uint32_t c, uint32_t seed) {
   return h ^ (h >> 13);
 }
 
-// Noise of a type: all values of narrow integers, small ones of wide integers (their overflow is
-// undefined when signed), floats between -4 and 4.
+// Random values of a type: all values of narrow integers, small values of wide integers (signed
+// overflow is undefined), floats between -4 and 4.
 template <typename T>
 T noise_value(uint32_t h) {
   if constexpr (std::is_same_v<T, bool>) {
@@ -53,7 +53,7 @@ T noise_value(uint32_t h) {
   }
 }
 
-// Noise with the extreme values of the type, and values near zero, mixed in.
+// Random values, mixed with the extreme values of the type and values near zero.
 template <typename T>
 T edgy_value(uint32_t h) {
   if constexpr (std::is_integral_v<T> && sizeof(T) < 4 && !std::is_same_v<T, bool>) {

@@ -1,4 +1,4 @@
-// Math functions, compared within the interpreter's stated ULP.
+// Math functions, compared within the ULP that the interpreter states.
 
 PIPELINE(rounding_functions) {
   Buffer<float> a = noise<float>({256}, 1);

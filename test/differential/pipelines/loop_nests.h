@@ -1,4 +1,4 @@
-// Schedules whose loops print_loop_nest shows. Included like common.h.
+// Schedules whose loop nests are compared. Included like common.h.
 #pragma once
 
 struct NestCase {
@@ -6,8 +6,8 @@ struct NestCase {
   std::function<Func()> build;
 };
 
-// One stencil of two stages: what every case schedules.
-// The names of what is made of a Func hold its own: Halide shows none of them when it has a number.
+// The two-stage stencil that every case schedules. Names of Funcs created for another Func contain
+// its name, and Halide prints none of them when it has a number.
 struct Stencil {
   Func f, g;
   Var x{"x"}, y{"y"}, xo{"xo"}, yo{"yo"}, xi{"xi"}, yi{"yi"}, t{"t"};

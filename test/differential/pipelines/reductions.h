@@ -1,4 +1,4 @@
-// Reduction domains, updates, scans, scatters, Tuples that reduce.
+// Reduction domains, updates, scans, scatters, reductions of Tuples.
 
 PIPELINE(inline_reductions) {
   Buffer<int32_t> in = noise<int32_t>({40, 12}, 1);
@@ -51,8 +51,8 @@ PIPELINE(triangular_domain) {
   return {{f}, {{20, 20}}, {}};
 }
 
-// Each pixel's rank, 0 to 99, among the pixels of its column block: counts of 16 values, those at
-// least as bright by a scan from the right, and a look-up.
+// Each pixel's rank, 0 to 99, among the pixels of its column block: a histogram of 16 values, a
+// scan from the right that counts pixels at least as bright, and a gather.
 PIPELINE(ranks_in_blocks) {
   const int columns = 48, rows = 27, block = 16;
   Buffer<uint8_t> in = noise<uint8_t>({columns, rows}, 1);

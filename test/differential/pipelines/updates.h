@@ -1,4 +1,4 @@
-// Updates whose iterations never touch one element twice, run in parallel and in lanes.
+// Updates whose iterations never access one element twice, parallel and vectorized.
 
 static Func line_of_squares(const char* name) {
   Func f(name);
@@ -58,7 +58,8 @@ PIPELINE(coordinates_from_absolute_values) {
   Buffer<float> image = noise<float>({20, 10}, 5);
   Func table("table"), f("f");
   table(x) = x * x;
-  f(x, y) = table(cast<int>(abs(cast<float>(x - 7)))) + table(min(cast<int>(abs(image(x, y)) * 3.0f), 9));
+  f(x, y) =
+      table(cast<int>(abs(cast<float>(x - 7)))) + table(min(cast<int>(abs(image(x, y)) * 3.0f), 9));
   if (scheduled) {
     table.compute_root();
     f.vectorize(x, 4).parallel(y);

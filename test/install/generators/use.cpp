@@ -1,4 +1,5 @@
-// Calls the libraries and checks them in plain C++: values, and gradients against differences.
+// Calls the generated libraries and checks them in plain C++: values, and gradients against
+// differences.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -54,7 +55,7 @@ void check_values(const Buffer<float>& in, const Buffer<float>& kernel, const Bu
   }
 }
 
-// d/d element by central differences in double.
+// The derivative by one element, by central differences in double.
 double slope(Buffer<float>& in, Buffer<float>& kernel, const Buffer<float>& weights,
              float& element) {
   const float kept = element, step = 1e-2f;

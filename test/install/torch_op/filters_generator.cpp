@@ -1,4 +1,5 @@
-// filters_generator.cpp -- what becomes operators: of images, numbers, one output and two.
+// filters_generator.cpp -- the generators that become PyTorch operators: with images, numbers, and
+// one or two outputs.
 #include <retrograde/retrograde.h>
 
 namespace {

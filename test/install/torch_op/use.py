@@ -1,4 +1,4 @@
-"""Operators that were compiled ahead of time, as PyTorch sees them; nothing of ours is imported.
+"""Tests operators compiled ahead of time from PyTorch, without importing the library.
 
     use.py FOLDER DRIVER        DRIVER: libretrograde_simt.so"""
 import os
@@ -31,7 +31,7 @@ def theirs(image, taps, gain):
     return gain * sum(image[:, k:k + image.shape[1] - 2] * taps[k] for k in range(3)), image * image
 
 
-# Values and gradients, of an output that is used and of both.
+# Values and gradients, with one or both outputs used.
 for negative, sign in ((False, 1), (True, -1)):
     ours = weighted(image, taps, 1.5, negative)
     for a, b in zip(ours, theirs(image, taps, 1.5 * sign)):
@@ -42,7 +42,7 @@ for loss in (lambda r: r[0].sum(), lambda r: r[1].square().sum(), lambda r: (r[0
     for a, b in zip(got, want):
         assert torch.allclose(a, torch.zeros_like(a) if b is None else b, atol=1e-5), (a, b)
 
-# Numbers are differentiated where they are tensors; each gradient is the same alone as with the others.
+# Numbers are differentiated if they are tensors; each gradient is the same alone as together with the others.
 gain = torch.tensor(1.5, requires_grad=True)
 assert all(torch.equal(a, b) for a, b in zip(weighted(image, taps, gain, True), weighted(image, taps, 1.5, True)))
 for given in (image, taps, gain), (gain,), (taps, gain), (image,):
@@ -55,7 +55,7 @@ in_double = torch.tensor(1.5, dtype=torch.float64, requires_grad=True)
 alone, = torch.autograd.grad(weighted(image, taps, in_double, False)[0].sum(), in_double)
 assert alone.dtype == torch.float64 and abs(alone - theirs(image, taps, 1.0)[0].sum()) < 1e-4
 
-# Only what is asked for is computed: autograd asks for the third gradient, and then none of an image's size is made.
+# Only the requested gradients are computed: autograd requests the third one, so no gradient of an image's size exists.
 class Asked(TorchDispatchMode):
     wanted = []
 
@@ -82,7 +82,7 @@ for given in (image.detach()[:, ::2], image.detach().t()[:, :5], torch.ones(1, 1
 meta = weighted(torch.empty(5, 9, device="meta"), torch.empty(3, device="meta"), 1.0, False)
 assert [m.shape for m in meta] == [(5, 7), (5, 9)]
 
-# What is wrong is an exception.
+# Errors are exceptions.
 raises(RuntimeError, '"image" has 2 dimensions', lambda: weighted(taps, taps, 1.0, False))
 raises(RuntimeError, '"image" is a tensor of the CPU of Float over 2 dimensions; given is one of cpu of Double',
        lambda: weighted(image.double(), taps, 1.0, False))
@@ -93,7 +93,7 @@ raises(RuntimeError, "made without GRADIENT", lambda: total(taps, taps).sum().ba
 raises(RuntimeError, '"gain" is a floating-point number, or a tensor of one without dimensions',
        lambda: weighted(image, taps, torch.ones(1), False))
 
-# Of kernels, whose results use_wrapper.cpp looks at: memory that the driver does not know is refused.
+# Kernels reject memory that the driver does not know; use_wrapper.cpp checks their results.
 kernels = torch.ops.tests.weighted_on_device
 meta = kernels(torch.empty(5, 9, device="meta"), torch.empty(3, device="meta"), 1.0, False)
 assert [m.shape for m in meta] == [(5, 7), (5, 9)]
@@ -102,7 +102,7 @@ raises(RuntimeError, "cuPointerGetAttribute", lambda: kernels(image.detach(), ta
 if hasattr(torch.library, "opcheck"):
     torch.library.opcheck(weighted.default, (image, taps, 1.5, False))
     torch.library.opcheck(weighted.tensors, (image, taps, gain, False))
-    # Without derivatives of its own.
+    # The backward operator itself has no derivatives.
     given = [t.detach() for t in (image, taps, gain)]
     torch.library.opcheck(torch.ops.tests.weighted_backward.default,
                           (*given, False, torch.ones(5, 7), torch.ones(5, 9), 0b101))
@@ -117,7 +117,7 @@ if hasattr(torch.library, "opcheck"):
         a.sum().backward()
         assert torch.allclose(given.grad, torch.autograd.grad(b.sum(), given)[0], atol=1e-6)
 
-# What a call costs, said and not judged here: machines are busy.
+# Prints the cost of a call; it is not checked, because machines may be busy.
 one = torch.ones(1)
 
 

@@ -1,5 +1,5 @@
-// Functions on tensors, by the wrappers that generators write: on the CPU, and as kernels on the simulated device,
-// whose memory is the CPU's to PyTorch.
+// Calls functions on tensors through the wrappers that generators write: on the CPU, and as kernels
+// on the simulated device, whose memory PyTorch sees as the CPU's.
 //
 //   use_wrapper DRIVER      DRIVER: libretrograde_simt.so
 #include <dlfcn.h>
@@ -54,7 +54,7 @@ class Device {
 int main(int, char** argv) {
   setenv("RETROGRADE_GPU", "simulated", 1);
   setenv("RETROGRADE_SIMT_LIBRARY", argv[1], 1);
-  halide_set_error_handler(retrograde_torch::note_error);  // what exceptions then say
+  halide_set_error_handler(retrograde_torch::note_error);  // makes exceptions carry the message
   const Device device(argv[1]);
   const at::Tensor image = torch::rand({5, 9}), taps = torch::rand({3});
   const at::Tensor seeds[] = {torch::rand({5, 7}), torch::rand({5, 9})};
@@ -80,7 +80,7 @@ int main(int, char** argv) {
   for (int i = 0; i < 5; i++)
     require(at::allclose(here[i], there[i], 1e-5, 1e-5), "kernels give other values");
 
-  // Memory that the driver does not know is refused.
+  // Memory that the driver does not know is rejected.
   try {
     weighted_on_device_forward_th_(image, placed_taps, 1.5, false, there[0], there[1]);
     require(false, "no error");

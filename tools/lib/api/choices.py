@@ -11,7 +11,7 @@ INTERNAL_HEADERS = {
     "checks/widen.h", "frontend/data/argument.h", "frontend/run/call.h", "frontend/run/compiler_interface.h",
     "generator/command_line.h", "generator/cpp_stub.h", "generator/members.h",
     "graph/associative_update.h", "graph/binder.h", "graph/copy_graph.h", "graph/define.h",
-    "graph/directive.h", "graph/directive_choices.h", "graph/directive_names.h", "graph/directive_text.h",
+    "graph/directive.h", "graph/directive_choices.h", "graph/directive_fields.h", "graph/directive_text.h",
     "graph/function.h", "graph/give_directive.h", "graph/graph.h", "graph/graph_lines.h", "graph/names.h", "graph/parameter_contents.h", "graph/provenance.h",
     "graph/race_checks.h", "graph/reduction_domain.h", "graph/reduction_leaves.h", "graph/rfactor.h", "graph/schedule.h",
     "graph/wrappers.h", "lower/lower.h"}
