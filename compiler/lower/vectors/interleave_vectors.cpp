@@ -1,6 +1,6 @@
-// interleave_vectors -- compute what alternates between lanes once for each residue of the lane.
+// interleave_vectors -- split expressions that alternate between lanes by the residue of the lane.
 // In:  Vector.
-// Out: Vector; the same values in the same places.
+// Out: Vector; the same values are stored to the same elements.
 //
 //   out[ramp(b, 1, 8)] = select(ramp(b, 1, 8) % 2 == 0, f[ramp(b, 1, 8) / 2], g[ramp(b, 1, 8) / 2])
 //      =>
@@ -12,17 +12,16 @@
 //   out[ramp(b + 1, 3, 8)] = y             =>
 //   out[ramp(b + 2, 3, 8)] = z
 //
-// So gathers become dense loads, and scattered stores dense ones.
+// Gathers become dense loads, and scattered stores become dense stores.
 //
-// Method: expressions. A ramp of stride s divided by c, or its remainder, has the period
-//         k = c / gcd(s, c): its lanes j, j + k, j + 2k ... are a ramp or a broadcast again. An
-//         expression has a period when all that varies in it has one, or is neither helped nor hurt
-//         by taking every k-th lane (ramps, broadcasts). The largest such subtrees with a load in
-//         them are split; dense loads stay whole. Splitting a node is linear in the nodes below it.
-//         Stores: neighbours of one buffer whose ramps have stride k and bases at distances
-//         0 ... k - 1 become one store, when no value reads the buffer. What an Atomic loads from
-//         the element that it stores to stays whole, next to a store that does.
-// Not done: nested ramps; stores apart from each other.
+// Method: expressions. A ramp of stride s, divided by c or taken modulo c, has the period k = c / gcd(s, c): its lanes
+//         j, j + k, j + 2k ... are a ramp or a broadcast again. An expression has a period if every varying
+//         part has one or can take every k-th lane at no cost (ramps, broadcasts). The largest such subtrees that
+//         contain a load are split; dense loads stay whole. Splitting a node is linear in the nodes below it.
+//         Stores: neighbouring stores to one buffer whose ramps have stride k and bases at distances 0 ... k - 1
+//         become one store, if no stored value reads the buffer. An Atomic's load of its own element is not split, so
+//         that load and store keep the same index.
+// Not done: nested ramps; stores that are not neighbours.
 // Source: folklore. Tests: test/golden/lower/interleave_vectors/, loop_passes_test.
 #include "lower/statement_passes.h"
 
@@ -42,14 +41,14 @@ namespace retrograde::lower {
 namespace {
 
 constexpr int max_pattern_period = 8;
-// A vector of floats with AVX-512 has as many lanes: what is stored to columns of a square is its
-// transpose, in four steps of shuffles instead of 256 elements.
+// The number of float lanes in an AVX-512 vector. Stores to the columns of a square of this size become a transpose,
+// in four steps of shuffles instead of 256 scalar stores.
 constexpr int max_store_period = 16;
 
-// How an expression behaves when only every k-th of its lanes is wanted.
+// How an expression behaves if it is split into every k-th lane.
 struct Pattern {
-  enum Kind { Any, Periodic, Whole } kind = Any;  // Whole: splitting it costs more than it saves
-  int period = 1;                                 // Periodic: the k that helps
+  enum Kind { Any, Periodic, Whole } kind = Any;  // Whole: splitting costs more than it saves
+  int period = 1;                                 // Periodic: the k into which it splits best
   bool has_load = false;
 };
 
@@ -63,7 +62,7 @@ Pattern combine(const Pattern& a, const Pattern& b) {
 
 const Pattern whole{Pattern::Whole, 1, false};
 
-// ramp / c or ramp % c with the scalars known.
+// ramp / c or ramp % c, where stride and c are constants.
 struct PeriodicIndex {
   Expr base;
   int64_t stride, divisor;
@@ -87,7 +86,8 @@ bool is_elementwise(const Call& call) {
   return cls == OpClass::Pure || cls == OpClass::Marker;
 }
 
-// Patterns of expressions, and their parts. Names of vectors stand for what they are bound to.
+// Finds the patterns of expressions and splits expressions into parts. Names of vectors have the patterns of their
+// values.
 class LaneSplitter {
  public:
   Pattern pattern(const Expr& e) {
@@ -100,7 +100,7 @@ class LaneSplitter {
     return result;
   }
 
-  // The parts of a subtree to be split: interleaved, they are e.
+  // The parts of a subtree: interleaved, they equal e.
   std::vector<Expr> parts(const Expr& e, int period) {
     std::vector<Expr> result;
     for (int first = 0; first < period; ++first) {
@@ -114,7 +114,7 @@ class LaneSplitter {
 
   void keep_whole(const Expr& e) { patterns_.insert_or_assign(e.get(), Entry{e, whole}); }
 
-  // From now on `name`, which is bound to a vector, may be split like this.
+  // Declares that `name`, which is bound to a vector, has pattern `p` and may be split.
   void bind(const std::string& name, const Expr& value, const Pattern& p) {
     names_[name] = {p, value, {}};
   }
@@ -130,8 +130,8 @@ class LaneSplitter {
   };
   struct Named {
     Pattern pattern;
-    Expr value;               // is computed again in parts,
-    std::vector<Expr> parts;  // or has parts of its own
+    Expr value;               // recomputed in parts,
+    std::vector<Expr> parts;  // unless the parts are bound to names of their own
   };
 
   Pattern find_pattern(const Expr& e) {
@@ -224,7 +224,7 @@ class LaneSplitter {
         [&](const ExprNode&) -> Expr { internal_error("interleave_vectors: no parts"); });
   }
 
-  // Of a name that has fewer parts than are asked for, each of these is split further.
+  // A name with fewer parts than the current period: its parts are split further.
   Expr part_of_parts(const std::vector<Expr>& parts, int lanes) const {
     const int count = static_cast<int>(parts.size()), step = period_ / count;
     const Expr& whole_part = parts.at(static_cast<size_t>(first_ % count));
@@ -254,11 +254,11 @@ class LaneSplitter {
   NodeMemo<Expr> memo_;
 };
 
-// Stores with the lets around each, that may become one.
+// Neighbouring stores, each with its lets, that may become one store.
 struct StoreGroup {
   std::string buffer;
   int64_t stride = 0;
-  std::vector<Stmt> members;  // as they stood
+  std::vector<Stmt> members;  // the original statements
   Lets lets;
   std::vector<const Store*> stores;
   std::vector<int64_t> offsets;  // from the first store's base
@@ -310,7 +310,7 @@ class Interleaver : public Rewriter {
 
   // ---- stores ----
 
-  // An update is one operation of its element only while both have the same index.
+  // An Atomic is a single operation on its element only while its load and its store have the same index.
   void keep_own_loads(const Atomic& n) {
     const auto* store = n.body.as<Store>();
     if (!store) return;
@@ -348,7 +348,7 @@ class Interleaver : public Rewriter {
     return make_block(std::move(result));
   }
 
-  // Adds the statement to the group, unless it does not belong there.
+  // Adds the statement to the group; false if it does not belong there.
   static bool joins(StoreGroup& group, const Stmt& s) {
     Lets lets;
     Stmt inner = s;
@@ -384,7 +384,7 @@ class Interleaver : public Rewriter {
     return true;
   }
 
-  // Undefined when the stores leave gaps.
+  // The merged store; undefined when the stores leave gaps.
   static Stmt one_store(const StoreGroup& group) {
     const size_t count = group.stores.size();
     const int64_t lowest = *std::min_element(group.offsets.begin(), group.offsets.end());
