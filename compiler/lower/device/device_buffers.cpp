@@ -13,7 +13,7 @@ namespace retrograde::lower {
 
 namespace {
 
-using Names = std::set<std::string>;  // sorted: what is generated must not depend on chance
+using Names = std::set<std::string>;  // sorted, so that the generated code is deterministic
 
 bool has_launch(const Stmt& s) {
   return any_stmt(s, [](const Stmt& part) { return part.kind() == Kind::Launch; });
@@ -91,7 +91,7 @@ class BothSides {
     to.writes.insert(from.writes.begin(), from.writes.end());
   }
 
-  // What a function is given the address of, it may read and store.
+  // A function that is passed an address may read and store there.
   template <class Tree>
   Accesses accesses(const Tree& tree) const {
     Accesses found;

@@ -62,7 +62,7 @@ class KernelMaker : public StatementRewriter {
     return result;
   }
 
-  // What only a host can do.
+  // Rejects statements that only the host can run.
   static void check_statements(const Stmt& body, const For& loop) {
     const auto refuse = [&](const std::string& evidence, const std::string& instead) {
       unsupported("run GPU blocks of " + describe_loop(loop.name),
