@@ -12,7 +12,7 @@ namespace retrograde::lower {
 
 namespace {
 
-constexpr int most_choices = 6;  // that are taken apart
+constexpr int most_choices = 6;  // selects in one extent whose arms are bounded separately
 
 Expr a_choice_in(const Expr& e) {
   Expr found;
@@ -23,7 +23,7 @@ Expr a_choice_in(const Expr& e) {
   return found;
 }
 
-// With every choice by this condition decided.
+// The expression with every select on this condition decided.
 Expr decided(const Expr& e, const Expr& condition, bool value) {
   return simplify(rewrite(e, [&](const Expr& part, const auto& recurse) -> Expr {
     const Select* choice = part.as<Select>();
@@ -46,7 +46,7 @@ int64_t bound_of(const Expr& e, Facts& facts, int choices) {
   return most;
 }
 
-// n == 3: what conditions say to be constants.
+// Pairs of an expression and the constant that a condition says it equals, as n == 3.
 using Constants = std::vector<std::pair<Expr, Expr>>;
 void add_constants(const Expr& condition, Constants& constants) {
   std::vector<Expr> conjuncts;
@@ -101,7 +101,7 @@ bool BoundedExtents::is_made_of_few(const Expr& extent, int names) const {
   return takes_names(extent, names);
 }
 
-// Names that are left of so many; fewer than none: no.
+// Subtracts the number of names in `e` from `left`; false once it is negative.
 bool BoundedExtents::takes_names(const Expr& e, int& left) const {
   walk(e, [&](const Expr& part) {
     const auto* name = part.as<Variable>();

@@ -1,4 +1,4 @@
-// skip_stages -- a Func is computed only where something reads it.
+// skip_stages -- compute a Func only where something reads it.
 // In:  Loops; names unique.
 // Out: Loops; producers under conditions, the same stores otherwise.
 //
@@ -8,31 +8,27 @@
 //       for x { out(x) = select(p, f(x), 0) }          for x { out(x) = select(p, f(x), 0) }
 //   } }                                            } }
 //
-// The consumers' selects and ifs say where they read it. A condition stays as far as it can be
-// evaluated where the storage of f begins: it is made of parameters, of extents of buffers, of
-// variables of loops around that storage, and of elements of images and of Funcs that are complete there. (A C function that a
-// select calls there anyway is pure, and called once for both.) What depends on loops inside counts
-// as true; but in a choice between Funcs, select(x < n, a(x), b(x - n)), it is asked whether x
-// reaches the arm at all, so that concatenations compute one part where the other is not wanted.
-// What only a skipped Func reads is skipped with it.
+// The selects and ifs of the consumers tell where they read it. A condition is used as far as it can be evaluated where
+// the storage of f begins. There it may mention parameters, extents of buffers, variables of loops around that
+// storage, and elements of images and of complete Funcs. (A C function that a select calls there anyway is
+// pure, and is called once for both.) Parts that depend on loops inside count as true. In a choice between Funcs, such
+// as select(x < n, a(x), b(x - n)), the range of x decides whether an arm is reached at all, so that concatenations
+// skip a part that is not required. A Func that only skipped Funcs read is skipped, too.
 //
-// The storage is not skipped: both arms of a select may be evaluated, and then one of them reads
-// values that nobody computed, and that nobody uses. So an arm of a select does not count where its
-// value is more than a value: a coordinate, the argument of a C function, what a promise speaks of.
+// The storage is not skipped: both arms of a select may be evaluated, and then one of them reads uninitialised
+// values that are not used. An arm of a select is therefore not taken into account if its value has a further
+// effect: a coordinate, an argument of a C function, an operand of a promise.
 //
-// Method: one walk, from outside in, with the conditions and the binders (loops, lets) around. A
-//         read of f adds the conditions between its storage and the read, seen from outside of the
-//         binders in between. A producer of g is a condition of its own, a name for what g's
-//         storage has not seen in full yet; where g's storage ends, the name is replaced, also in the needs
-//         of Funcs that were stored inside of it.
-// Not done: outputs, and Funcs that are async or computed inside the storage of one (producer and
-//         consumer wait for each other); what kernels compute, or is computed in them; Funcs that
-//         share loops with others (compute_with); conditions over the lanes of a vector; a single
-//         point where the condition changes from iteration to iteration: a branch costs more.
-// Side effects of a Func are those of its values: traced stores, calls of C functions and lookups of
-// memoized Funcs go with what is skipped. A load that is traced, or memory that debug_to_file
-// writes, is a use.
-// Source: Halide's tests and documentation say what users see of the same there. Tests:
+// Method: one walk, from outside in, that tracks conditions and binders (loops, lets). A read of f adds the conditions
+//         between its storage and the read, as seen from outside of the binders in between. The producer of g acts as a
+//         condition with a placeholder name, because not all reads of g are known yet. Where g's storage ends, the
+//         name is replaced, also in the conditions of Funcs that were stored inside of it.
+// Not done: outputs; async Funcs and Funcs inside the storage of one (producer and consumer wait for each other);
+//         Funcs that are computed by or in kernels; Funcs fused with others (compute_with); conditions over the lanes
+//         of a vector; a single point whose condition changes from iteration to iteration, where a branch costs more.
+// Side effects of a Func are part of its values: traced stores, calls of C functions and lookups of memoized Funcs are
+// skipped with it. A traced load, or memory that debug_to_file writes, is a read.
+// Source: Halide's tests and documentation describe the behaviour that users see. Tests:
 //         test/golden/lower/skip_stages/, test/unit/skip_stages_test.cpp, test/property.
 #include "lower/loops/skip_stages.h"
 
@@ -54,8 +50,9 @@ namespace retrograde::lower {
 
 namespace {
 
-constexpr int most_choices = 64;   // in one expression, and
-constexpr int deepest_choice = 4;  // inside each other: conditions of further ones count as true
+constexpr int most_choices = 64;  // in one expression
+constexpr int deepest_choice =
+    4;  // nesting depth; conditions of choices beyond either limit count as true
 
 bool is_choice(const Expr& e) { return e.as<Select>() || as_op(e, Op::if_then_else); }
 
@@ -63,7 +60,7 @@ bool reads_funcs(const Expr& e) {
   return any_node(e, [](const Call& call) { return call.call_type == CallType::Func; });
 }
 
-// Whether any values do as operands where nobody uses the result: no promise that may be checked.
+// Whether the operator accepts arbitrary operands if its result is unused. Promises do not, as they may be checked.
 bool is_plain_operator(const Call& call) {
   if (call.call_type != CallType::Operator) return false;
   const OpClass cls = op_info(call.op).cls;
@@ -71,7 +68,7 @@ bool is_plain_operator(const Call& call) {
   return cls == OpClass::Pure || (cls == OpClass::Marker && !promises);
 }
 
-// Whether it computes no more than a point, by no function that may take long.
+// Whether the statement computes a single point and calls no C function, which may take long.
 bool is_one_point(const Stmt& s) {
   return !any_node(
       s,
@@ -85,7 +82,7 @@ bool is_one_point(const Stmt& s) {
       });
 }
 
-// By Func: where it is needed.
+// By Func: the condition under which it is needed.
 using Guards = std::map<std::string, Expr>;
 
 class NeedFinder {
@@ -98,23 +95,23 @@ class NeedFinder {
   }
 
  private:
-  // A condition in force, inside of the first `binders` of all binders.
+  // A condition in force, inside of the first `binders` binders.
   struct Held {
     Expr condition;
     size_t binders;
     AtLoops at_loops;
-    int guards = 0;  // around it
+    int guards = 0;  // number of guards around it
   };
-  // A Func whose storage is open.
+  // A Func whose storage contains the current statement.
   struct Stage {
     size_t binders, held;  // outside of its storage
     int guards;
     Expr needed = const_false();
     bool is_read = false;
     std::vector<Stmt> producers = {};
-    std::set<std::string> mentioned_by = {};  // Funcs further out whose need speaks of this one's
-    std::set<std::string> complete =
-        {};  // Funcs whose values are all there when its storage begins
+    std::set<std::string> mentioned_by =
+        {};                               // Funcs further out whose condition mentions this one's
+    std::set<std::string> complete = {};  // Funcs that are complete when its storage begins
   };
 
   static std::string need_of(const std::string& func) { return func + ".needed"; }
@@ -176,7 +173,7 @@ class NeedFinder {
     for (const Range& side : n.bounds) visit_values({side.min, side.extent});
     const bool is_candidate = may_skip_(n.name) && kernels_ == 0 && waiting_ == 0 &&
                               !stages_.contains(n.name) && !forbidden_.contains(n.name);
-    forbidden_.insert(n.name);  // names are unique; of others nothing is known
+    forbidden_.insert(n.name);  // unique names only: a name that occurs again is not a candidate
     if (!is_candidate) {
       const bool waits = !may_skip_(n.name);
       waiting_ += waits;
@@ -203,7 +200,7 @@ class NeedFinder {
     producing_.pop_back();
   }
 
-  // What is complete, and in memory of the host, may be asked before it is read by the Funcs that follow.
+  // A complete Func in host memory may be read by the conditions of the Funcs that follow.
   void visit_consumer(const ProducerConsumer& n) {
     const bool is_there =
         may_skip_(n.name) && !on_device_.contains(n.name) && complete_.insert(n.name).second;
@@ -241,7 +238,7 @@ class NeedFinder {
     return condition;
   }
 
-  // Reads by its own updates make nothing needed.
+  // Records a read. Reads by the Func's own updates do not make it needed.
   void read(const std::string& func) {
     const auto found = stages_.find(func);
     if (found == stages_.end()) return;
@@ -253,7 +250,7 @@ class NeedFinder {
     if (is_const_true(stage.needed)) return;
     Expr where = const_true();
     for (size_t i = stage.held; i < held_.size(); i++) {
-      // What stands under another guard may read outside of its storage where that does not hold.
+      // Under another guard, a read in the condition may be out of bounds where that guard does not hold.
       const bool is_outermost = held_[i].guards == stage.guards;
       where =
           both(where, without_reads(seen_from(held_[i], stage.binders), [&](const Call& call) {
@@ -261,7 +258,7 @@ class NeedFinder {
                         (call.call_type == CallType::Image || stage.complete.contains(call.name));
                }));
     }
-    // C functions are called where they were, with their arguments: a select always does.
+    // A select evaluates C functions in its condition always, so the call can be moved; elsewhere it stays.
     if (outside_ > stage.held) where = without_calls(where);
     add_need(func, stage, where);
   }
@@ -280,12 +277,12 @@ class NeedFinder {
     });
   }
 
-  // The storage of the Func ends here: all of its reads are known.
+  // The storage of the Func ends here, so all of its reads are known.
   void close(const std::string& func) {
     const Stage stage = std::move(stages_.at(func));
     stages_.erase(func);
     Expr need = need_outside(stage);
-    // Whether a point is worth a branch is decided at once: what it reads is needed where it is computed.
+    // A single point is decided now, because its condition determines where the Funcs that it reads are needed.
     if (std::ranges::any_of(stage.producers, is_one_point)) {
       need = known_part(need);
       if (uses_any_variable(need, varying_)) need = const_true();
@@ -302,8 +299,8 @@ class NeedFinder {
     settle(func);
   }
 
-  // What speaks of Funcs whose storage is around and still open waits for them: where those are computed,
-  // and so read this one, is known at their end, and is the same all through their storage.
+  // A condition that mentions Funcs whose storage is still open is settled when that storage ends. Only then is it
+  // known where those Funcs are computed, and so where they read this one.
   void settle(const std::string& func) {
     const Expr need = open_needs_.at(func);
     if (uses_any_variable(need, unsettled())) return;
@@ -326,17 +323,17 @@ class NeedFinder {
     for (const auto& [name, need] : open_needs_) names.insert(need_of(name));
     return names;
   }
-  // What is known later counts as true.
+  // Parts that are not settled yet count as true.
   Expr known_part(const Expr& need) const { return simplify(without_parts_of(need, unsettled())); }
 
-  // True where it is not known to be right.
+  // The condition outside of the Func's storage; true if a condition may be wrong there.
   Expr need_outside(const Stage& stage) const {
     if (!stage.is_read || is_const_true(stage.needed)) return const_true();
     if (std::ranges::any_of(stage.producers, computes_others)) return const_true();
     return simplify(without_parts_of(stage.needed, lanes_));
   }
 
-  // Kernels, or Funcs stored elsewhere.
+  // Whether the producer contains kernels, or computes Funcs stored elsewhere.
   static bool computes_others(const Stmt& producer) {
     std::set<std::string> own{producer.as<ProducerConsumer>()->name};
     bool result = false;
@@ -370,7 +367,7 @@ class NeedFinder {
     }
   }
 
-  // `choice`: the innermost around, by number; 0: none.
+  // `choice`: the number of the innermost choice around; 0: none.
   void visit(const Expr& e, int choice, int depth) {
     if (seen_.contains({e.get(), 0}) || !seen_.insert({e.get(), choice}).second) return;
     if (const auto* select = e.as<Select>())
@@ -392,7 +389,7 @@ class NeedFinder {
     });
   }
 
-  // What is evaluated whatever is chosen, and must be what it is meant to be.
+  // Visits an operand that is evaluated whatever is chosen, and whose value must be valid.
   template <class Body>
   void outside_of_choices(Body&& body) {
     std::vector<Held> inside(held_.begin() + static_cast<std::ptrdiff_t>(outside_), held_.end());
@@ -416,26 +413,28 @@ class NeedFinder {
 
   FunctionRef<bool(const std::string&)> may_skip_;
   Guards guards_;
-  int guards_around_ = 0;                   // choices, branches, predicates, producers
-  std::map<std::string, Stage> stages_;     // whose storage is open
-  std::map<std::string, Expr> open_needs_;  // of Funcs whose storage has ended, in terms of others
+  int guards_around_ = 0;                // choices, branches, predicates, producers
+  std::map<std::string, Stage> stages_;  // Funcs whose storage is open
+  std::map<std::string, Expr>
+      open_needs_;  // of Funcs whose storage has ended; mention unsettled Funcs
   std::vector<Binder> binders_;
   std::vector<Held> held_;
   std::vector<std::string> producing_;
-  std::unordered_set<std::string> varying_;  // variables of loops, and what depends on them
-  std::unordered_set<std::string> lanes_;    // of vectors
+  std::unordered_set<std::string> varying_;  // loop variables, and lets that depend on them
+  std::unordered_set<std::string>
+      lanes_;  // variables of vectorized loops, and lets that depend on them
   std::unordered_set<std::string> forbidden_;
   std::set<std::string> complete_, on_device_;
-  int kernels_ = 0, waiting_ = 0;  // around: loops of kernels, storage that producers wait for
+  int kernels_ = 0, waiting_ = 0;  // around: loops of kernels, storage that is never skipped
 
-  // In one expression.
+  // State within one expression.
   std::set<std::pair<const ExprNode*, int>> seen_;
   std::unordered_set<std::string> let_names_;
   int choices_ = 0, arms_ = 0;
-  size_t outside_ = 0;  // conditions in force around it
+  size_t outside_ = 0;  // number of conditions in force around it
 };
 
-// Calls of C functions in the condition, and equal ones in `body`, are one, before it.
+// Computes calls of C functions in the condition, and equal calls in `body`, once before both.
 Stmt with_calls_shared(const std::string& func, const Expr& condition, Stmt body) {
   std::vector<Expr> calls;
   walk(condition, [&](const Expr& e) {
