@@ -61,8 +61,7 @@ class Checks {
   const bool has_device_;
   const Substitution actual_;
 
-  // Where a fact was promised, the code below uses the promise, and the check compares it with the
-  // ".actual" fact.
+  // Where a fact was promised, the code below uses the promise, and a check compares it with the ".actual" fact.
   Lets buffer_facts() const {
     Lets facts, promises;
     for (const LoweredArgument& arg : args_) {
@@ -86,8 +85,8 @@ class Checks {
     if (promised.defined()) promises.emplace_back(name, promised);
   }
 
-  // What the user promised; of a buffer that is named in the program: what it is. Dimension 0 is
-  // dense unless the user says otherwise.
+  // The user's promise. For a buffer that the program embeds, its actual shape. Dimension 0 is dense unless the user
+  // says otherwise.
   static BufferConstraint constraint_of(const LoweredArgument& arg, int d) {
     auto param = std::dynamic_pointer_cast<ParameterContents>(arg.symbol.lock());
     BufferConstraint promised;
@@ -102,8 +101,7 @@ class Checks {
     return promised;
   }
 
-  // The promise in terms of what the buffers are: it may speak of facts that are promised, too, its
-  // own among them, as "a multiple of 8" does.
+  // The promise in terms of actual facts. It may mention promised facts, even its own, as "a multiple of 8" does.
   BufferConstraint promise_of(const LoweredArgument& arg, int d) const {
     BufferConstraint promised = constraint_of(arg, d);
     for (Expr* side : {&promised.min, &promised.extent, &promised.stride}) {
@@ -117,7 +115,7 @@ class Checks {
     for (const LoweredArgument& arg : args_) {
       for (int d = 0; arg.is_buffer() && d < arg.dimensions; d++) {
         const BufferConstraint promised = constraint_of(arg, d);
-        // A promise of a constant is that constant, also of a stride that is another (see
+        // A constant promise stands for the constant, also for a stride that actually differs (see
         // add_constraint_check).
         const auto add = [&](const char* what, const Expr& promise) {
           if (!promise.defined()) return;
@@ -132,7 +130,7 @@ class Checks {
     return names;
   }
 
-  // Calls a check of the runtime, which tells what is wrong and gives its code, 0 where nothing is.
+  // Calls a check of the runtime, which reports an error and returns its code, or 0.
   static Stmt ask(const char* function, std::vector<Expr> args) {
     return checked_call("code", call_runtime(function, std::move(args)));
   }
@@ -143,7 +141,7 @@ class Checks {
                           Expr(static_cast<int32_t>(type_word(arg.type))), Expr(arg.dimensions)}));
   }
 
-  // The runtime has seen to it already: the simplifier learns it, and no code is made.
+  // States what a runtime call has already checked: the simplifier uses it, and no code is generated.
   static Stmt holds_already(const Expr& condition) {
     return make_assert(condition, call_op(Op::undef, Int(32), {}));
   }
@@ -173,7 +171,7 @@ class Checks {
     }
   }
 
-  // The box that a buffer must contain; undefined sides where nothing of it is used.
+  // The box that a buffer must contain; sides are undefined if nothing of it is used.
   Box required_box(const LoweredArgument& arg) const {
     if (arg.kind == LoweredArgument::Kind::OutputBuffer) {
       for (const LoopedFunc& f : program_.funcs) {
@@ -222,8 +220,8 @@ class Checks {
     return make_if(any_query, make_block(answers), make_block(run));
   }
 
-  // Where every output is empty nothing runs, and what would be read does not matter: the box read by
-  // loops that do not run may lie anywhere, that of clamp(x, 0, extent - 1) at 0.
+  // Returns if every output is empty. The regions of inputs do not matter then: loops that do not run may appear to
+  // read any box, for example clamp(x, 0, extent - 1) reads 0.
   void return_if_nothing_is_asked(std::vector<Stmt>& checks) const {
     Expr is_asked = const_false();
     for (const LoweredArgument& arg : args_) {
@@ -248,8 +246,8 @@ class Checks {
     }
   }
 
-  // What is needed, but where the user promised what it is. A promise that speaks of the buffer
-  // itself means what is needed of it. Strides are those of a dense buffer.
+  // Answers a bounds query with the required region, except where the user promised the shape. A promise that mentions
+  // the buffer itself refers to the required region. Strides are those of a dense buffer.
   Stmt answer(const LoweredArgument& arg, const Box& box) const {
     Substitution needed;
     for (size_t d = 0; d < box.size(); d++) {
@@ -280,7 +278,7 @@ class Checks {
         {handle_of(arg.name), Expr(static_cast<int32_t>(box.size())), pack(std::move(sides))}));
   }
 
-  // A region that was promised must hold what is used: this is known before any buffer is.
+  // Checks that a promised region contains the used one, which can be done before looking at the buffer.
   void add_promise_checks(const LoweredArgument& arg, const Box& box,
                           std::vector<Stmt>& checks) const {
     auto param = std::dynamic_pointer_cast<ParameterContents>(arg.symbol.lock());
@@ -307,14 +305,13 @@ class Checks {
     }
   }
 
-  // Where the data are, how far their elements lie apart, and that the buffer holds what is used: an
-  // empty buffer fits an empty box only by the numbers. Where the region is promised, the promise is
-  // what must hold it.
+  // Checks the memory, the density and the region of the buffer by a runtime call; an empty box is compared by its
+  // numbers. If the region is promised, the promise must contain it instead.
   void add_region_checks(const LoweredArgument& arg, const Box& box,
                          std::vector<Stmt>& checks) const {
     std::vector<Expr> sides;
     std::vector<Stmt> facts, of_promises;
-    int32_t dimensions = 0;  // a bit each
+    int32_t dimensions = 0;  // bit set of the dimensions to check
     for (size_t d = 0; d < box.size(); d++) {
       const int dimension = static_cast<int>(d);
       const Expr min = variable(fact(arg.name, "min", dimension)),
@@ -344,7 +341,7 @@ class Checks {
            (is_dense(arg) ? retrograde_region_is_dense : 0) |
            (has_device_ ? retrograde_region_on_device : 0);
   }
-  // As buffers are unless someone says otherwise.
+  // Whether dimension 0 is dense, which is the default.
   static bool is_dense(const LoweredArgument& arg) {
     return arg.dimensions > 0 && is_const_int(constraint_of(arg, 0).stride, 1);
   }
@@ -381,8 +378,8 @@ class Checks {
     return variable(fact(arg.name, what, d) + ".actual");
   }
 
-  // Then its stride leads to no other element, and may be anything: libraries of arrays leave it as it
-  // comes.
+  // Whether the stride is irrelevant because there is at most one element. Array libraries set such strides
+  // arbitrarily.
   Expr has_one_element_at_most(const LoweredArgument& arg, int d) const {
     return variable(fact(arg.name, "extent", d)) <= 1;
   }

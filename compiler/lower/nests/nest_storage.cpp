@@ -12,7 +12,7 @@ namespace retrograde::lower {
 
 namespace {
 
-// Whether a directive that names a loop of a Func, in any of its stages, means this one.
+// Whether a directive that names a loop of a Func refers to this loop; the loop may belong to any stage.
 bool is_named_by(const LoopLevel& level, const Loop& loop) {
   if (level.kind != LoopLevel::Kind::At) return false;
   const LoopName name = decode_loop_name(loop.known_as());
@@ -41,7 +41,8 @@ const StorageRule* rule_of(const LoopedFunc& f, size_t d) {
 void apply(const StorageRule& rule, const LoopedFunc& f, size_t d, Range& range, Expr& factor,
            std::vector<Stmt>& checks) {
   const int dimension = static_cast<int>(d);
-  if (rule.fold.defined() && !factor.defined()) {  // no loop hands it on: it must hold all
+  if (rule.fold.defined() &&
+      !factor.defined()) {  // no loop passes values on: the storage must hold the whole extent
     checks.push_back(fold_check(f, dimension, range.extent, rule.fold));
     factor = rule.fold;
   }
@@ -106,9 +107,9 @@ Stmt NestStorage::fold(const LoopedFunc& f, const Box& touched, const std::vecto
   return stmt;
 }
 
-// Values that are each computed once, into a place of their own, can be computed at any time. In
-// folded storage of F coordinates, of which an iteration touches W and computes S, there is room
-// for (F - W) / S more.
+// If each value is computed only once, into an element of its own, the producer may run ahead without limit. In storage
+// folded to F coordinates, of which an iteration accesses W and computes S, it may be (F - W) / S further iterations
+// ahead.
 void NestStorage::note_async_room(const LoopedFunc& f, const std::vector<Slide>& slides,
                                   const Box& touched) {
   const std::vector<Fold>& folds = folds_.at(f.name());
@@ -129,7 +130,7 @@ void NestStorage::note_async_room(const LoopedFunc& f, const std::vector<Slide>&
   if (!is_first && (it->second == 0 || (room != 0 && room < it->second))) it->second = room;
 }
 
-// A Func that is computed at several places folds where all of them allow it.
+// A dimension of a Func that is computed at several places folds only if all of them allow it.
 void NestStorage::note_folds(const LoopedFunc& f, std::vector<Fold> folds) {
   auto [it, is_first] = folds_.emplace(f.name(), folds);
   for (size_t d = 0; d < folds.size() && !is_first; d++) {
@@ -149,7 +150,7 @@ Stmt NestStorage::realize(const LoopedFunc& f, const Box& box, Stmt stmt) {
     Range range{box[d].min, simplify(box[d].max - box[d].min + 1)};
     Expr& factor = folds_.at(f.name())[d].factor;
     auto extent = as_const_int(range.extent), fold = as_const_int(factor.defined() ? factor : 0);
-    if (extent && fold && *extent <= *fold) factor = Expr();  // nothing to gain
+    if (extent && fold && *extent <= *fold) factor = Expr();  // folding would save nothing
     if (const StorageRule* rule = rule_of(f, d)) apply(*rule, f, d, range, factor, checks);
     ranges.push_back(range);
   }
