@@ -75,7 +75,7 @@ class SharedStorage {
     if (!is_new) return known->second;
     if (find_thread_elements(kernel_, name))
       known->second = Wait::None;
-    else if (is_one_warp() || is_one_warps(kernel_, name))
+    else if (is_one_warp() || belongs_to_one_warp(kernel_, name))
       known->second = Wait::Warp;
     return known->second;
   }

@@ -2,6 +2,7 @@
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/print.h"
 #include "ir/visit.h"
 #include "lower/device/kernel.h"
 #include "lower/nests/copy_statement.h"
@@ -75,7 +76,9 @@ class KernelMaker : public StatementRewriter {
             refuse(text("the loop ", describe_loop(n.name), " in it is parallel"),
                    "Keep it serial");
         },
-        [&](const Fork&) { refuse("what is async() in it runs in a thread", "Drop async()"); },
+        [&](const Fork&) {
+          refuse("an async Func in it runs in a thread of the host", "Drop async()");
+        },
         [&](const StringImm& n) {
           refuse(text("it takes the address of the text ", Expr(&n)), "Compute it on the host");
         },

@@ -48,7 +48,7 @@ void privatize(Kernel& kernel) {
                  "Store it in MemoryType::GPUShared, or run the loops that store and read it over "
                  "threads in the same way");
     }
-    kernel.body = in_own_numbers(kernel, name, *elements);
+    kernel.body = renumbered_privately(kernel, name, *elements);
     kernel.body = resized(kernel.body, name, elements->own_count);
   }
 }

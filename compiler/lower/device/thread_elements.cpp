@@ -245,15 +245,15 @@ std::optional<ThreadElements> find_thread_elements(const Kernel& kernel,
 }
 
 // A warp consists of whole rows of threads if the row length divides the warp size; likewise of whole planes.
-bool is_one_warps(const Kernel& kernel, const std::string& storage) {
+bool belongs_to_one_warp(const Kernel& kernel, const std::string& storage) {
   const int row = kernel.threads[0], plane = row * kernel.threads[1];
   const bool has_rows = warp_threads % row == 0, has_planes = warp_threads % plane == 0;
   if (!has_rows) return false;
   return ElementsFinder(kernel, storage, {false, !has_planes, true}).find().has_value();
 }
 
-Stmt in_own_numbers(const Kernel& kernel, const std::string& storage,
-                    const ThreadElements& elements) {
+Stmt renumbered_privately(const Kernel& kernel, const std::string& storage,
+                          const ThreadElements& elements) {
   std::vector<Digit> threads;
   std::ranges::copy_if(elements.digits, std::back_inserter(threads),
                        [](const Digit& digit) { return digit.thread >= 0; });

@@ -35,10 +35,10 @@ std::optional<ThreadElements> find_thread_elements(const Kernel& kernel,
                                                    const std::string& storage);
 
 // Whether each element is proven to be accessed by the threads of a single warp.
-bool is_one_warps(const Kernel& kernel, const std::string& storage);
+bool belongs_to_one_warp(const Kernel& kernel, const std::string& storage);
 
 // The kernel's body in which accesses of `storage` use the thread's own numbering.
-Stmt in_own_numbers(const Kernel& kernel, const std::string& storage,
-                    const ThreadElements& elements);
+Stmt renumbered_privately(const Kernel& kernel, const std::string& storage,
+                          const ThreadElements& elements);
 
 }  // namespace retrograde::lower

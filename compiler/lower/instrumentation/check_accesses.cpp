@@ -32,7 +32,7 @@ namespace retrograde::lower {
 namespace {
 
 // The range of valid elements, as int64 offsets from the address of the memory.
-struct Room {
+struct ElementRange {
   Expr first, last;
 };
 
@@ -86,7 +86,7 @@ bool is_read(const std::string& name, const Stmt& s) {
 
 // State that all parts of the walk share.
 struct Surroundings {
-  std::unordered_map<std::string, Room> rooms;
+  std::unordered_map<std::string, ElementRange> ranges;
   LoopName stage;  // of the innermost loop around
 };
 
@@ -176,7 +176,7 @@ class AccessChecker : public Rewriter {
   Stmt visit_allocate(const Stmt& s, const Allocate& n) {
     const Expr last = binary(Kind::Sub, n.elements, make_const(Int(64), 1));
     const Expr name = is_const(last) ? last : variable(n.name + ".last", Int(64));
-    around_.rooms[n.name] = {make_const(Int(64), 0), name};
+    around_.ranges[n.name] = {make_const(Int(64), 0), name};
     const Stmt result = children(s);
     return is_const(last) ? result : make_let(n.name + ".last", last, result);
   }
@@ -212,10 +212,10 @@ class AccessChecker : public Rewriter {
   // nullopt for memory whose extent is not known here.
   std::optional<Check> check_of(const std::string& name, const char* access, const Expr& index,
                                 const Expr& predicate) const {
-    const Room* room = find_or_null(around_.rooms, name);
-    if (!room) return {};
-    const Expr low = extreme(Kind::Min, index, predicate, room->first);
-    const Expr high = extreme(Kind::Max, index, predicate, room->last);
+    const ElementRange* range = find_or_null(around_.ranges, name);
+    if (!range) return {};
+    const Expr low = extreme(Kind::Min, index, predicate, range->first);
+    const Expr high = extreme(Kind::Max, index, predicate, range->last);
     std::vector<Expr> message = {Expr(int32_t{retrograde_error_access_out_of_bounds}),
                                  Expr(text("checked_accesses: ", quoted(name), " is ", access, " ",
                                            stage("by"), "at element ")),
@@ -225,15 +225,15 @@ class AccessChecker : public Rewriter {
       message.push_back(high);
     }
     message.emplace_back(". An access stays inside its storage, which has the elements ");
-    message.push_back(room->first);
+    message.push_back(range->first);
     message.emplace_back(" to ");
-    message.push_back(room->last);
+    message.push_back(range->last);
     message.emplace_back(
         ". Correct what unsafe_promise_clamped() or allow_race_conditions() promises; a program "
         "without them "
         "has met a fault of the compiler: report it.");
     const Expr holds =
-        binary(Kind::And, binary(Kind::LE, room->first, low), binary(Kind::LE, high, room->last));
+        binary(Kind::And, binary(Kind::LE, range->first, low), binary(Kind::LE, high, range->last));
     return Check{holds, call_op(Op::error, Int(32), std::move(message))};
   }
 
@@ -315,8 +315,8 @@ class AccessChecker : public Rewriter {
 };
 
 // Adds the range from the first to the last element of a buffer, for strides of either sign.
-void add_room(const LoweredArgument& arg, Lets& lets,
-              std::unordered_map<std::string, Room>& rooms) {
+void add_range(const LoweredArgument& arg, Lets& lets,
+               std::unordered_map<std::string, ElementRange>& ranges) {
   const Expr buffer = variable(arg.name + ".buffer", Handle()), zero = make_const(Int(64), 0);
   Expr first = zero, last = zero, is_empty = const_false();
   // This code runs before the checks of arguments, so it tests that the buffer is usable.
@@ -340,18 +340,18 @@ void add_room(const LoweredArgument& arg, Lets& lets,
   const std::string first_name = arg.name + ".first", last_name = arg.name + ".last";
   lets.emplace_back(first_name, if_usable(make_select(is_empty, zero, first), 0));
   lets.emplace_back(last_name, if_usable(make_select(is_empty, make_const(Int(64), -1), last), -1));
-  rooms[arg.name] = {variable(first_name, Int(64)), variable(last_name, Int(64))};
+  ranges[arg.name] = {variable(first_name, Int(64)), variable(last_name, Int(64))};
 }
 
 }  // namespace
 
 Stmt check_accesses(const Stmt& s, const std::vector<LoweredArgument>& args) {
   Lets lets;
-  std::unordered_map<std::string, Room> rooms;
+  std::unordered_map<std::string, ElementRange> ranges;
   for (const LoweredArgument& arg : args) {
-    if (arg.is_buffer()) add_room(arg, lets, rooms);
+    if (arg.is_buffer()) add_range(arg, lets, ranges);
   }
-  Surroundings around{std::move(rooms), {}};
+  Surroundings around{std::move(ranges), {}};
   return make_lets(lets, AccessChecker(around)(s));
 }
 

@@ -36,7 +36,7 @@ namespace {
 const char* const pipeline_id = "pipeline.trace_id";
 
 // The union of what target and schedule request.
-TraceSchedule asked_of(TraceSchedule trace, const Target& target) {
+TraceSchedule requested_trace(TraceSchedule trace, const Target& target) {
   trace.loads |= target.has_feature(Target::TraceLoads);
   trace.stores |= target.has_feature(Target::TraceStores);
   trace.realizations |= target.has_feature(Target::TraceRealizations);
@@ -83,7 +83,7 @@ class Tracer : public Rewriter {
  public:
   Tracer(const Program& program, const Target& target) : target_(target) {
     for (const LoopedFunc& f : program.funcs) {
-      const TraceSchedule trace = asked_of(f.func->trace, target);
+      const TraceSchedule trace = requested_trace(f.func->trace, target);
       if (is_any(trace)) traces_[f.name()] = trace;
     }
   }
@@ -132,7 +132,7 @@ class Tracer : public Rewriter {
   bool is_traced_image(const Call& call) const {
     if (call.call_type != CallType::Image) return false;
     const auto param = std::dynamic_pointer_cast<ParameterContents>(call.symbol.lock());
-    return asked_of(param ? param->trace : TraceSchedule(), target_).loads;
+    return requested_trace(param ? param->trace : TraceSchedule(), target_).loads;
   }
 
   std::string id_of(const std::string& func) const {

@@ -35,7 +35,8 @@ class AllocationBounder : public BoundedExtents {
     const auto* n = inner.as<Allocate>();
     if (!n || is_const(n->elements) || n->offset.defined()) return inner;
     const bool is_asked = n->memory == MemoryType::Stack;
-    if ((!is_asked && n->memory != MemoryType::Auto) || !is_made_of_few(n->elements, most_names))
+    if ((!is_asked && n->memory != MemoryType::Auto) ||
+        !mentions_few_names(n->elements, most_names))
       return inner;
     const int64_t bytes = int64_t{n->type.bytes()} * n->type.lanes();
     const auto most = largest(n->elements, (is_asked ? most_asked : most_unasked) / bytes);

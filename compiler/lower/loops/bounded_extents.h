@@ -24,7 +24,7 @@ class BoundedExtents : public StatementRewriter {
   // A constant upper bound of the extent at the current statement; nullopt if none of at most `most` is known.
   std::optional<int64_t> largest(const Expr& extent, int64_t most) const;
   // Whether the extent mentions at most `names` names, counting those in the values of its lets.
-  bool is_made_of_few(const Expr& extent, int names) const;
+  bool mentions_few_names(const Expr& extent, int names) const;
 
  private:
   Substitution values_;            // of lets around the current statement, not expanded
@@ -32,7 +32,7 @@ class BoundedExtents : public StatementRewriter {
   std::vector<Expr> conditions_;   // that hold there
 
   Stmt chosen(const IfThenElse& choice);
-  bool takes_names(const Expr& e, int& left) const;
+  bool count_names(const Expr& e, int& left) const;
 };
 
 }  // namespace retrograde::lower

@@ -205,18 +205,18 @@ class AsyncBranches {
   // The two branches; undefined if empty.
   Stmt producer, consumer;
   void split() {
-    made_ = {n_.name};
+    in_producer_branch_ = {n_.name};
     producer = only_producer(n_.body);
-    while (add_what_is_read()) producer = only_producer(n_.body);
-    made_.erase(n_.name);
-    consumer = without_unread(without_producer(n_.body, n_.name), made_);
+    while (add_producers_of_producer()) producer = only_producer(n_.body);
+    in_producer_branch_.erase(n_.name);
+    consumer = without_unread(without_producer(n_.body, n_.name), in_producer_branch_);
     check_is_apart();
   }
 
  private:
   // Adds Funcs computed in the same loops that the producer reads; false if there are no more.
-  bool add_what_is_read() {
-    const size_t before = made_.size();
+  bool add_producers_of_producer() {
+    const size_t before = in_producer_branch_.size();
     walk(
         n_.body, [](const Expr&) { return false; },
         [&](const Stmt& part) {
@@ -225,10 +225,10 @@ class AsyncBranches {
           const Names group = group_of(*other);
           if (std::any_of(group.begin(), group.end(),
                           [&](const std::string& func) { return uses_func(producer, func); }))
-            made_.insert(group.begin(), group.end());
+            in_producer_branch_.insert(group.begin(), group.end());
           return false;
         });
-    return made_.size() > before;
+    return in_producer_branch_.size() > before;
   }
 
   // Removes the computation of those Funcs that nothing reads.
@@ -250,7 +250,7 @@ class AsyncBranches {
     const std::string name = quoted(program_.original(n_.name));
     const Names inside = realized_in(n_.body);
     Names computed = produced_in(producer);
-    computed.insert(made_.begin(), made_.end());
+    computed.insert(in_producer_branch_.begin(), in_producer_branch_.end());
     computed.erase(n_.name);
     for (const std::string& other : computed) {
       const LoopedFunc* f = program_.find(other);
@@ -296,8 +296,9 @@ class AsyncBranches {
   // Keeps only the work of the producer and of the Funcs that it needs, with the control flow around; undefined if
   // nothing is left.
   Stmt only_producer(const Stmt& s) {
-    if (!s.defined() || !produces_any(s, made_)) return {};
-    if (const ProducerConsumer* n = as_producer(s); n && made_.count(n->name)) return s;
+    if (!s.defined() || !produces_any(s, in_producer_branch_)) return {};
+    if (const ProducerConsumer* n = as_producer(s); n && in_producer_branch_.count(n->name))
+      return s;
     const auto part = [&](const Stmt& child) { return only_producer(child); };
     if (const Block* n = s.as<Block>()) {
       const auto is_wait = [&](const Stmt& child) {
@@ -339,7 +340,7 @@ class AsyncBranches {
   const std::vector<std::string>& forked_;
   const Program& program_;
   Semaphores& semaphores_;
-  Names made_;  // computed by the producer's branch
+  Names in_producer_branch_;  // computed by the producer's branch
 };
 
 // ---- all async Funcs ----
@@ -350,8 +351,8 @@ class AsyncForker : public StatementRewriter {
       : program_(program), room_(room), semaphores_(s) {}
 
  protected:
-  Stmt rewrite(const Stmt& given) override {
-    const Stmt s = producers_outermost(given);
+  Stmt rewrite(const Stmt& original_stmt) override {
+    const Stmt s = producers_outermost(original_stmt);
     const Realize* n = s.as<Realize>();
     if (n) around_[original(n->name)] = s;
     if (const Realize* func = n ? ring_at(*n) : nullptr) return fork_ring(*n, *func);

@@ -61,10 +61,10 @@ class Kept : public Rewriter {
   }
 
   // Copies the elements into the array before the loops, and back after them.
-  Stmt fetch() const {
+  Stmt copy_in() const {
     return in_lanes(make_provide(name_, values_of(update_.provide->name, update_.point), args_));
   }
-  Stmt give_back() const {
+  Stmt copy_back() const {
     return in_lanes(make_provide(update_.provide->name, values_of(name_, args_), update_.point));
   }
 
@@ -181,8 +181,9 @@ class KeepAccumulators : public StatementRewriter {
     const std::string name = fresh_(update.provide->name + ".kept");
     const Stmt start = filling ? filling(name, update) : Stmt();
     Kept array(std::move(update), name);
-    return array.around(make_block({start.defined() ? start : copy_statement(array.fetch(), fresh_),
-                                    array(loop), copy_statement(array.give_back(), fresh_)}));
+    return array.around(
+        make_block({start.defined() ? start : copy_statement(array.copy_in(), fresh_), array(loop),
+                    copy_statement(array.copy_back(), fresh_)}));
   }
 
   const std::function<bool(const For&)>& is_pure_;

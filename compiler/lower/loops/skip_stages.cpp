@@ -82,7 +82,7 @@ bool is_one_point(const Stmt& s) {
       });
 }
 
-// By Func: the condition under which it is needed.
+// The condition under which each Func is needed.
 using Guards = std::map<std::string, Expr>;
 
 class NeedFinder {

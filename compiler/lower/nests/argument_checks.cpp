@@ -38,7 +38,7 @@ class Checks {
     for (const LoweredArgument& arg : args_) {
       if (arg.is_buffer()) add_shape_checks(arg, shape_checks);
     }
-    Stmt body = make_block({query_or_run()});
+    Stmt body = make_block({emit_query_or_run()});
     body = make_lets(nests_.bounds, body);
     std::vector<Stmt> fact_checks;
     for (const LoweredArgument& arg : args_) {
@@ -131,25 +131,25 @@ class Checks {
   }
 
   // Calls a check of the runtime, which reports an error and returns its code, or 0.
-  static Stmt ask(const char* function, std::vector<Expr> args) {
+  static Stmt call_check(const char* function, std::vector<Expr> args) {
     return checked_call("code", call_runtime(function, std::move(args)));
   }
 
   static void add_shape_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) {
-    checks.push_back(
-        ask(check_shape, {handle_of(arg.name), Expr(arg.name),
-                          Expr(static_cast<int32_t>(type_word(arg.type))), Expr(arg.dimensions)}));
+    checks.push_back(call_check(
+        check_shape, {handle_of(arg.name), Expr(arg.name),
+                      Expr(static_cast<int32_t>(type_word(arg.type))), Expr(arg.dimensions)}));
   }
 
   // States what a runtime call has already checked: the simplifier uses it, and no code is generated.
-  static Stmt holds_already(const Expr& condition) {
+  static Stmt known_fact(const Expr& condition) {
     return make_assert(condition, call_op(Op::undef, Int(32), {}));
   }
 
   static void add_extent_facts(const LoweredArgument& arg, std::vector<Stmt>& checks) {
     for (int d = 0; d < arg.dimensions; d++) {
       const Expr extent = call_op(Op::buffer_extent, Int(32), {handle_of(arg.name), d});
-      checks.push_back(holds_already(extent >= 0));
+      checks.push_back(known_fact(extent >= 0));
     }
   }
 
@@ -197,7 +197,7 @@ class Checks {
     }
   }
 
-  Stmt query_or_run() const {
+  Stmt emit_query_or_run() const {
     Expr any_query = const_false();
     std::vector<Stmt> answers, run;
     for (const LoweredArgument& arg : args_) {
@@ -210,7 +210,7 @@ class Checks {
       add_promise_checks(arg, box, run);
       add_constraint_checks(arg, run);
     }
-    return_if_nothing_is_asked(run);
+    return_if_outputs_are_empty(run);
     for (const LoweredArgument& arg : args_) {
       if (arg.is_buffer()) add_region_checks(arg, required_box(arg), run);
     }
@@ -222,17 +222,17 @@ class Checks {
 
   // Returns if every output is empty. The regions of inputs do not matter then: loops that do not run may appear to
   // read any box, for example clamp(x, 0, extent - 1) reads 0.
-  void return_if_nothing_is_asked(std::vector<Stmt>& checks) const {
-    Expr is_asked = const_false();
+  void return_if_outputs_are_empty(std::vector<Stmt>& checks) const {
+    Expr has_output = const_false();
     for (const LoweredArgument& arg : args_) {
       if (arg.kind != LoweredArgument::Kind::OutputBuffer) continue;
       Expr has_elements = const_true();
       for (int d = 0; d < arg.dimensions; d++)
         has_elements = has_elements && variable(fact(arg.name, "extent", d)) > 0;
-      is_asked = is_asked || has_elements;
+      has_output = has_output || has_elements;
     }
-    is_asked = simplify(is_asked);
-    if (!is_const_true(is_asked)) checks.push_back(make_assert(is_asked, 0));
+    has_output = simplify(has_output);
+    if (!is_const_true(has_output)) checks.push_back(make_assert(has_output, 0));
   }
 
   void add_requirements(std::vector<Stmt>& checks) const {
@@ -293,7 +293,7 @@ class Checks {
       if (is_const_true(holds)) continue;
       checks.push_back(run_time_check(
           holds, retrograde_error_constraints_make_required_region_smaller,
-          text("cannot run: what is promised of a buffer must hold what is used of it; ",
+          text("cannot run: a promised region must contain the region that is used; ",
                quoted(arg.name), " is used over ["),
           box[d].min, Expr(", "), box[d].max,
           text("] in dimension ", d,
@@ -326,9 +326,9 @@ class Checks {
       dimensions |= 1 << d;
       sides.push_back(cast(Int(32), box[d].min));
       sides.push_back(cast(Int(32), box[d].max));
-      facts.push_back(holds_already(inside));
+      facts.push_back(known_fact(inside));
     }
-    checks.push_back(ask(
+    checks.push_back(call_check(
         check_region, {handle_of(arg.name), Expr(arg.name), Expr(region_rules(arg)),
                        Expr(promised_alignment(arg)), Expr(dimensions), pack(std::move(sides))}));
     checks.insert(checks.end(), facts.begin(), facts.end());

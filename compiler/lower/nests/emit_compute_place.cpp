@@ -187,15 +187,15 @@ NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& cod
       keep_inside_needs(*member.f, member.need, member.slides, want.first > 0, site);
   }
   for (Member& member : members) member.required = member.need;
-  Emitted made = emit_members(group, members, site, std::move(checks));
-  std::map<std::string, Box> allocated = std::move(made.storage);
-  made.storage.clear();
+  Emitted generated = emit_members(group, members, site, std::move(checks));
+  std::map<std::string, Box> allocated = std::move(generated.storage);
+  generated.storage.clear();
   for (Member& member : members) {
     auto own = allocated.extract(member.f->name());
     member.need = hull(own.mapped(), member.touched);
   }
-  made.storage = std::move(allocated);
-  for (const auto& [name, use] : made.uses) {
+  generated.storage = std::move(allocated);
+  for (const auto& [name, use] : generated.uses) {
     auto [it, is_first] = wanted.emplace(name, Wanted{piece.lead, piece.lead});
     if (is_first || !code.uses.count(name)) it->second = {piece.lead, piece.lead};
     it->second.first = std::max(it->second.first, piece.lead);
@@ -205,10 +205,10 @@ NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& cod
     code.overrun.counts |= !may_be_partly_right(*member.f, values_);
     code.overrun.inside.push_back(member.f);
   }
-  merge_code(code, made);
+  merge_code(code, generated);
   if (site.around.empty()) ask_wholes(code, site);
-  for (Member& member : members) keep(member, member.need, code, made, piece, site);
-  piece.produce = members.size() == 1 ? unless_empty(members[0], made.stmt) : made.stmt;
+  for (Member& member : members) keep(member, member.need, code, generated, piece, site);
+  piece.produce = members.size() == 1 ? unless_empty(members[0], generated.stmt) : generated.stmt;
   return piece;
 }
 
@@ -231,16 +231,16 @@ Stmt NestEmitter::unless_empty(const Member& member, const Stmt& stmt) const {
 }
 
 // Decides on the storage of a computed Func.
-void NestEmitter::keep(Member& member, Box allocated, Emitted& code, Emitted& made, Piece& piece,
-                       ComputePlace& site) {
+void NestEmitter::keep(Member& member, Box allocated, Emitted& code, Emitted& generated,
+                       Piece& piece, ComputePlace& site) {
   const LoopedFunc& f = *member.f;
   if (f.is_output) {
     outputs_[f.name()] = allocated;
     return;
   }
   Box touched = hull(member.required, allocated);
-  made.stmt =
-      storage_.fold(f, touched, member.loops, member.slides, code.has_vectors, site, made.stmt);
+  generated.stmt = storage_.fold(f, touched, member.loops, member.slides, code.has_vectors, site,
+                                 generated.stmt);
   if (f.schedule.async && !member.loops.empty())
     storage_.note_async_room(f, member.slides, site.touched(touched));
   if (is_stored_where_computed(f)) {

@@ -345,7 +345,7 @@ namespace {
 
 Loop& loop_at(std::vector<Loop>& loops, int depth) { return loops[loops.size() - depth]; }
 
-// By how much the loop variable of a stage exceeds that of the stage it is aligned to.
+// The difference between the loop variable of a stage and that of the stage it is aligned to.
 Expr shift_of(LoopAlignStrategy align, const Interval& own, const Interval& other) {
   switch (align) {
     case LoopAlignStrategy::AlignStart:

@@ -14,7 +14,7 @@ struct Joining {
   std::vector<LoopAlignStrategy> align;  // outermost first
 };
 
-// Of a program that has passed check_joinings.
+// The compute_with directives of a program that has passed check_joinings.
 std::vector<Joining> joinings_of(const Program& program);
 
 // CompileError unless, for each compute_with: 1. the other stage is part of the pipeline, and named exactly if its Func

@@ -92,7 +92,7 @@ class NestEmitter {
   Wanted slide_together(std::vector<Member>& members, const WantedFuncs& wanted,
                         ComputePlace& site) const;
   Stmt unless_empty(const Member& member, const Stmt& stmt) const;
-  void keep(Member& member, Box allocated, Emitted& code, Emitted& made, Piece& piece,
+  void keep(Member& member, Box allocated, Emitted& code, Emitted& generated, Piece& piece,
             ComputePlace& site);
   Box output_box(const LoopedFunc& f, const Box& read);
 

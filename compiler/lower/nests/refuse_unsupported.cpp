@@ -149,7 +149,7 @@ void resolve(const Program& program, LoopLevel& level) {
 }
 
 // Stages that share only the outermost loop, which runs once, share nothing.
-void leave_outermost_company(StageLoops& schedule) {
+void drop_fusion_at_outermost(StageLoops& schedule) {
   LoopLevel& level = schedule.fuse_level;
   if (level.kind == LoopLevel::Kind::At && level.var == outermost_loop) level = {};
 }
@@ -162,7 +162,7 @@ void resolve_outermost_levels(Program& program) {
     resolve(program, f->schedule.compute_level);
     resolve(program, f->schedule.store_level);
     resolve(program, f->schedule.hoist_level);
-    for (Definition& stage : f->stages) leave_outermost_company(stage.schedule);
+    for (Definition& stage : f->stages) drop_fusion_at_outermost(stage.schedule);
   }
 }
 

@@ -41,7 +41,7 @@ struct Derived {
 };
 
 // Whether the Func has storage of its own that grows with the region its loops access.
-bool has_room_of_its_own(const LoopedFunc& f) {
+bool has_growing_storage(const LoopedFunc& f) {
   return !f.is_output && !f.func->is_extern() && !f.schedule.memoized && !f.schedule.async &&
          is_stored_where_computed(f);
 }
@@ -61,7 +61,7 @@ class NestBuilder {
         prefix_(stage_prefix(f.name(), stage)),
         is_update_(stage > 0),
         hosts_updates_(hosts_own_updates(f, stage)),
-        may_run_past_the_end_(stage == 0 && !hosts_updates_ && has_room_of_its_own(f) &&
+        may_run_past_the_end_(stage == 0 && !hosts_updates_ && has_growing_storage(f) &&
                               reads_nothing(definition_)),
         ranges_(domain) {}
 

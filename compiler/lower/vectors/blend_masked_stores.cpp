@@ -93,11 +93,11 @@ struct Storage {
   int task;  // number of parallel loops and forks around the allocation
   int padding = 0;
 
-  bool surely_holds(const Dense& places) const {
+  bool can_prove_inside(const Dense& places) const {
     const auto first = as_const_int(places.first);
     return first && elements && *first >= 0 && *first + places.lanes <= *elements;
   }
-  void make_room(const Dense& places) { padding = std::max(padding, places.lanes); }
+  void pad_for(const Dense& places) { padding = std::max(padding, places.lanes); }
 };
 
 class BlendMaskedStores : public Rewriter {
@@ -174,11 +174,11 @@ class BlendMaskedStores : public Rewriter {
     const auto storage = storage_.find(n.name);
     const auto places = as_dense(n.index);
     if (storage == storage_.end() || !places) return e;
-    if (storage->second.surely_holds(*places))
+    if (storage->second.can_prove_inside(*places))
       return make_load(n.type, n.name, n.index, {}, n.symbol);
     const Expr check = check_of(n.predicate);
     if (!check.defined()) return e;
-    storage->second.make_room(*places);
+    storage->second.pad_for(*places);
     const Expr first = is_known(check)
                            ? places->first
                            : make_select(check, places->first, make_zero(places->first.type()));
@@ -194,10 +194,10 @@ class BlendMaskedStores : public Rewriter {
     const auto storage = storage_.find(n.name);
     const auto places = as_dense(n.index);
     if (storage == storage_.end() || storage->second.task != task_ || !places) return children(s);
-    if (storage->second.surely_holds(*places)) return blended(n);
+    if (storage->second.can_prove_inside(*places)) return blended(n);
     const Expr check = check_of(n.predicate);
     if (!check.defined() || !loads_from(n.value, n.name)) return children(s);
-    storage->second.make_room(*places);
+    storage->second.pad_for(*places);
     if (is_known(check)) return blended(n);
     return checked(check, knowing(check, [&] { return blended(n); }));
   }

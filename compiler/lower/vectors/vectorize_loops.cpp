@@ -63,7 +63,7 @@ bool can_recompute(const Surroundings& around) {
 }
 
 // Rewrites accesses of per-lane allocations to the elements of one lane.
-Stmt with_own_elements(const Stmt& s, const Expr& lane, const Widener& widen) {
+Stmt with_lane_elements(const Stmt& s, const Expr& lane, const Widener& widen) {
   if (widen.wide_allocations().empty()) return s;
   const auto own = [&](const Expr& index) {
     Expr scaled = binary(Kind::Mul, index, make_const(index.type(), widen.iterations()));
@@ -88,7 +88,7 @@ Stmt lane_loop(const Stmt& s, const For& loop, const Surroundings& around, const
   Stmt body = make_lets(around.lets, make_if(conjunction(around.conditions), s));
   std::string lane = fresh(loop.name);
   Expr number = binary(Kind::Sub, variable(lane), loop.min);
-  body = with_own_elements(body, number, widen);
+  body = with_lane_elements(body, number, widen);
   body = copy_statement(body, fresh, {{loop.name, variable(lane)}});
   return make_for(lane, loop.min, make_const(loop.min.type(), widen.iterations()), ForType::Serial,
                   body);
@@ -101,7 +101,7 @@ Stmt lane_copies(const Stmt& s, const Widener& widen, FreshNames& fresh) {
     for (const auto& [name, wide] : widen.bound()) {
       values[name] = extract_iteration(wide, i, wide.type().lanes() / widen.iterations());
     }
-    Stmt copy = copy_statement(with_own_elements(s, Expr(i), widen), fresh, values);
+    Stmt copy = copy_statement(with_lane_elements(s, Expr(i), widen), fresh, values);
     const Expr& mask = widen.mask();
     copies.push_back(mask.defined() ? make_if(extract_iteration(mask, i, 1), copy) : copy);
   }
