@@ -50,9 +50,8 @@ namespace retrograde::lower {
 
 namespace {
 
-constexpr int most_choices = 64;  // in one expression
-constexpr int deepest_choice =
-    4;  // nesting depth; conditions of choices beyond either limit count as true
+// Choices in one expression, and their nesting depth; conditions of choices beyond either limit count as true.
+constexpr int most_choices = 64, deepest_choice = 4;
 
 bool is_choice(const Expr& e) { return e.as<Select>() || as_op(e, Op::if_then_else); }
 
