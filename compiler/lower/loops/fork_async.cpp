@@ -30,13 +30,12 @@
 
 #include <algorithm>
 #include <optional>
-#include <set>
 #include <utility>
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
-#include "ir/memory_reads.h"
 #include "ir/visit.h"
+#include "lower/loops/async_branches.h"
 #include "lower/loops/ring_buffers.h"
 #include "lower/loops/semaphores.h"
 #include "lower/nests/make_names_unique.h"
@@ -45,305 +44,6 @@
 namespace retrograde::lower {
 
 namespace {
-
-// Whether the expression (or statement) itself reads (or writes) the Func.
-bool reads_func(const Expr& e, const std::string& func) {
-  const Call* call = e.as<Call>();
-  const Variable* variable = e.as<Variable>();
-  return (call && call->call_type == CallType::Func && call->name == func) ||
-         (variable && variable->name.rfind(func + ".stride.", 0) == 0);
-}
-bool writes_func(const Stmt& s, const std::string& func) {
-  const Provide* provide = s.as<Provide>();
-  const Prefetch* prefetch = s.as<Prefetch>();
-  return (provide && provide->name == func) || (prefetch && prefetch->name == func);
-}
-bool uses_func(const Expr& e, const std::string& func) {
-  return any_node(e, [&](const Expr& node) { return reads_func(node, func); });
-}
-bool uses_func(const Stmt& s, const std::string& func) {
-  return any_node(
-      s, [&](const Expr& node) { return reads_func(node, func); },
-      [&](const Stmt& part) { return writes_func(part, func); });
-}
-
-bool own_parts_use(const Stmt& s, const std::string& func) {
-  bool found = false;
-  for_each_child(
-      s, [&](const Expr& e) { found = found || uses_func(e, func); }, [](const Stmt&) {});
-  return found;
-}
-
-using Names = std::set<std::string>;
-
-const ProducerConsumer* as_producer(const Stmt& s) {
-  const ProducerConsumer* n = s.as<ProducerConsumer>();
-  return n && n->produces ? n : nullptr;
-}
-
-bool is_producer_of(const Stmt& s, const std::string& func) {
-  const ProducerConsumer* n = as_producer(s);
-  return n && n->name == func;
-}
-
-bool produces_any(const Stmt& s, const Names& funcs) {
-  return any_stmt(s, [&](const Stmt& part) {
-    const ProducerConsumer* n = as_producer(part);
-    return n && funcs.count(n->name);
-  });
-}
-
-bool produces(const Stmt& s, const std::string& func) { return produces_any(s, {func}); }
-
-// The Funcs computed together in the loops of a producer (compute_with): those of producers nested directly in each
-// other, without a loop in between. Tracing may stand around the inner ones.
-void add_group(const Stmt& s, Names& names) {
-  if (const auto* let = s.as<LetStmt>()) return add_group(let->body, names);
-  if (const auto* block = s.as<Block>()) {
-    for (const Stmt& part : block->stmts) add_group(part, names);
-  } else if (const ProducerConsumer* n = as_producer(s)) {
-    names.insert(n->name);
-    add_group(n->body, names);
-  }
-}
-Names group_of(const ProducerConsumer& producer) {
-  Names names = {producer.name};
-  add_group(producer.body, names);
-  return names;
-}
-
-Names realized_in(const Stmt& s) {
-  Names names;
-  walk(s, [&](const Realize& n) { names.insert(n.name); });
-  return names;
-}
-
-Names produced_in(const Stmt& s) {
-  Names names;
-  walk(s, [&](const ProducerConsumer& n) {
-    if (n.produces) names.insert(n.name);
-  });
-  return names;
-}
-
-// Whether anything except the computation of the Func itself uses it.
-bool is_read_outside(const Stmt& s, const std::string& func) {
-  bool found = false;
-  walk(
-      s, [&](const Expr& e) { return !(found = found || reads_func(e, func)); },
-      [&](const Stmt& part) {
-        return !is_producer_of(part, func) && !(found = found || writes_func(part, func));
-      });
-  return found;
-}
-
-// Whether a loop inside of `s` is around the producer.
-bool has_loop_around(const Stmt& s, const std::string& func) {
-  bool found = false;
-  walk(
-      s, [](const Expr&) { return false; },
-      [&](const Stmt& part) {
-        if (is_producer_of(part, func)) return false;
-        found |= part.kind() == Kind::For && produces(part, func);
-        return !found;
-      });
-  return found;
-}
-
-// Whether anything uses this Func, or one that is computed together with it.
-bool is_group_read(const Stmt& s, const std::string& func) {
-  Names group = {func};
-  walk(
-      s, [](const Expr&) { return false; },
-      [&](const Stmt& part) {
-        const ProducerConsumer* n = as_producer(part);
-        const Names names = n ? group_of(*n) : Names();
-        if (names.count(func)) group.insert(names.begin(), names.end());
-        return !names.count(func);
-      });
-  return std::any_of(group.begin(), group.end(),
-                     [&](const std::string& other) { return is_read_outside(s, other); });
-}
-
-// The hoisted storage outside of the statement that holds its Funcs, by original names.
-Names places_of(const Stmt& s, const Program& program) {
-  Names places, inside;
-  if (!s.defined()) return places;
-  for (const std::string& name : realized_in(s)) inside.insert(program.original(name));
-  for (const std::string& name : inside) {
-    const LoopedFunc* f = program.find(name);
-    if (f && is_hoisted(*f) && !inside.count(place_name(name))) places.insert(place_name(name));
-  }
-  return places;
-}
-
-// Whether the statement uses the Func, or the hoisted storage, that was realized under this name.
-bool needs(const Stmt& s, const std::string& name, const Program& program) {
-  return s.defined() && (uses_func(s, name) || places_of(s, program).count(program.original(name)));
-}
-
-[[noreturn]] void refuse_loops(const std::string& func, const std::string& evidence,
-                               const char* instead) {
-  unsupported(
-      text("compute ", quoted(func), " async"),
-      "the loops between storage and computation of an async Func are serial and always run",
-      evidence, instead);
-}
-
-// ---- the two branches ----
-
-// Splits the code inside the storage of an async Func into the branches of a Fork. One keeps only the work of the
-// producer and the Funcs it needs; the other keeps everything else.
-class AsyncBranches {
- public:
-  // `room`: how many iterations the producer may be ahead (AsyncRoom); nullopt: it runs once.
-  // `forked`: the async Funcs whose Forks are around this code.
-  AsyncBranches(const Realize& n, std::optional<int> room, const std::vector<std::string>& forked,
-                const Program& program, Semaphores& semaphores)
-      : n_(n), room_(room), forked_(forked), program_(program), semaphores_(semaphores) {}
-
-  // The two branches; undefined if empty.
-  Stmt producer, consumer;
-  void split() {
-    in_producer_branch_ = {n_.name};
-    producer = only_producer(n_.body);
-    while (add_producers_of_producer()) producer = only_producer(n_.body);
-    in_producer_branch_.erase(n_.name);
-    consumer = without_unread(without_producer(n_.body, n_.name), in_producer_branch_);
-    check_is_apart();
-  }
-
- private:
-  // Adds Funcs computed in the same loops that the producer reads; false if there are no more.
-  bool add_producers_of_producer() {
-    const size_t before = in_producer_branch_.size();
-    walk(
-        n_.body, [](const Expr&) { return false; },
-        [&](const Stmt& part) {
-          const ProducerConsumer* other = as_producer(part);
-          if (!other || (other->name != n_.name && produces(part, n_.name))) return true;
-          const Names group = group_of(*other);
-          if (std::any_of(group.begin(), group.end(),
-                          [&](const std::string& func) { return uses_func(producer, func); }))
-            in_producer_branch_.insert(group.begin(), group.end());
-          return false;
-        });
-    return in_producer_branch_.size() > before;
-  }
-
-  // Removes the computation of those Funcs that nothing reads.
-  Stmt without_unread(Stmt s, Names funcs) {
-    for (auto it = funcs.begin(); s.defined() && it != funcs.end();) {
-      if (!produces(s, *it) || is_group_read(s, *it)) {
-        ++it;
-        continue;
-      }
-      s = without_producer(s, *it);
-      funcs.erase(it);
-      it = funcs.begin();
-    }
-    return s;
-  }
-
-  // Both branches may compute a Func, in its own loops or fused with another, only if each has storage for it.
-  void check_is_apart() const {
-    const std::string name = quoted(program_.original(n_.name));
-    const Names inside = realized_in(n_.body);
-    Names computed = produced_in(producer);
-    computed.insert(in_producer_branch_.begin(), in_producer_branch_.end());
-    computed.erase(n_.name);
-    for (const std::string& other : computed) {
-      const LoopedFunc* f = program_.find(other);
-      const bool is_output = f && f->is_output && is_read_outside(producer, other);
-      if (inside.count(other) || (!is_output && !produces(consumer, other))) continue;
-      user_error(text("compute ", name, " async"),
-                 "what an async Func and its consumer both read is stored no further out than the "
-                 "async Func, or computed outside of the loops that they share",
-                 text(quoted(program_.original(other)),
-                      " is computed in these loops and stored around ", name),
-                 text("Compute ", quoted(program_.original(other)), " at root, store it where ",
-                      name, " is stored, or call async() on it"));
-    }
-  }
-
-  // The loop around a branch's part of its body. The innermost loop around the producer gets the branch's wait and
-  // signal.
-  Stmt around_loop(const For& n, Stmt body, bool of_producer) {
-    if (room_ && produces(n.body, n_.name) && !has_loop_around(n.body, n_.name)) {
-      const Semaphore before = of_producer ? Space : Ready, after = of_producer ? Ready : Space;
-      std::vector<Stmt> stmts;
-      if (before == Ready || *room_ > 0) stmts.push_back(semaphores_.acquire(n_.name, before));
-      if (body.defined()) stmts.push_back(body);
-      if (after == Ready || *room_ > 0) stmts.push_back(Semaphores::release(n_.name, after));
-      body = make_block(std::move(stmts));
-    }
-    return make_for(n.name, n.min, n.extent, n.runs, body, n.partition);
-  }
-
-  // The statement with each part replaced; undefined if no part is left.
-  Stmt around(const Stmt& s, FunctionRef<Stmt(const Stmt&)> part) const {
-    const Stmt result = map_children(s, part);
-    const Realize* n = result.defined() ? result.as<Realize>() : nullptr;
-    return n && !needs(n->body, n->name, program_) ? n->body : result;
-  }
-
-  // Whether the statement checks a condition on the schedule or on sizes; neighbouring code relies on such checks.
-  static bool is_check(const Stmt& s) {
-    const auto* check = s.defined() ? s.as<Assert>() : nullptr;
-    return check && !reads_memory(check->condition, MemoryReads::Storage);
-  }
-
-  // Keeps only the work of the producer and of the Funcs that it needs, with the control flow around; undefined if
-  // nothing is left.
-  Stmt only_producer(const Stmt& s) {
-    if (!s.defined() || !produces_any(s, in_producer_branch_)) return {};
-    if (const ProducerConsumer* n = as_producer(s); n && in_producer_branch_.count(n->name))
-      return s;
-    const auto part = [&](const Stmt& child) { return only_producer(child); };
-    if (const Block* n = s.as<Block>()) {
-      const auto is_wait = [&](const Stmt& child) {
-        return std::any_of(forked_.begin(), forked_.end(), [&](const std::string& func) {
-          return Semaphores::is_step(child, func);
-        });
-      };
-      std::vector<Stmt> stmts;
-      for (const Stmt& child : n->stmts) {
-        const bool stays = is_wait(child) || is_check(child);
-        stmts.push_back(stays ? child : part(child));
-      }
-      return make_block(std::move(stmts));
-    }
-    if (const For* n = s.as<For>()) {
-      if (n->runs != ForType::Serial && produces(n->body, n_.name)) {
-        refuse_loops(program_.original(n_.name),
-                     text("the loop ", describe_loop(n->name), " is not serial"),
-                     "Store the Func inside of that loop");
-      }
-      return around_loop(*n, part(n->body), true);
-    }
-    if (const ProducerConsumer* n = s.as<ProducerConsumer>()) return part(n->body);
-    return around(s, part);
-  }
-
-  // Keeps everything except the work of a Func's producer.
-  Stmt without_producer(const Stmt& s, const std::string& func) {
-    if (!s.defined() || !produces(s, func)) return s;
-    if (is_producer_of(s, func)) return {};
-    const auto part = [&](const Stmt& child) { return without_producer(child, func); };
-    const For* n = s.as<For>();
-    if (n && func == n_.name) return around_loop(*n, part(n->body), false);
-    return around(s, part);
-  }
-
-  const Realize& n_;
-  const std::optional<int> room_;
-  const std::vector<std::string>& forked_;
-  const Program& program_;
-  Semaphores& semaphores_;
-  Names in_producer_branch_;  // computed by the producer's branch
-};
-
-// ---- all async Funcs ----
 
 class AsyncForker : public StatementRewriter {
  public:
@@ -370,8 +70,8 @@ class AsyncForker : public StatementRewriter {
   std::map<std::string, int>
       readers_;  // for each of those: the number of readers with their own semaphores
   std::map<std::string, Stmt> around_;  // Realizes by original name; the last one entered
-  Names rings_;                         // Funcs whose ring buffer is around and has been forked
-  Names shared_places_;                 // their hoisted storage, which both branches share
+  FuncNames rings_;                     // Funcs whose ring buffer is around and has been forked
+  FuncNames shared_places_;             // their hoisted storage, which both branches share
 
   const std::string& original(const std::string& name) const { return program_.original(name); }
   bool is_async(const std::string& name) const {
@@ -439,8 +139,7 @@ class AsyncForker : public StatementRewriter {
 
   // `room`: nullopt if the producer runs once.
   AsyncBranches branches_of(const Realize& n, std::optional<int> room) {
-    AsyncBranches branches(n, room, forked_, program_, semaphores_);
-    branches.split();
+    AsyncBranches branches = split_branches(n, room, forked_, program_, semaphores_);
     share_waits(branches.producer, branches.consumer);
     branches.producer = with_own_places(branches.producer, branches.consumer);
     return branches;
@@ -448,7 +147,8 @@ class AsyncForker : public StatementRewriter {
 
   // Adds separate hoisted storage to the producer's branch if both branches would use the same one.
   Stmt with_own_places(Stmt producer, const Stmt& consumer) const {
-    const Names here = places_of(producer, program_), there = places_of(consumer, program_);
+    const FuncNames here = hoisted_places_of(producer, program_),
+                    there = hoisted_places_of(consumer, program_);
     for (const std::string& place : here) {
       const auto around = around_.find(place);
       const bool is_shared = shared_places_.count(place) > 0;
@@ -511,10 +211,10 @@ class AsyncForker : public StatementRewriter {
         n.body, [](const Expr&) { return false; },
         [&](const Stmt& s) {
           const ProducerConsumer* around = as_producer(s);
-          if (!around || !may_be_skipped(*around) || group_of(*around).count(n.name) ||
+          if (!around || !may_be_skipped(*around) || fused_funcs_of(*around).count(n.name) ||
               !produces(around->body, n.name))
             return true;
-          refuse_loops(
+          refuse_async_loops(
               original(n.name),
               text("they are those of ", quoted(original(around->name)), ", which is memoized"),
               "Store the Func inside of that loop, or do not memoize the other");

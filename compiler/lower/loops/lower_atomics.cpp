@@ -1,5 +1,4 @@
 // lower_atomics -- reduce Atomic statements to the part that must be atomic, and drop those that need not be.
-// In:  FlatStorage; names unique; an Atomic holds one update of one point of a Func, or of several at
 // In:  FlatStorage; names unique; an Atomic holds an update of one point of a Func, or of several points at once.
 // Out: FlatStorage. Expressions that do not read the Func are computed before the Atomic. An Atomic with one store
 //      contains only that store. Storage that no parallel loop and no Fork shares has no Atomic.

@@ -5,6 +5,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/nests/buffer_constraints.h"
 #include "lower/nests/run_time_check.h"
 #include "lower/nests/schedule_checks.h"
 #include "lower/runtime_call.h"
@@ -83,22 +84,6 @@ class Checks {
     Expr actual = call_op(op, Int(32), {handle_of(arg.name), d});
     facts.emplace_back(promised.defined() ? name + ".actual" : name, actual);
     if (promised.defined()) promises.emplace_back(name, promised);
-  }
-
-  // The user's promise. For a buffer that the program embeds, its actual shape. Dimension 0 is dense unless the user
-  // says otherwise.
-  static BufferConstraint constraint_of(const LoweredArgument& arg, int d) {
-    auto param = std::dynamic_pointer_cast<ParameterContents>(arg.symbol.lock());
-    BufferConstraint promised;
-    if (param && d < static_cast<int>(param->constraints.size())) promised = param->constraints[d];
-    if (d == 0 && !promised.stride.defined() && !promised.any_stride) promised.stride = 1;
-    if (param && param->is_literal && param->buffer) {
-      const halide_dimension_t& dim = param->buffer->dim[d];
-      promised.min = dim.min;
-      promised.extent = dim.extent;
-      promised.stride = dim.stride;
-    }
-    return promised;
   }
 
   // The promise in terms of actual facts. It may mention promised facts, even its own, as "a multiple of 8" does.
@@ -341,16 +326,6 @@ class Checks {
            (is_dense(arg) ? retrograde_region_is_dense : 0) |
            (has_device_ ? retrograde_region_on_device : 0);
   }
-  // Whether dimension 0 is dense, which is the default.
-  static bool is_dense(const LoweredArgument& arg) {
-    return arg.dimensions > 0 && is_const_int(constraint_of(arg, 0).stride, 1);
-  }
-
-  static int32_t promised_alignment(const LoweredArgument& arg) {
-    const auto param = std::dynamic_pointer_cast<ParameterContents>(arg.symbol.lock());
-    return param && param->host_alignment > arg.type.bytes() ? param->host_alignment : 1;
-  }
-
   static Stmt box_check(const LoweredArgument& arg, const Interval& used, int d,
                         const Expr& inside) {
     const char* verb = arg.kind == LoweredArgument::Kind::OutputBuffer ? "written" : "read";

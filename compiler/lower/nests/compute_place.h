@@ -45,8 +45,8 @@ class ComputePlace {
  private:
   Substitution values_;  // of names with a single value, in terms of parts and outer names
   size_t known_ = 0;     // number of bindings that values_ contains
-  std::vector<std::string> parts_,
-      varying_parts_;  // names of ends; those of parts whose extent varies
+  std::vector<std::string> parts_;          // names of ends
+  std::vector<std::string> varying_parts_;  // names of ends of parts whose extent varies
   Scope<Interval> whole_, touched_;
 
   Expr name(const std::string& name, const Expr& value, bool always);

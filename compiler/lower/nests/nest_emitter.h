@@ -1,7 +1,7 @@
 // nest_emitter.h -- the class behind build_loop_nests: emits the stages computed at each place.
 //
 // build_loop_nests.cpp handles the root and the directives at a loop, emit_compute_place.cpp combines the Funcs of one
-// place, emit_stages.cpp emits the loops of their stages.
+// place, emit_stages.cpp emits the loops of their stages, and emit_extern.cpp emits extern stages.
 #pragma once
 
 #include <map>
@@ -96,7 +96,7 @@ class NestEmitter {
             ComputePlace& site);
   Box output_box(const LoopedFunc& f, const Box& read);
 
-  // ---- stages (emit_stages.cpp) ----
+  // ---- stages (emit_stages.cpp, emit_extern.cpp) ----
 
   // A stage among those that share loops (compute_with).
   struct NestStage {

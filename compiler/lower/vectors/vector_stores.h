@@ -33,7 +33,6 @@ class VectorStores {
 
   // True once a store that has been visited requires the iterations to run one after the other.
   bool must_stay_serial() const { return must_stay_serial_; }
-  // For all iterations; undefined: it has to run lane by lane.
   // The store for all iterations; undefined if it has to run lane by lane.
   Stmt store(const Stmt& s, const Store& n);
   // An atomic update whose index varies.
