@@ -36,6 +36,6 @@ struct GivenBuffers {
 };
 
 // In: a statement with launches. `given`: the buffer arguments of the function.
-Stmt keep_both_sides(const Stmt& s, const GivenBuffers& given);
+Stmt insert_device_transfers(const Stmt& s, const GivenBuffers& given);
 
 }  // namespace retrograde::lower

@@ -112,7 +112,7 @@ int most_shared_bytes(const Target& target) {
 Stmt make_kernels(const Stmt& s, const Target& target, const GivenBuffers& given) {
   const Stmt with_kernels = KernelMaker(s, target)(s);
   if (!target.has_feature(Target::CUDA)) return with_kernels;
-  return keep_both_sides(with_kernels, given);
+  return insert_device_transfers(with_kernels, given);
 }
 
 }  // namespace retrograde::lower

@@ -90,7 +90,8 @@ class Tracer : public Rewriter {
   std::set<std::string> traced;  // names for which events were inserted
 
   Stmt realization(const std::string& func, const std::vector<Range>& region, const Stmt& body) {
-    return told(func, halide_trace_begin_realization, halide_trace_end_realization, region, body);
+    return with_events(func, halide_trace_begin_realization, halide_trace_end_realization, region,
+                       body);
   }
   bool traces_realizations(const std::string& func) const {
     const auto it = traces_.find(func);
@@ -171,8 +172,8 @@ class Tracer : public Rewriter {
   }
 
   // begin; body; end. The number of the first event is the parent of the events inside.
-  Stmt told(const std::string& func, int begin, int end, const std::vector<Range>& region,
-            const Stmt& body) {
+  Stmt with_events(const std::string& func, int begin, int end, const std::vector<Range>& region,
+                   const Stmt& body) {
     traced.insert(func);
     const std::string id = func + ".trace_id";
     return make_let(
@@ -196,8 +197,9 @@ class Tracer : public Rewriter {
     RETROGRADE_ASSERT(had_id, "a region of ", n.name, " outside of its realization");
     return make_producer_consumer(
         n.name, n.produces,
-        told(n.name, n.produces ? halide_trace_produce : halide_trace_consume,
-             n.produces ? halide_trace_end_produce : halide_trace_end_consume, region, body));
+        with_events(n.name, n.produces ? halide_trace_produce : halide_trace_consume,
+                    n.produces ? halide_trace_end_produce : halide_trace_end_consume, region,
+                    body));
   }
 
   std::vector<Range> region_of(const ProducerConsumer& n) {

@@ -11,7 +11,8 @@ namespace retrograde::lower {
 // Names of Funcs, each with the condition under which it is needed; Funcs that are always needed are left out.
 using StageGuards = std::map<std::string, Expr>;
 
-// `may_skip`: whether the Func of that name may be skipped where nothing reads it. skip_stages.cpp describes the method.
+// `may_skip`: whether the Func of that name may be skipped where nothing reads it. The method is described in
+// skip_stages.cpp.
 StageGuards find_stage_guards(const Stmt& s, FunctionRef<bool(const std::string&)> may_skip);
 
 }  // namespace retrograde::lower

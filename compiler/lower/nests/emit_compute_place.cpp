@@ -161,9 +161,9 @@ NestEmitter::Wanted NestEmitter::slide_together(std::vector<Member>& members,
 }
 
 // Whether a Func may be computed from undefined values where its own values do not matter.
-static bool may_be_partly_right(const LoopedFunc& f, const ValueBounds& values) {
+static bool may_have_wrong_values(const LoopedFunc& f, const ValueBounds& values) {
   return !f.func->is_extern() && f.stages.size() == 1 && is_stored_where_computed(f) &&
-         !f.schedule.memoized && !f.schedule.async && takes_any_values(f.stages[0], values);
+         !f.schedule.memoized && !f.schedule.async && tolerates_any_values(f.stages[0], values);
 }
 
 // Computes a group: removes it from the uses of `code`, and adds the needs of the group itself.
@@ -202,7 +202,7 @@ NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& cod
     it->second.last = std::min(it->second.last, piece.lead);
   }
   for (const Member& member : members) {
-    code.overrun.counts |= !may_be_partly_right(*member.f, values_);
+    code.overrun.counts |= !may_have_wrong_values(*member.f, values_);
     code.overrun.inside.push_back(member.f);
   }
   merge_code(code, generated);

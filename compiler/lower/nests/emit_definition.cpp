@@ -236,7 +236,7 @@ bool may_do_harm(const Call& call, const ValueBounds& values) {
 
 }  // namespace
 
-bool takes_any_values(const Definition& definition, const ValueBounds& values) {
+bool tolerates_any_values(const Definition& definition, const ValueBounds& values) {
   return !definition.predicate.defined() &&
          !any_node(definition, [&](const Call& call) { return may_do_harm(call, values); });
 }

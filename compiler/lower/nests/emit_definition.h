@@ -24,7 +24,7 @@ Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& ne
 
 // Whether garbage in the values that a first definition reads is harmless as long as its results are unused: they are
 // not used as unclamped coordinates and have no effects.
-bool takes_any_values(const Definition& definition, const ValueBounds& values);
+bool tolerates_any_values(const Definition& definition, const ValueBounds& values);
 // The boxes that a first definition reads at the points of its domain.
 Requirements read_inside(const LoopedFunc& f, const Domain& domain, const ValueBounds& values);
 

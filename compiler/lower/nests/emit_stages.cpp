@@ -290,7 +290,7 @@ Emitted NestEmitter::emit_stage(const FusedNest& nest, std::vector<NestStage>& s
   code.uses = requirements_of(f, own.stage, own.nest, values_);
   if (never_stores(f, own.stage, code.uses)) code.stmt = make_evaluate(0);
   code.overrun.leaves_domain = own.nest.rounds_up;
-  code.overrun.counts = own.stage > 0 || !takes_any_values(f.stages[own.stage], values_);
+  code.overrun.counts = own.stage > 0 || !tolerates_any_values(f.stages[own.stage], values_);
   code = emit_children(computed_innermost_in(f), std::move(code), loops, 0, home);
   for (size_t i = 0; i < loops.size(); i++) {
     const int depth = static_cast<int>(loops.size() - i);

@@ -62,11 +62,12 @@ class SumsInto {
         s,
         [&](const For& n) {
           has_loops = true;
-          return n.runs == ForType::Serial && leaves(n.min) && leaves(n.extent) && holds(n.body);
+          return n.runs == ForType::Serial && does_not_read(n.min) && does_not_read(n.extent) &&
+                 holds(n.body);
         },
-        [&](const LetStmt& n) { return leaves(n.value) && holds(n.body); },
+        [&](const LetStmt& n) { return does_not_read(n.value) && holds(n.body); },
         [&](const IfThenElse& n) {
-          return leaves(n.condition) && holds(n.when_true) &&
+          return does_not_read(n.condition) && holds(n.when_true) &&
                  (!n.when_false.defined() || holds(n.when_false));
         },
         [&](const Block& n) {
@@ -79,7 +80,7 @@ class SumsInto {
   bool has_loops = false, has_strong_products = false;
 
  private:
-  bool leaves(const Expr& e) const { return !loads_from(e, array_); }
+  bool does_not_read(const Expr& e) const { return !loads_from(e, array_); }
 
   bool adds(const Store& store) {
     if (store.name != array_ || !store.value.type().is_float() || store.value.type().bits() < 32)

@@ -157,7 +157,7 @@ class LoopVectorizer {
   // ---- lets ----
 
   Stmt visit_let(const Stmt& s, const LetStmt& n) {
-    if (has_effects(n.value) || tells_of_some_lanes(n.value)) return lane_by_lane(s);
+    if (has_effects(n.value) || traces_some_lanes(n.value)) return lane_by_lane(s);
     Expr value = widen_(n.value);
     if (value.same_as(n.value)) return make_let(n.name, n.value, visit(n.body));
     around_.lets.emplace_back(n.name, n.value);
@@ -243,7 +243,7 @@ class LoopVectorizer {
   }
 
   // Trace events have no mask, so under a mask they are emitted lane by lane.
-  bool tells_of_some_lanes(const Expr& e) {
+  bool traces_some_lanes(const Expr& e) {
     return widen_.mask().defined() &&
            any_node(e, [](const Call& call) { return call.is_op(Op::trace); });
   }
@@ -251,7 +251,7 @@ class LoopVectorizer {
   // ---- stores ----
 
   Stmt visit_store(const Stmt& s, const Store& n) {
-    if (has_effects(n.value) || has_effects(n.index) || tells_of_some_lanes(n.value))
+    if (has_effects(n.value) || has_effects(n.index) || traces_some_lanes(n.value))
       return lane_by_lane(s);
     const Stmt stored = stores_.store(s, n);
     return stored.defined() ? stored : lane_by_lane(s);
