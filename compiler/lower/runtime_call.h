@@ -1,4 +1,4 @@
-// runtime_call.h -- calls of the runtime, which hands each function the context of the call as well.
+// runtime_call.h -- builds calls of runtime functions, which also receive the user context of the compiled function.
 #pragma once
 
 #include <string>
@@ -14,13 +14,13 @@ inline Expr call_runtime(const char* function, std::vector<Expr> args, Type type
   return call_op(Op::runtime_call, type, std::move(args));
 }
 
-// Calls what gives an error code, under this name, and leaves with the code unless it is 0.
+// Calls a function that returns an error code, binds the code to `name`, and returns from the pipeline if it is not 0.
 inline Stmt checked_call(const std::string& name, Expr call) {
   const Expr code = variable(name);
   return make_let(name, std::move(call), make_assert(code == 0, code));
 }
 
-// The values one after the other in memory.
+// A pointer to the values, stored one after the other.
 inline Expr pack(std::vector<Expr> values) {
   return call_op(Op::pack, Handle(), std::move(values));
 }

@@ -14,13 +14,13 @@ const std::vector<StatementPass>& statement_passes() {
       {"accumulate_vectors", accumulate_vectors},
       {"blend_masked_stores", blend_masked_stores},
       {"bound_allocations", bound_allocations},
-      {"check_accesses",  // of allocations alone: a statement does not name its buffers
+      {"check_accesses",  // only for allocations: a statement does not list its buffers
        [](const Stmt& s) { return check_accesses(s, {}); }},
       {"check_promises", check_promises},
       {"deinterleave_loads", deinterleave_loads},
       {"drop_asserts", drop_asserts},
       {"drop_bounds_query", drop_bounds_query},
-      {"keep_accumulators",  // loops over pure variables: by names without "r$"
+      {"keep_accumulators",  // loops whose names lack "r$" count as loops over pure variables
        [](const Stmt& s) {
          return keep_accumulators(
              s, [](const For& loop) { return loop.name.find(".r$") == std::string::npos; });
@@ -34,7 +34,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"partition_loops", partition_loops},
       {"simplify", [](const Stmt& s) { return simplify(s); }},
       {"mask_guarded_loads", mask_guarded_loads},
-      {"skip_stages",  // every Func that is stored
+      {"skip_stages",  // every Func that is stored may be skipped
        [](const Stmt& s) { return skip_stages(s, [](const std::string&) { return true; }); }},
       {"transpose_loads", transpose_loads},
       {"skip_empty_tiles", skip_empty_tiles},
@@ -42,7 +42,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"trim_loops", trim_loops},
       {"try_plain_products", try_plain_products},
       {"unroll_loops", unroll_loops},
-      {"vectorize_inner_loops",  // every loop taken for one over a pure variable
+      {"vectorize_inner_loops",  // every loop counts as a loop over a pure variable
        [](const Stmt& s) {
          return vectorize_inner_loops(s, {32, [](const For&) { return true; }});
        }},

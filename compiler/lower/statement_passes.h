@@ -1,6 +1,6 @@
-// The passes from statement to statement, each in the file of its name, whose first comment shows
-// what it does; and all of them by name, for tools/opt and the golden tests. (pipeline.cpp is the
-// order in which the compiler runs them.)
+// Passes from statement to statement. Each is in the file of its name, whose file comment describes it.
+// statement_passes() lists them by name for tools/opt and the golden tests; pipeline.cpp runs them in the compiler's
+// order.
 #pragma once
 
 #include <string>
@@ -12,63 +12,62 @@ namespace retrograde::lower {
 
 // ---- loops/: FlatStorage, before vectorization -> the same phase ----
 
-// Keeps only what must be indivisible, and only where iterations may meet.
+// Reduces Atomic statements to the part that must be atomic, and drops those whose storage is not shared.
 Stmt lower_atomics(const Stmt& s);
-// Splits loops so that conditions marked likely() vanish from most of their iterations; afterwards
-// there are no likely and likely_if_innermost markers. Loops, too.
+// Splits loops so that likely() conditions vanish from most of their iterations. Removes likely and
+// likely_if_innermost markers. Also for Loops.
 Stmt partition_loops(const Stmt& s);
-// What a condition says already is not said again where it holds. Loops, too.
+// Removes a min or max that a surrounding condition decides. Also for Loops.
 Stmt drop_guarded_clamps(const Stmt& s);
-// A tile without a point computes nothing of its producers, whose places need no clamp then. Before
-// loops are partitioned. Loops, too.
+// Skips the producers of tiles that contain no points, whose regions then need no clamp. Runs before partition_loops.
+// Also for Loops.
 Stmt skip_empty_tiles(const Stmt& s);
-// A condition that holds in one stretch of a loop becomes the ends of the loop. Loops, too.
+// Turns conditions on a loop's variable into bounds of the loop. Also for Loops.
 Stmt trim_loops(const Stmt& s);
-// Copies the body of every Unrolled loop once per iteration. Any phase. UserError when the extent of
-// such a loop is not a constant.
+// Copies the body of every Unrolled loop once per iteration. For any phase. UserError if the extent of such a loop has
+// no constant upper bound.
 Stmt unroll_loops(const Stmt& s);
-// A pure C function of what does not change in a loop is called once, before it.
+// Moves calls of pure C functions with loop-invariant arguments out of their loops.
 Stmt hoist_calls(const Stmt& s);
-// Storage that is small whatever its size is has a constant size. FlatStorage or Vector.
+// Gives small storage of varying size a constant size. For FlatStorage or Vector.
 Stmt bound_allocations(const Stmt& s);
-// A quotient and its remainder that make up an index together are one again.
+// Simplifies indices in which a quotient and its remainder recombine.
 Stmt join_indices(const Stmt& s);
 
 // ---- vectors/ ----
 
-// Turns the iterations of Vectorized loops into lanes of vectors: FlatStorage -> Vector. UserError
-// when the extent of such a loop is not a constant.
+// Turns the iterations of Vectorized loops into lanes of vectors: FlatStorage -> Vector. UserError if the extent of
+// such a loop has no constant upper bound.
 Stmt vectorize_loops(const Stmt& s);
-// Reductions of vectors combine lanes once after their loop, not in each iteration.
+// Combines the lanes of a vector reduction once after its loop instead of in each iteration.
 Stmt accumulate_vectors(const Stmt& s);
-// Vectors whose lanes follow a pattern are computed part by part and interleaved.
+// Splits expressions that alternate between lanes into parts, and interleaves their results.
 Stmt interleave_vectors(const Stmt& s);
-// Strided loads of neighbouring statements that together read a block are read by rows.
+// Reads the columns of a block by rows, and transposes them in registers.
 Stmt transpose_loads(const Stmt& s);
-// Strided loads that lie beside each other share the vectors they are picked from.
+// Reads neighbouring strided vectors through dense loads that they share.
 Stmt deinterleave_loads(const Stmt& s);
-// Loads of clamped places, in the arms of selects that hold where nothing is clamped, are dense.
+// Replaces clamped gathers under a select by dense loads under the select's mask.
 Stmt mask_guarded_loads(const Stmt& s);
-// Sums of strong products are of plain ones where these are no NaN.
+// Sums strong products with plain multiplications first, and repeats the sum if it gives NaN.
 Stmt try_plain_products(const Stmt& s);
-// Stores under a mask into storage of one's own write whole vectors.
+// Replaces masked accesses of local allocations by accesses of whole vectors.
 Stmt blend_masked_stores(const Stmt& s);
 
-// ---- what targets do without, or ask for to find faults ----
+// ---- checks that a target disables or requests ----
 
-// loops/drop_checks.cpp. Target::NoBoundsQuery: a buffer without memory is an error instead of a
-// question.
+// Target::NoBoundsQuery (loops/drop_checks.cpp): a buffer without memory is an error instead of a bounds query.
 Stmt drop_bounds_query(const Stmt& s);
-// Target::NoAsserts: every check is left out.
+// Target::NoAsserts: removes every check.
 Stmt drop_asserts(const Stmt& s);
-// instrumentation/debug_features.cpp. Target::CheckUnsafePromises: a call fails where a value breaks
-// its unsafe_promise_clamped().
+// Target::CheckUnsafePromises (instrumentation/debug_features.cpp): a call fails if a value breaks its
+// unsafe_promise_clamped().
 Stmt check_promises(const Stmt& s);
-// Target::FuzzFloatStores: the last bit of every stored float is 0.
+// Target::FuzzFloatStores: clears the last bit of every stored float.
 Stmt fuzz_float_stores(const Stmt& s);
 
-// Ends the life of an allocation right after its last use: FlatStorage or Vector -> the same phase,
-// with a Free in every Allocate whose storage is used (loops/).
+// Frees each allocation right after its last use (loops/): FlatStorage or Vector -> the same phase, with a Free in
+// every Allocate whose storage is used.
 Stmt free_early(const Stmt& s);
 
 // ---- by name ----
@@ -78,6 +77,6 @@ struct StatementPass {
   Stmt (*run)(const Stmt&);
 };
 const std::vector<StatementPass>& statement_passes();
-const StatementPass* find_statement_pass(const std::string& name);  // null when there is none
+const StatementPass* find_statement_pass(const std::string& name);  // null if there is none
 
 }  // namespace retrograde::lower

@@ -1,4 +1,4 @@
-// statement_rewriter.h -- rewriting statements whose expressions stay as they are.
+// statement_rewriter.h -- base class and helper for passes that rewrite statements and keep expressions.
 #pragma once
 
 #include <utility>
@@ -25,8 +25,8 @@ class StatementSteps : public StatementRewriter {
   Step step_;
 };
 
-// With a lambda: step(s, all) gives the new statement, where all.children(s) is s with its parts
-// rewritten, and all(part) a part of it.
+// Rewrites statements with a lambda: step(s, all) returns the new statement. all.children(s) is s with its parts
+// rewritten; all(part) is the rewritten part.
 template <class Step>
 Stmt rewrite_statements(const Stmt& s, Step step) {
   return StatementSteps<Step>(std::move(step))(s);

@@ -1,4 +1,4 @@
-// walk_in_bounds.h -- the parts of a statement, each with the bounds of the names around it.
+// walk_in_bounds.h -- visits the parts of a statement with the bounds of the names in scope.
 #pragma once
 
 #include "analysis/interval.h"
@@ -6,8 +6,8 @@
 
 namespace retrograde::lower {
 
-// Calls `on_stmt` for each statement, before its parts, and `on_expr` for each expression of it.
-// Loops bound their variables; lets of int32 lie in the bounds of their values, others anywhere.
+// Calls `on_stmt` for each statement, before its parts, and `on_expr` for each of its expressions. Loop variables are
+// bounded by their loops, lets of int32 by the bounds of their values; other lets are unbounded.
 void walk_in_bounds(const Stmt& s, FunctionRef<void(const Expr&, const Scope<Interval>&)> on_expr,
                     FunctionRef<void(const Stmt&, const Scope<Interval>&)> on_stmt);
 

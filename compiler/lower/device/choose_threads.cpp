@@ -1,11 +1,10 @@
-// choose_threads -- how many threads a block of a kernel has, and in which memory its storage lies.
+// choose_threads -- choose the number of threads of a kernel's blocks, and the memory of its storage.
 //
-// A kernel has one number of threads in each dimension, whatever its stages want: the most that one of
-// them has a known use for. A stage with fewer leaves threads idle, one with more lets each thread do
-// several of its iterations (map_threads). Where no extent is known, a dimension gets the number below.
+// A kernel has one number of threads per dimension, shared by its stages: the largest one that a stage is known to
+// use. Stages with smaller extents leave threads idle; in stages with larger ones each thread runs several
+// iterations (map_threads). If no extent is known, the dimension gets a default.
 //
-// Storage of what is computed in a loop over threads is the thread's own; what is computed in a block,
-// outside of such loops, is shared.
+// Storage inside a loop over threads is private to the thread; storage in a block, outside of such loops, is shared.
 #include <algorithm>
 #include <optional>
 
@@ -37,7 +36,7 @@ class ThreadChooser {
       const int unknown = used == 1 ? 4 * warp_threads : d == 0 ? warp_threads : 4;
       kernel_.threads[d] = most_[d] > 0 ? most_[d] : wants_some_[d] ? unknown : 1;
     }
-    // Stages with other shapes share a block: the largest dimension gives way.
+    // Stages of different shapes share a block: halve the largest dimension until the block is small enough.
     while (total() > most_threads) {
       int& largest = *std::ranges::max_element(kernel_.threads);
       largest = (largest + 1) / 2;
@@ -56,7 +55,7 @@ class ThreadChooser {
         s, [](const Expr&) {}, [&](const Stmt& part) { visit(part); });
   }
 
-  // `around`: the product of the known extents from the outermost loop over threads down to this one.
+  // `around`: the product of the known extents of the loops over threads around this one.
   void visit_threads(const For& loop, int64_t around) {
     const auto dimension = static_cast<size_t>(thread_depth(loop.body));
     depth_ = std::max(depth_, static_cast<int>(dimension) + 1);
@@ -149,7 +148,7 @@ class MemoryChooser : public StatementRewriter {
     user_error(text("store ", quoted(n.name), " in a kernel"), rule, evidence, instead);
   }
 
-  // What threads may have as their own without a word.
+  // Whether the storage is small enough for a thread's stack without a request.
   static bool is_small(const Allocate& n) {
     constexpr int64_t most_bytes = 16 << 10;
     const auto elements = as_const_int(n.elements);

@@ -13,13 +13,13 @@ namespace retrograde::lower {
 
 namespace {
 
-using Names = std::set<std::string>;  // sorted: what is generated must not depend on chance
+using Names = std::set<std::string>;  // sorted, so that the generated code is deterministic
 
 bool has_launch(const Stmt& s) {
   return any_stmt(s, [](const Stmt& part) { return part.kind() == Kind::Launch; });
 }
 
-Names touched_by_kernels(const Stmt& s) {
+Names accessed_by_kernels(const Stmt& s) {
   Names names, inside;
   walk(s, [&](const Launch& launch) {
     walk(
@@ -33,10 +33,10 @@ Names touched_by_kernels(const Stmt& s) {
 
 Expr buffer_of(const std::string& name) { return variable(name + ".buffer", Handle()); }
 
-class BothSides {
+class TransferInserter {
  public:
-  BothSides(const Stmt& s, const GivenBuffers& given)
-      : fresh_(s), given_(given), on_device_(touched_by_kernels(s)) {
+  TransferInserter(const Stmt& s, const GivenBuffers& given)
+      : fresh_(s), given_(given), on_device_(accessed_by_kernels(s)) {
     on_device_.insert(given.names.begin(), given.names.end());
   }
 
@@ -45,7 +45,7 @@ class BothSides {
     if (const auto* allocation = s.as<Allocate>()) return with_buffer(*allocation);
     if (!has_launch(s)) return on_host(s);
     if (const auto* let = s.as<LetStmt>()) {
-      std::vector<Stmt> all = brought_back(accesses(let->value));
+      std::vector<Stmt> all = copies_to_host(accesses(let->value));
       all.push_back(make_let(let->name, let->value, visit(let->body)));
       return make_block(std::move(all));
     }
@@ -55,7 +55,7 @@ class BothSides {
     Accesses own;
     for_each_child(
         s, [&](const Expr& e) { add(own, accesses(e)); }, [](const Stmt&) {});
-    std::vector<Stmt> all = brought_back(own);
+    std::vector<Stmt> all = copies_to_host(own);
     all.push_back(inside(s));
     return make_block(std::move(all));
   }
@@ -91,7 +91,7 @@ class BothSides {
     to.writes.insert(from.writes.begin(), from.writes.end());
   }
 
-  // What a function is given the address of, it may read and store.
+  // A function that is passed an address may read and store there.
   template <class Tree>
   Accesses accesses(const Tree& tree) const {
     Accesses found;
@@ -134,7 +134,7 @@ class BothSides {
     return make_allocate(n.name, n.type, n.memory, n.elements, body, n.offset);
   }
 
-  std::vector<Stmt> brought_back(const Accesses& accesses) {
+  std::vector<Stmt> copies_to_host(const Accesses& accesses) {
     Names names = accesses.reads;
     names.insert(accesses.writes.begin(), accesses.writes.end());
     std::vector<Stmt> calls;
@@ -148,7 +148,7 @@ class BothSides {
   Stmt on_host(const Stmt& s) {
     const Accesses here = accesses(s);
     if (here.reads.empty() && here.writes.empty()) return s;
-    std::vector<Stmt> all = brought_back(here);
+    std::vector<Stmt> all = copies_to_host(here);
     all.push_back(s);
     for (const std::string& name : here.writes)
       all.push_back(make_evaluate(call_runtime("retrograde_host_changed", {buffer_of(name)})));
@@ -162,8 +162,8 @@ class BothSides {
 
 }  // namespace
 
-Stmt keep_both_sides(const Stmt& s, const GivenBuffers& given) {
-  return BothSides(s, given).visit(s);
+Stmt insert_device_transfers(const Stmt& s, const GivenBuffers& given) {
+  return TransferInserter(s, given).visit(s);
 }
 
 }  // namespace retrograde::lower

@@ -1,9 +1,9 @@
-// device_buffers.h -- memory of the host and of the device hold the same where it is needed.
+// device_buffers.h -- inserts the copies between host and device memory that a program with kernels needs.
 //
-// Storage that kernels touch is a halide_buffer_t, whose flags say which side has changed it. A launch
-// brings to the device what the host has changed; where the host reads or stores what a kernel may have
-// stored, a call brings it back first, and what the host stores is marked. Flags decide when the program
-// runs: nothing is copied that has not changed.
+// Each allocation that kernels access is a halide_buffer_t, whose flags say which side has changed it. A launch copies
+// to the device what the host has changed. Before the host accesses storage that a kernel may have stored to, a
+// call copies it back; host stores set the host flag. The flags are tested at run time, so unchanged storage is
+// not copied.
 //
 //   allocate f[n] {                           allocate f[n] {
 //     launch k { f[..] = .. }                   let f.buffer = retrograde_device_buffer(&f[0], n, type)
@@ -13,7 +13,7 @@
 //                                               retrograde_device_buffer_free(f.buffer)
 //                                             }
 //
-// An output that kernels store into whole before anything reads it is not copied to the device first:
+// An output that kernels overwrite completely before anything reads it is not copied to the device first:
 //
 //   produce out { launch k { out[..] = .. } }  =>  let out.overwritten = retrograde_overwrite_begin(out.buffer,
 //                                                                          1, pack(in.buffer))
@@ -31,11 +31,11 @@ namespace retrograde::lower {
 
 struct GivenBuffers {
   std::vector<std::string> names;
-  // By Func, those of its values: where its first stage stores each element of them.
+  // For each Func whose first stage stores every element: the buffers of its values.
   std::map<std::string, std::vector<std::string>> overwritten;
 };
 
-// In: with launches. `given`: the buffers that the function is given.
-Stmt keep_both_sides(const Stmt& s, const GivenBuffers& given);
+// In: a statement with launches. `given`: the buffer arguments of the function.
+Stmt insert_device_transfers(const Stmt& s, const GivenBuffers& given);
 
 }  // namespace retrograde::lower

@@ -1,4 +1,4 @@
-// find_grid -- the loops over blocks of a kernel become its grid.
+// find_grid -- turn the loops over blocks of a kernel into its grid.
 //
 //   gpu_block for (f.s0.y, 2, n) {             launch f.kernel blocks(m, n, 1) {
 //     let a = f.s0.y * 8                  =>     let f.s0.y = f.kernel.block.y + 2
@@ -7,7 +7,7 @@
 //     }                                          body
 //   }                                          }
 //
-// The innermost loop is x. Between the loops there may be names, and marks of who produces what.
+// The innermost loop is x. Only lets and producer/consumer marks may stand between the loops.
 #include "diagnostics/error.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -34,7 +34,7 @@ namespace {
 
 constexpr size_t most_loops = 3;
 
-// What stands around the next loop over blocks, and the loops, outermost first.
+// Collects the loops over blocks, outermost first, and the lets between them.
 class GridFinder {
  public:
   GridFinder(const std::string& name, const For& outermost) : name_(name), outermost_(outermost) {}
@@ -88,7 +88,7 @@ class GridFinder {
            "Reorder the loops over blocks next to each other, and compute Funcs inside of them");
   }
 
-  // Known before the kernel runs.
+  // The number of blocks, as an expression that is known before the kernel runs.
   Expr count_of(const For& loop) const {
     Expr count = loop.extent;
     for (bool changed = true; changed;) {

@@ -1,23 +1,23 @@
-// insert_barriers -- between what one thread of a block stores and another one reads, all wait.
+// insert_barriers -- make all threads of a block wait between a store of one thread and an access of another.
 //
 //   gpu_thread for (x) { tile[x] = in[x] }          gpu_thread for (x) { tile[x] = in[x] }
 //   gpu_thread for (x) {                        =>  gpu_barrier
 //     out[x] = tile[x] + tile[x + 1]                gpu_thread for (x) { ... }
 //   }
 //
-// Method: a block runs steps, each a nest of loops over threads, or what a single thread does, one
-// after the other. A barrier stands before the first step that stores what a step since the last
-// barrier reads or stores, or reads what it stores: the same bytes of shared memory, or the same
-// storage elsewhere. Who meets whom decides which one:
-// - none where each element is one thread's alone (thread_elements.h): a thread sees what it stored; nor where
-//   the steps touch elements apart from each other (step_accesses.h);
-// - that of a warp where each element is one warp's alone, or the block has one warp;
-// - else that of the block.
+// Method: a block runs steps one after the other; a step is a nest of loops over threads, or code for a single
+// thread. A barrier is inserted before the first step that conflicts with a step since the last barrier: it stores
+// what that step accesses, or reads what it stores, in the same storage or the same bytes of shared memory. The
+// threads that may conflict determine the kind of barrier:
+// - none if each element belongs to one thread (thread_elements.h), which sees its own stores, or if the steps
+//   access disjoint elements (step_accesses.h);
+// - a warp barrier if each element belongs to one warp, or the block has a single warp;
+// - otherwise a block barrier.
 //
-// What an iteration of a loop leaves behind meets the next one, whose steps are walked again until it brings
-// nothing new: in terms of the loop's variable, one iteration earlier where a barrier stands in between for
-// certain, else that of any iteration.
-// Not done: a step's own conflicts: iterations of one loop over threads touch nothing of each other.
+// Accesses of one loop iteration may conflict with the next. The loop body is walked repeatedly until an iteration adds
+// no new accesses. They are expressed one iteration earlier if a barrier surely separates iterations, otherwise
+// as those of any iteration.
+// Not done: conflicts within a step. Iterations of a loop over threads are independent.
 #include <algorithm>
 #include <unordered_map>
 #include <unordered_set>
@@ -39,7 +39,7 @@ struct SharedPlace {
   int64_t bytes = -1;  // -1: not a constant
 };
 
-// What a kernel's threads do with its storage.
+// The storage of a kernel that its threads store to, and who shares it.
 class SharedStorage {
  public:
   explicit SharedStorage(const Kernel& kernel) : kernel_(kernel) {
@@ -55,10 +55,10 @@ class SharedStorage {
     for (const std::string& name : own) stored_.erase(name);
   }
 
-  // What is never stored, or is each thread's own, nobody waits for.
+  // Whether accesses of the storage can conflict: not if it is never stored to or is private to a thread.
   bool matters(const std::string& name) const { return stored_.count(name) > 0; }
 
-  // For whom a thread waits that touches `a` before it touches what another thread touched of `b`.
+  // The barrier needed between an access of `b` by one thread and an access of `a` by another.
   Wait wait_between(const std::string& a, const std::string& b) {
     if (a == b) return users_of(a);
     if (!share_bytes(a, b)) return Wait::None;
@@ -75,7 +75,7 @@ class SharedStorage {
     if (!is_new) return known->second;
     if (find_thread_elements(kernel_, name))
       known->second = Wait::None;
-    else if (is_one_warp() || is_one_warps(kernel_, name))
+    else if (is_one_warp() || belongs_to_one_warp(kernel_, name))
       known->second = Wait::Warp;
     return known->second;
   }
@@ -110,7 +110,7 @@ struct Pending {
   }
 };
 
-// Whether the list says more afterwards.
+// Returns whether the list changed.
 bool add(std::vector<Pending>& list, const Pending& one) {
   const auto found =
       std::ranges::find_if(list, [&](const Pending& other) { return other.is_same(one); });
@@ -132,11 +132,11 @@ class BarrierInserter {
   Stmt run() { return visit(kernel_.body); }
 
  private:
-  // What the block has done when it comes to a place.
+  // The state of the block at a point of the program.
   struct State {
     std::vector<Pending> pending;
     Wait passed =
-        Wait::None;  // the strongest barrier since the loop's iteration began, for certain
+        Wait::None;  // the strongest barrier that surely ran in this iteration of the loop
   };
 
   Stmt visit(const Stmt& s) {
@@ -189,7 +189,7 @@ class BarrierInserter {
     return result;
   }
 
-  // At the end of an iteration. What no barrier of this iteration came before may be of any earlier one.
+  // The accesses that the next iteration sees. Without a barrier in between they may be of any earlier iteration.
   std::vector<Pending> left_for_next(const For& loop) const {
     std::vector<Pending> left;
     for (const Pending& one : state_.pending) {
@@ -221,7 +221,7 @@ class BarrierInserter {
     return make_block(std::move(before));
   }
 
-  // The barrier before what does this; nothing where none is needed.
+  // The barrier needed before `next`; empty if none is needed. Records the accesses of `next`.
   std::vector<Stmt> waits_for(const Stmt& next) {
     std::vector<Access> accesses = around_.accesses_of(next);
     std::erase_if(accesses, [&](const Access& one) { return !storage_.matters(one.name); });

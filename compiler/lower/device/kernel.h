@@ -1,17 +1,17 @@
-// kernel.h -- a kernel on its way from loops over blocks and threads to what each thread does.
+// kernel.h -- the data structure and the steps that turn loops over blocks and threads into a kernel.
 //
-// The steps, in the order of make_kernels.cpp, each in the file of its name:
+// The steps, in the order in which make_kernels.cpp runs them, each in the file of its name:
 //
 //   find_grid         the loops over blocks become the grid
-//   choose_threads    how many threads a block has in each dimension; where storage lies
-//   privatize         what threads keep to themselves moves into their registers
-//   place_shared      where in the block's shared memory the rest lies
-//   insert_barriers   between what one thread stores and another reads
-//   place_heap        where a block's or a thread's part of device memory lies
-//   map_threads       loops over threads become what a thread does
+//   choose_threads    chooses the number of threads of a block per dimension, and the memory of each allocation
+//   privatize         moves storage of which each thread uses its own elements into that thread's registers
+//   place_shared      assigns offsets in the block's shared memory to the other storage
+//   insert_barriers   inserts barriers between stores of one thread and accesses of another
+//   place_heap        assigns each block or thread its part of device memory
+//   map_threads       replaces the loops over threads by the work of one thread
 //
-// Until the last, loops over threads are loops. One such loop is of the dimension that counts the
-// loops over threads in it: the innermost is x.
+// Loops over threads stay loops until the last step. A loop's dimension is the number of loops over threads nested in
+// it: the innermost one is x.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@
 
 namespace retrograde::lower {
 
-constexpr int warp_threads = 32;  // x innermost
+constexpr int warp_threads = 32;  // consecutive threads; x varies fastest
 
 struct Kernel {
   std::string name;
@@ -40,25 +40,25 @@ struct Kernel {
   Stmt body;
 };
 
-// Whether loops over threads are in the statement.
+// Whether the statement contains loops over threads.
 bool has_threads(const Stmt& s);
-// The most loops over threads that lie in each other in it.
+// The maximum nesting depth of loops over threads in the statement.
 int thread_depth(const Stmt& s);
 
-// In: loops over blocks, the outermost of which is `outermost`. UserError where one is not directly in
-// the other, or depends on it; or for more than three.
+// In: a nest of loops over blocks, the outermost of which is `outermost`. UserError if a loop is not directly inside
+// the next outer one or depends on it, or if there are more than three.
 Kernel find_grid(const std::string& name, const For& outermost);
 
-// UserError for blocks of more than 1,024 threads, of sizes that depend on data, and for storage between
-// loops over threads or of the wrong memory. Afterwards each allocation is of memory Stack (a thread's
-// own), GPUShared, Register (a block's, to be privatized), Heap, or Auto (a block's).
+// UserError for blocks of more than 1,024 threads, for sizes that depend on data, and for storage between loops over
+// threads or in an unsuitable memory. Afterwards the memory of each allocation is Stack (private to a thread),
+// GPUShared, Register (of a block, to be privatised), Heap, or Auto (of a block).
 void choose_threads(Kernel& kernel);
 
-// UserError for storage in registers of which a thread reads what another one stores.
+// UserError for storage in registers if a thread reads elements that another thread stored.
 void privatize(Kernel& kernel);
 
-// `limit_bytes`: what a block can have on the device. UserError beyond it. Auto is shared memory while there
-// is some left, else Heap.
+// `limit_bytes`: the shared memory that a block can have on the device; UserError beyond it. Auto storage becomes
+// shared memory while some is left, then Heap.
 void place_shared(Kernel& kernel, int limit_bytes);
 
 void insert_barriers(Kernel& kernel);

@@ -42,7 +42,7 @@ KernelLoops loops_of(const For& outermost) {
     auto at = std::ranges::find(stages, stage_of(name), &LoopsOfStage::stage);
     if (at == stages.end()) at = stages.insert(at, LoopsOfStage{stage_of(name), {}, {}});
     auto& loops = is_block ? at->blocks : at->threads;
-    // A stage may stand in several branches.
+    // Branches may repeat the loops of a stage.
     if (std::ranges::find(loops, name.var) == loops.end()) loops.push_back(name.var);
   });
   return mapped(stages, &LoopsOfStage::to_string);
@@ -57,7 +57,7 @@ void collect(const Stmt& s, std::vector<KernelLoops>& found) {
 
 }  // namespace
 
-// Launches have the order of the loops that they were made of.
+// Launches appear in the order of the loops that they were made from.
 std::map<std::string, KernelLoops> loops_of_kernels(const Stmt& before, const Stmt& after) {
   std::vector<KernelLoops> loops;
   collect(before, loops);

@@ -1,4 +1,4 @@
-// kernel_loops.h -- which loops become which kernel, for reports.
+// kernel_loops.h -- lists the loops that each kernel was made from, for reports.
 #pragma once
 
 #include <map>
@@ -9,11 +9,11 @@
 
 namespace retrograde::lower {
 
-// By stage, the loops over blocks and threads of a kernel, outermost first:
+// One line per stage with the loops over blocks and threads that became the kernel, outermost first:
 // "out: blocks y, x, threads yi, xi", "out.update(0): blocks x, threads xi", "rows: threads y, x".
 using KernelLoops = std::vector<std::string>;
 
-// By the names of launches; of a statement as make_kernels is given it, and as it gives it.
+// Keyed by the names of launches. `before` and `after` are the statements before and after make_kernels.
 std::map<std::string, KernelLoops> loops_of_kernels(const Stmt& before, const Stmt& after);
 
 }  // namespace retrograde::lower

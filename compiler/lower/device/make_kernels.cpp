@@ -2,6 +2,7 @@
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/print.h"
 #include "ir/visit.h"
 #include "lower/device/kernel.h"
 #include "lower/nests/copy_statement.h"
@@ -62,7 +63,7 @@ class KernelMaker : public StatementRewriter {
     return result;
   }
 
-  // What only a host can do.
+  // Rejects statements that only the host can run.
   static void check_statements(const Stmt& body, const For& loop) {
     const auto refuse = [&](const std::string& evidence, const std::string& instead) {
       unsupported("run GPU blocks of " + describe_loop(loop.name),
@@ -75,7 +76,9 @@ class KernelMaker : public StatementRewriter {
             refuse(text("the loop ", describe_loop(n.name), " in it is parallel"),
                    "Keep it serial");
         },
-        [&](const Fork&) { refuse("what is async() in it runs in a thread", "Drop async()"); },
+        [&](const Fork&) {
+          refuse("an async Func in it runs in a thread of the host", "Drop async()");
+        },
         [&](const StringImm& n) {
           refuse(text("it takes the address of the text ", Expr(&n)), "Compute it on the host");
         },
@@ -109,7 +112,7 @@ int most_shared_bytes(const Target& target) {
 Stmt make_kernels(const Stmt& s, const Target& target, const GivenBuffers& given) {
   const Stmt with_kernels = KernelMaker(s, target)(s);
   if (!target.has_feature(Target::CUDA)) return with_kernels;
-  return keep_both_sides(with_kernels, given);
+  return insert_device_transfers(with_kernels, given);
 }
 
 }  // namespace retrograde::lower

@@ -1,4 +1,4 @@
-// map_threads -- loops over threads become what each thread does. T: the threads of the dimension.
+// map_threads -- replace loops over threads by the work of one thread. T: the number of threads in the dimension.
 //
 //   gpu_thread for (x, a, T) { body }         let x = a + thread.x  body
 //   gpu_thread for (x, a, n) { body }   =>    if (thread.x < n) { let x = a + thread.x  body }     n <= T
@@ -7,7 +7,7 @@
 //                                               if (p < n) { let x = a + p  body }
 //                                             }
 //
-// What stands in no loop of a dimension is done by its first thread.
+// Code outside the loops of a dimension runs on the first thread of that dimension.
 #include <algorithm>
 
 #include "diagnostics/error.h"
@@ -41,7 +41,7 @@ class ThreadMapper {
   Expr thread(int dimension) const { return variable(thread_index(kernel_.name, dimension)); }
   int count(int dimension) const { return kernel_.threads[static_cast<size_t>(dimension)]; }
 
-  // Barriers are for all.
+  // Runs `s` on the first thread of the dimensions that no loop covers; barriers run on all threads.
   Stmt by_first_thread(const Stmt& s) const {
     const auto* call = s.as<Evaluate>();
     if (call && (as_op(call->value, Op::gpu_barrier) || as_op(call->value, Op::gpu_warp_barrier)))
@@ -74,7 +74,7 @@ class ThreadMapper {
                     make_let(place, variable(turn) * threads + thread(dimension), one));
   }
 
-  // The ends of tiles are lets: an end less a beginning has a bound where both are seen.
+  // An upper bound of the extent. Lets hold the ends of tiles, so the bound may only appear with lets expanded.
   int64_t largest(const Expr& extent) const {
     simplification::Facts facts;
     const Expr full = simplify(in_full(extent, lets_));

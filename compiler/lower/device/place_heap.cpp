@@ -1,4 +1,4 @@
-// place_heap -- storage in device memory is one for all blocks, or for all threads, each with its part.
+// place_heap -- allocate device memory once for all blocks or threads of a kernel, and give each its part.
 //
 //   launch k blocks(n, 1, 1) threads(32, 1, 1) {       allocate a[100 * n]:float32 heap {
 //     allocate a[100]:float32 heap {                     launch k blocks(n, 1, 1) threads(32, 1, 1) {
@@ -6,7 +6,7 @@
 //     }                                                  }
 //   }                                                  }
 //
-// Parts are of the most elements that one needs.
+// Each part has the maximum size over all blocks and threads.
 #include "diagnostics/error.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -70,12 +70,12 @@ class HeapPlacer : public Rewriter {
 
   void place(const Allocate& n) {
     const Expr elements = sizes_.most(n.elements);
-    // Regions that depend on data are refused before.
+    // Earlier passes reject regions that depend on data.
     RETROGRADE_ASSERT(elements.defined(), "nothing bounds the size of ", quoted(n.name));
     const bool is_threads_own = threads_around_ > 0;
     const int owners = kernel_.threads[0] * kernel_.threads[1] * kernel_.threads[2];
     const Expr number = is_threads_own ? block_ * owners + thread_ : block_;
-    // In 64 bits: more than 31 is told of when it is allocated.
+    // Computed in 64 bits: the allocation reports sizes above 31 bits.
     Expr all = cast_to(Int(64), elements);
     if (is_threads_own) all = all * make_const(Int(64), owners);
     for (const Expr& blocks : kernel_.blocks) all = all * cast_to(Int(64), blocks);
@@ -92,7 +92,7 @@ class HeapPlacer : public Rewriter {
   Kernel& kernel_;
   Expr block_, thread_;
   SizeBounds sizes_;
-  Substitution parts_;  // where a part begins
+  Substitution parts_;  // the first element of each part
   int threads_around_ = 0;
 };
 

@@ -1,13 +1,12 @@
-// place_shared -- where in the memory that a block's threads share its storage lies.
+// place_shared -- assign offsets in shared memory to the storage of a block.
 //
-// Allocations that are alive at the same time lie behind each other, at multiples of 16 bytes; those that
-// are not share bytes (a nest of allocations is a stack: what begins after another has ended begins where
-// that did).
+// Allocations that are alive at the same time get consecutive offsets, at multiples of 16 bytes; others share bytes.
+// The nest of allocations acts as a stack: an allocation that begins after another one ended reuses its offset.
 //
 //   allocate a[64]:float32 gpu_shared {            allocate a[64]:float32 gpu_shared at 0 {
 //     allocate b[64]:float32 gpu_shared {..}   =>    allocate b[64]:float32 gpu_shared at 256 {..}
 //     allocate c[64]:float32 gpu_shared {..}         allocate c[64]:float32 gpu_shared at 256 {..}
-//   }                                              }                             512 bytes altogether
+//   }                                              }                             512 bytes in total
 #include "diagnostics/error.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -19,7 +18,7 @@ namespace retrograde::lower {
 
 namespace {
 
-constexpr int alignment_bytes = 16;  // of the widest access
+constexpr int alignment_bytes = 16;  // the size of the widest access
 
 class SharedPlacer : public StatementRewriter {
  public:
@@ -53,7 +52,7 @@ class SharedPlacer : public StatementRewriter {
     return result;
   }
 
-  // Whatever the block.
+  // Whether the allocation fits for every block.
   bool fits(const Allocate& n) {
     const Expr elements = sizes_.most(n.elements);
     if (!elements.defined()) return false;
@@ -66,10 +65,10 @@ class SharedPlacer : public StatementRewriter {
 
   Expr bytes_of(const Allocate& n) {
     const Expr elements = sizes_.most(n.elements);
-    // Regions that depend on data are refused before.
+    // Earlier passes reject regions that depend on data.
     RETROGRADE_ASSERT(elements.defined(), "nothing bounds the size of ", quoted(n.name));
     const int element_bytes = n.type.bytes() * n.type.lanes();
-    // Far more than there is, and not too much for 32 bits: the launch fails with its reason.
+    // Exceeds every device limit but not 32 bits, so that the launch fails with a clear error.
     constexpr int too_many = 1 << 20;
     return simplify((min(elements, too_many) * element_bytes + (alignment_bytes - 1)) /
                     alignment_bytes * alignment_bytes);

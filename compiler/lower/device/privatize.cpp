@@ -1,4 +1,4 @@
-// privatize -- storage in registers that a block has becomes each thread's own.
+// privatize -- turn a block's storage in registers into private storage of each thread.
 //
 //   allocate sum[128]:float32 register {                   allocate sum[1]:float32 stack {
 //     gpu_thread for (y, 0, 8) {                             gpu_thread for (y, 0, 8) {
@@ -7,7 +7,7 @@
 //     ...                                                    ...
 //   }                                                      }
 //
-// UserError where a thread would read what another one stored: thread_elements.h.
+// UserError if a thread would read elements that another one stored; see thread_elements.h.
 #include "diagnostics/error.h"
 #include "ir/visit.h"
 #include "lower/device/kernel.h"
@@ -48,7 +48,7 @@ void privatize(Kernel& kernel) {
                  "Store it in MemoryType::GPUShared, or run the loops that store and read it over "
                  "threads in the same way");
     }
-    kernel.body = in_own_numbers(kernel, name, *elements);
+    kernel.body = renumbered_privately(kernel, name, *elements);
     kernel.body = resized(kernel.body, name, elements->own_count);
   }
 }

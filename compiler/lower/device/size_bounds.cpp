@@ -37,7 +37,7 @@ Expr SizeBounds::most(const Expr& size) {
   const Expr e = simplify(in_full(cast_to(Int(32), size), lets_));
   facts_.forget();
   const int64_t constant = std::min(facts_.range(e).max, facts_.upper_bound(ir::sum_of(e)));
-  // Beyond, a constant says more of how it was found than of the size.
+  // Larger constants are loose bounds; the symbolic bound is preferred to them.
   constexpr int64_t large = 1 << 16;
   if (constant <= large) return make_const(Int(32), std::max<int64_t>(constant, 0));
   const Expr symbolic = analysis::bounds_of(e, variables_).max;

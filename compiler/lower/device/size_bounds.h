@@ -1,5 +1,5 @@
-// size_bounds.h -- the most that a size in a kernel can be, whatever the block and the iteration: what is
-// allocated before the kernel starts is of that size.
+// size_bounds.h -- bounds sizes inside a kernel by values known before its launch, so that memory for all blocks
+// and iterations can be allocated in advance.
 #pragma once
 
 #include "analysis/interval.h"
@@ -12,11 +12,11 @@ namespace retrograde::lower {
 class SizeBounds {
  public:
   explicit SizeBounds(const Kernel& kernel);
-  // What is around the size.
+  // Declare the lets and loops around the size.
   void define(const LetStmt& let) { lets_[let.name] = let.value; }
   void enter(const For& loop);
   void leave(const For& loop);
-  // Over variables that are known outside of the kernel. Undefined where nothing bounds it.
+  // An upper bound of the size over variables known outside of the kernel; undefined if there is none.
   Expr most(const Expr& size);
 
  private:

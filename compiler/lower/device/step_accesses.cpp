@@ -25,7 +25,7 @@ Interval bounds_of_index(const Expr& index, const Ranges& ranges) {
                         analysis::bounds_of(ramp->base + ramp->stride * (ramp->lanes - 1), ranges));
 }
 
-// Between two places what is loaded may have changed.
+// An unbounded interval if the ends load memory, which may change between two steps.
 Interval without_loads(const Interval& interval) {
   const auto loads = [](const Expr& end) {
     return !end.defined() || any_node(end, [](const Load&) { return true; });
@@ -33,7 +33,7 @@ Interval without_loads(const Interval& interval) {
   return loads(interval.min) || loads(interval.max) ? Interval::everything() : interval;
 }
 
-// Of what the step itself says.
+// Finds the accesses of a step in terms of names outside of it.
 class AccessFinder {
  public:
   explicit AccessFinder(const Stmt& step) {
@@ -60,7 +60,7 @@ class AccessFinder {
     found.push_back({name, stores, elements});
   }
 
-  // Ends that are the same for all threads.
+  // Only ends that are the same for all threads are known.
   Interval known(const Interval& interval) const {
     const auto is_inner = [&](const Expr& end) {
       return !end.defined() || uses_any_variable(end, inner_);
@@ -68,10 +68,10 @@ class AccessFinder {
     return is_inner(interval.min) || is_inner(interval.max) ? Interval::everything() : interval;
   }
 
-  std::unordered_set<std::string> inner_;  // names within expressions
+  std::unordered_set<std::string> inner_;  // names bound inside expressions
 };
 
-// Divisors of the remainders of a loop's variable and a constant.
+// Makes `common` a multiple of the divisors of all remainders that involve the loop's variable.
 void find_divisors(const Expr& e, const std::string& loop, int64_t& common) {
   walk(e, [&](const Mod& n) {
     const auto divisor = as_const_int(n.b);
@@ -142,8 +142,8 @@ bool StepSurroundings::can_prove_apart(const Interval& a, const Interval& b) {
   return can_prove_below(a.max, b.min) || can_prove_below(b.max, a.min);
 }
 
-// Storage that a loop goes around in (fold_storage) is told apart by the remainders of its variable: all of
-// them are tried.
+// Folded storage (fold_storage) is indexed by remainders of a loop variable. To tell such accesses apart, all
+// remainders are tried.
 bool StepSurroundings::can_prove_apart(const Access& a, const Access& b) {
   if (!a.elements.is_bounded() || !b.elements.is_bounded()) return false;
   if (can_prove_apart(a.elements, b.elements)) return true;

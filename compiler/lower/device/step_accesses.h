@@ -1,5 +1,5 @@
-// step_accesses.h -- which elements of storage the threads of a block touch in a step (insert_barriers):
-// an interval of places in the storage, whatever the thread.
+// step_accesses.h -- bounds the elements that the threads of a block access in a step (insert_barriers): an interval of
+// indices that holds for all threads.
 //
 //   for (r, 1, n) {
 //     gpu_thread for (x, 0, 16) { f[16 * r + x] = g[x] }    stores f [16 * r, 16 * r + 15], reads g [0, 15]
@@ -16,15 +16,15 @@
 
 namespace retrograde::lower {
 
-// All that a step touches of one storage, in one way.
+// All loads, or all stores, that a step makes to one allocation.
 struct Access {
   std::string name;
   bool stores = false;
   Interval
-      elements;  // by loops around the step, and what is outside of the kernel; undefined: unknown
+      elements;  // in terms of loops around the step and values known outside; undefined: unknown
 };
 
-// What is around a step: names, and serial loops.
+// The lets and serial loops around a step.
 class StepSurroundings {
  public:
   void define(const LetStmt& let) { lets_[let.name] = let.value; }
@@ -33,11 +33,11 @@ class StepSurroundings {
 
   std::vector<Access> accesses_of(const Stmt& step);
 
-  // The same of the iteration before, and of all iterations, of a loop around it.
+  // The access one iteration of `loop` earlier, and the access in any iteration of it.
   static Access one_iteration_earlier(const Access& access, const For& loop);
   Access in_any_iteration(const Access& access, const For& loop) const;
 
-  // Whether no element of one is one of the other's.
+  // Whether the two accesses have no element in common.
   bool can_prove_apart(const Access& a, const Access& b);
   bool can_prove_runs(const For& loop);
 
@@ -49,7 +49,7 @@ class StepSurroundings {
   Substitution lets_;
   std::vector<const For*> loops_;  // outermost first
   simplification::Facts facts_;
-  // By step, in terms of the names directly around it: a step is looked at more than once.
+  // Accesses by step, in terms of the names directly around it; cached because a step is visited more than once.
   std::unordered_map<const void*, std::pair<Stmt, std::vector<Access>>> found_;
 };
 

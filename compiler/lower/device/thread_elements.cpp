@@ -16,12 +16,12 @@ namespace {
 
 using Digit = ThreadElements::Digit;
 
-// A place in a loop, as it appears in an index.
+// A loop counter as it appears in an index.
 struct Place {
-  Expr value;  // from 0
+  Expr value;  // counts from 0
   int64_t factor = 1, extent = 1;
   int thread = -1;
-  bool is_reversed = false;  // counted from the loop's end, for its factor is negative
+  bool is_reversed = false;  // counted down from the last iteration, because its factor is negative
 };
 struct AccessIndex {
   std::vector<Place> places;
@@ -31,7 +31,7 @@ struct AccessIndex {
 
 struct LoopAround {
   std::string name;
-  Expr min;  // in terms of what is around the loop
+  Expr min;  // in terms of names outside of the loop
   int64_t extent = 0;
   int thread = -1;
 };
@@ -44,14 +44,14 @@ std::optional<int64_t> largest_extent(const Expr& extent) {
   return most < unknown ? std::optional(most) : std::nullopt;
 }
 
-// Walks a kernel's body; `on_access` is told the index of each access and gives the new one.
+// Walks a kernel's body; `on_access` gets the index of each access and returns the new one.
 class AccessWalker : public Rewriter {
  public:
   using OnAccess = std::function<Expr(const AccessWalker&, const Expr& index)>;
   AccessWalker(const Kernel& kernel, const std::string& storage, OnAccess on_access)
       : kernel_(kernel), storage_(storage), on_access_(std::move(on_access)) {}
 
-  // Null: not a sum of places.
+  // nullopt if the index is not a sum of loop counters.
   std::optional<AccessIndex> split(const Expr& index) const {
     AccessIndex result;
     Expr base = index;
@@ -64,7 +64,7 @@ class AccessWalker : public Rewriter {
     }
     if (!base.type().is_scalar()) return std::nullopt;
     base = in_full(base, lets_);
-    // Inner loops first: where they begin may depend on outer ones.
+    // Inner loops first, because their minima may depend on outer loops.
     std::vector<std::string> names;
     simplification::BoundsMap bounds;
     for (auto loop = loops_.rbegin(); loop != loops_.rend(); ++loop) {
@@ -133,7 +133,7 @@ class AccessWalker : public Rewriter {
   Substitution lets_;
 };
 
-// `told_apart`: the dimensions whose threads an element tells.
+// `told_apart`: the dimensions whose threads must be determined by the element.
 class ElementsFinder {
  public:
   ElementsFinder(const Kernel& kernel, const std::string& storage,
@@ -156,7 +156,7 @@ class ElementsFinder {
     return numbered();
   }
 
-  // A constant as places between those of the threads: by factor.
+  // Splits a constant into digits that lie between those of the threads; keyed by factor.
   static std::optional<std::map<int64_t, int64_t>> places_of(int64_t constant,
                                                              const std::vector<Digit>& threads) {
     std::map<int64_t, int64_t> places;
@@ -176,7 +176,7 @@ class ElementsFinder {
     return thread >= 0 && told_apart_[d] && kernel_.threads[d] > 1;
   }
 
-  // Each dimension with more than one thread has one factor, in all accesses.
+  // Each dimension with more than one thread must have the same factor in all accesses.
   bool gather_threads() {
     for (int d = 0; d < 3; ++d) {
       if (!is_told_apart(d)) continue;
@@ -194,7 +194,7 @@ class ElementsFinder {
     return true;
   }
 
-  // What an access adds up in one digit: loops of the same factor, lanes and constants.
+  // The largest value of each other digit in this access: the sum of loops with the same factor, lanes and constants.
   bool gather_others(const AccessIndex& access) {
     const auto constant = places_of(access.constant, threads_);
     if (!constant) return false;
@@ -213,7 +213,7 @@ class ElementsFinder {
     result.digits = threads_;
     for (const auto& [factor, extent] : others_) result.digits.push_back({factor, extent});
     std::ranges::stable_sort(result.digits, {}, &Digit::factor);
-    int64_t largest = 0;  // that the smaller ones add up to
+    int64_t largest = 0;  // the largest sum of the smaller digits
     for (Digit& digit : result.digits) {
       if (digit.factor <= largest) return std::nullopt;
       largest += digit.factor * (digit.extent - 1);
@@ -244,16 +244,16 @@ std::optional<ThreadElements> find_thread_elements(const Kernel& kernel,
   return ElementsFinder(kernel, storage).find();
 }
 
-// Warps have whole rows of threads where a row's length divides theirs, and whole planes likewise.
-bool is_one_warps(const Kernel& kernel, const std::string& storage) {
+// A warp consists of whole rows of threads if the row length divides the warp size; likewise of whole planes.
+bool belongs_to_one_warp(const Kernel& kernel, const std::string& storage) {
   const int row = kernel.threads[0], plane = row * kernel.threads[1];
   const bool has_rows = warp_threads % row == 0, has_planes = warp_threads % plane == 0;
   if (!has_rows) return false;
   return ElementsFinder(kernel, storage, {false, !has_planes, true}).find().has_value();
 }
 
-Stmt in_own_numbers(const Kernel& kernel, const std::string& storage,
-                    const ThreadElements& elements) {
+Stmt renumbered_privately(const Kernel& kernel, const std::string& storage,
+                          const ThreadElements& elements) {
   std::vector<Digit> threads;
   std::ranges::copy_if(elements.digits, std::back_inserter(threads),
                        [](const Digit& digit) { return digit.thread >= 0; });

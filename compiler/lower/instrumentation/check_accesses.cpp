@@ -1,7 +1,7 @@
-// check_accesses -- every load and store of the host's code looks whether it stays inside its storage.
+// check_accesses -- check at run time that each load and store of host code stays inside its storage.
 //
-// In:  Vector, as code generation gets it. Out: Vector; the same stores; a call fails at the first access that
-//      leaves its allocation or buffer, before it happens, and where a promise of the compiler's is false.
+// In:  Vector, as code generation gets it. Out: Vector; the same stores. A call fails before the first access outside
+//      of its allocation or buffer, and where a promise that the compiler made is false.
 //
 //   allocate f[int64(n)]:float32 {         let f.last = int64(n) - 1
 //     f[i] = g[ramp(j, 1, 8)]        =>    allocate f[int64(n)]:float32 {
@@ -9,12 +9,12 @@
 //                                            f[i] = require(0 <= ramp(j, 1, 8) && ..., g[ramp(j, 1, 8)], "g ...")
 //                                          }
 //
-// Method: the pass runs last, so the checked code is the code that runs without it. A load is checked where its
-//         value is computed, under the conditions of the choices around it. Lanes that a predicate turns off may
-//         be anywhere. The body of an Atomic stays as it is, because its form makes it one instruction: its checks
-//         run before it. A promise is checked where it is a scalar outside of conditions and predicates; that of
-//         a let where what it names is used: inside the choices and loops between the two.
-// Not done: kernels, whose accesses the simulated device checks; what extern stages do.
+// Method: the pass runs last, so the checked code equals the code without the pass. A load is checked where its value
+//         is computed, under the conditions of the choices around it. Lanes that a predicate masks off may have any
+//         index. The body of an Atomic stays unchanged, because its form makes it a single instruction; its checks run
+//         before it. A promise is checked where it is a scalar outside of conditions and predicates. The promise of a
+//         let is checked where its name is used, inside the choices and loops between the two.
+// Not done: kernels, whose accesses the simulated device checks; accesses of extern stages.
 // Tests: test/golden/lower/check_accesses/, test/unit/checked_accesses_test.cpp.
 #include "lower/instrumentation/check_accesses.h"
 
@@ -31,8 +31,8 @@
 namespace retrograde::lower {
 namespace {
 
-// Elements that may be touched, as int64 offsets from where the memory is addressed.
-struct Room {
+// The range of valid elements, as int64 offsets from the address of the memory.
+struct ElementRange {
   Expr first, last;
 };
 
@@ -44,7 +44,7 @@ Expr lanes_like(const Expr& scalar, const Expr& e) {
   return e.type().is_scalar() ? scalar : make_broadcast(scalar, e.type().lanes());
 }
 
-// The lowest or highest lane of an index; a lane that is off counts as `neutral`.
+// The lowest or highest lane of an index; a masked-off lane counts as `neutral`.
 Expr extreme(Kind which, const Expr& index, const Expr& predicate, const Expr& neutral) {
   Expr places = as_int64(index);
   if (predicate.defined()) places = make_select(predicate, places, lanes_like(neutral, places));
@@ -53,7 +53,7 @@ Expr extreme(Kind which, const Expr& index, const Expr& predicate, const Expr& n
 
 // ---- where a let is used ----
 
-// Whether evaluating it reads the variable, whatever its conditions and predicates are.
+// Whether evaluating the expression always reads the variable, whatever its conditions and predicates are.
 bool is_read(const std::string& name, const Expr& e) {
   bool found = false;
   walk(e, [&](const Expr& part) {
@@ -67,7 +67,7 @@ bool is_read(const std::string& name, const Expr& e) {
   return found;
 }
 
-// Whether running it reads the variable, whatever is chosen and however often its loops run.
+// Whether running the statement always reads the variable, whatever is chosen and however often its loops run.
 bool is_read(const std::string& name, const Stmt& s) {
   const auto in = [&](const auto& part) { return is_read(name, part); };
   return match(
@@ -84,9 +84,9 @@ bool is_read(const std::string& name, const Stmt& s) {
       });
 }
 
-// What all parts of the walk know.
+// State that all parts of the walk share.
 struct Surroundings {
-  std::unordered_map<std::string, Room> rooms;
+  std::unordered_map<std::string, ElementRange> ranges;
   LoopName stage;  // of the innermost loop around
 };
 
@@ -128,11 +128,11 @@ class AccessChecker : public Rewriter {
 
  private:
   Surroundings& around_;
-  // For conditions, and what a predicate may turn off: promises hold there only where what they are a part of
-  // says so. None in itself.
+  // The checker for conditions and for operands that a predicate may mask off. Promises hold there only where the
+  // surrounding expression says so, so it does not check them. Null in that checker itself.
   const std::unique_ptr<AccessChecker> undecided_;
   std::vector<const LetStmt*>
-      unchecked_;  // lets around that promise something and were not used yet
+      unchecked_;  // lets around that contain promises and have not been used yet
 
   AccessChecker(Surroundings& around, std::nullptr_t) : around_(around) {}
   Expr undecided(const Expr& e) { return undecided_ ? (*undecided_)(e) : (*this)(e); }
@@ -150,7 +150,7 @@ class AccessChecker : public Rewriter {
     return make_let(n.name, value, body);
   }
 
-  // What runs as a whole or not at all: before it, what the lets promise that it uses.
+  // Rewrites a statement that runs completely or not at all. The promises of lets that it uses are checked before it.
   Stmt part(const Stmt& s) {
     if (!s.defined() || unchecked_.empty()) return s.defined() ? (*this)(s) : s;
     const std::vector<const LetStmt*> around = unchecked_;
@@ -171,12 +171,12 @@ class AccessChecker : public Rewriter {
     return with_parts(n, condition, when_true, part(n.when_false));
   }
 
-  // ---- rooms ----
+  // ---- valid ranges ----
 
   Stmt visit_allocate(const Stmt& s, const Allocate& n) {
     const Expr last = binary(Kind::Sub, n.elements, make_const(Int(64), 1));
     const Expr name = is_const(last) ? last : variable(n.name + ".last", Int(64));
-    around_.rooms[n.name] = {make_const(Int(64), 0), name};
+    around_.ranges[n.name] = {make_const(Int(64), 0), name};
     const Stmt result = children(s);
     return is_const(last) ? result : make_let(n.name + ".last", last, result);
   }
@@ -190,7 +190,7 @@ class AccessChecker : public Rewriter {
     return result;
   }
 
-  // Messages name the stage, so that what is known of shared expressions is known no more.
+  // Messages name the stage, so rewritten expressions cannot be reused in another stage.
   void enter(const LoopName& stage) {
     around_.stage = stage;
     forget();
@@ -209,13 +209,13 @@ class AccessChecker : public Rewriter {
     Expr holds, error;
   };
 
-  // None for memory whose extent is not known here.
+  // nullopt for memory whose extent is not known here.
   std::optional<Check> check_of(const std::string& name, const char* access, const Expr& index,
                                 const Expr& predicate) const {
-    const Room* room = find_or_null(around_.rooms, name);
-    if (!room) return {};
-    const Expr low = extreme(Kind::Min, index, predicate, room->first);
-    const Expr high = extreme(Kind::Max, index, predicate, room->last);
+    const ElementRange* range = find_or_null(around_.ranges, name);
+    if (!range) return {};
+    const Expr low = extreme(Kind::Min, index, predicate, range->first);
+    const Expr high = extreme(Kind::Max, index, predicate, range->last);
     std::vector<Expr> message = {Expr(int32_t{retrograde_error_access_out_of_bounds}),
                                  Expr(text("checked_accesses: ", quoted(name), " is ", access, " ",
                                            stage("by"), "at element ")),
@@ -225,19 +225,19 @@ class AccessChecker : public Rewriter {
       message.push_back(high);
     }
     message.emplace_back(". An access stays inside its storage, which has the elements ");
-    message.push_back(room->first);
+    message.push_back(range->first);
     message.emplace_back(" to ");
-    message.push_back(room->last);
+    message.push_back(range->last);
     message.emplace_back(
         ". Correct what unsafe_promise_clamped() or allow_race_conditions() promises; a program "
         "without them "
         "has met a fault of the compiler: report it.");
     const Expr holds =
-        binary(Kind::And, binary(Kind::LE, room->first, low), binary(Kind::LE, high, room->last));
+        binary(Kind::And, binary(Kind::LE, range->first, low), binary(Kind::LE, high, range->last));
     return Check{holds, call_op(Op::error, Int(32), std::move(message))};
   }
 
-  // Both arms are computed, so what they load is checked; what they promise holds of the one that is chosen.
+  // Both arms are computed, so the loads of both are checked; the promises of an arm hold only if it is chosen.
   Expr checked_select(const Select& n) {
     const auto loads = [](const Expr& arm) {
       return any_node(arm, [](const Load&) { return true; });
@@ -268,7 +268,7 @@ class AccessChecker : public Rewriter {
     return check ? make_assert(check->holds, check->error) : Stmt();
   }
 
-  // Its address is asked for, not its value.
+  // Only the address is needed, so the load itself is not checked.
   Expr address(const Expr& e, const Call& call) {
     const auto* load = call.args[0].as<Load>();
     const Expr index = (*this)(load->index);
@@ -277,7 +277,8 @@ class AccessChecker : public Rewriter {
                    {make_load(load->type, load->name, index, load->predicate, load->symbol)});
   }
 
-  // Lanes may be off where nothing says so: what they promise shows in what they access.
+  // Lanes may be masked off without a visible predicate, so vector promises are not checked; wrong values fail the
+  // checks of the accesses that use them.
   Expr checked_promise(const Expr& promise) const {
     if (!promise.type().is_scalar()) return promise;
     const auto* call = promise.as<Call>();
@@ -293,7 +294,7 @@ class AccessChecker : public Rewriter {
     return call_op(Op::require, value.type(), {holds, value, error});
   }
 
-  // What an indivisible update would be checked for.
+  // The checks for the body of an Atomic, to run before it.
   Stmt checks_of(const Stmt& s) {
     return match(
         s,
@@ -313,12 +314,12 @@ class AccessChecker : public Rewriter {
   }
 };
 
-// What lies between the first and the last element of a buffer, whatever the signs of its strides.
-void add_room(const LoweredArgument& arg, Lets& lets,
-              std::unordered_map<std::string, Room>& rooms) {
+// Adds the range from the first to the last element of a buffer, for strides of either sign.
+void add_range(const LoweredArgument& arg, Lets& lets,
+               std::unordered_map<std::string, ElementRange>& ranges) {
   const Expr buffer = variable(arg.name + ".buffer", Handle()), zero = make_const(Int(64), 0);
   Expr first = zero, last = zero, is_empty = const_false();
-  // What the function has not checked yet when this runs.
+  // This code runs before the checks of arguments, so it tests that the buffer is usable.
   const Expr is_usable =
       binary(Kind::EQ, call_op(Op::buffer_dimensions, Int(32), {buffer}), Expr(arg.dimensions));
   const auto if_usable = [&](const Expr& value, int otherwise) {
@@ -339,18 +340,18 @@ void add_room(const LoweredArgument& arg, Lets& lets,
   const std::string first_name = arg.name + ".first", last_name = arg.name + ".last";
   lets.emplace_back(first_name, if_usable(make_select(is_empty, zero, first), 0));
   lets.emplace_back(last_name, if_usable(make_select(is_empty, make_const(Int(64), -1), last), -1));
-  rooms[arg.name] = {variable(first_name, Int(64)), variable(last_name, Int(64))};
+  ranges[arg.name] = {variable(first_name, Int(64)), variable(last_name, Int(64))};
 }
 
 }  // namespace
 
 Stmt check_accesses(const Stmt& s, const std::vector<LoweredArgument>& args) {
   Lets lets;
-  std::unordered_map<std::string, Room> rooms;
+  std::unordered_map<std::string, ElementRange> ranges;
   for (const LoweredArgument& arg : args) {
-    if (arg.is_buffer()) add_room(arg, lets, rooms);
+    if (arg.is_buffer()) add_range(arg, lets, ranges);
   }
-  Surroundings around{std::move(rooms), {}};
+  Surroundings around{std::move(ranges), {}};
   return make_lets(lets, AccessChecker(around)(s));
 }
 

@@ -1,4 +1,4 @@
-// check_accesses -- see the .cpp. Target::CheckedAccesses.
+// check_accesses -- check bounds of every load and store (Target::CheckedAccesses); described in the .cpp file.
 #pragma once
 
 #include <vector>

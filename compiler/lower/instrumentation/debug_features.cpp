@@ -1,4 +1,4 @@
-// debug_features -- code that finds faults, for targets that ask for it.
+// debug_features -- insert checks that help to find faults, for targets that request them.
 //
 // check_promises. In: Loops, regions known. Out: Loops; the promises stay, around checked values.
 //
@@ -9,8 +9,8 @@
 //
 //   f[x] = v   =>   f[x] = reinterpret<float>(reinterpret<uint32>(v) & ~1)
 //
-// A NaN is stored as it is: without its last bit it may be an infinity. Inside Atomic nothing
-// changes: what is read there is compared with what was stored.
+// A NaN is stored unchanged: without its last bit it could be an infinity. Atomic statements stay unchanged, because
+// they compare the values they read with stored values.
 // Tests: test/golden/lower/check_promises/, fuzz_float_stores/.
 #include "lower/statement_passes.h"
 

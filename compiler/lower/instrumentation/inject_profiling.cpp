@@ -1,5 +1,4 @@
-// inject_profiling -- tell the profiler which Func is being computed, by how many threads, in how
-// much memory.
+// inject_profiling -- report to the profiler which Func each thread computes, and how much memory is allocated.
 // In:  Vector; names unique; nothing freed early yet.
 // Out: Vector; the same stores in the same order.
 //
@@ -11,13 +10,12 @@
 //                                  memory(f, -4 n) }
 //                                leave(profiler.place) end(profiler.run)
 //
-// Method: each thread has a place of its own, in which it writes the number of what it computes and
-//         which a sampling thread of the runtime reads. Entering is one store, which code generation
-//         emits in place: stages in innermost tiles, of a few nanoseconds, take no longer for being
-//         told apart, and sums around them stay in registers. Bodies of parallel loops and forks get
-//         their thread's place. Code generation leaves it, and ends the run, when the function leaves
-//         early. Blocks that fit the stack are not counted as memory: telling of one in an innermost
-//         tile would take longer than to fill it.
+// Method: each thread has a slot in which it writes the number of the Func that it computes; a sampling thread of the
+//         runtime reads it. Entering a Func is a single store, emitted inline. So small stages in innermost tiles,
+//         which take a few nanoseconds, are not slowed down, and sums around them stay in registers. Bodies of
+//         parallel loops and forks use the slot of their own thread. Code generation leaves the slot and ends the run
+//         when the function returns early. Allocations that fit on the stack are not counted as memory: reporting
+//         one in an innermost tile would take longer than filling it.
 // Source: the sampling profiler that Halide's documentation describes. Tests:
 //         test/golden/pipeline/inject_profiling/, test/unit/profiler_test.cpp.
 #include "lower/instrumentation/inject_profiling.h"
@@ -39,7 +37,7 @@ constexpr int64_t stack_block_bytes = 16 << 10;
 
 Expr run() { return variable(run_name, Handle()); }
 
-// Code generation puts most such blocks on the stack.
+// Whether the allocation is small enough that code generation usually puts it on the stack.
 bool is_small(const Allocate& n) {
   const auto elements = as_const_int(n.elements);
   const int64_t element_bytes = int64_t{n.type.bytes()} * n.type.lanes();
@@ -56,9 +54,9 @@ class Profiling : public StatementRewriter {
     names = "overhead";
     for (const LoopedFunc& f : program.funcs) names += "\n" + f.name();
   }
-  std::string names;  // by number
+  std::string names;  // ordered by number
 
-  // What one thread runs: in a place of its own.
+  // Code that runs on a thread of its own, with its own slot.
   Stmt on_a_thread(const Stmt& s) {
     const std::string outer = place_;
     place_ = places_ == 0 ? place_name : place_name + ("." + std::to_string(places_));
@@ -77,16 +75,16 @@ class Profiling : public StatementRewriter {
     if (const ProducerConsumer* n = s.as<ProducerConsumer>(); n && n->produces) return produce(*n);
     if (const For* n = s.as<For>(); n && runs_at_once(n->runs))
       return map_children(s, [&](const Stmt& body) { return on_a_thread(body); });
-    if (s.kind() == Kind::Launch) return s;  // memory of the host is none of a kernel's
+    if (s.kind() == Kind::Launch) return s;  // a kernel allocates no host memory
     if (const Fork* n = s.as<Fork>()) return make_fork(on_a_thread(n->first), (*this)(n->rest));
     if (const Allocate* n = s.as<Allocate>()) return allocate(*n);
     return children(s);
   }
 
  private:
-  std::map<std::string, int> numbers_;  // of Funcs, and of the memory of their values
+  std::map<std::string, int> numbers_;  // of Funcs and of the buffers of their values
   int current_ = 0;
-  std::string place_;  // the variable of this thread's
+  std::string place_;  // the variable that holds this thread's slot
   int places_ = 0;
 
   void add(const LoopedFunc& f, const std::string& name) {
@@ -135,8 +133,8 @@ bool has_work(const Stmt& s) {
   return any_stmt(s, [](const Stmt& part) { return is_work(part); });
 }
 
-// Wraps the smallest statement that holds all work: behind the checks of arguments, where no bounds
-// are asked for.
+// Wraps the smallest statement that contains all work: after the checks of arguments, on the path that is not a bounds
+// query.
 Stmt wrap_work(const Stmt& s, FunctionRef<Stmt(const Stmt&)> wrap) {
   if (!s.defined() || !has_work(s)) return s;
   if (is_work(s)) return wrap(s);

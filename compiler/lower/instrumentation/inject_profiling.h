@@ -1,5 +1,4 @@
-// inject_profiling -- tell the profiler which Func is being computed, by how many threads, in how
-// much memory.
+// inject_profiling -- report to the profiler which Func each thread computes, and how much memory is allocated.
 #pragma once
 
 #include <string>

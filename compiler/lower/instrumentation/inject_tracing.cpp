@@ -1,6 +1,6 @@
-// inject_tracing -- code that tells of loads, stores and regions.
+// inject_tracing -- insert trace events for loads, stores and realizations.
 // In:  Loops, as build_loop_nests gives it.
-// Out: Loops; the same stores in the same order, and events between them.
+// Out: Loops; the same stores in the same order, with events between them.
 //
 //   realize f [a, n] {              let f.trace_id = begin_realization f [a, n] in
 //     produce f { f(x) = v }          realize f [a, n] {
@@ -11,10 +11,10 @@
 //                                         g(x) = trace(f(x), load, f, x)
 //                                       ...
 //
-// Method: a load or a stored value is wrapped in Op::trace, which gives its first argument: so an
-//         event happens where, when and as often as the access does, also in vectors and branches.
-//         Regions are told by calls around statements. Events name the innermost one around them of
-//         their Func as parent, the pipeline's beginning where there is none.
+// Method: a load or a stored value is wrapped in Op::trace, which returns its first argument. An event thus happens
+//         where, when and as often as the access, in vectors and branches, too. Realizations, productions and
+//         consumptions are reported by calls around statements. The parent of an event is the innermost
+//         enclosing event of its Func, or the beginning of the pipeline if there is none.
 // Source: HalideRuntime.h on halide_trace. Tests: test/unit/tracing_test.cpp.
 #include "lower/instrumentation/inject_tracing.h"
 
@@ -35,8 +35,8 @@ namespace {
 
 const char* const pipeline_id = "pipeline.trace_id";
 
-// What target and schedule ask for together.
-TraceSchedule asked_of(TraceSchedule trace, const Target& target) {
+// The union of what target and schedule request.
+TraceSchedule requested_trace(TraceSchedule trace, const Target& target) {
   trace.loads |= target.has_feature(Target::TraceLoads);
   trace.stores |= target.has_feature(Target::TraceStores);
   trace.realizations |= target.has_feature(Target::TraceRealizations);
@@ -46,7 +46,7 @@ bool is_any(const TraceSchedule& trace) {
   return trace.loads || trace.stores || trace.realizations;
 }
 
-// Appends min and extent of each dimension, and how many numbers these are.
+// Appends the number of values and then min and extent of each dimension.
 void add_region(const std::vector<Range>& region, std::vector<Expr>& args) {
   std::vector<Expr> numbers;
   for (const Range& range : region) {
@@ -65,7 +65,7 @@ Expr region_event(const std::string& func, int event, const Expr& parent,
   return call_runtime("retrograde_trace_region", std::move(args));
 }
 
-// The box of all points of a Func that a statement stores to.
+// The box of all points of a Func to which a statement stores.
 Box region_stored(const Stmt& s, const std::string& func) {
   Box box;
   walk_in_bounds(
@@ -83,14 +83,15 @@ class Tracer : public Rewriter {
  public:
   Tracer(const Program& program, const Target& target) : target_(target) {
     for (const LoopedFunc& f : program.funcs) {
-      const TraceSchedule trace = asked_of(f.func->trace, target);
+      const TraceSchedule trace = requested_trace(f.func->trace, target);
       if (is_any(trace)) traces_[f.name()] = trace;
     }
   }
-  std::set<std::string> traced;  // names that events were made for
+  std::set<std::string> traced;  // names for which events were inserted
 
   Stmt realization(const std::string& func, const std::vector<Range>& region, const Stmt& body) {
-    return told(func, halide_trace_begin_realization, halide_trace_end_realization, region, body);
+    return with_events(func, halide_trace_begin_realization, halide_trace_end_realization, region,
+                       body);
   }
   bool traces_realizations(const std::string& func) const {
     const auto it = traces_.find(func);
@@ -122,7 +123,7 @@ class Tracer : public Rewriter {
   const Target& target_;
   std::map<std::string, TraceSchedule> traces_;
   std::map<std::string, std::vector<Range>> produced_;  // the latest region of each Func
-  std::set<std::string> with_id_;                       // Funcs inside of a region that was told
+  std::set<std::string> with_id_;                       // Funcs with an enclosing event
 
   bool loads_of(const std::string& func) const {
     const auto it = traces_.find(func);
@@ -132,7 +133,7 @@ class Tracer : public Rewriter {
   bool is_traced_image(const Call& call) const {
     if (call.call_type != CallType::Image) return false;
     const auto param = std::dynamic_pointer_cast<ParameterContents>(call.symbol.lock());
-    return asked_of(param ? param->trace : TraceSchedule(), target_).loads;
+    return requested_trace(param ? param->trace : TraceSchedule(), target_).loads;
   }
 
   std::string id_of(const std::string& func) const {
@@ -148,7 +149,7 @@ class Tracer : public Rewriter {
     return call_op(Op::trace, value.type(), std::move(args));
   }
 
-  // Of a Tuple all values are computed, and their loads told, before the first store is.
+  // All values of a Tuple are computed, and their loads reported, before the first store.
   Stmt store(const Stmt& s, const Provide& n) {
     const auto it = traces_.find(n.name);
     if (it == traces_.end() || !it->second.stores) return children(s);
@@ -170,9 +171,9 @@ class Tracer : public Rewriter {
     return make_lets(lets, make_provide(n.name, values, args, (*this)(n.predicate)));
   }
 
-  // begin; body; end -- the beginning's number is the parent of what happens inside.
-  Stmt told(const std::string& func, int begin, int end, const std::vector<Range>& region,
-            const Stmt& body) {
+  // begin; body; end. The number of the first event is the parent of the events inside.
+  Stmt with_events(const std::string& func, int begin, int end, const std::vector<Range>& region,
+                   const Stmt& body) {
     traced.insert(func);
     const std::string id = func + ".trace_id";
     return make_let(
@@ -196,8 +197,9 @@ class Tracer : public Rewriter {
     RETROGRADE_ASSERT(had_id, "a region of ", n.name, " outside of its realization");
     return make_producer_consumer(
         n.name, n.produces,
-        told(n.name, n.produces ? halide_trace_produce : halide_trace_consume,
-             n.produces ? halide_trace_end_produce : halide_trace_end_consume, region, body));
+        with_events(n.name, n.produces ? halide_trace_produce : halide_trace_consume,
+                    n.produces ? halide_trace_end_produce : halide_trace_end_consume, region,
+                    body));
   }
 
   std::vector<Range> region_of(const ProducerConsumer& n) {
@@ -219,7 +221,7 @@ class Tracer : public Rewriter {
   }
 
  public:
-  // The same around everything, of an output.
+  // The same around the whole body, for an output.
   template <class Make>
   Stmt output(const std::string& func, const std::vector<Range>& region, Make&& make) {
     const Stmt inside = within(func, make);
@@ -235,7 +237,7 @@ std::vector<Range> buffer_region(const LoopedFunc& f) {
   return region;
 }
 
-// What readers of a trace want to know of a Func in advance.
+// A tag that tells readers of a trace the types and dimensions of a Func in advance.
 Stmt type_tag(const LoopedFunc& f, const Box& box) {
   std::string text = "func_type_and_dim: " + std::to_string(f.func->types.size());
   for (const Type& type : f.func->types) {
@@ -252,7 +254,7 @@ Stmt type_tag(const LoopedFunc& f, const Box& box) {
   return make_evaluate(call_runtime("retrograde_trace_type", std::move(args)));
 }
 
-// Regions of all Funcs at root, where they are known there.
+// The regions of all Funcs at root, if they are known there.
 std::map<std::string, Box> regions_at_root(const Stmt& s) {
   std::map<std::string, Box> regions;
   walk_in_bounds(

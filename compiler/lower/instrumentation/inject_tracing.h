@@ -1,4 +1,4 @@
-// inject_tracing -- code that tells of loads, stores and regions.
+// inject_tracing -- insert trace events for loads, stores and realizations.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace retrograde::lower {
 
-// Changes nests.body; names need not be unique yet.
+// Changes nests.body, whose names need not be unique yet.
 void inject_tracing(LoopNests& nests, const Program& program, const std::string& pipeline,
                     const Target& target);
 

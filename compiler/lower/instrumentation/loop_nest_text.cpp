@@ -20,8 +20,8 @@ namespace {
 
 const char* keyword(ForType type) { return type == ForType::Serial ? "for" : for_name(type); }
 
-// Names as users wrote them, without the numbers that make them unique ("f$1_in_g$2"); but the
-// variables of vectorize(x, 8) and its like have no other name: "v$3" is shown as "v3".
+// Shows names as users wrote them, without the numbers that make them unique ("f$1_in_g$2"). The variables of
+// vectorize(x, 8) and similar directives have no other name, so "v$3" is shown as "v3".
 std::string shown(const std::string& name) {
   if (name.compare(0, 2, "v$") == 0) return "v" + name.substr(2);
   std::string result;
@@ -33,8 +33,8 @@ std::string shown(const std::string& name) {
   return result;
 }
 
-// Loops say where they come from: after split(x, xo, xi, 8) they are "x.xo" and "x.xi", after
-// fuse(x, y, t) "x.t". A reduction variable is shown by the name of its domain.
+// Shows where loops come from: after split(x, xo, xi, 8) they are "x.xo" and "x.xi", after fuse(x, y, t) "x.t". A
+// reduction variable is shown by the name of its domain.
 class LoopNames {
  public:
   explicit LoopNames(const Program& program) {
@@ -51,7 +51,7 @@ class LoopNames {
  private:
   std::unordered_map<std::string, std::string> names_;
 
-  // Of the general schedule first: specializations add the loops that only they have.
+  // Call for the general schedule first; specializations then add the loops that only they have.
   void add(const std::string& prefix, const StageLoops& schedule) {
     std::unordered_map<std::string, std::string> paths;
     const auto own = [](const std::string& var) { return shown(var.substr(0, var.find('.'))); };
@@ -70,7 +70,7 @@ class LoopNames {
           paths[split.inner] = from + "." + own(split.inner);
           break;
         case Split::Kind::Rename: {
-          // A variable of rfactor's own takes the name of the reduction variable it stands for.
+          // A variable introduced by rfactor takes the name of the reduction variable that it replaces.
           const bool is_rvar = split.outer.find('.') != std::string::npos;
           paths[split.outer] = is_rvar ? own(split.outer) : from + "." + own(split.outer);
         }
@@ -90,7 +90,7 @@ bool is_over_parameters(const Expr& condition) {
   return any && result;
 }
 
-// Of an expression whose shared parts count once; `most` when there are that many or more.
+// The number of distinct nodes of an expression; `most` if there are at least that many.
 size_t distinct_nodes(const Expr& e, size_t most) {
   size_t count = 0;
   walk(e, [&](const Expr&) { return ++count < most; });
@@ -100,9 +100,8 @@ size_t distinct_nodes(const Expr& e, size_t most) {
 class LoopNestPrinter {
  public:
   explicit LoopNestPrinter(const Program& program) : program_(program), names_(program) {}
-  // What a name of the nest stands for. Bounds that say how one grows out of the last, as those of
-  // a pyramid do, become large when they are put into each other, and no constant comes of them:
-  // such names stay names.
+  // Records the value of a name in the nest. Bounds that recursively depend on each other, like those of a pyramid,
+  // become large when expanded and never become constant: such names are not expanded.
   void bind(const std::string& name, const Expr& value) {
     const Expr known = value_of(value);
     if (distinct_nodes(known, most_nodes) < most_nodes) values_[name] = known;
@@ -118,7 +117,7 @@ class LoopNestPrinter {
 
   const Program& program_;
   const LoopNames names_;
-  Substitution values_;  // of the lets around
+  Substitution values_;  // of lets around the current statement
   std::ostringstream out_;
   int depth_ = 0;
 
@@ -133,7 +132,7 @@ class LoopNestPrinter {
     visit(s);
     depth_--;
   }
-  // Conditions of specialize are shown; those of tails and of where() belong to the body.
+  // Shows the conditions of specialize; conditions of tails and of where() count as part of the body.
   void visit_branch(const IfThenElse& branch) {
     if (!is_over_parameters(branch.condition)) {
       visit(branch.when_true);
@@ -146,7 +145,7 @@ class LoopNestPrinter {
     line() << "else:\n";
     nested(branch.when_false);
   }
-  // Funcs stored at one level, producers first.
+  // Shows Funcs stored at one level, producers first.
   void visit_storage(const Stmt& s) {
     std::vector<std::string> names;
     Stmt body = s;
@@ -164,7 +163,7 @@ class LoopNestPrinter {
     visit(body);
     depth_ -= static_cast<int>(names.size());
   }
-  // A loop of one iteration is none.
+  // A loop of one iteration is not shown.
   void visit_loop(const For& loop) {
     const auto constant = [&](const Expr& e) { return as_const_int(value_of(e)); };
     const auto min = constant(loop.min), extent = constant(loop.extent);

@@ -1,7 +1,7 @@
-// The loop nest of a pipeline as a user schedules it: one line a loop, producers marked.
+// Prints the loop nest of a pipeline for print_loop_nest: one line per loop, with producers and consumers marked.
 //
-// What constants the ends of loops are, and which loops run once, is found through the names of
-// regions (build_loop_nests.h), in time about linear in the number of names.
+// The names of regions (build_loop_nests.h) show which loop bounds are constant and which loops run once. The time is
+// about linear in the number of names.
 #pragma once
 
 #include <string>

@@ -1,10 +1,10 @@
-// write_debug_files -- Func::debug_to_file.
+// write_debug_files -- write the values of Funcs to files, for Func::debug_to_file.
 // In:  Loops; names unique.
-// Out: Loops; after a Func is produced its memory goes to a file.
+// Out: Loops; after a Func is produced, its memory is written to a file.
 //
 //   produce f { P }   =>   produce f { P }  assert(debug_to_file("f.tmp", buffer of f) == 0)
 //
-// Errors: Tuples, names that end in no format that can be written, types that the format lacks.
+// Errors: Tuples; file names without a known format; types that the format does not support.
 // Source: Halide's documentation of debug_to_file. Tests:
 //         test/golden/pipeline/write_debug_files/, test/unit/debug_file_test.cpp.
 #include "lower/instrumentation/write_debug_files.h"

@@ -1,4 +1,4 @@
-// write_debug_files -- Func::debug_to_file.
+// write_debug_files -- write the values of Funcs to files, for Func::debug_to_file.
 #pragma once
 
 #include "lower/program.h"

@@ -1,4 +1,4 @@
-// bound_allocations -- storage that is small whatever its size is has a constant size, the largest one.
+// bound_allocations -- give small storage of varying size a constant size, the maximum.
 // In:  FlatStorage or Vector; names unique.
 // Out: the same phase; the same stores in the same order.
 //
@@ -6,11 +6,11 @@
 //     allocate f[min(n - 8*xo, 8)] { ... }     =>      allocate f[8] { ... }
 //   }                                                }
 //
-// What has a constant size is memory of the stack, which costs nothing; the last tile of a split has
-// less to compute than the others and would make all of them ask for memory.
+// Storage of constant size is on the stack, which costs nothing. The last tile of a split computes less than the
+// others, and its varying size would otherwise put the storage of all tiles on the heap.
 //
-// Method: constants above sizes as for loops (bounded_extents.h), where a size is made of few names.
-// Not done: memory that asks for the heap or a device; kernels, whose storage is placed before.
+// Method: constant upper bounds of sizes, as for loops (bounded_extents.h), for sizes that mention few names.
+// Not done: storage that is scheduled on the heap or a device; kernels, whose storage is already placed.
 // Source: folklore. Tests: test/golden/lower/bound_allocations/, test/unit/loop_schedules_test.cpp.
 #include <algorithm>
 
@@ -22,9 +22,9 @@ namespace retrograde::lower {
 
 namespace {
 
-// In bytes: what code generation puts on the stack.
+// The limits in bytes up to which code generation uses the stack: by default, and for MemoryType::Stack.
 constexpr int64_t most_unasked = 16 << 10, most_asked = 256 << 10;
-// In a size and in the values of those names, so that chains of stages take time by their number.
+// A limit on the names in a size and in their values, so that the time is linear in the number of stages.
 constexpr int most_names = 20;
 
 class AllocationBounder : public BoundedExtents {
@@ -35,7 +35,8 @@ class AllocationBounder : public BoundedExtents {
     const auto* n = inner.as<Allocate>();
     if (!n || is_const(n->elements) || n->offset.defined()) return inner;
     const bool is_asked = n->memory == MemoryType::Stack;
-    if ((!is_asked && n->memory != MemoryType::Auto) || !is_made_of_few(n->elements, most_names))
+    if ((!is_asked && n->memory != MemoryType::Auto) ||
+        !mentions_few_names(n->elements, most_names))
       return inner;
     const int64_t bytes = int64_t{n->type.bytes()} * n->type.lanes();
     const auto most = largest(n->elements, (is_asked ? most_asked : most_unasked) / bytes);

@@ -12,9 +12,9 @@ namespace retrograde::lower {
 
 namespace {
 
-constexpr int most_choices = 6;  // that are taken apart
+constexpr int most_choices = 6;  // selects in one extent whose arms are bounded separately
 
-Expr a_choice_in(const Expr& e) {
+Expr find_select(const Expr& e) {
   Expr found;
   walk(e, [&](const Expr& part) {
     if (!found.defined() && part.as<Select>()) found = part;
@@ -23,8 +23,8 @@ Expr a_choice_in(const Expr& e) {
   return found;
 }
 
-// With every choice by this condition decided.
-Expr decided(const Expr& e, const Expr& condition, bool value) {
+// The expression with every select on this condition with_decided_selects.
+Expr with_decided_selects(const Expr& e, const Expr& condition, bool value) {
   return simplify(rewrite(e, [&](const Expr& part, const auto& recurse) -> Expr {
     const Select* choice = part.as<Select>();
     if (!choice || !equal(choice->condition, condition)) return {};
@@ -33,20 +33,20 @@ Expr decided(const Expr& e, const Expr& condition, bool value) {
 }
 
 int64_t bound_of(const Expr& e, Facts& facts, int choices) {
-  const Expr choice = choices > 0 ? a_choice_in(e) : Expr();
+  const Expr choice = choices > 0 ? find_select(e) : Expr();
   if (!choice.defined()) return std::min(facts.range(e).max, facts.upper_bound(sum_of(e)));
   const Expr condition = choice.as<Select>()->condition;
   const auto arm = [&](bool value) {
     const Facts::Assumption holds(facts, simplify(value ? condition : logical_not(condition)));
     facts.forget();
-    return bound_of(decided(e, condition, value), facts, choices - 1);
+    return bound_of(with_decided_selects(e, condition, value), facts, choices - 1);
   };
   const int64_t most = std::max(arm(true), arm(false));
   facts.forget();
   return most;
 }
 
-// n == 3: what conditions say to be constants.
+// Pairs of an expression and the constant that a condition says it equals, as n == 3.
 using Constants = std::vector<std::pair<Expr, Expr>>;
 void add_constants(const Expr& condition, Constants& constants) {
   std::vector<Expr> conjuncts;
@@ -97,17 +97,17 @@ Stmt BoundedExtents::chosen(const IfThenElse& choice) {
                     under(logical_not(choice.condition), choice.when_false));
 }
 
-bool BoundedExtents::is_made_of_few(const Expr& extent, int names) const {
-  return takes_names(extent, names);
+bool BoundedExtents::mentions_few_names(const Expr& extent, int names) const {
+  return count_names(extent, names);
 }
 
-// Names that are left of so many; fewer than none: no.
-bool BoundedExtents::takes_names(const Expr& e, int& left) const {
+// Subtracts the number of names in `e` from `left`; false once it is negative.
+bool BoundedExtents::count_names(const Expr& e, int& left) const {
   walk(e, [&](const Expr& part) {
     const auto* name = part.as<Variable>();
     if (!name) return left >= 0;
     const auto value = values_.find(name->name);
-    if (--left >= 0 && value != values_.end()) takes_names(value->second, left);
+    if (--left >= 0 && value != values_.end()) count_names(value->second, left);
     return false;
   });
   return left >= 0;

@@ -1,12 +1,11 @@
-// bounded_extents -- constants above the extents of loops, for passes that need one.
+// bounded_extents -- finds constant upper bounds of loop extents, for passes that need a constant.
 //
-//   for (x, 0, n) {                                     // y runs at most 4 times, by the ends of x,
-//     let m = min(n - x * 4, 4)                   =>    // the value of m, and the condition
+//   for (x, 0, n) {                                     // y runs at most 4 times: the bound follows from
+//     let m = min(n - x * 4, 4)                   =>    // the range of x, the value of m and the condition
 //     if (m < 5) { unrolled for (y, 0, m) ... }
 //   }
 //
-// Method: the extent in terms of the outermost names; each arm of a select is bounded under its own
-//         condition.
+// Method: expands lets in the extent, then bounds it; each arm of a select is bounded under its own condition.
 #pragma once
 
 #include <optional>
@@ -17,24 +16,23 @@
 
 namespace retrograde::lower {
 
-// A rewriter of statements that knows what holds at the loop at hand.
+// A rewriter of statements that knows the loops, lets and conditions around the current statement.
 class BoundedExtents : public StatementRewriter {
  protected:
-  // With its parts rewritten: derived classes call it first.
+  // Rewrites the parts of the statement. Derived classes call it first.
   Stmt parts(const Stmt& s);
-  // A constant that the extent does not exceed where the statement at hand runs; none when there is
-  // none up to `most`.
+  // A constant upper bound of the extent at the current statement; nullopt if none of at most `most` is known.
   std::optional<int64_t> largest(const Expr& extent, int64_t most) const;
-  // Whether the extent is made of at most so many names, those in the values of its names included.
-  bool is_made_of_few(const Expr& extent, int names) const;
+  // Whether the extent mentions at most `names` names, counting those in the values of its lets.
+  bool mentions_few_names(const Expr& extent, int names) const;
 
  private:
-  Substitution values_;            // of names around the statement at hand, as they are written
+  Substitution values_;            // of lets around the current statement, not expanded
   std::vector<const For*> loops_;  // around it
   std::vector<Expr> conditions_;   // that hold there
 
   Stmt chosen(const IfThenElse& choice);
-  bool takes_names(const Expr& e, int& left) const;
+  bool count_names(const Expr& e, int& left) const;
 };
 
 }  // namespace retrograde::lower

@@ -5,7 +5,7 @@
 
 namespace retrograde::lower {
 
-// The value for which a select takes its first arm, where its condition is about the variable.
+// The value of the variable for which a select takes its first arm; nullopt if its condition is not about the variable.
 std::optional<int64_t> ChoiceArms::case_of(const Expr& e) const {
   const auto* select = e.as<Select>();
   if (!select || select->condition.kind() != Kind::EQ) return std::nullopt;
@@ -24,13 +24,13 @@ ChoiceArms::Table ChoiceArms::table_of(const Expr& choice) const {
   table.otherwise = choice;
   while (const auto value = case_of(table.otherwise)) {
     const Expr select = table.otherwise;
-    table.arms.emplace(*value, select.as<Select>()->when_true);  // the first that fits is taken
+    table.arms.emplace(*value, select.as<Select>()->when_true);  // the first arm for a value wins
     table.otherwise = select.as<Select>()->when_false;
   }
   return table;
 }
 
-// What the choice that e begins is for a value; undefined where e begins none.
+// The result for a value of the chain of selects that begins with e; undefined if e is not such a select.
 Expr ChoiceArms::arm(const Expr& e, int64_t value) {
   if (!case_of(e)) return {};
   auto found = tables_.find(e.get());

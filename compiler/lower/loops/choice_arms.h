@@ -1,8 +1,8 @@
-// choice_arms.h -- choices by the value of one variable, looked up instead of tried arm after arm:
+// choice_arms.h -- resolves chains of selects on one variable by a table lookup instead of arm by arm:
 //
 //   select(c == 0, a, select(c == 1, b, ...))  for c == 1:  b
 //
-// So n copies of a body that chooses from n arms, one for each value, take n steps.
+// Copying a body that chooses from n arms once for each of n values then takes n steps instead of n * n.
 #pragma once
 
 #include <optional>
@@ -13,13 +13,13 @@
 
 namespace retrograde::lower {
 
-// Remembers the choices of one body, which must outlive it.
+// The choices of one body. The body must outlive this object.
 class ChoiceArms {
  public:
   explicit ChoiceArms(std::string variable) : variable_(std::move(variable)) {}
 
   bool has_any(const Stmt& s) const;
-  // The body where the variable has the value, without the arms of other values.
+  // The body for one value of the variable, without the arms of other values.
   Stmt choose(const Stmt& body, int64_t value);
 
  private:
@@ -33,7 +33,7 @@ class ChoiceArms {
   Expr arm(const Expr& e, int64_t value);
 
   const std::string variable_;
-  std::unordered_map<const ExprNode*, Table> tables_;  // of choices by their first select
+  std::unordered_map<const ExprNode*, Table> tables_;  // by the first select of a chain
 };
 
 }  // namespace retrograde::lower

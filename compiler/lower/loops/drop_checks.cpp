@@ -1,4 +1,4 @@
-// drop_checks -- leaves out what the target does without.
+// drop_checks -- remove bounds queries or checks that the target disables.
 // In:  any phase. Out: the same phase.
 //
 //   if (is_query(in) || is_query(out)) {         assert !is_query(in), "... \"in\" ..."
@@ -8,10 +8,10 @@
 //   }
 //
 //   assert c, message                     =>     (nothing)
-//   assert c, 0                           =>     the same: it returns and reports nothing
+//   assert c, 0                           =>     unchanged: it returns without reporting
 //
-// drop_asserts runs last: until then the checks tell the simplifier what holds. Failing allocations
-// are no Asserts and stay errors. Tests: test/golden/lower/drop_*/.
+// drop_asserts runs last, because the simplifier derives facts from the checks. Failing allocations are not Asserts and
+// stay errors. Tests: test/golden/lower/drop_*/.
 #include "lower/statement_passes.h"
 
 #include "diagnostics/error.h"

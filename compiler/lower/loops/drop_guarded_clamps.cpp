@@ -1,4 +1,4 @@
-// drop_guarded_clamps -- what a condition says already is not said again where it holds.
+// drop_guarded_clamps -- remove a min or max that a surrounding condition decides.
 // In:  Loops or FlatStorage, before unrolling and vectorization; names unique.
 // Out: the same phase; the same stores in the same order.
 //
@@ -6,20 +6,19 @@
 //     out[x] = out[x] + in[max(min(x - r, n - 1), 0)]  =>  out[x] = out[x] + in[x - r]
 //   }                                                   }
 //
-// Gathers that differentiation makes look like this: they may be asked for what lies outside of the
-// domain that they came from, and bounds inference takes no notice of conditions, so that their
-// places are clamped. In borders the condition stays, and over lanes a clamped place would be a
-// gather, where now it is a dense load under a mask.
+// Gathers that differentiation generates look like this. They may be required outside of their domain, and bounds
+// inference ignores conditions, so their indices are clamped. The clamp is redundant under the condition. Over vector
+// lanes the clamped index would be a gather; without the clamp it is a dense masked load.
 //
-// Method: conjuncts of a condition become sums that are at least 0. A min or max whose operands
-//         differ by such a sum and a constant of the right sign is one of them. Lets inside of
-//         loops are opened; those outside are the same on both sides.
-// Not done: conditions that read memory, which may change; facts that follow from several
-//           conjuncts together; arms of a select, both of which are evaluated over lanes.
+// Method: each conjunct of a condition becomes a sum that is at least 0. A min or max is decided if its operands differ
+//         by such a sum and a constant of the right sign. Lets inside of loops are expanded; those outside are the
+//         same on both sides.
+// Not done: conditions that read memory, which may change; facts that follow only from several conjuncts together; arms
+//           of a select, both of which are evaluated over lanes.
 // Source: folklore. Tests: test/golden/lower/drop_guarded_clamps/,
 // test/property/loop_passes_test.cpp.
 //
-// skip_empty_tiles -- a tile without a point computes nothing of its producers.
+// skip_empty_tiles -- skip the producers of tiles that contain no points.
 // In:  Loops or FlatStorage, before loops are partitioned; names unique.
 // Out: the same phase; the same stores to what outlives an iteration, in the same order.
 //
@@ -31,11 +30,11 @@
 //     }                                             }
 //   }                                             }
 //
-// Under a split with a guard the place of a producer is clamped only for the tiles beyond the end.
-// Without the clamp it is a multiple of the tile, so that what is packed by tiles is read in a row.
+// Under a split with a guard, the region of a producer is clamped only for tiles beyond the end. Without the clamp
+// its minimum is a multiple of the tile size, so that data packed in tiles is read contiguously.
 //
-// Method: what must hold for an iteration to do anything (needed_conditions.h) becomes a condition
-//         around it where that decides a clamp, by the same proof as above.
+// Method: a condition that must hold for an iteration to have any effect (needed_conditions.h) is put around the
+//         iteration if it decides a clamp, by the same proof as above.
 // Not done: loops around vectors and kernels.
 // Tests: test/golden/lower/skip_empty_tiles/.
 #include "lower/statement_passes.h"
@@ -57,12 +56,12 @@ namespace retrograde::lower {
 
 namespace {
 
-// Lets with more nodes than this, once those in them are opened, stay closed.
+// Lets with more nodes than this after expansion are not expanded further.
 constexpr int most_nodes = 60;
 
 bool is_small(const Expr& e) { return has_at_most_nodes(e, most_nodes); }
 
-// Where facts come from.
+// The conditions that facts are derived from.
 enum class FactSource { Conditions, NeededConditions };
 
 class ClampDropper : public Rewriter {
@@ -119,7 +118,7 @@ class ClampDropper : public Rewriter {
         s, [&](const Expr& e) { return (*this)(e); }, [&](const Stmt&) { return body; });
   }
 
-  // What all threads of a block do together stays outside of conditions.
+  // All threads of a block must reach barriers together, so kernels get no conditions around them.
   static bool has_kernel(const Stmt& s) {
     return any_node(s, [](const For& loop) { return is_gpu(loop.runs); });
   }
@@ -159,12 +158,12 @@ class ClampDropper : public Rewriter {
     if (is_small(whole)) lets_[name] = whole;
   }
   Expr opened(const Expr& e) const { return substitute(plain(e), lets_); }
-  // A promise is kept where the program does anything.
+  // Removes promises if facts are needed conditions: where the program has any effect, its promises hold.
   Expr plain(const Expr& e) const {
     return source_ == FactSource::NeededConditions ? without_promises(without_likely(e)) : e;
   }
 
-  // The operand that min or max is, where a fact says so.
+  // The operand that equals the min or max, if a fact decides it; otherwise e.
   Expr decided(const Binary& n, const Expr& e) const {
     if (!has_linear_form(n.type) || !is_small(e)) return e;
     const Sum difference =
@@ -187,7 +186,7 @@ class ClampDropper : public Rewriter {
 
   struct Fact {
     Sum form;             // is at least 0
-    Expr condition = {};  // that has to be added for it
+    Expr condition = {};  // to be added around the loop if the fact is used
     mutable bool used = false;
   };
   const FactSource source_;

@@ -1,7 +1,7 @@
-// flatten_storage -- replace points of Funcs and images by elements of allocations and buffers.
+// flatten_storage -- replace accesses of Funcs and images by accesses of flat allocations and buffers.
 // In:  Loops; names unique.
-// Out: FlatStorage; the same stores in the same order, except that the values of a Tuple are all
-//      computed before the first of them is stored.
+// Out: FlatStorage; the same stores in the same order, except that all values of a Tuple are computed before the first
+//      of them is stored.
 //
 //   realize f(float32) auto [a, n], [b, m] {       let f.min.0 = a
 //     f(x, y) = f(x - 1, y) + in(x, y)       =>    let f.min.1 = b
@@ -10,10 +10,9 @@
 //                                                    f[x - f.min.0 + (y - f.min.1)*f.stride.1] = ..
 //                                                  }
 //
-// Method: one rewriting walk; each Realize puts its strides in scope. Constant minima and strides
-//         are substituted right away, so that indices of Funcs with constant bounds are free of
-//         them.
-// A dimension that folds is addressed modulo its factor, from 0 on, and as large.
+// Method: one rewriting walk; each Realize puts its strides in scope. Constant minima and strides are substituted at
+//         once, so that indices of Funcs with constant bounds do not mention them. A folded dimension has the minimum
+//         0, is indexed modulo its factor and has the factor as its extent.
 // Source: folklore. Tests: test/golden/lower/flatten_storage/.
 #include "lower/loops/flatten_storage.h"
 
@@ -41,13 +40,13 @@ std::string element_name(const std::string& func, size_t value_count, size_t com
   return value_count == 1 ? func : func + "." + std::to_string(component);
 }
 
-// What addressing needs to know of a buffer: an Expr per dimension.
+// The layout of a buffer: one Expr per dimension.
 struct Layout {
   std::vector<Expr> mins, strides, folds;
-  Expr first;  // the element it begins with, in a ring buffer; undefined: 0
+  Expr first;  // its first element in a ring buffer; undefined: 0
 };
 
-// What the whole statement says about names, found before any rewriting.
+// Facts about names in the whole statement, found before any rewriting.
 struct Usage {
   std::unordered_map<std::string, size_t> value_counts;  // of Funcs that are provided or realized
   std::unordered_set<std::string> variables;             // mentioned anywhere
@@ -57,7 +56,7 @@ Usage find_usage(const Stmt& s) {
   Usage usage;
   walk(
       s, [&](const Variable& n) { usage.variables.insert(n.name); },
-      [&](const Call& n) {  // an output that a C function fills: no Provide names it
+      [&](const Call& n) {  // an output filled by a C function has no Provide
         if (n.call_type != CallType::Func || !n.symbol.defined()) return;
         const auto f = std::dynamic_pointer_cast<FuncContents>(n.symbol.lock());
         if (f && f->is_extern()) usage.value_counts.emplace(n.name, f->types.size());
@@ -134,13 +133,13 @@ class Flattener : public Rewriter {
     return folds;
   }
 
-  // A constant stands for itself; anything else is bound to a name.
+  // Binds the value to the name, unless it is a constant that nothing refers to by name.
   Expr bind(const std::string& name, const Expr& value, Lets& bindings) const {
     if (!is_const(value) || usage_.variables.count(name)) bindings.emplace_back(name, value);
     return is_const(value) ? value : variable(name);
   }
 
-  // What a predicate leaves nothing of has a negative extent: no element at all.
+  // The number of elements along a dimension. A negative extent, from a predicate that is never true, counts as 0.
   static Expr count_of(const Expr& extent) {
     const auto constant = as_const_int(extent);
     if (!constant) return binary(Kind::Max, extent, Expr(0));
@@ -183,7 +182,7 @@ class Flattener : public Rewriter {
     return make_lets(bindings, body);
   }
 
-  // Notes a place that begins here, or where in one the Func lies.
+  // Records where hoisted storage begins, or which hoisted storage the Func lies in; true in the second case.
   bool find_place(const std::string& name) {
     auto it = asked_.find(name);
     if (it == asked_.end()) return false;
@@ -210,8 +209,7 @@ class Flattener : public Rewriter {
     return result.defined() ? result : make_evaluate(Expr(0));
   }
 
-  // Values of a Tuple are stored one after the other: what reads storage is read before the first
-  // store.
+  // Values of a Tuple are stored one after the other, so operands that read storage are bound before the first store.
   void bind_operands(const Provide& n, std::vector<Expr>& values, std::vector<Expr>& args,
                      Expr& predicate, Lets& bindings) {
     auto bind_if_loading = [&](Expr& e, const std::string& part) {
@@ -231,8 +229,10 @@ class Flattener : public Rewriter {
   const Usage usage_;
   FreshNames fresh_;
   std::unordered_map<std::string, Layout> layouts_;
-  std::unordered_map<std::string, std::string> places_;  // by name before renaming, the innermost
-  std::unordered_map<std::string, std::string> memory_of_;  // Func -> place
+  std::unordered_map<std::string, std::string>
+      places_;  // hoisted storage by name before renaming, the innermost
+  std::unordered_map<std::string, std::string>
+      memory_of_;  // by Func: the hoisted storage that it lies in
 };
 
 }  // namespace

@@ -1,6 +1,6 @@
-// fork_async -- producers that run at the same time as their consumers.
+// fork_async -- run async producers concurrently with their consumers.
 // In:  Loops; names unique.
-// Out: Loops; every async Func is produced in one branch of a Fork and consumed in the other.
+// Out: Loops; every async Func is computed in one branch of a Fork and consumed in the other.
 //
 //   realize f {                      realize f { realize f.semaphores {
 //     produce f { P }                  fork { produce f { P }  release ready }
@@ -12,32 +12,30 @@
 //     consume f { B(f, y) }      =>         { for y { acquire ready; B(f, y); release space } }
 //   } }                              } }
 //
-// Method: in the second form both branches keep the loops between the storage and the computation,
-//         each without the other's work; `space` starts with the number of iterations that the
-//         producer may be ahead, which build_loop_nests knows from the folding, or is left out
-//         where nothing that is still read is ever overwritten. Storage of several async Funcs
-//         nests, and so do the Forks: outermost first, each next one splits the branch that
-//         consumes. When both of its parts read the Func of a Fork around, each has semaphores of
-//         its own to that producer. What else the producer reads and is computed in the same loops
-//         is computed in its branch, and in the other as well where that reads it too, or what is
-//         computed together with it (compute_with).
-//         A Func with a ring buffer (ring_buffers.h) is forked around its place: both branches lie in
-//         it, and the producer may be ahead by as many iterations as there are copies.
-// Errors: such a value that both branches read, and whose storage lasts longer than theirs; loops
-//         between storage and computation that are not serial, or belong to a memoized Func.
+// Method: in the second form both branches keep the loops between storage level and compute level, each without the
+//         other's work. `space` starts with the number of iterations that the producer may be ahead, which
+//         build_loop_nests derives from the fold factor. It is left out if no element is overwritten while it is
+//         still read.
+//         Storage of several async Funcs nests, and so do the Forks: outermost first, each next Fork splits the branch
+//         that consumes. If both parts read an outer async Func, each gets its own semaphores to that producer.
+//         Other Funcs that the producer reads, and that are computed in the same loops, are computed in its branch.
+//         They are computed in the other branch as well if that reads them or a Func computed with them (compute_with).
+//         A Func with a ring buffer (ring_buffers.h) is forked around its hoisted storage: both branches share it, and
+//         the producer may be ahead by the number of copies.
+// Errors: a Func that both branches compute, if its storage level is outside of theirs; loops between storage and
+//         compute level that are not serial, or that belong to a memoized Func.
 // Source: Halide's documentation of async; the handshake is a bounded buffer's (Dijkstra 1965).
 // Tests: test/golden/pipeline/fork_async/, test/unit/async_test.cpp.
 #include "lower/loops/fork_async.h"
 
 #include <algorithm>
 #include <optional>
-#include <set>
 #include <utility>
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
-#include "ir/memory_reads.h"
 #include "ir/visit.h"
+#include "lower/loops/async_branches.h"
 #include "lower/loops/ring_buffers.h"
 #include "lower/loops/semaphores.h"
 #include "lower/nests/make_names_unique.h"
@@ -47,313 +45,14 @@ namespace retrograde::lower {
 
 namespace {
 
-// Whether the expression or statement reads or writes the Func.
-bool reads_func(const Expr& e, const std::string& func) {
-  const Call* call = e.as<Call>();
-  const Variable* variable = e.as<Variable>();
-  return (call && call->call_type == CallType::Func && call->name == func) ||
-         (variable && variable->name.rfind(func + ".stride.", 0) == 0);
-}
-bool writes_func(const Stmt& s, const std::string& func) {
-  const Provide* provide = s.as<Provide>();
-  const Prefetch* prefetch = s.as<Prefetch>();
-  return (provide && provide->name == func) || (prefetch && prefetch->name == func);
-}
-bool uses_func(const Expr& e, const std::string& func) {
-  return any_node(e, [&](const Expr& node) { return reads_func(node, func); });
-}
-bool uses_func(const Stmt& s, const std::string& func) {
-  return any_node(
-      s, [&](const Expr& node) { return reads_func(node, func); },
-      [&](const Stmt& part) { return writes_func(part, func); });
-}
-
-bool own_parts_use(const Stmt& s, const std::string& func) {
-  bool found = false;
-  for_each_child(
-      s, [&](const Expr& e) { found = found || uses_func(e, func); }, [](const Stmt&) {});
-  return found;
-}
-
-using Names = std::set<std::string>;
-
-const ProducerConsumer* as_producer(const Stmt& s) {
-  const ProducerConsumer* n = s.as<ProducerConsumer>();
-  return n && n->produces ? n : nullptr;
-}
-
-bool is_producer_of(const Stmt& s, const std::string& func) {
-  const ProducerConsumer* n = as_producer(s);
-  return n && n->name == func;
-}
-
-bool produces_any(const Stmt& s, const Names& funcs) {
-  return any_stmt(s, [&](const Stmt& part) {
-    const ProducerConsumer* n = as_producer(part);
-    return n && funcs.count(n->name);
-  });
-}
-
-bool produces(const Stmt& s, const std::string& func) { return produces_any(s, {func}); }
-
-// The Funcs that are computed together in the loops of a producer (compute_with): those of
-// producers inside each other with no loop in between. Tracing stands around the inner ones.
-void add_group(const Stmt& s, Names& names) {
-  if (const auto* let = s.as<LetStmt>()) return add_group(let->body, names);
-  if (const auto* block = s.as<Block>()) {
-    for (const Stmt& part : block->stmts) add_group(part, names);
-  } else if (const ProducerConsumer* n = as_producer(s)) {
-    names.insert(n->name);
-    add_group(n->body, names);
-  }
-}
-Names group_of(const ProducerConsumer& producer) {
-  Names names = {producer.name};
-  add_group(producer.body, names);
-  return names;
-}
-
-Names realized_in(const Stmt& s) {
-  Names names;
-  walk(s, [&](const Realize& n) { names.insert(n.name); });
-  return names;
-}
-
-Names produced_in(const Stmt& s) {
-  Names names;
-  walk(s, [&](const ProducerConsumer& n) {
-    if (n.produces) names.insert(n.name);
-  });
-  return names;
-}
-
-// Whether anything but the computation of the Func itself reads it.
-bool is_read_outside(const Stmt& s, const std::string& func) {
-  bool found = false;
-  walk(
-      s, [&](const Expr& e) { return !(found = found || reads_func(e, func)); },
-      [&](const Stmt& part) {
-        return !is_producer_of(part, func) && !(found = found || writes_func(part, func));
-      });
-  return found;
-}
-
-// A loop around the producer, inside of `s`.
-bool has_loop_around(const Stmt& s, const std::string& func) {
-  bool found = false;
-  walk(
-      s, [](const Expr&) { return false; },
-      [&](const Stmt& part) {
-        if (is_producer_of(part, func)) return false;
-        found |= part.kind() == Kind::For && produces(part, func);
-        return !found;
-      });
-  return found;
-}
-
-// Whether anything reads a Func that is computed together with this one.
-bool is_group_read(const Stmt& s, const std::string& func) {
-  Names group = {func};
-  walk(
-      s, [](const Expr&) { return false; },
-      [&](const Stmt& part) {
-        const ProducerConsumer* n = as_producer(part);
-        const Names names = n ? group_of(*n) : Names();
-        if (names.count(func)) group.insert(names.begin(), names.end());
-        return !names.count(func);
-      });
-  return std::any_of(group.begin(), group.end(),
-                     [&](const std::string& other) { return is_read_outside(s, other); });
-}
-
-// Places outside of the statement in which its Funcs lie, by their original names.
-Names places_of(const Stmt& s, const Program& program) {
-  Names places, inside;
-  if (!s.defined()) return places;
-  for (const std::string& name : realized_in(s)) inside.insert(program.original(name));
-  for (const std::string& name : inside) {
-    const LoopedFunc* f = program.find(name);
-    if (f && is_hoisted(*f) && !inside.count(place_name(name))) places.insert(place_name(name));
-  }
-  return places;
-}
-
-// Whether the statement has to do with what was realized under this name: a Func or a place.
-bool needs(const Stmt& s, const std::string& name, const Program& program) {
-  return s.defined() && (uses_func(s, name) || places_of(s, program).count(program.original(name)));
-}
-
-[[noreturn]] void refuse_loops(const std::string& func, const std::string& evidence,
-                               const char* instead) {
-  unsupported(
-      text("compute ", quoted(func), " async"),
-      "the loops between storage and computation of an async Func are serial and always run",
-      evidence, instead);
-}
-
-// ---- the two branches ----
-
-// What each branch of a Fork keeps of the code where an async Func lives: just the work of the
-// producer and what it needs; everything else.
-class AsyncBranches {
- public:
-  // `room`: how many iterations the producer may be ahead (AsyncRoom); none: it runs once.
-  // `forked`: the async Funcs around.
-  AsyncBranches(const Realize& n, std::optional<int> room, const std::vector<std::string>& forked,
-                const Program& program, Semaphores& semaphores)
-      : n_(n), room_(room), forked_(forked), program_(program), semaphores_(semaphores) {}
-
-  // Undefined where nothing is left.
-  Stmt producer, consumer;
-  void split() {
-    made_ = {n_.name};
-    producer = only_producer(n_.body);
-    while (add_what_is_read()) producer = only_producer(n_.body);
-    made_.erase(n_.name);
-    consumer = without_unread(without_producer(n_.body, n_.name), made_);
-    check_is_apart();
-  }
-
- private:
-  // Funcs that are computed beside this one and that its producer reads.
-  bool add_what_is_read() {
-    const size_t before = made_.size();
-    walk(
-        n_.body, [](const Expr&) { return false; },
-        [&](const Stmt& part) {
-          const ProducerConsumer* other = as_producer(part);
-          if (!other || (other->name != n_.name && produces(part, n_.name))) return true;
-          const Names group = group_of(*other);
-          if (std::any_of(group.begin(), group.end(),
-                          [&](const std::string& func) { return uses_func(producer, func); }))
-            made_.insert(group.begin(), group.end());
-          return false;
-        });
-    return made_.size() > before;
-  }
-
-  // Without the computation of those that nothing reads.
-  Stmt without_unread(Stmt s, Names funcs) {
-    for (auto it = funcs.begin(); s.defined() && it != funcs.end();) {
-      if (!produces(s, *it) || is_group_read(s, *it)) {
-        ++it;
-        continue;
-      }
-      s = without_producer(s, *it);
-      funcs.erase(it);
-      it = funcs.begin();
-    }
-    return s;
-  }
-
-  // Both branches may compute a Func, in its own loops or in those of another, only where each has
-  // storage for it.
-  void check_is_apart() const {
-    const std::string name = quoted(program_.original(n_.name));
-    const Names inside = realized_in(n_.body);
-    Names computed = produced_in(producer);
-    computed.insert(made_.begin(), made_.end());
-    computed.erase(n_.name);
-    for (const std::string& other : computed) {
-      const LoopedFunc* f = program_.find(other);
-      const bool is_output = f && f->is_output && is_read_outside(producer, other);
-      if (inside.count(other) || (!is_output && !produces(consumer, other))) continue;
-      user_error(text("compute ", name, " async"),
-                 "what an async Func and its consumer both read is stored no further out than the "
-                 "async Func, or computed outside of the loops that they share",
-                 text(quoted(program_.original(other)),
-                      " is computed in these loops and stored around ", name),
-                 text("Compute ", quoted(program_.original(other)), " at root, store it where ",
-                      name, " is stored, or call async() on it"));
-    }
-  }
-
-  // A loop around what is left of its body, the innermost one around the producer with the waits of
-  // a branch.
-  Stmt around_loop(const For& n, Stmt body, bool of_producer) {
-    if (room_ && produces(n.body, n_.name) && !has_loop_around(n.body, n_.name)) {
-      const Semaphore before = of_producer ? Space : Ready, after = of_producer ? Ready : Space;
-      std::vector<Stmt> stmts;
-      if (before == Ready || *room_ > 0) stmts.push_back(semaphores_.acquire(n_.name, before));
-      if (body.defined()) stmts.push_back(body);
-      if (after == Ready || *room_ > 0) stmts.push_back(Semaphores::release(n_.name, after));
-      body = make_block(std::move(stmts));
-    }
-    return make_for(n.name, n.min, n.extent, n.runs, body, n.partition);
-  }
-
-  // The control of a statement around what `part` leaves of its parts; undefined without any.
-  Stmt around(const Stmt& s, FunctionRef<Stmt(const Stmt&)> part) const {
-    const Stmt result = map_children(s, part);
-    const Realize* n = result.defined() ? result.as<Realize>() : nullptr;
-    return n && !needs(n->body, n->name, program_) ? n->body : result;
-  }
-
-  // A condition of the schedule or of the sizes, which what stands beside it relies on.
-  static bool is_check(const Stmt& s) {
-    const auto* check = s.defined() ? s.as<Assert>() : nullptr;
-    return check && !reads_memory(check->condition, MemoryReads::Storage);
-  }
-
-  // Just the work of the producer and of what it needs, and the control around. Undefined where
-  // there is none.
-  Stmt only_producer(const Stmt& s) {
-    if (!s.defined() || !produces_any(s, made_)) return {};
-    if (const ProducerConsumer* n = as_producer(s); n && made_.count(n->name)) return s;
-    const auto part = [&](const Stmt& child) { return only_producer(child); };
-    if (const Block* n = s.as<Block>()) {
-      const auto is_wait = [&](const Stmt& child) {
-        return std::any_of(forked_.begin(), forked_.end(), [&](const std::string& func) {
-          return Semaphores::is_step(child, func);
-        });
-      };
-      std::vector<Stmt> stmts;
-      for (const Stmt& child : n->stmts) {
-        const bool stays = is_wait(child) || is_check(child);
-        stmts.push_back(stays ? child : part(child));
-      }
-      return make_block(std::move(stmts));
-    }
-    if (const For* n = s.as<For>()) {
-      if (n->runs != ForType::Serial && produces(n->body, n_.name)) {
-        refuse_loops(program_.original(n_.name),
-                     text("the loop ", describe_loop(n->name), " is not serial"),
-                     "Store the Func inside of that loop");
-      }
-      return around_loop(*n, part(n->body), true);
-    }
-    if (const ProducerConsumer* n = s.as<ProducerConsumer>()) return part(n->body);
-    return around(s, part);
-  }
-
-  // Everything but the work of the producer of a Func.
-  Stmt without_producer(const Stmt& s, const std::string& func) {
-    if (!s.defined() || !produces(s, func)) return s;
-    if (is_producer_of(s, func)) return {};
-    const auto part = [&](const Stmt& child) { return without_producer(child, func); };
-    const For* n = s.as<For>();
-    if (n && func == n_.name) return around_loop(*n, part(n->body), false);
-    return around(s, part);
-  }
-
-  const Realize& n_;
-  const std::optional<int> room_;
-  const std::vector<std::string>& forked_;
-  const Program& program_;
-  Semaphores& semaphores_;
-  Names made_;  // computed by the producer's branch
-};
-
-// ---- all async Funcs ----
-
 class AsyncForker : public StatementRewriter {
  public:
   AsyncForker(const Stmt& s, const Program& program, const AsyncRoom& room)
       : program_(program), room_(room), semaphores_(s) {}
 
  protected:
-  Stmt rewrite(const Stmt& given) override {
-    const Stmt s = producers_outermost(given);
+  Stmt rewrite(const Stmt& original_stmt) override {
+    const Stmt s = producers_outermost(original_stmt);
     const Realize* n = s.as<Realize>();
     if (n) around_[original(n->name)] = s;
     if (const Realize* func = n ? ring_at(*n) : nullptr) return fork_ring(*n, *func);
@@ -366,11 +65,13 @@ class AsyncForker : public StatementRewriter {
   const Program& program_;
   const AsyncRoom& room_;
   Semaphores semaphores_;
-  std::vector<std::string> forked_;     // async Funcs around whose consumers this is
-  std::map<std::string, int> readers_;  // of those, with semaphores of their own
-  std::map<std::string, Stmt> around_;  // by original name, the last one entered
-  Names rings_;                         // Funcs whose ring buffer is around, and was forked
-  Names shared_places_;                 // theirs: both branches lie in them
+  std::vector<std::string>
+      forked_;  // async Funcs whose consumer branch contains the current statement
+  std::map<std::string, int>
+      readers_;  // for each of those: the number of readers with their own semaphores
+  std::map<std::string, Stmt> around_;  // Realizes by original name; the last one entered
+  FuncNames rings_;                     // Funcs whose ring buffer is around and has been forked
+  FuncNames shared_places_;             // their hoisted storage, which both branches share
 
   const std::string& original(const std::string& name) const { return program_.original(name); }
   bool is_async(const std::string& name) const {
@@ -378,8 +79,7 @@ class AsyncForker : public StatementRewriter {
     return f && f->schedule.async && !rings_.count(f->name());
   }
 
-  // The Realize of an async Func in its ring buffer, which loops hand on; null where this is no such
-  // place.
+  // The Realize of the async Func whose ring buffer is `place`; null if `place` is not such storage.
   const Realize* ring_at(const Realize& place) const {
     const std::string& name = original(place.name);
     const LoopedFunc* f = program_.find(name.substr(0, name.rfind('.')));
@@ -399,7 +99,7 @@ class AsyncForker : public StatementRewriter {
     return found;
   }
 
-  // Both branches realize the Func, whose memory is the place around.
+  // Both branches realize the Func; the hoisted storage around provides the memory.
   Stmt fork_ring(const Realize& place, const Realize& func) {
     const LoopedFunc& f = *program_.find(func.name);
     const Stmt around = make_realize(func.name, func.types, func.memory, func.bounds, place.body);
@@ -414,8 +114,8 @@ class AsyncForker : public StatementRewriter {
     return make_realize(place.name, place.types, place.memory, place.bounds, both);
   }
 
-  // Realizes directly inside each other: those of async Funcs first, producers around what reads
-  // them. The others are then inside of the Forks, where each branch can have its own.
+  // Sorts directly nested Realizes: async Funcs come first, producers outside of their consumers. The others are then
+  // inside of the Forks, where each branch can have its own.
   Stmt producers_outermost(const Stmt& s) const {
     std::vector<const Realize*> chain;
     for (const Realize* n = s.as<Realize>(); n; n = n->body.as<Realize>()) chain.push_back(n);
@@ -437,18 +137,18 @@ class AsyncForker : public StatementRewriter {
 
   // ---- the two branches ----
 
-  // `room`: none where the producer runs once.
+  // `room`: nullopt if the producer runs once.
   AsyncBranches branches_of(const Realize& n, std::optional<int> room) {
-    AsyncBranches branches(n, room, forked_, program_, semaphores_);
-    branches.split();
+    AsyncBranches branches = split_branches(n, room, forked_, program_, semaphores_);
     share_waits(branches.producer, branches.consumer);
     branches.producer = with_own_places(branches.producer, branches.consumer);
     return branches;
   }
 
-  // Memory that both branches would hoist theirs to.
+  // Adds separate hoisted storage to the producer's branch if both branches would use the same one.
   Stmt with_own_places(Stmt producer, const Stmt& consumer) const {
-    const Names here = places_of(producer, program_), there = places_of(consumer, program_);
+    const FuncNames here = hoisted_places_of(producer, program_),
+                    there = hoisted_places_of(consumer, program_);
     for (const std::string& place : here) {
       const auto around = around_.find(place);
       const bool is_shared = shared_places_.count(place) > 0;
@@ -479,13 +179,13 @@ class AsyncForker : public StatementRewriter {
     return forked(n, 0, branches);
   }
 
-  // A producer that does not run when its result is in the cache.
+  // Whether the producer is memoized, and so does not run if the cache has its result.
   bool may_be_skipped(const ProducerConsumer& n) const {
     const LoopedFunc* f = program_.find(n.name);
     return n.produces && f && f->schedule.memoized;
   }
 
-  // Waits as late as possible: what does not need the Func runs before.
+  // Inserts the wait as late as possible, after all code that does not need the Func.
   Stmt acquired_late(const Stmt& s, const std::string& func) {
     const ProducerConsumer* computation = s.as<ProducerConsumer>();
     const bool runs_body =
@@ -505,16 +205,16 @@ class AsyncForker : public StatementRewriter {
 
   // ---- produced in a loop ----
 
-  // The branch that produces would wait for ever for a consumer that is in the cache.
+  // Rejects a memoized consumer: if the cache has its result, the branch that produces would wait for ever.
   void check_is_consumed(const Realize& n) const {
     walk(
         n.body, [](const Expr&) { return false; },
         [&](const Stmt& s) {
           const ProducerConsumer* around = as_producer(s);
-          if (!around || !may_be_skipped(*around) || group_of(*around).count(n.name) ||
+          if (!around || !may_be_skipped(*around) || fused_funcs_of(*around).count(n.name) ||
               !produces(around->body, n.name))
             return true;
-          refuse_loops(
+          refuse_async_loops(
               original(n.name),
               text("they are those of ", quoted(original(around->name)), ", which is memoized"),
               "Store the Func inside of that loop, or do not memoize the other");
@@ -528,9 +228,8 @@ class AsyncForker : public StatementRewriter {
     return forked(n, room, branches_of(n, room));
   }
 
-  // The handshake of an async Func around belongs to the branch that reads it. Where both do, one of
-  // them has semaphores of its own; that it waited in the other, by the order of one thread, is then
-  // not enough.
+  // The handshake of an outer async Func belongs to the branch that reads it. If both branches do, one gets semaphores
+  // of its own: a wait in the other branch no longer orders the two.
   void share_waits(Stmt& producer, Stmt& consumer) {
     for (const std::string& outer : forked_) {
       const bool producer_waits = Semaphores::has_steps(producer, outer),
@@ -559,7 +258,7 @@ Stmt fork_async(const Stmt& s, Program& program, const AsyncRoom& room) {
   const bool any = std::any_of(program.funcs.begin(), program.funcs.end(),
                                [](const LoopedFunc& f) { return f.schedule.async; });
   if (!any) return s;
-  // Both branches have the loops around them, and may compute the same Func.
+  // Both branches contain copies of the loops around them, and may compute the same Func.
   UniqueNames unique = make_names_unique(AsyncForker(s, program, room)(s));
   for (const auto& [name, copied] : unique.original)
     program.renamed[name] = program.original(copied);

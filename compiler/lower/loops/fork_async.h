@@ -1,4 +1,4 @@
-// fork_async -- producers that run at the same time as their consumers.
+// fork_async -- run async producers concurrently with their consumers.
 #pragma once
 
 #include <map>
@@ -8,11 +8,11 @@
 
 namespace retrograde::lower {
 
-// By Func: how many iterations its producer may be ahead of its consumer; 0: any number. Only of
-// async Funcs that are stored outside of where they are computed.
+// For each async Func that is stored outside of its compute level: how many iterations its producer may be ahead of its
+// consumer; 0: any number.
 using AsyncRoom = std::map<std::string, int>;
 
-// Funcs that both branches compute get new names, which are added to those of the program.
+// Funcs that both branches compute are renamed; the new names are added to those of the program.
 Stmt fork_async(const Stmt& s, Program& program, const AsyncRoom& room);
 
 }  // namespace retrograde::lower

@@ -1,7 +1,6 @@
 // free_early -- end the life of an allocation right after its last use.
 // In:  FlatStorage or Vector; names unique.
-// Out: the same phase, with a Free after the last statement that uses an allocation; at most one on
-//      every path.
+// Out: the same phase, with a Free after the last statement that uses an allocation; at most one on every path.
 //
 //   allocate a[n] {                    allocate a[n] {
 //     for ... { a[..] = .. }             for ... { a[..] = .. }
@@ -13,11 +12,10 @@
 //                                        }
 //                                      }
 //
-// Method: a region is a stretch of straight-line code: the body of the function, of a loop or of a
-//         branch, looking through lets, allocations, producers and blocks. What remains in it
-//         (loops, stores, branches) are its steps. One walk numbers the steps and notes the last
-//         one that uses each allocation of the region; a second walk puts the Frees there. Both are
-//         linear, however deep the allocations nest.
+// Method: a region is the straight-line code in the body of the function, of a loop or of a branch, looking through
+//         lets, allocations, producers and blocks. Its steps are the remaining statements: loops, stores, branches.
+//         One walk numbers the steps and notes the last one that uses each allocation of the region; a second
+//         walk inserts the Frees. Both are linear, however deep the allocations nest.
 // Not done: allocations that are never used; moving an allocation to its first use.
 // Source: folklore. Tests: test/golden/lower/free_early/.
 #include "lower/statement_passes.h"
@@ -34,27 +32,28 @@ namespace retrograde::lower {
 
 namespace {
 
-// What a region's straight-line code looks through.
+// Whether a region's straight-line code continues inside the statement.
 bool is_transparent(const Stmt& s) {
   return s.kind() == Kind::LetStmt || s.kind() == Kind::ProducerConsumer ||
          s.kind() == Kind::Allocate || s.kind() == Kind::Block;
 }
 
-// Statements by their place in the order of execution: one node may stand in several places.
+// The number of a statement in the order of execution; one node may occur in several places.
 using Place = size_t;
 
 struct LastUses {
   std::unordered_map<Place, std::vector<std::string>>
-      frees;  // what to free after the statement at a place
+      frees;  // allocations to free after the statement at a place
 };
 
-// Walks in the order of execution.
+// Visits statements in the order of execution.
 class LastUseFinder {
  public:
   LastUses find(const Stmt& s) {
     visit_region(s);
     LastUses result;
-    for (const std::string& name : allocations_) {  // inner allocations last: they are freed first
+    for (const std::string& name :
+         allocations_) {  // inner allocations come last and are freed first
       const Life& life = lives_.at(name);
       if (life.is_used && !life.is_freed) result.frees[life.last_step].push_back(name);
     }
@@ -66,7 +65,7 @@ class LastUseFinder {
     size_t region;
     Place last_step = 0;
     bool is_used = false;
-    bool is_freed = false;  // the program says so already
+    bool is_freed = false;  // the program already has a Free
   };
 
   void visit_region(const Stmt& s) {
@@ -91,7 +90,7 @@ class LastUseFinder {
         [&](const Stmt& child) { is_step ? visit_region(child) : visit(child); });
   }
 
-  // Loads in the value of a let lie before the let's body: the step is the let itself.
+  // Loads in the value of a let run before the let's body, so the step is the let itself.
   void visit(const Expr& e, Place place) {
     Place step = std::exchange(steps_.back(), place);
     walk(e, [&](const Load& load) { use(load.name); });
@@ -123,7 +122,8 @@ Stmt free_early(const Stmt& s) {
     if (here == uses.frees.end()) return all.children(node);
     std::vector<Stmt> frees;
     for (size_t i = here->second.size(); i-- > 0;) frees.push_back(make_free(here->second[i]));
-    if (const LetStmt* let = node.as<LetStmt>()) {  // last used by the value: free before the body
+    if (const LetStmt* let =
+            node.as<LetStmt>()) {  // the let's value is the last use: free before the body
       frees.push_back(all(let->body));
       return make_let(let->name, let->value, make_block(std::move(frees)));
     }

@@ -1,7 +1,7 @@
-// hoist_calls -- a pure C function of what does not change in a loop is called once, before it.
+// hoist_calls -- move calls of pure C functions with loop-invariant arguments out of their loops.
 // In:  FlatStorage, before vectorization; names unique; no Unrolled loops.
-// Out: the same phase; the same stores in the same order. Each call is one that the program made
-//      before, made less often.
+// Out: the same phase; the same stores in the same order. Only calls that the program made before are made, and
+//      less often.
 //
 //   for (y, 0, h) {                          let f.value = if_then_else(0 < h*w, f(a), 0)
 //     for (x, 0, w) {                        for (y, 0, h) {
@@ -10,13 +10,14 @@
 //   }                                            out[y*w + x] = f.value + g.value
 //                                          } }
 //
-// LLVM knows nothing of such a function and leaves it where it is; over lanes it is called lane by lane.
+// LLVM does not know that such a function is pure and leaves the call in place; a vectorized loop calls it lane by
+// lane.
 //
-// Method: a call leaves the loops and conditions around it, innermost first, while its arguments, these
-//         conditions and the extents of the loops do not change in the next one. It is made where they
-//         all hold and run, once for all that ask for it there.
-// Not done: calls in arms of a select; loops with checks, which come before the calls behind them;
-//           arguments and conditions that read memory.
+// Method: a call moves out of the loops and conditions around it, innermost first, as long as its arguments, these
+//         conditions and the extents of the loops are invariant in the next one. It is guarded by all of these
+//         conditions and by the loops running at least once. Equal calls at one place are merged.
+// Not done: calls in arms of a select; loops with checks, which must run before the calls after them; arguments and
+//           conditions that read memory.
 // Source: folklore. Tests: test/golden/lower/hoist_calls/, test/unit/extern_stage_test.cpp.
 #include "lower/statement_passes.h"
 
@@ -44,7 +45,7 @@ bool has_pure_calls(const Tree& tree) {
   return any_node(tree, [](const Call& call) { return call.is_pure_extern(); });
 }
 
-// Whether it has one value while its variables have.
+// Whether the value of the expression depends on its variables only.
 bool is_steady(const Expr& e) {
   return !reads_memory(e, MemoryReads::Functions) && !any_node(e, [](const Call& call) {
     return op_info(call.op).cls != OpClass::Pure && !call.is_marker();
@@ -74,13 +75,13 @@ class CallHoister : public Rewriter {
  private:
   struct Hoisted {
     std::string name;
-    Expr runs, call;  // what is called, where
+    Expr runs, call;  // the guard and the call
   };
-  // What surrounds the statement at hand: loops, lets, conditions, and what no call leaves.
+  // A statement around the current one: a loop, let or condition, or one that no call can leave.
   struct Frame {
     Stmt around;
-    Expr holds;                   // of a condition
-    std::vector<Hoisted> before;  // a loop's: what is computed before it
+    Expr holds;                   // a condition's
+    std::vector<Hoisted> before;  // a loop's: the calls computed before it
   };
   FreshNames fresh_;
   std::vector<Frame> frames_;
@@ -130,7 +131,7 @@ class CallHoister : public Rewriter {
     });
   }
 
-  // The name of its value before the outermost loop that it can leave; itself where there is none.
+  // The name of the call's value before the outermost loop that it can leave; the call itself if there is none.
   Expr outside(const Expr& call) {
     for (const Expr& arg : call.as<Call>()->args) {
       if (!is_steady(arg)) return call;
@@ -147,7 +148,7 @@ class CallHoister : public Rewriter {
     return place ? named(*place, at_place) : call;
   }
 
-  // What it is outside of the frame; false where it has to stay.
+  // Expresses the call outside of the frame; false if it has to stay.
   static bool leave(const Frame& frame, Hoisted& value) {
     if (frame.holds.defined()) return run_where(value, frame.holds);
     if (const auto* let = frame.around.as<LetStmt>()) {
@@ -187,7 +188,7 @@ class CallHoister : public Rewriter {
                                [&](const Hoisted& other) { return uses(value, other.name); });
   }
 
-  // One call for all places that ask for it.
+  // Adds the call to the place, merged with an equal call if there is one.
   Expr named(Frame& place, Hoisted value) {
     for (Hoisted& known : place.before) {
       if (!equal(known.call, value.call)) continue;

@@ -1,4 +1,4 @@
-// insert_prefetches -- ask for what later iterations read.
+// insert_prefetches -- prefetch the data that later iterations of a loop read.
 // In:  Loops; names unique.
 // Out: Loops; the same stores.
 //
@@ -6,11 +6,11 @@
 //     =>   for y { prefetch in [.., ..], [y + 2, 1]; out(x, y) = in(x, y) ... }
 //     =>   for y { for line { prefetch(&in(16 line, y + 2)) }; out(x, y) = in(x, y) ... }
 //
-// Method: the box that one iteration of the loop `at` reads, with the loop variable `from` moved by
-//         the offset; lets between the two loops are written out first. What the bound strategy
-//         says about data that does not exist: the box is clamped to it, or fetched only when it
-//         lies inside, or fetched regardless, which no machine faults for.
-// Not done: boxes larger than a cache are fetched whole.
+// Method: takes the box that one iteration of the loop `at` reads, with the loop variable `from` moved by the offset;
+//         lets between the two loops are expanded first. The bound strategy decides about boxes beyond the data: the
+//         box is clamped to the data, or prefetched only if it lies inside, or prefetched regardless, which never
+//         faults.
+// Not done: limiting the size; boxes larger than a cache are fetched completely.
 // Source: Halide's documentation of prefetch. Tests: test/golden/pipeline/insert_prefetches/,
 //         test/golden/pipeline/lower_prefetches/, test/unit/prefetch_test.cpp.
 #include "lower/loops/insert_prefetches.h"
@@ -29,7 +29,7 @@ namespace {
 
 constexpr int line_bytes = 64;
 
-// The box that a statement reads of a Func or image.
+// The box that the statement reads of a Func or image.
 Box region_read(const Stmt& s, const std::string& name) {
   Box box;
   walk_in_bounds(
@@ -72,7 +72,7 @@ class Inserter : public StatementRewriter {
  private:
   struct OuterLoop {
     std::string name;
-    size_t lets;  // how many are bound around it
+    size_t lets;  // number of lets around it
   };
   const Program& program_;
   Lets lets_;
@@ -94,7 +94,7 @@ class Inserter : public StatementRewriter {
     return body;
   }
 
-  // Undefined when the loop reads nothing of it, or no loop has the name.
+  // Undefined if the loop does not read the Func or image, or if no loop has the name `from`.
   Stmt prefetch(const PrefetchDirective& directive, const LoopName& at, const Stmt& body) {
     const auto image = std::dynamic_pointer_cast<ParameterContents>(directive.symbol.lock());
     const auto found = realized_.find(directive.name);
@@ -108,7 +108,7 @@ class Inserter : public StatementRewriter {
     std::vector<Range> region, data;
     for (size_t d = 0; d < box.size(); d++) {
       if (!box[d].is_bounded()) return {};
-      // What holds of this iteration's coordinates need not hold of a later one's.
+      // Promises about this iteration's coordinates need not hold for a later iteration.
       const Expr min = simplify(without_any_promises(substitute(box[d].min, later)));
       const Expr max = simplify(without_any_promises(substitute(box[d].max, later)));
       region.push_back({min, simplify(max - min + 1)});
@@ -138,7 +138,7 @@ class Inserter : public StatementRewriter {
     return nullptr;
   }
 
-  // The loop's variable, and every let inside of the loop, as they are `offset` iterations later.
+  // The values of the loop's variable and of every let inside of the loop, `offset` iterations later.
   Substitution moved(const OuterLoop& loop, const Expr& offset) const {
     Substitution later;
     later[loop.name] = variable(loop.name) + cast(Int(32), offset);
@@ -164,7 +164,7 @@ class Inserter : public StatementRewriter {
   }
 };
 
-// The first element of each line of dimension 0, and its last element.
+// Loops over the box that prefetch the first element of each cache line along dimension 0, and its last element.
 template <class Element>
 Stmt lines(const Prefetch& n, Type type, FreshNames& fresh, const Element& element) {
   const int step = std::max(1, line_bytes / type.bytes());

@@ -1,4 +1,4 @@
-// join_indices -- a quotient and its remainder that make up an index together are one again.
+// join_indices -- simplify indices in which a quotient and its remainder recombine.
 // In:  FlatStorage, before vectorization; names unique.
 // Out: FlatStorage; the same loads and stores.
 //
@@ -6,12 +6,12 @@
 //   let c = f % 3                    =>    let c = f % 3
 //   out[x*3 + c] = in[x*3 + c] * k[c]      out[f] = in[f] * k[c]
 //
-// So a loop over fused dimensions that lie one inside the other in memory, as the channels and
-// columns of an interleaved image do, has dense accesses.
+// Loops over fused dimensions that are adjacent in memory, such as the channels and columns of an interleaved image,
+// then have dense accesses.
 //
-// Method: an index that mentions a name for a quotient and one for a remainder is simplified with
-//         both put in, and kept where fewer divisions are left in it.
-// Not done: names inside of other names than these.
+// Method: if an index mentions names of a quotient and of a remainder, both are substituted and the index is
+//         simplified; the result is kept if it has fewer divisions.
+// Not done: names used in the values of other lets.
 // Source: folklore. Tests: test/golden/lower/join_indices/, loop_passes_test.
 #include "lower/statement_passes.h"
 
@@ -23,7 +23,7 @@ namespace retrograde::lower {
 
 namespace {
 
-constexpr int largest_value = 32;  // in nodes, of what is put in
+constexpr int largest_value = 32;  // nodes of a substituted value
 
 struct Divisions {
   int nodes = 0, quotients = 0, remainders = 0;
@@ -83,7 +83,7 @@ class IndexJoiner : public Rewriter {
                : index;
   }
 
-  Substitution values_;  // names of what divides
+  Substitution values_;  // of names whose value contains a division
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// keep_accumulators -- what a reduction adds to stays in registers while its loops run.
+// keep_accumulators -- keep the elements that a reduction updates in registers while its loops run.
 // In:  Loops; names unique.
 // Out: Loops; names unique; the same operations on every element, in the same order.
 //
@@ -12,27 +12,25 @@
 //                                               unrolled for (c, 0, 8) { f(x, c) = kept(c) }
 //                                             }
 //
-// What gives the elements their first values right before is made to fill kept, and f is not touched
-// until the end:
+// If the statement right before initialises the elements, it fills `kept` instead, and f is not accessed until the
+// end:
 //
 //   for (c, 0, 8) { f(x, c) = bias(c) }       realize kept [0, 8] {
 //   for (r, 0, n) { ... }                =>     unrolled for (c, 0, 8) { kept(c) = bias(c) }
 //                                               for (r, 0, n) { ... }
 //
-// Why: the storage of f may be as large as an image, with strides known at run time only, and LLVM
-//      cannot tell that other elements are not these. An array of constant size with constant
-//      indices becomes registers.
+// Why: the storage of f may be as large as an image, with strides known at run time only, and LLVM cannot prove that
+//      other accesses do not alias these elements. An array of constant size with constant indices becomes registers.
 //
-// Method: outermost loop first. A serial loop is followed inwards, through serial loops, lets and
-//         conditions, to vectorized and unrolled loops of constant extents over pure variables
-//         around one Provide, whose point is the same in all iterations of the serial loops and
-//         which reads its Func at this point alone. Conditions that hold for all iterations of the
-//         serial loops or for none, as those of tails do, also stand around the copies; others
-//         only around the update, so that a point may be written that was not: by what it holds.
-//         No other task writes it, since all parallel loops around are over pure variables. First
-//         values come from a nest of loops that are those of the update one by one, under the same
-//         conditions: then both have the same elements.
-// Not done: more elements than registers hold; Funcs all of which fit registers as they are.
+// Method: outermost loop first. A serial loop is followed inwards, through serial loops, lets and conditions, to
+//         vectorized and unrolled loops of constant extents over pure variables around a single Provide. Its point
+//         must be invariant in the serial loops, and it must read its own Func at this point only. Conditions that
+//         are invariant in the serial loops, as those of tails are, also guard the copies. Other conditions guard only
+//         the update, so an element may be written back with its old value although the program did not write it.
+//         No other parallel chunk writes it, because all parallel loops around are over pure variables.
+//         Initial values come from a nest whose loops and conditions correspond one by one to those of the
+//         update: then both have the same elements.
+// Not done: more elements than registers hold; Funcs that fit into registers as they are.
 // Source: scalar replacement (Callahan, Carr and Kennedy, PLDI 1990).
 // Tests: test/golden/lower/keep_accumulators/, codegen_idioms_test.
 #include "lower/loops/keep_accumulators.h"
@@ -54,7 +52,7 @@ namespace retrograde::lower {
 
 namespace {
 
-// The elements that an update adds to, as an array of its own.
+// Replaces the elements that an update accumulates into by an array of their own.
 class Kept : public Rewriter {
  public:
   Kept(KeptUpdate update, std::string name) : update_(std::move(update)), name_(std::move(name)) {
@@ -62,11 +60,11 @@ class Kept : public Rewriter {
       args_.push_back(variable(update_.lanes[i]->name));
   }
 
-  // Before the loops, and after them.
-  Stmt fetch() const {
+  // Copies the elements into the array before the loops, and back after them.
+  Stmt copy_in() const {
     return in_lanes(make_provide(name_, values_of(update_.provide->name, update_.point), args_));
   }
-  Stmt give_back() const {
+  Stmt copy_back() const {
     return in_lanes(make_provide(update_.provide->name, values_of(name_, args_), update_.point));
   }
 
@@ -131,7 +129,7 @@ class KeepAccumulators : public StatementRewriter {
   }
 
  private:
-  // In registers already, when its accesses have constant indices.
+  // Storage that fits registers needs no copy: its accesses become constant indices.
   Stmt in_storage(const Realize& realize, const Stmt& s) {
     int64_t bytes = 0;
     for (const Type& type : realize.types) bytes += type.bytes();
@@ -161,7 +159,7 @@ class KeepAccumulators : public StatementRewriter {
     return make_block(result);
   }
 
-  // The loop of an update, in lets, whose elements the nest before it starts; undefined: they are not.
+  // The loop of an update inside lets, if the preceding nest initialises its elements; undefined otherwise.
   Stmt started(const Stmt& nest, const Stmt& next, Substitution lets) {
     if (const auto* let = next.as<LetStmt>()) {
       lets[let->name] = substitute(let->value, lets);
@@ -178,18 +176,19 @@ class KeepAccumulators : public StatementRewriter {
   }
 
   using Filling = std::function<Stmt(const std::string& array, const KeptUpdate& update)>;
-  // `filling` gives the elements their first values; without one they are those of the Func.
+  // `filling` initialises the array; if empty, the elements are copied from the Func.
   Stmt kept(const Stmt& loop, KeptUpdate update, const Filling& filling) {
     const std::string name = fresh_(update.provide->name + ".kept");
     const Stmt start = filling ? filling(name, update) : Stmt();
     Kept array(std::move(update), name);
-    return array.around(make_block({start.defined() ? start : copy_statement(array.fetch(), fresh_),
-                                    array(loop), copy_statement(array.give_back(), fresh_)}));
+    return array.around(
+        make_block({start.defined() ? start : copy_statement(array.copy_in(), fresh_), array(loop),
+                    copy_statement(array.copy_back(), fresh_)}));
   }
 
   const std::function<bool(const For&)>& is_pure_;
   FreshNames fresh_;
-  bool shares_ = false;  // a parallel loop around may have iterations that meet in an element
+  bool shares_ = false;  // iterations of a parallel loop around may access the same element
   std::unordered_set<std::string> small_;
 };
 

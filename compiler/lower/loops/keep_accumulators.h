@@ -1,4 +1,4 @@
-// keep_accumulators -- what a reduction adds to stays in registers while its loops run.
+// keep_accumulators -- keep the elements that a reduction updates in registers while its loops run.
 #pragma once
 
 #include <functional>

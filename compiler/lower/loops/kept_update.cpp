@@ -66,7 +66,7 @@ class UpdateFinder {
     return bytes <= register_file;
   }
 
-  // Every iteration reads and writes the same points of the Func, and no other.
+  // Whether every iteration reads and writes the same points of the Func, and no others.
   bool stays_in_place() {
     const std::vector<Expr>& args = update_.provide->args;
     for (const Expr& arg : args) {
@@ -94,7 +94,7 @@ class UpdateFinder {
   KeptUpdate update_;
   std::unordered_set<std::string> varying_;  // serial loops
   Substitution lets_;
-  std::vector<Expr> around_;  // what is computed on the way
+  std::vector<Expr> around_;  // expressions evaluated by the loops, lets and conditions on the way
 };
 
 }  // namespace

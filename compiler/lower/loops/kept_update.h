@@ -1,5 +1,5 @@
-// kept_update.h -- what keep_accumulators keeps in registers: the elements that one update adds to while
-// its serial loops run.
+// kept_update.h -- finds updates for keep_accumulators: a reduction that updates the same few elements in all
+// iterations of its serial loops.
 #pragma once
 
 #include <cstdint>
@@ -11,20 +11,20 @@
 
 namespace retrograde::lower {
 
-inline constexpr int64_t register_file = 2048;  // bytes: 32 registers of 64
+inline constexpr int64_t register_file = 2048;  // bytes: 32 registers of 64 bytes
 
 inline bool is_lane_loop(const For& loop) {
   return loop.runs == ForType::Vectorized || loop.runs == ForType::Unrolled;
 }
 
-// The way from a serial loop to the one Provide in it.
+// The loops and conditions from a serial loop down to the only Provide in it.
 struct KeptUpdate {
   std::vector<const For*> lanes;  // outermost first
-  std::vector<Expr> conditions;   // that are the same for all iterations; lets are substituted
+  std::vector<Expr> conditions;   // that do not depend on the serial loops; lets are expanded
   const Provide* provide = nullptr;
-  std::vector<Expr> point;  // of the Provide; lets are substituted
+  std::vector<Expr> point;  // coordinates of the Provide; lets are expanded
 
-  // A value of its Func.
+  // The call, if `e` reads the updated Func itself.
   const Call* as_own(const Expr& e) const {
     const auto* call = e.as<Call>();
     const bool is_own = call && call->call_type == CallType::Func && call->name == provide->name;
@@ -32,9 +32,9 @@ struct KeptUpdate {
   }
 };
 
-// Of a serial loop; nullopt: there is another statement in it, or what is stored changes from iteration
-// to iteration, or does not fit registers. `is_pure`: whether the iterations of a loop store to
-// different elements.
+// The update in a serial loop. nullopt if the loop contains another statement, if the elements change from iteration to
+// iteration, or if they do not fit into registers. `is_pure`: whether the iterations of a loop store to different
+// elements.
 std::optional<KeptUpdate> kept_update(const For& loop,
                                       const std::function<bool(const For&)>& is_pure);
 

@@ -1,8 +1,7 @@
-// lower_atomics -- keep only what must be indivisible, and only where iterations may meet.
-// In:  FlatStorage; names unique; an Atomic holds one update of one point of a Func, or of several at
-//      once.
-// Out: FlatStorage. What does not read the Func is computed before the Atomic. An Atomic with one
-//      store is that store alone. Storage that no parallel loop and no Fork shares needs no Atomic.
+// lower_atomics -- reduce Atomic statements to the part that must be atomic, and drop those that need not be.
+// In:  FlatStorage; names unique; an Atomic holds an update of one point of a Func, or of several points at once.
+// Out: FlatStorage. Expressions that do not read the Func are computed before the Atomic. An Atomic with one store
+//      contains only that store. Storage that no parallel loop and no Fork shares has no Atomic.
 //
 //   parallel for (r, 0, n) {                  parallel for (r, 0, n) {
 //     atomic f {                                let t = in[r] * k
@@ -11,10 +10,10 @@
 //     }
 //   }
 //
-// A vectorized loop whose iterations read what others store, as atomic(true) allows, becomes serial.
+// A vectorized loop whose iterations read elements that others store, which atomic(true) allows, becomes serial.
 //
-// Method: one walk that counts the parallel loops around; an allocation remembers the count.
-// Errors: a require() that reads the element of a Tuple: it would leave with the lock held.
+// Method: one walk that counts the parallel loops around; each allocation remembers the count.
+// Errors: a require() that reads an element of a Tuple: it would return while holding the lock.
 // Source: folklore. Tests: test/golden/lower/lower_atomics/, test/unit/atomic_test.cpp.
 #include "lower/statement_passes.h"
 
@@ -39,7 +38,7 @@ BufferNames stored_in(const Stmt& s) {
   return names;
 }
 
-// Whether the value changes when the element does: it reads the Func, or a let that does.
+// Whether the value depends on the updated element: it reads the Func, or a let that does.
 bool depends_on(const Expr& e, const BufferNames& buffers, const BufferNames& lets) {
   return any_node(
       e, [&](const Load& load) { return buffers.count(load.name) > 0; },
@@ -52,7 +51,7 @@ bool may_leave(const Stmt& s) {
       [](const Stmt& part) { return part.kind() == Kind::Assert; });
 }
 
-// The update with everything that does not depend on the element in front of it.
+// The Atomic, with all computations that do not depend on the element moved in front of it.
 Stmt narrowed(const Atomic& n) {
   const BufferNames buffers = stored_in(n.body);
   BufferNames dependent;
@@ -81,7 +80,7 @@ Stmt narrowed(const Atomic& n) {
   return make_lets(outside, make_atomic(n.name, body));
 }
 
-// atomic(true) of f[r] = f[r - 2] + g: an iteration reads what another one stores.
+// Recognises f[r] = f[r - 2] + g under atomic(true): an iteration reads an element that another one stores.
 bool touches_other_elements(const Stmt& s) {
   return any_node(s, [](const Atomic& n) { return touches_several_elements(n.body); });
 }
@@ -102,7 +101,7 @@ Stmt lower_atomics(const Stmt& s) {
     if (const Allocate* n = node.as<Allocate>()) depth_of[n->name] = depth;
     const For* loop = node.as<For>();
     const bool is_parallel = node.kind() == Kind::Fork || (loop && runs_at_once(loop->runs));
-    // Lanes take turns: in the order of the loop, whatever they read.
+    // Lanes would read elements before others store them, so the loop becomes serial.
     if (loop && loop->runs == ForType::Vectorized && touches_other_elements(loop->body)) {
       return all(make_for(loop->name, loop->min, loop->extent, ForType::Serial, loop->body,
                           loop->partition));

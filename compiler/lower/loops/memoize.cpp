@@ -1,4 +1,4 @@
-// memoize -- look the results of memoized Funcs up before they are computed.
+// memoize -- look up the results of memoized Funcs in a cache before computing them.
 // In:  Loops; names unique.
 // Out: Loops.
 //
@@ -9,11 +9,11 @@
 //                                       consume f { C }
 //                                     }
 //
-// Method: the key names the compiled function, the Func, and holds the values of the Params that it
-//         depends on (found through all Funcs that it calls), what memoize_tag puts in place of an
-//         expression, and the region that is read. What is kept is the whole storage.
-// Errors: a memoized Func that reads an ImageParam without memoize_tag; one that is stored outside
-//         of where it is computed; a tag or eviction key that depends on Vars.
+// Method: the key names the compiled function and the Func. It holds the values of the Params that the Func depends on
+//         (found through all Funcs that it calls), the keys of memoize_tag instead of the tagged expressions, and the
+//         region that is read. The cache keeps the complete storage.
+// Errors: a memoized Func that reads an ImageParam without memoize_tag; one that is stored outside of its compute
+//         level; a tag or eviction key that depends on Vars.
 // Source: Halide's documentation of memoize and memoize_tag. Tests: test/golden/pipeline/memoize/,
 //         test/unit/memoize_test.cpp.
 #include "lower/loops/memoize.h"
@@ -38,7 +38,7 @@ std::string key_name(const std::string& func, const char* side, size_t dimension
   return text(func, key_mark, side, dimension);
 }
 
-// ---- what a key is made of ----
+// ---- the key ----
 
 class Dependencies {
  public:
@@ -137,7 +137,7 @@ void check_schedule(const LoopedFunc& f) {
              "Leave store_at and store_root out");
 }
 
-// The lets of `with_key_region`.
+// The lets that with_key_region inserts.
 class KeyRegions {
  public:
   void note(const std::string& let) {
@@ -150,7 +150,7 @@ class KeyRegions {
   }
 
  private:
-  std::map<std::string, std::string> lets_;  // the innermost, by name before renaming
+  std::map<std::string, std::string> lets_;  // the innermost let, by its name before renaming
 };
 
 class Memoizer : public Rewriter {
@@ -186,7 +186,7 @@ class Memoizer : public Rewriter {
     return key;
   }
 
-  // Where storage wraps around, its first element is that of 0.
+  // The fold factor of a dimension. Folded storage starts at coordinate 0.
   Expr fold_of(const LoopedFunc& f, size_t dimension) const {
     const auto it = folds_.find(f.name());
     return it == folds_.end() || it->second.size() <= dimension ? Expr() : it->second[dimension];
@@ -232,7 +232,7 @@ class Memoizer : public Rewriter {
     return make_evaluate(call_runtime("retrograde_memoization_store", what));
   }
 
-  // Pointers and numbers of any width, as the 64 bits that evicting is asked for.
+  // The key as 64 bits, the form in which the runtime's eviction takes it: for pointers and numbers of any width.
   static Expr eviction_bits(const Expr& key) {
     if (key.type().is_handle()) return reinterpret_as(UInt(64), key);
     return cast(UInt(64), key);

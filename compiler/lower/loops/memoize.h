@@ -1,4 +1,4 @@
-// memoize -- look the results of memoized Funcs up before they are computed.
+// memoize -- look up the results of memoized Funcs in a cache before computing them.
 #pragma once
 
 #include <map>
@@ -10,14 +10,14 @@
 
 namespace retrograde::lower {
 
-// By original name: what each dimension of its storage folds by, undefined where it does not.
+// For each Func, by its original name: the fold factor of each dimension of its storage, undefined if not folded.
 using StorageFolds = std::map<std::string, std::vector<Expr>>;
 
-// `storage` of a memoized Func, with the region that its consumers read of it, which a key names.
-// Storage may be larger: what a rounded split computes beyond holds no values of the Func.
+// Wraps `storage` of a memoized Func in lets that hold the region that its consumers read, which becomes part of the
+// key. Storage may be larger: the part that only a rounded split computes holds no valid values of the Func.
 Stmt with_key_region(const std::string& func, const Box& read, Stmt storage);
 
-// `function`: what is compiled.
+// `function`: the name of the compiled function.
 Stmt memoize(const Stmt& s, const Program& program, const std::string& function,
              const Target& target, const StorageFolds& folds);
 

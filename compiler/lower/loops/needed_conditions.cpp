@@ -25,8 +25,7 @@ std::optional<int64_t> difference(const Sum& a, const Sum& b) {
   return sum.valid && sum.is_constant() ? std::optional<int64_t>(sum.constant) : std::nullopt;
 }
 
-// Adds the sum, and what is at least 0 wherever it is: a largest is no less than its operands, a
-// smallest no more.
+// Adds the sum and the sums that it bounds from below: a max is at least each of its operands, a min at most.
 void add(const Sum& sum, Sums& sums) {
   const bool is_too_large = !sum.valid || sum.terms.size() > most_terms || sums.size() >= most_sums;
   if (is_too_large ||
@@ -43,7 +42,7 @@ void add(const Sum& sum, Sums& sums) {
   }
 }
 
-// What both say: of sums that a constant tells apart, the larger.
+// Sums that both lists imply: if two sums differ by a constant, the larger one.
 Sums common(const Sums& a, const Sums& b) {
   Sums result;
   for (const Sum& one : a) {
@@ -71,7 +70,7 @@ class ConditionFinder {
   }
 
  private:
-  // For the statement to do more than to fill memory of its own.
+  // The conditions that must hold for the statement to do more than fill its own memory.
   Sums needed_for(const Stmt& s) {
     return match(
         s, [&](const LetStmt& n) { return note_let(n), needed_for(n.body); },
@@ -102,7 +101,7 @@ class ConditionFinder {
     return needed.value_or(Sums());
   }
 
-  // Some iteration must do something: the best one, if there is any.
+  // At least one iteration must have an effect, so the conditions hold for the most favourable one.
   Sums needed_for_loop(const For& loop) {
     unknown_.insert(loop.name);
     Sums needed = needed_for(loop.body), result;
@@ -153,7 +152,7 @@ class ConditionFinder {
     }
   }
 
-  // What is not known outside is not opened: nothing grows with each let that reads another.
+  // Lets that are not known outside are not expanded, so that values do not grow with each let that reads another.
   bool is_known_outside(const Expr& e) const {
     return !reads_memory(e, MemoryReads::Functions) && !uses_any_variable(e, unknown_);
   }
@@ -161,7 +160,7 @@ class ConditionFinder {
     return substitute(without_promises(without_likely(without_lets(e))), lets_);
   }
 
-  std::unordered_set<std::string> own_, unknown_;  // memory; names bound inside
+  std::unordered_set<std::string> own_, unknown_;  // allocations inside; names bound inside
   Substitution lets_;
   bool fills_ = false;
 };

@@ -1,4 +1,4 @@
-// needed_conditions.h -- what must hold for an iteration of a loop to do anything.
+// needed_conditions.h -- finds conditions that must hold for an iteration of a loop to have any effect.
 //
 //   for (yi, 0, 8) {                             n - 32*xo > 0
 //     f[...] = ...                     <- fills memory of the iteration
@@ -7,9 +7,9 @@
 //     }
 //   }
 //
-// A guard of an inner loop holds in none of its iterations where it does not hold in the one that is
-// best for it: inner variables are replaced by the end of their range. Where that fails, what fills
-// memory for the guarded statement need not run.
+// The guard of an inner loop fails in all iterations if it fails in the most favourable one, so inner variables are
+// replaced by the end of their range. Where the condition fails, the statements that fill memory for the guarded
+// statement need not run either.
 #pragma once
 
 #include <vector>
@@ -19,8 +19,8 @@
 
 namespace retrograde::lower {
 
-// Sums that are at least 0 wherever the body of the loop does more than to fill memory of its own;
-// none where it fills nothing. They read no memory, and mention nothing that is bound in the body.
+// Sums that are at least 0 wherever the loop body does more than fill memory allocated inside it; empty if it fills
+// none. They read no memory and mention no names bound in the body.
 std::vector<Sum> needed_conditions(const For& loop);
 
 }  // namespace retrograde::lower

@@ -10,7 +10,8 @@ namespace retrograde::lower {
 
 namespace {
 
-constexpr int largest_condition = 40;  // nodes; larger ones cost more than they save
+constexpr int largest_condition =
+    40;  // nodes; evaluating larger conditions costs more than it saves
 
 bool is_usable(const Expr& e) {
   int nodes = 0;
@@ -23,7 +24,7 @@ bool is_usable(const Expr& e) {
   });
 }
 
-// The negated condition, for numbers without NaN.
+// The negated condition; comparisons of floats are not reversed, because of NaN.
 Expr negation(const Expr& e) {
   const auto* compared = e.as<Binary>();
   if (!compared || compared->a.type().is_float()) return !e;
@@ -45,7 +46,7 @@ Expr negation(const Expr& e) {
   }
 }
 
-// The condition with its parts, which are no And or Or, replaced.
+// The condition with its parts replaced; the parts are the operands of And and Or.
 Expr map_parts(const Expr& condition, ExprMap map) {
   const auto* pair = condition.as<Binary>();
   if (condition.kind() == Kind::And) return both(map_parts(pair->a, map), map_parts(pair->b, map));
@@ -53,7 +54,7 @@ Expr map_parts(const Expr& condition, ExprMap map) {
   return map(condition);
 }
 
-// Whether `part` may hold for a value of the variables of the scope.
+// Whether `part` may hold for some values of the variables in the scope.
 Expr for_some(const Expr& part, const Scope<Interval>& scope) {
   const auto* compared = part.as<Binary>();
   if (!compared || compared->a.type() != Int(32)) return const_true();

@@ -1,8 +1,8 @@
-// needed_where.h -- conditions under which code runs, as they look from outside of its loops.
+// needed_where.h -- derives from conditions inside of loops the conditions that hold outside of them.
 //
-//   if (p && x < n) S      S runs only where p: all that is known outside of the loop over x
+//   if (p && x < n) S      S runs only where p holds: outside of the loop over x nothing more is known
 //
-// A condition here says "only where": it may be too wide, never too narrow.
+// Each result is a necessary condition: it may hold too often, never too rarely.
 #pragma once
 
 #include <string>
@@ -13,12 +13,12 @@
 
 namespace retrograde::lower {
 
-// What is known where `condition` is true (or false: `holds`), made of what can be evaluated
-// anywhere, and of what is read of Funcs and images: no other memory, no effects, and little work but in C functions, which are
-// pure.
+// A necessary condition for `condition` to be true (or false, if not `holds`). It consists of expressions that can be
+// evaluated anywhere and of reads of Funcs and images. It reads no other memory, has no effects and costs little,
+// except for C functions, which are pure.
 Expr usable_where(const Expr& condition, bool holds);
 
-// Combine "only where a" and "only where b": `both` hold, or `either` does.
+// The conjunction and the disjunction of two necessary conditions.
 Expr both(const Expr& a, const Expr& b);
 Expr either(const Expr& a, const Expr& b);
 
@@ -30,14 +30,14 @@ struct Binder {
 };
 
 enum class AtLoops : uint8_t {
-  Forget,  // what depends on a loop's variable says nothing outside
-  Range,   // it holds for some iteration: by the range of the variable
+  Forget,  // parts that depend on the loop's variable are dropped
+  Range,   // parts are relaxed to "for some value in the variable's range"
 };
 
-// The condition as it looks from outside of the binder.
+// The condition as seen from outside of the binder.
 Expr from_outside(const Expr& condition, const Binder& binder, AtLoops at_loops);
 
-// Without the parts that read other Funcs and images than those that may be.
+// Without the parts that read Funcs or images for which `may_read` is false.
 Expr without_reads(const Expr& condition, FunctionRef<bool(const Call&)> may_read);
 
 // Without the parts that call C functions.

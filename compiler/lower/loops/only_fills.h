@@ -1,4 +1,4 @@
-// Statements that need not run where nothing reads what they fill.
+// only_fills.h -- recognises statements that only fill local memory, and may be skipped if nothing reads it.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace retrograde::lower {
 
-// Whether it does nothing but fill memory of the names, and of its own.
+// Whether the statement does nothing except store to the allocations `own` and to its own allocations.
 bool only_fills(const Stmt& s, std::unordered_set<std::string> own);
 
 }  // namespace retrograde::lower

@@ -7,37 +7,34 @@
 //   }                                    =>    }
 //                                              for (x, begin, end - begin) { out[x] = in[x - 1] }
 //
-// with  let begin = clamp(1, 0, w), let end = w,  and an epilogue where there is an upper limit. A
-// parallel loop, and one whose borders are as large as tiles, stays one loop, with an if inside.
-// Where the order of iterations is free, as in a pure definition that nothing slides in, both
-// borders of a large body are one loop before the steady state: what LLVM compiles of it is mostly
-// borders. Where it is not, a large body with loops in it stays one loop with an if inside, too.
+// with  let begin = clamp(1, 0, w), let end = w,  and an epilogue if there is an upper limit. A parallel loop, or one
+// whose borders are as large as tiles, stays one loop with an if inside. If the order of iterations is free, as in a
+// pure definition without sliding windows, both borders of a large body are one loop before the steady state: most of
+// the code that LLVM compiles is borders. If the order is not free, a large body with loops in it also stays one
+// loop with an if inside.
 //
-// What likely says:  likely(c)                     c is true
-//                    min(likely(a), b), max        the marked operand is the result
-//                    select(c, likely(a), b)       the marked arm is the result
-// A marked value stays marked through lets, arithmetic, min, max and select, so that
-// max(min(likely(x), hi), lo) is x. Once a min, max or select was decided by a mark, arithmetic
-// ends it: that a split's min(likely(xo*8), n - 8) is xo*8 says nothing of what is computed from
-// there.
+// Meaning of likely:  likely(c)                     c is true
+//                     min(likely(a), b), max        the marked operand is the result
+//                     select(c, likely(a), b)       the marked arm is the result
+// A mark carries over through lets, arithmetic, min, max and select, so that max(min(likely(x), hi), lo) is x. Once a
+// mark has decided a min, max or select, a remainder ends it: that a split's min(likely(xo*8), n - 8) is xo*8 says
+// nothing about values computed modulo something from it.
 //
-// Method: outermost loop first. One walk over the body of a loop rewrites it as if its likely
-//         conditions held, and asks analysis/linear.h where each of them holds: an interval of the
-//         loop variable, for all values of inner vectorized and unrolled loops, of loops with constant
-//         extents, and, for conditions over lanes in a body that is not large, of loops of unknown
-//         extent. Conditions without such an interval stay. The intersection of the
-//         intervals is the steady state. Inner loops are then partitioned in the steady state
-//         only; in the rest too where the rest may be large (a border of whole tiles), or is the
-//         first iteration of a sliding window, and the body is small. Large bodies keep the choice
-//         between the first iteration and others.
-//         Conditions that an inner loop decides, too, are left to it where a copy of a large body
-//         would save no more than a branch a row: to a loop over the rows of a strip, and to a long
-//         loop along a row beside rows of other Funcs.
-//         A loop is cut only if that saves something that is worth the copies (`Saving` in
-//         steady_state.h), or if the schedule says always.
-// Not done: a scalar condition that both this loop and an inner loop of unknown extent decide: it is
-//         left to the inner loop. Ends that depend on the lane of an enclosing vectorized loop: the
-//         worst lane decides.
+// Method: outermost loop first. One walk over the body of a loop rewrites it as if its likely conditions held. It asks
+//         analysis/linear.h where each condition holds: an interval of the loop variable that is valid for all
+//         iterations of inner vectorized and unrolled loops and of loops with constant extents. For conditions over
+//         lanes in a body that is not large, it is also valid for loops of unknown extent. Conditions without such an
+//         interval stay. The steady state is the intersection of the intervals.
+//         Inner loops are then partitioned in the steady state. They are also partitioned in the border if
+//         the body is small and the border may be large (whole tiles) or is the first iteration of a sliding window.
+//         Large bodies keep the branch between the first iteration and others.
+//         A condition that an inner loop decides, too, is left to that loop if a copy of a large body would save only
+//         one branch per row: for a loop over the rows of a strip, and for a long loop along a row beside rows of other
+//         Funcs.
+//         A loop is split only if the saving is worth the copies (`Saving` in steady_state.h), or if the schedule
+//         requests it with Partition::Always.
+// Not done: a scalar condition that both this loop and an inner loop of unknown extent decide is left to the inner
+//         loop. If an end depends on the lane of an enclosing vectorized loop, the worst lane decides.
 // Source: folklore (index-set splitting).
 // Tests: test/golden/lower/partition_loops/, test/property/loop_passes_test.cpp.
 #include "lower/statement_passes.h"
@@ -56,14 +53,14 @@ namespace retrograde::lower {
 
 namespace {
 
-// An operation less an iteration is worth a copy of a body that has up to this many nodes.
+// Copies of a body with up to this many nodes are worthwhile for each operation saved per iteration.
 constexpr int nodes_an_operation = 64;
-// And a condition over lanes less, which is a gather or a select: two copies of the body, one of them
-// with the condition, are what LLVM compiles. Above that it is less than a hundredth of the work.
+// The same for each condition over lanes, which is a gather or a select: LLVM compiles two copies of the body, one of
+// them with the condition. Above this limit the condition is less than a hundredth of the work.
 constexpr int nodes_a_vector_condition = 2048;
 
-// Both borders of a body with more nodes are one loop, where their order is free: a third of what LLVM compiles of a
-// long pipeline. A copy of a smaller one costs less than the choice between the two.
+// Above this number of nodes, both borders of a body are one loop if their order is free, which saves a third of the
+// code that LLVM compiles for a long pipeline. A smaller copy costs less than the choice between the two borders.
 constexpr int joined_border = 60;
 
 bool contains_likely(const Stmt& s) {
@@ -74,14 +71,14 @@ bool contains_loop(const Stmt& s) {
   return any_node(s, [](const For& loop) { return is_serial(loop); });
 }
 
-// "f" of the loop "f.s0.x" of its pure definition; else nothing.
+// "f" for a loop of its pure definition such as "f.s0.x"; otherwise empty.
 std::string func_of_pure_loop(const std::string& loop) {
   const size_t stage = loop.find(".s0.");
   return stage == std::string::npos ? "" : loop.substr(0, stage);
 }
 
-// Whether the loop is one of a pure definition, each of whose points is written once, and nothing
-// in it stores anywhere else for later iterations to find.
+// Whether the loop belongs to a pure definition, which writes each point once, and its body stores nothing else that
+// later iterations could read.
 bool runs_in_any_order(const For& loop) {
   const std::string func = func_of_pure_loop(loop.name);
   if (func.empty()) return false;
@@ -136,17 +133,17 @@ class Partitioner : public StatementRewriter {
                                         nodes_a_vector_condition * saving.over_lanes;
   }
 
-  // Loops inside a vectorized one have the same bounds in all lanes.
+  // Handles a vectorized loop. Loops inside it have the same bounds in all lanes.
   Stmt inside_lanes(const Stmt& s, const For& loop) {
     context_.add_loop(loop);
     ++in_vectorized_;
     Stmt result = children(s);
-    if (--in_vectorized_ == 0) context_ = {};  // its names are known inside only
+    if (--in_vectorized_ == 0) context_ = {};  // its names are not visible outside
     return result;
   }
 
   struct Ends {
-    Expr begin, end;  // of the steady state; undefined where it begins or ends with the loop
+    Expr begin, end;  // of the steady state; undefined where they coincide with those of the loop
   };
 
   static Ends find_ends(const For& loop, const SteadyState& steady) {
@@ -173,8 +170,7 @@ class Partitioner : public StatementRewriter {
                      : three_loops(loop, steady_body, rest, ends, steady.needed);
   }
 
-  // Two borders that must stay on their sides would be two copies; a branch around a large body
-  // costs nothing beside it.
+  // If the borders must run in order, they would be two copies of the body; a branch costs little beside a large body.
   static bool has_costly_borders_in_order(const For& loop, const Stmt& rest, const Ends& ends) {
     return ends.begin.defined() && ends.end.defined() && contains_loop(rest) &&
            node_count(rest) > costly_border && !runs_in_any_order(loop);
@@ -197,7 +193,7 @@ class Partitioner : public StatementRewriter {
     return make_lets(lets, make_for(loop.name, loop.min, loop.extent, loop.runs, body));
   }
 
-  // loop.min <= begin <= end <= loop_end, whatever the loop's extent.
+  // Ensures loop.min <= begin <= end <= loop_end for every extent of the loop.
   Stmt three_loops(const For& loop, const Stmt& steady_body, const Stmt& rest, const Ends& ends,
                    const Expr& needed) {
     Expr loop_end = simplify(binary(Kind::Add, loop.min, loop.extent));
@@ -231,7 +227,7 @@ class Partitioner : public StatementRewriter {
                           fresh_);
   }
 
-  // border 0, 1, ... of [loop.min, begin) and then of [end, loop_end)
+  // One loop over border = 0, 1, ..., which enumerates [loop.min, begin) and then [end, loop_end).
   Stmt both_borders(const For& loop, const Expr& begin, const Expr& end, const Expr& loop_end,
                     const Stmt& body) {
     const Type type = loop.min.type();

@@ -1,4 +1,4 @@
-// ring_buffers -- several copies of hoisted storage, used in turn.
+// ring_buffers -- give hoisted storage several copies that iterations use in turn.
 // In:  Loops; names unique; async Funcs forked.
 // Out: Loops; storage of Funcs with ring_buffer(n) lies in one of n copies.
 //
@@ -7,10 +7,10 @@
 //       realize f [a, e] { ... }     =>       realize f [a, e], [(y - y.min) % n * m, 1] { ... }
 //     } }                                   } }
 //
-// Method: counts the iterations of the loops between the place and the Func, the innermost fastest,
-//         modulo the number of copies. Producer and consumer of an async Func count for themselves.
-// Errors: loops whose iterations run at once; Funcs that nothing hoists; inner loops of an async Func
-//         whose extents vary, so that two iterations that follow each other may have one copy.
+// Method: counts the iterations of the loops between the hoisted storage and the Func, innermost fastest, modulo the
+//         number of copies. Producer and consumer of an async Func count separately.
+// Errors: loops that are not serial; Funcs whose storage is not hoisted; inner loops of an async Func with varying
+//         extents, for which two consecutive iterations could use the same copy.
 // Source: folklore. Tests: test/golden/pipeline/ring_buffers/, test/unit/ring_buffer_test.cpp.
 #include "lower/loops/ring_buffers.h"
 
@@ -62,9 +62,9 @@ class RingBuffers : public StatementRewriter {
     size_t loops_around = 0, names_around = 0;
   };
   const Program& program_;
-  std::vector<const For*> loops_;        // around, the outermost first
-  std::vector<std::string> names_;       // of loops and lets around
-  std::map<std::string, Place> places_;  // around, by Func
+  std::vector<const For*> loops_;        // around the current statement, outermost first
+  std::vector<std::string> names_;       // of loops and lets around it
+  std::map<std::string, Place> places_;  // hoisted storage around it, by Func
 
   Stmt binding(const std::string& name, const Stmt& s) {
     names_.push_back(name);
@@ -73,7 +73,7 @@ class RingBuffers : public StatementRewriter {
     return result;
   }
 
-  // The Func with a ring buffer whose place is realized under this name.
+  // The Func with a ring buffer whose hoisted storage is realized under this name.
   const LoopedFunc* func_at_place(const std::string& name) const {
     const std::string& place = program_.original(name);
     const LoopedFunc* f = program_.find(place.substr(0, place.rfind('.')));

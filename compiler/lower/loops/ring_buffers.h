@@ -1,4 +1,4 @@
-// ring_buffers -- several copies of hoisted storage, used in turn.
+// ring_buffers -- give hoisted storage several copies that iterations use in turn.
 #pragma once
 
 #include <string>
@@ -8,14 +8,14 @@
 
 namespace retrograde::lower {
 
-// Loops -> Loops. Places of Funcs with a ring buffer, and these Funcs' Realizes, have one bound more
-// than dimensions, which flatten_storage reads: of the place the number of copies, of the Func the
-// element that its copy begins with.
+// Loops -> Loops. The hoisted storage of Funcs with a ring buffer, and the Realizes of these Funcs, get one bound more
+// than dimensions, which flatten_storage reads. For the hoisted storage it is the number of copies, for the Func the
+// first element of its copy.
 Stmt ring_buffers(const Stmt& s, const Program& program);
 
-// How many copies an async Func has.
+// The constant number of copies of an async Func.
 int copies_in_ring(const LoopedFunc& f);
-// Iterations of an async Func have no copies that are used in turn.
+// Reports that the loops of an async Func do not allow a ring buffer.
 [[noreturn]] void refuse_ring(const LoopedFunc& f, const std::string& evidence);
 
 }  // namespace retrograde::lower

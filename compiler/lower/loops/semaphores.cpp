@@ -19,7 +19,7 @@ Stmt call(const char* function, const std::string& func, int which, int count) {
   return make_evaluate(call_runtime(function, {place, Expr(count)}));
 }
 
-// The first call that has the semaphores of the Func; undefined when there is none.
+// The first access of the Func's semaphores in the step; undefined if there is none.
 Expr semaphore_in(const Stmt& step, const std::string& func) {
   Expr found;
   walk(

@@ -1,4 +1,4 @@
-// skip_stages -- a Func is computed only where something reads it.
+// skip_stages -- compute a Func only where something reads it.
 // In:  Loops; names unique.
 // Out: Loops; producers under conditions, the same stores otherwise.
 //
@@ -8,434 +8,43 @@
 //       for x { out(x) = select(p, f(x), 0) }          for x { out(x) = select(p, f(x), 0) }
 //   } }                                            } }
 //
-// The consumers' selects and ifs say where they read it. A condition stays as far as it can be
-// evaluated where the storage of f begins: it is made of parameters, of extents of buffers, of
-// variables of loops around that storage, and of elements of images and of Funcs that are complete there. (A C function that a
-// select calls there anyway is pure, and called once for both.) What depends on loops inside counts
-// as true; but in a choice between Funcs, select(x < n, a(x), b(x - n)), it is asked whether x
-// reaches the arm at all, so that concatenations compute one part where the other is not wanted.
-// What only a skipped Func reads is skipped with it.
+// The selects and ifs of the consumers tell where they read it. A condition is used as far as it can be evaluated where
+// the storage of f begins. There it may mention parameters, extents of buffers, variables of loops around that
+// storage, and elements of images and of complete Funcs. (A C function that a select calls there anyway is
+// pure, and is called once for both.) Parts that depend on loops inside count as true. In a choice between Funcs, such
+// as select(x < n, a(x), b(x - n)), the range of x decides whether an arm is reached at all, so that concatenations
+// skip a part that is not required. A Func that only skipped Funcs read is skipped, too.
 //
-// The storage is not skipped: both arms of a select may be evaluated, and then one of them reads
-// values that nobody computed, and that nobody uses. So an arm of a select does not count where its
-// value is more than a value: a coordinate, the argument of a C function, what a promise speaks of.
+// The storage is not skipped: both arms of a select may be evaluated, and then one of them reads uninitialised
+// values that are not used. An arm of a select is therefore not taken into account if its value has a further
+// effect: a coordinate, an argument of a C function, an operand of a promise.
 //
-// Method: one walk, from outside in, with the conditions and the binders (loops, lets) around. A
-//         read of f adds the conditions between its storage and the read, seen from outside of the
-//         binders in between. A producer of g is a condition of its own, a name for what g's
-//         storage has not seen in full yet; where g's storage ends, the name is replaced, also in the needs
-//         of Funcs that were stored inside of it.
-// Not done: outputs, and Funcs that are async or computed inside the storage of one (producer and
-//         consumer wait for each other); what kernels compute, or is computed in them; Funcs that
-//         share loops with others (compute_with); conditions over the lanes of a vector; a single
-//         point where the condition changes from iteration to iteration: a branch costs more.
-// Side effects of a Func are those of its values: traced stores, calls of C functions and lookups of
-// memoized Funcs go with what is skipped. A load that is traced, or memory that debug_to_file
-// writes, is a use.
-// Source: Halide's tests and documentation say what users see of the same there. Tests:
+// Method: one walk, from outside in, that tracks conditions and binders (loops, lets). A read of f adds the conditions
+//         between its storage and the read, as seen from outside of the binders in between. The producer of g acts as a
+//         condition with a placeholder name, because not all reads of g are known yet. Where g's storage ends, the
+//         name is replaced, also in the conditions of Funcs that were stored inside of it.
+// Not done: outputs; async Funcs and Funcs inside the storage of one (producer and consumer wait for each other);
+//         Funcs that are computed by or in kernels; Funcs fused with others (compute_with); conditions over the lanes
+//         of a vector; a single point whose condition changes from iteration to iteration, where a branch costs more.
+// Side effects of a Func are part of its values: traced stores, calls of C functions and lookups of memoized Funcs are
+// skipped with it. A traced load, or memory that debug_to_file writes, is a read.
+// Source: Halide's tests and documentation describe the behaviour that users see. Tests:
 //         test/golden/lower/skip_stages/, test/unit/skip_stages_test.cpp, test/property.
 #include "lower/loops/skip_stages.h"
 
 #include <algorithm>
-#include <map>
-#include <set>
-#include <unordered_map>
-#include <unordered_set>
-#include <utility>
 #include <vector>
 
 #include "ir/build.h"
 #include "ir/equal.h"
-#include "lower/loops/needed_where.h"
+#include "lower/loops/needed_stages.h"
 #include "lower/statement_rewriter.h"
-#include "simplify/simplify.h"
 
 namespace retrograde::lower {
 
 namespace {
 
-constexpr int most_choices = 64;   // in one expression, and
-constexpr int deepest_choice = 4;  // inside each other: conditions of further ones count as true
-
-bool is_choice(const Expr& e) { return e.as<Select>() || as_op(e, Op::if_then_else); }
-
-bool reads_funcs(const Expr& e) {
-  return any_node(e, [](const Call& call) { return call.call_type == CallType::Func; });
-}
-
-// Whether any values do as operands where nobody uses the result: no promise that may be checked.
-bool is_plain_operator(const Call& call) {
-  if (call.call_type != CallType::Operator) return false;
-  const OpClass cls = op_info(call.op).cls;
-  const bool promises = call.is_op(Op::promise_clamped, Op::unsafe_promise_clamped);
-  return cls == OpClass::Pure || (cls == OpClass::Marker && !promises);
-}
-
-// Whether it computes no more than a point, by no function that may take long.
-bool is_one_point(const Stmt& s) {
-  return !any_node(
-      s,
-      [](const Expr& e) {
-        const auto* call = e.as<Call>();
-        return call && call->call_type == CallType::Extern;
-      },
-      [](const Stmt& part) {
-        const auto* loop = part.as<For>();
-        return loop && !is_one(simplify(loop->extent));
-      });
-}
-
-// By Func: where it is needed.
-using Guards = std::map<std::string, Expr>;
-
-class NeedFinder {
- public:
-  explicit NeedFinder(FunctionRef<bool(const std::string&)> may_skip) : may_skip_(may_skip) {}
-
-  Guards find(const Stmt& s) {
-    visit(s);
-    return std::move(guards_);
-  }
-
- private:
-  // A condition in force, inside of the first `binders` of all binders.
-  struct Held {
-    Expr condition;
-    size_t binders;
-    AtLoops at_loops;
-    int guards = 0;  // around it
-  };
-  // A Func whose storage is open.
-  struct Stage {
-    size_t binders, held;  // outside of its storage
-    int guards;
-    Expr needed = const_false();
-    bool is_read = false;
-    std::vector<Stmt> producers = {};
-    std::set<std::string> mentioned_by = {};  // Funcs further out whose need speaks of this one's
-    std::set<std::string> complete =
-        {};  // Funcs whose values are all there when its storage begins
-  };
-
-  static std::string need_of(const std::string& func) { return func + ".needed"; }
-
-  // ---- statements ----
-
-  void visit(const Stmt& s) {
-    if (!s.defined()) return;
-    match(
-        s, [&](const LetStmt& n) { visit_let(n); }, [&](const For& n) { visit_loop(n); },
-        [&](const IfThenElse& n) { visit_branch(n); }, [&](const Realize& n) { visit_storage(n); },
-        [&](const ProducerConsumer& n) { visit_producer(s, n); },
-        [&](const Provide& n) { visit_store(n); },
-        [&](const StmtNode&) {
-          for_each_child(
-              s, [&](const Expr& e) { visit_values({e}); },
-              [&](const Stmt& child) { visit(child); });
-        });
-  }
-
-  void visit_let(const LetStmt& n) {
-    visit_values({n.value});
-    if (uses_any_variable(n.value, varying_)) varying_.insert(n.name);
-    if (uses_any_variable(n.value, lanes_)) lanes_.insert(n.name);
-    binders_.push_back({n.name, n.value, {}, {}});
-    visit(n.body);
-    binders_.pop_back();
-  }
-
-  void visit_loop(const For& n) {
-    visit_values({n.min, n.extent});
-    varying_.insert(n.name);
-    if (n.runs == ForType::Vectorized) lanes_.insert(n.name);
-    kernels_ += is_gpu(n.runs);
-    binders_.push_back({n.name, {}, n.min, n.extent});
-    visit(n.body);
-    binders_.pop_back();
-    kernels_ -= is_gpu(n.runs);
-  }
-
-  void visit_branch(const IfThenElse& n) {
-    visit_values({n.condition});
-    const auto where = [&](bool holds) {
-      return without_calls(without_any_reads(usable_where(n.condition, holds)));
-    };
-    under(where(true), AtLoops::Forget, [&] { visit(n.when_true); });
-    under(where(false), AtLoops::Forget, [&] { visit(n.when_false); });
-  }
-
-  void visit_store(const Provide& n) {
-    guards_around_ += n.predicate.defined();
-    visit_values(n.args);
-    visit_values({n.predicate});
-    visit_values(n.values);
-    guards_around_ -= n.predicate.defined();
-  }
-
-  void visit_storage(const Realize& n) {
-    for (const Range& side : n.bounds) visit_values({side.min, side.extent});
-    const bool is_candidate = may_skip_(n.name) && kernels_ == 0 && waiting_ == 0 &&
-                              !stages_.contains(n.name) && !forbidden_.contains(n.name);
-    forbidden_.insert(n.name);  // names are unique; of others nothing is known
-    if (!is_candidate) {
-      const bool waits = !may_skip_(n.name);
-      waiting_ += waits;
-      visit(n.body);
-      waiting_ -= waits;
-      return;
-    }
-    stages_.emplace(n.name, Stage{.binders = binders_.size(),
-                                  .held = held_.size(),
-                                  .guards = guards_around_,
-                                  .complete = complete_});
-    visit(n.body);
-    close(n.name);
-  }
-
-  void visit_producer(const Stmt& s, const ProducerConsumer& n) {
-    const auto stage = stages_.find(n.name);
-    if (n.produces && runs_on_device(n.body)) on_device_.insert(n.name);
-    if (!n.produces) return visit_consumer(n);
-    if (stage == stages_.end()) return visit(n.body);
-    stage->second.producers.push_back(s);
-    producing_.push_back(n.name);
-    under(variable(need_of(n.name), Bool()), AtLoops::Forget, [&] { visit(n.body); });
-    producing_.pop_back();
-  }
-
-  // What is complete, and in memory of the host, may be asked before it is read by the Funcs that follow.
-  void visit_consumer(const ProducerConsumer& n) {
-    const bool is_there =
-        may_skip_(n.name) && !on_device_.contains(n.name) && complete_.insert(n.name).second;
-    visit(n.body);
-    if (is_there) complete_.erase(n.name);
-  }
-
-  static bool runs_on_device(const Stmt& s) {
-    return any_stmt(s, [](const Stmt& part) {
-      const auto* loop = part.as<For>();
-      return loop && is_gpu(loop->runs);
-    });
-  }
-
-  static Expr without_any_reads(const Expr& condition) {
-    return without_reads(condition, [](const Call&) { return false; });
-  }
-
-  template <class Body>
-  void under(const Expr& condition, AtLoops at_loops, Body&& body) {
-    const bool is_said = !is_const_true(condition);
-    if (is_said) held_.push_back({condition, binders_.size(), at_loops, guards_around_});
-    guards_around_++;
-    body();
-    guards_around_--;
-    if (is_said) held_.pop_back();
-  }
-
-  // ---- needs ----
-
-  Expr seen_from(const Held& held, size_t outside) const {
-    Expr condition = held.condition;
-    for (size_t i = held.binders; i-- > outside && !is_const_true(condition);)
-      condition = from_outside(condition, binders_[i], held.at_loops);
-    return condition;
-  }
-
-  // Reads by its own updates make nothing needed.
-  void read(const std::string& func) {
-    const auto found = stages_.find(func);
-    if (found == stages_.end()) return;
-    for (const std::string& own : producing_) {
-      if (own == func) return;
-    }
-    Stage& stage = found->second;
-    stage.is_read = true;
-    if (is_const_true(stage.needed)) return;
-    Expr where = const_true();
-    for (size_t i = stage.held; i < held_.size(); i++) {
-      // What stands under another guard may read outside of its storage where that does not hold.
-      const bool is_outermost = held_[i].guards == stage.guards;
-      where =
-          both(where, without_reads(seen_from(held_[i], stage.binders), [&](const Call& call) {
-                 return is_outermost && kernels_ == 0 &&
-                        (call.call_type == CallType::Image || stage.complete.contains(call.name));
-               }));
-    }
-    // C functions are called where they were, with their arguments: a select always does.
-    if (outside_ > stage.held) where = without_calls(where);
-    add_need(func, stage, where);
-  }
-
-  void add_need(const std::string& func, Stage& stage, const Expr& where) {
-    stage.needed = either(stage.needed, where);
-    note_mentions(where, func);
-  }
-
-  void note_mentions(const Expr& where, const std::string& func) {
-    walk(where, [&](const Variable& v) {
-      const size_t mark = v.name.rfind(".needed");
-      if (mark == std::string::npos) return;
-      const auto other = stages_.find(v.name.substr(0, mark));
-      if (other != stages_.end()) other->second.mentioned_by.insert(func);
-    });
-  }
-
-  // The storage of the Func ends here: all of its reads are known.
-  void close(const std::string& func) {
-    const Stage stage = std::move(stages_.at(func));
-    stages_.erase(func);
-    Expr need = need_outside(stage);
-    // Whether a point is worth a branch is decided at once: what it reads is needed where it is computed.
-    if (std::ranges::any_of(stage.producers, is_one_point)) {
-      need = known_part(need);
-      if (uses_any_variable(need, varying_)) need = const_true();
-    }
-    for (const std::string& reader : stage.mentioned_by) {
-      const auto outer = stages_.find(reader);
-      if (outer == stages_.end()) continue;
-      const Expr whole = seen_from({without_any_reads(need), binders_.size(), AtLoops::Forget},
-                                   outer->second.binders);
-      outer->second.needed = simplify(substitute(outer->second.needed, need_of(func), whole));
-      note_mentions(whole, reader);
-    }
-    open_needs_[func] = need;
-    settle(func);
-  }
-
-  // What speaks of Funcs whose storage is around and still open waits for them: where those are computed,
-  // and so read this one, is known at their end, and is the same all through their storage.
-  void settle(const std::string& func) {
-    const Expr need = open_needs_.at(func);
-    if (uses_any_variable(need, unsettled())) return;
-    open_needs_.erase(func);
-    if (!is_const_true(need)) guards_[func] = need;
-    std::vector<std::string> waiting;
-    for (auto& [name, other] : open_needs_) {
-      if (!uses_variable(other, need_of(func))) continue;
-      other = simplify(substitute(other, need_of(func), need));
-      waiting.push_back(name);
-    }
-    for (const std::string& name : waiting) {
-      if (open_needs_.contains(name)) settle(name);
-    }
-  }
-
-  std::unordered_set<std::string> unsettled() const {
-    std::unordered_set<std::string> names;
-    for (const auto& [name, stage] : stages_) names.insert(need_of(name));
-    for (const auto& [name, need] : open_needs_) names.insert(need_of(name));
-    return names;
-  }
-  // What is known later counts as true.
-  Expr known_part(const Expr& need) const { return simplify(without_parts_of(need, unsettled())); }
-
-  // True where it is not known to be right.
-  Expr need_outside(const Stage& stage) const {
-    if (!stage.is_read || is_const_true(stage.needed)) return const_true();
-    if (std::ranges::any_of(stage.producers, computes_others)) return const_true();
-    return simplify(without_parts_of(stage.needed, lanes_));
-  }
-
-  // Kernels, or Funcs stored elsewhere.
-  static bool computes_others(const Stmt& producer) {
-    std::set<std::string> own{producer.as<ProducerConsumer>()->name};
-    bool result = false;
-    walk(
-        producer, [](const Expr&) { return false; },
-        [&](const Stmt& part) {
-          if (const auto* storage = part.as<Realize>()) own.insert(storage->name);
-          if (const auto* store = part.as<Provide>()) result |= !own.contains(store->name);
-          if (const auto* loop = part.as<For>()) result |= is_gpu(loop->runs);
-          return !result;
-        });
-    return result;
-  }
-
-  // ---- expressions ----
-
-  void visit_values(const std::vector<Expr>& values) {
-    for (const Expr& e : values) {
-      if (!e.defined()) continue;
-      seen_.clear();
-      choices_ = arms_ = 0;
-      outside_ = held_.size();
-      let_names_.clear();
-      if (any_node(e, [](const Expr& node) { return is_choice(node); })) {
-        visit(e, 0, 0);
-      } else {
-        walk(e, [&](const Call& call) {
-          if (call.call_type == CallType::Func) read(call.name);
-        });
-      }
-    }
-  }
-
-  // `choice`: the innermost around, by number; 0: none.
-  void visit(const Expr& e, int choice, int depth) {
-    if (seen_.contains({e.get(), 0}) || !seen_.insert({e.get(), choice}).second) return;
-    if (const auto* select = e.as<Select>())
-      return visit_choice(select->condition, select->when_true, select->when_false, choice, depth);
-    const auto* call = e.as<Call>();
-    if (call && call->is_op(Op::if_then_else))
-      return visit_choice(call->args[0], call->args[1], call->args[2], choice, depth);
-    const auto* let = e.as<ir::Let>();
-    if (let) let_names_.insert(let->name);
-    const bool is_plain = !let && (!call || is_plain_operator(*call));
-    if (call && call->call_type == CallType::Func) read(call->name);
-    if (let) {
-      outside_of_choices([&] { visit(let->value, 0, 0); });
-      return visit(let->body, choice, depth);
-    }
-    for_each_child(e, [&](const Expr& child) {
-      if (is_plain) return visit(child, choice, depth);
-      outside_of_choices([&] { visit(child, 0, 0); });
-    });
-  }
-
-  // What is evaluated whatever is chosen, and must be what it is meant to be.
-  template <class Body>
-  void outside_of_choices(Body&& body) {
-    std::vector<Held> inside(held_.begin() + static_cast<std::ptrdiff_t>(outside_), held_.end());
-    held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(outside_), held_.end());
-    body();
-    held_.insert(held_.end(), inside.begin(), inside.end());
-  }
-
-  void visit_choice(const Expr& condition, const Expr& a, const Expr& b, int choice, int depth) {
-    visit(condition, choice, depth);
-    const bool is_too_much = ++choices_ > most_choices || depth >= deepest_choice;
-    const AtLoops at_loops =
-        !is_too_much && reads_funcs(a) && reads_funcs(b) ? AtLoops::Range : AtLoops::Forget;
-    for (const bool holds : {true, false}) {
-      const Expr where =
-          is_too_much ? const_true() : without_parts_of(usable_where(condition, holds), let_names_);
-      const int inner = is_const_true(where) ? choice : ++arms_;
-      under(where, at_loops, [&] { visit(holds ? a : b, inner, depth + 1); });
-    }
-  }
-
-  FunctionRef<bool(const std::string&)> may_skip_;
-  Guards guards_;
-  int guards_around_ = 0;                   // choices, branches, predicates, producers
-  std::map<std::string, Stage> stages_;     // whose storage is open
-  std::map<std::string, Expr> open_needs_;  // of Funcs whose storage has ended, in terms of others
-  std::vector<Binder> binders_;
-  std::vector<Held> held_;
-  std::vector<std::string> producing_;
-  std::unordered_set<std::string> varying_;  // variables of loops, and what depends on them
-  std::unordered_set<std::string> lanes_;    // of vectors
-  std::unordered_set<std::string> forbidden_;
-  std::set<std::string> complete_, on_device_;
-  int kernels_ = 0, waiting_ = 0;  // around: loops of kernels, storage that producers wait for
-
-  // In one expression.
-  std::set<std::pair<const ExprNode*, int>> seen_;
-  std::unordered_set<std::string> let_names_;
-  int choices_ = 0, arms_ = 0;
-  size_t outside_ = 0;  // conditions in force around it
-};
-
-// Calls of C functions in the condition, and equal ones in `body`, are one, before it.
+// Computes calls of C functions in the condition, and equal calls in `body`, once before both.
 Stmt with_calls_shared(const std::string& func, const Expr& condition, Stmt body) {
   std::vector<Expr> calls;
   walk(condition, [&](const Expr& e) {
@@ -460,7 +69,7 @@ Stmt with_calls_shared(const std::string& func, const Expr& condition, Stmt body
 }  // namespace
 
 Stmt skip_stages(const Stmt& s, FunctionRef<bool(const std::string&)> may_skip) {
-  const Guards guards = NeedFinder(may_skip).find(s);
+  const StageGuards guards = find_stage_guards(s, may_skip);
   if (guards.empty()) return s;
   return rewrite_statements(s, [&](const Stmt& node, auto& all) {
     const Stmt result = all.children(node);

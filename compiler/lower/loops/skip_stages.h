@@ -1,3 +1,4 @@
+// skip_stages -- compute a Func only where something reads it.
 #pragma once
 
 #include <string>
@@ -6,7 +7,7 @@
 
 namespace retrograde::lower {
 
-// `may_skip`: whether the Func of that name may be left out where no one reads it.
+// `may_skip`: whether the Func of that name may be skipped where nothing reads it.
 Stmt skip_stages(const Stmt& s, FunctionRef<bool(const std::string&)> may_skip);
 
 }  // namespace retrograde::lower

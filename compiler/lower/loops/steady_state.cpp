@@ -10,16 +10,15 @@ namespace retrograde::lower {
 
 namespace {
 
-// A border is thick when the inner loops that a condition is about run a serial loop of at least
-// this extent, ...
+// A border is thick if the inner loops in a condition include a serial loop of at least this extent, ...
 constexpr int64_t thick_loop = 8;
-// ... and at least this many points in all: a tile then, and not a stencil or a vector.
+// ... and run at least this many points in total: a tile, and not a stencil or a vector.
 constexpr int64_t thick_points = 32;
-// Iterations of an inner loop beside which its own borders are nothing.
+// From this extent on, the borders of an inner loop cost little in comparison with it.
 constexpr int64_t long_row = 16;
 
-// A loop whose extent varies has at most so many iterations if it follows what is unrolled around
-// it: what is prepared for its copies, say. No more than they does it count as a loop.
+// The maximum number of iterations of a short loop. A loop of varying extent inside unrolled code, for example one that
+// prepares data for the copies, does not count as a loop if it is that short.
 constexpr int short_iterations = 4;
 
 bool is_short(const For& loop, const Substitution& lets) {
@@ -37,7 +36,7 @@ bool contains_serial_loop(const Stmt& s) {
   });
 }
 
-// Rows of several Funcs, say: serial loops without others inside.
+// Whether there are several serial loops without others inside, such as rows of several Funcs.
 bool has_several_rows(const Stmt& s) {
   int rows = 0;
   walk(
@@ -142,7 +141,7 @@ Expr SteadyRewriter::rewrite_let(const Expr& e, const Let& n) {
   return value.same_as(n.value) && body.same_as(n.body) ? e : make_let(n.name, value, body);
 }
 
-// The value of a let. Marks and decided conditions go on into the body.
+// Rewrites the value of a let. Marks and decided conditions carry over to the body.
 Expr SteadyRewriter::bind(const std::string& name, const Expr& original) {
   Expr value = (*this)(original);
   context_.add_let(name, value);
@@ -171,8 +170,8 @@ Stmt SteadyRewriter::rewrite_loop(const Stmt& s, const For& n) {
   return copy;
 }
 
-// What another copy of the body of this loop would save is a branch in each iteration of that one,
-// or, where other loops stand beside it, in each of its rows.
+// Whether an inner loop is left to partition itself. A copy of this loop's body would save only one branch per
+// iteration of the inner loop, or, if other loops stand beside it, one per row.
 bool SteadyRewriter::decides_alone(const For& n, int64_t extent) const {
   if (contains_serial_loop(n.body))
     return extent >= thick_loop && node_count(n.body) > costly_border;
@@ -197,7 +196,7 @@ Expr SteadyRewriter::rewrite_select(const Select& n, const Expr& copy) {
   return t_mark > f_mark ? op->when_true : op->when_false;
 }
 
-// Whether e is computed from something marked, not counting what it loads.
+// Whether e is computed from a marked value; loaded values do not count.
 SteadyRewriter::Mark SteadyRewriter::mark(const Expr& e) {
   if (const auto* it = find_or_null(marks_, e.get())) return *it;
   const auto decided = [&](const Expr& a, const Expr& b) {
@@ -223,8 +222,8 @@ SteadyRewriter::Mark SteadyRewriter::mark(const Expr& e) {
   return result;
 }
 
-// Whether the steady state can be where the condition is `is_true`; then it is from now on. A
-// choice skips what it does not choose, where an extreme is but an operation.
+// Tries to restrict the steady state to iterations in which the condition is `is_true`; returns whether it did. A
+// choice (`is_choice`) skips work, whereas a min or max saves a single operation.
 bool SteadyRewriter::holds(const Expr& condition, bool is_true, bool is_choice) {
   Expr expanded = context_.expand(is_true ? condition : logical_not(condition));
   const std::unordered_set<std::string> names = variables_of(expanded);
@@ -233,7 +232,7 @@ bool SteadyRewriter::holds(const Expr& condition, bool is_true, bool is_choice) 
   if (std::ranges::any_of(decide_alone_, is_in)) return false;
   const bool is_over_unknown = std::ranges::any_of(of_unknown_extent_, is_in);
   const bool is_over_lanes = inside_lanes_ || std::ranges::any_of(lanes_, is_in);
-  // All iterations may be border where inner loops are long: the border must be partitioned, too.
+  // If inner loops are long, all iterations may be border, so the border must be partitioned, too.
   if (is_over_unknown && !(is_over_lanes && partitions_borders_)) return false;
   auto solution = solve_for(expanded, loop_.name, context_.ranges());
   if (!solution) return false;
@@ -267,7 +266,7 @@ void SteadyRewriter::count_saving(const std::unordered_set<std::string>& names, 
   }
 }
 
-// Whether all but the first iteration are steady, and no inner loop has a part in that.
+// Whether all iterations except the first are steady, independent of inner loops.
 bool SteadyRewriter::is_warm_up(const Interval& steady,
                                 const std::unordered_set<std::string>& names) const {
   const auto is_inside = [&](const std::string& name) {

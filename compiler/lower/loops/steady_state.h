@@ -1,5 +1,5 @@
-// steady_state.h -- the part of a loop in which its likely() conditions hold, and what they are
-// worth there. Used by partition_loops.
+// steady_state.h -- finds the iterations of a loop in which its likely() conditions hold, and what a separate loop for
+// them saves. Used by partition_loops.
 #pragma once
 
 #include <string>
@@ -14,22 +14,23 @@
 namespace retrograde::lower {
 
 bool is_likely(const Call* call);
-bool is_serial(const For& loop);  // or parallel: it runs one iteration after the other
+bool is_serial(
+    const For&
+        loop);  // serial or parallel: an iteration is not a lane, a copy or a thread of a block
 
-// A copy of a body with more nodes costs more than a branch in each iteration.
+// Above this number of nodes a second copy of the body costs more than a branch in each iteration.
 inline constexpr int costly_border = 200;
-// The copy for the borders of a body with more nodes is not partitioned further.
+// Above this number of nodes the copy of the body for the borders is not partitioned further.
 inline constexpr int small_body = 1500;
 int node_count(const Stmt& s);
 
-// Names whose values a solution may not mention: what a let stands for, and between what a loop
-// variable lies.
+// Names that a solution may not mention, with the values of lets and the ranges of loop variables.
 class PartitionContext {
  public:
   void add_let(const std::string& name, const Expr& value);
   void add_range(const std::string& name, const Interval& range) { ranges_.push(name, range); }
   void add_loop(const For& loop);
-  // Without lets and markers.
+  // The expression with lets substituted and likely markers removed.
   Expr expand(const Expr& e) const { return without_likely(substitute(e, lets_)); }
   const Scope<Interval>& ranges() const { return ranges_; }
 
@@ -38,14 +39,13 @@ class PartitionContext {
   Scope<Interval> ranges_;
 };
 
-// What the iterations of the steady state save by it.
+// How much a separate loop for the steady state saves.
 //
-// A condition that an inner serial loop does not change, or that stands outside of all inner loops,
-// is computed once for a whole inner loop: nothing is saved. One over the lanes of a vector turns
-// gathers into dense loads and selects into nothing: it pays unless the body is very large beside
-// it. What is left, the min of a
-// shifted tile or a clamp of scalars, saves an operation or two an iteration, and maybe that the
-// start of a vector is known to be a multiple of something, for the divisions in the body.
+// A condition outside of all inner loops, or one that does not change in an inner serial loop, is evaluated once per
+// inner loop: nothing is saved. A condition over the lanes of a vector turns gathers into dense loads and removes
+// selects: it pays unless the body is very large in comparison. Other conditions, such as the min of a shifted tile or
+// a clamp of scalars, save one or two operations per iteration. They may also show that the start of a vector is a
+// multiple of some constant, which simplifies divisions in the body.
 struct Saving {
   bool always_pays = false;
   int over_lanes = 0;
@@ -53,17 +53,18 @@ struct Saving {
   bool divides = false;
 };
 
-// Where the steady state of one loop lies.
+// The steady state of one loop.
 struct SteadyState {
   Interval range;                 // of the loop variable
-  Expr needed;                    // and only if this holds; undefined: always
-  bool has_thick_border = false;  // some iteration of the rest is a tile or more
-  bool has_warm_up = false;       // the first iteration chooses otherwise, whatever runs inside
+  Expr needed;                    // a further condition for the steady state; undefined: none
+  bool has_thick_border = false;  // an iteration of the border may contain a tile or more
+  bool has_warm_up =
+      false;  // only the first iteration decides differently, independent of inner loops
   int solved = 0;
   Saving saving;
 };
 
-// Rewrites the body of a loop for its steady state, and finds where that lies.
+// Rewrites the body of a loop for its steady state, and finds the range of that state.
 class SteadyRewriter : public Rewriter {
  public:
   SteadyRewriter(const For& loop, const PartitionContext& outer, bool inside_lanes);
@@ -74,7 +75,7 @@ class SteadyRewriter : public Rewriter {
   Stmt rewrite(const Stmt& s) override;
 
  private:
-  // In the order of what wins.
+  // Ordered by precedence.
   enum class Mark : uint8_t { None, Decided, Likely };
 
   Expr rewrite_let(const Expr& e, const Let& n);
@@ -96,14 +97,16 @@ class SteadyRewriter : public Rewriter {
   const bool has_inner_loops_, has_costly_rows_, partitions_borders_;
   SteadyState steady_;
   std::unordered_set<std::string>
-      dependent_;  // the loop's variable, and those of inner loops that start from it
+      dependent_;  // the loop's variable, and those of inner loops whose minimum depends on it
   std::unordered_set<std::string> inner_serial_, lanes_, of_unknown_extent_;
-  std::unordered_set<std::string> decide_alone_;  // of these, what their own borders are
-  std::vector<std::string> enclosing_;            // inner serial loops around the place of the walk
+  std::unordered_set<std::string>
+      decide_alone_;                    // inner serial loops that partition on their own conditions
+  std::vector<std::string> enclosing_;  // inner serial loops around the current node
   std::unordered_map<std::string, int64_t> inner_extents_;  // constant ones
   std::unordered_map<std::string, Mark> marked_lets_;
   std::unordered_map<std::string, Expr> decided_lets_;
-  std::unordered_map<const ExprNode*, Mark> marks_;  // of nodes of the body, which outlives this
+  std::unordered_map<const ExprNode*, Mark>
+      marks_;  // by node of the body, which outlives this object
 };
 
 }  // namespace retrograde::lower

@@ -1,4 +1,4 @@
-// trim_loops -- a condition that holds in one stretch of a loop becomes the ends of the loop.
+// trim_loops -- turn conditions on a loop's variable into bounds of the loop.
 // In:  Loops or FlatStorage, before unrolling and vectorization; names unique.
 // Out: the same phase; the same stores in the same order; names unique.
 //
@@ -8,22 +8,19 @@
 //     }                                      }
 //   }
 //
-// and (x < 62) ends the loop over x in turn. Gathers over domains that are no boxes, and where() of
-// a user's RDom, look like this. A condition that is the same in all iterations goes around the
-// loop. What fills memory that each iteration has anew may stand before the condition: it is for
-// what stands under it. So the last tile of a split with a guard computes no more of its producers
-// than it needs.
+// In turn, (x < 62) bounds the loop over x. Gathers over non-rectangular domains, and where() of a user's RDom, look
+// like this. A loop-invariant condition moves around the loop. Statements before the condition are allowed if they
+// only fill memory that each iteration allocates, because only the guarded statement reads it. The last tile of a
+// split with a guard thus computes no more of its producers than it needs.
 //
-// Method: a loop is trimmed where all of its body stands under the condition (looking through lets,
-//         allocations, inner loops and further conditions without an else), but for what does
-//         nothing else than to fill those allocations. Each conjunct is brought into the
-//         form  c*v + rest >= 0  with a constant c, rest free of the loop's variable v and of
-//         what is bound inside the loop: then v >= -floor(rest / c), or v <= floor(rest / -c), says
-//         exactly the same, and the conjunct goes away. A conjunct without v and what is bound
-//         inside goes around the loop. Loops with a constant extent of a few iterations keep their
-//         ends: they are unrolled with their conditions.
-// Not done: ends that depend on the lane of an enclosing vectorized loop; several
-//           statements, each under a condition of its own.
+// Method: a loop is trimmed if the condition guards its whole body (looking through lets, allocations, inner loops and
+//         further conditions without an else), except for statements that only fill the allocations inside. Each
+//         conjunct is brought into the form  c*v + rest >= 0  with a constant c, and with a rest that mentions
+//         neither the loop's variable v nor names bound inside the loop. It is equivalent to v >= -floor(rest / c), or
+//         to v <= floor(rest / -c), and becomes a bound. A conjunct without v and names bound inside moves around the
+//         loop. Loops with a small constant extent keep their bounds: they are unrolled with their conditions.
+// Not done: bounds that depend on the lane of an enclosing vectorized loop; several statements, each under its own
+//           condition.
 // Source: folklore (loop bounds from guards). Tests: test/golden/lower/trim_loops/,
 // test/property/loop_passes_test.cpp.
 #include "lower/statement_passes.h"
@@ -45,7 +42,7 @@ namespace retrograde::lower {
 
 namespace {
 
-// Constant extents up to this one are left alone.
+// Loops with constant extents up to this one keep their bounds.
 constexpr int64_t untrimmed_iterations = 16;
 
 bool may_end_elsewhere(const For& loop) {
@@ -53,10 +50,10 @@ bool may_end_elsewhere(const For& loop) {
   return !extent || *extent > untrimmed_iterations;
 }
 
-// Takes conditions on one loop out of its body.
+// Removes conditions on one loop from its body.
 class Trimmer {
  public:
-  // `lanes`: names with a value of their own in each lane around the loop.
+  // `lanes`: names whose value differs between the lanes of a vectorized loop around.
   Trimmer(const For& loop, const std::unordered_set<std::string>& lanes)
       : loop_(loop), lanes_(lanes) {}
 
@@ -94,7 +91,7 @@ class Trimmer {
         [&](const StmtNode&) { return s; });
   }
 
-  // The loop with a trimmed body between its new ends.
+  // The loop with the trimmed body and its new bounds.
   Stmt assemble(const Stmt& body, FreshNames& fresh) const {
     Expr begin = loop_.min, end = binary(Kind::Add, loop_.min, loop_.extent);
     for (const Expr& e : begins_) begin = binary(Kind::Max, begin, e);
@@ -120,8 +117,8 @@ class Trimmer {
                         [&](const Stmt& child) { return child.same_as(body) ? trimmed : child; });
   }
 
-  // What cannot be known outside is not substituted: its value would grow with each let that reads
-  // the one before, and be walked as often.
+  // Lets whose value is not known outside are not expanded: the value would grow with each let that reads the one
+  // before, and would be walked as often.
   void note_let(const LetStmt& let) {
     if (reads_memory(let.value, MemoryReads::Functions) ||
         uses_any_variable(let.value, unusable_)) {
@@ -131,7 +128,7 @@ class Trimmer {
     }
   }
 
-  // The condition less the conjuncts that became ends or go around the loop.
+  // The condition without the conjuncts that became bounds or move around the loop.
   Expr without_ends(const Expr& condition) {
     if (condition.kind() == Kind::And) {
       const auto* both = condition.as<Binary>();
@@ -174,19 +171,19 @@ class Trimmer {
   }
 
   const For& loop_;
-  const std::unordered_set<std::string>& lanes_;  // of the whole program: not to be copied
-  std::unordered_set<std::string> unusable_;      // bound inside
-  std::unordered_set<std::string> own_;           // memory that each iteration has anew
+  const std::unordered_set<std::string>& lanes_;  // of the whole program, so kept by reference
+  std::unordered_set<std::string> unusable_;      // names bound inside
+  std::unordered_set<std::string> own_;           // allocations inside
   Substitution lets_;
-  std::vector<Expr> begins_, lasts_;  // the variable lies between them
-  std::vector<Expr> around_;          // without the variable
+  std::vector<Expr> begins_, lasts_;  // inclusive bounds of the variable
+  std::vector<Expr> around_;          // conditions without the variable
 };
 
 }  // namespace
 
 Stmt trim_loops(const Stmt& s) {
   FreshNames fresh(s);
-  std::unordered_set<std::string> lanes;  // names are unique: none is ever taken away
+  std::unordered_set<std::string> lanes;  // names are unique, so none is ever removed
   return rewrite_statements(s, [&](const Stmt& node, auto& all) {
     const auto* let = node.as<LetStmt>();
     if (let && uses_any_variable(let->value, lanes)) lanes.insert(let->name);

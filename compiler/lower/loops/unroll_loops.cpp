@@ -1,6 +1,6 @@
 // unroll_loops -- copy the body of every Unrolled loop once per iteration.
-// In:  any phase; names unique; extents of Unrolled loops are constants, or have constants above
-//      them: by what they are, or by the conditions around the loop.
+// In:  any phase; names unique; extents of Unrolled loops are constants, or have constant upper bounds that follow from
+//      their value or from the conditions around the loop.
 // Out: the same phase without Unrolled loops; the same stores in the same order; names unique.
 //
 //   unrolled for (x, a, 2) {          f[a] = g[a]
@@ -11,13 +11,13 @@
 //     f[x] = g[x]               =>    if (1 < min(n, 2)) f[a + 1] = g[a + 1]
 //   }
 //
-// HL_PERMIT_FAILED_UNROLL=1 in the environment makes a loop serial whose extent has no constant above
-// it; otherwise that is an error.
+// With HL_PERMIT_FAILED_UNROLL=1 in the environment, a loop whose extent has no constant upper bound becomes serial;
+// otherwise it is an error.
 //
-// Method: inner loops first; copies after the first get fresh names for everything that they bind.
-//         Of select(x == 0, .., select(x == 1, ..)) a copy has its own arm, which is looked up: n
-//         copies of a choice from n arms take n steps. Constants above extents: bounded_extents.h.
-// Not done: a limit on the size of the result: the user asked for the copies.
+// Method: inner loops first; copies after the first get fresh names for everything that they bind. In each copy,
+//         select(x == 0, .., select(x == 1, ..)) is replaced by its arm, found by table lookup (choice_arms.h).
+//         Upper bounds of extents: bounded_extents.h.
+// Not done: limiting the size of the result; the schedule requests the copies.
 // Source: folklore. Tests: test/golden/lower/unroll_loops/.
 #include "lower/statement_passes.h"
 
@@ -38,9 +38,9 @@ namespace retrograde::lower {
 
 namespace {
 
-constexpr int64_t most_guarded = 256;  // copies of a loop whose extent is not known
+constexpr int64_t most_guarded = 256;  // copies of a loop whose extent is unknown
 
-// As Halide: for schedules that hold for constant extents, tried on others.
+// As in Halide: lets schedules for constant extents compile for others.
 bool may_stay_loops() {
   const char* text = std::getenv("HL_PERMIT_FAILED_UNROLL");
   return text && std::string_view(text) == "1";

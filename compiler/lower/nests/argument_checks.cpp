@@ -5,6 +5,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/nests/buffer_constraints.h"
 #include "lower/nests/run_time_check.h"
 #include "lower/nests/schedule_checks.h"
 #include "lower/runtime_call.h"
@@ -38,7 +39,7 @@ class Checks {
     for (const LoweredArgument& arg : args_) {
       if (arg.is_buffer()) add_shape_checks(arg, shape_checks);
     }
-    Stmt body = make_block({query_or_run()});
+    Stmt body = make_block({emit_query_or_run()});
     body = make_lets(nests_.bounds, body);
     std::vector<Stmt> fact_checks;
     for (const LoweredArgument& arg : args_) {
@@ -61,8 +62,7 @@ class Checks {
   const bool has_device_;
   const Substitution actual_;
 
-  // Where a fact was promised, the code below uses the promise, and the check compares it with the
-  // ".actual" fact.
+  // Where a fact was promised, the code below uses the promise, and a check compares it with the ".actual" fact.
   Lets buffer_facts() const {
     Lets facts, promises;
     for (const LoweredArgument& arg : args_) {
@@ -86,24 +86,7 @@ class Checks {
     if (promised.defined()) promises.emplace_back(name, promised);
   }
 
-  // What the user promised; of a buffer that is named in the program: what it is. Dimension 0 is
-  // dense unless the user says otherwise.
-  static BufferConstraint constraint_of(const LoweredArgument& arg, int d) {
-    auto param = std::dynamic_pointer_cast<ParameterContents>(arg.symbol.lock());
-    BufferConstraint promised;
-    if (param && d < static_cast<int>(param->constraints.size())) promised = param->constraints[d];
-    if (d == 0 && !promised.stride.defined() && !promised.any_stride) promised.stride = 1;
-    if (param && param->is_literal && param->buffer) {
-      const halide_dimension_t& dim = param->buffer->dim[d];
-      promised.min = dim.min;
-      promised.extent = dim.extent;
-      promised.stride = dim.stride;
-    }
-    return promised;
-  }
-
-  // The promise in terms of what the buffers are: it may speak of facts that are promised, too, its
-  // own among them, as "a multiple of 8" does.
+  // The promise in terms of actual facts. It may mention promised facts, even its own, as "a multiple of 8" does.
   BufferConstraint promise_of(const LoweredArgument& arg, int d) const {
     BufferConstraint promised = constraint_of(arg, d);
     for (Expr* side : {&promised.min, &promised.extent, &promised.stride}) {
@@ -117,7 +100,7 @@ class Checks {
     for (const LoweredArgument& arg : args_) {
       for (int d = 0; arg.is_buffer() && d < arg.dimensions; d++) {
         const BufferConstraint promised = constraint_of(arg, d);
-        // A promise of a constant is that constant, also of a stride that is another (see
+        // A constant promise stands for the constant, also for a stride that actually differs (see
         // add_constraint_check).
         const auto add = [&](const char* what, const Expr& promise) {
           if (!promise.defined()) return;
@@ -132,26 +115,26 @@ class Checks {
     return names;
   }
 
-  // Calls a check of the runtime, which tells what is wrong and gives its code, 0 where nothing is.
-  static Stmt ask(const char* function, std::vector<Expr> args) {
+  // Calls a check of the runtime, which reports an error and returns its code, or 0.
+  static Stmt call_check(const char* function, std::vector<Expr> args) {
     return checked_call("code", call_runtime(function, std::move(args)));
   }
 
   static void add_shape_checks(const LoweredArgument& arg, std::vector<Stmt>& checks) {
-    checks.push_back(
-        ask(check_shape, {handle_of(arg.name), Expr(arg.name),
-                          Expr(static_cast<int32_t>(type_word(arg.type))), Expr(arg.dimensions)}));
+    checks.push_back(call_check(
+        check_shape, {handle_of(arg.name), Expr(arg.name),
+                      Expr(static_cast<int32_t>(type_word(arg.type))), Expr(arg.dimensions)}));
   }
 
-  // The runtime has seen to it already: the simplifier learns it, and no code is made.
-  static Stmt holds_already(const Expr& condition) {
+  // States what a runtime call has already checked: the simplifier uses it, and no code is generated.
+  static Stmt known_fact(const Expr& condition) {
     return make_assert(condition, call_op(Op::undef, Int(32), {}));
   }
 
   static void add_extent_facts(const LoweredArgument& arg, std::vector<Stmt>& checks) {
     for (int d = 0; d < arg.dimensions; d++) {
       const Expr extent = call_op(Op::buffer_extent, Int(32), {handle_of(arg.name), d});
-      checks.push_back(holds_already(extent >= 0));
+      checks.push_back(known_fact(extent >= 0));
     }
   }
 
@@ -173,7 +156,7 @@ class Checks {
     }
   }
 
-  // The box that a buffer must contain; undefined sides where nothing of it is used.
+  // The box that a buffer must contain; sides are undefined if nothing of it is used.
   Box required_box(const LoweredArgument& arg) const {
     if (arg.kind == LoweredArgument::Kind::OutputBuffer) {
       for (const LoopedFunc& f : program_.funcs) {
@@ -199,7 +182,7 @@ class Checks {
     }
   }
 
-  Stmt query_or_run() const {
+  Stmt emit_query_or_run() const {
     Expr any_query = const_false();
     std::vector<Stmt> answers, run;
     for (const LoweredArgument& arg : args_) {
@@ -212,7 +195,7 @@ class Checks {
       add_promise_checks(arg, box, run);
       add_constraint_checks(arg, run);
     }
-    return_if_nothing_is_asked(run);
+    return_if_outputs_are_empty(run);
     for (const LoweredArgument& arg : args_) {
       if (arg.is_buffer()) add_region_checks(arg, required_box(arg), run);
     }
@@ -222,19 +205,19 @@ class Checks {
     return make_if(any_query, make_block(answers), make_block(run));
   }
 
-  // Where every output is empty nothing runs, and what would be read does not matter: the box read by
-  // loops that do not run may lie anywhere, that of clamp(x, 0, extent - 1) at 0.
-  void return_if_nothing_is_asked(std::vector<Stmt>& checks) const {
-    Expr is_asked = const_false();
+  // Returns if every output is empty. The regions of inputs do not matter then: loops that do not run may appear to
+  // read any box, for example clamp(x, 0, extent - 1) reads 0.
+  void return_if_outputs_are_empty(std::vector<Stmt>& checks) const {
+    Expr has_output = const_false();
     for (const LoweredArgument& arg : args_) {
       if (arg.kind != LoweredArgument::Kind::OutputBuffer) continue;
       Expr has_elements = const_true();
       for (int d = 0; d < arg.dimensions; d++)
         has_elements = has_elements && variable(fact(arg.name, "extent", d)) > 0;
-      is_asked = is_asked || has_elements;
+      has_output = has_output || has_elements;
     }
-    is_asked = simplify(is_asked);
-    if (!is_const_true(is_asked)) checks.push_back(make_assert(is_asked, 0));
+    has_output = simplify(has_output);
+    if (!is_const_true(has_output)) checks.push_back(make_assert(has_output, 0));
   }
 
   void add_requirements(std::vector<Stmt>& checks) const {
@@ -248,8 +231,8 @@ class Checks {
     }
   }
 
-  // What is needed, but where the user promised what it is. A promise that speaks of the buffer
-  // itself means what is needed of it. Strides are those of a dense buffer.
+  // Answers a bounds query with the required region, except where the user promised the shape. A promise that mentions
+  // the buffer itself refers to the required region. Strides are those of a dense buffer.
   Stmt answer(const LoweredArgument& arg, const Box& box) const {
     Substitution needed;
     for (size_t d = 0; d < box.size(); d++) {
@@ -280,7 +263,7 @@ class Checks {
         {handle_of(arg.name), Expr(static_cast<int32_t>(box.size())), pack(std::move(sides))}));
   }
 
-  // A region that was promised must hold what is used: this is known before any buffer is.
+  // Checks that a promised region contains the used one, which can be done before looking at the buffer.
   void add_promise_checks(const LoweredArgument& arg, const Box& box,
                           std::vector<Stmt>& checks) const {
     auto param = std::dynamic_pointer_cast<ParameterContents>(arg.symbol.lock());
@@ -295,7 +278,7 @@ class Checks {
       if (is_const_true(holds)) continue;
       checks.push_back(run_time_check(
           holds, retrograde_error_constraints_make_required_region_smaller,
-          text("cannot run: what is promised of a buffer must hold what is used of it; ",
+          text("cannot run: a promised region must contain the region that is used; ",
                quoted(arg.name), " is used over ["),
           box[d].min, Expr(", "), box[d].max,
           text("] in dimension ", d,
@@ -307,14 +290,13 @@ class Checks {
     }
   }
 
-  // Where the data are, how far their elements lie apart, and that the buffer holds what is used: an
-  // empty buffer fits an empty box only by the numbers. Where the region is promised, the promise is
-  // what must hold it.
+  // Checks the memory, the density and the region of the buffer by a runtime call; an empty box is compared by its
+  // numbers. If the region is promised, the promise must contain it instead.
   void add_region_checks(const LoweredArgument& arg, const Box& box,
                          std::vector<Stmt>& checks) const {
     std::vector<Expr> sides;
     std::vector<Stmt> facts, of_promises;
-    int32_t dimensions = 0;  // a bit each
+    int32_t dimensions = 0;  // bit set of the dimensions to check
     for (size_t d = 0; d < box.size(); d++) {
       const int dimension = static_cast<int>(d);
       const Expr min = variable(fact(arg.name, "min", dimension)),
@@ -329,9 +311,9 @@ class Checks {
       dimensions |= 1 << d;
       sides.push_back(cast(Int(32), box[d].min));
       sides.push_back(cast(Int(32), box[d].max));
-      facts.push_back(holds_already(inside));
+      facts.push_back(known_fact(inside));
     }
-    checks.push_back(ask(
+    checks.push_back(call_check(
         check_region, {handle_of(arg.name), Expr(arg.name), Expr(region_rules(arg)),
                        Expr(promised_alignment(arg)), Expr(dimensions), pack(std::move(sides))}));
     checks.insert(checks.end(), facts.begin(), facts.end());
@@ -344,16 +326,6 @@ class Checks {
            (is_dense(arg) ? retrograde_region_is_dense : 0) |
            (has_device_ ? retrograde_region_on_device : 0);
   }
-  // As buffers are unless someone says otherwise.
-  static bool is_dense(const LoweredArgument& arg) {
-    return arg.dimensions > 0 && is_const_int(constraint_of(arg, 0).stride, 1);
-  }
-
-  static int32_t promised_alignment(const LoweredArgument& arg) {
-    const auto param = std::dynamic_pointer_cast<ParameterContents>(arg.symbol.lock());
-    return param && param->host_alignment > arg.type.bytes() ? param->host_alignment : 1;
-  }
-
   static Stmt box_check(const LoweredArgument& arg, const Interval& used, int d,
                         const Expr& inside) {
     const char* verb = arg.kind == LoweredArgument::Kind::OutputBuffer ? "written" : "read";
@@ -381,8 +353,8 @@ class Checks {
     return variable(fact(arg.name, what, d) + ".actual");
   }
 
-  // Then its stride leads to no other element, and may be anything: libraries of arrays leave it as it
-  // comes.
+  // Whether the stride is irrelevant because there is at most one element. Array libraries set such strides
+  // arbitrarily.
   Expr has_one_element_at_most(const LoweredArgument& arg, int d) const {
     return variable(fact(arg.name, "extent", d)) <= 1;
   }

@@ -1,17 +1,17 @@
-// argument_checks -- what a generated function checks of its arguments before it runs, and how it
-// answers a bounds query.
+// argument_checks -- check the arguments of a generated function before it runs, and answer bounds queries.
 //
-// In:  the loop nests, with the boxes they read of inputs and touch of outputs.
-// Out: the same inside the checks. In this order: buffers are not null, have the element type and
-//      dimensions, sane extents; scalars are in their range; then, when any buffer is a query (host
-//      null), every query gets the box that it must have and the function returns; else every
-//      promise (strides, bounds) holds; when every output is empty the function returns; and every
-//      buffer has memory, is dense and has its box. Messages name the buffer, the dimension and both
-//      boxes.
+// In:  the loop nests, with the boxes that they read of inputs and access of outputs.
+// Out: the loop nests inside the checks, in this order:
+//      - buffers are not null and have the right element type, dimensions and sane extents; scalars are in range;
+//      - if any buffer is a bounds query (null host pointer), every query receives its required box and the function
+//        returns;
+//      - every promise (strides, bounds) holds;
+//      - if every output is empty, the function returns;
+//      - every buffer has memory, is dense and contains its required box.
+//      Messages name the buffer, the dimension and both boxes.
 //
-// What is checked of every buffer is two calls of the runtime (runtime/buffer.cpp): as code of its
-// own it took longer to compile than a small kernel. The simplifier still learns what they make
-// sure of, from Asserts that are no code.
+// The checks of every buffer are two calls of the runtime (runtime/buffer.cpp), because inline checks took longer to
+// compile than a small kernel. Asserts that generate no code tell the simplifier what these calls guarantee.
 #pragma once
 
 #include "ir/lowered_function.h"
@@ -19,11 +19,11 @@
 
 namespace retrograde::lower {
 
-// `has_device`: data may lie on a device alone.
+// `has_device`: data may be in device memory only.
 Stmt add_argument_checks(const LoopNests& nests, const std::vector<LoweredArgument>& args,
                          const Program& program, bool has_device);
 
-// Whether the statement does nothing but ask the runtime for such a check and leave when it fails.
+// Whether the statement is such a call of the runtime, which returns from the function if the check fails.
 bool is_check_by_runtime(const Stmt& s);
 
 }  // namespace retrograde::lower

@@ -27,7 +27,7 @@ Range ComputePlace::bind(const std::string& name, Interval& range) {
 
 namespace {
 
-// An end of what an iteration computes: that of what it touches, where there is no choice.
+// The range of an end within one iteration: a single point if the part has no choice between iterations.
 Interval end_of_part(const Expr& end, const Expr& touched_end, const Interval& touched) {
   return end.same_as(touched_end) ? Interval::point(end) : touched;
 }

@@ -1,10 +1,9 @@
-// compute_place.h -- the place inside a loop where Funcs are computed together, and what is known there of
-// the regions that were given names.
+// compute_place.h -- a place inside a loop where Funcs are computed, with the names that are bound there and their
+// values.
 //
-// A Func that slides over a loop computes only a part of what an iteration needs. Code at the site
-// speaks of the part by name ("f.s0.y.min"); what is allocated and computed further out must know
-// the whole. So a name of a part stands for an interval: all that it covers in the end, or all that
-// one iteration touches.
+// A Func that slides over a loop computes only a part of the region that an iteration needs. Code at the place refers
+// to the part by name ("f.s0.y.min"). Code further out needs the complete region, so the name of a part stands for an
+// interval: either all values it takes in the end, or the values within one iteration.
 #pragma once
 
 #include <string>
@@ -21,33 +20,33 @@ class ComputePlace {
  public:
   explicit ComputePlace(std::vector<Loop> around) : around(std::move(around)) {}
 
-  const std::vector<Loop> around;  // loops of the consumer, innermost first; none at root
-  Lets bindings;                   // to be bound around the site, each may use those before it
+  const std::vector<Loop> around;  // loops of the consumer, innermost first; empty at root
+  Lets bindings;                   // to be bound around the place; each may use those before it
 
-  // Gives the range a name where it is no name or constant yet, and the range in terms of it.
+  // Binds names to the ends of the range, unless they are names or constants, and expresses the range in terms of them.
   Range bind(const std::string& name, Interval& range);
-  // The same for what a slide computes; always named.
+  // The same for the part that a slide computes; its ends always get names.
   Range bind_part(const std::string& name, const Slide& slide, Interval& range);
 
-  // A name that is bound already, for an end of a part.
+  // Registers a name that is already bound as an end of a part.
   void bind_part(const std::string& name, const Interval& whole) {
     note_part(variable(name), whole, whole);
   }
 
-  // Boxes in terms of what lies around the site.
+  // The box in terms of names outside of the place: over all iterations, or within one iteration.
   Box whole(const Box& box) { return expand(box, whole_); }
   Box touched(const Box& box) { return expand(box, touched_); }
-  // Whether an end depends on what a Func that slides computes, if that may be nothing.
+  // Whether an end depends on a part of a sliding Func that may be empty.
   bool mentions_parts(const Interval& side) const;
   bool has_names() const { return !bindings.empty(); }
-  // The same value without names that stand for one.
+  // The expression with names of single values replaced by their values.
   Expr without_names(const Expr& e);
 
  private:
-  Substitution values_;  // of names that stand for one value, in terms of parts and outer names
-  size_t known_ = 0;     // bindings that values_ has
-  std::vector<std::string> parts_,
-      varying_parts_;  // names of ends; those of parts whose extent varies
+  Substitution values_;  // of names with a single value, in terms of parts and outer names
+  size_t known_ = 0;     // number of bindings that values_ contains
+  std::vector<std::string> parts_;          // names of ends
+  std::vector<std::string> varying_parts_;  // names of ends of parts whose extent varies
   Scope<Interval> whole_, touched_;
 
   Expr name(const std::string& name, const Expr& value, bool always);

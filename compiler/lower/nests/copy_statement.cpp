@@ -9,7 +9,7 @@ namespace retrograde::lower {
 
 namespace {
 
-// Without the number of a copy.
+// The name without the number of a copy.
 std::string original_name(const std::string& name) {
   size_t mark = name.rfind(".$");
   bool is_copy = mark != std::string::npos && mark + 2 < name.size() &&
@@ -37,7 +37,7 @@ void for_each_name(const Stmt& s, Found found) {
       });
 }
 
-// One flat map of new names suffices, since names are unique.
+// Renames all bindings. One flat map of new names suffices, since names are unique.
 class Copier : public Rewriter {
  public:
   Copier(const Stmt& s, FreshNames& fresh, const Substitution& values) : values_(values) {

@@ -1,6 +1,5 @@
-// Copies of statements, for passes that run one body several times: names stay unique because every
-// copy binds names of its own. Fresh names depend on the program alone, so that passes are
-// deterministic.
+// Copies statements for passes that run a body several times. Names stay unique because every copy binds fresh names.
+// Fresh names depend on the program alone, so that passes are deterministic.
 #pragma once
 
 #include <string>
@@ -13,8 +12,7 @@
 
 namespace retrograde::lower {
 
-// Makes names that occur nowhere in a statement: "f.s0.x" and "f.s0.x.$1" give "f.s0.x.$2",
-// "f.s0.x.$3", ...
+// Generates names that occur nowhere in a statement: "f.s0.x" and "f.s0.x.$1" give "f.s0.x.$2", "f.s0.x.$3", ...
 class FreshNames {
  public:
   explicit FreshNames(Stmt s) : program_(std::move(s)) {}
@@ -22,7 +20,8 @@ class FreshNames {
 
  private:
   void read_program();
-  Stmt program_;  // until the first name is asked for: most programs leave most passes as they are
+  Stmt
+      program_;  // read when the first name is requested: most passes leave most programs unchanged
   std::unordered_set<std::string> taken_;
   std::unordered_map<std::string, int> next_;
 };
@@ -31,13 +30,13 @@ class FreshNames {
 // replaced by a fresh one.
 Stmt copy_statement(const Stmt& s, FreshNames& fresh, const Substitution& values = {});
 
-// The user's words for a loop: "f.s1.x" is the loop over "x" in stage 1 of "f".
+// The parts of a loop's name as the user knows them: "f.s1.x" is the loop over "x" in stage 1 of "f".
 struct LoopName {
   std::string func, stage, var;
 };
-// A copy's number is left out.
+// Ignores the number of a copy.
 LoopName decode_loop_name(const std::string& loop);
-// `"x" of "f"`, with the stage when it is an update.
+// `"x" of "f"`, with the number of the update if the stage is one.
 std::string describe_loop(const std::string& loop);
 
 }  // namespace retrograde::lower

@@ -1,4 +1,4 @@
-// Funcs that are computed at one place: consumers first, each group of Funcs that share loops once.
+// Emits the Funcs computed at one place: consumers first, each group of Funcs that share loops once.
 #include <algorithm>
 
 #include "ir/build.h"
@@ -12,7 +12,7 @@
 
 namespace retrograde::lower {
 
-// A Func whose values nothing reads here is not computed, also when others run with it elsewhere.
+// The Funcs of the group that are read here. Others are not computed here, even if they run with the group elsewhere.
 std::vector<int> NestEmitter::needed_of(const FusedGroup& group, const Emitted& code) const {
   return filtered(group.funcs, [&](const int f) {
     return program_.funcs[f].is_output || code.uses.count(program_.funcs[f].name());
@@ -27,7 +27,7 @@ Emitted NestEmitter::emit_place(const std::vector<int>& children, Emitted code,
   for (const auto& [name, use] : code.uses) wanted[name] = {};
   for (auto it = children.rbegin(); it != children.rend(); ++it) {
     const FusedGroup& group = groups_[group_of_[*it]];
-    if (*it != group.funcs.back()) continue;  // the group is dealt with as a whole
+    if (*it != group.funcs.back()) continue;  // emits each group once
     const std::vector<int> needed = needed_of(group, code);
     if (needed.empty()) continue;
     const bool is_whole = needed.size() == group.funcs.size();
@@ -40,7 +40,7 @@ Emitted NestEmitter::emit_place(const std::vector<int>& children, Emitted code,
 
 namespace {
 
-// What starts later than the loop around does.
+// The statement, guarded if it starts later than the loop around.
 Stmt running_from(int lead, const Stmt& stmt, const Emitted& code, const ComputePlace& site) {
   if (lead == code.lead || !stmt.defined()) return stmt;
   const Loop& loop = site.around[0];
@@ -98,14 +98,14 @@ int slide_lead(const std::vector<Slide>& slides, int lead, const ComputePlace& s
   return lead;
 }
 
-// Bounds the region of a Func that does not slide over the loop around, beside Funcs that do.
+// Restricts the region of a Func that does not slide over the loop around, beside Funcs that do.
 //
-// Iterations before the loop's first run for sliding consumers only, which compute parts of what the first iteration
-// needs. So the Func computes there what the first iteration needs: the coordinates of other consumers lie outside
-// all that is ever required. A part may be empty; its ends then lie one element outside its iteration's region.
-// Regions that follow from them are clamped to those of the whole, since storage and inputs hold no more. Loops that
-// run beyond a small region, as tiles that are moved inwards, run over the whole: what they read beyond a part would
-// lie outside it.
+// Iterations before the loop's first run only for sliding consumers, which compute parts of the first iteration's
+// region. In these iterations the Func computes the first iteration's region, because coordinates of other consumers
+// lie outside of every required region. A part may be empty; its ends then lie one element outside of its iteration's
+// region. Regions derived from such ends are clamped to the complete region, since storage and inputs hold no more.
+// Loops that run beyond a small region, such as tiles shifted inwards, run over the complete region: their reads
+// beyond a part would lie outside of it.
 void keep_inside_needs(const LoopedFunc& f, Box& required, const std::vector<Slide>& slides,
                        bool is_early, ComputePlace& site) {
   const Loop& loop = site.around[0];
@@ -117,7 +117,7 @@ void keep_inside_needs(const LoopedFunc& f, Box& required, const std::vector<Sli
     if (slides_over_it) continue;
     Interval& side = required[d];
     const bool may_be_empty = site.mentions_parts(side);
-    if (is_early) {  // names that others gave speak of their own iterations, too
+    if (is_early) {  // names bound by other Funcs also refer to their own iterations
       side = held_from_first({site.without_names(side.min), site.without_names(side.max)}, loop);
     }
     if (!may_be_empty) continue;
@@ -130,8 +130,8 @@ void keep_inside_needs(const LoopedFunc& f, Box& required, const std::vector<Sli
 
 }  // namespace
 
-// Funcs that share loops begin in the same iteration of the loop around: in the first in which any
-// of them must. What that gives to one may let another one begin earlier still.
+// Funcs that share loops begin in the same iteration of the loop around, the earliest that any of them needs. A Func
+// that begins earlier may in turn need another to begin earlier still, hence the rounds.
 NestEmitter::Wanted NestEmitter::slide_together(std::vector<Member>& members,
                                                 const WantedFuncs& wanted,
                                                 ComputePlace& site) const {
@@ -150,7 +150,7 @@ NestEmitter::Wanted NestEmitter::slide_together(std::vector<Member>& members,
       if (!member.loops.empty() && !is_last_round)
         member.slides =
             slides_of(*member.f, site.whole(member.need), member.loops, site.around, lead);
-      // The first stage, run beyond the region, would overwrite finished elements with their initial values.
+      // Beyond the region, the first stage would overwrite finished elements with their initial values.
       if (member.f->stages.size() > 1 && keeps_beside_its_regions(member, site))
         member.slides.clear();
       all.first = std::max(all.first, slide_lead(member.slides, lead, site));
@@ -160,13 +160,13 @@ NestEmitter::Wanted NestEmitter::slide_together(std::vector<Member>& members,
   return all;
 }
 
-// Whether a Func may be computed of values that do not count, where its own do not.
-static bool may_be_partly_right(const LoopedFunc& f, const ValueBounds& values) {
+// Whether a Func may be computed from undefined values where its own values do not matter.
+static bool may_have_wrong_values(const LoopedFunc& f, const ValueBounds& values) {
   return !f.func->is_extern() && f.stages.size() == 1 && is_stored_where_computed(f) &&
-         !f.schedule.memoized && !f.schedule.async && takes_any_values(f.stages[0], values);
+         !f.schedule.memoized && !f.schedule.async && tolerates_any_values(f.stages[0], values);
 }
 
-// Computes a group: takes it out of what `code` uses, and adds what the group itself needs.
+// Computes a group: removes it from the uses of `code`, and adds the needs of the group itself.
 NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& code,
                                            WantedFuncs& wanted, ComputePlace& site) {
   Piece piece;
@@ -187,33 +187,33 @@ NestEmitter::Piece NestEmitter::emit_piece(const FusedGroup& group, Emitted& cod
       keep_inside_needs(*member.f, member.need, member.slides, want.first > 0, site);
   }
   for (Member& member : members) member.required = member.need;
-  Emitted made = emit_members(group, members, site, std::move(checks));
-  std::map<std::string, Box> allocated = std::move(made.storage);
-  made.storage.clear();
+  Emitted generated = emit_members(group, members, site, std::move(checks));
+  std::map<std::string, Box> allocated = std::move(generated.storage);
+  generated.storage.clear();
   for (Member& member : members) {
     auto own = allocated.extract(member.f->name());
     member.need = hull(own.mapped(), member.touched);
   }
-  made.storage = std::move(allocated);
-  for (const auto& [name, use] : made.uses) {
+  generated.storage = std::move(allocated);
+  for (const auto& [name, use] : generated.uses) {
     auto [it, is_first] = wanted.emplace(name, Wanted{piece.lead, piece.lead});
     if (is_first || !code.uses.count(name)) it->second = {piece.lead, piece.lead};
     it->second.first = std::max(it->second.first, piece.lead);
     it->second.last = std::min(it->second.last, piece.lead);
   }
   for (const Member& member : members) {
-    code.overrun.counts |= !may_be_partly_right(*member.f, values_);
+    code.overrun.counts |= !may_have_wrong_values(*member.f, values_);
     code.overrun.inside.push_back(member.f);
   }
-  merge_code(code, made);
+  merge_code(code, generated);
   if (site.around.empty()) ask_wholes(code, site);
-  for (Member& member : members) keep(member, member.need, code, made, piece, site);
-  piece.produce = members.size() == 1 ? unless_empty(members[0], made.stmt) : made.stmt;
+  for (Member& member : members) keep(member, member.need, code, generated, piece, site);
+  piece.produce = members.size() == 1 ? unless_empty(members[0], generated.stmt) : generated.stmt;
   return piece;
 }
 
-// Skips the loops of a Func while its part is empty, if other Funcs are computed inside these loops. Their regions
-// follow from the ends of the part, which enclose nothing then.
+// Skips the loops of a Func while its part is empty, if other Funcs are computed inside these loops: their regions
+// follow from the ends of the part, which are reversed then.
 Stmt NestEmitter::unless_empty(const Member& member, const Stmt& stmt) const {
   const bool has_children = std::any_of(at_.begin(), at_.end(), [&](const auto& entry) {
     return entry.first.first == member.f->name();
@@ -230,17 +230,17 @@ Stmt NestEmitter::unless_empty(const Member& member, const Stmt& stmt) const {
   return has_children && !is_const_true(has_elements) ? make_if(has_elements, stmt) : stmt;
 }
 
-// Finds storage for what was computed of a Func.
-void NestEmitter::keep(Member& member, Box allocated, Emitted& code, Emitted& made, Piece& piece,
-                       ComputePlace& site) {
+// Decides on the storage of a computed Func.
+void NestEmitter::keep(Member& member, Box allocated, Emitted& code, Emitted& generated,
+                       Piece& piece, ComputePlace& site) {
   const LoopedFunc& f = *member.f;
   if (f.is_output) {
     outputs_[f.name()] = allocated;
     return;
   }
   Box touched = hull(member.required, allocated);
-  made.stmt =
-      storage_.fold(f, touched, member.loops, member.slides, code.has_vectors, site, made.stmt);
+  generated.stmt = storage_.fold(f, touched, member.loops, member.slides, code.has_vectors, site,
+                                 generated.stmt);
   if (f.schedule.async && !member.loops.empty())
     storage_.note_async_room(f, member.loops, member.slides, site.touched(touched));
   if (is_stored_where_computed(f)) {
@@ -253,7 +253,7 @@ void NestEmitter::keep(Member& member, Box allocated, Emitted& code, Emitted& ma
 
 Box NestEmitter::output_box(const LoopedFunc& f, const Box& read) {
   check_storage_of_output(f);
-  outputs_[f.name()] = read;  // what others read of it must lie inside, too
+  outputs_[f.name()] = read;  // consumers' reads must lie inside, too
   return buffer_box(value_buffer_name(*f.func, 0), f.func->dimensions());
 }
 

@@ -21,8 +21,8 @@ bool is_comparison(const Expr& e) {
   return kind == Kind::LT || kind == Kind::LE || kind == Kind::GT || kind == Kind::GE;
 }
 
-// A domain's condition that its vectorized loop decides would mask all iterations of the loops
-// around it. Marked likely, it masks only those that reach over the domain's end.
+// A condition of the domain that depends on vector lanes would mask all iterations of the loops around. Marked likely,
+// it masks only those that reach beyond the domain's end.
 Expr likely_in_lanes(const Expr& condition, const StageNest& nest) {
   std::unordered_set<std::string> lanes;
   for (const Loop& loop : nest.loops) {
@@ -62,9 +62,9 @@ Stmt emit_point(const LoopedFunc& f, const Definition& definition, const StageNe
 
 // ---- several points at once ----
 
-// What an iteration does at one of its points.
+// The update of one point in an iteration of an update of several points.
 struct PointUpdate {
-  Expr condition;  // of this point alone; undefined: always
+  Expr condition;  // of this point only; undefined: always
   std::vector<Expr> values, args;
 };
 
@@ -72,21 +72,21 @@ Expr simplified_at(const Expr& e, const Substitution& point) {
   return e.defined() ? simplify(substitute(e, point)) : e;
 }
 
-// Whether a value or place must be computed before anything is stored.
+// Whether a value or coordinate must be computed before anything is stored.
 bool reads_func(const Expr& e, const std::string& func) {
   return any_node(
       e, [&](const Call& call) { return call.call_type == CallType::Func && call.name == func; });
 }
 
-// Everything that is read of the Func gets a name before the stores of all points:
+// Binds all reads of the Func to names before the stores of all points:
 //
 //   f(scatter(a, b)) = f(gather(b, a))   =>   let v0 = f(b)
 //                                             let v1 = f(a)
 //                                             f(a) = v0
 //                                             f(b) = v1
 //
-// What holds for all points stands around all of it; of a point with a condition of its own,
-// nothing is read where that fails.
+// The part of the predicate that all points share guards the whole statement. A point with a condition of its own reads
+// nothing where that condition fails.
 class PointsEmitter {
  public:
   PointsEmitter(const LoopedFunc& f, int stage, const StageNest& nest)
@@ -191,13 +191,13 @@ Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& ne
   const auto add_all = [&](const std::function<Expr(const Expr&)>& here) {
     const Expr predicate = definition.predicate.defined() ? here(definition.predicate) : Expr();
     auto add = [&](const Expr& e) { merge_footprints(uses, footprints(e, point, &values)); };
-    // Where the predicate is false nothing is read or written.
+    // Where the predicate is false, nothing is read or written.
     auto add_guarded = [&](const Expr& e) {
       bool guarded = predicate.defined() && !e.type().is_handle() && !is_undef(e);
       add(guarded ? call_op(Op::if_then_else, e.type(), {predicate, e, make_zero(e.type())}) : e);
     };
     for (const Expr& value : definition.values) add_guarded(here(value));
-    // What is written is a box like what is read; the type is of no matter.
+    // The written box is found like a read one; the type does not matter.
     add_guarded(call_func(f.name(), Int(32), mapped(definition.args, here), 0, SymbolRef(f.func)));
     if (predicate.defined()) add(predicate);
   };
@@ -210,8 +210,8 @@ Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& ne
 
 namespace {
 
-// A coordinate that any values leave inside of a table: lut(clamp(f(x), 0, 255)). The table must have
-// all of it, too: it has less where f is known to have values of its own.
+// Whether a coordinate stays inside a table for arbitrary values, as in lut(clamp(f(x), 0, 255)). All of the table must
+// be required anyway; known bounds of f may restrict the required part.
 bool is_within_constants(const Expr& coordinate, const ValueBounds& values) {
   const Interval any = bounds_of(coordinate, Scope<Interval>());
   if (!any.is_bounded()) return false;
@@ -236,7 +236,7 @@ bool may_do_harm(const Call& call, const ValueBounds& values) {
 
 }  // namespace
 
-bool takes_any_values(const Definition& definition, const ValueBounds& values) {
+bool tolerates_any_values(const Definition& definition, const ValueBounds& values) {
   return !definition.predicate.defined() &&
          !any_node(definition, [&](const Call& call) { return may_do_harm(call, values); });
 }

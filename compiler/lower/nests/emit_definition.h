@@ -1,10 +1,9 @@
-// emit_definition -- the innermost statement of a stage, and what it reads.
+// emit_definition -- build the innermost statement of a stage, and find the regions that it accesses.
 //
 //   f(x) = select(p, a * a, 0), a = g(x) + 1      let t = g(f.s0.x) + 1
 //                                            =>   f(f.s0.x) = select(p, t * t, 0)
 //
-// Shared sub-expressions become lets, so that from here on expressions are trees whose size is that
-// of the DAG.
+// Shared sub-expressions become lets, so that expressions are trees from here on, of the same size as the DAG.
 #pragma once
 
 #include <string>
@@ -14,23 +13,23 @@
 
 namespace retrograde::lower {
 
-// if (guards && predicate) { lets; Provide }. Of an update at several points at once the lets hold
-// all that is read of f, and a Provide follows for each point.
+// if (guards && predicate) { lets; Provide }. For an update of several points at once, the lets hold all values read
+// of f, and a Provide follows for each point.
 Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest);
 
-// Boxes that one point of the loops reads of other Funcs, images and (in updates) of f, and that it
-// writes of f. `values`: between what values Funcs lie, for those that are coordinates here.
+// The boxes that one point of the loops reads of other Funcs, images and (in updates) of f, and the box that it writes
+// of f. `values`: bounds of the values of Funcs that are used as coordinates.
 Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest,
                              const ValueBounds& values);
 
-// Whether any values may stand for those that a first definition reads, as far as its own do not
-// count: they are no coordinates, unless clamped, and have no effects.
-bool takes_any_values(const Definition& definition, const ValueBounds& values);
-// What a first definition reads at the points of its domain.
+// Whether garbage in the values that a first definition reads is harmless as long as its results are unused: they are
+// not used as unclamped coordinates and have no effects.
+bool tolerates_any_values(const Definition& definition, const ValueBounds& values);
+// The boxes that a first definition reads at the points of its domain.
 Requirements read_inside(const LoopedFunc& f, const Domain& domain, const ValueBounds& values);
 
-// Whether no point passes the predicate, by the same analysis: what the stage reads is then not
-// computed anywhere.
+// Whether the same analysis shows that the predicate holds nowhere; the regions that the stage reads are then not
+// computed.
 bool never_stores(const LoopedFunc& f, int stage, const Requirements& uses);
 
 }  // namespace retrograde::lower

@@ -1,5 +1,5 @@
-// The stages of a group: their regions, last nest first, and the loops of each nest, from the
-// innermost body of every stage up to the place where the group is computed.
+// Emits the stages of a group: their regions, last nest first, and the loops of each nest, from the innermost body of
+// every stage up to the place where the group is computed.
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -9,7 +9,6 @@
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/nests/emit_definition.h"
-#include "lower/nests/extern_stage.h"
 #include "lower/nests/nest_checks.h"
 #include "lower/nests/nest_emitter.h"
 #include "lower/nests/shared_loops.h"
@@ -28,7 +27,7 @@ void bind_reductions(const LoopedFunc& f, int s, Domain& domain, ComputePlace& s
   }
 }
 
-// Names the region of a stage, and gives it in terms of the names. `need` becomes the same.
+// Binds names to the region of a stage, and returns the region in terms of the names; `need` is updated likewise.
 Domain bind_domain(const LoopedFunc& f, int s, Box& need, const std::vector<Slide>& slides,
                    ComputePlace& site) {
   Domain domain;
@@ -43,7 +42,7 @@ Domain bind_domain(const LoopedFunc& f, int s, Box& need, const std::vector<Slid
   return domain;
 }
 
-// Of a stage that a later one of its Func shares loops with.
+// The domain of a stage that shares loops with a later stage of its Func.
 Domain domain_of_earlier(const LoopedFunc& f, int s, const Domain& later, ComputePlace& site) {
   Domain domain;
   for (const std::string& arg : f.func->args) domain[arg] = later.at(arg);
@@ -53,8 +52,8 @@ Domain domain_of_earlier(const LoopedFunc& f, int s, const Domain& later, Comput
 
 }  // namespace
 
-// Whether what the loops of a Func compute beyond its region along a dimension may be what it keeps for later
-// iterations. Where the region is the same for as long as the storage lasts, nothing beyond it is ever read.
+// Whether values that a Func's loops compute beyond its region along a dimension may overwrite values kept for later
+// iterations. If the region stays the same during the lifetime of the storage, nothing beyond it is ever read.
 bool NestEmitter::keeps_beside_its_region(const Member& member, size_t dimension,
                                           ComputePlace& site) {
   if (member.slides.empty()) return false;
@@ -72,8 +71,8 @@ bool NestEmitter::keeps_beside_its_regions(const Member& member, ComputePlace& s
   return false;
 }
 
-// The points whose values may be read: those of the domain, and along a dimension in which values beside the region
-// are kept, all that the loops run over. None where that is not known.
+// The points whose values may be read: those of the domain, extended to the range of the loops in dimensions in which
+// values beside the region are kept. nullopt if unknown.
 std::optional<Domain> NestEmitter::counted_points(const NestStage& stage, const Member& member,
                                                   ComputePlace& site) {
   Domain result = stage.domain;
@@ -105,8 +104,8 @@ Emitted NestEmitter::emit_members(const FusedGroup& group, std::vector<Member>& 
     return members[it - group.funcs.begin()];
   };
   for (size_t n = group.nests.size(); n-- > 0;) {
-    // Of one Func the last first: what slides is a part for the stages before it, too, and those that
-    // share its loops run over the same region, by the same names.
+    // The last stage of a Func comes first: the part that slides also applies to earlier stages, and stages that share
+    // its loops run over the same region, with the same names.
     const std::vector<FusedStage>& fused = group.nests[n].stages;
     std::vector<NestStage> stages(fused.size());
     std::map<int, Domain> bound;  // by Func
@@ -147,9 +146,9 @@ Emitted NestEmitter::emit_members(const FusedGroup& group, std::vector<Member>& 
   return result;
 }
 
-// Outside of its loops, a nest needs what the points that count need: what they read themselves,
-// and what these need of the Funcs computed in the loops. What loops that leave the domains read
-// beyond that must be there, and no more.
+// Computes the needs of a nest outside of its loops. Only points whose values matter count: their own reads, and the
+// needs that follow for the Funcs computed in the loops. For reads beyond that, by loops that leave their domains,
+// storage must exist, but the values do not matter.
 void NestEmitter::leave_overrun(const std::vector<NestStage>& stages, Emitted& code) const {
   const Overrun& overrun = code.overrun;
   if (!std::exchange(code.overrun.leaves_domain, false) || overrun.counts) return;
@@ -176,13 +175,13 @@ void NestEmitter::leave_overrun(const std::vector<NestStage>& stages, Emitted& c
   }
 }
 
-// What an update reads of its own Func, the stages before it compute.
+// Adds the reads of an update from its own Func to the region that earlier stages compute.
 void NestEmitter::widen_by_own_reads(Member& member, Emitted& code) const {
   const auto self = code.uses.find(member.f->name());
   if (self == code.uses.end()) return;
   Box wider = hull(member.need, self->second.box);
-  // Along a slide every stage stays inside of the part, and must: of a part that is empty a
-  // hull would have one end, where an earlier stage alone would run again.
+  // Along a slide every stage must stay inside of the part. For an empty part, the hull would mix ends of two
+  // regions, and an earlier stage alone would run again.
   for (const Slide& slide : member.slides) wider[slide.dimension] = member.need[slide.dimension];
   member.need = std::move(wider);
   check_bounded(program_, *member.f, member.need);
@@ -191,113 +190,7 @@ void NestEmitter::widen_by_own_reads(Member& member, Emitted& code) const {
 
 namespace {
 
-// An extern stage's loops around the calls, and the region of a call inside of them.
-struct ExternLoops {
-  std::vector<Loop> loops;  // innermost first
-  Box slice;
-  Expr has_points;
-};
-
-ExternLoops extern_loops(const LoopedFunc& f, const Domain& domain) {
-  ExternLoops result;
-  StageNest nest = build_stage_nest(f, 0, domain);
-  Scope<Interval> in_call;
-  for (size_t i = 0; i < nest.loops.size(); i++) {
-    const Loop& loop = nest.loops[i];
-    if (f.stages[0].schedule.dims[i].is_in_call)
-      in_call.push(loop.name, loop.range());
-    else
-      result.loops.push_back(loop);
-  }
-  std::vector<Expr> conditions;
-  for (const std::string& arg : f.func->args) {
-    const Range& all = domain.at(arg);
-    const Interval slice = bounds_of(nest.guarded_coordinate.at(arg), in_call);
-    result.slice.push_back(
-        {simplify(max(slice.min, all.min)), simplify(min(slice.max, all.min + all.extent - 1))});
-    conditions.push_back(result.slice.back().min <= result.slice.back().max);
-  }
-  result.has_points = simplify(conjunction(conditions));
-  return result;
-}
-
-Box box_of(const LoopedFunc& f, const Domain& domain) {
-  return mapped(f.func->args, [&](const std::string& arg) {
-    const Range& range = domain.at(arg);
-    return Interval{range.min, range.min + range.extent - 1};
-  });
-}
-
-}  // namespace
-
-// Without loops of its own: the C function computes all at once, and may compute more than that.
-Emitted NestEmitter::emit_extern(Member& member, const Domain& domain, ComputePlace& site) {
-  const LoopedFunc& f = *member.f;
-  ExternLoops nest = extern_loops(f, domain);
-  if (!nest.loops.empty())
-    return emit_extern_loops(f, nest.loops, nest.slice, nest.has_points, site);
-  const bool in_loops = !site.around.empty();
-  Box computed;
-  Emitted code = emit_extern_call(f, {box_of(f, domain), in_loops, false}, site, computed);
-  member.need = computed;
-  return code;
-}
-
-Emitted NestEmitter::emit_extern_call(const LoopedFunc& f, const ExternCall& call,
-                                      ComputePlace& site, Box& computed) const {
-  ExternStage stage = emit_extern_stage(program_, f, call);
-  append(site.bindings, stage.bindings);
-  for (const auto& [name, whole] : stage.parts) site.bind_part(name, whole);
-  Emitted code;
-  code.stmt = stage.call;
-  code.uses = std::move(stage.uses);
-  if (call.in_loops) {
-    std::erase_if(code.uses, [](const auto& use) { return use.second.is_image; });
-    code.uses[whole_region_of(f)].box = call.region;
-  }
-  computed = stage.computed;
-  code.has_loops = true;
-  return code;
-}
-
-// for each slice: what is computed there; the C function on the slice
-Emitted NestEmitter::emit_extern_loops(const LoopedFunc& f, std::vector<Loop>& loops,
-                                       const Box& slice, const Expr& has_points,
-                                       ComputePlace& home) {
-  ComputePlace site(loops);
-  Box computed;
-  Emitted code = emit_extern_call(f, {slice, true, true}, site, computed);
-  code.stmt = make_if(has_points, code.stmt);
-  code = emit_place(children_at(f, 0, loops[0]), std::move(code), site);
-  code.stmt = make_lets(site.bindings, code.stmt);
-  map_boxes(code, [&](const Box& box) { return site.whole(box); });
-  for (size_t i = 0; i < loops.size(); i++) {
-    if (i > 0) code = emit_children(children_at(f, 0, loops[i]), std::move(code), loops, i, home);
-    code = store_here(f, 0, std::move(code), loops, i, home);
-    check_parallel(f, loops[i], code);
-    wrap(loops[i], code);
-  }
-  range_over_loops(code);
-  return code;
-}
-
-// Asks extern stages inside of the loops that were emitted last for the whole regions that they need.
-void NestEmitter::ask_wholes(Emitted& code, ComputePlace& root) const {
-  for (const LoopedFunc& f : program_.funcs) {
-    if (!f.func->is_extern()) continue;
-    auto noted = code.uses.extract(whole_region_of(f));
-    if (!noted) continue;
-    ExternAnswer whole = ask_for_whole(f, noted.mapped().box);
-    append(root.bindings, whole.bindings);
-    for (const auto& [name, use] : whole.uses) {
-      if (use.is_image) merge_footprints(code.uses, {{name, use}});
-    }
-  }
-}
-
-namespace {
-
-// Where a condition over parameters chooses between two boxes, so does what needs to be there.
+// Makes boxes that differ between two branches depend on the condition over parameters.
 void choose_box(const Expr& condition, Box& chosen, Box& other) {
   for (size_t d = 0; d < std::min(chosen.size(), other.size()); d++) {
     for (auto end : {&Interval::min, &Interval::max}) {
@@ -310,7 +203,7 @@ void choose_box(const Expr& condition, Box& chosen, Box& other) {
 
 }  // namespace
 
-// The nest as each specialization of its first stage has it: if (condition) this one else the next.
+// Emits the nest once per specialization of its first stage: if (condition) this variant, else the next.
 Emitted NestEmitter::emit_variants(const FusedNest& nest, std::vector<NestStage> stages,
                                    ComputePlace& home) {
   const NestStage& first = stages[0];
@@ -344,8 +237,7 @@ namespace {
 
 Loop& loop_at(std::vector<Loop>& loops, int depth) { return loops[loops.size() - depth]; }
 
-// By how much the loop variable of a stage exceeds that of the stage it is aligned to, which it
-// shares the loop with.
+// The difference between the loop variable of a stage and that of the stage it is aligned to.
 Expr shift_of(LoopAlignStrategy align, const Interval& own, const Interval& other) {
   switch (align) {
     case LoopAlignStrategy::AlignStart:
@@ -387,7 +279,7 @@ Emitted NestEmitter::emit_nest(const FusedNest& nest, std::vector<NestStage> sta
   return code;
 }
 
-// One stage with those that join its loops, inside of the loops that it shares itself.
+// Emits one stage and the stages that join its loops, up to the loops that it shares itself.
 Emitted NestEmitter::emit_stage(const FusedNest& nest, std::vector<NestStage>& stages, int index,
                                 ComputePlace& home) {
   NestStage& own = stages[index];
@@ -398,7 +290,7 @@ Emitted NestEmitter::emit_stage(const FusedNest& nest, std::vector<NestStage>& s
   code.uses = requirements_of(f, own.stage, own.nest, values_);
   if (never_stores(f, own.stage, code.uses)) code.stmt = make_evaluate(0);
   code.overrun.leaves_domain = own.nest.rounds_up;
-  code.overrun.counts = own.stage > 0 || !takes_any_values(f.stages[own.stage], values_);
+  code.overrun.counts = own.stage > 0 || !tolerates_any_values(f.stages[own.stage], values_);
   code = emit_children(computed_innermost_in(f), std::move(code), loops, 0, home);
   for (size_t i = 0; i < loops.size(); i++) {
     const int depth = static_cast<int>(loops.size() - i);

@@ -59,7 +59,7 @@ void merge_code(Emitted& into, const Emitted& from) {
 
 namespace {
 
-// Splits promise where the coordinates of a loop's iterations lie, not those of iterations before its first.
+// Promises from splits bound the coordinates of a loop's iterations, but not of those before the first (warm-up).
 template <class Tree>
 Tree without_promises_about(const std::string& loop, const Tree& tree) {
   return rewrite(tree, [&](const Expr& e, const auto& recurse) {
@@ -68,8 +68,8 @@ Tree without_promises_about(const std::string& loop, const Tree& tree) {
   });
 }
 
-// Iterations before a loop's first need no more than the first does, but a box that follows from the
-// loop's variable may be larger there. Hoisted storage has room for each.
+// Iterations before a loop's first need at most the region of the first, but a box that depends on the loop's variable
+// may be larger there. Hoisted storage has room for each of them.
 void make_room_for_early_iterations(const Loop& early, Emitted& code) {
   range_over_loops(code);
   for (auto& [name, box] : code.storage) {

@@ -14,9 +14,9 @@ namespace retrograde::lower {
 
 namespace {
 
-// Of one halide_buffer_t: where its first element lies, and its dimensions.
+// The contents of a halide_buffer_t.
 struct Descriptor {
-  Expr host;  // a null handle when there is no memory
+  Expr host;  // the address of its first element; a null handle if there is no memory
   Type type;
   std::vector<Range> region;
   std::vector<Expr> strides;
@@ -68,11 +68,10 @@ std::vector<Range> ranges_of(const Box& box) {
   return mapped(box, [](const Interval& side) { return Range{side.min, side.max - side.min + 1}; });
 }
 
-// One query: the function called with descriptors without memory, what it wrote into them read back
-// through the call.
+// One query: calls the function with descriptors without memory, and reads back what it wrote into them.
 class Query {
  public:
-  // Names begin with the prefix.
+  // `prefix`: of the names to bind.
   Query(const LoopedFunc& f, const std::string& prefix, Lets& bindings)
       : f_(f), definition_(*f.func->extern_definition), prefix_(prefix), bindings_(bindings) {}
 
@@ -83,7 +82,7 @@ class Query {
         const std::vector<Range> nothing(arg.func->args.size(), Range{0, 0});
         for (const Type type : arg.func->types) add_input(arg, type, nothing, args);
       } else if (is_image(arg)) {
-        // As large as it is: what the function leaves alone is not asked for beyond that.
+        // Its actual size, so that inputs that the function does not query have no further requirements.
         std::vector<Range> actual;
         for (int d = 0; d < arg.buffer->dimensions; d++) actual.push_back(range_of_image(arg, d));
         add_input(arg, arg.buffer->type, actual, args);
@@ -100,15 +99,15 @@ class Query {
     code_ = bind("query.code", call_extern(definition_.function, Int(32), args));
   }
 
-  // What the function wants to compute, which is no less than what it was asked for.
+  // The region that the function wants to compute, at least the requested one.
   Box computed(const Box& region) const {
     Box result = region;
     for (const Expr& buffer : outputs_) result = hull(result, box_in(buffer, region.size()));
     return simplified(result);
   }
 
-  // What it reads of each Func and image. Of an image that is there all that is there will do: the
-  // function sees for itself how large it is.
+  // The regions that the function reads of each Func and image. For an existing image all of it counts as available,
+  // because the function sees its size.
   Requirements inputs() const {
     Requirements result;
     for (const auto& [arg, buffer] : inputs_) {
@@ -169,7 +168,7 @@ class Query {
   }
 };
 
-// The box by names of its ends.
+// Binds names to the ends of the box, and returns the box in terms of them.
 Box bind_box(const std::string& name, const Box& box, Lets& bindings) {
   Box named = box;
   for (size_t d = 0; d < box.size(); d++) {
@@ -242,7 +241,7 @@ class Emitter {
     }
   }
 
-  // A buffer has no way to say that coordinates wrap around.
+  // A buffer descriptor cannot express folded storage.
   static void check_dense(const LoopedFunc& f, const std::string& asked) {
     for (const StorageRule& rule : f.schedule.storage_rules) {
       if (!rule.fold.defined()) continue;
@@ -252,7 +251,7 @@ class Emitter {
     }
   }
 
-  // Inside of a loop, code further out knows of each input what is asked for in the end.
+  // Inside of a loop, records the complete region of each input for code further out.
   void note_parts() {
     for (auto& [name, use] : stage_.uses) {
       if (use.is_image) continue;
@@ -333,7 +332,7 @@ Expr packed_buffer(Type type, const Expr& host, const std::vector<Range>& region
   return packed({host, type, region, strides});
 }
 
-// A function that enlarges its output is asked again, for what it reads then.
+// Queries a function that enlarges its output a second time, for the inputs of the enlarged output.
 static ExternAnswer ask_extern_stage(const LoopedFunc& f, const Box& region,
                                      const std::string& prefix, bool may_enlarge) {
   ExternAnswer answer;
@@ -363,7 +362,7 @@ ExternAnswer ask_for_whole(const LoopedFunc& f, const Box& region) {
   ExternAnswer whole = ask_extern_stage(f, region, prefix, may_enlarge);
   Box first = region, last = region;
   for (size_t d = 0; d < region.size(); d++) {
-    first[d].max = min(region[d].min, region[d].max);  // of nothing: nothing
+    first[d].max = min(region[d].min, region[d].max);  // stays empty if the region is empty
     last[d].min = max(region[d].min, region[d].max);
   }
   for (const auto& [corner, name] : {std::pair(&first, "first."), std::pair(&last, "last.")}) {

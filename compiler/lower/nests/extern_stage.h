@@ -1,4 +1,4 @@
-// extern_stage -- a Func that a C function computes.
+// extern_stage -- build the code of a Func that a C function computes (define_extern).
 //
 //   f.define_extern("fill", {g, k}, Int(32), {x})      let query = fill(&g_query, k, &f_query)
 //                                                  =>  let g.min = g_query.min ...
@@ -6,20 +6,20 @@
 //                                                        assert(fill(&g_buffer, k, &f_buffer) == 0)
 //                                                      } }
 //
-// The function is called several times: when bounds are inferred with buffers without memory, first
-// for how large it makes its output, then for what it needs of its inputs to fill that; at last to
-// fill it. An output of the pipeline has the size that its caller gives. Images are asked for in the
-// same way; where there is one, the function is handed it as it is. What the function reads or
-// writes is stored where it is computed (inline_functions sees to it).
+// The function is called several times. For bounds inference it gets buffers without memory: first it answers how large
+// its output will be, then which regions of its inputs it needs for that. The last call fills the output. An output of
+// the pipeline has the size of the caller's buffer. Images are queried in the same way, but an existing image is
+// passed unchanged. Funcs that the function reads or writes are stored where they are computed (inline_functions
+// ensures this).
 //
-// Inside of a loop it is asked in each iteration for its part, and once outside of all loops for the
-// whole (ask_for_whole): code further out knows nothing else. A function that asks for more in a
-// part than for the whole is stopped by a check. One that rounds its output up may reach further
-// from the last point than from the whole, so the first and the last point are asked for, too.
+// Inside of a loop the function is queried in each iteration for its part, and once outside of all loops for the
+// complete region (ask_for_whole), which code further out uses. A run-time check fails if a part needs more than the
+// complete region. A function that rounds up its output may reach further for the last point than for the complete
+// region, so the first and the last point are queried as well.
 //
-// Method: descriptors are packed values (Op::pack) in the layout of halide_buffer_t. What was asked
-//         for is an expression that contains the call, so that it can stand wherever a bound does.
-// Errors: arguments that are inlined or folded; C++ names.
+// Method: buffer descriptors are packed values (Op::pack) in the layout of halide_buffer_t. The answer to a query is an
+//         expression that contains the call, so that it can be used wherever a bound can.
+// Errors: arguments that are inlined or folded; functions with C++ names.
 // Source: Halide's documentation of define_extern. Tests: test/unit/extern_stage_test.cpp.
 #pragma once
 
@@ -30,7 +30,7 @@
 
 namespace retrograde::lower {
 
-// What the function says to a region: in terms of names that are to be bound, in this order.
+// The function's answer to a query for a region, in terms of names that are to be bound in this order.
 struct ExternAnswer {
   Lets bindings;
   Box computed;       // no less than the region
@@ -43,24 +43,25 @@ struct ExternStage {
   Box computed;
   Requirements uses;
   std::vector<Stmt> checks;
-  // In loops: names that stand for ends of what one iteration uses, and all that they cover in the
-  // end, in terms of names that ask_for_whole binds.
+  // In loops: names of ends of the regions that one iteration uses, and the intervals that these cover in the end, in
+  // terms of names that ask_for_whole binds.
   std::vector<std::pair<std::string, Interval>> parts;
 };
 
-// What a stage inside of loops computes in the end is noted in the uses under this name.
+// The name under which `uses` holds the complete region of a stage inside of loops.
 std::string whole_region_of(const LoopedFunc& f);
-// At root.
+// Queries the function for the complete region, at root.
 ExternAnswer ask_for_whole(const LoopedFunc& f, const Box& region);
 
-// A halide_buffer_t on the stack. `host`: of the element at the region's minima.
+// A halide_buffer_t on the stack. `host`: the address of the element at the region's minima.
 Expr packed_buffer(Type type, const Expr& host, const std::vector<Range>& region,
                    const std::vector<Expr>& strides);
 
 struct ExternCall {
-  Box region;  // what is to be computed
+  Box region;  // to be computed
   bool in_loops;
-  bool is_slice;  // of storage that is made for the whole: it computes its region and no more
+  bool
+      is_slice;  // of storage allocated for the complete region: the call computes exactly its region
 };
 ExternStage emit_extern_stage(const Program& program, const LoopedFunc& f, const ExternCall& call);
 

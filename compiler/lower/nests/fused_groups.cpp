@@ -24,7 +24,7 @@ class Grouping {
 
   bool is_trivial() const { return joinings_.empty(); }
 
-  // Producers before consumers, as far as the program has them so.
+  // The groups, producers before consumers as far as the program's order allows.
   std::vector<FusedGroup> groups() {
     std::map<int, FusedGroup> by_leader;
     for (size_t f = 0; f < leader_.size(); f++)
@@ -78,7 +78,7 @@ class Grouping {
     const auto [nest, position] = with->second;
     std::vector<FusedStage>& stages = nests[nest].stages;
     FusedStage stage{place.first, place.second, position, position, joining.depth, joining.align};
-    // Loops that the other one shares with a third are the third's.
+    // Loops that the other stage shares with a third belong to the third.
     while (stages[stage.joins].joins >= 0 && stages[stage.joins].depth >= stage.depth)
       stage.joins = stages[stage.joins].joins;
     found[place] = {nest, static_cast<int>(stages.size())};
@@ -86,7 +86,7 @@ class Grouping {
     return true;
   }
 
-  // The first of the stages that run in each other's loops, up to this one.
+  // The first of the stages of this Func that run in each other's loops, up to this one.
   int first_joined(const FusedStage& stage) const {
     int first = stage.stage;
     for (auto it = joinings_.find({stage.func, first}); it != joinings_.end() && is_own(it->second);
@@ -95,7 +95,7 @@ class Grouping {
     return first;
   }
 
-  // A nest runs when the stages before its own have run.
+  // Orders nests so that a nest runs after the earlier stages of its Funcs.
   std::vector<FusedNest> in_order(std::vector<FusedNest> nests,
                                   const std::map<Place, Place>& found) const {
     std::vector<FusedNest> result;
@@ -122,7 +122,7 @@ class Grouping {
   }
 };
 
-// Groups, each after all that it reads.
+// Orders groups so that each comes after all groups that it reads.
 class GroupOrder {
  public:
   GroupOrder(const Program& program, const std::vector<FusedGroup>& groups)
@@ -180,8 +180,8 @@ std::vector<FusedGroup> fused_groups(const Program& program) { return Grouping(p
 
 namespace {
 
-// Stages of a nest that are left, each with those that join its loops: the first nest holds those
-// that still run with the first stage, if it is left.
+// The kept stages of a nest, each with those that join its loops. The first nest contains the stages that still run
+// with the first stage, if that is kept.
 std::vector<FusedNest> parts_of(const FusedNest& nest, const std::vector<int>& kept) {
   std::vector<FusedNest> parts;
   std::vector<std::pair<int, int>> now(nest.stages.size(), {-1, -1});  // part, position in it
@@ -192,7 +192,7 @@ std::vector<FusedNest> parts_of(const FusedNest& nest, const std::vector<int>& k
       const auto [part, position] = now[stage.joins];
       if (now[stage.aligned_to].first == part) {
         stage.aligned_to = now[stage.aligned_to].second;
-      } else {  // what it was aligned to is not here
+      } else {  // the stage that it was aligned to has been removed
         stage.aligned_to = position;
         std::fill(stage.align.begin(), stage.align.end(), LoopAlignStrategy::NoAlign);
       }

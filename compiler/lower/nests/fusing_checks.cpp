@@ -29,7 +29,7 @@ std::string asked_of(const Program& program, int f, int stage) {
 
 int with_stage_of(const LoopLevel& level) { return std::max(level.stage, 0); }
 
-// Loops from the outermost inwards down to the one of this name; 0: there is none.
+// The number of loops from the outermost inwards to the one of this name; 0 if there is none.
 int depth_of(const StageLoops& schedule, const std::string& var) {
   const std::vector<Dim>& dims = schedule.dims;
   for (size_t i = 0; i < dims.size(); i++) {
@@ -220,7 +220,7 @@ std::vector<Joining> joinings_of(const Program& program) {
       for (int d = 1; d <= joining.depth; d++) {
         const auto asked =
             value_or(own.fuse_alignment, loop_at(own, d).var, LoopAlignStrategy::Auto);
-        // Both have one range; what shifts the stage before shifts this one, too.
+        // Both stages have the same range, and are shifted together.
         joining.align.push_back(is_own(joining) ? LoopAlignStrategy::AlignStart : asked);
       }
       joinings.push_back(std::move(joining));
@@ -262,7 +262,7 @@ std::vector<int> callees_of(const Program& program, int f) {
 
 namespace {
 
-// Names, each of which reads the next: from a member to another one of the group; empty: none does.
+// Finds a path of names, each of which reads the next, from one member of the group to another; empty if there is none.
 class PathFinder {
  public:
   PathFinder(const Program& program, const FusedGroup& group)
@@ -286,7 +286,7 @@ class PathFinder {
     for (const int callee : callees_of(program_, f)) {
       path_.push_back(callee);
       if (members_.count(callee)) return true;
-      // Producers come first: nothing that lies before the first member can need one.
+      // Producers come first, so no Func before the first member can depend on one.
       if (callee > *members_.begin() && seen_.insert(callee).second && reaches_member(callee))
         return true;
       path_.pop_back();

@@ -1,4 +1,4 @@
-// fusing_checks.h -- what compute_with asks for, and when stages cannot share loops.
+// fusing_checks.h -- collects compute_with directives, and rejects stages that cannot share loops.
 #pragma once
 
 #include <vector>
@@ -7,33 +7,32 @@
 
 namespace retrograde::lower {
 
-// One compute_with: a stage runs in `depth` outermost loops of another.
+// One compute_with: a stage runs in the `depth` outermost loops of another.
 struct Joining {
   int func = 0, stage = 0, with = 0, with_stage = 0;
   int depth = 0;
   std::vector<LoopAlignStrategy> align;  // outermost first
 };
 
-// Of a program that check_joinings let pass.
+// The compute_with directives of a program that has passed check_joinings.
 std::vector<Joining> joinings_of(const Program& program);
 
-// CompileError unless, for each compute_with: 1. the other stage is part of the pipeline, and known
-// if its Func has several; 2. both are computed, at the same place, by loops; 3. the loops down to
-// the level have the same names and kinds; 4. neither Func is memoized or asynchronous, and nothing
-// is prefetched at a shared loop of the stage that joins; 5. no stage joins itself by way of
-// others; 6. an update that joins the stage before it touches in each iteration what that has made
-// there (own_joining.h).
+// CompileError unless, for each compute_with: 1. the other stage is part of the pipeline, and named exactly if its Func
+// has several stages; 2. both are computed by loops at the same place; 3. the loops down to the level have the same
+// names and kinds; 4. neither Func is memoized or async, and no prefetch is at a shared loop of the stage that joins;
+// 5. no stage joins itself through others; 6. an update that joins the stage before it accesses, in each
+// iteration, only elements that the stage computed in that iteration (own_joining.h).
 void check_joinings(const Program& program);
 
-// 7. No Func of a group needs another one of it.
+// 7. No Func of a group depends on another one of the group.
 void check_group(const Program& program, const FusedGroup& group);
 
-// What follows throws.
-// 8. Stages of one Func run in their order. `stages`: of a nest that has to wait for itself.
+// The following functions always throw.
+// 8. Stages of one Func run in their order. `stages`: of a nest that would have to wait for itself.
 [[noreturn]] void check_order_of_stages(const Program& program,
                                         const std::vector<FusedStage>& stages);
-// 9. Groups do not need each other. `path`: groups, each of which needs the next, and the last
-// needs `again`, which is one of them.
+// 9. Groups do not depend on each other cyclically. `path`: groups of which each depends on the next; the last one
+// depends on `again`, which is in the path.
 [[noreturn]] void check_groups_have_order(const Program& program,
                                           const std::vector<FusedGroup>& groups,
                                           const std::vector<int>& path, int again);

@@ -65,7 +65,7 @@ bool is_inlined(const FuncContents& f, const FuncPlacement& schedule, bool is_ou
   return !is_output && f.is_pure() && schedule.compute_level.kind == LoopLevel::Kind::Inlined;
 }
 
-// Nodes of an expression beyond which no code generator ends within minutes.
+// The number of nodes of an expression above which code generation would take more than minutes.
 constexpr double most_nodes = 200000;
 
 double distinct_nodes(const std::vector<Expr>& values) {
@@ -88,8 +88,8 @@ void check_size(const FuncContents& f, const InlinedSizes& sizes) {
            ", or a Func that it reads, at root or at a loop of its consumer"));
 }
 
-// A C function gets each of its buffers as one box, which a Func is only where it lives no longer
-// than it is computed: wherever else it was said to be stored, values are the same.
+// A C function gets each of its buffers as one box. The storage of a Func is one box only at its compute level, so the
+// store level of such Funcs is set to it; the values are the same.
 void store_with_extern_stages(Program& program) {
   std::unordered_set<const FuncContents*> boxes;
   for (const LoopedFunc& f : program.funcs) {

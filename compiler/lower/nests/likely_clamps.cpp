@@ -20,7 +20,7 @@ Names loop_variables(const LoopedFunc& f, const Definition& stage) {
   return names;
 }
 
-// An integer of loops and parameters alone, and not marked yet.
+// Whether the expression is an integer made of loop variables and parameters only, and not marked yet.
 bool is_place_of_loops(const Expr& e, const Names& loops) {
   if (!e.type().is_int_or_uint() || !uses_any_variable(e, loops)) return false;
   return !any_node(e, [](const Expr& part) {
@@ -32,7 +32,7 @@ bool is_other_extreme(const Expr& e, Kind outer) {
   return e.kind() == (outer == Kind::Min ? Kind::Max : Kind::Min);
 }
 
-// max(min(place, hi), lo), or the other way round.
+// Matches max(min(place, hi), lo), and the reverse order.
 struct Clamp {
   Kind outer;
   Expr place, inner_limit, outer_limit;

@@ -1,15 +1,14 @@
-// likely_clamps -- a clamped index is inside of its limits for most iterations.
+// likely_clamps -- mark clamped indices as likely to be inside of their limits.
 //
 //   g(x) = f(clamp(x - 1, 0, w - 1))  =>  g(x) = f(clamp(likely(x - 1), 0, w - 1))
 //
-// So partition_loops makes dense loads of what would be gathers, as it does for a boundary
-// condition: users write the clamp as often as the condition. Marked is what the loops of a stage
-// alone decide, between limits that they do not move, in the indices of what it reads: a place that
-// data decide may lie anywhere, and so may one whose limits move along.
+// partition_loops then turns gathers into dense loads, as it does for boundary conditions; users write clamps as often
+// as boundary conditions. A clamped index in a stage's reads is marked if it depends only on the stage's loops, with
+// limits that do not depend on them. Data-dependent indices may lie anywhere, and so may indices whose limits vary.
 //
-// Not done: the indices of a Func that its own update reads, and what these read in turn: they say by
-// being the same as those that it stores to that the update accumulates.
-// Source: ours, of what partition_loops says of likely. Tests: test/unit/likely_clamps_test.cpp.
+// Not done: indices with which an update reads its own Func, and indices inside of those. The update is recognised as
+//           an accumulation because they equal the indices of its store.
+// Source: our own, based on the meaning of likely in partition_loops. Tests: test/unit/likely_clamps_test.cpp.
 #pragma once
 
 #include "lower/program.h"

@@ -9,13 +9,13 @@
 namespace retrograde::lower {
 namespace {
 
-using Renamings = std::unordered_map<std::string, std::string>;  // those in force
+using Renamings = std::unordered_map<std::string, std::string>;  // in force
 
 std::string current(const Renamings& renamings, const std::string& name) {
   return value_or(renamings, name, name);
 }
 
-// "f.stride.1" of a Func that is "f.$1" here.
+// The new name of "f.stride.1" and similar names if Func "f" has been renamed to "f.$1" here.
 std::string renamed_fact(const Renamings& renamings, const std::string& name) {
   for (const char* fact : {".stride.", ".min.", ".extent."}) {
     const size_t at = name.rfind(fact);
@@ -26,7 +26,7 @@ std::string renamed_fact(const Renamings& renamings, const std::string& name) {
   return {};
 }
 
-// Uses of renamed variables and Funcs.
+// Renames the uses of renamed variables and Funcs.
 Expr with_uses_renamed(const Expr& root, const Renamings& renamings) {
   return rewrite(root, [&](const Expr& e, const auto& recurse) -> Expr {
     if (const Variable* v = e.as<Variable>()) {
@@ -81,10 +81,10 @@ class Uniquifier {
 
  private:
   FreshNames fresh_;
-  std::unordered_set<std::string> bound_;  // so far, anywhere
+  std::unordered_set<std::string> bound_;  // so far, in the whole statement
   Renamings renamings_;
 
-  // A name from here to the end of its scope.
+  // A name that is bound from here to the end of its scope.
   struct Binding {
     Binding(Uniquifier& owner, const std::string& name) : owner(owner), name(name), unique(name) {
       if (const auto* now = find_or_null(owner.renamings_, name)) outer = *now;

@@ -1,10 +1,9 @@
-// make_names_unique -- give every binding a name of its own.
+// make_names_unique -- give every binding a unique name.
 //
-// In:  Loops, as build_loop_nests makes it: a Func that is computed at several places binds its
-// names at each of them, nested
-//      places included. Names mean the innermost binding around them.
-// Out: the same program; every name is bound once. First bindings keep their names, unless an argument
-// has it.
+// In:  Loops, as build_loop_nests generates it: a Func that is computed at several places binds its names at each of
+//      them, also at nested places. A name refers to the innermost binding around it.
+// Out: the same program, in which every name is bound once. First bindings keep their names, unless an argument has the
+//      same name.
 //
 //   produce g: realize f: ...                produce g: realize f: ...
 //   produce h: realize f: ...       =>       produce h: realize f.$1: ...
@@ -22,9 +21,9 @@ namespace retrograde::lower {
 
 struct UniqueNames {
   Stmt stmt;
-  std::map<std::string, std::string> original;  // of each Func that was renamed
+  std::map<std::string, std::string> original;  // original name of each renamed Func
 };
-// `taken`: names that have a meaning in all of s, as arguments of its function do.
+// `taken`: names that are visible in all of s, such as arguments of its function.
 UniqueNames make_names_unique(const Stmt& s, const std::vector<std::string>& taken = {});
 
 }  // namespace retrograde::lower

@@ -1,4 +1,5 @@
-// memory_order -- the order in which Funcs are computed (graph/computing_order.h).
+// memory_order -- orders the Funcs computed at root so that few of them are in memory at once
+// (graph/computing_order.h).
 #pragma once
 
 #include "lower/program.h"

@@ -1,5 +1,4 @@
-// nest_checks.h -- what a schedule must obey that only building the loops tells, and the messages
-// when it does not.
+// nest_checks.h -- checks of schedules that need the loop nests, with their error messages.
 #pragma once
 
 #include "lower/nests/build_loop_nests.h"
@@ -7,15 +6,15 @@
 
 namespace retrograde::lower {
 
-// Funcs whose definitions read f, quoted, for messages.
+// The quoted names of the Funcs whose definitions read f, for messages.
 std::string consumers_of(const Program& program, const LoopedFunc& f);
 
 void check_bounded(const Program& program, const LoopedFunc& f, const Box& box);
 // `stored`: a Func that is computed inside `loop` of f and stored outside of it.
 void check_no_shared_storage(const LoopedFunc& f, const Loop& loop, const std::string& stored);
-// What was neither computed nor stored when the walk came to the root.
+// Reports a Func that is neither computed nor stored anywhere when the walk arrives at the root.
 void check_found_its_place(const Program& program, const LoopedFunc& f, bool is_stored);
-// A place for hoisted storage that no loop gave, and one that nothing bounds.
+// Check that hoisted storage has a loop, and that its size is bounded.
 void check_place_found(const Program& program, const LoopedFunc& f);
 void check_room(const LoopedFunc& f, const Box& room);
 void check_storage_of_output(const LoopedFunc& f);

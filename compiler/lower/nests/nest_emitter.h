@@ -1,7 +1,7 @@
-// nest_emitter.h -- the walk of build_loop_nests: sites, and the stages computed there.
+// nest_emitter.h -- the class behind build_loop_nests: emits the stages computed at each place.
 //
-// build_loop_nests.cpp has the root and what is found at a loop, emit_compute_place.cpp how Funcs of one
-// site are put together, emit_stages.cpp the loops of their stages.
+// build_loop_nests.cpp handles the root and the directives at a loop, emit_compute_place.cpp combines the Funcs of one
+// place, emit_stages.cpp emits the loops of their stages, and emit_extern.cpp emits extern stages.
 #pragma once
 
 #include <map>
@@ -32,7 +32,7 @@ class NestEmitter {
   const ValueBounds values_;
   NestStorage storage_;
   const std::vector<FusedGroup> groups_;
-  std::vector<int> group_of_;          // index in groups_, of each Func
+  std::vector<int> group_of_;          // per Func: index into groups_
   std::vector<int> root_, innermost_;  // indices into program_.funcs, producers first
   std::map<std::pair<std::string, std::string>, std::vector<int>>
       at_;  // (consumer, loop) -> Funcs computed there
@@ -43,7 +43,7 @@ class NestEmitter {
   void note_site(int index);
   std::vector<int> computed_innermost_in(const LoopedFunc& f) const;
   std::vector<int> children_at(const LoopedFunc& f, int s, const Loop& loop) const;
-  // Funcs computed just outside `code` and inside loops[i]; their bounds are bound around them.
+  // Computes Funcs just outside `code` and inside loops[i]; their bounds are bound around them.
   Emitted emit_children(const std::vector<int>& children, Emitted code, std::vector<Loop>& loops,
                         size_t i, ComputePlace& home);
   Emitted store_here(const LoopedFunc& f, int s, Emitted code, std::vector<Loop>& loops, size_t i,
@@ -51,16 +51,16 @@ class NestEmitter {
   void check_parallel(const LoopedFunc& f, const Loop& loop, const Emitted& code) const;
   void check_everything_found_its_place(const Emitted& all) const;
 
-  // ---- one site: Funcs that are computed together, just outside `inner` (emit_compute_place.cpp) ----
+  // ---- one place: Funcs computed just outside `inner` (emit_compute_place.cpp) ----
 
-  // One of the Funcs of a group, and how it is computed here.
+  // A Func of a group, and how it is computed here.
   struct Member {
     const LoopedFunc* f;
-    Box need;  // what is still to be computed of it, by the stages that are not emitted yet
-    std::vector<Loop> loops;  // to its storage
+    Box need;  // the region still to be computed, by the stages that have not been emitted yet
+    std::vector<Loop> loops;  // between here and its storage
     std::vector<Slide> slides;
     Box required = {};
-    Box touched = {};  // of its storage, beside what is computed
+    Box touched = {};  // accessed storage beyond the computed region
   };
 
   struct Realized {
@@ -68,8 +68,8 @@ class NestEmitter {
     Box required, allocated;
   };
 
-  // A group's part of the site:
-  //   realize { if (lead) produce f; consume f { what came before } }
+  // The code of a group at a place:
+  //   realize { if (lead) produce f; consume f { the code before } }
   struct Piece {
     Stmt produce;
     int lead = 0;
@@ -77,8 +77,7 @@ class NestEmitter {
     std::vector<Realized> realized;
   };
 
-  // From how many iterations before the loop's first on a Func is wanted: by the first and by the
-  // last of its consumers.
+  // How many iterations before the loop's first a Func is needed: by the first and by the last of its consumers.
   struct Wanted {
     int first = 0, last = 0;
   };
@@ -93,24 +92,24 @@ class NestEmitter {
   Wanted slide_together(std::vector<Member>& members, const WantedFuncs& wanted,
                         ComputePlace& site) const;
   Stmt unless_empty(const Member& member, const Stmt& stmt) const;
-  void keep(Member& member, Box allocated, Emitted& code, Emitted& made, Piece& piece,
+  void keep(Member& member, Box allocated, Emitted& code, Emitted& generated, Piece& piece,
             ComputePlace& site);
   Box output_box(const LoopedFunc& f, const Box& read);
 
-  // ---- stages (emit_stages.cpp) ----
+  // ---- stages (emit_stages.cpp, emit_extern.cpp) ----
 
-  // A stage among those that share loops.
+  // A stage among those that share loops (compute_with).
   struct NestStage {
     const LoopedFunc* f;
     int stage;
     Domain domain;
     StageNest nest = {};
-    std::vector<Expr> shift = {};  // what its loop variables are more than those of the first stage
-    std::vector<int> guests = {};  // that join its loops
+    std::vector<Expr> shift = {};  // by how much its loop variables exceed those of the first stage
+    std::vector<int> guests = {};  // stages that join its loops
   };
 
-  // All stages of the members over what is needed of each. The boxes that their storage must have
-  // come back in `storage`.
+  // Emits all stages of the members over the regions that each needs. `storage` of the result holds the boxes that
+  // their storage must have.
   Emitted emit_members(const FusedGroup& group, std::vector<Member>& members, ComputePlace& site,
                        std::vector<Stmt> stmts);
   static bool keeps_beside_its_region(const Member& member, size_t dimension, ComputePlace& site);

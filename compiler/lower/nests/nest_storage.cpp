@@ -12,7 +12,7 @@ namespace retrograde::lower {
 
 namespace {
 
-// Whether a directive that names a loop of a Func, in any of its stages, means this one.
+// Whether a directive that names a loop of a Func refers to this loop; the loop may belong to any stage.
 bool is_named_by(const LoopLevel& level, const Loop& loop) {
   if (level.kind != LoopLevel::Kind::At) return false;
   const LoopName name = decode_loop_name(loop.known_as());
@@ -41,7 +41,8 @@ const StorageRule* rule_of(const LoopedFunc& f, size_t d) {
 void apply(const StorageRule& rule, const LoopedFunc& f, size_t d, Range& range, Expr& factor,
            std::vector<Stmt>& checks) {
   const int dimension = static_cast<int>(d);
-  if (rule.fold.defined() && !factor.defined()) {  // no loop hands it on: it must hold all
+  if (rule.fold.defined() &&
+      !factor.defined()) {  // no loop passes values on: the storage must hold the whole extent
     checks.push_back(fold_check(f, dimension, range.extent, rule.fold));
     factor = rule.fold;
   }
@@ -125,13 +126,11 @@ Stmt NestStorage::fold(const LoopedFunc& f, const Box& touched, const std::vecto
   return stmt;
 }
 
-// Along one loop a window computes each value once, into a place of its own: its producer may run ahead of the
-// consumer as far as the storage allows. In folded storage of F coordinates, of which an iteration touches W and
-// computes S, there is room for (F - W) / S more iterations. Under several loops the window begins anew in each
-// iteration of the outer ones, and overwrites what may still be read. That does no harm where nothing is folded and
-// the same value is written; an update definition writes others in between.
-void NestStorage::note_async_room(const LoopedFunc& f, const std::vector<Loop>& loops,
-                                  const std::vector<Slide>& slides, const Box& touched) {
+// If each value is computed only once, into an element of its own, the producer may run ahead without limit. In storage
+// folded to F coordinates, of which an iteration accesses W and computes S, it may be (F - W) / S further iterations
+// ahead.
+void NestStorage::note_async_room(const LoopedFunc& f, const std::vector<Slide>& slides,
+                                  const Box& touched) {
   const std::vector<Fold>& folds = folds_.at(f.name());
   const bool is_folded =
       std::ranges::any_of(folds, [](const Fold& fold) { return fold.factor.defined(); });
@@ -142,7 +141,7 @@ void NestStorage::note_async_room(const LoopedFunc& f, const std::vector<Loop>& 
   if (!is_first && (it->second == 0 || (room != 0 && room < it->second))) it->second = room;
 }
 
-// A Func that is computed at several places folds where all of them allow it.
+// A dimension of a Func that is computed at several places folds only if all of them allow it.
 void NestStorage::note_folds(const LoopedFunc& f, std::vector<Fold> folds) {
   auto [it, is_first] = folds_.emplace(f.name(), folds);
   for (size_t d = 0; d < folds.size() && !is_first; d++) {
@@ -162,7 +161,7 @@ Stmt NestStorage::realize(const LoopedFunc& f, const Box& box, Stmt stmt) {
     Range range{box[d].min, simplify(box[d].max - box[d].min + 1)};
     Expr& factor = folds_.at(f.name())[d].factor;
     auto extent = as_const_int(range.extent), fold = as_const_int(factor.defined() ? factor : 0);
-    if (extent && fold && *extent <= *fold) factor = Expr();  // nothing to gain
+    if (extent && fold && *extent <= *fold) factor = Expr();  // folding would save nothing
     if (const StorageRule* rule = rule_of(f, d)) apply(*rule, f, d, range, factor, checks);
     ranges.push_back(range);
   }

@@ -17,7 +17,7 @@ namespace retrograde::lower {
 
 namespace {
 
-// A loop as a part of a dimension: the splits that made it, from the dimension on.
+// A loop that covers a part of a dimension: the splits from the dimension down to the loop.
 struct PartOfDimension {
   struct Step {
     const Split* split;
@@ -27,7 +27,7 @@ struct PartOfDimension {
   std::vector<Step> steps;
 };
 
-// nullopt: a fused loop runs over several dimensions.
+// nullopt if a fused loop runs over several dimensions.
 std::optional<PartOfDimension> part_along(const StageLoops& schedule, const std::string& loop) {
   PartOfDimension part{loop, {}};
   for (auto split = schedule.splits.rbegin(); split != schedule.splits.rend(); ++split) {

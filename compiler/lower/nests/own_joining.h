@@ -1,12 +1,11 @@
-// own_joining -- an update in the loops of the stage before it.
+// own_joining -- check an update that runs in the loops of the stage before it (compute_with).
 //
 //   f(x, y) = 0;  f(x, y) += g(x, y, r)           for y: for x: f = 0
 //   f.update().compute_with(Stage(f), y)   =>              for x: for r: f += ...
 //
-// A tile of sums starts where it is in the cache. Every iteration of the shared loops must touch
-// the elements that the stage before has made in the same iteration, and no others: the loops are
-// the same parts of the same dimensions, the stage before makes no element twice, and the update
-// changes each element by what that holds alone.
+// A tile of sums is then initialised while it is in the cache. In every iteration of the shared loops, the update must
+// access exactly the elements that the stage before has computed in that iteration: the loops are the same parts of the
+// same dimensions, the stage before computes no element twice, and the update of each element reads no other element.
 // Tests: test/unit/compute_with_test.cpp, test/error/compute_with_errors_test.cpp.
 #pragma once
 
@@ -16,17 +15,17 @@
 
 namespace retrograde::lower {
 
-// The stage joins the one before it.
+// Whether the stage joins an earlier stage of its own Func.
 bool is_own(const Joining& joining);
 
-// CompileError unless an iteration of the shared loops is all that the update touches.
+// CompileError unless the update accesses, in each iteration of the shared loops, only elements of that iteration.
 void check_own_joining(const Program& program, const Joining& joining);
 
-// Whether stages after this one run in its loops: its tiles must not overlap then.
+// Whether later stages of the Func run in the loops of this one; its tiles must not overlap then.
 bool hosts_own_updates(const LoopedFunc& f, int stage);
 
-// The last of the stages after this one that run, one in the loops of the other, in this loop of it;
-// itself where none does.
+// The last of the later stages that run in this loop of the stage, directly or through one another; the stage itself if
+// there is none.
 int last_stage_in(const LoopedFunc& f, int stage, const std::string& loop);
 
 }  // namespace retrograde::lower

@@ -1,4 +1,4 @@
-// What users promise or want of the region of a Func.
+// Applies the directives bound, align_bounds and align_extent to the region of a Func.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace retrograde::lower {
 
-// Func::bound: the loops cover exactly what was promised; a check makes sure that it is enough.
-// Func::align_bounds and align_extent: they cover more.
+// Func::bound: the loops cover exactly the promised region; a run-time check ensures that it is large enough.
+// Func::align_bounds and align_extent enlarge the region.
 void apply_promised_bounds(const LoopedFunc& f, Box& box, std::vector<Stmt>& checks);
 
 }  // namespace retrograde::lower

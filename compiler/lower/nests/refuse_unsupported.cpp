@@ -24,7 +24,7 @@ void refuse_memory_of_devices(const LoopedFunc& f) {
   }
 }
 
-// ---- schedules that contradict themselves ----
+// ---- contradictory schedules ----
 
 void check_level_is_set(const LoopedFunc& f, const std::shared_ptr<LoopLevelContents>& from,
                         const char* verb) {
@@ -34,9 +34,9 @@ void check_level_is_set(const LoopedFunc& f, const std::shared_ptr<LoopLevelCont
              "Set it: level.set(LoopLevel(f, x))");
 }
 
-// 1. Loops over blocks are around those over threads. 2. Neither is inside of a vectorized loop.
+// 1. Loops over blocks are outside of loops over threads. 2. Neither is inside of a vectorized loop.
 void check_gpu_loops(const LoopedFunc& f, int stage, const StageLoops& schedule) {
-  const Dim *blocks = nullptr, *on_gpu = nullptr;  // the last of each that was met
+  const Dim *blocks = nullptr, *on_gpu = nullptr;  // the last of each kind visited
   const std::string name = quoted(stage_name(*f.func, stage));
   for (const Dim& dim : schedule.dims) {  // innermost first
     if (is_gpu_thread(dim.runs) && blocks) {
@@ -143,13 +143,13 @@ namespace {
 void resolve(const Program& program, LoopLevel& level) {
   if (level.kind != LoopLevel::Kind::At || level.var != outermost_loop) return;
   const LoopedFunc* consumer = program.find(level.func);
-  if (!consumer) return;  // refused where every level finds its place
+  if (!consumer) return;  // reported later, where every level must be found
   level = consumer->is_output ? LoopLevel{LoopLevel::Kind::Root, "", "", -1}
                               : consumer->schedule.compute_level;
 }
 
-// Stages that share nothing but the outermost loop, which runs once, share nothing.
-void leave_outermost_company(StageLoops& schedule) {
+// Stages that share only the outermost loop, which runs once, share nothing.
+void drop_fusion_at_outermost(StageLoops& schedule) {
   LoopLevel& level = schedule.fuse_level;
   if (level.kind == LoopLevel::Kind::At && level.var == outermost_loop) level = {};
 }
@@ -162,7 +162,7 @@ void resolve_outermost_levels(Program& program) {
     resolve(program, f->schedule.compute_level);
     resolve(program, f->schedule.store_level);
     resolve(program, f->schedule.hoist_level);
-    for (Definition& stage : f->stages) leave_outermost_company(stage.schedule);
+    for (Definition& stage : f->stages) drop_fusion_at_outermost(stage.schedule);
   }
 }
 

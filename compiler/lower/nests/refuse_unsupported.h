@@ -1,4 +1,4 @@
-// refuse_unsupported -- what no single directive could know when it was given, and what no CPU has.
+// refuse_unsupported -- reject schedules whose directives contradict each other or need hardware that the target lacks.
 #pragma once
 
 #include "ir/target.h"
@@ -6,17 +6,16 @@
 
 namespace retrograde::lower {
 
-// CompileError for schedules that contradict themselves; Unsupported for memory of devices.
+// CompileError for contradictory schedules; Unsupported for memory types of devices that are not supported.
 void refuse_unsupported(const Program& program);
 
-// CompileError for loops over blocks or threads where the target has no GPU.
+// CompileError for loops over blocks or threads if the target has no GPU.
 void check_devices(const Program& program, const Target& target);
 
-// CompileError for a Func that is substituted into its users and has a schedule that needs storage
-// or a computation of its own.
+// CompileError for a Func that is inlined into its consumers but has directives that need storage or loops of its own.
 void check_inlined(const FuncContents& f, const FuncPlacement& schedule);
 
-// Var::outermost() as a level means outside of all loops of the Func: where that one is computed.
+// Var::outermost() as a level means outside of all loops of the Func, which is the Func's own compute level.
 void resolve_outermost_levels(Program& program);
 
 }  // namespace retrograde::lower

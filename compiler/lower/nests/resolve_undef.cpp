@@ -1,4 +1,4 @@
-// First where a value is defined, as a condition; then the value without the arms that are not.
+// Finds the condition under which each value is defined, then removes the undefined arms from the value.
 #include "lower/nests/resolve_undef.h"
 
 #include <algorithm>
@@ -30,7 +30,7 @@ Expr either(const Expr& a, const Expr& b) {
   return binary(Kind::Or, a, b);
 }
 
-// What `first` guards is not read where it is false.
+// The conjunction, where `second` is not evaluated if `first` is false and guards its reads.
 Expr first_then(const Expr& first, const Expr& second) {
   if (is_const_true(first) || !reads_memory(second, MemoryReads::Storage))
     return both(first, second);
@@ -39,7 +39,7 @@ Expr first_then(const Expr& first, const Expr& second) {
 
 struct Choice {
   Expr condition, if_true, if_false;
-  bool is_lazy;  // the arm that is not chosen must not be evaluated
+  bool is_lazy;  // only the chosen arm may be evaluated
 };
 std::optional<Choice> as_choice(const Expr& e) {
   if (const Select* s = e.as<Select>())
@@ -83,7 +83,7 @@ class WhereDefined {
   NodeMemo<Expr> memo_;
 };
 
-// An equal value where it is defined; what is never defined is never chosen.
+// A value that is equal where it is defined, without arms that are never defined.
 Expr without_undef(const Expr& value, WhereDefined& where_defined) {
   return rewrite(value, [&](const Expr& e, const auto& recurse) -> Expr {
     if (auto choice = as_choice(e)) {
@@ -110,7 +110,7 @@ class StageResolver {
  private:
   Expr undef_of(size_t i) const { return call_op(Op::undef, definition_.values[i].type(), {}); }
 
-  // f(x)[0] = f(x)[0]: what f(x)[1] = e says of the other elements. It may be stored or not.
+  // Matches f(x)[0] = f(x)[0], which f(x)[1] = e generates for the other elements. Storing it is optional.
   bool keeps_old_value(size_t i) const {
     const Call* old = definition_.values[i].as<Call>();
     return old && old->call_type == CallType::Func && old->name == f_.name() &&
@@ -119,7 +119,7 @@ class StageResolver {
                               [](const Expr& a, const Expr& b) { return equal(a, b); });
   }
 
-  // Elements that are never stored, or keep their value, have no say.
+  // Checks that the elements are defined in the same places; those never stored or unchanged are ignored.
   void check_alike() {
     for (size_t i = 0; i < where_.size(); ++i) {
       const Expr& where = where_[i];
@@ -152,8 +152,8 @@ class StageResolver {
   const LoopedFunc& f_;
   Definition& definition_;
   WhereDefined where_defined_;
-  std::vector<Expr> where_;  // of each value
-  Expr common_;              // of all that are stored
+  std::vector<Expr> where_;  // the condition of each value
+  Expr common_;              // the condition of all stored values
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// run_time_check.h -- what a call of generated code fails for.
+// run_time_check.h -- builds checks in generated code that make the call fail.
 #pragma once
 
 #include <utility>
@@ -7,7 +7,7 @@
 
 namespace retrograde::lower {
 
-// Unless it holds, the call fails with the code, and a message of these parts.
+// Unless the condition holds, the call fails with the code and a message of these parts.
 template <class... Parts>
 Stmt run_time_check(Expr holds, int code, Parts&&... message) {
   return make_assert(

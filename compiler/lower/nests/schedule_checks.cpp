@@ -26,7 +26,7 @@ class SizeChecks {
   std::vector<Stmt> checks;
 
  private:
-  // A schedule runs where its condition holds and none before it; only then its factors count.
+  // A schedule's factors are checked only where it runs: its condition holds, and none before it.
   void add_factors(const LoopedFunc& f, const StageLoops& schedule, Expr runs) {
     for (const StageLoops& special : schedule.specializations) {
       if (!special.condition.defined()) continue;

@@ -1,7 +1,7 @@
-// schedule_checks.h -- what every call checks of the sizes in the schedule.
+// schedule_checks.h -- run-time checks of sizes in the schedule that depend on parameters.
 //
-// Factors of splits, alignments of storage and moduli of bounds may be made of parameters. Loops
-// and strides divide by them, so that 0 or less would leave points out or overlap rows.
+// Factors of splits, alignments of storage and moduli of bounds may depend on parameters. Loops and strides divide by
+// them, so a value of 0 or less would skip points or overlap rows.
 #pragma once
 
 #include <vector>
@@ -11,7 +11,7 @@
 
 namespace retrograde::lower {
 
-// Assertions over parameters; none for what is constant, which the directives check.
+// Assertions over parameters; constants are checked by the directives themselves.
 std::vector<Stmt> schedule_checks(const Program& program);
 
 }  // namespace retrograde::lower

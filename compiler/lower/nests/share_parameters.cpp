@@ -13,7 +13,7 @@ namespace retrograde::lower {
 
 namespace {
 
-// Nodes of a tree from which on it gets a name.
+// The size of a tree, in nodes, from which it gets a name.
 constexpr int large = 24;
 
 class ParameterSharer : public Rewriter {
@@ -41,7 +41,7 @@ class ParameterSharer : public Rewriter {
            dynamic_cast<const ParameterContents*>(v.symbol.raw()) != nullptr;
   }
 
-  // Of integers and conditions of parameters alone; 0 for any other expression.
+  // The size of an integer or condition that consists of parameters only; 0 for any other expression.
   int tree_size(const Expr& e) {
     return sizes_.get(e, [&] { return counted(e); });
   }

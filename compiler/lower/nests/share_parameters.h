@@ -1,16 +1,17 @@
-// share_parameters -- large integers of parameters alone get names, bound once at the root.
+// share_parameters -- bind large integer expressions of parameters to names at the root.
 //
 // In:  a Program (definitions as DAGs over pure variables, reduction variables and parameters).
-// Out: the same, in which no integer of parameters alone is larger than a few nodes; the names.
+// Out: the same program, in which integer expressions of parameters have at most a few nodes; and the names.
 //
 //   f(x) = g(min(x, (w + 6) / 8 * 4 + 3))        let shared.0 = (w + 6) / 8
 //   h(x) = f(min(x, ((w + 6) / 8 + 1) / 2))  =>  f(x) = g(min(x, shared.0 * 4 + 3))  ...
 //
-// Why: the regions of a pyramid's levels are such integers, each a division of the last one. Bounds
-// inference puts them into each other; as trees they double with each level, and every loop that
-// has a condition on them would say all of it. Method: children first; what is large in terms of
-// the names found below it becomes a name. Equal ones are one. Not done: in programs with a
-// memoized Func, whose key is made of the parameters that it mentions.
+// Why: the regions of a pyramid's levels are such expressions, each a division of the last one. Bounds inference
+//      substitutes them into each other; as trees their size doubles with each level, in every loop that has a
+//      condition on them.
+// Method: children first; an expression that is large in terms of the names found below it gets a name. Equal
+//         expressions share one.
+// Not done: programs with a memoized Func, whose key consists of the parameters that it mentions.
 #pragma once
 
 #include <string>
@@ -21,7 +22,7 @@
 
 namespace retrograde::lower {
 
-// Each may use those before it.
+// The values may use names bound before them.
 std::vector<std::pair<std::string, Expr>> share_parameters(Program& program);
 
 }  // namespace retrograde::lower

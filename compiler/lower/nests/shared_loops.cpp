@@ -32,7 +32,7 @@ Interval shifted(const Interval& range, const Expr& shift) {
   return {simplify(range.min - shift), simplify(range.max - shift)};
 }
 
-// Where a loop variable that takes all values of `all` is inside of its own range.
+// Adds the conditions under which a loop variable that runs over `all` lies in its own range.
 void add_conditions(ComputePlace& home, const Expr& value, const Interval& own, const Interval& all,
                     std::vector<Expr>& conditions) {
   if (!equal(own.min, all.min) && !is_known(home, own.min <= all.min))
@@ -43,11 +43,11 @@ void add_conditions(ComputePlace& home, const Expr& value, const Interval& own, 
 
 Loop& loop_from_inside(std::vector<Loop>& loops, int depth) { return loops[loops.size() - depth]; }
 
-// One of the two that are joined.
+// One of the two stages that are joined.
 struct Side {
-  std::vector<Loop> loops;       // as it would have them alone, outermost first
-  std::vector<Expr> at;          // their variables in terms of the shared ones
-  std::vector<Expr> conditions;  // under which it runs
+  std::vector<Loop> loops;       // as the stage would have them alone, outermost first
+  std::vector<Expr> at;          // their variables in terms of the shared loops
+  std::vector<Expr> conditions;  // under which the stage runs
 };
 
 Strand strand_of(const Needs& needs, const Side& side) { return {needs, side.loops, side.at}; }
@@ -67,7 +67,7 @@ Box substituted(const Box& box, const Substitution& values) {
   return result;
 }
 
-// The needs of one side become a strand, or, where it always runs, part of the common ones.
+// Adds the needs of one side as a strand, or, if it always runs, to the common needs.
 void add_needs(Emitted& code, Needs needs, const Side& side) {
   if (!side.conditions.empty()) {
     code.strands.push_back(strand_of(needs, side));
@@ -79,7 +79,7 @@ void add_needs(Emitted& code, Needs needs, const Side& side) {
   merge_needs(code, needs);
 }
 
-// The statement of the side that joins speaks of its own loop variables.
+// Binds the loop variables of the joining side, which its statement uses.
 Stmt with_variables(Stmt stmt, const Side& side) {
   for (size_t d = side.loops.size(); d-- > 0;)
     stmt = make_let(side.loops[d].name, side.at[d], stmt);
@@ -130,8 +130,8 @@ void join(Emitted& code, SharedLoops around, Emitted other, const std::vector<Lo
 
 namespace {
 
-// A strand's loop variables in terms of the shared loops: as they are where its stage runs, and
-// kept inside of their ranges.
+// A strand's loop variables in terms of the shared loops: their values where its stage runs, and the values clamped to
+// their ranges.
 struct InLoops {
   Substitution values, inside;
   std::vector<Expr> conditions;
@@ -158,11 +158,10 @@ InLoops in_loops(const Strand& strand, SharedLoops around, size_t inner) {
   return result;
 }
 
-// The hull of boxes of which only those count whose condition holds. Where none does, anything will
-// do that lies inside of what is ever needed.
+// The hull of the boxes whose condition holds. If none holds, any box inside of the needed region is correct.
 class ConditionalHull {
  public:
-  // `inside`: the box, moved to where its stage runs when it does not.
+  // `inside`: the box, clamped to its stage's range for iterations in which the stage does not run.
   void add(const Expr& runs, const Box& box, const Box& inside) {
     if (hull_.empty()) {
       hull_ = box;
@@ -180,9 +179,9 @@ class ConditionalHull {
   const Box& box() const { return always_; }
 
  private:
-  Box hull_;    // where any stage runs
-  Box always_;  // the same, and something where none does
-  Expr runs_;   // whether any does
+  Box hull_;    // where at least one stage runs
+  Box always_;  // the same, and a valid box where none runs
+  Expr runs_;   // whether at least one runs
 
   void add_end(const Expr& runs, const Expr& end, const Expr& both, Expr& hull_end,
                Expr& always_end) const {

@@ -30,21 +30,21 @@ Interval held_from_first(const Interval& side, const Loop& loop) {
 
 namespace {
 
-// A split promises where its loop variable lies. It does not speak of the iterations of a warm-up,
-// nor of the one before the first, whose front is where the first part begins.
+// Removes the promises of splits about loop variables. They do not hold in warm-up iterations, nor in the one before
+// the first iteration, whose front is where the first part begins.
 Interval without_promises(const Interval& part) {
   return {ir::without_promises(part.min), ir::without_promises(part.max)};
 }
 
 constexpr int longest_warm_up = 256;
-constexpr int longest_reach = 16;   // of the first part that is worth a smaller window
-constexpr int undecided_steps = 4;  // of a warm-up whose length is not a constant so far
+constexpr int longest_reach = 16;   // of a first part that is worth a smaller window
+constexpr int undecided_steps = 4;  // of a warm-up whose length is not known to be constant
 
 bool can_slide_over(const Loop& loop) {
   return loop.runs == ForType::Serial || loop.runs == ForType::Unrolled;
 }
 
-// Every update writes, and reads of f itself, at the dimension's own variable.
+// Whether every update writes, and reads of f itself, at the dimension's own variable only.
 bool is_pure_in(const LoopedFunc& f, int d) {
   const std::string& var = f.func->args[d];
   auto is_var = [&](const Expr& e) { return e.as<Variable>() && e.as<Variable>()->name == var; };
@@ -61,7 +61,7 @@ class Slider {
   Slider(const LoopedFunc& f, const Box& box, const std::vector<Loop>& around)
       : f_(f), box_(box), slid_(box.size(), false), facts_(facts_of(around)) {}
 
-  // From here on of loops further out, each iteration of which has those before the first of `inner`, too.
+  // Continues with the loops outside of `inner`, each iteration of which includes the warm-up of `inner`.
   void hold(const Loop& inner) {
     for (Interval& side : box_) side = held_from_first(side, inner);
   }
@@ -85,8 +85,7 @@ class Slider {
   std::vector<bool> slid_;
   const BoundsMap facts_;
 
-  // The ends in the direction of movement: an iteration adds what lies beyond the front that the
-  // one before had.
+  // The front is the end in the direction of movement: an iteration adds the values beyond the front of the one before.
   bool is_upwards_ = true;
   Expr front_, back_;
 
@@ -113,7 +112,7 @@ class Slider {
     return is_upwards_ || is(Monotonic::Decreasing);
   }
 
-  // First coordinate that the iterations before `iteration` have not computed.
+  // The first coordinate that the iterations before `iteration` have not computed.
   Expr fresh_at(const Slide& slide, const Expr& iteration) const {
     Expr before = substitute(front_, slide.loop.name, simplify(iteration - 1));
     return is_upwards_ ? before + 1 : before - 1;
@@ -123,7 +122,7 @@ class Slider {
     return as_const_int(simplify(ir::without_promises(without_likely(ahead)), facts_));
   }
 
-  // No values in common with the iteration before: nothing to gain.
+  // Whether an iteration shares no values with the one before, so that sliding saves nothing.
   bool never_overlaps(const Expr& fresh) const {
     Expr apart = is_upwards_ ? back_ >= fresh : back_ <= fresh;
     return can_prove(without_likely(apart), facts_);
@@ -144,7 +143,7 @@ class Slider {
     return simplify(is_upwards_ ? max(back_, fresh) : min(back_, fresh));
   }
 
-  // Finds the lead with which the parts begin exactly where the first iteration's box does.
+  // Finds a lead for which the parts begin exactly where the first iteration's box does.
   bool start_early(Slide& slide, int lead) const {
     auto fresh = fresh_part(slide);
     if (!fresh) return false;
@@ -162,7 +161,7 @@ class Slider {
     return false;
   }
 
-  // The front of an iteration before the first, and whether it is at `first` or beyond it.
+  // The front `lead` iterations before the first, and whether it is at `first` or beyond.
   Expr front_at(const Slide& slide, int lead) const {
     return substitute(front_, slide.loop.name, simplify(slide.loop.min - lead));
   }
@@ -170,8 +169,8 @@ class Slider {
     const Expr is_there = is_upwards_ ? front >= first : front <= first;
     return can_prove(ir::without_promises(without_likely(is_there)), facts_);
   }
-  // A clamp may keep parts from beginning before the first iteration's box. But the earliest
-  // iteration whose front is not before it has the fewest values to compute at once.
+  // Clamps may prevent the parts from beginning before the first iteration's box. Then the earliest iteration whose
+  // front is not before the box has the fewest values to compute at once.
   int earliest_start(const Slide& slide, int lead, const Expr& first) const {
     int k = lead;
     while (k < lead + longest_warm_up && difference(front_at(slide, k), first) != 0 &&
@@ -180,8 +179,8 @@ class Slider {
     return k;
   }
 
-  // How far behind its front the first part begins, at most: where a chain stays inside of an image,
-  // a coordinate for each Func behind it at the border, and none elsewhere.
+  // An upper bound on how far the first part begins behind its front. If a chain of Funcs stays inside an image, it is
+  // one coordinate per Func behind this one at the border, and zero elsewhere.
   std::optional<int> reach_of_first_part(const Slide& slide, const Expr& first) const {
     const Expr front = front_at(slide, slide.lead);
     for (int reach = 0; reach <= longest_reach; reach++) {
@@ -209,13 +208,13 @@ class Slider {
       slide.touched = without_promises(from(at_least_as_far_back(*fresh, *reach)));
     const Expr start = simplify(slide.loop.min - slide.lead);
     const Expr is_first = variable(slide.loop.name) <= start;
-    // Marked, so that partition_loops takes the first iteration off.
+    // Marked likely, so that partition_loops separates the first iteration.
     if (simplify(select(is_first, first, *fresh)).as<Select>()) fresh = likely(*fresh);
     slide.part = without_promises(from(select(is_first, first, *fresh)));
     return true;
   }
 
-  Expr alignment(int d) const {  // of align_bounds, which parts have, too
+  Expr alignment(int d) const {  // from align_bounds, which also applies to parts
     for (const Bound& bound : f_.schedule.bounds) {
       if (bound.var == f_.func->args[d] && bound.modulus.defined() && bound.remainder.defined())
         return bound.modulus;
@@ -223,7 +222,7 @@ class Slider {
     return 1;
   }
 
-  // The loops of every stage, over a part like this one, write nothing outside of it.
+  // Whether the loops of every stage, over a part of this extent, write nothing outside of it.
   bool stays_inside(const Slide& slide) const {
     Expr extent = simplify(without_likely(slide.part.max - slide.part.min + 1));
     for (size_t s = 0; s < f_.stages.size(); s++) {

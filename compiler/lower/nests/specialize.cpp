@@ -11,7 +11,7 @@
 namespace retrograde::lower {
 namespace {
 
-// A condition that is known, taken apart.
+// A known fact: a condition without And, Or and Not, and its value.
 struct Known {
   Expr condition;
   bool value;
@@ -41,7 +41,7 @@ Definition assuming(const Definition& definition, const Expr& condition, bool va
   std::vector<Known> known;
   Substitution constants;
   take_apart(condition, value, known, constants);
-  // What another specialization left is in this form.
+  // Other specializations leave conditions in simplified form.
   take_apart(simplify(condition), value, known, constants);
   StepRewriter under([&](const Expr& e, const auto&) -> Expr {
     if (const Variable* v = e.as<Variable>()) {
@@ -64,7 +64,7 @@ Definition assuming(const Definition& definition, const Expr& condition, bool va
 
 std::vector<Variant> variants_of(const LoopedFunc& f, int stage) {
   std::vector<Variant> variants;
-  Definition left = f.stages[stage];  // for what no condition so far holds
+  Definition left = f.stages[stage];  // for the case that no condition so far holds
   const std::vector<StageLoops> specializations = std::move(left.schedule.specializations);
   left.schedule.specializations.clear();
   auto with = [&](const Definition& definition) {

@@ -16,38 +16,38 @@ Interval Loop::range() const { return {min, simplify(min + extent - 1)}; }
 
 namespace {
 
-// How the value of a variable that was split or fused away follows from those that replaced it. One
-// of these may have its name: vectorize(x, 8) replaces x by an outer x and an inner loop.
+// How a variable that was fused away is recovered from the fused variable. The fused variable may have the same name:
+// vectorize(x, 8) replaces x by an outer x and an inner loop.
 struct Fused {
-  std::string fused;  // the variable that took the place of outer and inner
+  std::string fused;  // the variable that replaced outer and inner
   Range outer, inner;
-  bool is_outer = false;  // which of the two this is about
+  bool is_outer = false;  // whether this describes outer or inner
 };
 
-// A split whose last part is guarded: no iteration of the outer loop begins past the end.
+// A split with a guarded tail: no iteration of the outer loop begins beyond the end.
 struct Tail {
   std::string outer, inner;
   Expr outer_extent;
-  Expr first, last;  // what an iteration of the outer loop stays between
+  Expr first, last;  // the bounds of an iteration of the outer loop
 };
 
 struct Derived {
   std::string var;
-  Expr value;          // over the variables that replaced it
+  Expr value;          // in terms of the variables that replaced it
   Expr guarded_value;  // the same, clamped where a guard applies
-  Expr guard;          // over them, too; undefined when there is none
+  Expr guard;          // likewise; undefined if there is none
   std::optional<Fused> fused;
   std::optional<Tail> tail = {};
 };
 
-// Whether storage of the Func grows with what its loops touch, and holds nothing else.
-bool has_room_of_its_own(const LoopedFunc& f) {
+// Whether the Func has storage of its own that grows with the region its loops access.
+bool has_growing_storage(const LoopedFunc& f) {
   return !f.is_output && !f.func->is_extern() && !f.schedule.memoized && !f.schedule.async &&
          is_stored_where_computed(f);
 }
 
-// Tiles of what needs nothing may run past the end. So they begin where the tiles of what is added
-// to it later do, and a tile in registers has constant places, at the border, too.
+// Whether a definition reads nothing. Its tiles may run beyond the end of the region: they then begin where the tiles
+// of updates begin, and register tiles have constant indices, at the border, too.
 bool reads_nothing(const Definition& definition) {
   return !any_node(definition, [](const Call& call) {
     return call.call_type != CallType::Operator || op_info(call.op).cls == OpClass::Effect;
@@ -61,7 +61,7 @@ class NestBuilder {
         prefix_(stage_prefix(f.name(), stage)),
         is_update_(stage > 0),
         hosts_updates_(hosts_own_updates(f, stage)),
-        may_run_past_the_end_(stage == 0 && !hosts_updates_ && has_room_of_its_own(f) &&
+        may_run_past_the_end_(stage == 0 && !hosts_updates_ && has_growing_storage(f) &&
                               reads_nothing(definition_)),
         ranges_(domain) {}
 
@@ -80,7 +80,8 @@ class NestBuilder {
   const bool is_update_, hosts_updates_, may_run_past_the_end_;
   bool rounds_up_ = false;
   Domain ranges_;  // of every variable that exists after the splits so far
-  std::vector<std::vector<Derived>> derived_;  // by split; what one of them derives is one step
+  std::vector<std::vector<Derived>>
+      derived_;  // one step per split, with the variables that it derives
 
   Expr loop_variable(const std::string& var) const { return variable(prefix_ + var); }
 
@@ -113,8 +114,8 @@ class NestBuilder {
     if (is_zero(simplify(extent % split.factor))) return TailStrategy::RoundUp;  // there is no tail
     if (split.tail != TailStrategy::Auto) return split.tail;
     if (may_run_past_the_end_) return TailStrategy::RoundUp;
-    // An update may read what it writes, so no point of it may run twice; nor may one that has
-    // been added to.
+    // An update may read the elements that it writes, so each point of it must run once. The same holds for a stage
+    // whose loops an update has joined.
     const bool runs_once = is_update_ || hosts_updates_ || split.exact;
     return runs_once ? TailStrategy::GuardWithIf : TailStrategy::ShiftInwards;
   }
@@ -131,7 +132,7 @@ class NestBuilder {
         rounds_up_ = rounds_up_ || !is_zero(simplify(old.extent % factor));
         return derive(split.old_var, base + inner + old.min);
       case TailStrategy::ShiftInwards:
-        // Where the extent is less than the factor, the only block begins before the domain.
+        // If the extent is smaller than the factor, the only block begins before the domain.
         rounds_up_ = rounds_up_ || !can_prove(old.extent >= factor);
         base = min(likely(base), old.extent - factor);
         return derive(split.old_var, base + inner + old.min);
@@ -149,7 +150,7 @@ class NestBuilder {
     }
   }
 
-  // The outer variable is recovered by division, the inner by remainder.
+  // Recovers the outer variable by division and the inner one by remainder.
   void apply_fuse(const Split& split) {
     const Range outer = ranges_.at(split.outer), inner = ranges_.at(split.inner);
     ranges_[split.old_var] = {0, simplify(outer.extent * inner.extent)};
@@ -168,10 +169,9 @@ class NestBuilder {
     return bounds_of(substitute(loop_variable(var), guarded), loops);
   }
 
-  // Interval arithmetic does not know that a part begins inside the range, when outer and inner
-  // variable stay inside theirs. So what the part needs of others begins where it does: at a
-  // multiple of the factor. (A variable that is split again, and shifted inwards, may begin before
-  // its range.)
+  // Clamps the part of a guarded split for bounds inference, which does not know that a part begins inside the range if
+  // outer and inner variable are in range. The region that the part needs then begins at a multiple of the factor, too.
+  // (A variable that is split again and shifted inwards may begin before its range.)
   Expr within_tail(const Tail& tail, const Expr& value, const Substitution& guarded) const {
     const Interval outer = reached(tail.outer, guarded), inner = reached(tail.inner, guarded);
     if (!outer.is_bounded() || !inner.is_bounded()) return value;
@@ -180,9 +180,8 @@ class NestBuilder {
                    {value, simplify(substitute(tail.first, guarded)), simplify(tail.last)});
   }
 
-  // Interval arithmetic cannot divide by an extent that is a symbol. But a fused variable that
-  // stays inside its range recovers variables that stay inside theirs; one that a tail takes
-  // outside does so in proportion.
+  // Interval arithmetic cannot divide by a symbolic extent. But if a fused variable is in range, the variables
+  // recovered from it are in range; if a tail takes it out of range, they leave theirs in proportion.
   Expr within_fused_range(const Fused& from, const Expr& value, const Substitution& guarded) const {
     const Interval fused = reached(from.fused, guarded);
     const Range& own = from.is_outer ? from.outer : from.inner;
@@ -195,9 +194,9 @@ class NestBuilder {
     return call_op(Op::promise_clamped, Int(32), {value, simplify(first), simplify(last)});
   }
 
-  // Later derivations replace variables that earlier ones introduced: resolve from the last to the
-  // first. At each step `values` holds what the variables stand for that exist after that split: a
-  // fused variable may have the name of one that it replaced, which only what was before it means.
+  // Later derivations replace variables that earlier ones introduced, so they are resolved from the last to the first.
+  // At each step `values` holds the values of the variables that exist after that split: a fused variable may have the
+  // name of one that it replaced, which has the other meaning before the split.
   void resolve(StageNest& nest) {
     Substitution values, guarded;
     for (auto step = derived_.rbegin(); step != derived_.rend(); ++step) {

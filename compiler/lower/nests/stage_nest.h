@@ -1,5 +1,4 @@
-// stage_nest.h -- the loops of one stage: its splits, fuses and reorders turned into loop
-// variables.
+// stage_nest.h -- builds the loops of one stage from its splits, fuses and reorders.
 //
 //   f(x) = ...; f.split(x, xo, xi, 8)       for f.s0.xo in [0, ceil(extent / 8)):
 //                                      =>     for f.s0.xi in [0, 8):
@@ -22,7 +21,7 @@ struct Loop {
   Expr min, extent;
   ForType runs = ForType::Serial;
   Partition partition = Partition::Auto;
-  // The loop of another stage that this one runs in, which directives name; empty: it runs alone.
+  // The other stage's loop that this one runs in (compute_with), which directives name; empty: it has its own loop.
   std::string runs_in = {};
   Interval range() const;
   const std::string& known_as() const { return runs_in.empty() ? name : runs_in; }
@@ -31,20 +30,19 @@ struct Loop {
 struct StageNest {
   std::vector<Loop> loops;  // innermost first
   Substitution coordinate;  // pure or reduction variable -> its value at a point of the loops
-  // The same for bounds inference: where a guard keeps the point inside, the value says so.
+  // The same for bounds inference: clamped where a guard keeps the point inside.
   Substitution guarded_coordinate;
-  std::vector<Expr> guards;  // the point is in the domain iff all hold
+  std::vector<Expr> guards;  // the point is in the domain if and only if all hold
   bool rounds_up = false;    // the loops run beyond the domain
 };
 
-// `extent_of_domain`: for each pure and reduction variable of the stage, the range it must cover.
+// For each pure and reduction variable of the stage, the range that the loops must cover.
 using Domain = std::map<std::string, Range>;
 StageNest build_stage_nest(const LoopedFunc& f, int stage, const Domain& domain);
 
-// Whether the loops of a stage, over `extent` (> 0) coordinates of a pure variable, reach none
-// beyond.
+// Whether the loops of a stage, over `extent` (> 0) coordinates of a pure variable, visit no coordinates beyond it.
 bool covers_exactly(const LoopedFunc& f, int stage, const std::string& var, const Expr& extent);
-// Whether some stage's loops may reach further than a region along a dimension of the Func.
+// Whether the loops of some stage may run beyond a region along a dimension of the Func.
 bool runs_beyond_regions(const LoopedFunc& f, size_t dimension);
 
 }  // namespace retrograde::lower

@@ -41,7 +41,7 @@ class Folder {
   const bool is_vectorized_;
   std::vector<Fold> folds_;
 
-  // Windows are wider before a loop's first iteration where they follow from y / 2 beside y.
+  // Before a loop's first iteration, windows that depend on both y / 2 and y are wider.
   static BoundsMap facts_with_early_iterations(const std::vector<Loop>& around,
                                                const std::vector<Slide>& slides) {
     BoundsMap facts = facts_of(around);

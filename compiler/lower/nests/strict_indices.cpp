@@ -16,7 +16,7 @@ bool reads_element(const Expr& e) {
   return call && (call->call_type == CallType::Func || call->call_type == CallType::Image);
 }
 
-// A float sum and a float product that it may be contracted with; elements that e reads are values.
+// Whether e contains a float sum and a float product that could be contracted; elements that e reads count as values.
 bool may_contract(const Expr& e) {
   bool sum = false, product = false;
   walk(e, [&](const Expr& part) {
@@ -36,7 +36,7 @@ bool may_be_negative_as_nan(const Expr& value, Type type) {
          !bounds_of(value, Scope<Interval>()).has_lower_bound();
 }
 
-// Of a coordinate, down to the elements that it reads.
+// Makes a coordinate strict, down to the elements that it reads.
 Expr strict_coordinate(const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
   if (reads_element(e)) return e;
   const auto* cast = e.as<Cast>();

@@ -7,7 +7,7 @@
 namespace retrograde::lower {
 namespace {
 
-// What an end may not mention outside of its definition: coordinates.
+// The names that bounds may not mention outside of the definition: coordinates.
 std::unordered_set<std::string> coordinates_of(const LoopedFunc& f) {
   std::unordered_set<std::string> names(f.func->args.begin(), f.func->args.end());
   for (const Definition& stage : f.stages) {
@@ -20,7 +20,7 @@ Interval bounds_of_value(const LoopedFunc& f, size_t value,
                          const std::unordered_set<std::string>& coordinates,
                          const ValueBounds& known) {
   if (f.func->is_extern()) return Interval::everything();
-  // What the pure definition stores only in some places may hold anything elsewhere.
+  // If the pure definition is predicated, elements elsewhere may have any value.
   if (f.stages[0].predicate.defined()) return Interval::everything();
   Scope<Interval> anywhere;
   for (const std::string& name : coordinates) anywhere.push(name, Interval::everything());

@@ -1,9 +1,9 @@
-// value_bounds -- between what values a Func lies, as far as its definitions tell.
+// value_bounds -- bound the values of Funcs, as far as their definitions allow.
 //
 //   layer(x, y) = clamp(cast<int>(depth(x, y)), 0, 6)      =>   layer: [0, 6]
 //
-// So that a Func read at layer(x, y) has a bounded region. Coordinates may be anything; what is
-// left are constants and parameters. Cost: one pass of interval arithmetic over every definition.
+// A Func read at layer(x, y) then has a bounded region. Bounds hold for all coordinates and consist of constants and
+// parameters. Cost: one pass of interval arithmetic over every definition.
 #pragma once
 
 #include "analysis/interval.h"

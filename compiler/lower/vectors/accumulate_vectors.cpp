@@ -1,7 +1,6 @@
-// accumulate_vectors -- combine the lanes of a reduction once after its loop.
+// accumulate_vectors -- combine the lanes of a vector reduction once, after its loop.
 // In:  Vector; names unique.
-// Out: Vector; names unique. The operands of a reduction are combined in another order, which
-//      depends on the program alone.
+// Out: Vector; names unique. Operands of a reduction are combined in another order, which depends on the program only.
 //
 //   for (r, 0, n) {                          allocate t[16] {
 //     f[i] = f[i] + reduce(add, x, 1)          t[ramp(0, 1, 16)] = broadcast(-0, 16)
@@ -9,14 +8,13 @@
 //                                              if (0 < n) { f[i] = f[i] + reduce(add, t[...], 1) }
 //                                            }
 //
-// The vector t has a constant size, so that it lives in registers. Sums of products of 16-bit
-// numbers keep half as many lanes: machines add such products in pairs (ir/narrow_product.h).
+// The vector t has a constant size, so it lives in registers. Sums of products of 16-bit numbers keep half the
+// lanes: processors add such products in pairs (ir/narrow_product.h).
 //
-// Method: outermost loop first. A store belongs to the loop when its index, and whatever decides
-//         that it runs at all, is the same in every iteration. It must be a chain of one operator
-//         from its own element over reductions of vectors, and the loop must not read the buffer
-//         elsewhere. The element is not touched when the loop does not run.
-// Not done: stores under conditions that vary; loops that run as tasks; several operators.
+// Method: outermost loop first. A store is moved if its index, and every condition that decides whether it runs, is
+//         loop-invariant. It must be a chain of one operator from its own element over reductions of vectors, and
+//         nothing else in the loop may read or write the buffer. If the loop does not run, the element is not touched.
+// Not done: stores under conditions that vary; parallel loops; chains with several operators.
 // Source: folklore (reduction variable expansion). Tests: test/golden/lower/accumulate_vectors/,
 // loop_passes_test, vector_reduction_test.
 #include "lower/statement_passes.h"
@@ -43,7 +41,7 @@ const VectorReduce& reduce_of(const UpdateChain::Term& term) {
   return *term.value.as<VectorReduce>();
 }
 
-// f[i] op reduce(x) op reduce(y) ..., of vectors of one type
+// Matches f[i] op reduce(x) op reduce(y) ..., where all reduced vectors have one type.
 std::optional<UpdateChain> as_chain(const Store& store) {
   auto chain = find_vector_reduction(store);
   if (!chain) return std::nullopt;
@@ -56,12 +54,12 @@ std::optional<UpdateChain> as_chain(const Store& store) {
   return is_reduced ? chain : std::nullopt;
 }
 
-// ---- what a loop does to its buffers ----
+// ---- reductions in a loop ----
 
 struct Candidate {
   const Store* store;
   UpdateChain chain;
-  Stmt whole;                    // the store, or the Atomic around it
+  Stmt statement;                // the store, or the Atomic around it
   std::vector<Expr> conditions;  // under which it runs at least once
 };
 
@@ -73,7 +71,7 @@ class LoopReductions {
     visit(loop.body, true);
   }
 
-  // Those that nothing else in the loop could see.
+  // Candidates whose buffer nothing else in the loop reads or writes.
   std::vector<Candidate> found() const {
     return filtered(candidates_, [&](const Candidate& candidate) {
       return !others_.count(candidate.store->name);
@@ -81,7 +79,7 @@ class LoopReductions {
   }
 
  private:
-  // `runs_alike`: whether the statement runs in every iteration of the loop, or in none.
+  // `runs_alike`: whether the statement runs either in every iteration of the loop or in none.
   void visit(const Stmt& s, bool runs_alike) {
     if (!s.defined()) return;
     match(
@@ -130,7 +128,7 @@ class LoopReductions {
     store ? visit_store(s, *store, runs_alike) : visit(n.body, false);
   }
 
-  void visit_store(const Stmt& whole, const Store& n, bool runs_alike) {
+  void visit_store(const Stmt& statement, const Store& n, bool runs_alike) {
     auto chain =
         runs_alike && !n.predicate.defined() && is_invariant(n.index) ? as_chain(n) : std::nullopt;
     note(n.index);
@@ -141,14 +139,14 @@ class LoopReductions {
       return;
     }
     for (const UpdateChain::Term& term : chain->terms) note(reduce_of(term).value);
-    candidates_.push_back({&n, std::move(*chain), whole, conditions_});
+    candidates_.push_back({&n, std::move(*chain), statement, conditions_});
   }
 
   bool is_invariant(const Expr& e) const {
     return !reads_memory(e, MemoryReads::Calls) && !uses_any_variable(e, bound_);
   }
 
-  // Buffers that the expression reads, or hands on.
+  // Records the buffers that the expression reads or passes to a call.
   void note(const Expr& e) {
     walk(
         e, [&](const Load& load) { others_.insert(load.name); },
@@ -164,8 +162,8 @@ class LoopReductions {
 
 // ---- the vector of partial results ----
 
-// A vector whose lanes are put in another order before they are combined: the vector itself is
-// what can be accumulated.
+// Matches a permutation of one vector's lanes. The order of lanes does not matter to the reduction, so the unpermuted
+// vector can be accumulated.
 const Shuffle* as_reordering(const Expr& e) {
   const auto* shuffle = e.as<Shuffle>();
   if (!shuffle || shuffle->vectors.size() != 1 ||
@@ -196,7 +194,7 @@ class Accumulator {
     type_ = value.type().with_lanes(in_pairs_ ? lanes / 2 : lanes);
   }
 
-  // Whether lanes are combined at all.
+  // Whether the reduction combines lanes at all.
   bool is_of_use() const { return type_.lanes() > store_.value.type().lanes(); }
 
   Stmt start() const { return store(identity_of(op(), type_)); }
@@ -210,13 +208,13 @@ class Accumulator {
     return store(value);
   }
 
-  // After the loop.
+  // The statement after the loop: reduces the vector and updates the element.
   Stmt finish() const {
     const Expr all = reordering_ ? make_shuffle({load()}, reordering_->indices) : load();
     const Expr sum = make_vector_reduce(op(), all, store_.value.type().lanes());
     Stmt result = make_store(store_.name, binary(chain_.kind, chain_.own, sum), store_.index, {},
                              store_.symbol);
-    if (const auto* atomic = candidate_.whole.as<Atomic>())
+    if (const auto* atomic = candidate_.statement.as<Atomic>())
       result = make_atomic(atomic->name, result);
     const std::vector<Expr> conditions = filtered(
         candidate_.conditions, [&](const Expr& condition) { return !is_const_true(condition); });
@@ -262,7 +260,7 @@ Stmt accumulate_vectors(const Stmt& all) {
     for (const Candidate& candidate : candidates) {
       Accumulator accumulator(candidate, fresh(candidate.store->name + ".partial"));
       if (!accumulator.is_of_use()) continue;
-      steps[candidate.whole.get()] = accumulator.step();
+      steps[candidate.statement.get()] = accumulator.step();
       accumulators.push_back(std::move(accumulator));
     }
     if (accumulators.empty()) return rewriter.children(s);

@@ -1,7 +1,7 @@
-// blend_masked_stores -- storage of one's own is read and written by whole vectors under masks,
-// too. In:  Vector; names unique. Out: Vector; names unique. What a store leaves alone it writes
-// back; what a load reads beyond its
-//      mask is not used.
+// blend_masked_stores -- replace masked accesses of local allocations by accesses of whole vectors.
+// In:  Vector; names unique.
+// Out: Vector; names unique. A store writes the old value back to masked-off elements; elements that a load reads
+//      beyond its mask are not used.
 //
 //   allocate t[8] {                             allocate t[8] {
 //     t[ramp(4, 1, 4) if m] =             =>      t[ramp(4, 1, 4)] =
@@ -9,18 +9,18 @@
 //                                                            t[ramp(4, 1, 4)])
 //   }                                           }
 //
-// So an accumulator stays in a register at the border of its domain, too: LLVM takes masked stores
-// for calls, and a processor that loads what one has just stored waits for the cache. Masked loads
-// of bytes go lane by lane where no instruction does them.
+// Accumulators then stay in registers at the border of a domain, too. LLVM treats masked stores as opaque calls, and
+// a load right after a masked store waits for the cache. Masked loads of bytes have no instruction on many
+// processors and run lane by lane.
 //
-// Method: a vector with constant places in storage of constant size is read or written as it is.
-//         Elsewhere the mask must hold in its first lanes if anywhere (a tail's does): then its
-//         first lane lies inside the storage, which gets room for the others. A store is checked,
-//         and neighbours under one check share it; a load that is for nobody reads from the
-//         beginning. Stores must not be seen by other threads: between the allocation and the store
-//         no loop or branch is a task.
-// Not done: masks that begin later; strided accesses; stores with places of run-time size that do
-//         not read what they replace, which gain nothing.
+// Method: a dense vector with a constant index in storage of constant size is accessed whole. Elsewhere the mask must
+//         be a prefix: it holds in the first lanes or nowhere, as the mask of a tail does. If it holds anywhere, the
+//         first element lies inside the storage, and the storage is padded for the other lanes. Stores run under a
+//         check of the mask's first lane, and neighbouring stores share one check. A load whose mask holds
+//         nowhere reads from the start of the storage. No other thread may see the stores: no parallel loop or fork
+//         lies between the allocation and the store.
+// Not done: masks that hold only in later lanes; strided accesses; stores to storage of run-time size that do not
+//         read the element that they replace, which would gain nothing.
 // Source: folklore. Tests: test/golden/lower/blend_masked_stores/, loop_passes_test.
 #include "lower/statement_passes.h"
 
@@ -42,7 +42,7 @@ namespace retrograde::lower {
 
 namespace {
 
-// Neighbours, perhaps as a ramp of ramps.
+// A dense index: consecutive elements, possibly written as a ramp of ramps.
 struct Dense {
   Expr first;
   int lanes;
@@ -63,7 +63,7 @@ Expr scalar_of(const Expr& e) {
   return splat && splat->value.type().is_scalar() ? splat->value : Expr();
 }
 
-// Of a mask that holds in the first lanes or in none: whether it holds in the first.
+// For a mask that holds in the first lanes or nowhere: the condition that it holds in the first lane.
 Expr first_of_prefix(const Expr& mask) {
   if (const Expr all = scalar_of(mask); all.defined()) return all;
   const auto* lanes = mask.as<Shuffle>();
@@ -82,7 +82,7 @@ Expr first_of_prefix(const Expr& mask) {
   return lane && end.defined() ? binary(mask.kind(), lane->first, end) : Expr();
 }
 
-// The same, simplified; undefined also where it could change in between.
+// The same, simplified; undefined also if it reads memory or calls something, so that its value could change.
 Expr check_of(const Expr& mask) {
   const Expr first = first_of_prefix(mask);
   return first.defined() && !reads_memory(first, MemoryReads::Calls) ? simplify(first) : Expr();
@@ -90,14 +90,14 @@ Expr check_of(const Expr& mask) {
 
 struct Storage {
   std::optional<int64_t> elements;
-  int task;  // how many tasks around it
+  int task;  // number of parallel loops and forks around the allocation
   int padding = 0;
 
-  bool surely_holds(const Dense& places) const {
+  bool can_prove_inside(const Dense& places) const {
     const auto first = as_const_int(places.first);
     return first && elements && *first >= 0 && *first + places.lanes <= *elements;
   }
-  void make_room(const Dense& places) { padding = std::max(padding, places.lanes); }
+  void pad_for(const Dense& places) { padding = std::max(padding, places.lanes); }
 };
 
 class BlendMaskedStores : public Rewriter {
@@ -121,7 +121,7 @@ class BlendMaskedStores : public Rewriter {
   }
 
  private:
-  // Other threads may run it at the same time as what surrounds it.
+  // Rewrites a statement that may run concurrently with the code around it.
   Stmt in_task(const Stmt& s) {
     ++task_;
     Stmt result = children(s);
@@ -174,11 +174,11 @@ class BlendMaskedStores : public Rewriter {
     const auto storage = storage_.find(n.name);
     const auto places = as_dense(n.index);
     if (storage == storage_.end() || !places) return e;
-    if (storage->second.surely_holds(*places))
+    if (storage->second.can_prove_inside(*places))
       return make_load(n.type, n.name, n.index, {}, n.symbol);
     const Expr check = check_of(n.predicate);
     if (!check.defined()) return e;
-    storage->second.make_room(*places);
+    storage->second.pad_for(*places);
     const Expr first = is_known(check)
                            ? places->first
                            : make_select(check, places->first, make_zero(places->first.type()));
@@ -194,10 +194,10 @@ class BlendMaskedStores : public Rewriter {
     const auto storage = storage_.find(n.name);
     const auto places = as_dense(n.index);
     if (storage == storage_.end() || storage->second.task != task_ || !places) return children(s);
-    if (storage->second.surely_holds(*places)) return blended(n);
+    if (storage->second.can_prove_inside(*places)) return blended(n);
     const Expr check = check_of(n.predicate);
     if (!check.defined() || !loads_from(n.value, n.name)) return children(s);
-    storage->second.make_room(*places);
+    storage->second.pad_for(*places);
     if (is_known(check)) return blended(n);
     return checked(check, knowing(check, [&] { return blended(n); }));
   }
@@ -208,7 +208,7 @@ class BlendMaskedStores : public Rewriter {
                       n.symbol);
   }
 
-  // ---- checks of several stores become one ----
+  // ---- merging the checks of several stores ----
 
   Stmt checked(const Expr& condition, const Stmt& body) {
     Stmt result = make_if(condition, body);
@@ -253,8 +253,8 @@ class BlendMaskedStores : public Rewriter {
 
   std::unordered_map<std::string, Storage> storage_;
   int task_ = 0;
-  std::vector<Expr> known_;                              // conditions around
-  std::unordered_set<Stmt, HashNode, SameNode> checks_;  // those that this pass has made
+  std::vector<Expr> known_;                              // conditions around the current statement
+  std::unordered_set<Stmt, HashNode, SameNode> checks_;  // checks that this pass generated
 };
 
 }  // namespace

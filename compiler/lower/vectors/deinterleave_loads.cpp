@@ -1,17 +1,16 @@
-// deinterleave_loads -- read neighbouring strided vectors through dense ones that they share.
+// deinterleave_loads -- read neighbouring strided vectors through dense loads that they share.
 // In:  Vector.
-// Out: Vector; the same stores; no element is read that lies outside of what a statement read.
+// Out: Vector; the same stores; a statement reads no element beyond the range that it read before.
 //
 //   out[..] = in[ramp(b, 2, 8)] + in[ramp(b + 1, 2, 8)]
 //   =>
 //   out[..] = shuffle(u, v; 0, 2, 4, ...) + shuffle(u, v; 1, 3, 5, ...)
 //             with u = in[ramp(b, 1, 8)] and v = in[ramp(b + 8, 1, 8)], the same nodes in both
 //
-// Method: per statement. Loads of one buffer, stride s and n lanes whose bases differ by constants
-//         are a family; those whose offsets from the lowest base fall between j s and (j + 1) s are
-//         picked from the s n elements that start there, when there are at least two of them and
-//         the family reads that far. A load alone is left to code generation, which reads s
-//         vectors for it.
+// Method: per statement. Loads of one buffer with stride s and n lanes, whose bases differ by constants, form a
+//         family. Loads whose offsets from the lowest base lie between j s and (j + 1) s are picked from the s n
+//         elements that start there, if there are at least two of them and the family reads that far. A single load
+//         is left to code generation, which reads s vectors for it.
 // Not done: sharing between statements; predicated loads.
 // Source: folklore. Tests: test/golden/lower/deinterleave_loads/, loop_passes_test.
 #include "lower/statement_passes.h"
@@ -29,7 +28,7 @@ namespace {
 
 constexpr int max_stride = 4;
 
-// What every execution of the statement evaluates.
+// Families of the loads that every execution of the statement evaluates.
 std::vector<StridedFamily> find_families(const Stmt& s) {
   std::vector<StridedFamily> families;
   const auto visit = [&](const Expr& e) {
@@ -50,7 +49,7 @@ class LoadSharer : public Rewriter {
   }
 
   Stmt rewrite(const Stmt& s) override {
-    // What one statement may read another need not: nothing carries over.
+    // Another statement may not be allowed to read the same elements, so no replacement carries over.
     forget();
     replacements_.clear();
     for (const StridedFamily& family : find_families(s)) share(family);
@@ -78,7 +77,7 @@ class LoadSharer : public Rewriter {
     }
   }
 
-  // The stride * lanes elements from `distance` after the first of `lowest`.
+  // Dense loads of stride * lanes elements, starting `distance` after the first element of `lowest`.
   static std::vector<Expr> dense_loads(const StridedLoad& lowest, int64_t distance) {
     const Load& node = lowest.node();
     const int lanes = node.type.lanes();

@@ -1,17 +1,18 @@
-// mask_guarded_loads -- what a select leaves out need not be read from a place that it may be read from.
+// mask_guarded_loads -- replace clamped gathers under a select by dense loads under the select's mask.
 // In:  Vector; names unique.
 // Out: Vector; names unique; the same stores; fewer elements are read.
 //
 //   select(x < 0 || n - 1 < x, 0, in[max(min(x, n - 1), 0)])   =>   select(x < 0 || n - 1 < x, 0,
 //                                                                          in[x if !(x < 0 || n - 1 < x)])
 //
-// where x are neighbours, ramp(b, 1, lanes). Boundary conditions look like this in the borders that partition_loops
-// leaves; clamped, the places would be a gather, where now they are one load under a mask.
+// where x are consecutive, ramp(b, 1, lanes). Boundary conditions look like this in the borders that partition_loops
+// leaves. The clamped index is a gather; without the clamp it is one masked load.
 //
-// Method: in the arm that is taken where a condition does not hold, none of its alternatives holds: of a comparison of
-//         two vectors, a min or max of the same two is one of them. A load whose place is dense then gets the mask.
-// Not done: elements of less than 32 bits, whose masks most machines do lane by lane; places that stay clamped, as
-//           those of repeated edges.
+// Method: in the arm that is taken where a condition is false, all of its alternatives are false. A false comparison
+//         of two vectors decides which of the two their min or max is. A load whose index is dense after this
+//         simplification gets the mask.
+// Not done: elements of less than 32 bits, whose masked loads most processors run lane by lane; indices that stay
+//           clamped, as with repeat_edge.
 // Source: folklore. Tests: test/golden/lower/mask_guarded_loads/, loop_passes_test.
 #include <algorithm>
 #include <vector>
@@ -28,7 +29,7 @@ namespace {
 
 constexpr int least_bits = 32;
 
-// Where the vectors a and b of integers are known to be in this order: a <= b.
+// A known order of two integer vectors: a <= b.
 struct Order {
   Expr a, b;
 };
@@ -66,7 +67,7 @@ class ClampDropper : public Rewriter {
   const std::vector<Order>& orders_;
 };
 
-// What an arm reads where a condition does not hold.
+// Rewrites the loads in the arm that a select takes where its condition is false.
 class ArmRewriter : public Rewriter {
  public:
   ArmRewriter(const Expr& condition, const std::vector<Order>& orders)
@@ -76,7 +77,9 @@ class ArmRewriter : public Rewriter {
   Expr rewrite(const Expr& e) override {
     const auto* load = e.as<Load>();
     if (!load)
-      return e.kind() == Kind::Let ? e : children(e);  // what is named may not be in the condition
+      return e.kind() == Kind::Let
+                 ? e
+                 : children(e);  // the condition may not see names that a let binds
     const Type type = load->type;
     const bool is_gather = type.is_vector() && !load->index.as<Ramp>();
     if (!is_gather || type.bits() < least_bits ||

@@ -1,4 +1,4 @@
-// Minus zero is the identity of floating-point sums: 0 + -0 is 0, and -0 + -0 is -0.
+// Minus zero is the identity of floating-point addition: 0 + -0 is 0, and -0 + -0 is -0.
 #include "lower/vectors/reductions.h"
 
 #include "diagnostics/error.h"

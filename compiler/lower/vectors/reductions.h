@@ -1,4 +1,4 @@
-// What is known of the operators that vectors are reduced by.
+// Identities and update chains of the operators by which vectors are reduced.
 #pragma once
 
 #include <optional>
@@ -9,7 +9,7 @@ namespace retrograde::lower {
 
 // x op identity == x, bit for bit; a broadcast when the type has lanes.
 Expr identity_of(Kind op, Type type);
-// What a store adds to its element, by such an operator and without a predicate.
+// The chain of updates that the store applies to its own element, if it has one operator and no predicate.
 std::optional<UpdateChain> find_vector_reduction(const Store& store);
 
 }  // namespace retrograde::lower

@@ -1,4 +1,4 @@
-// transpose_loads -- read the columns of a block by its rows, and transpose in registers.
+// transpose_loads -- read the columns of a block by rows, and transpose them in registers.
 // In:  Vector.
 // Out: Vector; the same stores; the same elements are read.
 //
@@ -7,11 +7,11 @@
 //   out[ramp(a + 2n, 1, 4)] = in[ramp(b + 2, 64, 4)]   out[ramp(a, 1, 4)] = lanes 0 ... 3 of t
 //   out[ramp(a + 3n, 1, 4)] = in[ramp(b + 3, 64, 4)]   ...
 //
-// Method: per run of neighbouring stores, looking through the lets around each. Loads of a buffer
-//         that the run does not store to, with one constant stride and a power of two lanes, whose
-//         bases go up by one, are the columns; as many as the largest power of two there is, and
-//         not fewer than min_columns. Interleaved, the rows are the columns one after the other.
-// Not done: strides up to 4, which deinterleave_loads shares; strides unknown until run time.
+// Method: per run of neighbouring stores, looking through the lets around each. Columns are loads of a buffer that the
+//         run does not store to, with one constant stride and a power of two lanes, whose bases go up by one. A
+//         block takes the largest power of two of columns, at least min_columns. The interleaved rows hold the
+//         columns one after the other.
+// Not done: strides up to 4, which deinterleave_loads handles; strides unknown until run time.
 // Source: folklore. Tests: test/golden/lower/transpose_loads/, loop_passes_test.
 #include "lower/statement_passes.h"
 
@@ -36,17 +36,17 @@ constexpr size_t min_columns = 4, max_columns = 16;
 
 bool is_power_of_two(int64_t n) { return n > 0 && (n & (n - 1)) == 0; }
 
-// Stores one after the other, with the lets around each.
+// Neighbouring stores, each with its lets.
 struct Run {
   std::vector<Stmt> stmts;
   std::vector<StridedLoad> columns;  // with the lets around the store substituted in their bases
   std::unordered_set<std::string> stored;
 };
 
-// Adds the statement to the run, unless it is no store.
+// Adds the statement to the run; false if it is not a store.
 bool joins(Run& run, const Stmt& s) {
   Substitution lets;
-  std::unordered_set<std::string> inside;  // cannot be known before the run
+  std::unordered_set<std::string> inside;  // names whose values are not known before the run
   Stmt inner = s;
   while (const auto* let = inner.as<LetStmt>()) {
     const bool is_plain = let->value.type().is_scalar() &&
@@ -107,7 +107,7 @@ class Transposer : public StatementRewriter {
   }
 
  private:
-  using Columns = std::map<int64_t, std::vector<Expr>>;  // by their distance from the first
+  using Columns = std::map<int64_t, std::vector<Expr>>;  // by offset from the family's base
 
   Stmt transposed(const Run& run) {
     Lets blocks;
@@ -120,7 +120,7 @@ class Transposer : public StatementRewriter {
                      }));
   }
 
-  // Columns side by side, taken from the left in powers of two.
+  // Splits neighbouring columns into blocks, from the left, with powers of two as widths.
   void add_blocks(const StridedFamily& family, Lets& blocks, Replacements& replacements) {
     Columns columns;
     for (const StridedLoad& load : family) columns[load.offset].push_back(load.load);

@@ -1,6 +1,6 @@
-// try_plain_products -- sums of strong products are added up with plain ones first.
+// try_plain_products -- sum strong products with plain multiplications first, and repeat the sum if it gives NaN.
 // In:  Vector; names unique.
-// Out: Vector; names unique; the same values, but for the sign of a zero.
+// Out: Vector; names unique; the same values, except for the sign of a zero.
 //
 //   allocate kept[32] {                       allocate kept[32] {
 //     kept[0..16] = f[..]                       kept[0..16] = f[..]
@@ -14,16 +14,16 @@
 //                                               f[..] = kept[0..16]
 //                                             }
 //
-// Why: a strong product (0 * anything is 0) differs from a plain one only where 0 meets an infinity
-//      or NaN, which gives NaN, and what has been added to a sum stays in it. So a sum that is not
-//      NaN is that of the strong products. They cost a comparison each, on the unit that adds, and
-//      gradients of finite numbers are what nearly all programs compute.
+// Why: a strong product (0 * anything is 0) differs from a plain one only where 0 meets an infinity or NaN. The plain
+//      product is then NaN, and so is every sum that contains it. A sum that is not NaN therefore equals the sum of
+//      strong products. Strong products cost a comparison each, on the unit that adds, and nearly all programs
+//      compute gradients of finite numbers.
 //
-// Method: storage that statements fill without reading it, a loop that only adds to what they have
-//         filled, and whatever follows: the filling can be done again. What the check adds up may
-//         overflow from sums that are not NaN; then the same comes out twice.
-// Not done: sums in storage that is not filled right before; masks around what is filled.
-// Source: our own; speculation and a check of the result, as in Rauchwerger and Padua, "The LRPD
+// Method: matches storage that statements fill without reading it, loops that only add to the filled elements, and any
+//         code that follows. The fill can be repeated. The check sums all elements, which may overflow to NaN although
+//         none of them is NaN; the repeated sum then gives the same result.
+// Not done: sums in storage that is not filled right before; masked fills.
+// Source: our own; speculation followed by a check of the result, as in Rauchwerger and Padua, "The LRPD
 //         test" (PLDI 1995). Tests: test/golden/lower/try_plain_products/, strong_zeros_test.
 #include <algorithm>
 #include <vector>
@@ -42,7 +42,7 @@ namespace {
 
 bool is_strong_product(const Expr& e) { return as_op(e, Op::strong_mul) != nullptr; }
 
-// A sum down to the element that it is added to, with plain products.
+// The sum e with plain products instead of strong ones.
 Expr with_plain_products(const Expr& e) {
   if (const Call* product = as_op(e, Op::strong_mul)) return product->args[0] * product->args[1];
   const auto* sum = e.as<Binary>();
@@ -51,7 +51,7 @@ Expr with_plain_products(const Expr& e) {
   return sum->kind == Kind::Add ? a + b : a - b;
 }
 
-// Statements that only add to elements of one array, all of which were filled.
+// Matches statements that only add to elements of one array, all of which were filled before.
 class SumsInto {
  public:
   SumsInto(const std::string& array, const std::vector<const Store*>& filled)
@@ -62,11 +62,12 @@ class SumsInto {
         s,
         [&](const For& n) {
           has_loops = true;
-          return n.runs == ForType::Serial && leaves(n.min) && leaves(n.extent) && holds(n.body);
+          return n.runs == ForType::Serial && does_not_read(n.min) && does_not_read(n.extent) &&
+                 holds(n.body);
         },
-        [&](const LetStmt& n) { return leaves(n.value) && holds(n.body); },
+        [&](const LetStmt& n) { return does_not_read(n.value) && holds(n.body); },
         [&](const IfThenElse& n) {
-          return leaves(n.condition) && holds(n.when_true) &&
+          return does_not_read(n.condition) && holds(n.when_true) &&
                  (!n.when_false.defined() || holds(n.when_false));
         },
         [&](const Block& n) {
@@ -79,7 +80,7 @@ class SumsInto {
   bool has_loops = false, has_strong_products = false;
 
  private:
-  bool leaves(const Expr& e) const { return !loads_from(e, array_); }
+  bool does_not_read(const Expr& e) const { return !loads_from(e, array_); }
 
   bool adds(const Store& store) {
     if (store.name != array_ || !store.value.type().is_float() || store.value.type().bits() < 32)
@@ -110,7 +111,7 @@ class TryPlainProducts : public StatementRewriter {
   }
 
  private:
-  // Undefined: they are not of the form.
+  // The rewritten statements; undefined if they do not have the form above.
   Stmt in_storage(const std::string& array, const std::vector<Stmt>& stmts) {
     std::vector<const Store*> filled;
     auto sums = stmts.begin();
@@ -142,9 +143,9 @@ class TryPlainProducts : public StatementRewriter {
     });
   }
 
-  // NaN stays in a sum of sums, too.
+  // Checks all sums at once: a NaN stays in a sum of sums.
   static Expr any_is_nan(const std::vector<const Store*>& filled) {
-    std::vector<Expr> sums;  // one for each number of lanes
+    std::vector<Expr> sums;  // one per number of lanes
     for (const Store* fill : filled) {
       const Expr value = make_load(fill->value.type(), fill->name, fill->index);
       const auto same = std::find_if(sums.begin(), sums.end(),

@@ -36,9 +36,8 @@ void find_facts(const Stmt& s, BodyFacts& facts) {
       [&](const Stmt& child) { find_facts(child, facts); });
 }
 
-// A Func computed in every iteration into storage that all of them share: where their regions
-// overlap, an iteration initializes again what another has updated, so they must not be
-// interleaved.
+// Whether a Func is computed and updated in every iteration, in storage that all iterations share. Where the regions
+// of two iterations overlap, one initialises again what the other has updated, so they must not be interleaved.
 bool recomputes_shared_updates(const BodyFacts& facts) {
   for (const auto& [name, buffer] : facts.buffers) {
     if (buffer.stores < 2 || buffer.is_allocated) continue;
@@ -48,7 +47,7 @@ bool recomputes_shared_updates(const BodyFacts& facts) {
   return false;
 }
 
-// Of a nest of ramps with known strides one must step over all of the other.
+// In a nest of ramps with known strides, the step of one ramp must exceed the whole range of the other.
 bool hits_each_element_once(const Expr& index) {
   const Ramp* ramp = index.as<Ramp>();
   if (!ramp || is_zero(ramp->stride)) return false;
@@ -88,17 +87,17 @@ Stmt VectorStores::store(const Stmt& s, const Store& n) {
   if (auto reduction = find_vector_reduction(n)) return store_reduction(s, n, *reduction);
   require_no_load(n.name, 0);
   bool is_same = !widen_.varies(n.value) && !widen_.varies(n.predicate);
-  return is_same ? s : Stmt();  // the last lane wins
+  return is_same ? s : Stmt();  // lane by lane, the last lane's value remains
 }
 
-// An element may be hit by several lanes: it is stored lane by lane.
+// Several lanes may hit one element, so code generation stores lane by lane.
 Stmt VectorStores::atomic_update(const Store& n) {
   require_no_load(n.name, own_loads(n));
   return make_store(n.name, widen_.spread(n.value), widen_(n.index),
                     widen_.masked(n.predicate, n.index.type().lanes()), n.symbol);
 }
 
-// f[i] = f[i] op g, where nothing else in the body reads f but updates by the same operation.
+// Matches f[i] = f[i] op g, if all other loads of f in the body belong to updates by the same operation.
 std::optional<AtomicUpdate> VectorStores::as_plain_update(const Store& n) const {
   if (!n.index.type().is_scalar() || n.predicate.defined() || !n.value.type().is_scalar())
     return std::nullopt;
@@ -108,8 +107,8 @@ std::optional<AtomicUpdate> VectorStores::as_plain_update(const Store& n) const 
   return find_atomic_update(n);
 }
 
-// Places and operands are vectors; the elements change one after the other, in the order of the
-// lanes, as several may be the same.
+// Indices and operands are vectors. The elements are updated one after the other in lane order, as several may be the
+// same element.
 Stmt VectorStores::update_in_order(const Store& n, const Expr& index, const AtomicUpdate& update) {
   Expr operand = widen_.spread(update.operand);
   const std::string places = fresh_(name_ + ".places"), terms = fresh_(name_ + ".terms");
@@ -125,8 +124,7 @@ Stmt VectorStores::update_in_order(const Store& n, const Expr& index, const Atom
   return make_let(places, index, make_let(terms, operand, make_block(std::move(stores))));
 }
 
-// A buffer that several lanes store to may be read by nothing but the `own` loads of the store
-// itself.
+// Several lanes store to `buffer`, so nothing in the body may read it except the `own` loads of the store itself.
 void VectorStores::require_no_load(const std::string& buffer, int own) {
   must_stay_serial_ |= facts_.buffers.at(buffer).loads > own;
 }
@@ -145,12 +143,12 @@ Stmt VectorStores::store_reduction(const Stmt& s, const Store& n, const UpdateCh
   return make_store(n.name, result, n.index, predicate, n.symbol);
 }
 
-// The terms of all iterations, combined lane by lane of the statement.
+// Reduces the terms of all iterations, separately for each lane of the statement.
 Expr VectorStores::reduce(Kind kind, const Expr& term, const Expr& active) {
   int lanes = term.type().lanes();
   Expr wide = widen_.spread(term);
   if (active.defined()) wide = make_select(active, wide, identity_of(kind, wide.type()));
-  if (lanes > 1) {  // iteration-major to lane-major: the groups that are reduced lie side by side
+  if (lanes > 1) {  // iteration-major to lane-major: each reduced group becomes contiguous
     std::vector<int> indices;
     for (int lane = 0; lane < lanes; ++lane) {
       for (int iteration = 0; iteration < widen_.iterations(); ++iteration)

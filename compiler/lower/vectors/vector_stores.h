@@ -1,5 +1,5 @@
-// Stores of a vectorized loop: of vectors, of what all iterations add up, of one lane after the other
-// where several may hit one element.
+// Stores in a vectorized loop. A store becomes a vector store, a reduction of all lanes, or, where several lanes may
+// hit one element, one scalar store per lane in order.
 #pragma once
 
 #include <optional>
@@ -14,11 +14,11 @@
 
 namespace retrograde::lower {
 
-// What a loop body does to a buffer.
+// How a loop body uses a buffer.
 struct BufferFacts {
-  int loads = 0, stores = 0;  // nodes that load, counted once per statement
+  int loads = 0, stores = 0;  // numbers of nodes; a load that a statement shares counts once
   bool is_allocated = false;  // inside the body
-  // Of stores f[i] = f[i] op g: their loads of f, and which operations there are.
+  // For stores of the form f[i] = f[i] op g: how often they load f, and which operations they use.
   int update_loads = 0;
   std::set<std::pair<Kind, Op>> update_operations;
 };
@@ -31,11 +31,11 @@ class VectorStores {
  public:
   VectorStores(const For& loop, Widener& widen, FreshNames& fresh);
 
-  // Whether the iterations must run one after the other, by what has been stored so far.
+  // True once a store that has been visited requires the iterations to run one after the other.
   bool must_stay_serial() const { return must_stay_serial_; }
-  // For all iterations; undefined: it has to run lane by lane.
+  // The store for all iterations; undefined if it has to run lane by lane.
   Stmt store(const Stmt& s, const Store& n);
-  // One operation on elements whose place varies.
+  // An atomic update whose index varies.
   Stmt atomic_update(const Store& n);
 
  private:

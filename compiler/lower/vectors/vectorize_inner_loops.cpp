@@ -1,4 +1,4 @@
-// vectorize_inner_loops -- lanes for innermost loops that no schedule says anything about.
+// vectorize_inner_loops -- vectorize innermost loops that have no scheduling directive.
 // In:  FlatStorage, unrolled; names unique.
 // Out: FlatStorage; the same elements with the same values; names unique.
 //
@@ -8,15 +8,14 @@
 //                                     }
 //                                     for (x.$1, a + vectors*8, n - vectors*8) { out[x.$1] = ... }
 //
-// Method: a serial loop over a pure variable, over nothing but stores of scalars and lets, whose
-//         accesses have a vector form. How an index moves with the loop's variable x is said by a
-//         period p and a step s: index(x + p) = index(x) + s for all x. Sums and products with
-//         constants of such indices, and their quotients and remainders by constants, move so, too.
-//         A load with a small step is dense, strided or interleaved (interleave_vectors). Stores
-//         must be dense, or as many beside each other as their step is long. As many lanes as the
-//         widest value allows in one register.
-// Not done: reductions, whose order matters; gathers; conditions that vary; bodies of more than
-//           largest_body nodes, of which a second copy is not worth its compilation.
+// Method: accepts a serial loop over a pure variable that contains only scalar stores and lets, if all its accesses
+//         have a vector form. An index is described by a period p and a step s over the loop variable x:
+//         index(x + p) = index(x) + s for all x. Sums of such indices, products with constants, and quotients
+//         and remainders by constants have this form again. A load with a small step is dense, strided or interleaved
+//         (interleave_vectors). Stores must be dense, or a store of step s needs s neighbours. The widest
+//         value sets the number of lanes: it fills one register.
+// Not done: reductions, whose order matters; gathers; conditions that vary; bodies of more than largest_body nodes,
+//           for which a second copy costs more compile time than it is worth.
 // Source: folklore. Tests: test/golden/lower/vectorize_inner_loops/, loop_passes_test.
 #include "lower/vectors/vectorize_inner_loops.h"
 
@@ -57,7 +56,7 @@ MaybeMovement sum_of(const Movement& a, const Movement& b, int64_t factor_of_b) 
 
 bool is_small(int64_t n) { return std::abs(n) <= INT32_MAX; }
 
-// Of integers of 32 bits and more, which are assumed not to overflow.
+// Movements of integers of 32 bits and more, which are assumed not to overflow.
 class Movements {
  public:
   explicit Movements(const std::string& variable) : variable_(variable) {}
@@ -65,7 +64,7 @@ class Movements {
   void bind(const std::string& name, const Expr& value) { lets_[name] = value; }
   const Expr* value_of(const std::string& name) const { return find_or_null(lets_, name); }
 
-  // nullopt: it varies in another way.
+  // nullopt: the expression varies in another way.
   MaybeMovement of(const Expr& e) {
     return memo_.get(e, [&] { return find(e); });
   }
@@ -120,18 +119,18 @@ class Movements {
   }
 
   const std::string variable_;
-  std::unordered_map<std::string, Expr> lets_;  // that the body binds
+  std::unordered_map<std::string, Expr> lets_;  // bound in the body
   NodeMemo<MaybeMovement> memo_;
 };
 
-// Whether lanes pay for the body of a loop, and how many.
+// Decides whether vectorizing a loop body pays, and with how many lanes.
 class BodyCheck {
  public:
   explicit BodyCheck(const For& loop) : movements_(loop.name) {
     has_form_ = visit(loop.body) && seen_.size() <= largest_body && stores_fill_rows();
   }
 
-  // 0: none.
+  // 0: do not vectorize.
   int lanes(int vector_bytes) const {
     return has_form_ && has_stores() ? vector_bytes / widest_bytes_ : 0;
   }
@@ -166,7 +165,7 @@ class BodyCheck {
            measure(n.value);
   }
 
-  // Stores with a step become one when they lie beside each other.
+  // A store with step s must have s - 1 neighbours, so that together they become one dense store.
   bool stores_fill_rows() const {
     return std::all_of(stores_.begin(), stores_.end(), [](const auto& entry) {
       const int64_t step = entry.second.step;
@@ -207,7 +206,7 @@ class BodyCheck {
     return !n.predicate.defined() && index && std::abs(index->step) <= max_load_step;
   }
 
-  // The widest value that is no index.
+  // Finds the widest value, indices left out.
   bool measure(const Expr& e) {
     if (!measured_.insert(e.get()).second) return true;
     widest_bytes_ = std::max(widest_bytes_, e.type().bytes());

@@ -1,4 +1,4 @@
-// vectorize_inner_loops -- lanes for innermost loops that no schedule says anything about.
+// vectorize_inner_loops -- vectorizes innermost loops that have no scheduling directive.
 #pragma once
 
 #include <functional>
@@ -9,8 +9,7 @@ namespace retrograde::lower {
 
 struct InnerLoops {
   int vector_bytes = 32;
-  // Whether the iterations of a loop touch different elements of what they store, so that they may
-  // run in any order.
+  // Whether the iterations of a loop store to different elements, so that they may run in any order.
   std::function<bool(const For&)> is_independent;
 };
 

@@ -1,9 +1,8 @@
 // vectorize_loops -- turn the iterations of Vectorized loops into lanes of vectors.
-// In:  FlatStorage; names unique; extents of Vectorized loops are constants, or have constants above
-//      them, which guarded lanes fill; iterations are independent, except for stores of the form
-//      f[i] = f[i] op g with an associative op and an i that does not vary.
-// Out: FlatStorage without Vectorized loops; names unique. All lanes of a statement run before the
-//      next statement.
+// In:  FlatStorage; names unique. Extents of Vectorized loops are constants, or have constant upper bounds: then
+//      the lanes run under a guard. Iterations are independent, except for stores of the form f[i] = f[i] op g
+//      with an associative op and a loop-invariant i.
+// Out: FlatStorage without Vectorized loops; names unique. All lanes of a statement run before the next statement.
 //
 //   vectorized for (x, a, 8) {
 //     out[x + 1] = in[x] * k         =>   out[ramp(a + 1, 1, 8)] = in[ramp(a, 1, 8)] * broadcast(k)
@@ -12,17 +11,16 @@
 //     h[i(x)] = h[i(x)] + g(x)            let p = i(ramp(a, 1, 8)), t = g(ramp(a, 1, 8))
 //   }                                     h[p.0] = h[p.0] + t.0; ... h[p.7] = h[p.7] + t.7
 //
-// Method: inner loops first. Expressions are widened by widen_expr.h; a condition that varies
-//         becomes the predicate of the loads and stores under it. What has no vector form runs lane
-//         by lane: statements with effects (print, require, assertions), loops whose bounds vary,
-//         allocations whose size varies, stores to one element that are no reduction.
-//         Where lanes may hit one element, updates of elements by one operation go through the
-//         lanes in order: places and operands are vectors, the elements are not.
-//         The whole loop stays a serial one when the body reads that buffer elsewhere (argmax: two
-//         stores and the comparison of the old value).
+// Method: inner loops first. widen_expr.h widens expressions; a condition that varies becomes the predicate of
+//         the loads and stores under it. Code without a vector form runs lane by lane: statements with
+//         effects (print, require, assertions), loops with varying bounds, allocations with varying sizes, and
+//         stores to one element that are not reductions.
+//         Where lanes may hit one element, updates of elements by one operation go through the lanes in order: indices
+//         and operands are vectors, the updates are scalar.
+//         The whole loop stays serial when the body also reads that buffer elsewhere (argmax: two stores and
+//         the comparison with the old value).
 // Not done: loops with varying bounds under a mask; reductions through casts.
-// Source: folklore; the mask of a branch is Allen, Kennedy, Porterfield & Warren 1983
-//         (if-conversion).
+// Source: folklore; the mask of a branch is if-conversion (Allen, Kennedy, Porterfield & Warren 1983).
 // Tests: test/golden/lower/vectorize_loops/, test/property/loop_passes_test.cpp.
 #include "lower/statement_passes.h"
 
@@ -45,14 +43,14 @@ namespace retrograde::lower {
 namespace {
 
 constexpr int max_lanes = 4096;
-constexpr int64_t max_guarded_lanes = 256;  // of a loop whose extent is not known
+constexpr int64_t max_guarded_lanes = 256;  // for loops whose extent is unknown
 
 // ---- lane by lane ----
 
-// What one iteration has around the current statement, as far as it varies.
+// Lets and conditions around the current statement that vary with the iteration.
 struct Surroundings {
   Lets lets;
-  std::vector<Expr> conditions;  // that make up the mask
+  std::vector<Expr> conditions;  // together they are the mask
 };
 
 bool can_recompute(const Surroundings& around) {
@@ -64,8 +62,8 @@ bool can_recompute(const Surroundings& around) {
          std::all_of(around.conditions.begin(), around.conditions.end(), is_pure);
 }
 
-// Accesses of allocations that exist once per lane, as seen by one lane.
-Stmt with_own_elements(const Stmt& s, const Expr& lane, const Widener& widen) {
+// Rewrites accesses of per-lane allocations to the elements of one lane.
+Stmt with_lane_elements(const Stmt& s, const Expr& lane, const Widener& widen) {
   if (widen.wide_allocations().empty()) return s;
   const auto own = [&](const Expr& index) {
     Expr scaled = binary(Kind::Mul, index, make_const(index.type(), widen.iterations()));
@@ -90,7 +88,7 @@ Stmt lane_loop(const Stmt& s, const For& loop, const Surroundings& around, const
   Stmt body = make_lets(around.lets, make_if(conjunction(around.conditions), s));
   std::string lane = fresh(loop.name);
   Expr number = binary(Kind::Sub, variable(lane), loop.min);
-  body = with_own_elements(body, number, widen);
+  body = with_lane_elements(body, number, widen);
   body = copy_statement(body, fresh, {{loop.name, variable(lane)}});
   return make_for(lane, loop.min, make_const(loop.min.type(), widen.iterations()), ForType::Serial,
                   body);
@@ -103,7 +101,7 @@ Stmt lane_copies(const Stmt& s, const Widener& widen, FreshNames& fresh) {
     for (const auto& [name, wide] : widen.bound()) {
       values[name] = extract_iteration(wide, i, wide.type().lanes() / widen.iterations());
     }
-    Stmt copy = copy_statement(with_own_elements(s, Expr(i), widen), fresh, values);
+    Stmt copy = copy_statement(with_lane_elements(s, Expr(i), widen), fresh, values);
     const Expr& mask = widen.mask();
     copies.push_back(mask.defined() ? make_if(extract_iteration(mask, i, 1), copy) : copy);
   }
@@ -127,8 +125,8 @@ class LoopVectorizer {
   }
 
  private:
-  // A loop over the lanes when everything the statement needs of its surroundings can be computed
-  // again, else one copy of the statement per lane, which takes its operands out of the vectors.
+  // A loop over the lanes if the varying lets and conditions around the statement can be recomputed. Otherwise one
+  // copy of the statement per lane, which extracts its operands from the vectors.
   Stmt lane_by_lane(const Stmt& s) {
     return can_recompute(around_) ? lane_loop(s, loop_, around_, widen_, fresh_)
                                   : lane_copies(s, widen_, fresh_);
@@ -159,7 +157,7 @@ class LoopVectorizer {
   // ---- lets ----
 
   Stmt visit_let(const Stmt& s, const LetStmt& n) {
-    if (has_effects(n.value) || tells_of_some_lanes(n.value)) return lane_by_lane(s);
+    if (has_effects(n.value) || traces_some_lanes(n.value)) return lane_by_lane(s);
     Expr value = widen_(n.value);
     if (value.same_as(n.value)) return make_let(n.name, n.value, visit(n.body));
     around_.lets.emplace_back(n.name, n.value);
@@ -173,7 +171,7 @@ class LoopVectorizer {
     return ramp && ramp->base.type().is_scalar() && is_const(ramp->stride);
   }
 
-  // Keeps the ramp visible to the loads and stores that it indexes: only its base is bound.
+  // Binds only the ramp's base to a name, so that loads and stores still see the ramp as their index.
   Stmt bind_ramp(const LetStmt& n, const Ramp& ramp) {
     if (is_const(ramp.base) || ramp.base.as<Variable>()) {
       widen_.bind(n.name, &ramp);
@@ -195,7 +193,7 @@ class LoopVectorizer {
     if (widen_.varies(n.min) || widen_.varies(n.extent)) return lane_by_lane(s);
     Stmt body = visit(n.body);
     if (body.same_as(n.body)) return s;
-    // Vectors are not handed to other threads.
+    // Other threads cannot access vector values of this one, so a parallel loop becomes serial.
     return make_for(n.name, n.min, n.extent, n.runs == ForType::Parallel ? ForType::Serial : n.runs,
                     body);
   }
@@ -205,9 +203,8 @@ class LoopVectorizer {
     Expr condition = widen_(n.condition);
     if (condition.same_as(n.condition))
       return make_if(n.condition, visit(n.when_true), visit(n.when_false));
-    bool must_bind = reads_memory(
-        condition,
-        MemoryReads::Loads);  // a store of the branch may change what the condition reads
+    // A store in the branch may change what the condition reads, so such a condition is bound to a name.
+    bool must_bind = reads_memory(condition, MemoryReads::Loads);
     std::string name = must_bind ? fresh_(loop_.name + ".mask") : "";
     Expr mask = must_bind ? variable(name, condition.type()) : condition;
     Stmt branches =
@@ -229,8 +226,8 @@ class LoopVectorizer {
     return make_if(make_vector_reduce(Kind::Or, mask, 1), body);
   }
 
-  // In what a branch has become: accesses that did not vary have no predicate, and loops are not
-  // worth running for nobody.
+  // Whether the widened branch may run only if some lane is active: unpredicated accesses would touch memory for no
+  // lane, and loops would run in vain.
   static bool needs_an_active_lane(const Stmt& branch) {
     return any_node(
         branch, [](const Load& n) { return !n.predicate.defined(); },
@@ -245,8 +242,8 @@ class LoopVectorizer {
     return make_allocate(n.name, n.type, n.memory, elements, visit(n.body));
   }
 
-  // An event has no mask.
-  bool tells_of_some_lanes(const Expr& e) {
+  // Trace events have no mask, so under a mask they are emitted lane by lane.
+  bool traces_some_lanes(const Expr& e) {
     return widen_.mask().defined() &&
            any_node(e, [](const Call& call) { return call.is_op(Op::trace); });
   }
@@ -254,13 +251,13 @@ class LoopVectorizer {
   // ---- stores ----
 
   Stmt visit_store(const Stmt& s, const Store& n) {
-    if (has_effects(n.value) || has_effects(n.index) || tells_of_some_lanes(n.value))
+    if (has_effects(n.value) || has_effects(n.index) || traces_some_lanes(n.value))
       return lane_by_lane(s);
     const Stmt stored = stores_.store(s, n);
     return stored.defined() ? stored : lane_by_lane(s);
   }
 
-  // One operation on the element stays a vector. Anything else runs lane by lane altogether.
+  // A single operation on the element stays a vector. Anything else runs lane by lane.
   Stmt visit_atomic(const Stmt& s, const Atomic& n) {
     const Store* store = n.body.as<Store>();
     if (store && widen_.is_wide_allocation(store->name)) return visit_store(n.body, *store);
@@ -318,7 +315,7 @@ class Vectorizer : public BoundedExtents {
  private:
   FreshNames fresh_;
 
-  // Lanes beyond the extent do nothing.
+  // The loop with `lanes` iterations, of which those beyond the extent do nothing.
   static Stmt with_all_lanes(const For& loop, int64_t lanes) {
     const Expr runs = variable(loop.name, loop.min.type()) < loop.min + loop.extent;
     return make_for(loop.name, loop.min, make_const(loop.extent.type(), lanes), loop.runs,

@@ -1,4 +1,4 @@
-// Ramps and broadcasts are kept as far as they go: they are what makes a load dense.
+// Keeps ramps and broadcasts as long as possible: a load whose index is a ramp is dense.
 #include "lower/vectors/widen_expr.h"
 
 #include <numeric>
@@ -10,7 +10,7 @@ namespace retrograde::lower {
 
 namespace {
 
-// v as a repetition of one vector `times` times, undefined when it is none.
+// The vector of which v is `times` repetitions; undefined if there is none.
 Expr repeated_part(const Expr& v, int times) {
   const Broadcast* b = v.as<Broadcast>();
   if (!b || v.type().lanes() % times != 0) return {};
@@ -20,7 +20,7 @@ Expr repeated_part(const Expr& v, int times) {
   return make_broadcast(b->value, part_lanes / b->value.type().lanes());
 }
 
-// a op b of ramps and broadcasts of integers; undefined when the result is no ramp.
+// a op b for ramps and broadcasts of integers; undefined when the result is not a ramp.
 Expr combine_ramps(Kind kind, const Expr& a, const Expr& b) {
   const Ramp* ra = a.as<Ramp>();
   const Ramp* rb = b.as<Ramp>();
@@ -47,8 +47,8 @@ Expr combine_ramps(Kind kind, const Expr& a, const Expr& b) {
   return make_ramp(binary(Kind::Sub, part, rb->base), falling, rb->lanes);
 }
 
-// (base + s i) / c = base / c + (s / c) i and (base + s i) % c = base % c where c divides s,
-// whatever base is; undefined otherwise.
+// (base + s i) / c = base / c + (s / c) i and (base + s i) % c = base % c if c divides s, for every base; undefined
+// otherwise.
 Expr divide_ramp(Kind kind, const Expr& a, const Expr& b) {
   const Ramp* ramp = a.as<Ramp>();
   const Type type = a.type().element_of();
@@ -115,7 +115,7 @@ Expr repeat_each(const Expr& v, int times) {
 
 bool has_effects(const Expr& e) {
   return any_node(e, [&](const Call& call) {
-    // The event of a trace can be that of a vector.
+    // A trace can be emitted once for a whole vector.
     return op_info(call.op).conduct != Conduct::Silent && !call.is_op(Op::undef) &&
            !call.is_op(Op::trace);
   });
@@ -233,7 +233,7 @@ Expr Widener::widen_ramp(const Expr& e, const Ramp& n) {
                      make_broadcast(affine->stride, n.lanes), iterations_);
   }
   int base_lanes = n.base.type().lanes();
-  std::vector<int> blocks;  // every iteration's base n.lanes times
+  std::vector<int> blocks;  // the base of every iteration, repeated n.lanes times
   for (int iteration = 0; iteration < iterations_; ++iteration) {
     for (int step = 0; step < n.lanes; ++step) {
       for (int lane = 0; lane < base_lanes; ++lane) blocks.push_back(iteration * base_lanes + lane);
@@ -285,7 +285,7 @@ Expr Widener::under_mask(const Expr& mask, const Expr& e) {
   return result;
 }
 
-// A condition that varies makes both arms run, each with its loads predicated.
+// If the condition varies, both arms run, each with its loads predicated.
 Expr Widener::widen_branches(const Expr& e, const Call& n) {
   Expr c = (*this)(n.args[0]);
   int lanes = n.type.lanes();
@@ -299,7 +299,7 @@ Expr Widener::widen_branches(const Expr& e, const Call& n) {
                  {c, spread(n.args[1]), spread(n.args[2])});
 }
 
-// C functions take scalars: one call for each lane.
+// C functions take scalars, so every lane calls once.
 Expr Widener::widen_extern(const Call& n) {
   Lets lets;
   std::vector<Expr> args, results;
@@ -318,9 +318,9 @@ Expr Widener::widen_extern(const Call& n) {
   return make_lets(lets, make_shuffle(std::move(results), std::move(indices)));
 }
 
-// A let under several masks is widened several times, each time under another name. Parts of the
-// body are remembered by node: a name that stays narrow is replaced in what the body has become,
-// and not before, which would make new nodes of some parts, with old names in the others.
+// A let under several masks is widened once per mask, each time under another name. The memo keys parts of the body
+// by node. A name that does not vary is therefore renamed in the widened body: renaming it first would create new
+// nodes for some parts while the memo returns others with the old name.
 Expr Widener::widen_let(const Expr& e, const Let& n) {
   Expr value = (*this)(n.value);
   const bool varies = !value.same_as(n.value);
@@ -329,7 +329,7 @@ Expr Widener::widen_let(const Expr& e, const Let& n) {
   const std::string name = is_first ? n.name : fresh_(n.name);
   if (varies) bind(n.name, variable(name, value.type()));
   Expr body = (*this)(n.body);
-  if (varies) wide_values_.erase(n.name);  // outside of the body it stands for nothing
+  if (varies) wide_values_.erase(n.name);  // unbound outside of the body
   if (varies && body.same_as(n.body)) return make_broadcast(body, iterations_);
   if (!varies && !is_first) body = substitute(body, n.name, variable(name, value.type()));
   return make_let(name, value, body);
@@ -340,7 +340,8 @@ Expr Widener::widen_shuffle(const Expr& e, const Shuffle& n) {
   for (const Expr& v : n.vectors) varies |= !(*this)(v).same_as(v);
   if (!varies) return e;
   struct Source {
-    int start, lanes;  // of the wide vector among all, and of the narrow one
+    int start,
+        lanes;  // first lane of the wide vector in the concatenation; lanes of the narrow vector
   };
   std::vector<Source> of_lane;  // by lane of the narrow concatenation
   std::vector<int> lane_in_source;

@@ -1,9 +1,7 @@
-// Expressions of a loop body, for all iterations at once: the vector of the values that an
-// expression takes.
+// Widens expressions of a loop body for vectorization: the result holds the values of all iterations in one vector.
 //
-// Layout: an expression of L lanes becomes one of N*L lanes, iteration-major: lanes [i*L, (i+1)*L)
-// are its value in iteration i. In the program's terms a Ramp or Broadcast around a vector
-// concatenates: Ramp(b, s, N) is b, b + s, ...
+// Layout: an expression of L lanes becomes one of N*L lanes, iteration-major: lanes [i*L, (i+1)*L) hold its value in
+// iteration i. A Ramp or Broadcast of a vector concatenates its steps: Ramp(b, s, N) is b, b + s, ...
 #pragma once
 
 #include <string>
@@ -17,31 +15,30 @@ namespace retrograde::lower {
 
 // Lanes [iteration*L, iteration*L + L) of a vector of N*L lanes.
 Expr extract_iteration(const Expr& wide, int iteration, int narrow_lanes);
-// Every lane of `v` repeated `times` in place: a b -> a a b b.
+// Every lane of `v` repeated `times` times in place: a b -> a a b b.
 Expr repeat_each(const Expr& v, int times);
-// Calls that do more than compute a value: print, require, error, ... (random and undef are
-// values).
+// Whether `e` calls something that does more than compute a value: print, require, error, ... (random and undef only
+// compute values).
 bool has_effects(const Expr& e);
 
 class Widener {
  public:
   Widener(const std::string& variable, const Expr& min, int iterations, FreshNames& fresh);
 
-  // For all iterations; the same handle when the value is the same in all of them (then with L
-  // lanes still).
+  // The value for all iterations. A value that does not depend on the iteration is returned as the same handle, with
+  // L lanes.
   Expr operator()(const Expr& e);
   // Always with N*L lanes.
   Expr spread(const Expr& e);
   int iterations() const { return iterations_; }
-  // False for an undefined one.
+  // Whether the value depends on the iteration; false for an undefined expression.
   bool varies(const Expr& e) { return e.defined() && !(*this)(e).same_as(e); }
 
-  // A name bound outside of expressions: from now on `e` stands for the variable in all iterations.
+  // Binds a name that is defined outside of the widened expression: `wide` holds its values in all iterations.
   void bind(const std::string& name, const Expr& wide) { wide_values_[name] = wide; }
   const std::unordered_map<std::string, Expr>& bound() const { return wide_values_; }
 
-  // An allocation that every iteration has its own copy of: element e of iteration i is element e*N
-  // + i.
+  // Declares an allocation of which every iteration has its own copy: element e of iteration i is stored at e*N + i.
   void bind_allocation(const std::string& name) { wide_allocations_.insert(name); }
   bool is_wide_allocation(const std::string& name) const {
     return wide_allocations_.count(name) > 0;
@@ -49,11 +46,11 @@ class Widener {
   const std::unordered_set<std::string>& wide_allocations() const { return wide_allocations_; }
   Expr index_in_wide_allocation(const Expr& index);
 
-  // Bool of N lanes: the iterations that run; undefined when all do. Loads that vary are predicated
-  // by it. What does not vary is loaded as it was, so some iteration must run.
+  // Bool of N lanes: the iterations that run; undefined when all do. Loads that vary are predicated by it. Loads that
+  // do not vary stay unpredicated, so the caller guarantees that at least one iteration runs.
   const Expr& mask() const { return mask_; }
   void set_mask(const Expr& mask);
-  // A predicate of N*L lanes: `predicate` (may be undefined) and the mask.
+  // The conjunction of `predicate` (may be undefined) and the mask, with N*L lanes.
   Expr masked(const Expr& predicate, int narrow_lanes);
 
  private:
@@ -75,7 +72,7 @@ class Widener {
   FreshNames& fresh_;
   Expr mask_;
   bool may_run_nowhere_ =
-      false;  // inside an arm of if_then_else: even what does not vary is loaded under the mask
+      false;  // inside an arm of if_then_else: loads that do not vary are masked, too
   NodeMemo<Expr> memo_;
   std::unordered_map<std::string, Expr> wide_values_;
   std::unordered_set<std::string> wide_allocations_, widened_lets_;
