@@ -1,4 +1,4 @@
-// From a command line to files.
+// command_line.cpp -- parses the command line of a generator program, runs the generator and writes the files.
 #include "generator/command_line.h"
 
 #include <malloc.h>
@@ -105,7 +105,7 @@ void set_flag(char flag, const std::string& value, CommandLine& command) {
   }
 }
 
-// What a run cannot do without.
+// Checks that all required flags are present.
 void check_complete(const CommandLine& command) {
   if (command.generator.empty() && command.runtime.empty()) {
     const std::vector<std::string> names = GeneratorRegistry::enumerate();
@@ -132,7 +132,7 @@ std::string base_name(const std::string& function) {
   return colons == std::string::npos ? function : function.substr(colons + 2);
 }
 
-// A scheduler is part of the context that a generator is made in.
+// Creates the generator in a context for the target, with the autoscheduler of -s.
 std::unique_ptr<GeneratorBase> make_generator(const CommandLine& command, const Target& target) {
   AutoschedulerParams scheduler;
   GeneratorParamsMap params;
@@ -185,7 +185,7 @@ void run_runtime(const CommandLine& command) {
   log(command, compile_standalone_runtime(files_of(command, command.runtime), common));
 }
 
-// One for each target, as a schedule may ask for it.
+// Writes one schedule for each target, since a schedule may depend on the target.
 void emit_schedules(const CommandLine& command, const std::string& function,
                     const std::string& base) {
   const std::string extension =
@@ -230,7 +230,7 @@ void run_generator(const CommandLine& command) {
     compile_multitarget(function, files, command.targets, command.suffixes, build);
 }
 
-// Everything that the command line alone decides.
+// Parses the command line, loads plugins, and creates the generator once, so that errors come before any file.
 CommandLine prepare(int argc, const char* const* argv) {
   CommandLine command = read_command_line(argc, argv);
   for (const std::string& plugin : command.plugins) load_plugin(plugin);
@@ -350,8 +350,8 @@ static bool asks_for_help(int argc, const char* const* argv) {
   return argc <= 1;
 }
 
-// The process compiles and ends. By default glibc asks the system for memory a page at a time where
-// a thread compiles, and gives back what will be wanted again.
+// Makes glibc request memory in large pieces and keep it, since the process only compiles and exits. By default a
+// thread's arena grows a page at a time, and glibc returns memory that is needed again soon.
 static void expect_much_memory() {
 #ifdef __GLIBC__
   constexpr int at_once_bytes = 8 << 20;

@@ -1,4 +1,4 @@
-// The life of a generator.
+// generator_base.cpp -- runs the phases of a generator and builds pipelines and modules from it.
 #include "generator/generator_base.h"
 
 #include <algorithm>
@@ -223,7 +223,7 @@ Expr constant_for_input(const Expr& value, const GeneratorPort& input) {
   return ir::to_expr(converted);
 }
 
-// ---- by name ----
+// ---- the interface AbstractGenerator ----
 
 std::vector<AbstractGenerator::ArgInfo> GeneratorBase::arginfos() {
   configure_once();
@@ -278,7 +278,7 @@ std::vector<Parameter> GeneratorBase::input_parameter(const std::string& name) {
   });
 }
 
-// ---- what it makes ----
+// ---- pipelines and modules ----
 
 Pipeline GeneratorBase::get_pipeline() {
   if (!is_generated()) {
@@ -349,7 +349,7 @@ void GeneratorBase::auto_schedule_pipeline(Pipeline& pipeline) const {
     pipeline.auto_schedule(auto_schedule.scheduler(), get_target(), get_machine_params());
 }
 
-// Parameters and Funcs may have had to take other names than those that were declared.
+// Restores the declared names in the metadata; parameters and Funcs may have received other, unique names.
 Module GeneratorBase::to_module(Pipeline& pipeline, const std::vector<Argument>& inputs,
                                 const std::vector<std::string>& declared_names,
                                 const std::string& function_name, LinkageType linkage) {
@@ -401,7 +401,7 @@ Module GeneratorBase::build_module(const std::string& function_name, LinkageType
 
 namespace {
 
-// A C++ literal of several lines.
+// Text as a C++ string literal, one literal for each line.
 std::string quoted_lines(const std::string& text) {
   std::string out;
   for (size_t begin = 0; begin < text.size();) {

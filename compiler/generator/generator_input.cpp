@@ -1,4 +1,4 @@
-// Inputs: parameters of a compiled function, or values from C++.
+// generator_input.cpp -- the values of inputs: parameters of a compiled function, or values from C++.
 #include "generator/generator_input.h"
 
 #include "generator/generator_base.h"

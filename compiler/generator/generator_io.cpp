@@ -1,4 +1,4 @@
-// Declarations of inputs and outputs: completed from several places, in agreement.
+// generator_io.cpp -- completes the declarations of inputs and outputs, and checks that all sources agree.
 #include "generator/generator_io.h"
 
 #include "generator/generator_base.h"

@@ -1,4 +1,4 @@
-// Outputs: Funcs that generate() defines as they are declared.
+// generator_output.cpp -- creates the Funcs of outputs and checks that generate() defines them as declared.
 #include "generator/generator_output.h"
 
 #include "generator/generator_base.h"

@@ -108,9 +108,8 @@ class Param {
   Param(const Param&) = default;
   Param& operator=(const Param&) = default;
 
-  const std::string& name() const {
-    return parameter_->name;
-  }                                               // name in messages and generated code
+  // Name in messages and generated code.
+  const std::string& name() const { return parameter_->name; }
   Type type() const { return parameter_->type; }  // type of the value
   // The value that set() or the constructor bound.
   // Requires: a value must have been set; the types must agree.

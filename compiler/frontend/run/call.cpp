@@ -1,5 +1,4 @@
-// call.cpp -- from values of parameters to the argument vector of compiled code, and back to an
-// exception.
+// call.cpp -- turns values of parameters into the argument vector of compiled code, and error codes into exceptions.
 #include "frontend/run/call.h"
 
 #include <atomic>
@@ -131,7 +130,7 @@ JITHandlers merged(JITHandlers handlers, const JITHandlers& first) {
 
 namespace {
 
-// Beside what the program itself prints.
+// Prints to stdout, through the same buffer as the program's own output.
 void default_print(const char* message) {
   std::fputs(message, stdout);
   std::fflush(stdout);
@@ -147,7 +146,7 @@ DefaultHandlers& defaults() {
   return result;
 }
 
-// The handlers of a call: the caller's, else the pipeline's, else the process's.
+// The handlers of a call. The caller's take precedence over the pipeline's, and these over the process's.
 JITHandlers handlers_of(const JITHandlers& own, const JITUserContext* user) {
   JITHandlers handlers = defaults().are_set ? merged(default_handlers(), own) : own;
   return user ? merged(std::move(handlers), user->handlers) : handlers;

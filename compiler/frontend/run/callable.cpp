@@ -1,4 +1,4 @@
-// callable.cpp -- arguments in the caller's order, brought into the order of compiled code.
+// callable.cpp -- maps arguments from the caller's order to the order of compiled code.
 #include "frontend/run/callable.h"
 
 #include "frontend/run/call.h"
@@ -11,7 +11,7 @@ namespace {
 
 using ParameterPtr = std::shared_ptr<graph::ParameterContents>;
 
-// One argument of the function, and where compiled code has it.
+// One argument of the function, and its position in the arguments of compiled code.
 struct Place {
   std::string name;
   Type type;
@@ -46,8 +46,7 @@ struct Callable::Contents {
   std::string asked;            // how errors begin
 };
 
-// Every argument is one of the code's, or one that the outputs do not need, which is taken and left
-// alone.
+// An argument that the outputs do not need is accepted and ignored; all others are arguments of the code.
 Callable Pipeline::callable(const std::vector<Argument>& args, const Target& target) {
   auto contents = std::make_shared<Callable::Contents>();
   contents->name = spec().name;

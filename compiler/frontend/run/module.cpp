@@ -180,7 +180,7 @@ void check_targets(const std::string& asked, const std::vector<Target>& targets,
   }
 }
 
-// What changes how the function is called must be the same for all.
+// All targets must agree on the features that change the function's signature or symbol.
 void check_interface(const std::string& asked, const std::vector<Target>& targets) {
   for (Target::Feature feature : {Target::UserContext, Target::CPlusPlusMangling}) {
     for (const Target& target : targets) {

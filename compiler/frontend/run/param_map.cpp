@@ -1,4 +1,4 @@
-// param_map.cpp -- what a value must be to stand for a parameter.
+// param_map.cpp -- checks that a value fits its parameter.
 #include "frontend/run/param_map.h"
 
 namespace retrograde {

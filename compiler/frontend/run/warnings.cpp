@@ -1,16 +1,15 @@
-// warnings.cpp -- looks at definitions and schedules as they stand: nothing is compiled, and a
-// program without findings means the same as one with them.
+// warnings.cpp -- finds suspicious definitions and directives without compiling. Findings never change a program:
 //
 //   f(x) = g(x);  f(x) = h(x)              the first definition is computed and thrown away
-//   f.vectorize(x, 8), f.update() bare     the update was forgotten
+//   f.vectorize(x, 8), f.update() without  the update was forgotten
 //   f.vectorize(x, 1)                      a vector of one lane
-//   f.update().atomic() alone              nothing runs at the same time
+//   f.update().atomic() alone              no loop of the update is parallel or vectorized
 //   RDom r(0, 0)                           the update never runs
-//   f.specialize(true)                     a condition that no call decides
+//   f.specialize(true)                     a constant condition
 //   require(1 > 2, ...)                    every call fails
 //   f.bound(x, 0, 9) of an inlined f       no loop runs over f's region
 //   a gradient without a schedule          the compiler chooses one
-//   float16 without f16c                   each conversion is a function of many instructions
+//   float16 without f16c                   each conversion takes many instructions
 #include "frontend/run/warnings.h"
 
 #include <algorithm>
@@ -28,7 +27,7 @@
 namespace retrograde::frontend {
 namespace {
 
-// Whether it stores every element anew, whatever was there.
+// Whether the update overwrites every element independently of its old value.
 bool overwrites_all(const FuncContents& f, const Definition& update) {
   if (update.predicate.defined() || !update.rvars.empty()) return false;
   for (size_t d = 0; d < f.args.size(); d++) {
@@ -43,7 +42,7 @@ std::string words_for_stage(const FuncContents& f, int stage) {
   return stage == 0 ? quoted(f.name) : text("update ", stage - 1, " of ", quoted(f.name));
 }
 
-// How many Funcs nobody scheduled, where adjoints are among them.
+// Number of Funcs without directives; 0 if there are no adjoints among them.
 size_t unscheduled_beside_adjoints(const std::vector<FuncPtr>& funcs) {
   size_t count = 0;
   bool has_adjoints = false;
@@ -103,7 +102,7 @@ class Findings {
         "Add the feature f16c where the machine has it, or keep values in float32");
   }
 
-  // Outputs are computed over what a call asks for, and what has updates in loops of its own.
+  // Outputs and Funcs with updates always have loops of their own, so their bounds are not idle.
   void find_idle_bounds(const FuncContents& f) {
     if (f.is_extern() || !f.updates.empty()) return;
     if (f.schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined) return;
@@ -225,7 +224,7 @@ std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs, bool w
 }
 
 namespace {
-// Not shared: a scope is of the thread that opened it.
+// A scope belongs to the thread that opened it.
 thread_local std::function<void(const std::string&)> listener;
 
 struct ProcessHandler {

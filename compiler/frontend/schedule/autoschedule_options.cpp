@@ -1,4 +1,4 @@
-// autoschedule_options.cpp -- the options as text, as generators take them.
+// autoschedule_options.cpp -- the options of the built-in autoscheduler as text, as generators take them.
 #include "frontend/schedule/autoschedule_options.h"
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace retrograde {
 
 namespace {
 
-// In the order of the decisions.
+// Names in the order of the enumeration.
 const std::vector<std::string>& names_of_decisions() {
   static const std::vector<std::string> names{
       "scatter_strategy", "cut_reductions", "register_tiles", "layout_staging", "join_sweeps",

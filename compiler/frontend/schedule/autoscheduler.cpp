@@ -1,4 +1,4 @@
-// autoscheduler.cpp -- the schedulers that this process has loaded.
+// autoscheduler.cpp -- the registry of autoschedulers, and auto_schedule() of a pipeline.
 #include "frontend/schedule/autoscheduler.h"
 
 #include <dlfcn.h>
@@ -31,7 +31,7 @@ Loaded& loaded() {
   return result;
 }
 
-// One number and the comma behind it.
+// Parses one number and the comma after it.
 template <typename T>
 bool take_number(const char*& at, const char* end, bool last, T& value) {
   const auto [stop, error] = std::from_chars(at, end, value);
@@ -40,7 +40,7 @@ bool take_number(const char*& at, const char* end, bool last, T& value) {
   return true;
 }
 
-// "blur" means libblur.so; anything with a slash or a dot is a file as it stands.
+// "blur" means libblur.so; a name with a slash or a dot is a file name.
 std::string library_file(const std::string& library) {
   return library.find_first_of("/.") == std::string::npos ? "lib" + library + ".so" : library;
 }
@@ -75,7 +75,7 @@ namespace {
 
 const char* const machine_keys[] = {"parallelism", "last_level_cache_size", "balance"};
 
-// Parameters that are not given are those of the generic machine.
+// Missing parameters have the values of the generic machine.
 MachineParams machine_of(const AutoschedulerParams& params) {
   std::string values;
   for (size_t i = 0; i < std::size(machine_keys); i++) {
@@ -95,7 +95,7 @@ AutoschedulerParams params_of(const std::string& name, const MachineParams& mach
            {machine_keys[2], text(machine.balance)}}};
 }
 
-// What the built-in scheduler has no use for.
+// Parameters that the built-in autoscheduler ignores.
 std::string unknown_keys(const AutoschedulerParams& params) {
   std::vector<std::string> keys;
   for (const auto& [key, value] : params.extra) {
@@ -111,7 +111,7 @@ bool is_of_halide(const std::string& name) {
 
 }  // namespace
 
-// Plugins call it as they are loaded, where nothing may be thrown: find_autoscheduler tells of it.
+// Plugins call this from static initialisers, which must not throw; find_autoscheduler reports the error instead.
 void frontend::add_autoscheduler(const std::string& name, const AutoschedulerParamsFn& scheduler) {
   std::lock_guard lock(loaded().mutex);
   if (!scheduler) {
@@ -182,9 +182,9 @@ void load_plugin(const std::string& library) {
              reason ? reason : "it cannot", "Give its path");
 }
 
-// ---- of a pipeline ----
+// ---- auto_schedule ----
 
-// Its Funcs are shared, its options are not.
+// The copy of the pipeline shares the Funcs but has options of its own.
 AutoSchedulerResults Pipeline::auto_schedule(const Target& target,
                                              const AutoscheduleOptions& options,
                                              const MachineParams& machine) const {

@@ -1,4 +1,4 @@
-// func_wrappers.cpp -- Func::in and clone_in, and copies between memories.
+// func_wrappers.cpp -- Func::in, clone_in and copy_input, and copies between host and device.
 #include <algorithm>
 
 #include "frontend/language/func.h"
@@ -46,7 +46,7 @@ Func Func::copy_to_device(DeviceAPI) {
               "no code is generated for devices", "Leave it out");
 }
 
-// f(x, y) = g(x, y), and nothing more.
+// Whether the definition is f(x, y) = g(x, y).
 static bool is_plain_copy(const graph::FuncContents& f) {
   if (!f.pure || f.is_extern() || !f.updates.empty() || f.pure->values.size() != 1) return false;
   const ir::Call* read = f.pure->values[0].as<ir::Call>();
