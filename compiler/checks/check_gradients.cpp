@@ -25,10 +25,10 @@ using namespace checks;
 using checks::Values;
 using Clock = std::chrono::steady_clock;
 
-// The complex step, relative to the input's size: its square vanishes beside 1, and exists.
+// The complex step, relative to the input's size. Its square is negligible beside 1 but does not underflow.
 const double tiny_step = std::ldexp(1.0, -200);
 
-// A result, and how long it took.
+// A result and the time that it took.
 template <class T>
 struct Timed {
   T value;
@@ -40,7 +40,7 @@ auto timed(F&& f) -> Timed<decltype(f())> {
   auto value = f();
   return {value, std::chrono::duration<double>(Clock::now() - start).count()};
 }
-// The second of two runs: the first compiles.
+// Runs f twice and times the second run, since the first one compiles.
 template <class F>
 auto timed_warm(F&& f) {
   f();
@@ -81,7 +81,7 @@ class Checker {
     return "check the gradients of " + retrograde::quoted(output_.name());
   }
 
-  // ---- what is asked for ----
+  // ---- inputs and weights ----
 
   bool is_wanted(const Input& input) const {
     for (const AdjointInput& w : options_.wrt) {
@@ -106,12 +106,12 @@ class Checker {
     for (double& v : result) v = normal(random_);
     return result;
   }
-  // So that both precisions see the same numbers.
+  // Rounds values to the input's type, so that both precisions get the same numbers.
   static Values own_precision(Values values, Type type = Float(32)) {
     for (double& v : values) v = held_by(type, v);
     return values;
   }
-  // Of each value of the output; none for integers.
+  // Draws weights for each floating value of the output.
   void draw_weights() {
     bool any = false;
     for (Type t : output_.types()) {
@@ -130,7 +130,7 @@ class Checker {
     return sum;
   }
 
-  // The weights as a Func, of the types of `of`.
+  // The weights as a Func with the types of `of`.
   Func seed(const Func& of) {
     std::vector<Expr> values;
     for (size_t k = 0; k < weights_.size(); ++k) {
@@ -172,8 +172,8 @@ class Checker {
     bind_imaginary();
     complex_primal_ = scheduled_for(complex_.output, shape_);
   }
-  // Rules of the user are made of Funcs in the user's precision. They are checked by giving those a
-  // meaning in double, constants as they are; all else is differentiated in double.
+  // Custom derivative rules consist of Funcs in the user's precision. To check them, the Funcs of the adjoint are
+  // widened to double; their constants keep their values. Without custom rules the widened graph is differentiated.
   bool has_rules() const {
     const auto order = topological_order({output_.function()});
     return std::any_of(order.begin(), order.end(),
@@ -190,7 +190,7 @@ class Checker {
     if (wide_) return wide_->of(wide);
     return Func(widened_.funcs.at(own_->of(input).function().get()));
   }
-  // Beside the inputs: weights, and what rules of the user read.
+  // Binds parameters other than the inputs: weights, and parameters that custom rules read.
   void bind(const std::shared_ptr<ParameterContents>& p) {
     auto wide = widened_.parameters.find(p.get());
     if (wide == widened_.parameters.end()) return;
@@ -198,7 +198,7 @@ class Checker {
     if (std::ranges::find(own_inputs_, p) != own_inputs_.end()) inputs_.push_back(bound);
   }
 
-  // In double. Definitions say it where no rule of the user does.
+  // The tangent in double. Funcs without a custom tangent rule are differentiated.
   Func tangent(const Input& input, const Buffer<>& direction) const {
     for (const FuncPtr& f : topological_order({output_.function()})) {
       if (autodiff::has_custom_tangent(*f)) return tangent_by_rules(input, direction);
@@ -239,7 +239,7 @@ class Checker {
 
   static double size_of(const Input& input) { return std::max(largest(input.values), 1e-3); }
 
-  // The best estimate by the differences alone; the time is that of all that were tried.
+  // The best estimate from the differences; the time includes all steps that were tried.
   Timed<double> difference(Input& input, const Values& v, double adjoint, double scale,
                            std::vector<GradientReport::Step>* steps) {
     Timed<double> best{0, 0};
@@ -273,7 +273,7 @@ class Checker {
       to.set_wide(Values(to.values.size(), 0.0));
     }
   }
-  // The slope in the imaginary part.
+  // The slope by a complex step.
   Timed<double> complex_step(const Input& input, const Values& v) {
     Input& moved = imaginary_[static_cast<size_t>(&input - inputs_.data())];
     const double h = tiny_step * size_of(input);
@@ -332,7 +332,7 @@ class Checker {
     report_.inputs.push_back(result);
   }
 
-  // ---- where the digits go ----
+  // ---- errors by Func ----
 
   void compare_funcs() {
     auto order = topological_order({output_.function()});
@@ -352,7 +352,7 @@ class Checker {
     }
   }
 
-  // The worst of the adjoint's values; of Funcs that have one over a known region.
+  // The worst error of the adjoint of each Func, for adjoints over a known region.
   std::map<const ir::Symbol*, double> func_errors(const std::vector<FuncPtr>& order,
                                                   const autodiff::Regions& regions) {
     std::vector<const ir::Symbol*> funcs;

@@ -19,8 +19,8 @@ using namespace checks;
 using checks::Values;
 using Limits = std::numeric_limits<float>;
 
-// Of the largest, smallest normal and smallest number of a type. Doubles are taken to the ends of
-// float32, beyond which there is nothing to compare them with.
+// The largest, the smallest normal and the smallest number of a type. Inputs in double are limited to the range of
+// float32, since nothing exists to compare larger values with.
 struct Ends {
   double max, min, denormal;
 };
@@ -49,8 +49,8 @@ double magnitude(Extreme extreme, Type type) {
   return 0;
 }
 
-// One Func or adjoint, and what it is in double: the same definitions, so that they differ by
-// rounding alone.
+// A Func or adjoint to compare with double. The version in double has the same definitions, so the two differ only by
+// rounding.
 struct Watched {
   std::string name;  // of the primal
   bool is_adjoint;
@@ -97,7 +97,7 @@ class StabilityChecker {
   }
 
  private:
-  // ---- what is looked at ----
+  // ---- Funcs and adjoints ----
 
   Derivative adjoints() const {
     std::vector<Expr> ones;
@@ -222,7 +222,7 @@ class StabilityChecker {
 
   // ---- errors ----
 
-  // A case of the same name grows: samples are one case.
+  // Starts a case, or continues the last one if it has the same name; all samples form one case.
   void add_case(const std::string& name) {
     const bool is_new = report_.cases.empty() || report_.cases.back().name != name;
     if (is_new) report_.cases.push_back({name, {}, {}, {}});
@@ -258,7 +258,7 @@ class StabilityChecker {
     return {w.name, w.is_adjoint, value, at, own, wide, culprit(w.own, value, at)};
   }
 
-  // ---- estimates, in double, so that what is seen is not its rounding ----
+  // ---- estimates: computed in double, whose own rounding is negligible ----
 
   void estimate(StabilityReport::Case& to) {
     const double eps = Limits::epsilon();

@@ -1,14 +1,13 @@
-// The same graph of Funcs over complex numbers: derivatives by a step into the imaginary direction.
+// complex_step.h -- copies a graph of Funcs over complex numbers, for derivatives by a complex step.
 //
 //   f(x + i h v) = f(x) + i h <f'(x), v> + O(h^2)       (Squire and Trapp, SIAM Review 40, 1998)
 //
-// There is no subtraction, so that h may be so small that the error is rounding alone. Every
-// floating value of a Func becomes two, its real and its imaginary part. Comparisons, indices and
-// what is constant between its steps (floor) look at the real part, so that the branch is that of
-// the original; min, max and abs choose by it.
+// Nothing is subtracted, so h can be so small that only rounding error remains. Every floating value of a Func becomes
+// two values, its real and its imaginary part. Comparisons, indices and step functions (floor) use the real part, and
+// min, max and abs choose by it, so that every branch is that of the original.
 //
-// Not every operator allows it: the function must be complex differentiable and its imaginary part
-// computable for tiny imaginary parts. Of the others there is a reason.
+// An operator must be complex differentiable, and its imaginary part must be computable for tiny imaginary parts. For
+// other operators `refused` states the reason.
 #pragma once
 
 #include <map>
@@ -20,13 +19,13 @@
 namespace retrograde::checks {
 
 struct ComplexGraph {
-  Func output;  // values: real and imaginary part in turn; integers alone
-  // Behind each floating input: its imaginary part; unbound.
+  Func output;  // values: real and imaginary parts alternate; integers have no imaginary part
+  // The parameter of the imaginary part of each floating input; unbound.
   std::map<const ir::Symbol*, std::shared_ptr<graph::ParameterContents>> imaginary;
-  std::string refused;  // why there is no graph; empty when there is one
+  std::string refused;  // why there is no graph; empty if there is one
 };
 
-// `output`: of a graph in double (widen.h).
+// The complex version of `output`, a graph in double (widen.h).
 ComplexGraph complex_graph(const Func& output);
 
 }  // namespace retrograde::checks

@@ -57,7 +57,7 @@ class Widening {
     }
   }
 
-  // What only moves is not rounded: constants, reads, `undef`.
+  // Values that are only copied are not rounded: constants, reads, `undef`.
   static bool is_computed(const Expr& value) {
     if (value.as<FloatImm>() || !value.type().is_float()) return false;
     const Call* call = value.as<Call>();

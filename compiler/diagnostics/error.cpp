@@ -1,4 +1,4 @@
-// error.cpp -- rendering of the four parts, and the functions that throw.
+// error.cpp -- renders the four parts of a message, and throws.
 #include "diagnostics/error.h"
 
 #include <atomic>

@@ -11,7 +11,7 @@ namespace retrograde {
 
 namespace {
 
-// The log that the environment asks for.
+// The log that RETROGRADE_PASS_LOG enables.
 class PassLog {
  public:
   PassLog() {
