@@ -1,4 +1,4 @@
-// call_arguments.cpp -- see call_arguments.h.
+// call_arguments.cpp -- converts the Python arguments of realize() and similar functions.
 #include "call_arguments.h"
 
 #include "any_stride.h"
@@ -13,7 +13,7 @@ bool is_list(const py::object& object) {
   return py::isinstance<py::list>(object) || py::isinstance<py::tuple>(object);
 }
 
-// Of Python or NumPy; an array of NumPy without axes is none.
+// Whether it is an integer of Python or NumPy; a NumPy array without axes is not.
 bool is_integer(py::handle object) {
   if (PyLong_Check(object.ptr())) return true;
   return py::isinstance(object, py::module_::import("numbers").attr("Integral"));

@@ -1,4 +1,5 @@
-// callable.cpp -- Callable: a compiled pipeline as a function of its arguments and outputs.
+// callable.cpp -- binds Callable, a compiled pipeline as a function of its arguments and outputs, and the faster calls
+// on tensors of PyTorch.
 #include "frontend/run/callable.h"
 
 #include <algorithm>
@@ -16,7 +17,7 @@
 
 namespace retrograde::frontend {
 
-// Calls with as many arguments as a list has.
+// Calls with an argument list whose length is known at run time.
 struct DynamicCall {
   using Value = Callable::Value;
   static Value value_of(const Buffer<>& buffer) { return Callable::value_of(buffer); }
@@ -40,7 +41,7 @@ using frontend::DynamicCall;
 using py::arg;
 using Parameter = std::shared_ptr<graph::ParameterContents>;
 
-// A call that works on one stream of the context that is current.
+// The context of a call that uses the current CUDA context and a given stream.
 struct OnStream : JITUserContext {
   explicit OnStream(void* given) : stream(given) {
     handlers.custom_cuda_get_stream = [](JITUserContext* context, void*, void** result) {
@@ -51,7 +52,7 @@ struct OnStream : JITUserContext {
   void* stream;
 };
 
-// Compiled again where an array comes whose innermost axis is not dense (any_stride.h): once.
+// The compiled pipeline. An array whose innermost axis is not dense makes it recompile once (any_stride.h).
 class Bound {
  public:
   using Compile = std::function<Callable()>;
@@ -94,15 +95,15 @@ class Bound {
     });
   }
 
-  // The same of tensors of PyTorch, whose element types are those of the pipeline: whoever calls has seen to that.
-  // A number is a tensor without dimensions. Written for calls whose work is nothing.
+  // Calls on tensors of PyTorch; the caller has checked the element types. A number is a tensor without dimensions.
+  // Optimised for low overhead, for calls that compute little.
   void call_tensors(const py::tuple& given) {
     auto [tensors, elements] = tensors_of(given);
     run(given, elements, std::move(tensors));
   }
 
-  // The same of tensors in a device's memory, but for numbers, on a stream of the context that is current for this
-  // thread: it is in the stream when this is over, not done.
+  // Calls on tensors in device memory, except for numbers. The work is queued in a stream of this thread's current CUDA
+  // context and may not have finished when this returns.
   // Requires: the driver knows the tensors' memory (RuntimeError); kernels alone use it (RuntimeError).
   void call_tensors_on_device(const py::tuple& given, uintptr_t stream) {
     auto [tensors, elements] = tensors_of(given);
@@ -117,7 +118,7 @@ class Bound {
     try {
       DynamicCall::call(callable_, tensors.values, &context);
     } catch (const RuntimeError& failed) {
-      // A stage on the host asks for elements; of wrapped memory there is no copy there.
+      // A host stage requested elements, but wrapped device memory has no copy on the host.
       if (failed.code() != halide_error_code_copy_to_host_failed &&
           failed.code() != halide_error_code_host_is_null)
         throw;
@@ -126,10 +127,10 @@ class Bound {
   }
 
  private:
-  // Without the number that makes it unique.
+  // The user's name, without the number that makes it unique.
   static std::string given_name(const std::string& name) { return name.substr(0, name.find('$')); }
 
-  // Every argument and output in its place.
+  // Arguments and outputs in the order of the function.
   py::tuple in_order(const py::args& positional, const py::kwargs& named) const {
     std::string all;
     for (const std::string& name : names_) all += (all.empty() ? "" : ", ") + name;
@@ -155,14 +156,14 @@ class Bound {
     return result;
   }
 
-  // What a call touches, for as long as it runs. Values point into buffers, also of what it is moved to.
+  // The buffers and scalars of a call. `values` points into `buffers`; the pointers stay valid after a move.
   struct Tensors {
     explicit Tensors(size_t count) : buffers(count), values(count) {}
     std::vector<Runtime::Buffer<>> buffers;
     std::vector<DynamicCall::Value> values;
   };
 
-  // Of arguments and outputs, and how many elements these have. Compiles again, where one asks for that.
+  // Buffers of arguments and outputs, and their total number of elements. Recompiles if a stride requires it.
   std::pair<Tensors, int64_t> tensors_of(const py::tuple& given) {
     if (given.size() != args_.size() + outputs_.size())
       throw py::type_error("a Callable takes its arguments, then its output buffers");
@@ -194,7 +195,7 @@ class Bound {
                failed.code());
   }
 
-  // One whose address is the device's.
+  // A Buffer whose device memory is at the tensor's address.
   static Buffer<> on_device(const Runtime::Buffer<>& tensor, const Parameter& parameter) {
     Buffer<> moved(tensor, parameter ? parameter->name : "");
     halide_buffer_t& raw = *moved.raw_buffer();
@@ -205,9 +206,9 @@ class Bound {
     return moved;
   }
 
-  // Another thread for the sake of Ctrl-C costs more than a call that is over before anybody could press it. Such a
-  // call is one on no more elements than one that was seen to be short; a number among the arguments may be a count
-  // of loops, so then nothing is known.
+  // Short calls run on this thread, because a worker thread for Ctrl-C would cost more than the call. A call counts as
+  // short if an earlier one with at least as many elements was short. With a scalar argument nothing is known, since it
+  // may be an iteration count.
   void run(const py::tuple& given, int64_t elements, Tensors tensors) {
     const bool may_be_short = !counts_ && elements <= most_short_elements;
     const Callable callable = callable_;
@@ -240,7 +241,8 @@ class Bound {
     if (const Parameter& parameter = parameter_of_argument(i)) allow_stride_of(*parameter, buffer);
   }
 
-  // Parameters whose promise of a dense dimension 0 is lifted: by this Callable, or by another one that has them, too.
+  // Number of parameters whose dimension 0 need not be dense; another Callable with the same parameters may have
+  // removed the assumption.
   size_t count_lifted() const {
     size_t count = 0;
     for (const auto* parameters : {&parameters_, &outputs_}) {
@@ -264,11 +266,11 @@ class Bound {
   bool counts_ = false;          // whether an argument is a whole number
 };
 
-// Calls on tensors of element types and sizes that are known: one call of Python's for all that there is to do, each of
-// which would take longer than what it asks for. Nothing of it changes: threads may share it.
+// A call on tensors of known element types and sizes, in a single Python call, because each further Python call would
+// take longer than the computation. Immutable, so threads may share it.
 class ExpectedCall {
  public:
-  // Of a Bound; element types and sizes of its arguments, in pairs; functions that make a result each.
+  // `callable`: a Bound; `inputs`: pairs of element type and sizes; `makers`: functions that each create a result.
   ExpectedCall(py::object callable, const py::iterable& inputs, const py::iterable& makers)
       : callable_(std::move(callable)), bound_(callable_.cast<Bound*>()) {
     for (py::handle one : inputs) {
@@ -278,7 +280,7 @@ class ExpectedCall {
     for (py::handle one : makers) makers_.push_back(py::reinterpret_borrow<py::object>(one));
   }
 
-  // The results; None, and nothing has happened, where tensors are others than was said.
+  // The results. Returns None, without side effects, if the tensors have other types or sizes.
   py::object call(const py::tuple& given) const {
     if (given.size() != inputs_.size()) return py::none();
     for (size_t i = 0; i < inputs_.size(); i++) {

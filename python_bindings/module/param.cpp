@@ -1,4 +1,4 @@
-// param.cpp -- Param: the type is an argument here, not of the class.
+// param.cpp -- binds Param, whose type is an argument of the constructor.
 #include "frontend/data/param.h"
 #include "bind_all.h"
 #include "binding.h"

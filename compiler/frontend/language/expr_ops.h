@@ -175,7 +175,7 @@ Expr count_trailing_zeros(Expr x);  // the width if x is 0
 // Requires: every operand must be a defined expression; it takes a number.
 Expr floor(Expr x);
 Expr ceil(Expr x);           // the smallest integer that is not below x, as a float
-Expr round(Expr x);          // the nearest integer, halves to even, as a float
+Expr round(Expr x);          // the nearest integer as a float, half to even
 Expr trunc(Expr x);          // x without its fraction, as a float
 Expr fract(Expr x);          // x - trunc(x), which has the sign of x
 Expr sqrt(Expr x);           // square root
