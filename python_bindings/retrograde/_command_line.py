@@ -1,4 +1,4 @@
-"""The program that build files call to run a generator; its command line is that of generators in C++."""
+"""The command line of programs with generators, which build files call. Its flags are those of generators in C++."""
 import os
 import sys
 
@@ -31,7 +31,7 @@ def usage():
 
 
 def read(words):
-    """The flags, and the params apart."""
+    """The flags and the generator parameters of a command line."""
     flags, params, rest = {}, {}, list(words)
     while rest:
         word = rest.pop(0)
@@ -100,7 +100,7 @@ def run(flags, params):
 
 
 def main(argv=None):
-    """Runs what the command line says. What goes wrong is one line on the standard error stream, and exit status 1."""
+    """Runs the generator that the command line names. An error prints one line to standard error and exits with 1."""
     words = sys.argv[1:] if argv is None else list(argv)
     if not words or {"-h", "--help"} & set(words):
         print(usage(), end="", file=sys.stderr)

@@ -175,9 +175,9 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Inserts a wrapper: a new Func that reads this one and replaces it in some consumers, to be scheduled on
   // its own. g.in(f) serves f alone, g.in({f, h}) serves both, and g.in() all consumers without a wrapper of
   // their own.
-  //  g(x) = ...                        g(x) = ...
-  //  f(x) = g(x) + g(x + 1)      =>    g_in_f(x) = g(x)
-  //                                    f(x) = g_in_f(x) + g_in_f(x + 1)
+  //   g(x) = ...                        g(x) = ...
+  //   f(x) = g(x) + g(x + 1)      =>    g_in_f(x) = g(x)
+  //                                     f(x) = g_in_f(x) + g_in_f(x + 1)
   // A second call returns the same wrapper. A wrapper is inlined unless scheduled, and can be wrapped itself:
   // g.in(f).in(f). Wrappers are applied when the pipeline is compiled; the definition of f does not change.
   // Requires: a Func is wrapped in the Funcs that read it; a user needs a definition first; Funcs
@@ -188,15 +188,15 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   Func in();
   // Inserts a clone: a copy of this Func that replaces it in the given consumers. The clone starts with the
   // directives given so far, and recomputes the values for those consumers.
-  //  g(x) = e(x)                       g(x) = e(x)
-  //  f(x) = g(x)                 =>    g_clone_in_f(x) = e(x)
-  //  h(x) = g(x)                       f(x) = g_clone_in_f(x);  h(x) = g(x)
+  //   g(x) = e(x)                       g(x) = e(x)
+  //   f(x) = g(x)                 =>    g_clone_in_f(x) = e(x)
+  //   h(x) = g(x)                       f(x) = g_clone_in_f(x);  h(x) = g(x)
   Func clone_in(const Func& f);
   Func clone_in(const std::vector<Func>& fs);
   // Inserts a copy of an input image that only this Func reads, to be laid out and scheduled like any Func.
   // It serves this Func alone. (A Buffer that the program names has no in(f).)
-  //  f(x) = image(3 * x)         =>    image_in_f(x) = image(x)
-  //                                    f(x) = image_in_f(3 * x)
+  //   f(x) = image(3 * x)         =>    image_in_f(x) = image(x)
+  //                                     f(x) = image_in_f(3 * x)
   // A second call returns the same copy.
   // Requires: an input is copied for a Func that reads it; an input has a type and dimensions.
   Func copy_input(const ImageParam& image);
@@ -212,17 +212,17 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
 
   // Substitutes the definition into the consumers. This is the default, except for Funcs whose inlining would
   // explode code size. A Func with updates is computed in the innermost loop of each consumer.
-  //  for x: f(x) = g(x) + 1    =>    for x: f(x) = (x * x) + 1
+  //   for x: f(x) = g(x) + 1    =>    for x: f(x) = (x * x) + 1
   // Requires: what is inlined makes an expression that a code generator finishes.
   Func& compute_inline() { return compute_at(LoopLevel::inlined()); }
   // Computes the whole required region before any consumer starts.
-  //  for x: f(x) = g(x) + g(x + 1)    =>    for x in [0, n + 1): g(x) = ...
-  //                                         for x in [0, n): f(x) = g(x) + g(x + 1)
+  //   for x: f(x) = g(x) + g(x + 1)    =>    for x in [0, n + 1): g(x) = ...
+  //                                          for x in [0, n): f(x) = g(x) + g(x + 1)
   Func& compute_root() { return compute_at(LoopLevel::root()); }
   // Computes, inside the loop `var` of `f`, the region that one iteration requires. g.compute_at(f, y):
-  //  for y:                       for y:
-  //    for x:                =>     for x in [0, n + 1): g(x, y) = ...
-  //      f(x, y) = ...              for x in [0, n): f(x, y) = g(x, y) + g(x + 1, y)
+  //   for y:                       for y:
+  //     for x:                =>     for x in [0, n + 1): g(x, y) = ...
+  //       f(x, y) = ...              for x in [0, n): f(x, y) = g(x, y) + g(x + 1, y)
   Func& compute_at(const Func& f, const Var& var) { return compute_at(LoopLevel(f, var)); }
   Func& compute_at(const Func& f, const RVar& var) { return compute_at(LoopLevel(f, var)); }
   // Requires: a Func must be stored and computed at a loop that encloses every use of it, and its
@@ -234,10 +234,10 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Stores the whole required region at the outermost level. Values that earlier iterations computed are
   // reused, and storage is folded if fewer lines are alive at once. g.compute_at(f, y).store_root(), with
   // f(x, y) = g(x, y) + g(x, y + 1):
-  //  realize g over all rows (folded: two rows)
-  //    for y:
-  //      for x: g(x, y + 1) = ...     (and row 0 when y == 0)
-  //      for x: f(x, y) = g(x, y) + g(x, y + 1)
+  //   realize g over all rows (folded: two rows)
+  //     for y:
+  //       for x: g(x, y + 1) = ...     (and row 0 when y == 0)
+  //       for x: f(x, y) = g(x, y) + g(x, y + 1)
   Func& store_root() { return store_at(LoopLevel::root()); }
   // Stores at the loop `var` of `f`, which must enclose the compute level; see store_root().
   Func& store_at(const Func& f, const Var& var) { return store_at(LoopLevel(f, var)); }
@@ -247,9 +247,9 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   Func& store_at(const LoopLevel& level) { return give(graph::StoreAt{{{}, level.contents()}}); }
   // Allocates memory once, at a level around the store level, instead of in each iteration between the two.
   // The computation does not change.
-  //  for y:                            allocate g
-  //    allocate g                =>    for y:
-  //      g(...) = ...                    g(...) = ...
+  //   for y:                            allocate g
+  //     allocate g                =>    for y:
+  //       g(...) = ...                    g(...) = ...
   Func& hoist_storage(const Func& f, const Var& var) { return hoist_storage(LoopLevel(f, var)); }
   Func& hoist_storage(const Func& f, const RVar& var) { return hoist_storage(LoopLevel(f, var)); }
   // Requires: storage is hoisted to a loop that encloses its store level; the size of hoisted
@@ -262,9 +262,9 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Keeps `copies` copies of hoisted storage, which the iterations of the loops between hoist level and store
   // level use in turn. A value stays valid until `copies` more iterations have begun. An async Func computes
   // that far ahead of its consumers.
-  //  allocate g                 allocate g[copies]
-  //  for y:                =>   for y:
-  //    g(...) = ...               g[y % copies](...) = ...
+  //   allocate g                 allocate g[copies]
+  //   for y:                =>   for y:
+  //     g(...) = ...               g[y % copies](...) = ...
   // Requires: the number of copies must be a defined expression; the number of copies is an integer;
   // the number of copies is at least 1 and fits an int32; the number of copies has one value in each
   // call: it is made of parameters and facts about buffers; a ring buffer lies in storage that is
@@ -277,7 +277,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // reads of its registers what it stored itself.
   Func& store_in(MemoryType memory) { return give(graph::StoreIn{memory}); }
   // Sets the layout in memory: dimensions from innermost to outermost. reorder_storage(c, x, y):
-  //  g[x + w * y + w * h * c]    =>    g[c + 3 * x + 3 * w * y]
+  //   g[x + w * y + w * h * c]    =>    g[c + 3 * x + 3 * w * y]
   // Requires: each must be one of its dimensions; each dimension is named once.
   Func& reorder_storage(const std::vector<Var>& dims);
   template <std::convertible_to<Var>... Rest>
@@ -286,7 +286,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   }
   // Rounds the extent of a dimension in storage up to a multiple of `alignment`, so that every line begins
   // aligned.
-  //  align_storage(x, 8):   allocate g[w * h]  =>  allocate g[(w + 7) / 8 * 8 * h]
+  //   align_storage(x, 8):   allocate g[w * h]  =>  allocate g[(w + 7) / 8 * 8 * h]
   // Requires: the dimension must be a pure variable of the first definition; the alignment must be
   // a defined expression; the alignment is an integer; the alignment is at least 1 and fits an
   // int32; the alignment has one value in each call: it is made of parameters and facts about
@@ -305,14 +305,14 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   }
   // Allocates `bound` coordinates of a dimension whatever bounds inference says; a call that needs more
   // fails.
-  //  allocate g[n']   =>   assert(n' <= bound); allocate g[bound]
+  //   allocate g[n']   =>   assert(n' <= bound); allocate g[bound]
   // Requires: the bound is at least 1 and fits an int32; storage that the compiler lays out can be
   // folded or bounded.
   Func& bound_storage(const Var& dim, const Expr& bound) {
     return give(graph::BoundStorage{dim.name(), bound});
   }
   // Keeps results in the runtime's cache, keyed by the values of all parameters that this Func depends on.
-  //  produce g   =>   if not in cache: produce g, put it in
+  //   produce g   =>   if not in cache: produce g, put it in
   // Requires: an eviction key is an integer or a pointer; a Func has one eviction key; what an
   // image holds is no part of a memoized Func's key; the key must be made of Params and constants;
   // an output is computed by every call; a memoized Func must be computed whole, where its storage
@@ -321,7 +321,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
     return give(graph::Memoize{eviction_key.key()});
   }
   // Computes this Func on a thread of its own, ahead of its consumers as far as storage allows.
-  //  produce g; consume g   =>   fork { produce g, signal } and { wait, consume g }
+  //   produce g; consume g   =>   fork { produce g, signal } and { wait, consume g }
   // Requires: what an async Func and its consumer both read is stored no further out than the async
   // Func, or computed outside of the loops that they share; the loops between storage and
   // computation of an async Func are serial and always run (Unsupported).
@@ -330,8 +330,8 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // ---- bounds and estimates ----
 
   // Promises that exactly [min, min + extent) is computed. A call that needs more fails.
-  //  for x in [x0, x0 + n): ...   =>   assert(range is within [min, min + extent))
-  //                                    for x in [min, min + extent): ...
+  //   for x in [x0, x0 + n): ...   =>   assert(range is within [min, min + extent))
+  //                                     for x in [min, min + extent): ...
   // Requires: the variable must be a pure variable of the first definition; the extent must be a
   // defined expression; bounds are integers; an extent is not negative; a bound has one value in
   // each call: it is made of parameters and facts about buffers.
@@ -341,7 +341,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Promises the extent only, so loops have this constant extent.
   Func& bound_extent(const Var& var, Expr extent) { return bound(var, {}, std::move(extent)); }
   // Enlarges the computed region so that min % modulus == remainder and the extent is a multiple of modulus.
-  //  for x in [x0, x1): ...   =>   for x in [x0 rounded down, x1 rounded up): ...
+  //   for x in [x0, x1): ...   =>   for x in [x0 rounded down, x1 rounded up): ...
   // Requires: the modulus is at least 1 and fits an int32; the remainder is an integer; the extent
   // is a multiple of the modulus; min % modulus is the remainder.
   Func& align_bounds(const Var& var, Expr modulus, Expr remainder = 0) {

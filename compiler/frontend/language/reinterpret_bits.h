@@ -7,7 +7,7 @@
 namespace retrograde::internal {
 
 // The bits of a C++ value as a value of another type of the same size.
-//  uint32_t bits = reinterpret_bits<uint32_t>(1.0f);   // 0x3f800000
+//   uint32_t bits = reinterpret_bits<uint32_t>(1.0f);   // 0x3f800000
 template <typename To, typename From>
 To reinterpret_bits(const From& from) {
   static_assert(sizeof(To) == sizeof(From), "both types have one size");

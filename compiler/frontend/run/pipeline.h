@@ -160,9 +160,9 @@ class Pipeline : public Runnable<Pipeline> {
 // The implementation of a C name that a pipeline calls: a C function, or a Pipeline, which is compiled with
 // the caller and computes an extern stage. A Pipeline takes user_context_value(), which may be omitted, then
 // the images that it uses, then its Params, each sorted by name, then its outputs:
-//  blur: uses the ImageParam "in" and the Param "radius"
-//  f.define_extern("blur", {user_context_value(), g, radius}, Float(32), 2);
-//  f.set_jit_externs({{"blur", JITExtern(blur)}});
+//   blur: uses the ImageParam "in" and the Param "radius"
+//   f.define_extern("blur", {user_context_value(), g, radius}, Float(32), 2);
+//   f.set_jit_externs({{"blur", JITExtern(blur)}});
 struct JITExtern {
   // A pipeline as the implementation.
   // Requires: it needs outputs; a pipeline that is called by name gets its arguments.
