@@ -175,7 +175,7 @@ class StabilityChecker {
       bool found = false;
       for (const Input& input : inputs_) found |= input.own == r.input.symbol();
       if (!found) {
-        user_error(asked_, "a range is one of a floating input that the output depends on",
+        user_error(asked_, "a range belongs to a floating input that the output depends on",
                    "there is one of something else", "Give an ImageParam, a Buffer or a Param");
       }
     }

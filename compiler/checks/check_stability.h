@@ -90,10 +90,9 @@ struct StabilityReport {
 };
 
 // Compares `output` over `sizes`, and its adjoint, with double precision on several sets of inputs.
-// Requires: every input must be bound (RuntimeError); the output needs a size in each of its
-// dimensions, and a min in each or none; a range has two finite ends, the lower first; a range is
-// one of a floating input that the output depends on; every operation needs a meaning in double
-// (Unsupported).
+// Requires: every input must be bound (RuntimeError); the output needs a size in each of its dimensions, and
+// a min in each or none; a range has two finite ends, the lower first; a range belongs to a floating input
+// that the output depends on; every operation needs a meaning in double (Unsupported).
 StabilityReport check_stability(const Func& output, const std::vector<int>& sizes = {},
                                 const StabilityOptions& options = {});
 

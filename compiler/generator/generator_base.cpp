@@ -283,7 +283,7 @@ std::vector<Parameter> GeneratorBase::input_parameter(const std::string& name) {
 Pipeline GeneratorBase::get_pipeline() {
   if (!is_generated()) {
     user_error("take the Pipeline of the generator " + quoted(name_),
-               "the Pipeline is made of what generate() defines", "generate() has not run",
+               "the Pipeline has the outputs that generate() defines", "generate() has not run",
                "Call it in schedule(), or after apply()");
   }
   if (!pipeline_.defined()) {

@@ -119,7 +119,7 @@ class GeneratorBase : public NamesInterface, public AbstractGenerator {
   void generate_all();
   void schedule_all();
   // The pipeline of all outputs; after generate().
-  // Requires: the Pipeline is made of what generate() defines.
+  // Requires: the Pipeline has the outputs that generate() defines.
   Pipeline get_pipeline();
   // Reports the begin and end of each call to the trace handler; may precede generate().
   void trace_pipeline();
@@ -159,7 +159,7 @@ class GeneratorBase : public NamesInterface, public AbstractGenerator {
   // for each floating-point output _grad_loss_for_<output>, and compute _grad_loss_wrt_<input>. Scheduling is
   // as in build_gradient_module.
   // Requires: gradients are of outputs with one value; gradients are of floating-point outputs;
-  // gradients are by floating-point inputs.
+  // gradients are with respect to floating-point inputs.
   Module build_separate_gradients(const std::string& function_name = "");
 
   // ---- the interface AbstractGenerator ----

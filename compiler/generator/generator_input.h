@@ -41,7 +41,7 @@ class GeneratorInputBase : public GeneratorPort {
   // still unknown.
   virtual void make_parameters();
   // Binds values from C++.
-  // Requires: the value is what the input declares.
+  // Requires: the value matches the declaration of the input.
   void set_values(std::vector<InputValue> values);
   // A parameter as a value of this input.
   InputValue value_of(const std::shared_ptr<graph::ParameterContents>& parameter) const;
@@ -144,8 +144,8 @@ class GeneratorInput : public internal::InputElements<T>,
 
   // States a likely range of a dimension, for schedulers. `var` is one of _0, _1, ... or an argument of the
   // Func.
-  // Requires: inputs have values in generate() and schedule(); a dimension goes by the name of the
-  // input's argument.
+  // Requires: inputs have values in generate() and schedule(); a dimension has the name of one of the input's
+  // arguments.
   GeneratorInput& set_estimate(const Var& var, const Expr& min, const Expr& extent) {
     Base::check_ready();
     GeneratorInputBase::set_estimate_of(var, min, extent);

@@ -114,7 +114,7 @@ void GeneratorPort::agree_on(const std::vector<Type>& types, int dims) {
 void GeneratorPort::agree_on_size(size_t size) {
   const int wanted = static_cast<int>(size);
   if (wanted < 0 || (array_size_defined() && wanted != array_size_)) {
-    refuse(text("use ", wanted, " as the array size of"), "its size is said once, and not negative",
+    refuse(text("use ", wanted, " as the array size of"), "its size is set once, and not negative",
            array_size_defined() ? text("it is ", array_size_) : "it is open",
            "Give that many elements");
   }

@@ -69,7 +69,7 @@ class GeneratorPort {
 
   // Sets the type that the declaration leaves open; call it in configure().
   // Requires: configure() is the place for that; its type is declared once; its dimensions are
-  // declared once; its size is said once, and not negative.
+  // declared once; its size is set once, and not negative.
   void set_type(const Type& type) { set_types({type}); }
   void set_type(const std::vector<Type>& types) { set_types(types); }  // of a Tuple
   // Sets the types of a Tuple that the declaration leaves open; call it in configure().

@@ -166,7 +166,7 @@ Module GeneratorBase::build_separate_gradients(const std::string& function_name)
   const std::vector<NamedParameter> inputs = differentiable_inputs();
   if (inputs.empty()) {
     user_error("build the gradients of the generator " + quoted(name_),
-               "gradients are by floating-point inputs", "it has none",
+               "gradients are with respect to floating-point inputs", "it has none",
                "Make an input one of floats");
   }
   std::vector<Module> modules{gradient_function(function, inputs)};

@@ -259,7 +259,7 @@ void check_embed(const Runtime::Buffer<>& buffer, const std::string& name, int d
   const std::string asked =
       text("embed the Buffer ", quoted(name), " as dimension ", d, " of another");
   if (d >= 0 && d <= buffer.dimensions()) return check_new_dimension(buffer, asked);
-  user_error(asked, "a new dimension stands before, between or behind those that are there",
+  user_error(asked, "a new dimension is inserted before, between or after the existing ones",
              text("it has ", buffer.dimensions(), " dimensions"),
              text("Give a number from 0 to ", buffer.dimensions()));
 }

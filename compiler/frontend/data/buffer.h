@@ -393,7 +393,7 @@ class Buffer {
   // Removes dimension d by fixing its coordinate at the min.
   void slice(int d) { slice(d, min(d)); }
   // Inserts a dimension d of extent 1 with the coordinate `position`.
-  // Requires: a new dimension stands before, between or behind those that are there; its strides must
+  // Requires: a new dimension is inserted before, between or after the existing ones; its strides must
   // fit 31 bits.
   void embed(int d, int position = 0) {
     frontend::check_embed(runtime(), name(), d);
@@ -516,13 +516,13 @@ class Buffer {
     return copied(frontend::Layout::Interleaved, "copy_to_interleaved");
   }
   // Overwrites the elements of this Buffer where its bounds overlap those of `source`.
-  // Requires: both Buffers have one type and as many dimensions.
+  // Requires: both Buffers have the same type and number of dimensions.
   template <typename T2, int D2>
   void copy_from(const Buffer<T2, D2>& source) {
     if (runtime().type() != source.runtime().type() || dimensions() != source.dimensions()) {
       user_error(
           text("copy ", retrograde::quoted(source.name()), " into ", retrograde::quoted(name())),
-          "both Buffers have one type and as many dimensions",
+          "both Buffers have the same type and number of dimensions",
           text("they have ", source.dimensions(), " dimensions of ", to_string(source.type()),
                " and ", dimensions(), " of ", to_string(type())),
           "Copy into a Buffer of the same type and dimensions");

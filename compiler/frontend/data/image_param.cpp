@@ -164,7 +164,7 @@ int OutputImageParam::host_alignment() const {
 OutputImageParam& OutputImageParam::store_in(MemoryType memory) {
   if (memory != MemoryType::Auto && memory != MemoryType::Heap) {
     unsupported("store the buffer " + quoted(name()) + " in another memory",
-                "buffers of arguments are memory of the CPU", "that memory belongs to a device",
+                "argument buffers lie in the memory of the CPU", "that memory belongs to a device",
                 "Leave it out");
   }
   return *this;

@@ -85,7 +85,7 @@ class OutputImageParam {
   OutputImageParam& set_host_alignment(int bytes);
   int host_alignment() const;  // promised alignment in bytes, at least the element size
   // Accepts MemoryType::Auto and MemoryType::Heap; other memories cannot hold an argument.
-  // Requires: buffers of arguments are memory of the CPU (Unsupported).
+  // Requires: argument buffers lie in the memory of the CPU (Unsupported).
   OutputImageParam& store_in(MemoryType memory);
   // Describes the parameter as an argument of an ahead-of-time function.
   operator Argument() const { return frontend::argument_of(checked()); }

@@ -27,7 +27,7 @@ class Parameter {
   // Whether both handles refer to one parameter.
   bool same_as(const Parameter& other) const { return contents_ == other.contents_; }
   // Name in messages and generated code.
-  // Requires: it stands for a Param or an ImageParam.
+  // Requires: it refers to a Param or an ImageParam.
   const std::string& name() const { return checked("take the name of").name; }
   // Type of the scalar or of the elements.
   Type type() const { return checked("take the type of").type; }

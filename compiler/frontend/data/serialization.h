@@ -16,7 +16,7 @@ namespace frontend {
 }
 
 // Always throws: a pipeline has no serialized form.
-// Requires: pipelines live in the process that defines them (Unsupported).
+// Requires: a pipeline exists only in the process that defines it (Unsupported).
 template <typename... Args>
 void serialize_pipeline(const Pipeline&, Args&&...) {
   frontend::refuse_serialization("serialize a Pipeline");

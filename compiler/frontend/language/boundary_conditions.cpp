@@ -133,7 +133,7 @@ Func constant_exterior(const Func& source, const Tuple& value, const Region& bou
   for (size_t i = 0; i < value.size(); i++) {
     const Expr constant = ir::literal_in(source.output_types()[i], value[i],
                                          "apply constant_exterior to " + quoted(source.name()),
-                                         "the value outside is one of the type inside");
+                                         "the value outside has the type of the values inside");
     values.push_back(ir::make_select(outside, constant, likely(inside[i])));
   }
   Func result("constant_exterior");

@@ -22,7 +22,7 @@ namespace retrograde::BoundaryConditions {
 // Extends `source` by a constant: points outside of `bounds` have the value `value`.
 // Requires: it must have a definition; there are bounds for at most its dimensions; bounds are
 // integers; an extent is not negative; there is one constant for each value; the value outside is a
-// defined expression; the value outside is one of the type inside.
+// defined expression; the value outside has the type of the values inside.
 Func constant_exterior(const Func& source, const Tuple& value, const Region& bounds);
 Func constant_exterior(const Func& source, const Expr& value, const Region& bounds);
 // Extends `source` by its border: a point outside has the value of the nearest element inside.

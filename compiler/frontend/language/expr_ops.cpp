@@ -414,8 +414,8 @@ Expr call_with(Op op, std::vector<Expr> first, const std::vector<Expr>& values) 
   const char* what = op_info(op).name;
   for (const Expr& condition : first) check_condition(condition, what);
   if (values.empty())
-    user_error(text("apply ", what), "it gives the value of its first argument",
-               "it was given none", "Give it a value");
+    user_error(text("apply ", what), "it returns its first argument", "it was given none",
+               "Give it a value");
   for (const Expr& value : values) check_defined(value, what);
   first.insert(first.end(), values.begin(), values.end());
   return call_op(op, values[0].type(), std::move(first));

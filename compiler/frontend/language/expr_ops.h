@@ -263,7 +263,7 @@ void check_defined(const Expr& e, const char* what);
 void check_integer(const Expr& e, const char* what);
 }  // namespace frontend
 // The first value; each evaluation also prints all values on one line.
-// Requires: it gives the value of its first argument; every operand must be a defined expression.
+// Requires: it returns its first argument; every operand must be a defined expression.
 inline Expr print(const std::vector<Expr>& values) { return frontend::print_values(values); }
 template <typename First, typename... Rest>
 requires std::constructible_from<Expr, First> Expr print(First&& first, Rest&&... rest) {

@@ -205,7 +205,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Requires: storage lies in the memory of the CPU (Unsupported).
   Func copy_to_device(DeviceAPI device = DeviceAPI::Default_GPU);
   // Computes this Func on the host. It must be a plain copy of another Func: g.in().copy_to_host().
-  // Requires: a copy is the same values at the same coordinates.
+  // Requires: a copy has the same values at the same coordinates.
   Func copy_to_host();
 
   // ---- compute level, storage level and storage ----

@@ -45,10 +45,10 @@ class Function : public graph::FuncPtr {
   bool same_as(const Function& other) const { return get() == other.get(); }
 
  private:
-  // Requires: a Function is that of a Func.
+  // Requires: a Function belongs to a Func.
   const graph::FuncContents& checked() const {
     if (const graph::FuncContents* contents = get()) return *contents;
-    user_error("look at a Function", "a Function is that of a Func", "this one was made of nothing",
+    user_error("look at a Function", "a Function belongs to a Func", "this one was made of nothing",
                "Take it from a Func: f.function()");
   }
 };

@@ -81,9 +81,9 @@ Expr user_context_value();
 // to f(b). All reads of f come before the stores. Over an RDom this holds for each iteration, which sees the
 // stores of earlier ones: f(scatter(r, r + 1)) = f(gather(r + 1, r)) moves f(0) to the end. Operators apply
 // point by point: f(x + scatter(1, 0), y + scatter(0, 3)) = 2 * gather(x, y).
-// Requires: at least one point is named; each point is a defined Expr; all points are of one type;
-// a first definition is for all points; scatter() names the places on the left-hand side; all of an
-// update's scatter() and gather() have as many points.
+// Requires: at least one point is named; each point is a defined Expr; all points are of one type; a first
+// definition is for all points; scatter() names the places on the left-hand side; all scatter() and gather()
+// of an update have the same number of points.
 Expr scatter(const std::vector<Expr>& points);
 // The values or coordinates that an update reads, one for each point of scatter().
 Expr gather(const std::vector<Expr>& points);

@@ -119,7 +119,7 @@ RVar RDom::operator[](int i) const {
 const RVar RDom::only_variable() const {
   if (dimensions() != 1) {
     user_error("use an RDom as a variable",
-               "only a domain of one variable stands for that variable",
+               "only a domain of one variable converts to that variable",
                text("it has ", dimensions(), " variables"), "Name the variable: r.x, r.y or r[i]");
   }
   return RVar(domain_, 0);

@@ -84,7 +84,7 @@ class RDom {
   // Requires: variables are numbered from 0.
   RVar operator[](int i) const;
   // The variable of a one-dimensional domain.
-  // Requires: only a domain of one variable stands for that variable.
+  // Requires: only a domain of one variable converts to that variable.
   operator RVar() const;
   // The variable of a one-dimensional domain, as an Expr.
   operator Expr() const;

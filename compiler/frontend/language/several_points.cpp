@@ -113,7 +113,7 @@ class SeveralPoints {
       const int points = static_cast<int>(call->args.size());
       if (points_ == 0) points_ = points;
       if (points == points_) continue;
-      user_error(asked_, "all of an update's scatter() and gather() have as many points",
+      user_error(asked_, "all scatter() and gather() of an update have the same number of points",
                  text("one has ", points_, " and one has ", points), "Give as many to each");
     }
   }

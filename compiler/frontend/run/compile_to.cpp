@@ -94,7 +94,8 @@ class Inputs {
 
   void check(const Argument& argument, std::set<std::string>& names) const {
     if (argument.is_output()) {
-      user_error(asked_, "the list of arguments holds inputs, and outputs follow by themselves",
+      user_error(asked_,
+                 "the list of arguments holds inputs, and outputs are appended automatically",
                  quoted(argument.name) + " is an output", "Leave it out");
     }
     if (!names.insert(argument.name).second) {
@@ -107,7 +108,7 @@ class Inputs {
         parameter->dimensions == argument.dimensions) {
       return;
     }
-    user_error(asked_, "an argument is what the pipeline uses under its name",
+    user_error(asked_, "an argument agrees with what the pipeline uses under its name",
                "the Argument " + quoted(argument.name) + " differs in kind, type or dimensions",
                "List the Param, ImageParam or Buffer itself");
   }

@@ -72,7 +72,7 @@ internal::LoweredFunc Module::get_function_by_name(const std::string& name) cons
     names += (names.empty() ? "" : ", ") + quoted(function.name);
   }
   user_error("find the function " + quoted(name) + " in the module " + quoted(this->name()),
-             "a module gives functions that were appended to it",
+             "a module has the functions that were appended to it",
              names.empty() ? "it has none" : "it has " + names, "Name one of them");
 }
 

@@ -92,7 +92,7 @@ class Module {
   const std::vector<Module>& submodules() const;  // modules that were appended
   bool any_strict_float() const;                  // whether the target has strict_float
   // The function that was appended under `name`.
-  // Requires: a module gives functions that were appended to it.
+  // Requires: a module has the functions that were appended to it.
   internal::LoweredFunc get_function_by_name(const std::string& name) const;
 
   // Adds a function, or the functions of another module.

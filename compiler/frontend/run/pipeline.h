@@ -79,7 +79,7 @@ class Pipeline : public Runnable<Pipeline> {
   AutoSchedulerResults auto_schedule(const Target& target, const AutoscheduleOptions& options,
                                      const MachineParams& machine = {}) const;
   // Schedules the pipeline with an autoscheduler that is selected and configured by name and text.
-  // Requires: the built-in autoscheduler is told of the machine.
+  // Requires: the built-in autoscheduler takes parameters of the machine.
   AutoSchedulerResults apply_autoscheduler(const Target& target,
                                            const AutoschedulerParams& params) const;
   // Keeps the compiler from scheduling Funcs without directives; gradients are then inlined into their

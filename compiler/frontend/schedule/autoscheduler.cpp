@@ -212,7 +212,7 @@ std::string frontend::scheduler_for(const AutoschedulerParams& params) {
     if (asked != built_in_autoscheduler || unknown_keys(params).empty()) return asked;
     user_error(
         "schedule automatically with " + params.to_string(),
-        "the built-in autoscheduler is told of the machine",
+        "the built-in autoscheduler takes parameters of the machine",
         "it knows parallelism, last_level_cache_size and balance, not " + unknown_keys(params),
         "Leave them out, or give AutoscheduleOptions");
   }

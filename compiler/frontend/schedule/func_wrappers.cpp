@@ -60,7 +60,7 @@ static bool is_plain_copy(const graph::FuncContents& f) {
 Func Func::copy_to_host() {
   if (!is_plain_copy(*func_)) {
     user_error("copy " + quoted(name()) + " to the host",
-               "a copy is the same values at the same coordinates",
+               "a copy has the same values at the same coordinates",
                defined() ? text("its definition is another one") : text("it has no definition"),
                "Copy a wrapper: " + name() + ".in().copy_to_host()");
   }

@@ -334,11 +334,11 @@ class LoopDirectives {
   // thread. The target needs the feature CUDA; other devices are Unsupported.
 
   // Maps loops to the threads of a block, at most 1,024 in all.
-  // Requires: iterations that run at the same time must not touch the same element; a directive for
-  // GPUs names a GPU; code for GPUs is made for CUDA (Unsupported); the target has a GPU; threads belong
-  // to blocks; blocks consist of threads; threads compute vectors, and no vector has threads; a kernel
-  // computes, and calls nothing of the host (Unsupported); kernels are launched by one thread of the
-  // host (Unsupported).
+  // Requires: iterations that run at the same time must not touch the same element; a directive for GPUs
+  // names a GPU; code for GPUs is generated for CUDA (Unsupported); the target has a GPU; threads belong to
+  // blocks; blocks consist of threads; threads compute vectors, and no vector has threads; a kernel computes,
+  // and calls nothing of the host (Unsupported); kernels are launched by one thread of the host
+  // (Unsupported).
   Self& gpu_threads(const VarOrRVar& x, DeviceAPI device = DeviceAPI::Default_GPU) {
     return run_on_gpu(ForType::GpuThread, {x}, device);
   }
@@ -383,7 +383,7 @@ class LoopDirectives {
         .gpu_threads(thread_x, thread_y, thread_z, device);
   }
   // Runs the whole stage on one thread of one block.
-  // Requires: code for GPUs is made for CUDA (Unsupported).
+  // Requires: code for GPUs is generated for CUDA (Unsupported).
   Self& gpu_single_thread(DeviceAPI device = DeviceAPI::Default_GPU) {
     return run_on_gpu(ForType::GpuBlock, {Var::outermost()}, device);
   }

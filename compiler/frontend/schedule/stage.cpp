@@ -83,7 +83,7 @@ void check_device(const SchedulePlace& place, const std::vector<VarOrRVar>& loop
     user_error(asked + "a GPU", "a directive for GPUs names a GPU", "it names the host",
                "Leave the device out, or use parallel, vectorize and tile");
   }
-  unsupported(asked + "a GPU", "code for GPUs is made for CUDA",
+  unsupported(asked + "a GPU", "code for GPUs is generated for CUDA",
               "the directive names another kind of device",
               "Leave the device out, or give DeviceAPI::CUDA");
 }
