@@ -73,9 +73,10 @@ class Findings {
     const size_t count = unscheduled_beside_adjoints(funcs);
     if (count == 0) return;
     add("performance note: the compiler schedules the gradient " + quoted(output.name),
-        text("of its ", funcs.size(), " Funcs ", count, " have no directive, adjoints among them"),
-        "Give them schedules, call Pipeline::auto_schedule() to see and edit what it chooses, say "
-        "set_autoschedule() how it is to choose, or Pipeline::unscheduled() for no schedule");
+        text(count, " of its ", funcs.size(), " Funcs have no directive, adjoints among them"),
+        "Schedule them, call Pipeline::auto_schedule() to see and edit the schedule, set its "
+        "options "
+        "with set_autoschedule(), or call Pipeline::unscheduled() for no schedule");
   }
 
   void note_slow_floats(const FuncContents& f, const Target& target) {
@@ -107,7 +108,7 @@ class Findings {
     if (f.is_extern() || !f.updates.empty()) return;
     if (f.schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined) return;
     for (const graph::Bound& bound : f.schedule.bounds) {
-      add("what is said of the bounds of " + quoted(bound.var) + " of " + quoted(f.name) +
+      add("the directive about the bounds of " + quoted(bound.var) + " of " + quoted(f.name) +
               " changes nothing",
           quoted(f.name) + " is inlined: it is computed at each point that its consumers read",
           "Compute it in a loop or at root, or leave the bounds out");
@@ -120,9 +121,9 @@ class Findings {
       if (s == 1 && is_undef(f.pure->values[0])) return;
       const std::string earlier =
           s == 1 ? "its first definition" : text("its first ", s, " definitions");
-      add(words_for_stage(f, s) + " hides what is defined before",
-          "it stores every element and reads none of " + quoted(f.name) + ", so that " + earlier +
-              " decide nothing",
+      add(words_for_stage(f, s) + " hides the earlier definitions",
+          "it stores every element and reads none of " + quoted(f.name) + ", so " + earlier +
+              (s == 1 ? " has no effect" : " have no effect"),
           "Leave them out, or give the new values a Func of their own");
       return;
     }
@@ -141,8 +142,8 @@ class Findings {
     for (int s = 1; any && s < f.stage_count(); s++) {
       if (f.stage(s).schedule.is_given) continue;
       add(words_for_stage(f, s) + " has no schedule",
-          "other definitions of " + quoted(f.name) + " have one, and it holds for them alone",
-          text("Schedule it through update(", s - 1, "), or say update(", s - 1,
+          "other definitions of " + quoted(f.name) + " have one, which applies to them alone",
+          text("Schedule it through update(", s - 1, "), or call update(", s - 1,
                ").unscheduled()"));
     }
   }
@@ -160,7 +161,7 @@ class Findings {
   void find_failing_requirement(const FuncContents& f, int s) {
     walk(f.stage(s), [&](const Call& call) {
       if (!call.is_op(Op::require) || as_const_int(call.args[0]) != 0) return;
-      add(words_for_stage(f, s) + " requires what never holds",
+      add(words_for_stage(f, s) + " has a requirement that never holds",
           "the condition does not depend on the call, and is false",
           "Require a condition on parameters or facts about buffers");
     });
