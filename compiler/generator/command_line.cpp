@@ -38,7 +38,8 @@ OutputFileType read_emit_type(const std::string& word) {
     if (info.name == word) return type;
   }
   user_error("emit a file of type " + quoted(word), "the types of -e are " + names_of(emit_names()),
-             quoted(word) + " is none of them", "Name one or more of these, with commas between");
+             quoted(word) + " is not one of them",
+             "Name one or more of these, with commas between");
 }
 
 CommandLine::Gradient read_gradient(const std::string& text) {
@@ -48,7 +49,7 @@ CommandLine::Gradient read_gradient(const std::string& text) {
   const auto found = known.find(text);
   if (found == known.end()) {
     user_error(std::string(asked) + " with -d " + text, "-d takes 1, the gradient, 0, or separate",
-               quoted(text) + " is none of them", "Write -d 1 or leave it out");
+               quoted(text) + " is not one of them", "Write -d 1 or leave it out");
   }
   return found->second;
 }
@@ -57,7 +58,7 @@ int read_seconds(const std::string& text) {
   const std::optional<int> seconds = read_number<int>(text);
   if (!seconds || *seconds < 0) {
     user_error(std::string(asked) + " with -t " + text,
-               "-t takes a number of seconds, 0 for no limit", quoted(text) + " is none",
+               "-t takes a number of seconds, 0 for no limit", quoted(text) + " is not a number",
                "Write for example -t 60");
   }
   return *seconds;

@@ -102,7 +102,7 @@ bool GeneratorBase::set_declared_part(const std::string& key, const StringOrLoop
       const std::optional<Type> type = read_type(word);
       if (!type) {
         user_error("set " + key + " of the generator " + quoted(name_) + " to " + quoted(text),
-                   "types are " + type_choices(), quoted(word) + " is none of them",
+                   "types are " + type_choices(), quoted(word) + " is not one of them",
                    "Give one of these, or several with commas for a Tuple");
       }
       types.push_back(*type);

@@ -48,8 +48,7 @@ void GeneratorPort::refuse(const std::string& asked, const std::string& rule,
 const std::vector<Type>& GeneratorPort::types() const {
   if (!types_defined()) {
     refuse("take the type of", "it is known once it is declared, set or given",
-           "nothing has said it yet",
-           "Call set_type() in configure(), or give " + name_ + ".type=");
+           "it is still unknown", "Call set_type() in configure(), or give " + name_ + ".type=");
   }
   return types_;
 }
@@ -73,7 +72,7 @@ int GeneratorPort::dims() const {
 size_t GeneratorPort::array_size() const {
   if (!array_size_defined()) {
     refuse("take the array size of", "it is known once it is declared, set or given",
-           "nothing has said it yet",
+           "it is still unknown",
            "Call set_array_size() in configure(), resize() an output, or give " + name_ + ".size=");
   }
   return static_cast<size_t>(array_size_);

@@ -214,7 +214,7 @@ void GeneratorParam<T>::set_from_string(const std::string& text) {
     static_assert(is_number, "a GeneratorParam cannot be of this type");
     value = internal::read_number<T>(text);
   }
-  if (!value) refuse_value(text, "this is none of them");
+  if (!value) refuse_value(text, "this is not one of them");
   assign(*value);
 }
 

@@ -48,7 +48,7 @@ TEST_F(ExternErrors, ThereIsAValue) {
 
 TEST_F(ExternErrors, VariablesDiffer) {
   expect_mentions(definition_error("g", {}, {Int(32)}, {x, y, x}),
-                  {"its arguments are different Vars", "\"x\" stands there twice"});
+                  {"its arguments are different Vars", "\"x\" appears twice"});
 }
 
 TEST_F(ExternErrors, FuncsAmongTheArgumentsAreDefined) {

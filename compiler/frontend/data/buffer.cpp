@@ -271,7 +271,7 @@ void check_same_shape(const Runtime::Buffer<>& buffer, const std::string& name,
     is_same = buffer.dim(d).extent() == other.dim(d).extent();
   if (is_same) return;
   user_error("visit the values of the Buffer " + quoted(name) + " and of others",
-             "all Buffers have the same extents", "those of one of them are others",
+             "all Buffers have the same extents", "one of them has other extents",
              "Crop them to one size first");
 }
 

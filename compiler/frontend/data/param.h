@@ -164,7 +164,7 @@ class Param {
       user_error("use the Param " + retrograde::quoted(name()) + " as a Param of " +
                      to_string(type_of<T>()),
                  "the types must agree", "it is of type " + to_string(other),
-                 "Use it as what it is");
+                 "Use it with its own type");
     }
   }
   std::shared_ptr<graph::ParameterContents> parameter_;

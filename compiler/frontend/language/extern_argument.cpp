@@ -80,8 +80,7 @@ void define_extern(const FuncPtr& f, ExternDefinition definition, const std::vec
   for (size_t i = 0; i < variables.size(); i++) {
     for (size_t j = 0; j < i; j++) {
       if (variables[i] != variables[j]) continue;
-      user_error(asked, "its arguments are different Vars",
-                 quoted(variables[i]) + " stands there twice",
+      user_error(asked, "its arguments are different Vars", quoted(variables[i]) + " appears twice",
                  "Use a Var of its own for each dimension");
     }
   }

@@ -48,7 +48,7 @@ class Function : public graph::FuncPtr {
   // Requires: a Function belongs to a Func.
   const graph::FuncContents& checked() const {
     if (const graph::FuncContents* contents = get()) return *contents;
-    user_error("look at a Function", "a Function belongs to a Func", "this one was made of nothing",
+    user_error("look at a Function", "a Function belongs to a Func", "this one is empty",
                "Take it from a Func: f.function()");
   }
 };

@@ -108,7 +108,7 @@ class SeveralPoints {
         std::ranges::all_of(places, [](const Call* call) { return call->name == scatter_name; });
     if (!is_named)
       user_error(asked_, "scatter() names the places on the left-hand side",
-                 "gather() stands there", "Write f(scatter(a, b)) = gather(u, v)");
+                 "gather() is on the left-hand side", "Write f(scatter(a, b)) = gather(u, v)");
     for (const Call* call : all) {
       const int points = static_cast<int>(call->args.size());
       if (points_ == 0) points_ = points;

@@ -24,7 +24,7 @@ const std::string& checked_name(const std::string& name) {
   if (!is_identifier(name)) {
     user_error("make a Var named " + quoted(name),
                "the name of a Var is an identifier: letters, digits, _ and $",
-               quoted(name) + " is none", "Choose a name such as \"x\" or \"x_outer\"");
+               quoted(name) + " is not", "Choose a name such as \"x\" or \"x_outer\"");
   }
   return name;  // NOLINT(bugprone-return-const-ref-from-parameter): used within the full expression
 }
