@@ -192,11 +192,11 @@ void GeneratorBase::schedule_all() {
   phase_ = Phase::Scheduled;
 }
 
-void GeneratorBase::check_input_count(size_t given) {
+void GeneratorBase::check_input_count(size_t count) {
   configure_once();
-  if (given == members_.inputs.size()) return;
+  if (count == members_.inputs.size()) return;
   user_error("set the inputs of the generator " + quoted(name_), "all are given, in their order",
-             text("it has ", members_.inputs.size(), " and was given ", given),
+             text("it has ", members_.inputs.size(), " and was given ", count),
              "Give that many; a std::vector for an array");
 }
 
@@ -355,11 +355,11 @@ Module GeneratorBase::to_module(Pipeline& pipeline, const std::vector<Argument>&
                                 const std::string& function_name, LinkageType linkage) {
   const std::string function = function_name.empty() ? name_ : function_name;
   Module module = pipeline.compile_to_module(inputs, function, get_target(), linkage);
-  const std::vector<Argument>& made = module.functions().back().args;
-  const size_t first = made.size() - declared_names.size();
+  const std::vector<Argument>& compiled = module.functions().back().args;
+  const size_t first = compiled.size() - declared_names.size();
   for (size_t i = 0; i < declared_names.size(); i++) {
-    if (made[first + i].name != declared_names[i])
-      module.remap_metadata_name(made[first + i].name, declared_names[i]);
+    if (compiled[first + i].name != declared_names[i])
+      module.remap_metadata_name(compiled[first + i].name, declared_names[i]);
   }
   return module;
 }

@@ -271,7 +271,7 @@ class GeneratorBase : public NamesInterface, public AbstractGenerator {
 
   void configure_once();
   void check_names() const;
-  void check_input_count(size_t given);
+  void check_input_count(size_t count);
   void check_configuring(const char* role, const std::string& name) const;
   void adopt(GeneratorPort* extra) {
     extras_.emplace_back(extra);

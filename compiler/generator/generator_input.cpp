@@ -35,8 +35,9 @@ int InputValue::dims() const {
   return kind == IOKind::Function ? func.dimensions() : 0;
 }
 
-GeneratorInputBase::GeneratorInputBase(Declared declared, IOKind kind, Declared said, bool is_array)
-    : GeneratorPort(std::move(declared), kind, std::move(said), is_array, false) {
+GeneratorInputBase::GeneratorInputBase(Declared declared, IOKind kind, Declared fixed,
+                                       bool is_array)
+    : GeneratorPort(std::move(declared), kind, std::move(fixed), is_array, false) {
   if (GeneratorMembers* members = GeneratorMembers::around(this)) members->inputs.push_back(this);
 }
 

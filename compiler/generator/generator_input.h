@@ -47,7 +47,7 @@ class GeneratorInputBase : public GeneratorPort {
   InputValue value_of(const std::shared_ptr<graph::ParameterContents>& parameter) const;
 
  protected:
-  GeneratorInputBase(Declared declared, IOKind kind, Declared said, bool is_array);
+  GeneratorInputBase(Declared declared, IOKind kind, Declared fixed, bool is_array);
   virtual void values_changed() = 0;
   // Sets default, limits and estimate of a scalar's parameter.
   virtual void describe(graph::ParameterContents&) const {}
@@ -65,7 +65,7 @@ class InputElements : public GeneratorInputBase {
   using Traits = ElementTraits<ElementOf<T>>;
   using Handle = typename Traits::Handle;
   explicit InputElements(Declared declared)
-      : GeneratorInputBase(std::move(declared), Traits::kind, said_by<T>(), IsArrayIO<T>) {}
+      : GeneratorInputBase(std::move(declared), Traits::kind, fixed_by<T>(), IsArrayIO<T>) {}
   void values_changed() override {
     handles_.clear();
     for (const InputValue& value : values()) {

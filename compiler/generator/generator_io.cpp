@@ -14,14 +14,14 @@ std::string list_of(const std::vector<Type>& types) {
 
 }  // namespace
 
-GeneratorPort::GeneratorPort(Declared declared, IOKind kind, Declared said, bool is_array,
+GeneratorPort::GeneratorPort(Declared declared, IOKind kind, Declared fixed, bool is_array,
                              bool is_output)
     : name_(std::move(declared.name)),
       kind_(kind),
-      types_(std::move(said.types)),
-      dims_(said.dims),
+      types_(std::move(fixed.types)),
+      dims_(fixed.dims),
       is_array_(is_array),
-      array_size_(said.size),
+      array_size_(fixed.size),
       is_output_(is_output) {
   if (const GeneratorMembers* members = GeneratorMembers::around(this))
     generator_ = members->owner();
@@ -111,13 +111,14 @@ void GeneratorPort::agree_on(const std::vector<Type>& types, int dims) {
 }
 
 void GeneratorPort::agree_on_size(size_t size) {
-  const int wanted = static_cast<int>(size);
-  if (wanted < 0 || (array_size_defined() && wanted != array_size_)) {
-    refuse(text("use ", wanted, " as the array size of"), "its size is set once, and not negative",
+  const int requested = static_cast<int>(size);
+  if (requested < 0 || (array_size_defined() && requested != array_size_)) {
+    refuse(text("use ", requested, " as the array size of"),
+           "its size is set once, and not negative",
            array_size_defined() ? text("it is ", array_size_) : "it is open",
            "Give that many elements");
   }
-  array_size_ = wanted;
+  array_size_ = requested;
 }
 
 void GeneratorPort::check_not_generated(const char* asked) const {

@@ -88,9 +88,9 @@ class GeneratorPort {
   GeneratorBase* generator() const { return generator_; }  // the generator that it is a member of
 
  protected:
-  // `declared` holds the constructor's arguments, `said` the properties that the C++ type fixes. Throws
+  // `declared` holds the constructor's arguments, `fixed` the properties that the C++ type fixes. Throws
   // CompileError if they contradict each other.
-  GeneratorPort(Declared declared, IOKind kind, Declared said, bool is_array, bool is_output);
+  GeneratorPort(Declared declared, IOKind kind, Declared fixed, bool is_array, bool is_output);
 
   [[noreturn]] void refuse(const std::string& asked, const std::string& rule,
                            const std::string& evidence, const std::string& instead) const;
@@ -173,7 +173,7 @@ struct ElementTraits<Buffer<T, Dims>> {
   }
 };
 template <typename T>
-Declared said_by() {
+Declared fixed_by() {
   using Traits = ElementTraits<ElementOf<T>>;
   return Declared(static_cast<size_t>(ArrayTraits<T>::size), "", Traits::types(), Traits::dims);
 }

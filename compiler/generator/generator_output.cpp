@@ -5,9 +5,9 @@
 
 namespace retrograde::internal {
 
-GeneratorOutputBase::GeneratorOutputBase(Declared declared, IOKind kind, Declared said,
+GeneratorOutputBase::GeneratorOutputBase(Declared declared, IOKind kind, Declared fixed,
                                          bool is_array)
-    : GeneratorPort(std::move(declared), kind, std::move(said), is_array, true) {
+    : GeneratorPort(std::move(declared), kind, std::move(fixed), is_array, true) {
   if (GeneratorMembers* members = GeneratorMembers::around(this)) members->outputs.push_back(this);
 }
 

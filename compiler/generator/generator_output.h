@@ -31,7 +31,7 @@ class GeneratorOutputBase : public GeneratorPort {
   void check_defined();
 
  protected:
-  GeneratorOutputBase(Declared declared, IOKind kind, Declared said, bool is_array);
+  GeneratorOutputBase(Declared declared, IOKind kind, Declared fixed, bool is_array);
   Func make_func(size_t i) const;
   // Declares types and dimensions of the Func of element i. The handle stays the same, so a copy that was
   // taken before generate() refers to the output.
@@ -46,7 +46,7 @@ class OutputElements : public GeneratorOutputBase {
   requires std::is_constructible_v<Declared, Args...>
   explicit OutputElements(Args&&... args)
       : GeneratorOutputBase(Declared(std::forward<Args>(args)...),
-                            ElementTraits<ElementOf<T>>::kind, said_by<T>(), IsArrayIO<T>) {}
+                            ElementTraits<ElementOf<T>>::kind, fixed_by<T>(), IsArrayIO<T>) {}
   OutputElements(const std::string& name, const std::vector<Type>& types)
       : OutputElements(Declared(name, types)) {}
   OutputElements(const std::string& name, const std::vector<Type>& types, int dims)

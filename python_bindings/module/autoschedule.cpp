@@ -19,9 +19,9 @@ std::optional<FuncName> func_name_from(py::handle object) {
   return {};
 }
 
-std::vector<FuncName> func_names(const py::iterable& given) {
+std::vector<FuncName> func_names(const py::iterable& objects) {
   std::vector<FuncName> names;
-  for (py::handle one : given) {
+  for (py::handle one : objects) {
     const std::optional<FuncName> name = func_name_from(one);
     if (!name) throw py::type_error("a Func, or the name of one");
     names.push_back(*name);

@@ -171,10 +171,10 @@ std::optional<Buffer<>> buffer_from(py::handle object) {
   return buffer_of(*memory);
 }
 
-Buffer<> with_owner_of(const Buffer<>& source, const Buffer<>& made) {
+Buffer<> with_owner_of(const Buffer<>& source, const Buffer<>& view) {
   const auto* owner = std::get_deleter<MemoryOwner>(source.contents());
-  if (!owner) return made;
-  return owned(made.contents()->buffer, "", owner->owner, owner->read_only);
+  if (!owner) return view;
+  return owned(view.contents()->buffer, "", owner->owner, owner->read_only);
 }
 
 bool is_read_only(const Buffer<>& buffer) {

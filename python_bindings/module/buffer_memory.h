@@ -33,8 +33,8 @@ struct ArrayMemory {
 std::optional<ArrayMemory> array_memory(py::handle object);
 Buffer<> buffer_of(const ArrayMemory& memory, const std::string& name = "");
 
-// Gives `made`, which shares the memory of `source`, the same owner.
-Buffer<> with_owner_of(const Buffer<>& source, const Buffer<>& made);
+// Gives `view`, which shares the memory of `source`, the same owner.
+Buffer<> with_owner_of(const Buffer<>& source, const Buffer<>& view);
 bool is_read_only(const Buffer<>& buffer);
 // Throws CompileError if the buffer is read-only.
 void check_writable(const Buffer<>& buffer, const std::string& asked);

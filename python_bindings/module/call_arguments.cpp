@@ -27,13 +27,13 @@ Buffer<> output_buffer(const py::object& object, const std::string& asked) {
 
 }  // namespace
 
-Outputs outputs_from(const py::object& given, const std::string& asked) {
+Outputs outputs_from(const py::object& source, const std::string& asked) {
   Outputs outputs;
-  if (!is_list(given)) {
-    outputs.buffers.push_back(output_buffer(given, asked));
+  if (!is_list(source)) {
+    outputs.buffers.push_back(output_buffer(source, asked));
     return outputs;
   }
-  for (py::handle one : given) {
+  for (py::handle one : source) {
     if (is_integer(one)) {
       outputs.sizes.push_back(one.attr("__index__")().cast<int32_t>());
     } else {

@@ -13,7 +13,7 @@ struct Outputs {
   std::vector<Buffer<>> buffers;
   bool are_buffers() const { return !buffers.empty(); }
 };
-Outputs outputs_from(const py::object& given, const std::string& asked);
+Outputs outputs_from(const py::object& source, const std::string& asked);
 
 // A ParamMap from a dict: {gain: 2.0, image: array}.
 ParamMap param_map_from(const py::dict& values);

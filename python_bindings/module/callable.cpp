@@ -43,7 +43,7 @@ using Parameter = std::shared_ptr<graph::ParameterContents>;
 
 // The context of a call that uses the current CUDA context and a given stream.
 struct OnStream : JITUserContext {
-  explicit OnStream(void* given) : stream(given) {
+  explicit OnStream(void* cuda_stream) : stream(cuda_stream) {
     handlers.custom_cuda_get_stream = [](JITUserContext* context, void*, void** result) {
       *result = static_cast<OnStream*>(context)->stream;
       return 0;
@@ -71,19 +71,19 @@ class Bound {
   }
 
   void call(const py::args& positional, const py::kwargs& named) {
-    const py::tuple given = named.empty() ? py::tuple(positional) : in_order(positional, named);
-    std::vector<Buffer<>> buffers(given.size());
-    std::vector<DynamicCall::Value> values(given.size());
-    for (size_t i = 0; i < given.size(); i++) {
+    const py::tuple arguments = named.empty() ? py::tuple(positional) : in_order(positional, named);
+    std::vector<Buffer<>> buffers(arguments.size());
+    std::vector<DynamicCall::Value> values(arguments.size());
+    for (size_t i = 0; i < arguments.size(); i++) {
       if (i < args_.size() && args_[i].is_scalar()) {
-        values[i] = DynamicCall::value_of(scalar_of(args_[i].type, given[i]));
+        values[i] = DynamicCall::value_of(scalar_of(args_[i].type, arguments[i]));
         continue;
       }
       try {
-        buffers[i] = given[i].cast<Buffer<>>();
+        buffers[i] = arguments[i].cast<Buffer<>>();
       } catch (const py::cast_error&) {
         throw py::type_error((i < names_.size() ? quoted(names_[i]) : "a buffer") +
-                             " is an array, not " + std::string(py::repr(given[i])));
+                             " is an array, not " + std::string(py::repr(arguments[i])));
       }
       if (i >= args_.size()) check_writable(buffers[i], "call a Callable");
       lift(i, buffers[i]);
@@ -97,20 +97,20 @@ class Bound {
 
   // Calls on tensors of PyTorch; the caller has checked the element types. A number is a tensor without dimensions.
   // Optimised for low overhead, for calls that compute little.
-  void call_tensors(const py::tuple& given) {
-    auto [tensors, elements] = tensors_of(given);
-    run(given, elements, std::move(tensors));
+  void call_tensors(const py::tuple& arguments) {
+    auto [tensors, elements] = tensors_of(arguments);
+    run(arguments, elements, std::move(tensors));
   }
 
   // Calls on tensors in device memory, except for numbers. The work is queued in a stream of this thread's current CUDA
   // context and may not have finished when this returns.
   // Requires: the driver knows the tensors' memory (RuntimeError); kernels alone use it (RuntimeError).
-  void call_tensors_on_device(const py::tuple& given, uintptr_t stream) {
-    auto [tensors, elements] = tensors_of(given);
+  void call_tensors_on_device(const py::tuple& arguments, uintptr_t stream) {
+    auto [tensors, elements] = tensors_of(arguments);
     OnStream context(reinterpret_cast<void*>(stream));
     const py::gil_scoped_release release;
     std::vector<Buffer<>> there;
-    for (size_t i = 0; i < given.size(); i++) {
+    for (size_t i = 0; i < arguments.size(); i++) {
       if (tensors.buffers[i].number_of_elements() == 0 || !tensors.buffers[i].data()) continue;
       there.push_back(on_device(tensors.buffers[i], parameter_of_argument(i)));
       tensors.values[i] = DynamicCall::value_of(there.back());
@@ -164,19 +164,19 @@ class Bound {
   };
 
   // Buffers of arguments and outputs, and their total number of elements. Recompiles if a stride requires it.
-  std::pair<Tensors, int64_t> tensors_of(const py::tuple& given) {
-    if (given.size() != args_.size() + outputs_.size())
+  std::pair<Tensors, int64_t> tensors_of(const py::tuple& arguments) {
+    if (arguments.size() != args_.size() + outputs_.size())
       throw py::type_error("a Callable takes its arguments, then its output buffers");
-    Tensors tensors(given.size());
+    Tensors tensors(arguments.size());
     int64_t elements = 0;
-    for (size_t i = 0; i < given.size(); i++) {
+    for (size_t i = 0; i < arguments.size(); i++) {
       if (i < args_.size() && args_[i].is_scalar()) {
-        tensors.values[i] = DynamicCall::value_of(scalar_of_tensor(given[i], args_[i].type));
+        tensors.values[i] = DynamicCall::value_of(scalar_of_tensor(arguments[i], args_[i].type));
         continue;
       }
       const Parameter& parameter = parameter_of_argument(i);
       Runtime::Buffer<>& buffer = tensors.buffers[i];
-      buffer = buffer_of_tensor(given[i], i < args_.size() ? args_[i].type : parameter->type);
+      buffer = buffer_of_tensor(arguments[i], i < args_.size() ? args_[i].type : parameter->type);
       if (parameter && buffer.dimensions() > 0)
         allow_stride(*parameter, buffer.dim(0).stride(), buffer.dim(0).extent());
       elements += static_cast<int64_t>(buffer.number_of_elements());
@@ -209,7 +209,7 @@ class Bound {
   // Short calls run on this thread, because a worker thread for Ctrl-C would cost more than the call. A call counts as
   // short if an earlier one with at least as many elements was short. With a scalar argument nothing is known, since it
   // may be an iteration count.
-  void run(const py::tuple& given, int64_t elements, Tensors tensors) {
+  void run(const py::tuple& arguments, int64_t elements, Tensors tensors) {
     const bool may_be_short = !counts_ && elements <= most_short_elements;
     const Callable callable = callable_;
     if (may_be_short && elements <= short_elements_) {
@@ -219,7 +219,7 @@ class Bound {
     }
     const auto start = std::chrono::steady_clock::now();
     auto kept = std::make_shared<Tensors>(std::move(tensors));
-    unlocked([callable, kept, owner = keep(given)](const Interruption&) {
+    unlocked([callable, kept, owner = keep(arguments)](const Interruption&) {
       DynamicCall::call(callable, kept->values);
     });
     if (may_be_short && std::chrono::steady_clock::now() - start < short_time)
@@ -281,22 +281,22 @@ class ExpectedCall {
   }
 
   // The results. Returns None, without side effects, if the tensors have other types or sizes.
-  py::object call(const py::tuple& given) const {
-    if (given.size() != inputs_.size()) return py::none();
+  py::object call(const py::tuple& arguments) const {
+    if (arguments.size() != inputs_.size()) return py::none();
     for (size_t i = 0; i < inputs_.size(); i++) {
-      if (!is_of(given[i], inputs_[i])) return py::none();
+      if (!is_of(arguments[i], inputs_[i])) return py::none();
     }
-    py::list made(makers_.size());
-    py::tuple all(given.size() + makers_.size());
-    for (size_t i = 0; i < given.size(); i++) all[i] = given[i];
+    py::list results(makers_.size());
+    py::tuple all(arguments.size() + makers_.size());
+    for (size_t i = 0; i < arguments.size(); i++) all[i] = arguments[i];
     for (size_t i = 0; i < makers_.size(); i++) {
       PyObject* const result = PyObject_CallNoArgs(makers_[i].ptr());
       if (!result) throw py::error_already_set();
-      made[i] = py::reinterpret_steal<py::object>(result);
-      all[given.size() + i] = made[i];
+      results[i] = py::reinterpret_steal<py::object>(result);
+      all[arguments.size() + i] = results[i];
     }
     bound_->call_tensors(all);
-    return made;
+    return results;
   }
 
  private:
@@ -317,12 +317,13 @@ template <class Self>
 void bind_compile(Class<Self> c) {
   c.def(
       "compile_to_callable",
-      [](const py::object& object, const py::iterable& given, const std::optional<Target>& target) {
+      [](const py::object& object, const py::iterable& arguments,
+         const std::optional<Target>& target) {
         const Pinned<Self> self(object);
         std::vector<Argument> args;
         std::vector<Parameter> parameters, outputs;
         std::vector<std::string> output_names;
-        for (py::handle one : given) {
+        for (py::handle one : arguments) {
           args.push_back(one.cast<Argument>());
           parameters.push_back(parameter_of(one));
         }

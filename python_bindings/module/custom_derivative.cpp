@@ -21,9 +21,9 @@ std::optional<AdjointContribution> contribution_from(py::handle object) {
   return AdjointContribution(input, pair[1].cast<Func>());
 }
 
-std::vector<AdjointContribution> contributions_of(const py::object& given) {
+std::vector<AdjointContribution> contributions_of(const py::object& objects) {
   std::vector<AdjointContribution> result;
-  for (py::handle one : given) {
+  for (py::handle one : objects) {
     std::optional<AdjointContribution> contribution = contribution_from(one);
     if (!contribution)
       throw py::type_error("a rule gives AdjointContributions, or pairs of an input and a Func");

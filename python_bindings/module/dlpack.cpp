@@ -148,7 +148,7 @@ void check_exportable(const ArrayMemory& memory) {
 }
 
 template <class Managed>
-py::capsule given(const Buffer<>& buffer) {
+py::capsule exported(const Buffer<>& buffer) {
   const ArrayMemory memory = memory_of(buffer);
   check_exportable(memory);
   auto* kept = new Given<Managed>;
@@ -203,7 +203,7 @@ py::capsule dlpack_capsule(const Buffer<>& buffer, bool versioned) {
     throw py::buffer_error(
         "the Buffer is read only, which DLPack before 1.0 cannot say: copy it first");
   }
-  return versioned ? given<dl::ManagedVersioned>(buffer) : given<dl::Managed>(buffer);
+  return versioned ? exported<dl::ManagedVersioned>(buffer) : exported<dl::Managed>(buffer);
 }
 
 }  // namespace retrograde::python

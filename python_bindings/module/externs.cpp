@@ -22,16 +22,16 @@ ExternFuncArgument argument_of(py::handle object) {
   return object.cast<Buffer<>>();
 }
 
-std::vector<ExternFuncArgument> arguments_of(const py::iterable& given) {
+std::vector<ExternFuncArgument> arguments_of(const py::iterable& objects) {
   std::vector<ExternFuncArgument> result;
-  for (py::handle one : given) result.push_back(argument_of(one));
+  for (py::handle one : objects) result.push_back(argument_of(one));
   return result;
 }
 
-std::vector<Type> types_of(const py::object& given) {
-  if (py::isinstance<py::list>(given) || py::isinstance<py::tuple>(given))
-    return given.cast<std::vector<Type>>();
-  return {given.cast<Type>()};
+std::vector<Type> types_of(const py::object& objects) {
+  if (py::isinstance<py::list>(objects) || py::isinstance<py::tuple>(objects))
+    return objects.cast<std::vector<Type>>();
+  return {objects.cast<Type>()};
 }
 
 void bind_argument(py::module_& m) {

@@ -13,11 +13,11 @@ namespace retrograde::python {
 namespace {
 
 // Values converted to the types of earlier definitions: `f[x] = 0` on a float Func stores 0.0.
-std::vector<Expr> values_for(const Func& f, const py::sequence& given) {
+std::vector<Expr> values_for(const Func& f, const py::sequence& objects) {
   std::vector<Expr> values;
   const std::vector<Type>& types = value_types(*f.function());
-  for (size_t i = 0; i < given.size(); i++) {
-    const py::object value = given[i];
+  for (size_t i = 0; i < objects.size(); i++) {
+    const py::object value = objects[i];
     const bool known = i < types.size();
     values.push_back(known ? operand_for(types[i], value) : py::cast<Expr>(value));
   }

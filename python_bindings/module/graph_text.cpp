@@ -84,12 +84,12 @@ py::object parameter_object(const Parameter& parameter) {
 
 // The outputs and the parameters by name. Names that the compiler generates later differ from those of the text.
 py::tuple pipeline_described(const std::string& text, const py::list& buffers) {
-  const graph::Graph made = graph::parse_graph(text);
+  const graph::Graph parsed = graph::parse_graph(text);
   py::list outputs;
   py::dict parameters;
-  for (const graph::FuncPtr& f : made.funcs) graph::claim_name(f->name);
-  for (const graph::FuncPtr& f : made.outputs) outputs.append(Func(f));
-  for (const Parameter& parameter : made.parameters) {
+  for (const graph::FuncPtr& f : parsed.funcs) graph::claim_name(f->name);
+  for (const graph::FuncPtr& f : parsed.outputs) outputs.append(Func(f));
+  for (const Parameter& parameter : parsed.parameters) {
     graph::claim_name(parameter->name);
     if (!parameter->is_literal) {
       parameters[py::str(parameter->name)] = parameter_object(parameter);

@@ -76,9 +76,9 @@ void bind_defaults(py::module_& m) {
   });
   m.def("_warn_of_rounding", &warn_of_rounding);
   m.def("_set_warning_handler", [](const std::optional<py::function>& tell) {
-    const std::function<void(const char*)> told = printer_of(tell);
-    set_warning_handler(told ? [told](const std::string& text) { told(text.c_str()); }
-                             : WarningHandler());
+    const std::function<void(const char*)> printer = printer_of(tell);
+    set_warning_handler(printer ? [printer](const std::string& text) { printer(text.c_str()); }
+                                : WarningHandler());
   });
 }
 

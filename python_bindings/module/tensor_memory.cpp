@@ -20,9 +20,9 @@ struct Name {
   PyObject* object;
 };
 
-py::object checked(PyObject* made) {
-  if (!made) throw py::error_already_set();
-  return py::reinterpret_steal<py::object>(made);
+py::object checked(PyObject* result) {
+  if (!result) throw py::error_already_set();
+  return py::reinterpret_steal<py::object>(result);
 }
 
 int part(PyObject* number, const char* what) {

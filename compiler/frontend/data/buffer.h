@@ -180,15 +180,15 @@ class Buffer {
   template <typename... Args>
   requires(frontend::AreSizes<Args...>::value &&
            !std::is_void_v<T>) explicit Buffer(int first, Args&&... rest) {
-    const frontend::NamedSizes given(first, std::forward<Args>(rest)...);
-    *this = adopt(frontend::allocate_buffer(static_halide_type(), given.sizes), given.name);
+    const frontend::NamedSizes named(first, std::forward<Args>(rest)...);
+    *this = adopt(frontend::allocate_buffer(static_halide_type(), named.sizes), named.name);
   }
   // Allocates dense memory for elements of a type that is known at run time.
   template <typename... Args>
   requires(frontend::AreSizes<Args...>::value) explicit Buffer(Type type, int first,
                                                                Args&&... rest) {
-    const frontend::NamedSizes given(first, std::forward<Args>(rest)...);
-    *this = adopt(frontend::allocate_buffer(to_halide_type(type), given.sizes), given.name);
+    const frontend::NamedSizes named(first, std::forward<Args>(rest)...);
+    *this = adopt(frontend::allocate_buffer(to_halide_type(type), named.sizes), named.name);
   }
   // Allocates dense memory with one extent for each dimension.
   // Requires: an extent is not negative; its elements must fit the address space; its strides must fit
@@ -215,8 +215,8 @@ class Buffer {
   template <typename... Args>
   requires(frontend::AreSizes<Args...>::value &&
            !std::is_void_v<T>) explicit Buffer(T* data, int first, Args&&... rest) {
-    const frontend::NamedSizes given(first, std::forward<Args>(rest)...);
-    *this = adopt(frontend::wrap_memory(static_halide_type(), data, given.sizes), given.name);
+    const frontend::NamedSizes named(first, std::forward<Args>(rest)...);
+    *this = adopt(frontend::wrap_memory(static_halide_type(), data, named.sizes), named.name);
   }
   explicit Buffer(T* data, const std::vector<int>& sizes,
                   const std::string& name = "") requires(!std::is_void_v<T>)
@@ -224,8 +224,8 @@ class Buffer {
   template <typename... Args>
   requires(frontend::AreSizes<Args...>::value) explicit Buffer(Type type, VoidLikeT* data,
                                                                int first, Args&&... rest) {
-    const frontend::NamedSizes given(first, std::forward<Args>(rest)...);
-    *this = adopt(frontend::wrap_memory(to_halide_type(type), data, given.sizes), given.name);
+    const frontend::NamedSizes named(first, std::forward<Args>(rest)...);
+    *this = adopt(frontend::wrap_memory(to_halide_type(type), data, named.sizes), named.name);
   }
   explicit Buffer(Type type, VoidLikeT* data, const std::vector<int>& sizes,
                   const std::string& name = "")

@@ -98,15 +98,15 @@ void DeviceCall::check_not_newer_on_host() const {
              halide_error_code_host_and_device_dirty);
 }
 
-void DeviceCall::check_sole_owner(Runtime::BufferDeviceOwnership wanted) const {
-  const bool frees = wanted == Runtime::BufferDeviceOwnership::Allocated;
-  if (buffer_.device_ownership() != wanted && frees) {
+void DeviceCall::check_sole_owner(Runtime::BufferDeviceOwnership expected) const {
+  const bool frees = expected == Runtime::BufferDeviceOwnership::Allocated;
+  if (buffer_.device_ownership() != expected && frees) {
     call_error(asked(), "only memory that the Buffer allocated is freed",
                "its device memory was wrapped, or is a part of another Buffer's",
                "Detach it, or free the Buffer that it is a part of",
                halide_error_code_device_free_failed);
   }
-  if (buffer_.device_ownership() != wanted) {
+  if (buffer_.device_ownership() != expected) {
     call_error(asked(), "only memory that was wrapped is detached", "its device memory was not",
                "Free it", halide_error_code_device_detach_native_failed);
   }

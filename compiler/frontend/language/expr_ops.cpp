@@ -253,8 +253,8 @@ Expr checked_weight(const Expr& zero, Expr weight) {
   }
   if (!zero.type().is_float()) return weight;
   if (weight.type().is_float()) return ir::cast_to(zero.type(), weight);
-  const auto whole = static_cast<double>(weight.type().max_uint());
-  return ir::cast_to(zero.type(), weight) / ir::make_const(zero.type(), whole);
+  const auto largest = static_cast<double>(weight.type().max_uint());
+  return ir::cast_to(zero.type(), weight) / ir::make_const(zero.type(), largest);
 }
 
 }  // namespace

@@ -61,12 +61,12 @@ Expr Tuple::operator[](size_t i) const {
 // the implicit variables that the right-hand side uses.
 std::vector<Expr> FuncRef::left_args(const std::vector<Expr>& values) const {
   if (frontend::placeholder_position(args_) < 0) return args_;
-  const int given = static_cast<int>(args_.size()) - 1;
+  const int named_count = static_cast<int>(args_.size()) - 1;
   int count = frontend::implicit_count(values);
   if (func_->is_defined())
-    count = func_->dimensions() - given;
+    count = func_->dimensions() - named_count;
   else if (func_->required_dimensions >= 0)
-    count = func_->required_dimensions - given;
+    count = func_->required_dimensions - named_count;
   return frontend::expand_placeholder(args_, std::max(count, 0));
 }
 

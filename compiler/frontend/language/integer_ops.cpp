@@ -272,11 +272,11 @@ Expr concat_bits(const std::vector<Expr>& parts) {
     user_error(asked, "the result has 8, 16, 32 or 64 bits", text("it would have ", total),
                "Give another number of parts");
   }
-  const Type whole = UInt(total), part_bits = parts[0].type().with_code(TypeCode::UInt);
+  const Type result_type = UInt(total), part_bits = parts[0].type().with_code(TypeCode::UInt);
   Expr result;
   for (size_t i = 0; i < parts.size(); i++) {
-    const Expr bits = cast(whole, reinterpret(part_bits, parts[i]));
-    const Expr placed = bits << cast(whole, static_cast<int>(i) * part_bits.bits());
+    const Expr bits = cast(result_type, reinterpret(part_bits, parts[i]));
+    const Expr placed = bits << cast(result_type, static_cast<int>(i) * part_bits.bits());
     result = result.defined() ? result | placed : placed;
   }
   return result;

@@ -94,10 +94,10 @@ void* Arguments::bind_scalar(const ParameterPtr& parameter) {
 
 void* Arguments::bind_buffer(const ParameterPtr& parameter, bool is_query) {
   const ParamMap::Entry* entry = map_.find(parameter);
-  halide_buffer_t* given = entry ? entry->raw_buffer() : parameter->buffer;
-  if (given) {
-    check_buffer(given, parameter->name, parameter->type, parameter->dimensions, true, asked_);
-    return given;
+  halide_buffer_t* bound = entry ? entry->raw_buffer() : parameter->buffer;
+  if (bound) {
+    check_buffer(bound, parameter->name, parameter->type, parameter->dimensions, true, asked_);
+    return bound;
   }
   if (!is_query) {
     call_error(asked_, text("the ImageParam ", quoted(parameter->name), " needs a buffer"),

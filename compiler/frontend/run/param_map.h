@@ -47,7 +47,7 @@ class ParamMap {
     template <typename T, int Dims>
     ParamMapping(const ImageParam& image, Buffer<T, Dims>* buffer) : parameter(image.parameter()) {
       checked(image, {});
-      entry.receive = [buffer](const Buffer<>& made) { *buffer = made; };
+      entry.receive = [buffer](const Buffer<>& inferred) { *buffer = inferred; };
     }
     std::shared_ptr<graph::ParameterContents> parameter;  // the parameter
     Entry entry;                                          // its value

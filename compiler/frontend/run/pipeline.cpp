@@ -302,10 +302,10 @@ static void check_one_shape(const halide_buffer_t& first, const halide_buffer_t&
   }
 }
 
-std::vector<halide_buffer_t*> Pipeline::checked_outputs(const RealizationArg& given,
+std::vector<halide_buffer_t*> Pipeline::checked_outputs(const RealizationArg& requested,
                                                         bool with_memory) const {
   const std::string asked = "realize " + names_of(checked().outputs);
-  const std::vector<halide_buffer_t*>& buffers = given.buffers();
+  const std::vector<halide_buffer_t*>& buffers = requested.buffers();
   size_t count = 0;
   for (const graph::FuncPtr& f : contents_->outputs) count += f->types.size();
   if (buffers.size() != count) {
@@ -347,11 +347,11 @@ ScheduleReport Pipeline::explain_schedule(const RealizationArg& outputs, const T
 
 // ---- calling ----
 
-void Pipeline::run(JITUserContext* context, const RealizationArg& given, const Target& target,
+void Pipeline::run(JITUserContext* context, const RealizationArg& requested, const Target& target,
                    const ParamMap& map) const {
   const JITHandlers& handlers = checked().handlers;
   std::vector<halide_buffer_t*> outputs;
-  const auto check = [&] { outputs = checked_outputs(given, true); };
+  const auto check = [&] { outputs = checked_outputs(requested, true); };
   if (frontend::prepared(handlers, context, check) != 0) return;
   const auto code = compiled(target);
   const std::string asked = "realize " + names_of(contents_->outputs);

@@ -50,8 +50,8 @@ namespace frontend {
 
 // Handlers of Halide's older interface take the context as a void*; calls are the same.
 template <typename To, typename From>
-void set_handler(To& handler, From* given) {
-  handler = reinterpret_cast<To>(given);
+void set_handler(To& handler, From* function) {
+  handler = reinterpret_cast<To>(function);
 }
 void check_allocator(bool allocates, bool frees);
 

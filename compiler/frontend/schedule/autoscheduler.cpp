@@ -82,8 +82,8 @@ MachineParams machine_of(const AutoschedulerParams& params) {
     const MachineParams generic = MachineParams::generic();
     const std::string defaults[] = {text(generic.parallelism), text(generic.last_level_cache_size),
                                     text(generic.balance)};
-    const auto given = params.extra.find(machine_keys[i]);
-    values += (i ? "," : "") + (given == params.extra.end() ? defaults[i] : given->second);
+    const auto entry = params.extra.find(machine_keys[i]);
+    values += (i ? "," : "") + (entry == params.extra.end() ? defaults[i] : entry->second);
   }
   return MachineParams(values);
 }
