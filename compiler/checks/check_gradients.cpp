@@ -54,7 +54,7 @@ class Checker {
         shape_(shape_of_output(output, options.mins, sizes, asked(), "check_gradients")),
         options_(options),
         random_(options.seed) {
-    widen({output.function()});  // says what has no meaning in double before all else
+    widen({output.function()});  // throws first for operations without a meaning in double
     draw_weights();
     for (const auto& p : parameters_of({output.function()})) {
       if (p->type.is_float()) own_inputs_.push_back(p);
@@ -386,9 +386,9 @@ class Checker {
   std::mt19937_64 random_;
   std::vector<std::shared_ptr<ParameterContents>> own_inputs_;
   std::vector<Values> weights_;
-  std::unique_ptr<Derivative> own_, wide_;  // wide_: null where rules of the user take part
+  std::unique_ptr<Derivative> own_, wide_;  // wide_: null if there are custom derivative rules
   Widened widened_;
-  Func wide_output_, wide_primal_, complex_primal_;  // the last two are what runs
+  Func wide_output_, wide_primal_, complex_primal_;  // the last two run
   std::vector<Input> inputs_, imaginary_;
   ComplexGraph complex_;
   GradientReport report_;

@@ -52,7 +52,7 @@ double magnitude(Extreme extreme, Type type) {
 // A Func or adjoint to compare with double. The version in double has the same definitions, so the two differ only by
 // rounding.
 struct Watched {
-  std::string name;  // of the primal
+  std::string name;  // name of the primal Func
   bool is_adjoint;
   Func own;
   Shape shape;
@@ -110,7 +110,9 @@ class StabilityChecker {
 
   void watch() {
     auto order = topological_order({output_.function()});
-    widen({output_.function()});  // says what has no meaning in double before anything is bound
+    widen(
+        {output_
+             .function()});  // throws for operations without a meaning in double before anything is bound
     autodiff::Regions regions(order, box_of(shape_));
     Derivative derivative = adjoints();
     std::vector<Watched> adjoints;
@@ -306,9 +308,9 @@ class StabilityChecker {
   Param<double> amount_{"rounding_amount"};
   Param<int> seed_{"rounding_seed"};
   std::vector<Watched> watched_;
-  Batch own_, wide_;  // what is watched, in its own precision and in double
+  Batch own_, wide_;  // the watched Funcs in their own precision and in double
   std::vector<Input> inputs_;
-  std::vector<Values> now_;  // the inputs' values
+  std::vector<Values> now_;  // current values of the inputs
   StabilityReport report_;
 };
 

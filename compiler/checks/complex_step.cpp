@@ -127,7 +127,7 @@ class Complexifier {
 
   Complex of(const Expr& root) {
     const Expr e = without_lets(root);
-    kept_.push_back(e);  // so that the addresses in memo_ stay theirs
+    kept_.push_back(e);  // keeps the addresses in memo_ valid
     for (const Expr& node : autodiff::post_order({e})) {
       if (!memo_.contains(node.get())) memo_.emplace(node.get(), made(node));
     }

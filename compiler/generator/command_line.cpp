@@ -261,11 +261,11 @@ CommandLine read_command_line(int argc, const char* const* argv) {
                  quoted(word) + " is neither", "See --help");
     }
     if (i + 1 == argc)
-      user_error(asked, "every flag has a value", word + " has none", "Put it behind the flag");
+      user_error(asked, "every flag has a value", word + " has none", "Put it after the flag");
     set_flag(word[1], argv[++i], command);
   }
   check_complete(command);
-  if (command.targets.empty()) read_targets("host", command);  // for a stub, which has none
+  if (command.targets.empty()) read_targets("host", command);  // for a stub, which needs no target
   return command;
 }
 

@@ -65,7 +65,7 @@ class InputElements : public GeneratorInputBase {
   using Traits = ElementTraits<ElementOf<T>>;
   using Handle = typename Traits::Handle;
   explicit InputElements(Declared declared)
-      : GeneratorInputBase(std::move(declared), Traits::kind, fixed_by<T>(), IsArrayIO<T>) {}
+      : GeneratorInputBase(std::move(declared), Traits::kind, said_by<T>(), IsArrayIO<T>) {}
   void values_changed() override {
     handles_.clear();
     for (const InputValue& value : values()) {

@@ -173,7 +173,7 @@ struct ElementTraits<Buffer<T, Dims>> {
   }
 };
 template <typename T>
-Declared fixed_by() {
+Declared said_by() {
   using Traits = ElementTraits<ElementOf<T>>;
   return Declared(static_cast<size_t>(ArrayTraits<T>::size), "", Traits::types(), Traits::dims);
 }

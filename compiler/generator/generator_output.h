@@ -46,7 +46,7 @@ class OutputElements : public GeneratorOutputBase {
   requires std::is_constructible_v<Declared, Args...>
   explicit OutputElements(Args&&... args)
       : GeneratorOutputBase(Declared(std::forward<Args>(args)...),
-                            ElementTraits<ElementOf<T>>::kind, fixed_by<T>(), IsArrayIO<T>) {}
+                            ElementTraits<ElementOf<T>>::kind, said_by<T>(), IsArrayIO<T>) {}
   OutputElements(const std::string& name, const std::vector<Type>& types)
       : OutputElements(Declared(name, types)) {}
   OutputElements(const std::string& name, const std::vector<Type>& types, int dims)

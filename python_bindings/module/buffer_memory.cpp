@@ -59,7 +59,7 @@ std::optional<ArrayMemory> buffer_protocol_memory(py::handle object) {
   if (!PyObject_CheckBuffer(object.ptr())) return {};
   auto view = py::reinterpret_steal<py::object>(PyMemoryView_FromObject(object.ptr()));
   if (!view) {
-    PyErr_Clear();  // NumPy's own types have no format there: what else the object offers is asked next
+    PyErr_Clear();  // the buffer protocol has no format for NumPy's own types; other protocols are tried next
     return {};
   }
   const Py_buffer& buffer = *PyMemoryView_GET_BUFFER(view.ptr());

@@ -207,8 +207,8 @@ class Bound {
   }
 
   // Short calls run on this thread, because a worker thread for Ctrl-C would cost more than the call. A call counts as
-  // short if an earlier one with at least as many elements was short. With a scalar argument nothing is known, since it
-  // may be an iteration count.
+  // short if an earlier one with at least as many elements was short. With an integer argument nothing is known,
+  // since it may be an iteration count.
   void run(const py::tuple& arguments, int64_t elements, Tensors tensors) {
     const bool may_be_short = !counts_ && elements <= most_short_elements;
     const Callable callable = callable_;
@@ -258,11 +258,11 @@ class Bound {
 
   Compile compile_;
   std::vector<Argument> args_;
-  std::vector<Parameter> parameters_, outputs_;  // null: of a scalar
-  std::vector<std::string> names_;               // of arguments, then outputs
+  std::vector<Parameter> parameters_, outputs_;  // null for scalars
+  std::vector<std::string> names_;               // names of arguments, then outputs
   Callable callable_;
-  size_t lifted_ = 0;            // when it was compiled
-  int64_t short_elements_ = -1;  // calls on so many were short
+  size_t lifted_ = 0;            // count_lifted() at the last compilation
+  int64_t short_elements_ = -1;  // largest number of elements whose call was short
   bool counts_ = false;          // whether an argument is a whole number
 };
 

@@ -189,7 +189,8 @@ std::optional<ArrayMemory> dlpack_memory(py::handle object) {
   try {
     capsule = object.attr("__dlpack__")(py::arg("max_version") = py::make_tuple(1, 0));
   } catch (py::error_already_set& error) {
-    if (!error.matches(PyExc_TypeError)) throw;  // of a library that knows the first protocol only
+    if (!error.matches(PyExc_TypeError))
+      throw;  // TypeError: the library knows only the first protocol
     capsule = object.attr("__dlpack__")();
   }
   if (auto memory = consumed<dl::ManagedVersioned>(capsule, false)) return memory;

@@ -44,7 +44,7 @@ Expr floor_divided(Expr a, Expr b) {
 
 struct Named {
   const char* name;      // "__add__"
-  const char* reversed;  // "__radd__"; null for comparisons, which Python turns around itself
+  const char* reversed;  // "__radd__"; null for comparisons, which Python reverses itself
   Binary op;
 };
 const Named binary_operators[] = {

@@ -51,7 +51,7 @@ class Worker {
       } catch (...) {
         job->error = std::current_exception();
       }
-      job->work = nullptr;  // lets go of what it kept
+      job->work = nullptr;  // releases the objects that it held
       std::lock_guard lock(self->mutex_);
       job->done = true;
       self->changed_.notify_all();
@@ -80,7 +80,8 @@ Hired hired;
 Worker& worker() {
   if (hired.worker && hired.process == getpid()) return *hired.worker;
   if (hired.worker)
-    new std::shared_ptr<Worker>(std::move(hired.worker));  // its locks are those of a parent
+    new std::shared_ptr<Worker>(
+        std::move(hired.worker));  // leaked: its locks belong to the parent process
   hired = {std::make_shared<Worker>(), getpid()};
   std::thread([self = hired.worker] { Worker::loop(self); }).detach();
   return *hired.worker;

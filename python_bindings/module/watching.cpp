@@ -43,7 +43,7 @@ class PassTimes {
  private:
   mutable std::mutex mutex_;
   std::vector<Row> reports_;
-  std::unique_ptr<PassObserver> observer_;  // goes first
+  std::unique_ptr<PassObserver> observer_;  // destroyed first
 };
 
 void bind_passes(py::module_& m) {

@@ -37,7 +37,7 @@ def read(words):
         word = rest.pop(0)
         if word in FLAGS:
             if not rest:
-                raise error(CompileError, ASKED, "every flag has a value", f"{word} has none", "Put it behind the flag")
+                raise error(CompileError, ASKED, "every flag has a value", f"{word} has none", "Put it after the flag")
             flags[FLAGS[word]] = rest.pop(0)
         elif "=" in word and not word.startswith("-"):
             key, _, value = word.partition("=")
@@ -72,7 +72,7 @@ def files_of(flags, base, default):
     for word in flags["emit"].split(",") if "emit" in flags else default:
         if word not in info:
             raise error(CompileError, f'emit a file of type "{word}"', f"the types of -e are {', '.join(info)}",
-                        f'"{word}" is none of them', "Name one or more of these, with commas between")
+                        f'"{word}" is not one of them', "Name one or more of these, with commas between")
         kind, extension = info[word]
         files[kind] = os.path.join(flags["folder"], base + extension)
     return files

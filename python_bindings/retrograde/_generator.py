@@ -47,7 +47,7 @@ class GeneratorParam:
             read = self._read(value)
         except (ValueError, KeyError, TypeError) as problem:
             kind = type(self.default).__name__
-            raise error(CompileError, asked, f"it is a value of type {kind}", f"it is none: {problem}",
+            raise error(CompileError, asked, f"it is a value of type {kind}", f"it is not: {problem}",
                         f"Write it as {self.default!r} is written") from None
         below, above = self.min is not None and read < self.min, self.max is not None and read > self.max
         if below or above:

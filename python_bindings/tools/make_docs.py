@@ -55,7 +55,7 @@ def docstrings(root):
         reader = HeaderReader(root, header)
         for name in reader.read():
             text = docstring(reader, name)
-            # Of all overloads, the one with the longest comment.
+            # Keeps the longest comment of all overloads.
             if len(text) > len(found.get(name.full, "")):
                 found[name.full] = text
     return found

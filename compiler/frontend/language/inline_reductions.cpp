@@ -18,8 +18,8 @@ using DomainPtr = std::shared_ptr<graph::ReductionDomainContents>;
 struct Reduction {
   DomainPtr domain;
   Expr body;               // over `args` and the variables of the domain
-  std::vector<Expr> args;  // of the Func that is made
-  std::vector<Expr> at;    // what the enclosing expression passes for them
+  std::vector<Expr> args;  // arguments of the new Func
+  std::vector<Expr> at;    // the values that the enclosing expression passes for them
 };
 
 class Finder {

@@ -164,7 +164,7 @@ class SeveralPoints {
   // ---- can each point be stored as soon as it is computed? ----
 
   bool may_take_turns() const {
-    std::vector<std::vector<Expr>> stored;  // places of the points so far
+    std::vector<std::vector<Expr>> stored;  // coordinates of the earlier points
     for (int i = 0; i < points_; ++i) {
       std::vector<Expr> place = of_point(args_, i), all = of_point(values_, i);
       all.insert(all.end(), place.begin(), place.end());

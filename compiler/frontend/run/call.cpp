@@ -32,7 +32,7 @@ void check_limits(const ParameterContents& parameter, const Scalar& value,
 
 void check_buffer(const halide_buffer_t* buffer, const std::string& name, Type type, int dimensions,
                   bool with_memory, const std::string& asked) {
-  const auto what = [&] { return "the buffer for " + quoted(name); };  // of errors only
+  const auto what = [&] { return "the buffer for " + quoted(name); };  // built only for errors
   if (!buffer)
     call_error(asked, what() + " must not be null", "a null halide_buffer_t* was given",
                "Give a buffer");

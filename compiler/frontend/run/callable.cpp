@@ -42,8 +42,8 @@ struct Callable::Contents {
   std::shared_ptr<CompiledPipeline> code;
   JITHandlers handlers;
   std::vector<Place> places;    // one for each argument, in the caller's order
-  std::vector<Place> literals;  // Buffers that the program itself names
-  std::string asked;            // how errors begin
+  std::vector<Place> literals;  // Buffers embedded in the program
+  std::string asked;            // begins every message
 };
 
 // An argument that the outputs do not need is accepted and ignored; all others are arguments of the code.
@@ -117,7 +117,8 @@ int Callable::call(JITUserContext* context, const std::vector<Value>& values) co
   const int refused = frontend::prepared(handlers, context, [&] { check(values); });
   if (refused != 0) return refused;
   const std::string& asked = contents_->asked;
-  std::vector<void*> argv(contents_->code->arguments().size() + 1);  // one more: for those unused
+  std::vector<void*> argv(contents_->code->arguments().size() +
+                          1);  // one more, for unused arguments
   std::vector<uint64_t> scalars(values.size());
   const int unfit = frontend::prepared(handlers, context, [&] { bind(values, argv, scalars); });
   if (unfit != 0) return unfit;

@@ -216,7 +216,8 @@ std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs, bool w
     findings.look_at(*f, with_hidden);
     findings.note_slow_floats(*f, target);
   }
-  const bool may_be_placed = unscheduled_beside_adjoints(funcs) > 0;  // by the compiler
+  const bool may_be_placed =
+      unscheduled_beside_adjoints(funcs) > 0;  // the compiler may choose levels
   for (const FuncPtr& f : funcs) {
     if (!may_be_placed && !std::ranges::count(outputs, f)) findings.find_idle_bounds(*f);
   }
