@@ -201,7 +201,7 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   // Requires: an input is copied for a Func that reads it; an input has a type and dimensions.
   Func copy_input(const ImageParam& image);
   Func copy_input(const Buffer<>& image);
-  // Wraps this Func in a copy that a device stores.
+  // Always throws: there is no directive that stores a copy of a Func on a device.
   // Requires: storage lies in the memory of the CPU (Unsupported).
   Func copy_to_device(DeviceAPI device = DeviceAPI::Default_GPU);
   // Computes this Func on the host. It must be a plain copy of another Func: g.in().copy_to_host().

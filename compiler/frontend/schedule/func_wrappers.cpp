@@ -43,7 +43,7 @@ Func Func::clone_in(const std::vector<Func>& fs) {
 
 Func Func::copy_to_device(DeviceAPI) {
   unsupported("copy " + quoted(name()) + " to a device", "storage lies in the memory of the CPU",
-              "no code is generated for devices", "Leave it out");
+              "kernels copy the data that they need by themselves", "Leave it out");
 }
 
 // Whether the definition is f(x, y) = g(x, y).

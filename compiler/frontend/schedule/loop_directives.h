@@ -158,8 +158,8 @@ class LoopDirectives {
   //     body(x)         =>  body(1)
   // Requires: the extent of an unrolled loop must be a constant, or have a constant above it.
   Self& unroll(const VarOrRVar& var) { return give(graph::RunLoop{var.name(), ForType::Unrolled}); }
-  // Splits a loop and runs the new outer loop in parallel; vectorize and unroll with a factor run the inner loop so.
-  // The outer loop keeps the name of `var`.
+  // Splits a loop and runs the new outer loop in parallel. vectorize and unroll with a factor also split, and apply to
+  // the new inner loop. The outer loop keeps the name of `var`.
   //   parallel(y, 4):            vectorize(x, 8), unroll(x, 8):
   //     parallel for y:            for x:
   //       for y' in [0, 4):          vectorized (unrolled) for x' in [0, 8):
