@@ -109,7 +109,7 @@ Buffer<> new_buffer(Type type, const Shape& shape) {
 
 namespace {
 
-// Calls visit(Buffer<T>) with the element type of a floating-point buffer; returns false for other types.
+// Calls visit(Buffer<T>) with the element type of a floating buffer. Returns false for other types.
 template <class Visit>
 bool with_floats(const Buffer<>& buffer, Visit visit) {
   if (buffer.type() == Float(64)) return visit(Buffer<double>(buffer)), true;

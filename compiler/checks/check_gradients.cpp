@@ -25,7 +25,7 @@ using namespace checks;
 using checks::Values;
 using Clock = std::chrono::steady_clock;
 
-// The complex step, relative to the input's size: its square is negligible beside 1, but does not underflow.
+// The complex step, relative to the input's size. Its square is negligible beside 1 but does not underflow.
 const double tiny_step = std::ldexp(1.0, -200);
 
 // A result and the time that it took.
@@ -40,7 +40,7 @@ auto timed(F&& f) -> Timed<decltype(f())> {
   auto value = f();
   return {value, std::chrono::duration<double>(Clock::now() - start).count()};
 }
-// Times the second of two runs, because the first one compiles.
+// Runs f twice and times the second run, since the first one compiles.
 template <class F>
 auto timed_warm(F&& f) {
   f();
@@ -54,7 +54,7 @@ class Checker {
         shape_(shape_of_output(output, options.mins, sizes, asked(), "check_gradients")),
         options_(options),
         random_(options.seed) {
-    widen({output.function()});  // reports operations without a meaning in double first
+    widen({output.function()});  // throws first for operations without a meaning in double
     draw_weights();
     for (const auto& p : parameters_of({output.function()})) {
       if (p->type.is_float()) own_inputs_.push_back(p);
@@ -81,7 +81,7 @@ class Checker {
     return "check the gradients of " + retrograde::quoted(output_.name());
   }
 
-  // ---- what is asked for ----
+  // ---- inputs and weights ----
 
   bool is_wanted(const Input& input) const {
     for (const AdjointInput& w : options_.wrt) {
@@ -106,12 +106,12 @@ class Checker {
     for (double& v : result) v = normal(random_);
     return result;
   }
-  // Rounds the values, so that both precisions see the same numbers.
+  // Rounds values to the input's type, so that both precisions get the same numbers.
   static Values own_precision(Values values, Type type = Float(32)) {
     for (double& v : values) v = held_by(type, v);
     return values;
   }
-  // Draws weights for each value of the output; none for integers.
+  // Draws weights for each floating value of the output.
   void draw_weights() {
     bool any = false;
     for (Type t : output_.types()) {
@@ -172,8 +172,8 @@ class Checker {
     bind_imaginary();
     complex_primal_ = scheduled_for(complex_.output, shape_);
   }
-  // Custom rules consist of Funcs in the user's precision. These Funcs are widened to double, with the same constants;
-  // everything else is differentiated in double.
+  // Custom derivative rules consist of Funcs in the user's precision. To check them, the Funcs of the adjoint are
+  // widened to double; their constants keep their values. Without custom rules the widened graph is differentiated.
   bool has_rules() const {
     const auto order = topological_order({output_.function()});
     return std::any_of(order.begin(), order.end(),
@@ -190,7 +190,7 @@ class Checker {
     if (wide_) return wide_->of(wide);
     return Func(widened_.funcs.at(own_->of(input).function().get()));
   }
-  // Binds parameters that are no inputs: the weights, and parameters that custom rules read.
+  // Binds parameters other than the inputs: weights, and parameters that custom rules read.
   void bind(const std::shared_ptr<ParameterContents>& p) {
     auto wide = widened_.parameters.find(p.get());
     if (wide == widened_.parameters.end()) return;
@@ -198,7 +198,7 @@ class Checker {
     if (std::ranges::find(own_inputs_, p) != own_inputs_.end()) inputs_.push_back(bound);
   }
 
-  // The tangent in double, by custom rules if there are any, else from the definitions.
+  // The tangent in double. Funcs without a custom tangent rule are differentiated.
   Func tangent(const Input& input, const Buffer<>& direction) const {
     for (const FuncPtr& f : topological_order({output_.function()})) {
       if (autodiff::has_custom_tangent(*f)) return tangent_by_rules(input, direction);
@@ -239,7 +239,7 @@ class Checker {
 
   static double size_of(const Input& input) { return std::max(largest(input.values), 1e-3); }
 
-  // The best estimate by the differences alone; the time is that of all steps tried.
+  // The best estimate from the differences; the time includes all steps that were tried.
   Timed<double> difference(Input& input, const Values& v, double adjoint, double scale,
                            std::vector<GradientReport::Step>* steps) {
     Timed<double> best{0, 0};
@@ -273,7 +273,7 @@ class Checker {
       to.set_wide(Values(to.values.size(), 0.0));
     }
   }
-  // The slope, read off the imaginary part.
+  // The slope by a complex step.
   Timed<double> complex_step(const Input& input, const Values& v) {
     Input& moved = imaginary_[static_cast<size_t>(&input - inputs_.data())];
     const double h = tiny_step * size_of(input);
@@ -332,7 +332,7 @@ class Checker {
     report_.inputs.push_back(result);
   }
 
-  // ---- where the digits go ----
+  // ---- errors by Func ----
 
   void compare_funcs() {
     auto order = topological_order({output_.function()});
@@ -352,7 +352,7 @@ class Checker {
     }
   }
 
-  // The worst error among the adjoint's values, for Funcs whose adjoint has a known region.
+  // The worst error of the adjoint of each Func, for adjoints over a known region.
   std::map<const ir::Symbol*, double> func_errors(const std::vector<FuncPtr>& order,
                                                   const autodiff::Regions& regions) {
     std::vector<const ir::Symbol*> funcs;
@@ -386,9 +386,9 @@ class Checker {
   std::mt19937_64 random_;
   std::vector<std::shared_ptr<ParameterContents>> own_inputs_;
   std::vector<Values> weights_;
-  std::unique_ptr<Derivative> own_, wide_;  // wide_: null if there are custom rules
+  std::unique_ptr<Derivative> own_, wide_;  // wide_: null if there are custom derivative rules
   Widened widened_;
-  Func wide_output_, wide_primal_, complex_primal_;  // the last two are realized
+  Func wide_output_, wide_primal_, complex_primal_;  // the last two run
   std::vector<Input> inputs_, imaginary_;
   ComplexGraph complex_;
   GradientReport report_;

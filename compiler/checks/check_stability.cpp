@@ -19,8 +19,8 @@ using namespace checks;
 using checks::Values;
 using Limits = std::numeric_limits<float>;
 
-// The largest, smallest normal and smallest positive number of a type. For double these are the ends of float32, beyond
-// which there is no reference to compare with.
+// The largest, the smallest normal and the smallest number of a type. Inputs in double are limited to the range of
+// float32, since nothing exists to compare larger values with.
 struct Ends {
   double max, min, denormal;
 };
@@ -49,9 +49,10 @@ double magnitude(Extreme extreme, Type type) {
   return 0;
 }
 
-// One Func or adjoint, and the same definitions in double: the two differ by rounding alone.
+// A Func or adjoint to compare with double. The version in double has the same definitions, so the two differ only by
+// rounding.
 struct Watched {
-  std::string name;  // of the primal
+  std::string name;  // name of the primal Func
   bool is_adjoint;
   Func own;
   Shape shape;
@@ -96,7 +97,7 @@ class StabilityChecker {
   }
 
  private:
-  // ---- the Funcs that are checked ----
+  // ---- Funcs and adjoints ----
 
   Derivative adjoints() const {
     std::vector<Expr> ones;
@@ -109,7 +110,9 @@ class StabilityChecker {
 
   void watch() {
     auto order = topological_order({output_.function()});
-    widen({output_.function()});  // reports operations without a meaning in double before binding
+    widen(
+        {output_
+             .function()});  // throws for operations without a meaning in double before anything is bound
     autodiff::Regions regions(order, box_of(shape_));
     Derivative derivative = adjoints();
     std::vector<Watched> adjoints;
@@ -174,7 +177,7 @@ class StabilityChecker {
       bool found = false;
       for (const Input& input : inputs_) found |= input.own == r.input.symbol();
       if (!found) {
-        user_error(asked_, "a range is one of a floating input that the output depends on",
+        user_error(asked_, "a range belongs to a floating input that the output depends on",
                    "there is one of something else", "Give an ImageParam, a Buffer or a Param");
       }
     }
@@ -221,7 +224,7 @@ class StabilityChecker {
 
   // ---- errors ----
 
-  // Adds to the last case if it has the same name: all samples are one case.
+  // Starts a case, or continues the last one if it has the same name; all samples form one case.
   void add_case(const std::string& name) {
     const bool is_new = report_.cases.empty() || report_.cases.back().name != name;
     if (is_new) report_.cases.push_back({name, {}, {}, {}});
@@ -257,7 +260,7 @@ class StabilityChecker {
     return {w.name, w.is_adjoint, value, at, own, wide, culprit(w.own, value, at)};
   }
 
-  // ---- estimates, in double, so that their own rounding does not show ----
+  // ---- estimates: computed in double, whose own rounding is negligible ----
 
   void estimate(StabilityReport::Case& to) {
     const double eps = Limits::epsilon();
@@ -307,7 +310,7 @@ class StabilityChecker {
   std::vector<Watched> watched_;
   Batch own_, wide_;  // the watched Funcs in their own precision and in double
   std::vector<Input> inputs_;
-  std::vector<Values> now_;  // the inputs' values
+  std::vector<Values> now_;  // current values of the inputs
   StabilityReport report_;
 };
 

@@ -14,7 +14,7 @@ namespace retrograde::checks {
 
 namespace {
 
-// Thrown internally, and caught by complex_graph.
+// Thrown for operators without a complex form; complex_graph catches it.
 struct Refused {
   std::string why;
 };
@@ -49,7 +49,7 @@ Complex exponential(const Complex& a) {
   return {e * real_op(Op::cos, a.im), e * real_op(Op::sin, a.im)};
 }
 Complex logarithm(const Complex& a) { return {real_op(Op::log, modulus(a)), angle(a)}; }
-// Requires a nonnegative real part.
+// The square root of a number whose real part is not negative.
 Complex square_root(const Complex& a) {
   Expr re = real_op(Op::sqrt, (modulus(a) + a.re) * 0.5);
   return {re, a.im / (re * 2.0)};
@@ -69,7 +69,7 @@ Complex hyperbolic_sine(const Complex& a) {
 Complex hyperbolic_cosine(const Complex& a) {
   return {product_of(Op::cosh, Op::cos, a), product_of(Op::sinh, Op::sin, a)};
 }
-// Requires a nonnegative real base, or a real integer power.
+// a to the power p; the real part of a must not be negative unless p is a real integer.
 Complex power(const Complex& a, const Complex& p) {
   if (is_zero(p.im)) {
     Expr size = call_op(Op::pow, Float(64), {modulus(a), p.re}), turn = angle(a) * p.re;
@@ -94,7 +94,7 @@ class Complexifier {
   ComplexGraph take() { return std::move(result_); }
 
  private:
-  // The position of value k of a Func among the values of its complex version.
+  // Index of value k of a Func among the values of its complex version.
   static int position(const FuncContents& f, int k) {
     int result = 0;
     for (int i = 0; i < k; ++i) result += f.types[static_cast<size_t>(i)].is_float() ? 2 : 1;
@@ -127,7 +127,7 @@ class Complexifier {
 
   Complex of(const Expr& root) {
     const Expr e = without_lets(root);
-    kept_.push_back(e);  // keeps the nodes of memo_ alive
+    kept_.push_back(e);  // keeps the addresses in memo_ valid
     for (const Expr& node : autodiff::post_order({e})) {
       if (!memo_.contains(node.get())) memo_.emplace(node.get(), converted(node));
     }
@@ -199,7 +199,7 @@ class Complexifier {
     if (!c.type.is_float()) return {part(0), {}};
     return {part(0), part(1)};
   }
-  // A call with integer or boolean value.
+  // A call whose result is an integer or a condition.
   Complex real_call(const Expr& e, const Call& c) {
     if (c.call_type == CallType::Func) return read(c);
     return {map_children(e, [&](const Expr& child) { return operand(child).re; }), {}};

@@ -1,13 +1,13 @@
-// complex_step.h -- rewrites a graph of Funcs over complex numbers, for derivatives by the complex-step method.
+// complex_step.h -- copies a graph of Funcs over complex numbers, for derivatives by a complex step.
 //
 //   f(x + i h v) = f(x) + i h <f'(x), v> + O(h^2)       (Squire and Trapp, SIAM Review 40, 1998)
 //
-// There is no subtraction, so h may be so small that the error is rounding alone. Every floating-point value of a Func
-// becomes two, its real and its imaginary part. Comparisons, indices and step functions (floor) use the real part, so
-// the original branches are taken; min, max and abs choose by it.
+// Nothing is subtracted, so h can be so small that only rounding error remains. Every floating value of a Func becomes
+// two values, its real and its imaginary part. Comparisons, indices and step functions (floor) use the real part, and
+// min, max and abs choose by it, so that every branch is that of the original.
 //
-// An operator is supported if it is complex differentiable and its imaginary part can be computed for tiny imaginary
-// parts. For other operators the graph is refused with a reason.
+// An operator must be complex differentiable, and its imaginary part must be computable for tiny imaginary parts. For
+// other operators `refused` states the reason.
 #pragma once
 
 #include <map>
@@ -19,13 +19,13 @@
 namespace retrograde::checks {
 
 struct ComplexGraph {
-  Func output;  // values: alternating real and imaginary parts; integers have no imaginary part
-  // The imaginary part of each floating-point input; unbound.
+  Func output;  // values: real and imaginary parts alternate; integers have no imaginary part
+  // The parameter of the imaginary part of each floating input; unbound.
   std::map<const ir::Symbol*, std::shared_ptr<graph::ParameterContents>> imaginary;
-  std::string refused;  // reason if there is no graph; else empty
+  std::string refused;  // why there is no graph; empty if there is one
 };
 
-// `output` belongs to a graph in double (widen.h).
+// The complex version of `output`, a graph in double (widen.h).
 ComplexGraph complex_graph(const Func& output);
 
 }  // namespace retrograde::checks

@@ -16,22 +16,23 @@ namespace {
 
 constexpr size_t most_operations = 400, most_evaluations = 2'000'000;
 
-// The floating-point nodes that do not read f itself, operands first. Both branches of a select are evaluated.
+// Floating-point nodes that do not read f itself, operands first. Both arms of a select are included, since both are
+// evaluated.
 std::vector<Expr> operations_of(const Expr& value, const FuncContents& f) {
   return ir::filtered(autodiff::post_order({ir::without_lets(value)}), [&](const Expr& e) {
     return e.type().is_float() && !e.as<ir::FloatImm>() && !ir::calls(e, &f);
   });
 }
 
-// One definition of f at one element: all iterations of its reduction.
+// One definition of f at one element, with all iterations of its reduction.
 struct Run {
   std::vector<Expr> operations;
   Shape shape;  // the operations, then the reduction variables, innermost first
   ir::Substitution place;
 };
 
-// nullopt if there are very many operations, if the loops have no constant bounds, or if the left-hand side does not
-// have the form of this element.
+// nullopt if there are very many iterations, if the loops have no constant bounds, or if the coordinates of the update
+// are not plain variables.
 std::optional<Run> run_of(const FuncContents& f, int stage, int value, const std::vector<int>& at) {
   const Definition& d = f.stage(stage);
   Run run{operations_of(d.values[static_cast<size_t>(value)], f), {{0}, {}}, {}};
@@ -53,7 +54,7 @@ std::optional<Run> run_of(const FuncContents& f, int stage, int value, const std
   return run;
 }
 
-// A Func with all operations: the i-th operation, at an iteration.
+// A Func whose value at (i, iteration) is the result of operation i.
 Func probe(const Definition& d, const Run& run) {
   Var i("i");
   std::vector<Var> args{i};
@@ -80,7 +81,7 @@ std::string described(const Expr& e, const ir::Substitution& place) {
   return text(simplification::simplify(ir::substitute(e, place)), ", an input");
 }
 
-// ", in update 0 at r = 3"; empty for the pure definition.
+// " in update 0 at r = 3"; empty for the pure definition.
 std::string where(const Definition& d, int stage, const std::vector<int>& at) {
   if (stage == 0) return "";
   std::string result = text(", in update ", stage - 1);
@@ -89,7 +90,7 @@ std::string where(const Definition& d, int stage, const std::vector<int>& at) {
   return result;
 }
 
-// The culprit in one definition; empty if all values are finite, nullopt if the definition cannot be analysed.
+// The culprit in one definition. Empty if all values are finite, nullopt if the definition cannot be examined.
 std::optional<std::string> culprit_in(const FuncContents& f, int stage, int value,
                                       const std::vector<int>& at) {
   auto run = run_of(f, stage, value, at);

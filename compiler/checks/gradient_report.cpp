@@ -1,4 +1,4 @@
-// Writes a GradientReport as JSON.
+// gradient_report.cpp -- GradientReport as JSON.
 #include <nlohmann/json.hpp>
 
 #include "checks/check_gradients.h"

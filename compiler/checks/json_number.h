@@ -1,4 +1,4 @@
-// JSON has no NaN and no infinity, so they are written as text.
+// json_number.h -- numbers as JSON. NaN and infinities, which JSON lacks, become strings.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Writes a StabilityReport as JSON.
+// stability_report.cpp -- StabilityReport as JSON.
 #include <nlohmann/json.hpp>
 
 #include "checks/check_stability.h"

@@ -1,12 +1,11 @@
-// widen.h -- copies a graph of Funcs with every float widened to double: the reference for the loss of single
-// precision.
+// widen.h -- copies a graph of Funcs in double, as the reference for the precision that float32 loses.
 //
-// Inputs become new parameters in double, so that they can move by less than the resolution of float32. The fast_*
-// functions become the functions that they approximate. Random numbers stay the same.
+// Inputs become new parameters in double, so they can change by less than a float32 resolves. The fast_* functions
+// become the functions that they approximate. Random numbers do not change.
 //
-// On request, rounding is added at random (Parker's Monte Carlo arithmetic; here once for each value of a Func instead
-// of once for each operation): every computed value, in any definition, is multiplied by 1 + amount * u, with u in [-1,
-// 1) drawn from the seed, the Func and the point.
+// Optionally every computed value of every definition is multiplied by 1 + amount * u, with u in [-1, 1) drawn from the
+// seed, the Func and the point. This is Parker's Monte Carlo arithmetic with one random rounding for each value of a
+// Func instead of each operation.
 #pragma once
 
 #include <map>
@@ -28,7 +27,7 @@ struct Rounding {
   Expr seed;    // int32
 };
 
-// Throws Unsupported for C functions, extern stages, and the bits of floats.
+// Copies the graph in double. Throws Unsupported for C functions, extern stages, and the bits of floats.
 Widened widen(const std::vector<FuncPtr>& outputs, const Rounding& rounding = {});
 
 }  // namespace retrograde::checks

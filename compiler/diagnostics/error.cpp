@@ -1,4 +1,4 @@
-// error.cpp -- renders the four parts of a message, and defines the functions that throw.
+// error.cpp -- renders the four parts of a message, and throws.
 #include "diagnostics/error.h"
 
 #include <atomic>

@@ -1,6 +1,6 @@
 #include "diagnostics/large_stack.h"
 
-// A POSIX thread, because std::thread has no stack size.
+// POSIX threads, because std::thread cannot set the stack size.
 #include <pthread.h>
 
 #include <exception>

@@ -11,7 +11,7 @@ namespace retrograde {
 
 namespace {
 
-// The log requested by environment variables.
+// The log that RETROGRADE_PASS_LOG enables.
 class PassLog {
  public:
   PassLog() {

@@ -1,11 +1,11 @@
-// pass_observer.h -- observes the compiler: the time and the result of each pass.
+// pass_observer.h -- observes compiler passes: the run time of each pass and the program after it.
 //
 //   PassObserver observer([](const PassReport& r) { times[r.pass] += r.seconds; });
 //   f.compile_jit();
 //
-// Environment variables do the same for unmodified programs. RETROGRADE_PASS_LOG=FILE appends a
-// line per pass to a file; RETROGRADE_DUMP_AFTER=PASS,... (or "all") adds the results of these
-// passes. `opt -- program` sets both and shows the file.
+// The environment does the same for unmodified programs. RETROGRADE_PASS_LOG=FILE appends a line for every pass to a
+// file, and RETROGRADE_DUMP_AFTER=PASS,... (or "all") also the program after these passes. `opt -- program` sets both
+// and shows the file.
 #pragma once
 
 #include <functional>
@@ -13,17 +13,19 @@
 
 namespace retrograde {
 
+// One run of a compiler pass.
 struct PassReport {
-  std::string pipeline;  // the name of the compiled function
-  std::string pass;
-  double seconds = 0;
-  std::function<std::string()> text;  // the program after the pass; empty for passes inside LLVM
+  std::string pipeline;               // name of the function
+  std::string pass;                   // name of the pass
+  double seconds = 0;                 // its run time
+  std::function<std::string()> text;  // the program after it; empty for passes inside LLVM
 };
 
-// While it lives, `observe` is called for every pass of every compilation in the process, one call
-// at a time, on the compiling thread. It must not compile anything itself.
+// While it exists, the function receives every pass of every compilation in the process. Calls come one at a
+// time, on the thread that compiles; the function must not compile anything.
 class PassObserver {
  public:
+  // Starts observing.
   explicit PassObserver(std::function<void(const PassReport&)> observe);
   ~PassObserver();
   PassObserver(const PassObserver&) = delete;
@@ -33,7 +35,7 @@ class PassObserver {
   const std::function<void(const PassReport&)> observe_;
 };
 
-// Called by the compiler; cheap without observers.
+// Reports a pass; cheap without observers.
 void tell_pass_observers(const PassReport& report);
 
 }  // namespace retrograde

@@ -1,4 +1,4 @@
-// text_hash.h -- a hash of a text that is the same on all machines, for file names and table keys.
+// text_hash.h -- a hash of text that is the same on all machines, for file names and table keys.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 
 namespace retrograde {
 
-// FNV-1a, 64 bits.
+// The 64-bit FNV-1a hash.
 constexpr uint64_t text_hash(std::string_view text) {
   uint64_t hash = 14695981039346656037u;
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;

@@ -1,4 +1,4 @@
-// Generators of other front ends, presented as GeneratorBases.
+// abstract_generator.cpp -- an adapter that presents the generators of other front ends as GeneratorBases.
 #include "generator/abstract_generator.h"
 
 #include "diagnostics/error.h"
@@ -8,7 +8,7 @@ namespace retrograde::internal {
 
 namespace {
 
-// Whether it is an array shows when its parameters are there.
+// An input that the generator describes. Once it has parameters, their number tells whether it is an array.
 class DescribedInput : public GeneratorInputBase {
  public:
   explicit DescribedInput(const AbstractGenerator::ArgInfo& info)
@@ -18,7 +18,7 @@ class DescribedInput : public GeneratorInputBase {
     declared.dims = info.kind == IOKind::Scalar ? 0 : info.dimensions;
     return declared;
   }
-  // The generator makes its own.
+  // Does nothing: the generator creates its own parameters.
   void make_parameters() override {}
   void take(const std::vector<Parameter>& parameters) {
     if (parameters.size() != 1) become_array();
@@ -47,7 +47,7 @@ class DescribedOutput : public GeneratorOutputBase {
 
 class DescribedGenerator : public GeneratorBase {
  public:
-  // Owns it where `owned` says so.
+  // Owns the generator unless `owned` is null.
   DescribedGenerator(AbstractGenerator& generator, AbstractGeneratorPtr owned)
       : GeneratorBase(sizeof(DescribedGenerator)), generator_(generator), owned_(std::move(owned)) {
     init_from_context(generator_.context());
@@ -115,7 +115,7 @@ class DescribedGenerator : public GeneratorBase {
   }
 };
 
-// The same for one call: it stays with its owner.
+// Calls `use` with the generator as a GeneratorBase, without taking ownership.
 template <typename Use>
 auto with_base(AbstractGenerator& generator, const Use& use) {
   if (auto* base = dynamic_cast<GeneratorBase*>(&generator)) return use(*base);

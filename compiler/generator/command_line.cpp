@@ -1,4 +1,4 @@
-// From a command line to files.
+// command_line.cpp -- parses the command line of a generator program, runs the generator and writes the files.
 #include "generator/command_line.h"
 
 #include <malloc.h>
@@ -38,7 +38,8 @@ OutputFileType read_emit_type(const std::string& word) {
     if (info.name == word) return type;
   }
   user_error("emit a file of type " + quoted(word), "the types of -e are " + names_of(emit_names()),
-             quoted(word) + " is none of them", "Name one or more of these, with commas between");
+             quoted(word) + " is not one of them",
+             "Name one or more of these, with commas between");
 }
 
 CommandLine::Gradient read_gradient(const std::string& text) {
@@ -48,7 +49,7 @@ CommandLine::Gradient read_gradient(const std::string& text) {
   const auto found = known.find(text);
   if (found == known.end()) {
     user_error(std::string(asked) + " with -d " + text, "-d takes 1, the gradient, 0, or separate",
-               quoted(text) + " is none of them", "Write -d 1 or leave it out");
+               quoted(text) + " is not one of them", "Write -d 1 or leave it out");
   }
   return found->second;
 }
@@ -57,7 +58,7 @@ int read_seconds(const std::string& text) {
   const std::optional<int> seconds = read_number<int>(text);
   if (!seconds || *seconds < 0) {
     user_error(std::string(asked) + " with -t " + text,
-               "-t takes a number of seconds, 0 for no limit", quoted(text) + " is none",
+               "-t takes a number of seconds, 0 for no limit", quoted(text) + " is not a number",
                "Write for example -t 60");
   }
   return *seconds;
@@ -105,7 +106,7 @@ void set_flag(char flag, const std::string& value, CommandLine& command) {
   }
 }
 
-// What a run cannot do without.
+// Checks that all required flags are present.
 void check_complete(const CommandLine& command) {
   if (command.generator.empty() && command.runtime.empty()) {
     const std::vector<std::string> names = GeneratorRegistry::enumerate();
@@ -132,7 +133,7 @@ std::string base_name(const std::string& function) {
   return colons == std::string::npos ? function : function.substr(colons + 2);
 }
 
-// A scheduler is part of the context that a generator is made in.
+// Creates the generator in a context for the target, with the autoscheduler of -s.
 std::unique_ptr<GeneratorBase> make_generator(const CommandLine& command, const Target& target) {
   AutoschedulerParams scheduler;
   GeneratorParamsMap params;
@@ -185,7 +186,7 @@ void run_runtime(const CommandLine& command) {
   log(command, compile_standalone_runtime(files_of(command, command.runtime), common));
 }
 
-// One for each target, as a schedule may ask for it.
+// Writes one schedule for each target, since a schedule may depend on the target.
 void emit_schedules(const CommandLine& command, const std::string& function,
                     const std::string& base) {
   const std::string extension =
@@ -230,7 +231,7 @@ void run_generator(const CommandLine& command) {
     compile_multitarget(function, files, command.targets, command.suffixes, build);
 }
 
-// Everything that the command line alone decides.
+// Parses the command line, loads plugins, and creates the generator once, so that errors come before any file.
 CommandLine prepare(int argc, const char* const* argv) {
   CommandLine command = read_command_line(argc, argv);
   for (const std::string& plugin : command.plugins) load_plugin(plugin);
@@ -260,11 +261,11 @@ CommandLine read_command_line(int argc, const char* const* argv) {
                  quoted(word) + " is neither", "See --help");
     }
     if (i + 1 == argc)
-      user_error(asked, "every flag has a value", word + " has none", "Put it behind the flag");
+      user_error(asked, "every flag has a value", word + " has none", "Put it after the flag");
     set_flag(word[1], argv[++i], command);
   }
   check_complete(command);
-  if (command.targets.empty()) read_targets("host", command);  // for a stub, which has none
+  if (command.targets.empty()) read_targets("host", command);  // for a stub, which needs no target
   return command;
 }
 
@@ -350,8 +351,8 @@ static bool asks_for_help(int argc, const char* const* argv) {
   return argc <= 1;
 }
 
-// The process compiles and ends. By default glibc asks the system for memory a page at a time where
-// a thread compiles, and gives back what will be wanted again.
+// Makes glibc request memory in large pieces and keep it, since the process only compiles and exits. By default a
+// thread's arena grows a page at a time, and glibc returns memory that is needed again soon.
 static void expect_much_memory() {
 #ifdef __GLIBC__
   constexpr int at_once_bytes = 8 << 20;

@@ -1,4 +1,4 @@
-// cpp_stub.cpp -- the header that stands for a generator: its declarations as C++ text.
+// cpp_stub.cpp -- writes the stub header, with the declarations of a generator as C++ text.
 #include "generator/cpp_stub.h"
 
 #include <set>
@@ -10,13 +10,13 @@ namespace retrograde::internal {
 
 namespace {
 
-// A member of one of the structs, and how a value of it becomes a param's.
+// A member of one of the structs, and how its value is converted to that of a parameter.
 struct Member {
   std::string type, name, value;  // value: its default, empty for none
   std::string key, text;          // its name in the generator; of a param: the text of its value
 };
 
-// The names of a struct's members: what is taken already gets an underscore.
+// Unique names for the members of a struct; a duplicate gets an underscore.
 class MemberNames {
  public:
   explicit MemberNames(std::set<std::string> taken) : taken_(std::move(taken)) {}
@@ -66,7 +66,7 @@ Member member_of(const GeneratorPort& io, const char* buffer_class, MemberNames&
           ""};
 }
 
-// What an output's declaration leaves open: a param "out.type", a member out_type.
+// Adds a member out_type for each parameter "out.type" that an output's declaration leaves open.
 void add_open_parts(const GeneratorPort& output, std::vector<Member>& params, MemberNames& names) {
   const auto add = [&](const char* type, const std::string& part, const char* value,
                        const char* function) {
@@ -141,7 +141,7 @@ class StubWriter {
     params_.push_back({type, member, type + "::" + cpp.value, name, "param_text(" + member + ")"});
   }
 
-  // Of all members at once, and of none, to be set one by one.
+  // Two constructors: one that takes all members, and one without arguments.
   static std::string constructors(const std::string& name, const std::vector<Member>& members) {
     const std::string plain = "    " + name + "() {}\n";
     if (members.empty()) return plain;

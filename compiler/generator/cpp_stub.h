@@ -1,12 +1,12 @@
-// cpp_stub.h -- a generator used inside another one, by a header that the build writes (-e
-// cpp_stub).
+// cpp_stub.h -- support for using one generator inside another one, through a header that the build writes
+// (-e cpp_stub):
 //
 //   auto small = ns::Resize::generate(context(), {input}, {factor});
 //   output(x, y) = small.resized(x, y);
 //
-// The header declares a class with the structs Inputs, GeneratorParams and Outputs and a static
-// function generate(). It needs no source of the generator, which is linked into the program. What
-// configure() adds is in it, as configure() adds it for the params that the header was made with.
+// The header declares a class with the structs Inputs, GeneratorParams and Outputs and a static function generate(). It
+// does not need the source of the generator, which is linked into the program. Inputs and outputs that configure() adds
+// are included, for the parameter values with which the header was written.
 #pragma once
 
 #include <type_traits>
@@ -16,7 +16,7 @@
 
 namespace retrograde::internal {
 
-// An image for an Input<Buffer<T>>.
+// An image to pass for an Input<Buffer<T>>.
 template <typename T = void>
 class StubInputBuffer : public ImageParam {
  public:
@@ -28,7 +28,7 @@ class StubInputBuffer : public ImageParam {
   StubInputBuffer(const ImageParam& image) : ImageParam(image) {}
 };
 
-// What an Output<Buffer<T>> holds: a Func, to be used or realized.
+// The Func of an Output<Buffer<T>>, to be used or realized.
 template <typename T = void>
 class StubOutputBuffer : public Func {
  public:
@@ -36,7 +36,7 @@ class StubOutputBuffer : public Func {
   StubOutputBuffer(const Func& f) : Func(f) {}
 };
 
-// An array of outputs, as Funcs or as images.
+// An array of outputs; converts to a vector of Funcs or images.
 struct StubOutputs {
   std::vector<Func> funcs;
   template <typename Output>

@@ -1,5 +1,5 @@
-// generator.h -- Generator<T>: a pipeline as a class, compiled ahead of time by a build file or
-// used from C++.
+// generator.h -- Generator<T>, the base of pipelines that are classes. A build file compiles them ahead of time, or C++
+// code uses them directly.
 //
 //   class Blur : public Generator<Blur> {
 //    public:
@@ -11,7 +11,7 @@
 //   };
 //   RETROGRADE_REGISTER_GENERATOR(Blur, blur)
 //
-// linked with the program of generator_main.cpp: ./blur.generator -g blur -o . target=host radius=2
+// Linked with generator_main.cpp this is a program: ./blur.generator -g blur -o . target=host radius=2
 #pragma once
 
 #include <memory>
@@ -22,9 +22,11 @@
 
 namespace retrograde {
 
+// Base of a user's generator T, with the members configure(), generate() and schedule().
 template <typename T>
 class Generator : public internal::GeneratorBase {
  public:
+  // Creates a generator for a context, under its registered name or `name`.
   static std::unique_ptr<T> create(const GeneratorContext& context) {
     auto generator = std::make_unique<T>();
     generator->init_from_context(context);
@@ -35,13 +37,13 @@ class Generator : public internal::GeneratorBase {
     generator->set_name(name);
     return generator;
   }
-  // Sets all inputs, generates and schedules: the outputs can be used then.
+  // Sets all inputs, generates and schedules; then the outputs can be used.
   template <typename... Args>
   void apply(const Args&... args) {
     set_inputs(args...);
     schedule_all();
   }
-  // Another generator for the same target.
+  // Creates another generator for the same context.
   template <typename T2>
   std::unique_ptr<T2> create() const {
     return context().template create<T2>();

@@ -1,4 +1,4 @@
-// The life of a generator.
+// generator_base.cpp -- runs the phases of a generator and builds pipelines and modules from it.
 #include "generator/generator_base.h"
 
 #include <algorithm>
@@ -102,7 +102,7 @@ bool GeneratorBase::set_declared_part(const std::string& key, const StringOrLoop
       const std::optional<Type> type = read_type(word);
       if (!type) {
         user_error("set " + key + " of the generator " + quoted(name_) + " to " + quoted(text),
-                   "types are " + type_choices(), quoted(word) + " is none of them",
+                   "types are " + type_choices(), quoted(word) + " is not one of them",
                    "Give one of these, or several with commas for a Tuple");
       }
       types.push_back(*type);
@@ -192,11 +192,11 @@ void GeneratorBase::schedule_all() {
   phase_ = Phase::Scheduled;
 }
 
-void GeneratorBase::check_input_count(size_t given) {
+void GeneratorBase::check_input_count(size_t count) {
   configure_once();
-  if (given == members_.inputs.size()) return;
+  if (count == members_.inputs.size()) return;
   user_error("set the inputs of the generator " + quoted(name_), "all are given, in their order",
-             text("it has ", members_.inputs.size(), " and was given ", given),
+             text("it has ", members_.inputs.size(), " and was given ", count),
              "Give that many; a std::vector for an array");
 }
 
@@ -223,7 +223,7 @@ Expr constant_for_input(const Expr& value, const GeneratorPort& input) {
   return ir::to_expr(converted);
 }
 
-// ---- by name ----
+// ---- the interface AbstractGenerator ----
 
 std::vector<AbstractGenerator::ArgInfo> GeneratorBase::arginfos() {
   configure_once();
@@ -278,12 +278,12 @@ std::vector<Parameter> GeneratorBase::input_parameter(const std::string& name) {
   });
 }
 
-// ---- what it makes ----
+// ---- pipelines and modules ----
 
 Pipeline GeneratorBase::get_pipeline() {
   if (!is_generated()) {
     user_error("take the Pipeline of the generator " + quoted(name_),
-               "the Pipeline is made of what generate() defines", "generate() has not run",
+               "the Pipeline has the outputs that generate() defines", "generate() has not run",
                "Call it in schedule(), or after apply()");
   }
   if (!pipeline_.defined()) {
@@ -349,17 +349,17 @@ void GeneratorBase::auto_schedule_pipeline(Pipeline& pipeline) const {
     pipeline.auto_schedule(auto_schedule.scheduler(), get_target(), get_machine_params());
 }
 
-// Parameters and Funcs may have had to take other names than those that were declared.
+// Restores the declared names in the metadata; parameters and Funcs may have received other, unique names.
 Module GeneratorBase::to_module(Pipeline& pipeline, const std::vector<Argument>& inputs,
                                 const std::vector<std::string>& declared_names,
                                 const std::string& function_name, LinkageType linkage) {
   const std::string function = function_name.empty() ? name_ : function_name;
   Module module = pipeline.compile_to_module(inputs, function, get_target(), linkage);
-  const std::vector<Argument>& made = module.functions().back().args;
-  const size_t first = made.size() - declared_names.size();
+  const std::vector<Argument>& compiled = module.functions().back().args;
+  const size_t first = compiled.size() - declared_names.size();
   for (size_t i = 0; i < declared_names.size(); i++) {
-    if (made[first + i].name != declared_names[i])
-      module.remap_metadata_name(made[first + i].name, declared_names[i]);
+    if (compiled[first + i].name != declared_names[i])
+      module.remap_metadata_name(compiled[first + i].name, declared_names[i]);
   }
   return module;
 }
@@ -401,7 +401,7 @@ Module GeneratorBase::build_module(const std::string& function_name, LinkageType
 
 namespace {
 
-// A C++ literal of several lines.
+// Text as a C++ string literal, one literal for each line.
 std::string quoted_lines(const std::string& text) {
   std::string out;
   for (size_t begin = 0; begin < text.size();) {

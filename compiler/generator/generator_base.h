@@ -1,6 +1,6 @@
-// generator_base.h -- the life of a generator: its params are set, configure() may add inputs and
-// outputs, generate() defines the outputs, schedule() schedules them; then it is a Pipeline, a
-// Module, or the Module of its gradient.
+// generator_base.h -- the life cycle of a generator. Its parameters are set, configure() may add inputs and outputs,
+// generate() defines the outputs, and schedule() schedules them. The result is a Pipeline, a Module, or the Module of
+// the gradient.
 #pragma once
 
 #include <map>
@@ -22,18 +22,21 @@
 namespace retrograde {
 namespace internal {
 
-// A param's value: as text, or a level to be computed at.
+// The value of a generator parameter: text or a LoopLevel.
 struct StringOrLoopLevel {
+  // A value as text.
   StringOrLoopLevel(const std::string& text) : text(text) {}
   StringOrLoopLevel(const char* text) : text(text) {}
   StringOrLoopLevel(std::nullptr_t) = delete;  // and of a literal 0
+  // A loop level.
   StringOrLoopLevel(const LoopLevel& level) : level(level) {}
-  std::string text;
-  LoopLevel level;  // undefined: the text says it
+  std::string text;  // the value as text
+  LoopLevel level;   // undefined: the value is the text
 };
+// Values of generator parameters by name.
 using GeneratorParamsMap = std::map<std::string, StringOrLoopLevel>;
 
-// auto_schedule=false, =true (the default scheduler) or =<name of a scheduler>.
+// The parameter auto_schedule: false, true (the default autoscheduler) or the name of an autoscheduler.
 class AutoScheduleParam : public GeneratorParamBase {
  public:
   AutoScheduleParam() : GeneratorParamBase("auto_schedule") {}
@@ -52,45 +55,54 @@ class AutoScheduleParam : public GeneratorParamBase {
   std::string scheduler_;
 };
 
+// The part of Generator<T> that does not depend on T.
 class GeneratorBase : public NamesInterface, public AbstractGenerator {
  public:
   ~GeneratorBase() override = default;
   GeneratorBase(const GeneratorBase&) = delete;
   GeneratorBase& operator=(const GeneratorBase&) = delete;
 
+  // Name in the registry, or the name that set_name() gave.
   const std::string& name() const { return name_; }
   std::string name() override { return name_; }
+  // Sets the name of the generator, which is also the default name of its function.
   void set_name(const std::string& name) { name_ = name; }
+  // Takes over target and autoscheduler from a context.
   void init_from_context(const GeneratorContext& context);
+  // A context with the same target and autoscheduler, to create other generators.
   GeneratorContext context() const override;
-  Target get_target() const { return target; }
+  Target get_target() const { return target; }  // the target
+  // Whether auto_schedule selects an autoscheduler.
   bool get_auto_schedule() const { return auto_schedule; }
+  // Whether any autoscheduler will run; then schedule() may skip its directives.
   bool using_autoscheduler() const { return auto_schedule || !autoscheduler_.name.empty(); }
+  // The autoscheduler that was selected by name.
   const AutoschedulerParams& get_autoscheduler_params() const { return autoscheduler_; }
+  // The machine for the autoscheduler.
   MachineParams get_machine_params() const { return machine_params; }
+  // Number of elements of a type in a vector register of the target.
   int natural_vector_size(const Type& type) const { return get_target().natural_vector_size(type); }
   template <typename T>
   int natural_vector_size() const {
     return get_target().natural_vector_size<T>();
   }
 
-  // By name: GeneratorParams, and what declarations leave open: in.type=float32, in.dim=2,
-  // in.size=3. autoscheduler=NAME names a scheduler for the pipeline, and autoscheduler.KEY=VALUE tells
-  // it something: see AutoschedulerParams.
+  // Sets generator parameters by name, and properties that declarations leave open: in.type=float32,
+  // in.dim=2, in.size=3. autoscheduler=NAME selects an autoscheduler and autoscheduler.KEY=VALUE sets its
+  // parameters; see AutoschedulerParams.
   // Requires: only what the generator declares can be set; types are names such as float32; numbers
   // of dimensions and of elements are whole and at least 0; a value is set before generate() reads
   // it.
   void set_generator_param_values(const GeneratorParamsMap& values);
-  // Writes a header with a class that runs this generator inside another one: see cpp_stub.h.
+  // Writes a header with a class that runs this generator inside another one; see cpp_stub.h.
   bool emit_cpp_stub(const std::string& path) override;
-  // Writes a header whose function
+  // Writes a header with a function that applies the schedule of build_module() to a pipeline of the same Funcs:
   //   void apply_schedule_<function>(retrograde::Pipeline pipeline, retrograde::Target target)
-  // gives the schedule that build_module() compiles with to a pipeline of the same Funcs.
   void emit_schedule(const std::string& path, const std::string& function_name = "");
-  // Name of that class, with its namespaces; by default that of the generator.
+  // Sets the qualified name of the stub class, by default the name of the generator.
   void set_stub_name(const std::string& name) { stub_name_ = name; }
 
-  // Values for all inputs, in their order; a std::vector for an array.
+  // Sets the values of all inputs in order; an array takes a std::vector.
   // Requires: all are given, in their order; the value fits the input's type.
   template <typename... Args>
   void set_inputs(const Args&... args) {
@@ -99,20 +111,22 @@ class GeneratorBase : public NamesInterface, public AbstractGenerator {
     (set_input(i++, args), ...);
   }
 
+  // Whether generate() has run.
   bool is_generated() const { return phase_ >= Phase::Generated; }
-  // Runs what has not run yet of configure(), generate() and schedule().
+  // Runs configure() and generate() unless they have run; schedule_all() also runs schedule().
   // Requires: names are letters, digits and underscores, a letter first; its params, inputs and
   // outputs have different names; it declares at least one Output.
   void generate_all();
   void schedule_all();
-  // All outputs together; after generate().
-  // Requires: the Pipeline is made of what generate() defines.
+  // The pipeline of all outputs; after generate().
+  // Requires: the Pipeline has the outputs that generate() defines.
   Pipeline get_pipeline();
-  // Every call tells when it begins and ends; may be said before generate() has run.
+  // Reports the begin and end of each call to the trace handler; may precede generate().
   void trace_pipeline();
-  // Of one output. After generate().
+  // The Funcs of one output; after generate().
   // Requires: an output has the name that the generator declares.
   std::vector<Func> output_funcs(const std::string& name) const;
+  // Generates, schedules and runs the pipeline; see Pipeline::realize.
   template <typename... Args>
   decltype(auto) realize(Args&&... args) {
     schedule_all();
@@ -123,55 +137,62 @@ class GeneratorBase : public NamesInterface, public AbstractGenerator {
     return get_pipeline().realize(sizes, get_target());
   }
 
-  // The function takes the inputs, then the outputs. Its name defaults to the generator's.
+  // Builds a module whose function takes the inputs, then the outputs. An empty name means that of the
+  // generator.
   // Requires: its inputs are those of the compiled function.
   Module build_module(const std::string& function_name = "",
                       LinkageType linkage = LinkageType::ExternalPlusMetadata);
-  // The same in this process: see Pipeline::compile_to_callable.
-  // The handlers are those of its calls; the C functions that it calls by name are among `externs`,
-  // or in this process.
+  // Compiles the pipeline for this process; see Pipeline::compile_to_callable. `handlers` are those of its
+  // calls. C functions that it calls by name are in `externs` or symbols of this process.
   Callable compile_to_callable(const JITHandlers* handlers = nullptr,
                                const std::map<std::string, JITExtern>* externs = nullptr);
-  // The gradient of every output with respect to every image: the function takes the same inputs,
-  // then for each output _grad_loss_for_<output>, then for each output and each image input
-  // _grad_loss_<output>_wrt_<input>, all of the shape of what they belong to, with _dummy in front
-  // where the output does not read the input. schedule() is not called: it speaks of another
-  // pipeline. Funcs that generate() has not scheduled get the default schedule of gradients.
+  // Builds the gradients of every output with respect to every image. The function takes the inputs, then for
+  // each output _grad_loss_for_<output>, then for each output and each image _grad_loss_<output>_wrt_<input>.
+  // Each has the shape of the image that it belongs to. If the output does not read the input, the name
+  // begins with _dummy. schedule() is not called, since it schedules another pipeline; unscheduled Funcs get
+  // the default schedule of gradients.
   // Requires: gradients are of outputs with one value; gradients are of floating-point outputs.
   Module build_gradient_module(const std::string& function_name = "");
-  // The gradients by images and numbers of floating-point types, summed over the outputs, for who
-  // wants some of them: the function gives all; <function>_by_<input>, one for each input where
-  // there are several, computes that by this input and nothing else. They take the inputs, then for
-  // each floating-point output _grad_loss_for_<output>, and give _grad_loss_wrt_<input>. The rest
-  // is as above.
+  // Builds gradients with respect to images and numbers of floating-point types, summed over the outputs, for
+  // callers that need only some of them. The main function computes all gradients. If there are several
+  // inputs, <function>_by_<input> computes the gradient for one of them. The functions take the inputs, then
+  // for each floating-point output _grad_loss_for_<output>, and compute _grad_loss_wrt_<input>. Scheduling is
+  // as in build_gradient_module.
   // Requires: gradients are of outputs with one value; gradients are of floating-point outputs;
-  // gradients are by floating-point inputs.
+  // gradients are with respect to floating-point inputs.
   Module build_separate_gradients(const std::string& function_name = "");
 
-  // ---- by name: see AbstractGenerator ----
-  // Runs configure().
+  // ---- the interface AbstractGenerator ----
+
+  // The declared inputs and outputs; runs configure().
   std::vector<ArgInfo> arginfos() override;
+  // Always false: inputs precede outputs.
   bool allow_out_of_order_inputs_and_outputs() const override { return false; }
+  // Sets one generator parameter.
   void set_generatorparam_value(const std::string& name, const std::string& value) override {
     set_generator_param_values({{name, value}});
   }
   void set_generatorparam_value(const std::string& name, const LoopLevel& value) override {
     set_generator_param_values({{name, value}});
   }
+  // Binds an input to a value instead of a parameter of the compiled function.
   // Requires: an input has the name that the generator declares.
   void bind_input(const std::string& name, const std::vector<Parameter>& values) override;
   void bind_input(const std::string& name, const std::vector<Func>& values) override;
   void bind_input(const std::string& name, const std::vector<Expr>& values) override;
-  // Runs generate() and schedule().
+  // The scheduled pipeline; runs generate() and schedule().
   Pipeline build_pipeline() override;
+  // The parameters of an input.
   // Requires: an input has the name that the generator declares.
   std::vector<Parameter> input_parameter(const std::string& name) override;
+  // The Funcs of an output.
   std::vector<Func> output_func(const std::string& name) override { return output_funcs(name); }
-  bool emit_hlpipe(const std::string&) override {
-    return false;
-  }  // pipelines have no form as bytes
+  // Always returns false: a pipeline has no serialized form.
+  bool emit_hlpipe(const std::string&) override { return false; }
 
   // ---- in configure() ----
+
+  // Adds an input; call it in configure().
   // Requires: inputs and outputs are added in configure().
   template <typename T, typename... Args>
   GeneratorInput<T>* add_input(const std::string& name, const Args&... args) {
@@ -180,7 +201,8 @@ class GeneratorBase : public NamesInterface, public AbstractGenerator {
     add_port(result);
     return result;
   }
-  // Several types: add_output<Func>("pair", {Float(32), UInt(8)}, 2).
+  // Adds an output; call it in configure(). add_output<Func>("pair", {Float(32), UInt(8)}, 2) has several
+  // values.
   template <typename T>
   GeneratorOutput<T>* add_output(const std::string& name, const std::vector<Type>& types,
                                  int dims) {
@@ -199,8 +221,9 @@ class GeneratorBase : public NamesInterface, public AbstractGenerator {
   }
 
   // ---- in generate() ----
-  // Every call of the compiled function fails unless the condition, which may use inputs only,
-  // holds; the rest is the message.
+
+  // Makes every call of the compiled function fail with the message unless the condition, over inputs only,
+  // holds; call it in generate().
   template <typename... Args>
   void add_requirement(const Expr& condition, Args&&... message) {
     std::vector<Expr> parts;
@@ -213,9 +236,9 @@ class GeneratorBase : public NamesInterface, public AbstractGenerator {
   virtual void call_configure() = 0;
   virtual void call_generate() = 0;
   virtual void call_schedule() = 0;
-  // Something by this name that is no GeneratorParam; false where there is none.
+  // Sets something that is not a GeneratorParam; returns false if there is nothing of this name.
   virtual bool set_declared_part(const std::string& key, const StringOrLoopLevel& value);
-  // In configure(). The generator owns it from now on.
+  // Takes ownership of an input or output that configure() adds.
   void add_port(GeneratorInputBase* input) {
     adopt(input);
     members_.inputs.push_back(input);
@@ -224,18 +247,18 @@ class GeneratorBase : public NamesInterface, public AbstractGenerator {
     adopt(output);
     members_.outputs.push_back(output);
   }
-  // In generate(), instead of the one that its outputs would make.
+  // Sets the pipeline, in generate(), instead of the one of the outputs.
   void use_pipeline(Pipeline pipeline);
 
  private:
-  // First: params, inputs and outputs below and in derived classes register there.
+  // Declared first, since params, inputs and outputs below and in derived classes register here.
   GeneratorMembers members_;
 
  protected:
   GeneratorParam<Target> target{"target", Target()};
   AutoScheduleParam auto_schedule;
   GeneratorParam<MachineParams> machine_params{"machine_params", MachineParams::generic()};
-  // As text: autoschedule_options=without=strips+slices,threads=4.
+  // Options of the built-in autoscheduler as text: autoschedule_options=without=strips+slices,threads=4.
   GeneratorParam<AutoscheduleOptions> autoschedule_options{"autoschedule_options",
                                                            AutoscheduleOptions()};
 
@@ -248,7 +271,7 @@ class GeneratorBase : public NamesInterface, public AbstractGenerator {
 
   void configure_once();
   void check_names() const;
-  void check_input_count(size_t given);
+  void check_input_count(size_t count);
   void check_configuring(const char* role, const std::string& name) const;
   void adopt(GeneratorPort* extra) {
     extras_.emplace_back(extra);
@@ -288,8 +311,7 @@ class GeneratorBase : public NamesInterface, public AbstractGenerator {
 
 // ---- values from C++ ----
 
-// A C++ number for an input of type `type` (undefined: not said yet). CompileError when it does not
-// fit.
+// Converts a C++ number to the type of an input, if that is known. Throws CompileError if it does not fit.
 Expr constant_for_input(const Expr& value, const GeneratorPort& input);
 
 template <typename A>

@@ -1,5 +1,5 @@
-// generator_context.h -- what a generator is made for: target, scheduler, machine. And the names
-// that generators use without qualification.
+// generator_context.h -- the environment of a generator (target, autoscheduler, machine), and the names that generators
+// use without qualification.
 #pragma once
 
 #include <memory>
@@ -16,25 +16,31 @@ namespace retrograde {
 template <typename T>
 class GeneratorParam;
 
+// The environment that a generator is created for: target, autoscheduler and machine.
 class GeneratorContext {
  public:
-  GeneratorContext() = default;
+  GeneratorContext() = default;  // the default target, no autoscheduler
   explicit GeneratorContext(const Target& target, bool auto_schedule = false,
                             const MachineParams& machine = MachineParams::generic())
       : target_(target), auto_schedule_(auto_schedule), machine_(machine) {}
-  // With a scheduler, which is told this; none where its name is empty.
+  // A context with an autoscheduler and its parameters; an empty name means none.
   GeneratorContext(const Target& target, const AutoschedulerParams& params)
       : target_(target), autoscheduler_(params) {}
-  const Target& get_target() const { return target_; }
+  const Target& get_target() const { return target_; }  // the target
+  // Whether the default autoscheduler runs.
   bool get_auto_schedule() const { return auto_schedule_; }
+  // The machine for the autoscheduler.
   const MachineParams& get_machine_params() const { return machine_; }
+  // The autoscheduler by name, if one was selected.
   const AutoschedulerParams& autoscheduler_params() const { return autoscheduler_; }
 
-  // auto blur = context.create<Blur>(); blur->radius.set(3); blur->apply(image); use blur->out
+  // Creates a generator for this context: auto blur = context.create<Blur>(); blur->radius.set(3);
+  // blur->apply(image); then use blur->out.
   template <typename T>
   std::unique_ptr<T> create() const {
     return T::create(*this);
   }
+  // Creates a generator and applies it to inputs.
   template <typename T, typename... Args>
   std::unique_ptr<T> apply(const Args&... args) const {
     std::unique_ptr<T> generator = create<T>();
@@ -49,7 +55,7 @@ class GeneratorContext {
   AutoschedulerParams autoscheduler_;
 };
 
-// What generators call by its plain name, without a using directive.
+// Names that generators may use without qualification or a using directive.
 class NamesInterface {
  protected:
   using EvictionKey = retrograde::EvictionKey;

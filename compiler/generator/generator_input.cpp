@@ -1,4 +1,4 @@
-// Inputs: parameters of a compiled function, or values from C++.
+// generator_input.cpp -- the values of inputs: parameters of a compiled function, or values from C++.
 #include "generator/generator_input.h"
 
 #include "generator/generator_base.h"
@@ -35,8 +35,9 @@ int InputValue::dims() const {
   return kind == IOKind::Function ? func.dimensions() : 0;
 }
 
-GeneratorInputBase::GeneratorInputBase(Declared declared, IOKind kind, Declared said, bool is_array)
-    : GeneratorPort(std::move(declared), kind, std::move(said), is_array, false) {
+GeneratorInputBase::GeneratorInputBase(Declared declared, IOKind kind, Declared fixed,
+                                       bool is_array)
+    : GeneratorPort(std::move(declared), kind, std::move(fixed), is_array, false) {
   if (GeneratorMembers* members = GeneratorMembers::around(this)) members->inputs.push_back(this);
 }
 
@@ -72,7 +73,7 @@ void GeneratorInputBase::set_values(std::vector<InputValue> values) {
   for (const InputValue& value : values) {
     if (value.kind != kind()) {
       const char* names[] = {"a scalar", "a Func", "an image"};
-      refuse("set", "the value is what the input declares",
+      refuse("set", "the value matches the declaration of the input",
              std::string("it declares ") + names[static_cast<int>(kind())] + " and was given " +
                  names[static_cast<int>(value.kind)],
              "Give a value of that kind");
@@ -94,7 +95,7 @@ void GeneratorInputBase::set_estimate_of(const Var& var, const Expr& min,
     if (d == names.size()) {
       const std::string list = listed(names, [](const Var& name) { return quoted(name.name()); });
       refuse("set an estimate of " + quoted(var.name()) + " of",
-             "a dimension goes by the name of the input's argument", "these are " + list,
+             "a dimension has the name of one of the input's arguments", "these are " + list,
              "Use one of them, or dim(i).set_estimate()");
     }
     image.dim(static_cast<int>(d)).set_estimate(min, extent);

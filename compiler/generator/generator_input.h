@@ -1,10 +1,10 @@
-// generator_input.h -- Input<T>: an argument of the function that a generator makes.
+// generator_input.h -- Input<T>, an argument of the function that a generator compiles.
 //
 //   Input<Buffer<float, 2>> in{"in"};       an image, used like an ImageParam
-//   Input<Func> f{"f", Float(32), 2};       ahead of time an image; from C++ any Func
+//   Input<Func> f{"f", Float(32), 2};       an image ahead of time; any Func from C++
 //   Input<float> gain{"gain", 1.0f, 0, 10}; a scalar with default and limits
 //   Input<Expr> e{"e"};                     a scalar whose type configure() sets
-//   Input<Buffer<float>[]> many{"many", 2}; an array of them, sized by many.size=3
+//   Input<Buffer<float>[]> many{"many", 2}; an array of images, sized by many.size=3
 #pragma once
 
 #include <memory>
@@ -18,12 +18,12 @@
 namespace retrograde {
 namespace internal {
 
-// One element of an input: a parameter of the compiled function, or a value given from C++.
+// One element of an input: a parameter of the compiled function, or a value from C++.
 struct InputValue {
   IOKind kind = IOKind::Scalar;
-  std::shared_ptr<graph::ParameterContents> parameter;  // null for a Func or Expr given from C++
-  Func func;                                            // of a Function
-  Expr expr;                                            // of a Scalar
+  std::shared_ptr<graph::ParameterContents> parameter;  // null for a Func or Expr from C++
+  Func func;                                            // if it is a Func
+  Expr expr;                                            // if it is a scalar
 
   static InputValue of_func(const Func& f);
   static InputValue of_expr(const Expr& e);
@@ -32,26 +32,27 @@ struct InputValue {
   int dims() const;
 };
 
+// The part of Input<T> that does not depend on T.
 class GeneratorInputBase : public GeneratorPort {
  public:
   ~GeneratorInputBase() override = default;
-  const std::vector<InputValue>& values() const { return values_; }
-  // Makes parameters of the compiled function. CompileError when types, dimensions or array size
-  // are still open.
+  const std::vector<InputValue>& values() const { return values_; }  // one for each array element
+  // Creates parameters of the compiled function. Throws CompileError if types, dimensions or array size are
+  // still unknown.
   virtual void make_parameters();
-  // Values from C++.
-  // Requires: the value is what the input declares.
+  // Binds values from C++.
+  // Requires: the value matches the declaration of the input.
   void set_values(std::vector<InputValue> values);
   // A parameter as a value of this input.
   InputValue value_of(const std::shared_ptr<graph::ParameterContents>& parameter) const;
 
  protected:
-  GeneratorInputBase(Declared declared, IOKind kind, Declared said, bool is_array);
+  GeneratorInputBase(Declared declared, IOKind kind, Declared fixed, bool is_array);
   virtual void values_changed() = 0;
-  // Default, limits and estimate of a scalar's parameter.
+  // Sets default, limits and estimate of a scalar's parameter.
   virtual void describe(graph::ParameterContents&) const {}
   void check_ready() const;  // CompileError before generate()
-  // Of the dimension that the Func of an image or Func has under this name.
+  // Sets the estimate of the dimension that the Func of the image or Func calls `var`.
   void set_estimate_of(const Var& var, const Expr& min, const Expr& extent) const;
 
  private:
@@ -91,7 +92,7 @@ class InputElements : public GeneratorInputBase {
   std::vector<Handle> handles_;
 };
 
-// Scalars may have a default value and limits.
+// Adds default value and limits for scalars.
 template <typename T>
 class ScalarElements : public InputElements<T> {
  protected:
@@ -122,7 +123,7 @@ class ScalarElements : public InputElements<T> {
 
 }  // namespace internal
 
-// One image or Func: it is its handle.
+// A single image or Func, which derives from ImageParam or Func.
 template <typename T>
 class GeneratorInput : public internal::InputElements<T>,
                        public internal::ElementTraits<T>::Handle {
@@ -131,23 +132,26 @@ class GeneratorInput : public internal::InputElements<T>,
   using Handle = typename internal::ElementTraits<T>::Handle;
 
  public:
+  // Declares an input: a name, then types and dimensions that T leaves open.
   template <typename... Args>
   requires std::is_constructible_v<internal::Declared, Args...>
   explicit GeneratorInput(Args&&... args) : Base(internal::Declared(std::forward<Args>(args)...)) {}
-  using Base::name;
-  using Base::type;
-  using Base::types;
-  int dimensions() const { return Base::dims(); }
-  Handle& handle() { return *this; }
+  using Base::name;                                // declared name
+  using Base::type;                                // type of the elements
+  using Base::types;                               // types of a Tuple
+  int dimensions() const { return Base::dims(); }  // number of dimensions
+  Handle& handle() { return *this; }               // the input as an ImageParam or Func
 
-  // Guesses of its size, for schedulers. `var` is one of _0, _1, ..., or an argument of the Func.
-  // Requires: inputs have values in generate() and schedule(); a dimension goes by the name of the
-  // input's argument.
+  // States a likely range of a dimension, for schedulers. `var` is one of _0, _1, ... or an argument of the
+  // Func.
+  // Requires: inputs have values in generate() and schedule(); a dimension has the name of one of the input's
+  // arguments.
   GeneratorInput& set_estimate(const Var& var, const Expr& min, const Expr& extent) {
     Base::check_ready();
     GeneratorInputBase::set_estimate_of(var, min, extent);
     return *this;
   }
+  // States likely ranges of all dimensions, for schedulers.
   GeneratorInput& set_estimates(const Region& estimates) {
     Base::check_ready();
     if (const auto& image = Base::values().at(0).parameter) {
@@ -155,7 +159,7 @@ class GeneratorInput : public internal::InputElements<T>,
     }
     return *this;
   }
-  // What a C function is given of it: the buffer itself, where there is one.
+  // Passes the input to an extern stage, as its buffer if it has one.
   operator ExternFuncArgument() const requires std::is_same_v<Handle, Func> {
     Base::check_ready();
     const auto& image = Base::values().at(0).parameter;
@@ -170,7 +174,7 @@ class GeneratorInput : public internal::InputElements<T>,
   }
 };
 
-// One scalar.
+// A single scalar, which converts to Expr.
 template <typename T>
 requires(internal::IsScalarIO<T> && !internal::IsArrayIO<T>) class GeneratorInput<T>
     : public internal::ScalarElements<T> {
@@ -181,17 +185,19 @@ requires(internal::IsScalarIO<T> && !internal::IsArrayIO<T>) class GeneratorInpu
  public:
   explicit GeneratorInput(const std::string& name) : Base(Declared(name)) {}
   GeneratorInput(const std::string& name, const Value& value) : Base(Declared(name), value) {}
-  // An Expr of this type.
+  // An Input<Expr> of this type.
   GeneratorInput(const std::string& name, const Type& type) requires std::is_same_v<T, Expr>
       : Base(Declared(name, type)) {}
   GeneratorInput(const std::string& name, const Value& value, const Value& min, const Value& max)
       : Base(Declared(name), value, min, max) {}
-  operator Expr() const { return Base::handles()[0]; }
+  operator Expr() const { return Base::handles()[0]; }  // the value
+  // Passes the value to an extern stage.
   operator ExternFuncArgument() const { return ExternFuncArgument(Base::handles()[0]); }
+  // States a likely value, for schedulers.
   void set_estimate(const Expr& value) { Base::set_estimate_of(0, value); }
 };
 
-// An array.
+// An array of inputs.
 template <typename T>
 requires internal::IsArrayIO<T>
 class GeneratorInput<T>
@@ -225,8 +231,9 @@ class GeneratorInput<T>
                                     const V& min, const V& max)
       : Base(Declared(size, name), value, min, max) {}
 
+  // Number of elements.
   size_t size() const { return Base::handles().size(); }
-  // A handle of the element: what is said of it is said of the input.
+  // A handle of element i; directives and promises on it apply to the input.
   auto operator[](size_t i) const {
     const auto& handles = Base::handles();
     this->check_index(i);

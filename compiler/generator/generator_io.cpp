@@ -1,4 +1,4 @@
-// Declarations of inputs and outputs: completed from several places, in agreement.
+// generator_io.cpp -- completes the declarations of inputs and outputs, and checks that all sources agree.
 #include "generator/generator_io.h"
 
 #include "generator/generator_base.h"
@@ -14,14 +14,14 @@ std::string list_of(const std::vector<Type>& types) {
 
 }  // namespace
 
-GeneratorPort::GeneratorPort(Declared declared, IOKind kind, Declared said, bool is_array,
+GeneratorPort::GeneratorPort(Declared declared, IOKind kind, Declared fixed, bool is_array,
                              bool is_output)
     : name_(std::move(declared.name)),
       kind_(kind),
-      types_(std::move(said.types)),
-      dims_(said.dims),
+      types_(std::move(fixed.types)),
+      dims_(fixed.dims),
       is_array_(is_array),
-      array_size_(said.size),
+      array_size_(fixed.size),
       is_output_(is_output) {
   if (const GeneratorMembers* members = GeneratorMembers::around(this))
     generator_ = members->owner();
@@ -48,8 +48,7 @@ void GeneratorPort::refuse(const std::string& asked, const std::string& rule,
 const std::vector<Type>& GeneratorPort::types() const {
   if (!types_defined()) {
     refuse("take the type of", "it is known once it is declared, set or given",
-           "nothing has said it yet",
-           "Call set_type() in configure(), or give " + name_ + ".type=");
+           "it is still unknown", "Call set_type() in configure(), or give " + name_ + ".type=");
   }
   return types_;
 }
@@ -73,7 +72,7 @@ int GeneratorPort::dims() const {
 size_t GeneratorPort::array_size() const {
   if (!array_size_defined()) {
     refuse("take the array size of", "it is known once it is declared, set or given",
-           "nothing has said it yet",
+           "it is still unknown",
            "Call set_array_size() in configure(), resize() an output, or give " + name_ + ".size=");
   }
   return static_cast<size_t>(array_size_);
@@ -112,13 +111,14 @@ void GeneratorPort::agree_on(const std::vector<Type>& types, int dims) {
 }
 
 void GeneratorPort::agree_on_size(size_t size) {
-  const int wanted = static_cast<int>(size);
-  if (wanted < 0 || (array_size_defined() && wanted != array_size_)) {
-    refuse(text("use ", wanted, " as the array size of"), "its size is said once, and not negative",
+  const int requested = static_cast<int>(size);
+  if (requested < 0 || (array_size_defined() && requested != array_size_)) {
+    refuse(text("use ", requested, " as the array size of"),
+           "its size is set once, and not negative",
            array_size_defined() ? text("it is ", array_size_) : "it is open",
            "Give that many elements");
   }
-  array_size_ = wanted;
+  array_size_ = requested;
 }
 
 void GeneratorPort::check_not_generated(const char* asked) const {

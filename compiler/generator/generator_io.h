@@ -1,6 +1,6 @@
-// What inputs and outputs of a generator have in common: name, types, dimensions, array size, each
-// of which may stay open until configure(), a generator param (in.type=float32, in.dim=3,
-// in.size=2) or the value itself says it.
+// generator_io.h -- the common base of a generator's inputs and outputs: name, types, dimensions and array size. The
+// declaration may leave types, dimensions and array size open. Then configure(), a generator parameter
+// (in.type=float32, in.dim=3, in.size=2) or the value itself determines them.
 #pragma once
 
 #include <string>
@@ -13,12 +13,13 @@
 namespace retrograde {
 namespace internal {
 
+// Kinds of inputs and outputs.
 enum class IOKind { Scalar, Function, Buffer };
 
-constexpr int any_size = -1;  // of an array, or the dimensions of a Func: not said yet
+// An array size or a number of dimensions that is not yet known.
+constexpr int any_size = -1;
 
-// The arguments of a declaration: a name, then types, dimensions or both; in front of it the size
-// of an array.
+// The arguments of a declaration: an optional array size, a name, then types, dimensions or both.
 struct Declared {
   explicit Declared(std::string name) : name(std::move(name)) {}
   Declared(std::string name, const Type& type) : Declared(std::move(name), std::vector{type}) {}
@@ -41,52 +42,59 @@ struct Declared {
   int size = any_size;
 };
 
+// The common base of inputs and outputs.
 class GeneratorPort {
  public:
   virtual ~GeneratorPort() = default;
   GeneratorPort(const GeneratorPort&) = delete;
   GeneratorPort& operator=(const GeneratorPort&) = delete;
 
-  const std::string& name() const { return name_; }
-  IOKind kind() const { return kind_; }
-  bool is_array() const { return is_array_; }
+  const std::string& name() const { return name_; }  // declared name
+  IOKind kind() const { return kind_; }              // scalar, Func or buffer
+  bool is_array() const { return is_array_; }        // whether it is an array
 
-  // What is open until configure() or the caller has said it.
+  // Whether the types are known: from the declaration, configure(), the caller, or the value.
   // Requires: it is known once it is declared, set or given; they are known once they are declared,
   // set or given; it has one value.
   bool types_defined() const { return !types_.empty(); }
+  // Types of the values; several for a Tuple.
   const std::vector<Type>& types() const;
-  Type type() const;
+  Type type() const;  // type of the only value
+  // Whether the number of dimensions is known.
   bool dims_defined() const { return dims_ != any_size; }
-  int dims() const;
+  int dims() const;  // number of dimensions
+  // Whether the array size is known.
   bool array_size_defined() const { return array_size_ != any_size; }
-  size_t array_size() const;
+  size_t array_size() const;  // number of elements; 1 if it is not an array
 
-  // In configure() only, for what the declaration leaves open.
+  // Sets the type that the declaration leaves open; call it in configure().
   // Requires: configure() is the place for that; its type is declared once; its dimensions are
-  // declared once; its size is said once, and not negative.
+  // declared once; its size is set once, and not negative.
   void set_type(const Type& type) { set_types({type}); }
   void set_type(const std::vector<Type>& types) { set_types(types); }  // of a Tuple
+  // Sets the types of a Tuple that the declaration leaves open; call it in configure().
   void set_types(const std::vector<Type>& types);
+  // Sets the number of dimensions that the declaration leaves open; call it in configure().
   void set_dimensions(int dims);
+  // Sets the array size that the declaration leaves open; call it in configure().
   void set_array_size(int size);
 
-  // CompileError when the constructor's arguments contradict the C++ type. Not thrown by the
-  // constructor: generators are also made where nobody catches, to be asked for their names.
+  // Throws CompileError if the constructor's arguments contradict the C++ type. The constructor does not
+  // throw, because generators are also created only to list their names.
   void check_declaration() const;
-  std::string role_name() const { return is_output_ ? "output" : "input"; }
-  // The name of an element: "pyramid_2".
+  std::string role_name() const { return is_output_ ? "output" : "input"; }  // "input" or "output"
+  // The name of an array element: "pyramid_2".
   std::string element_name(size_t i) const;
-  GeneratorBase* generator() const { return generator_; }
+  GeneratorBase* generator() const { return generator_; }  // the generator that it is a member of
 
  protected:
-  // `declared` holds what its constructor was given, `said` what its C++ type says. CompileError
-  // when they contradict each other.
-  GeneratorPort(Declared declared, IOKind kind, Declared said, bool is_array, bool is_output);
+  // `declared` holds the constructor's arguments, `fixed` the properties that the C++ type fixes. Throws
+  // CompileError if they contradict each other.
+  GeneratorPort(Declared declared, IOKind kind, Declared fixed, bool is_array, bool is_output);
 
   [[noreturn]] void refuse(const std::string& asked, const std::string& rule,
                            const std::string& evidence, const std::string& instead) const;
-  // CompileError unless they agree with the declaration; what was open is known from now on.
+  // Sets open properties; throws CompileError if known ones differ.
   void agree_on(const std::vector<Type>& types, int dims);
   void agree_on_size(size_t size);
   void check_not_generated(const char* asked) const;
@@ -107,7 +115,7 @@ class GeneratorPort {
   Message contradiction_;
 };
 
-// What the T of Input<T> and Output<T> says about it. T[] and T[n] are arrays.
+// Properties of the T in Input<T> and Output<T>: T[] and T[n] are arrays.
 template <typename T>
 struct ArrayTraits {
   using Element = T;
@@ -129,7 +137,8 @@ struct ArrayTraits<T[N]> {
 template <typename T>
 using ElementOf = typename ArrayTraits<T>::Element;
 
-// Scalars: arithmetic types and pointers. Handle is what a user holds of one element.
+// Properties of one element; the general case covers arithmetic types and pointers. Handle is the type
+// through which a generator uses the element.
 template <typename E>
 struct ElementTraits {
   using Handle = Expr;

@@ -1,4 +1,4 @@
-// main() of the programs that build files call: linked behind the generators of a user.
+// generator_main.cpp -- main() of the programs that build files call; linked with the generators of a user.
 #include <unistd.h>
 
 #include <iostream>
@@ -7,7 +7,7 @@
 
 namespace {
 
-// A build must not hang: SIGALRM ends the program.
+// Ends the program by SIGALRM after the time limit, so that a build cannot hang.
 void limit_time(int argc, char** argv) {
   try {
     alarm(

@@ -1,13 +1,13 @@
-// Outputs: Funcs that generate() defines as they are declared.
+// generator_output.cpp -- creates the Funcs of outputs and checks that generate() defines them as declared.
 #include "generator/generator_output.h"
 
 #include "generator/generator_base.h"
 
 namespace retrograde::internal {
 
-GeneratorOutputBase::GeneratorOutputBase(Declared declared, IOKind kind, Declared said,
+GeneratorOutputBase::GeneratorOutputBase(Declared declared, IOKind kind, Declared fixed,
                                          bool is_array)
-    : GeneratorPort(std::move(declared), kind, std::move(said), is_array, true) {
+    : GeneratorPort(std::move(declared), kind, std::move(fixed), is_array, true) {
   if (GeneratorMembers* members = GeneratorMembers::around(this)) members->outputs.push_back(this);
 }
 

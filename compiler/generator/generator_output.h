@@ -1,11 +1,11 @@
-// generator_output.h -- Output<T>: what generate() defines.
+// generator_output.h -- Output<T>, a Func that generate() defines and the compiled function computes.
 //
 //   Output<Buffer<float, 2>> out{"out"};     out(x, y) = ...; or out = some_func;
 //   Output<Func> out{"out", {Float(32), UInt(8)}, 2};   a Tuple
 //   Output<float> sum{"sum"};                sum() = ...
 //   Output<Func[]> levels{"levels", Float(32), 2};      levels.resize(n); levels[0](x, y) = ...
 //
-// An output is a Func: defined, updated and scheduled like any other.
+// An output is defined, updated and scheduled like any Func.
 #pragma once
 
 #include <string>
@@ -18,21 +18,23 @@
 namespace retrograde {
 namespace internal {
 
+// The part of Output<T> that does not depend on T.
 class GeneratorOutputBase : public GeneratorPort {
  public:
   ~GeneratorOutputBase() override = default;
+  // The Funcs, one for each array element.
   virtual std::vector<Func> funcs() const = 0;
-  // Makes Funcs without definitions, for generate() to define.
+  // Creates undefined Funcs for generate() to define.
   virtual void make_funcs() = 0;
-  // Every Func has the declared types and dimensions.
+  // Checks that generate() defined every Func with the declared types and dimensions.
   // Requires: generate() defines every output.
   void check_defined();
 
  protected:
-  GeneratorOutputBase(Declared declared, IOKind kind, Declared said, bool is_array);
+  GeneratorOutputBase(Declared declared, IOKind kind, Declared fixed, bool is_array);
   Func make_func(size_t i) const;
-  // The Func of element i is to be as declared. The handle stays the same: who took it before
-  // generate() has run has the output.
+  // Declares types and dimensions of the Func of element i. The handle stays the same, so a copy that was
+  // taken before generate() refers to the output.
   void declare(const Func& f, size_t i) const;
   void check_assignable(const Func& f) const;
 };
@@ -55,26 +57,29 @@ class OutputElements : public GeneratorOutputBase {
 
 }  // namespace internal
 
-// One output: it is a Func.
+// A single output, which is a Func.
 template <typename T>
 class GeneratorOutput : public internal::OutputElements<T>, public Func {
   using Base = internal::OutputElements<T>;
   static constexpr bool is_image = internal::ElementTraits<T>::kind == internal::IOKind::Buffer;
 
  public:
-  using Base::name;
-  using Base::OutputElements;
-  // Those of its definition, where the declaration leaves them open.
+  using Base::name;  // declared name
+  using Base::
+      OutputElements;  // declares an output: a name, then types and dimensions that T leaves open
+  // Declared types, or those of the definition if the declaration leaves them open.
   std::vector<Type> types() const {
     return asks_func(Base::types_defined()) ? Func::types() : Base::types();
   }
+  // Declared type, or that of the definition if the declaration leaves it open.
   Type type() const { return asks_func(Base::types_defined()) ? Func::type() : Base::type(); }
+  // Declared number of dimensions, or that of the definition if the declaration leaves it open.
   int dimensions() const {
     return asks_func(Base::dims_defined()) ? Func::dimensions() : Base::dims();
   }
-  Func& handle() { return *this; }
+  Func& handle() { return *this; }  // the output as a Func
 
-  // This Func becomes the output.
+  // Makes an existing Func the output.
   // Requires: the Func has a definition.
   GeneratorOutput& operator=(const Func& f) {
     Base::check_assignable(f);
@@ -90,18 +95,28 @@ class GeneratorOutput : public internal::OutputElements<T>, public Func {
     return *this = static_cast<const Func&>(other);
   }
 
-  // Promises about the buffer it is written to, and its shape as Exprs.
+  // Bounds and promises of one dimension of the output buffer.
   Dimension dim(int d) const requires is_image { return output_buffer().dim(d); }
+  // The output buffer, for promises about it.
   operator OutputImageParam() const requires is_image { return output_buffer(); }
+  // Extent of dimension 0 of the output buffer.
   Expr width() const requires is_image { return output_buffer().width(); }
+  // Extent of dimension 1 of the output buffer.
   Expr height() const requires is_image { return output_buffer().height(); }
+  // Extent of dimension 2 of the output buffer.
   Expr channels() const requires is_image { return output_buffer().channels(); }
+  // First coordinate of dimension 0 of the output buffer.
   Expr left() const requires is_image { return output_buffer().left(); }
+  // Last coordinate of dimension 0 of the output buffer.
   Expr right() const requires is_image { return output_buffer().right(); }
+  // First coordinate of dimension 1 of the output buffer.
   Expr top() const requires is_image { return output_buffer().top(); }
+  // Last coordinate of dimension 1 of the output buffer.
   Expr bottom() const requires is_image { return output_buffer().bottom(); }
 
+  // The output as a list of one Func.
   std::vector<Func> funcs() const override { return {*this}; }
+  // Creates the undefined Func for generate() to define.
   void make_funcs() override {
     if (!Func::defined()) Base::declare(*this, 0);
   }
@@ -119,12 +134,13 @@ class GeneratorOutput<T> : public internal::OutputElements<T> {
  public:
   using Base::OutputElements;
 
-  size_t size() const { return Base::array_size(); }
-  // Of an array declared without a size, in generate().
+  size_t size() const { return Base::array_size(); }  // number of elements
+  // Sets the size of an array that was declared without one; call it in generate().
   void resize(size_t size) {
     Base::agree_on_size(size);
     make_funcs();
   }
+  // Element i.
   // Requires: elements are counted from 0 to below the array's size.
   Func& operator[](size_t i) {
     Base::check_index(i);
@@ -140,11 +156,12 @@ class GeneratorOutput<T> : public internal::OutputElements<T> {
   auto end() { return funcs_.end(); }
   auto begin() const { return funcs_.begin(); }
   auto end() const { return funcs_.end(); }
-  // Of every element.
+  // States a likely range of a dimension of every element, for schedulers.
   GeneratorOutput& set_estimate(const Var& var, const Expr& min, const Expr& extent) {
     for (Func& f : funcs_) f.set_estimate(var, min, extent);
     return *this;
   }
+  // States likely ranges of all dimensions of every element, for schedulers.
   GeneratorOutput& set_estimates(const Region& estimates) {
     for (Func& f : funcs_) f.set_estimates(estimates);
     return *this;
@@ -152,7 +169,7 @@ class GeneratorOutput<T> : public internal::OutputElements<T> {
 
   std::vector<Func> funcs() const override { return funcs_; }
   void make_funcs() override {
-    if (!Base::array_size_defined()) return;  // resize() says it
+    if (!Base::array_size_defined()) return;  // resize() will set it
     funcs_.clear();
     for (size_t i = 0; i < size(); i++) funcs_.push_back(Base::make_func(i));
   }

@@ -1,4 +1,4 @@
-// Values of generator params as text.
+// generator_param.cpp -- converts values of generator parameters from and to text.
 #include "generator/generator_param.h"
 
 #include <array>

@@ -1,12 +1,11 @@
-// generator_param.h -- GeneratorParam<T>: a value that shapes the code a generator makes.
+// generator_param.h -- GeneratorParam<T>, a compile-time parameter of a generator.
 //
-// GeneratorParam<int> levels{"levels", 4, 1, 8};   // a build file says levels=6
+// GeneratorParam<int> levels{"levels", 4, 1, 8};   // a build file passes levels=6
 // GeneratorParam<Edge> edge{"edge", Edge::Clamp, {{"clamp", Edge::Clamp}, {"mirror",
 // Edge::Mirror}}};
 //
-// T is bool, an arithmetic or enumeration type, std::string, Type, Target, LoopLevel or
-// MachineParams. A value that does not parse to its last character, or that is out of range, is a
-// CompileError that lists what is allowed.
+// T is bool, an arithmetic or enumeration type, std::string, Type, Target, LoopLevel or MachineParams. A text that is
+// not a value of T to its last character, or a value out of range, throws CompileError with the allowed values.
 #pragma once
 
 #include <charconv>
@@ -23,30 +22,34 @@
 namespace retrograde {
 namespace internal {
 
+// The part of GeneratorParam<T> that does not depend on T.
 class GeneratorParamBase {
  public:
+  // A parameter of this name; it registers with the generator around it.
   explicit GeneratorParamBase(const std::string& name);
   virtual ~GeneratorParamBase() = default;
   GeneratorParamBase(const GeneratorParamBase&) = delete;
   GeneratorParamBase& operator=(const GeneratorParamBase&) = delete;
 
-  const std::string& name() const { return name_; }
+  const std::string& name() const { return name_; }  // name of the parameter
+  // Sets the value from text.
   virtual void set_from_string(const std::string& text) = 0;
+  // Sets the value of a LoopLevel parameter.
   // Requires: a param takes values of its type.
   virtual void set_from_loop_level(const LoopLevel& level);
-  // What set_from_string reads back.
+  // The value as text that set_from_string() accepts.
   virtual std::string to_string() const = 0;
-  // How a stub declares it; see cpp_stub.h.
+  // The declaration of the parameter in a stub; see cpp_stub.h.
   struct InCpp {
     std::string type, value;           // "int", "3"
-    std::vector<std::string> choices;  // of an enumeration; its type has no name
-    const char* to_text = "";          // the function that makes a text of a value; "": it is one
+    std::vector<std::string> choices;  // enumerators of an enumeration, whose type has no name
+    const char* to_text = "";  // function that converts a value to text; "": the value is text
   };
   virtual InCpp in_cpp() const = 0;
 
  protected:
-  bool is_writable() const;  // until generate() has run
-  // CompileError once generate() has run: the value would come too late.
+  bool is_writable() const;  // whether generate() has not run
+  // Throws CompileError once generate() has run, since it has read the value.
   void check_writable() const;
   [[noreturn]] void refuse(const std::string& value, const std::string& rule,
                            const std::string& evidence, const std::string& instead) const;
@@ -55,7 +58,7 @@ class GeneratorParamBase {
   std::string name_;
 };
 
-// ---- values as text; nullopt when the text is not one ----
+// ---- values as text; nullopt if the text is not a value ----
 
 template <typename T>
 std::optional<T> read_number(const std::string& text) {
@@ -80,14 +83,14 @@ std::string number_text(T value) {
   return std::string(text, std::to_chars(text, text + sizeof text, value).ptr);
 }
 
-// A value as set_from_string reads it.
+// A value as text that set_from_string() accepts.
 inline std::string param_text(bool value) { return value ? "true" : "false"; }
 template <typename T>
 std::string param_text(T value) {
   return number_text(value);
 }
 
-// Whether `from` keeps its value as a To: floats may round, whole numbers may not.
+// Whether a conversion to To keeps the value; floats may round, integers may not.
 template <typename To, typename From>
 bool keeps_value(From from) {
   if constexpr (std::is_floating_point_v<From> && std::is_floating_point_v<To>) {
@@ -104,15 +107,17 @@ bool keeps_value(From from) {
 
 }  // namespace internal
 
+// A compile-time parameter of a generator with a default value.
 template <typename T>
 class GeneratorParam : public internal::GeneratorParamBase {
   static constexpr bool is_number = std::is_arithmetic_v<T> && !std::is_same_v<T, bool>;
   static constexpr bool is_text = std::is_same_v<T, std::string>;
 
  public:
+  // A parameter with a default.
   GeneratorParam(const std::string& name, const T& value)
       : GeneratorParamBase(name), value_(value) {}
-  // Values from min to max.
+  // A number in [min, max].
   GeneratorParam(const std::string& name, const T& value, const T& min,
                  const T& max) requires is_number : GeneratorParamBase(name),
                                                     min_(min),
@@ -120,22 +125,25 @@ class GeneratorParam : public internal::GeneratorParamBase {
     assign(value);
   }
   GeneratorParam(const std::string& name, const T& value,
+                 // An enumeration with the names of its values.
                  const std::map<std::string, T>& choices) requires std::is_enum_v<T>
       : GeneratorParamBase(name), value_(value), choices_(choices) {
     to_string();  // the default is one of the choices
   }
 
-  T value() const { return value_; }
-  operator T() const { return value_; }
+  T value() const { return value_; }     // the value
+  operator T() const { return value_; }  // the value
+  // The value as a constant Expr.
   operator Expr() const requires std::is_arithmetic_v<T> { return Expr(value_); }
 
-  // Where it is a LoopLevel: after generate() too, which has given it to schedules. They follow it.
+  // Sets a LoopLevel. After generate() too: schedules that use the level then follow it.
   void set(const LoopLevel& level) requires std::is_same_v<T, LoopLevel> {
     if (is_writable())
       value_ = level;
     else
       value_.set(level);
   }
+  // Sets the value; must precede generate().
   template <typename V>
   void set(const V& value) {
     if constexpr (!std::is_same_v<T, LoopLevel>) check_writable();
@@ -148,13 +156,16 @@ class GeneratorParam : public internal::GeneratorParamBase {
       value_ = value;
     }
   }
+  // Sets the value from text.
   void set_from_string(const std::string& text) override;
+  // Sets the value of a LoopLevel parameter.
   void set_from_loop_level(const LoopLevel& level) override {
     if constexpr (std::is_same_v<T, LoopLevel>)
       set(level);
     else
       GeneratorParamBase::set_from_loop_level(level);
   }
+  // The value as text that set_from_string() accepts.
   std::string to_string() const override;
   InCpp in_cpp() const override;
 
@@ -203,10 +214,11 @@ void GeneratorParam<T>::set_from_string(const std::string& text) {
     static_assert(is_number, "a GeneratorParam cannot be of this type");
     value = internal::read_number<T>(text);
   }
-  if (!value) refuse_value(text, "this is none of them");
+  if (!value) refuse_value(text, "this is not one of them");
   assign(*value);
 }
 
+// The value as text that set_from_string() accepts.
 template <typename T>
 std::string GeneratorParam<T>::to_string() const {
   if constexpr (is_text) {
@@ -244,7 +256,7 @@ internal::GeneratorParamBase::InCpp GeneratorParam<T>::in_cpp() const {
             {},
             "::retrograde::internal::param_text"};
   } else {
-    return {};  // of every generator: target and machine, which the context says
+    return {};  // parameters of every generator, such as target, whose values the context provides
   }
 }
 
@@ -269,7 +281,7 @@ std::string GeneratorParam<T>::allowed() const {
   }
 }
 
-// ---- a param in arithmetic stands for its value: levels - 1, gain * in(x), a && b ----
+// ---- operators use the value of a parameter: levels - 1, gain * in(x), a && b ----
 
 #define RETROGRADE_PARAM_OPERATOR(op)                                                  \
   template <typename T, typename U>                                                    \
@@ -299,14 +311,17 @@ RETROGRADE_PARAM_OPERATOR(!=)
 RETROGRADE_PARAM_OPERATOR(&&)
 RETROGRADE_PARAM_OPERATOR(||)
 #undef RETROGRADE_PARAM_OPERATOR
+// The negated value.
 template <typename T>
 auto operator-(const GeneratorParam<T>& a) -> decltype(-a.value()) {
   return -a.value();
 }
+// Prints the value as text.
 template <typename T>
 std::ostream& operator<<(std::ostream& out, const GeneratorParam<T>& a) {
   return out << a.to_string();
 }
+// The logical negation of the value.
 template <typename T>
 auto operator!(const GeneratorParam<T>& a) -> decltype(!a.value()) {
   return !a.value();
@@ -335,8 +350,8 @@ auto operator!(const GeneratorParam<T>& a) -> decltype(!a.value()) {
   auto name(const U& a, const GeneratorParam<T>& b) {                   \
     return internal::name##_of(a, b.value());                           \
   }
-RETROGRADE_PARAM_EXTREME(min)  // of numbers std's, of Exprs ours
-RETROGRADE_PARAM_EXTREME(max)  // of numbers std's, of Exprs ours
+RETROGRADE_PARAM_EXTREME(min)  // std::min for numbers, an Expr otherwise
+RETROGRADE_PARAM_EXTREME(max)  // std::max for numbers, an Expr otherwise
 #undef RETROGRADE_PARAM_EXTREME
 
 }  // namespace retrograde

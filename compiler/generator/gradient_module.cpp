@@ -1,16 +1,16 @@
-// The module of a generator's gradient.
+// gradient_module.cpp -- builds the module that computes the gradient of a generator.
 //
-//   y = f(a, w)   =>   (a, w, L_y) -> (L_a, L_w)     L_v: the derivative of a loss L by v
+//   y = f(a, w)   =>   (a, w, L_y) -> (L_a, L_w)     L_v: the derivative of a loss L with respect to v
 //
-// L is never named: whoever trains gives L_y, its gradient at the output. For several outputs the
-// gradients are kept apart, one for each pair of output and input; the caller sums what it needs.
-// Names, order and types of the arguments are those of Halide's gradient modules: images only.
-// An image of integers gets a gradient of zeros; so does every image from an output of integers,
-// which stands still while the inputs change a little. L_y is of floats where y is of integers. An
-// image that y does not read gets zeros, too, of L_y's type; its name begins with _dummy.
+// The caller chooses the loss L and passes L_y, its gradient at the output. With several outputs there is one gradient
+// for each pair of output and input; the caller sums those that it needs. Names, order and types of the arguments are
+// those of Halide's gradient modules, which cover images only.
+// Gradients with respect to integer images are zero. So are those of integer outputs, whose values do not change under
+// small changes of the inputs; L_y is float for these. If y does not read an image, its gradient is zero, has the type
+// of L_y, and its name begins with _dummy.
 //
-// Separate gradients are another form of the same, for who asks for some of the gradients only:
-// summed over the outputs, of numbers too, and without what is known to be 0.
+// Separate gradients are an alternative for callers that need only some of the gradients. They are summed over the
+// outputs, include scalar inputs, and omit gradients that are known to be 0.
 #include <optional>
 #include <set>
 
@@ -41,7 +41,7 @@ std::vector<NamedOutput> named_outputs(const std::vector<GeneratorOutputBase*>& 
   return result;
 }
 
-// Every output has one value, and at least one of them is of floats.
+// Checks that every output has one value and that at least one output is of floats.
 void check_differentiable(const std::vector<NamedOutput>& outputs, const std::string& generator) {
   const std::string asked = "build the gradient of the generator " + quoted(generator);
   std::string types;
@@ -60,7 +60,7 @@ void check_differentiable(const std::vector<NamedOutput>& outputs, const std::st
              "Make one an output of floats");
 }
 
-// The gradient at an output, which becomes the next argument.
+// Adds the seed of an output, the gradient L_y, as the next argument.
 ImageParam add_seed(const NamedOutput& output, std::vector<Argument>& arguments,
                     std::vector<std::string>& names) {
   names.push_back("_grad_loss_for_" + output.name);
@@ -74,7 +74,7 @@ AdjointInput adjoint_input(const std::shared_ptr<graph::ParameterContents>& para
   return AdjointInput(std::shared_ptr<ir::Symbol>(parameter));
 }
 
-// Over the dimensions of an input, and of its type; 0 where there is nothing to add.
+// Sum of the parts as a Func with the dimensions and type of an input; 0 if there are no parts.
 Func sum_of(const std::vector<Func>& parts, const graph::ParameterContents& input) {
   const auto at = ir::numbered(input.dimensions, [&](int d) { return Var::implicit(d); });
   Func f(parts.empty() ? "zeros" : "gradient");
@@ -166,7 +166,7 @@ Module GeneratorBase::build_separate_gradients(const std::string& function_name)
   const std::vector<NamedParameter> inputs = differentiable_inputs();
   if (inputs.empty()) {
     user_error("build the gradients of the generator " + quoted(name_),
-               "gradients are by floating-point inputs", "it has none",
+               "gradients are with respect to floating-point inputs", "it has none",
                "Make an input one of floats");
   }
   std::vector<Module> modules{gradient_function(function, inputs)};

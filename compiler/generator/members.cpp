@@ -1,4 +1,4 @@
-// The generators that are alive, by address.
+// members.cpp -- a table of the existing generators by address.
 #include "generator/members.h"
 
 #include <functional>
@@ -13,7 +13,8 @@ struct Extent {
   size_t bytes;
   GeneratorMembers* members;
 };
-// Ends are not needed to find an address: extents nest at most, they never overlap.
+// The generators by their begin address. Objects may nest but never overlap partially, so a search for an address needs
+// no end addresses.
 struct Alive {
   std::mutex mutex;
   std::multimap<const char*, Extent, std::less<>> by_begin;
@@ -42,7 +43,7 @@ GeneratorMembers* GeneratorMembers::around(const void* object) {
   const char* address = static_cast<const char*>(object);
   std::lock_guard lock(alive().mutex);
   const auto& generators = alive().by_begin;
-  // The nearest beginning below is that of the innermost generator.
+  // The innermost generator around an address is the one that begins nearest below it.
   for (auto i = generators.upper_bound(address); i != generators.begin();) {
     --i;
     if (address < i->first + i->second.bytes) return i->second.members;

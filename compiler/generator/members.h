@@ -1,6 +1,5 @@
-// What belongs to a generator. Params, inputs and outputs are plain members of the user's class; a
-// member finds the generator that it stands in by its address, so that nothing has to be listed
-// twice.
+// members.h -- finds the parameters, inputs and outputs of a generator, which are plain members of the user's class. A
+// member finds the generator around it by its own address, so users need not list members a second time.
 #pragma once
 
 #include <cstddef>
@@ -13,6 +12,7 @@ class GeneratorParamBase;
 class GeneratorInputBase;
 class GeneratorOutputBase;
 
+// The parameters, inputs and outputs that are members of one generator.
 class GeneratorMembers {
  public:
   // Members are those within `bytes` from `owner`.
@@ -21,7 +21,7 @@ class GeneratorMembers {
   GeneratorMembers(const GeneratorMembers&) = delete;
   GeneratorMembers& operator=(const GeneratorMembers&) = delete;
 
-  // The generator that holds the object at this address; null for an object on its own.
+  // The generator that contains the object at this address, or null.
   static GeneratorMembers* around(const void* object);
 
   GeneratorBase* owner() const { return owner_; }

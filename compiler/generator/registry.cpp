@@ -1,4 +1,4 @@
-// The generators that are linked into this program.
+// registry.cpp -- the generators that are linked into this program.
 #include "generator/registry.h"
 
 #include <mutex>

@@ -1,16 +1,15 @@
-// any_stride.h -- arrays whose last axis is not dense: a[:, ::2], a.T, the channels of an image.
+// any_stride.h -- support for arrays whose last axis is not dense: a[:, ::2], a.T, the channels of an image.
 //
-// Compiled code takes for granted that dimension 0 of a buffer is dense, unless dim(0).set_stride(None) lifts that.
-// Arrays of Python come with any strides, and who passes one has said what its strides are: so passing one that is
-// not dense lifts it, where the program has not promised another stride itself. The pipeline is then compiled anew,
-// once.
+// Compiled code assumes that dimension 0 of a buffer is dense, unless dim(0).set_stride(None) removes the assumption.
+// Passing a Python array that is not dense removes it too, unless the program has promised a stride itself. The
+// pipeline is then recompiled once.
 #pragma once
 
 #include "frontend/data/buffer.h"
 
 namespace retrograde::python {
 
-// Of dimension 0.
+// Allows this stride for dimension 0 of a parameter.
 inline void allow_stride(graph::ParameterContents& parameter, int stride, int extent) {
   if (stride == 1 || extent <= 1 || parameter.constraints.empty()) return;
   graph::BufferConstraint& first = parameter.constraints[0];

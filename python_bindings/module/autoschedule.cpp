@@ -1,4 +1,4 @@
-// autoschedule.cpp -- schedules that nobody writes: auto_schedule, its options, and what a schedule costs.
+// autoschedule.cpp -- binds auto_schedule, its options and results, and Python autoschedulers.
 #include "bind_all.h"
 #include "binding.h"
 #include "callback.h"
@@ -19,9 +19,9 @@ std::optional<FuncName> func_name_from(py::handle object) {
   return {};
 }
 
-std::vector<FuncName> func_names(const py::iterable& given) {
+std::vector<FuncName> func_names(const py::iterable& objects) {
   std::vector<FuncName> names;
-  for (py::handle one : given) {
+  for (py::handle one : objects) {
     const std::optional<FuncName> name = func_name_from(one);
     if (!name) throw py::type_error("a Func, or the name of one");
     names.push_back(*name);
@@ -101,7 +101,7 @@ void bind_results(py::module_& m) {
       .def("to_string", &SearchedSchedules::to_string)
       .def("__str__", &SearchedSchedules::to_string);
   using Results = AutoSchedulerResults;
-  // What a scheduler of a user's own writes, too.
+  // Autoschedulers in Python write these results too.
   Class<Results>(m, "AutoSchedulerResults")
       .def_readwrite("scheduler_name", &Results::scheduler_name)
       .def_readwrite("target", &Results::target)
@@ -119,7 +119,7 @@ AutoSchedulerFn scheduler_of(const std::optional<py::function>& function) {
                                           const MachineParams& machine,
                                           AutoSchedulerResults* results) {
     const py::gil_scoped_acquire acquire;
-    // Of the call's own: the scheduler writes into it.
+    // The results object of this call, which the autoscheduler writes into.
     callback.call<void>(pipeline, target, machine,
                         py::cast(results, py::return_value_policy::reference));
   };
@@ -137,7 +137,7 @@ void bind_schedulers(py::module_& m) {
   def(m, "default_autoscheduler_name", &default_autoscheduler_name);
   def(m, "load_plugin", &load_plugin, arg("library"));
   m.attr("built_in_autoscheduler") = built_in_autoscheduler;
-  // Functions of Python may not outlive the interpreter.
+  // Python functions must not outlive the interpreter, so their registrations end at exit.
   py::module_::import("atexit").attr("register")(py::cpp_function([m] {
     for (const std::string& name : autoscheduler_names()) {
       if (name != built_in_autoscheduler) add_autoscheduler(name, nullptr);
@@ -145,8 +145,8 @@ void bind_schedulers(py::module_& m) {
   }));
 }
 
-// Another one of the same definitions, which has the schedule that auto_schedule() gives for the target; but where its
-// user gave directives, and the target has no kernels, it stays as they say.
+// A copy of the pipeline with the schedule of auto_schedule() for the target. If the user gave directives and the
+// target has no GPU, the copy keeps those instead.
 Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target) {
   const PipelineSpec spec = pipeline.spec();
   std::vector<Func> outputs;
@@ -158,7 +158,7 @@ Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target) {
   return copy;
 }
 
-// Numbers are as good as their text.
+// Values may be numbers, which become text.
 void bind_params(py::module_& m) {
   Class<AutoschedulerParams>(m, "AutoschedulerParams")
       .def(py::init([](const std::string& name, const py::dict& extra) {

@@ -1,4 +1,5 @@
-// bind_all.h -- the parts of the module, in the order in which their classes are known to each other's signatures.
+// bind_all.h -- the functions that bind the parts of the module. They are called in this order, so that a class is
+// bound before signatures mention it.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -36,7 +37,7 @@ void bind_handlers(pybind11::module_& module);
 void bind_watching(pybind11::module_& module);
 void bind_boundary_conditions(pybind11::module_& module);
 void bind_inline_reductions(pybind11::module_& module);
-// The operators of Python for everything that stands for an Expr: once the classes are there.
+// Adds Python's operators to all classes that convert to Expr; called after these are bound.
 void bind_operators(pybind11::module_& module);
 
 }  // namespace retrograde::python

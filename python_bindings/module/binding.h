@@ -1,7 +1,7 @@
-// binding.h -- what every file of the extension module uses: classes and functions that take their docstrings from
-// the headers' comments, and the conversions of casters.h.
+// binding.h -- helpers for all files of the extension module: bindings of classes and functions whose docstrings come
+// from the headers' comments, and the conversions of casters.h.
 //
-// One file binds one header or topic, so that they compile side by side in little memory. bind_all.h lists them.
+// One file binds one header or topic, so that files compile in parallel in little memory. bind_all.h lists them.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -17,12 +17,12 @@ namespace retrograde::python {
 
 namespace py = pybind11;
 
-// What the headers say of "Func::compute_root", from the table that tools/make_docs.py writes of them; the first of
-// these scopes that has the name. "" where none has.
+// The header comment of a name such as "Func::compute_root", from the table that tools/make_docs.py writes. The first
+// of the scopes that has the name wins; "" if none has.
 const char* documentation(std::initializer_list<const char*> scopes, const std::string& name);
 inline const char* documentation(const std::string& name) { return documentation({""}, name); }
 
-// A class whose methods are documented where the C++ class of the same name, or one of `inherited`, is.
+// A class whose methods get the documentation of the C++ class of the same name, or of one of `inherited`.
 template <class T, class... Options>
 class Class : public py::class_<T, Options...> {
   using Base = py::class_<T, Options...>;
@@ -35,7 +35,7 @@ class Class : public py::class_<T, Options...> {
     scopes_.insert(scopes_.end(), inherited.begin(), inherited.end());
   }
   Class(py::handle scope, const char* name) : Class(scope, name, {}) {}
-  // One that another file made, to add to.
+  // A class that another file has bound, to add methods to.
   struct Made {
     py::object cls;
   };
@@ -49,7 +49,7 @@ class Class : public py::class_<T, Options...> {
     Base::def(name, std::forward<F>(f), doc(name), extra...);
     return *this;
   }
-  // Constructors and what else pybind11 makes of one.
+  // Constructors, and other definitions that pybind11 builds from one object.
   template <class... Args, class... Extra>
   Class& def(const py::detail::initimpl::constructor<Args...>& init, const Extra&... extra) {
     Base::def(init, doc(scopes_[0]), extra...);
@@ -96,7 +96,7 @@ class Class : public py::class_<T, Options...> {
   std::vector<const char*> scopes_;
 };
 
-// A function of the module, documented as the C++ function of its name.
+// A function of the module with the documentation of the C++ function of the same name.
 template <class F, class... Extra>
 void def(py::module_& module, const char* name, F&& f, const Extra&... extra) {
   module.def(name, std::forward<F>(f), documentation(name), extra...);

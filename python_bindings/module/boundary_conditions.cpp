@@ -1,4 +1,4 @@
-// boundary_conditions.cpp -- BoundaryConditions, a submodule: Funcs that are defined everywhere.
+// boundary_conditions.cpp -- binds the submodule BoundaryConditions.
 #include "frontend/language/boundary_conditions.h"
 
 #include "bind_all.h"
@@ -8,7 +8,7 @@ namespace retrograde::python {
 
 namespace {
 
-// A Buffer or an ImageParam has bounds of its own, a Func is given some.
+// Bounds are optional for a Buffer or an ImageParam, which has its own, and required for a Func.
 template <class Make>
 Func bounded(const py::object& source, const std::optional<Region>& bounds, Make make) {
   if (py::isinstance<Func>(source)) {
@@ -44,7 +44,7 @@ void bind_boundary_conditions(py::module_& m) {
       sub, "constant_exterior",
       [](const py::object& source, const py::object& value, const std::optional<Region>& bounds) {
         return bounded(source, bounds, [&](const auto& image, const auto&... region) {
-          // A number is one of the type inside.
+          // A plain number takes the type of the source.
           Func f;
           if constexpr (std::is_same_v<std::decay_t<decltype(image)>, Func>)
             f = image;

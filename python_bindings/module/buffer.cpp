@@ -1,4 +1,4 @@
-// buffer.cpp -- Buffer: elements, shapes, and the arrays of Python that share its memory.
+// buffer.cpp -- binds Buffer: elements, shapes, and conversions to and from arrays that share its memory.
 #include <pybind11/functional.h>
 
 #include <algorithm>
@@ -40,7 +40,7 @@ char* address(const Buffer<>& buffer, const py::tuple& index) {
                             static_cast<int>(at.size()));
   int64_t elements = 0;
   for (int d = 0; d < buffer.dimensions(); d++) {
-    // One past the end is a place that C++ may point to, but no element.
+    // C++ accepts one past the end, for pointers, but there is no element.
     if (at[d] >= buffer.min(d) + buffer.extent(d))
       throw py::index_error("the coordinate lies outside of the Buffer");
     elements += static_cast<int64_t>(at[d] - buffer.min(d)) * buffer.stride(d);
@@ -79,7 +79,7 @@ void store(Type type, char* to, const ir::Scalar& value) {
   std::memcpy(to, &bits, type.bytes());  // this machine is little-endian
 }
 
-// buffer[x, y]: an element for numbers, the load of one for Exprs.
+// buffer[x, y]: an element if the coordinates are numbers, an Expr that loads it if they are Exprs.
 py::object get_item(const Buffer<>& buffer, const py::object& index) {
   const py::tuple at = as_tuple(index);
   if (!are_numbers(at)) return py::cast(buffer(coordinates(index)));
@@ -194,7 +194,7 @@ void bind_shapes(Class<Buffer<>>& c) {
             return changed(b, [&](Buffer<>& to) { to.transpose(d1, d2); });
           },
           py::arg("d1"), py::arg("d2"))
-      // The same memory with the dimensions in the opposite order.
+      // A view with the dimensions in reverse order.
       .def("reverse_axes",
            [](const Buffer<>& b) {
              return changed(b, [](Buffer<>& to) {
@@ -241,7 +241,7 @@ void bind_facts(Class<Buffer<>>& c) {
       .def("set_device_dirty", &Buffer<>::set_device_dirty, py::arg("dirty") = true)
       .def("has_device_allocation", &Buffer<>::has_device_allocation)
       .def("copy_to_host", [](Buffer<>& b) { return b.copy_to_host(); })
-      // What extension modules take in place of an array: compiler/aot/python_extension.h.
+      // Extension modules accept this in place of an array; see compiler/aot/python_extension.h.
       .def("_get_raw_halide_buffer_t",
            [](Buffer<>& b) {
              return reinterpret_cast<uintptr_t>(b.defined() ? b.raw_buffer() : nullptr);
@@ -310,7 +310,7 @@ void bind_elements(Class<Buffer<>>& c) {
       .def("__repr__", &repr);
 }
 
-// As NumPy's protocol describes memory.
+// The memory as a dict of NumPy's array interface.
 py::dict array_interface(const ArrayMemory& memory) {
   using namespace py::literals;
   if (format_of(memory.type).empty())
@@ -342,7 +342,7 @@ void bind_arrays(Class<Buffer<>>& c) {
        },
        py::kw_only(), py::arg("stream") = py::none(), py::arg("max_version") = py::none(),
        py::arg("dl_device") = py::none(), py::arg("copy") = py::none())
-      // Where the buffer protocol has no word for the elements; NumPy would make an array of one object.
+      // Raises for elements that the buffer protocol cannot describe; NumPy would create an array of one object.
       .def("__array__",
            [](const Buffer<>& b, const py::args&, const py::kwargs&) -> py::object {
              throw py::type_error("no array of NumPy has elements of type " +
@@ -351,7 +351,7 @@ void bind_arrays(Class<Buffer<>>& c) {
       .def("__dlpack_device__", [](const Buffer<>&) { return py::make_tuple(1, 0); })
       .def_property_readonly("__array_interface__",
                              [](const Buffer<>& b) { return array_interface(memory_of(b)); })
-      // Numba's protocol of the same for devices; there is no such attribute where there is no such memory.
+      // Numba's protocol for device memory; a Buffer without device memory lacks the attribute.
       .def_property_readonly("__cuda_array_interface__", [](const Buffer<>& b) {
         if (!b.defined() || !b.has_device_allocation())
           throw py::attribute_error("the Buffer has no memory on a device: see copy_to_device()");
@@ -361,7 +361,8 @@ void bind_arrays(Class<Buffer<>>& c) {
       });
 }
 
-// Dimension 0 is the array's last axis, or with `reverse_axes` false its first.
+// A Buffer on an array's memory. Dimension 0 is the last axis of the array, or the first one if `reverse_axes` is
+// false.
 Buffer<> buffer_over(const py::object& array, const std::string& name,
                      const std::optional<Type>& type, bool reverse_axes) {
   std::optional<ArrayMemory> memory = array_memory(array);
@@ -414,7 +415,7 @@ void bind_buffer(py::module_& m) {
           },
           py::arg("type"), py::arg("width"), py::arg("height"), py::arg("channels"),
           py::arg("name") = "")
-      // A shape without memory: a call with it says there which region it needs.
+      // A shape without memory, for a bounds query: a call writes the required region into it.
       .def_static(
           "make_bounds_query",
           [](Type type, const std::vector<int>& sizes, const std::string& name) {

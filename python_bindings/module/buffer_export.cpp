@@ -1,6 +1,6 @@
-// buffer_export.cpp -- Buffers as arrays: Python's buffer protocol.
+// buffer_export.cpp -- exports Buffers through Python's buffer protocol.
 //
-// The slots are filled here and not by pybind11, whose 2.10 lets exceptions of C++ out of them.
+// The slots are set here rather than by pybind11, because version 2.10 lets C++ exceptions escape from them.
 #include <algorithm>
 #include <memory>
 
@@ -12,8 +12,8 @@ namespace retrograde::python {
 
 namespace {
 
-// What one view of a Buffer points to. The handle of the runtime keeps memory that the Buffer allocated; the
-// view's `obj` keeps everything else.
+// Data of one view of a Buffer. The runtime's handle keeps memory that the Buffer allocated alive; the view's `obj`
+// keeps everything else alive.
 struct View {
   Runtime::Buffer<> buffer;
   std::string format;
@@ -28,7 +28,7 @@ bool is_dense(const ArrayMemory& memory) {
   return true;
 }
 
-// Why the view cannot be had; empty when it can.
+// The reason why the view is impossible; empty if it is possible.
 std::string refusal(const Buffer<>& buffer, const ArrayMemory& memory, int flags) {
   if (format_of(memory.type).empty()) {
     return "arrays of Python have no elements of type " + to_string(memory.type) +

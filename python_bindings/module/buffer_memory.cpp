@@ -1,4 +1,4 @@
-// buffer_memory.cpp -- arrays as Buffers: see buffer_memory.h.
+// buffer_memory.cpp -- reads the memory of arrays and wraps it in Buffers; see buffer_memory.h.
 #include "buffer_memory.h"
 
 #include <algorithm>
@@ -14,7 +14,8 @@ namespace {
 
 using frontend::BufferContents;
 
-// Deletes the contents, and then lets the owner of the memory go: on whichever thread, with or without the GIL.
+// A deleter that destroys the contents, then releases the owner of the memory; works on any thread, with or without the
+// GIL.
 struct MemoryOwner {
   PyObject* owner;
   bool read_only;
@@ -38,7 +39,7 @@ Buffer<> owned(Runtime::Buffer<> buffer, const std::string& name, PyObject* owne
   user_error("use the memory of an array as a Buffer", rule, evidence, instead);
 }
 
-// A character of module struct, with the bytes of an element.
+// The type of a format of Python's module struct, given the size of an element.
 std::optional<Type> type_of_format(std::string format, int64_t bytes) {
   if (!format.empty() && std::string("@=<").find(format[0]) != std::string::npos)
     format.erase(0, 1);
@@ -58,7 +59,7 @@ std::optional<ArrayMemory> buffer_protocol_memory(py::handle object) {
   if (!PyObject_CheckBuffer(object.ptr())) return {};
   auto view = py::reinterpret_steal<py::object>(PyMemoryView_FromObject(object.ptr()));
   if (!view) {
-    PyErr_Clear();  // NumPy's own types have no format there: what else the object offers is asked next
+    PyErr_Clear();  // the buffer protocol has no format for NumPy's own types; other protocols are tried next
     return {};
   }
   const Py_buffer& buffer = *PyMemoryView_GET_BUFFER(view.ptr());
@@ -82,7 +83,7 @@ std::vector<int64_t> dense_strides(const std::vector<int64_t>& shape, int64_t by
   return strides;
 }
 
-// https://numpy.org/doc/stable/reference/arrays.interface.html, version 3.
+// Reads NumPy's array interface, version 3: https://numpy.org/doc/stable/reference/arrays.interface.html.
 std::optional<ArrayMemory> array_interface_memory(py::handle object) {
   if (!py::hasattr(object, "__array_interface__")) return {};
   const py::dict facts = object.attr("__array_interface__");
@@ -153,7 +154,7 @@ Buffer<> buffer_of(const ArrayMemory& memory, const std::string& name) {
                   " bytes, and an element has ", bytes),
              "Copy it first, as with array.copy()");
     }
-    // An axis of one element or none has any stride, as it leads nowhere: one that fits.
+    // The stride of an axis with at most one element is arbitrary; choose one that fits.
     const int64_t stride = memory.strides_bytes[axis] / bytes;
     const bool leads_nowhere = memory.shape[axis] <= 1 && std::abs(stride) > INT32_MAX;
     shape.emplace_back(0, dimension_part(memory.shape[axis], "extents"),
@@ -170,10 +171,10 @@ std::optional<Buffer<>> buffer_from(py::handle object) {
   return buffer_of(*memory);
 }
 
-Buffer<> with_owner_of(const Buffer<>& source, const Buffer<>& made) {
+Buffer<> with_owner_of(const Buffer<>& source, const Buffer<>& view) {
   const auto* owner = std::get_deleter<MemoryOwner>(source.contents());
-  if (!owner) return made;
-  return owned(made.contents()->buffer, "", owner->owner, owner->read_only);
+  if (!owner) return view;
+  return owned(view.contents()->buffer, "", owner->owner, owner->read_only);
 }
 
 bool is_read_only(const Buffer<>& buffer) {

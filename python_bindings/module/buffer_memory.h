@@ -1,10 +1,10 @@
-// buffer_memory.h -- memory of arrays as Buffers, and of Buffers as arrays, never copied.
+// buffer_memory.h -- arrays as Buffers and Buffers as arrays, sharing memory without copies.
 //
-// One rule at every boundary: a[y, x] == f[x, y]. Python's arrays name their innermost dimension last, Funcs and
-// Buffers name it first, so the axes of an array are the dimensions of a Buffer in reverse.
+// One axis rule holds everywhere: a[y, x] == f[x, y]. Arrays list their innermost dimension last, Funcs and
+// Buffers list it first, so the axes of an array are the dimensions of a Buffer in reverse.
 //
-// A Buffer keeps what owns its memory alive, and so do all Buffers that were made of it (cropped, sliced ...): the
-// owner lives in the deleter of the contents that handles share.
+// A Buffer keeps the owner of its memory alive, and so do all views of it (cropped, sliced, ...). The owner is held by
+// the deleter of the contents that the handles share.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -20,7 +20,7 @@ namespace py = pybind11;
 
 // The memory of an array as its owner describes it, axes in Python's order.
 struct ArrayMemory {
-  py::object owner;  // alive as long as the memory is
+  py::object owner;  // keeps the memory alive
   void* data = nullptr;
   Type type;
   std::vector<int64_t> shape;
@@ -28,22 +28,22 @@ struct ArrayMemory {
   bool read_only = false;
 };
 
-// Of an object with the buffer protocol, DLPack or the array interface; nothing where it has none of them.
-// CompileError where its elements or strides are none that a Buffer can have.
+// The memory of an object with the buffer protocol, DLPack or the array interface; nullopt for other objects. Throws
+// CompileError if a Buffer cannot have its elements or strides.
 std::optional<ArrayMemory> array_memory(py::handle object);
 Buffer<> buffer_of(const ArrayMemory& memory, const std::string& name = "");
 
-// What `made` from `source` shares its memory, and so its owner.
-Buffer<> with_owner_of(const Buffer<>& source, const Buffer<>& made);
+// Gives `view`, which shares the memory of `source`, the same owner.
+Buffer<> with_owner_of(const Buffer<>& source, const Buffer<>& view);
 bool is_read_only(const Buffer<>& buffer);
-// CompileError where it is.
+// Throws CompileError if the buffer is read-only.
 void check_writable(const Buffer<>& buffer, const std::string& asked);
 
 // The elements of a buffer that has memory, axes in Python's order; the owner is empty.
 ArrayMemory memory_of(const Buffer<>& buffer);
-// The same of one that has memory on a device; CompileError where the host's is newer.
+// The device memory of a buffer. Throws CompileError if the host's elements are newer.
 ArrayMemory device_memory_of(const Buffer<>& buffer);
-std::string format_of(Type type);  // as module struct writes it; "" where it knows no such type
+std::string format_of(Type type);  // format of Python's module struct; "" if it has no such type
 
 // dlpack.cpp
 std::optional<ArrayMemory> dlpack_memory(py::handle object);

@@ -1,4 +1,4 @@
-// c_address.h -- the address of a C function: an int, or a function of ctypes.
+// c_address.h -- the address of a C function, given as an int or as a ctypes function.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// call_arguments.cpp -- see call_arguments.h.
+// call_arguments.cpp -- converts the Python arguments of realize() and similar functions.
 #include "call_arguments.h"
 
 #include "any_stride.h"
@@ -13,7 +13,7 @@ bool is_list(const py::object& object) {
   return py::isinstance<py::list>(object) || py::isinstance<py::tuple>(object);
 }
 
-// Of Python or NumPy; an array of NumPy without axes is none.
+// Whether it is an integer of Python or NumPy; a NumPy array without axes is not.
 bool is_integer(py::handle object) {
   if (PyLong_Check(object.ptr())) return true;
   return py::isinstance(object, py::module_::import("numbers").attr("Integral"));
@@ -27,13 +27,13 @@ Buffer<> output_buffer(const py::object& object, const std::string& asked) {
 
 }  // namespace
 
-Outputs outputs_from(const py::object& given, const std::string& asked) {
+Outputs outputs_from(const py::object& source, const std::string& asked) {
   Outputs outputs;
-  if (!is_list(given)) {
-    outputs.buffers.push_back(output_buffer(given, asked));
+  if (!is_list(source)) {
+    outputs.buffers.push_back(output_buffer(source, asked));
     return outputs;
   }
-  for (py::handle one : given) {
+  for (py::handle one : source) {
     if (is_integer(one)) {
       outputs.sizes.push_back(one.attr("__index__")().cast<int32_t>());
     } else {

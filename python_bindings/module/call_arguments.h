@@ -1,4 +1,4 @@
-// call_arguments.h -- what realize() and its like are given by Python.
+// call_arguments.h -- converts the Python arguments of realize() and similar functions.
 #pragma once
 
 #include "binding.h"
@@ -7,21 +7,21 @@
 
 namespace retrograde::python {
 
-// Sizes, a Buffer or an array, or a list of them.
+// Outputs of a call: sizes, a Buffer or an array, or a list of these.
 struct Outputs {
   std::vector<int32_t> sizes;
   std::vector<Buffer<>> buffers;
   bool are_buffers() const { return !buffers.empty(); }
 };
-Outputs outputs_from(const py::object& given, const std::string& asked);
+Outputs outputs_from(const py::object& source, const std::string& asked);
 
-// {gain: 2.0, image: array}
+// A ParamMap from a dict: {gain: 2.0, image: array}.
 ParamMap param_map_from(const py::dict& values);
 
-// The strides of these are none that the code was promised otherwise (any_stride.h).
+// Allows the strides of the output buffers, unless the program promised others (any_stride.h).
 void allow_strides(const std::vector<Func>& outputs, const std::vector<Buffer<>>& buffers);
 
-// One Buffer, or a tuple of them.
+// A Buffer, or a tuple of Buffers.
 py::object object_of(const Realization& realization);
 
 }  // namespace retrograde::python

@@ -1,4 +1,4 @@
-// call_site.h -- where the Python program is, for messages that say where a Func was declared.
+// call_site.h -- file and line of the calling Python code, for messages that name the declaration of a Func.
 #pragma once
 
 #include <pybind11/pybind11.h>

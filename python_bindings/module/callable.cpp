@@ -1,4 +1,5 @@
-// callable.cpp -- Callable: a compiled pipeline as a function of its arguments and outputs.
+// callable.cpp -- binds Callable, a compiled pipeline as a function of its arguments and outputs, and the faster calls
+// on tensors of PyTorch.
 #include "frontend/run/callable.h"
 
 #include <algorithm>
@@ -16,7 +17,7 @@
 
 namespace retrograde::frontend {
 
-// Calls with as many arguments as a list has.
+// Calls with an argument list whose length is known at run time.
 struct DynamicCall {
   using Value = Callable::Value;
   static Value value_of(const Buffer<>& buffer) { return Callable::value_of(buffer); }
@@ -40,9 +41,9 @@ using frontend::DynamicCall;
 using py::arg;
 using Parameter = std::shared_ptr<graph::ParameterContents>;
 
-// A call that works on one stream of the context that is current.
+// The context of a call that uses the current CUDA context and a given stream.
 struct OnStream : JITUserContext {
-  explicit OnStream(void* given) : stream(given) {
+  explicit OnStream(void* cuda_stream) : stream(cuda_stream) {
     handlers.custom_cuda_get_stream = [](JITUserContext* context, void*, void** result) {
       *result = static_cast<OnStream*>(context)->stream;
       return 0;
@@ -51,7 +52,7 @@ struct OnStream : JITUserContext {
   void* stream;
 };
 
-// Compiled again where an array comes whose innermost axis is not dense (any_stride.h): once.
+// The compiled pipeline. An array whose innermost axis is not dense makes it recompile once (any_stride.h).
 class Bound {
  public:
   using Compile = std::function<Callable()>;
@@ -70,19 +71,19 @@ class Bound {
   }
 
   void call(const py::args& positional, const py::kwargs& named) {
-    const py::tuple given = named.empty() ? py::tuple(positional) : in_order(positional, named);
-    std::vector<Buffer<>> buffers(given.size());
-    std::vector<DynamicCall::Value> values(given.size());
-    for (size_t i = 0; i < given.size(); i++) {
+    const py::tuple arguments = named.empty() ? py::tuple(positional) : in_order(positional, named);
+    std::vector<Buffer<>> buffers(arguments.size());
+    std::vector<DynamicCall::Value> values(arguments.size());
+    for (size_t i = 0; i < arguments.size(); i++) {
       if (i < args_.size() && args_[i].is_scalar()) {
-        values[i] = DynamicCall::value_of(scalar_of(args_[i].type, given[i]));
+        values[i] = DynamicCall::value_of(scalar_of(args_[i].type, arguments[i]));
         continue;
       }
       try {
-        buffers[i] = given[i].cast<Buffer<>>();
+        buffers[i] = arguments[i].cast<Buffer<>>();
       } catch (const py::cast_error&) {
         throw py::type_error((i < names_.size() ? quoted(names_[i]) : "a buffer") +
-                             " is an array, not " + std::string(py::repr(given[i])));
+                             " is an array, not " + std::string(py::repr(arguments[i])));
       }
       if (i >= args_.size()) check_writable(buffers[i], "call a Callable");
       lift(i, buffers[i]);
@@ -94,22 +95,22 @@ class Bound {
     });
   }
 
-  // The same of tensors of PyTorch, whose element types are those of the pipeline: whoever calls has seen to that.
-  // A number is a tensor without dimensions. Written for calls whose work is nothing.
-  void call_tensors(const py::tuple& given) {
-    auto [tensors, elements] = tensors_of(given);
-    run(given, elements, std::move(tensors));
+  // Calls on tensors of PyTorch; the caller has checked the element types. A number is a tensor without dimensions.
+  // Optimised for low overhead, for calls that compute little.
+  void call_tensors(const py::tuple& arguments) {
+    auto [tensors, elements] = tensors_of(arguments);
+    run(arguments, elements, std::move(tensors));
   }
 
-  // The same of tensors in a device's memory, but for numbers, on a stream of the context that is current for this
-  // thread: it is in the stream when this is over, not done.
+  // Calls on tensors in device memory, except for numbers. The work is queued in a stream of this thread's current CUDA
+  // context and may not have finished when this returns.
   // Requires: the driver knows the tensors' memory (RuntimeError); kernels alone use it (RuntimeError).
-  void call_tensors_on_device(const py::tuple& given, uintptr_t stream) {
-    auto [tensors, elements] = tensors_of(given);
+  void call_tensors_on_device(const py::tuple& arguments, uintptr_t stream) {
+    auto [tensors, elements] = tensors_of(arguments);
     OnStream context(reinterpret_cast<void*>(stream));
     const py::gil_scoped_release release;
     std::vector<Buffer<>> there;
-    for (size_t i = 0; i < given.size(); i++) {
+    for (size_t i = 0; i < arguments.size(); i++) {
       if (tensors.buffers[i].number_of_elements() == 0 || !tensors.buffers[i].data()) continue;
       there.push_back(on_device(tensors.buffers[i], parameter_of_argument(i)));
       tensors.values[i] = DynamicCall::value_of(there.back());
@@ -117,7 +118,7 @@ class Bound {
     try {
       DynamicCall::call(callable_, tensors.values, &context);
     } catch (const RuntimeError& failed) {
-      // A stage on the host asks for elements; of wrapped memory there is no copy there.
+      // A host stage requested elements, but wrapped device memory has no copy on the host.
       if (failed.code() != halide_error_code_copy_to_host_failed &&
           failed.code() != halide_error_code_host_is_null)
         throw;
@@ -126,10 +127,10 @@ class Bound {
   }
 
  private:
-  // Without the number that makes it unique.
+  // The user's name, without the number that makes it unique.
   static std::string given_name(const std::string& name) { return name.substr(0, name.find('$')); }
 
-  // Every argument and output in its place.
+  // Arguments and outputs in the order of the function.
   py::tuple in_order(const py::args& positional, const py::kwargs& named) const {
     std::string all;
     for (const std::string& name : names_) all += (all.empty() ? "" : ", ") + name;
@@ -155,27 +156,27 @@ class Bound {
     return result;
   }
 
-  // What a call touches, for as long as it runs. Values point into buffers, also of what it is moved to.
+  // The buffers and scalars of a call. `values` points into `buffers`; the pointers stay valid after a move.
   struct Tensors {
     explicit Tensors(size_t count) : buffers(count), values(count) {}
     std::vector<Runtime::Buffer<>> buffers;
     std::vector<DynamicCall::Value> values;
   };
 
-  // Of arguments and outputs, and how many elements these have. Compiles again, where one asks for that.
-  std::pair<Tensors, int64_t> tensors_of(const py::tuple& given) {
-    if (given.size() != args_.size() + outputs_.size())
+  // Buffers of arguments and outputs, and their total number of elements. Recompiles if a stride requires it.
+  std::pair<Tensors, int64_t> tensors_of(const py::tuple& arguments) {
+    if (arguments.size() != args_.size() + outputs_.size())
       throw py::type_error("a Callable takes its arguments, then its output buffers");
-    Tensors tensors(given.size());
+    Tensors tensors(arguments.size());
     int64_t elements = 0;
-    for (size_t i = 0; i < given.size(); i++) {
+    for (size_t i = 0; i < arguments.size(); i++) {
       if (i < args_.size() && args_[i].is_scalar()) {
-        tensors.values[i] = DynamicCall::value_of(scalar_of_tensor(given[i], args_[i].type));
+        tensors.values[i] = DynamicCall::value_of(scalar_of_tensor(arguments[i], args_[i].type));
         continue;
       }
       const Parameter& parameter = parameter_of_argument(i);
       Runtime::Buffer<>& buffer = tensors.buffers[i];
-      buffer = buffer_of_tensor(given[i], i < args_.size() ? args_[i].type : parameter->type);
+      buffer = buffer_of_tensor(arguments[i], i < args_.size() ? args_[i].type : parameter->type);
       if (parameter && buffer.dimensions() > 0)
         allow_stride(*parameter, buffer.dim(0).stride(), buffer.dim(0).extent());
       elements += static_cast<int64_t>(buffer.number_of_elements());
@@ -194,7 +195,7 @@ class Bound {
                failed.code());
   }
 
-  // One whose address is the device's.
+  // A Buffer whose device memory is at the tensor's address.
   static Buffer<> on_device(const Runtime::Buffer<>& tensor, const Parameter& parameter) {
     Buffer<> moved(tensor, parameter ? parameter->name : "");
     halide_buffer_t& raw = *moved.raw_buffer();
@@ -205,10 +206,10 @@ class Bound {
     return moved;
   }
 
-  // Another thread for the sake of Ctrl-C costs more than a call that is over before anybody could press it. Such a
-  // call is one on no more elements than one that was seen to be short; a number among the arguments may be a count
-  // of loops, so then nothing is known.
-  void run(const py::tuple& given, int64_t elements, Tensors tensors) {
+  // Short calls run on this thread, because a worker thread for Ctrl-C would cost more than the call. A call counts as
+  // short if an earlier one with at least as many elements was short. With an integer argument nothing is known,
+  // since it may be an iteration count.
+  void run(const py::tuple& arguments, int64_t elements, Tensors tensors) {
     const bool may_be_short = !counts_ && elements <= most_short_elements;
     const Callable callable = callable_;
     if (may_be_short && elements <= short_elements_) {
@@ -218,7 +219,7 @@ class Bound {
     }
     const auto start = std::chrono::steady_clock::now();
     auto kept = std::make_shared<Tensors>(std::move(tensors));
-    unlocked([callable, kept, owner = keep(given)](const Interruption&) {
+    unlocked([callable, kept, owner = keep(arguments)](const Interruption&) {
       DynamicCall::call(callable, kept->values);
     });
     if (may_be_short && std::chrono::steady_clock::now() - start < short_time)
@@ -240,7 +241,8 @@ class Bound {
     if (const Parameter& parameter = parameter_of_argument(i)) allow_stride_of(*parameter, buffer);
   }
 
-  // Parameters whose promise of a dense dimension 0 is lifted: by this Callable, or by another one that has them, too.
+  // Number of parameters whose dimension 0 need not be dense; another Callable with the same parameters may have
+  // removed the assumption.
   size_t count_lifted() const {
     size_t count = 0;
     for (const auto* parameters : {&parameters_, &outputs_}) {
@@ -256,19 +258,19 @@ class Bound {
 
   Compile compile_;
   std::vector<Argument> args_;
-  std::vector<Parameter> parameters_, outputs_;  // null: of a scalar
-  std::vector<std::string> names_;               // of arguments, then outputs
+  std::vector<Parameter> parameters_, outputs_;  // null for scalars
+  std::vector<std::string> names_;               // names of arguments, then outputs
   Callable callable_;
-  size_t lifted_ = 0;            // when it was compiled
-  int64_t short_elements_ = -1;  // calls on so many were short
+  size_t lifted_ = 0;            // count_lifted() at the last compilation
+  int64_t short_elements_ = -1;  // largest number of elements whose call was short
   bool counts_ = false;          // whether an argument is a whole number
 };
 
-// Calls on tensors of element types and sizes that are known: one call of Python's for all that there is to do, each of
-// which would take longer than what it asks for. Nothing of it changes: threads may share it.
+// A call on tensors of known element types and sizes, in a single Python call, because each further Python call would
+// take longer than the computation. Immutable, so threads may share it.
 class ExpectedCall {
  public:
-  // Of a Bound; element types and sizes of its arguments, in pairs; functions that make a result each.
+  // `callable`: a Bound; `inputs`: pairs of element type and sizes; `makers`: functions that each create a result.
   ExpectedCall(py::object callable, const py::iterable& inputs, const py::iterable& makers)
       : callable_(std::move(callable)), bound_(callable_.cast<Bound*>()) {
     for (py::handle one : inputs) {
@@ -278,23 +280,23 @@ class ExpectedCall {
     for (py::handle one : makers) makers_.push_back(py::reinterpret_borrow<py::object>(one));
   }
 
-  // The results; None, and nothing has happened, where tensors are others than was said.
-  py::object call(const py::tuple& given) const {
-    if (given.size() != inputs_.size()) return py::none();
+  // The results. Returns None, without side effects, if the tensors have other types or sizes.
+  py::object call(const py::tuple& arguments) const {
+    if (arguments.size() != inputs_.size()) return py::none();
     for (size_t i = 0; i < inputs_.size(); i++) {
-      if (!is_of(given[i], inputs_[i])) return py::none();
+      if (!is_of(arguments[i], inputs_[i])) return py::none();
     }
-    py::list made(makers_.size());
-    py::tuple all(given.size() + makers_.size());
-    for (size_t i = 0; i < given.size(); i++) all[i] = given[i];
+    py::list results(makers_.size());
+    py::tuple all(arguments.size() + makers_.size());
+    for (size_t i = 0; i < arguments.size(); i++) all[i] = arguments[i];
     for (size_t i = 0; i < makers_.size(); i++) {
       PyObject* const result = PyObject_CallNoArgs(makers_[i].ptr());
       if (!result) throw py::error_already_set();
-      made[i] = py::reinterpret_steal<py::object>(result);
-      all[given.size() + i] = made[i];
+      results[i] = py::reinterpret_steal<py::object>(result);
+      all[arguments.size() + i] = results[i];
     }
     bound_->call_tensors(all);
-    return made;
+    return results;
   }
 
  private:
@@ -315,12 +317,13 @@ template <class Self>
 void bind_compile(Class<Self> c) {
   c.def(
       "compile_to_callable",
-      [](const py::object& object, const py::iterable& given, const std::optional<Target>& target) {
+      [](const py::object& object, const py::iterable& arguments,
+         const std::optional<Target>& target) {
         const Pinned<Self> self(object);
         std::vector<Argument> args;
         std::vector<Parameter> parameters, outputs;
         std::vector<std::string> output_names;
-        for (py::handle one : given) {
+        for (py::handle one : arguments) {
           args.push_back(one.cast<Argument>());
           parameters.push_back(parameter_of(one));
         }

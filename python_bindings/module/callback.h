@@ -1,4 +1,4 @@
-// callback.h -- functions of Python that the compiler calls back, on whatever thread it works.
+// callback.h -- Python functions that the compiler calls, on any thread.
 #pragma once
 
 #include <utility>
@@ -8,12 +8,12 @@
 
 namespace retrograde::python {
 
-// May be copied, called and let go without the GIL; what it raises goes through the C++ code to who called that.
+// May be copied, called and destroyed without the GIL. A Python exception passes through the C++ code to its caller.
 class Callback {
  public:
   explicit Callback(py::function function) : function_(keep(std::move(function))) {}
 
-  // The result is converted while the GIL is held.
+  // Converts the result while it holds the GIL.
   template <class Result, class... Args>
   Result call(const Args&... args) const {
     const py::gil_scoped_acquire acquire;

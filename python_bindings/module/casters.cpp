@@ -1,4 +1,4 @@
-// casters.cpp -- see casters.h.
+// casters.cpp -- conversions of Python objects to Exprs, Tuples, Ranges and other arguments.
 #include "casters.h"
 
 #include "buffer_memory.h"

@@ -1,9 +1,8 @@
-// casters.h -- what stands for what in a call: a number or a Var for an Expr, an array for a Buffer, a pair for a
-// Range, a dtype for a Type. Every file that binds anything sees these, so that there is one rule for all.
+// casters.h -- conversions of Python arguments: a number or a Var for an Expr, an array for a Buffer, a pair for a
+// Range, a dtype for a Type. All bindings include these, so every function accepts the same objects.
 //
-// A caster tries the class itself first. What else it takes is looked at only where pybind11 allows conversions, in
-// its second pass over overloads; errors on the way (a Func that is read before it is defined) are thrown, not hidden
-// behind "incompatible arguments".
+// A caster tries the class itself first. Conversions are tried only in pybind11's second pass over the overloads. An
+// error during a conversion, such as reading an undefined Func, is thrown instead of becoming "incompatible arguments".
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -21,7 +20,7 @@ namespace retrograde::python {
 
 namespace py = pybind11;
 
-// Nothing where the object cannot stand for one.
+// Each returns nullopt if the object does not convert.
 std::optional<Expr> expr_from(py::handle object);
 std::optional<Tuple> tuple_from(py::handle object);
 std::optional<VarOrRVar> loop_from(py::handle object);
@@ -35,36 +34,37 @@ std::optional<Argument> argument_from(py::handle object);
 
 py::object object_of(const VarOrRVar& loop);
 
-// A Python number takes the type of what stands beside it: of the first operand that is an Expr already, where it
-// fits; a float the widest floating type among them, or float32. NumPy's scalars have types of their own.
+// Operands of one operator. A plain Python number takes the type of the first operand that is an Expr, if it fits. A
+// float takes the widest floating-point type among the operands, or float32. NumPy's scalars keep their types.
 std::vector<Expr> operands(const std::vector<py::object>& objects);
-// The same of what an element of type `type` is given.
+// The operand that is assigned to an element of type `type`.
 Expr operand_for(Type type, py::handle object);
 // The operand of a cast: a Python float becomes a float64, so that only the cast rounds it.
 std::optional<Expr> unrounded_from(py::handle object);
 struct Unrounded {
   Expr expr;
 };
-// A number in the type's width, for the bits of it.
+// A number as an Expr as wide as `type`, for operators on its bits.
 Expr bits_operand(Type type, py::handle object);
-// The types of a Func's values, which its declaration may say before its definition does.
+// The types of a Func's values; before its definition, those of its declaration.
 const std::vector<Type>& value_types(const graph::FuncContents& f);
-// Numbers among the values of a Tuple take the types of the Func that they are for.
+// A Tuple whose plain numbers take the given types, those of a Func.
 Tuple tuple_for(const std::vector<Type>& types, py::handle object);
-// A Python int or float, which has no type of its own here.
+// Whether it is a Python int or float, whose type depends on the context.
 bool is_plain_number(py::handle object);
 
-// Tuples, lists, and objects of a user's class with a length and elements, such as complex numbers; no arrays, no dicts.
+// Whether it is a tuple, a list, or an object of a user's class with a length and elements, such as a complex number.
+// Arrays and dicts are not.
 bool is_tuple_like(py::handle object);
 
-// f[x, y]: one coordinate or a tuple of them; `...` stands for the placeholder _.
+// The coordinates in f[x, y]: one or a tuple; `...` is the placeholder _.
 std::vector<Expr> coordinates(py::handle index);
 
 }  // namespace retrograde::python
 
 namespace pybind11::detail {
 
-// The class itself, or what `from` makes of an object.
+// Loads an object of the class, or the result of `from`.
 template <class T, std::optional<T> (*from)(handle)>
 class converting_caster : public type_caster_base<T> {
  public:
@@ -107,7 +107,7 @@ class type_caster<retrograde::python::Unrounded> {
   }
 };
 
-// Not a class in Python: a Var, an RVar, or an RDom of one variable.
+// VarOrRVar is not a class in Python; a Var, an RVar or a one-dimensional RDom converts to it.
 template <>
 class type_caster<retrograde::VarOrRVar> {
  public:

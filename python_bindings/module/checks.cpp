@@ -1,4 +1,4 @@
-// checks.cpp -- check_gradients and check_stability, and their reports.
+// checks.cpp -- binds check_gradients, check_stability and their reports.
 #include "bind_all.h"
 #include "binding.h"
 #include "checks/check_gradients.h"

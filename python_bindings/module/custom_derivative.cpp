@@ -1,4 +1,4 @@
-// custom_derivative.cpp -- custom_adjoint and custom_tangent: rules that are functions of Python.
+// custom_derivative.cpp -- binds custom_adjoint and custom_tangent, whose rules are Python functions.
 #include "autodiff/custom_derivative.h"
 
 #include "bind_all.h"
@@ -11,7 +11,7 @@ namespace {
 
 using py::arg;
 
-// (input, Func) stands for a contribution, (input, None) for a derivative that is zero.
+// A contribution from (input, Func), or a zero derivative from (input, None).
 std::optional<AdjointContribution> contribution_from(py::handle object) {
   if (py::isinstance<AdjointContribution>(object)) return object.cast<AdjointContribution>();
   if (!py::isinstance<py::tuple>(object) || py::len(object) != 2) return {};
@@ -21,9 +21,9 @@ std::optional<AdjointContribution> contribution_from(py::handle object) {
   return AdjointContribution(input, pair[1].cast<Func>());
 }
 
-std::vector<AdjointContribution> contributions_of(const py::object& given) {
+std::vector<AdjointContribution> contributions_of(const py::object& objects) {
   std::vector<AdjointContribution> result;
-  for (py::handle one : given) {
+  for (py::handle one : objects) {
     std::optional<AdjointContribution> contribution = contribution_from(one);
     if (!contribution)
       throw py::type_error("a rule gives AdjointContributions, or pairs of an input and a Func");

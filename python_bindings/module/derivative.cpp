@@ -1,4 +1,4 @@
-// derivative.cpp -- propagate_adjoints and what it gives.
+// derivative.cpp -- binds propagate_adjoints, its options and its results.
 #include "autodiff/derivative.h"
 
 #include "bind_all.h"
@@ -43,7 +43,7 @@ void bind_explanations(py::module_& m) {
 
 void bind_operation_counts(py::module_& m) {
   using autodiff::OperationCount;
-  // A number, or nothing where it depends on sizes that only a call knows.
+  // A number, or None if it depends on sizes that are known only in a call.
   const auto value = [](auto part) {
     return [part](const OperationCount& c) { return (c.*part)().value(); };
   };

@@ -1,6 +1,6 @@
-// dlpack.cpp -- Buffers to and from DLPack, the exchange of arrays between libraries: capsules of either protocol,
-// "dltensor" and "dltensor_versioned". The structures are those of version 1.0 of the standard
-// (https://dmlc.github.io/dlpack/latest/c_api.html); memory is the CPU's.
+// dlpack.cpp -- converts Buffers to and from DLPack, with capsules of both protocols, "dltensor" and
+// "dltensor_versioned". The structures are those of version 1.0 of the standard
+// (https://dmlc.github.io/dlpack/latest/c_api.html). Only CPU memory is supported.
 #include <memory>
 
 #include "buffer_memory.h"
@@ -79,7 +79,7 @@ dl::DataType dl_type(Type type) {
   return {code, static_cast<uint8_t>(type.is_bool() ? 8 : type.bits()), 1};
 }
 
-// ---- taking one ----
+// ---- import ----
 
 ArrayMemory described(const dl::Tensor& tensor) {
   const std::optional<Type> type = type_of(tensor.dtype);
@@ -103,7 +103,8 @@ ArrayMemory described(const dl::Tensor& tensor) {
   return memory;
 }
 
-// The tensor becomes ours: its capsule is renamed, as the standard asks, and another one keeps it.
+// Takes ownership of the tensor: renames its capsule, as the standard requires, and keeps the tensor in another
+// capsule.
 template <class Managed>
 std::optional<ArrayMemory> consumed(const py::object& capsule, bool read_only) {
   const char* name = dl::name_of(static_cast<Managed*>(nullptr));
@@ -121,9 +122,9 @@ std::optional<ArrayMemory> consumed(const py::object& capsule, bool read_only) {
   return memory;
 }
 
-// ---- giving one ----
+// ---- export ----
 
-// What a capsule points to; the Buffer keeps the memory and its owner.
+// Data of a capsule; the Buffer keeps the memory and its owner alive.
 template <class Managed>
 struct Given {
   Managed managed{};
@@ -147,7 +148,7 @@ void check_exportable(const ArrayMemory& memory) {
 }
 
 template <class Managed>
-py::capsule given(const Buffer<>& buffer) {
+py::capsule exported(const Buffer<>& buffer) {
   const ArrayMemory memory = memory_of(buffer);
   check_exportable(memory);
   auto* kept = new Given<Managed>;
@@ -172,7 +173,7 @@ py::capsule given(const Buffer<>& buffer) {
   }
   return py::reinterpret_steal<py::capsule>(
       PyCapsule_New(&kept->managed, dl::name_of(&kept->managed), [](PyObject* capsule) {
-        // One that nobody took.
+        // The capsule was not consumed.
         const char* name = dl::name_of(static_cast<Managed*>(nullptr));
         if (!PyCapsule_IsValid(capsule, name)) return;
         auto* managed = static_cast<Managed*>(PyCapsule_GetPointer(capsule, name));
@@ -188,7 +189,8 @@ std::optional<ArrayMemory> dlpack_memory(py::handle object) {
   try {
     capsule = object.attr("__dlpack__")(py::arg("max_version") = py::make_tuple(1, 0));
   } catch (py::error_already_set& error) {
-    if (!error.matches(PyExc_TypeError)) throw;  // of a library that knows the first protocol only
+    if (!error.matches(PyExc_TypeError))
+      throw;  // TypeError: the library knows only the first protocol
     capsule = object.attr("__dlpack__")();
   }
   if (auto memory = consumed<dl::ManagedVersioned>(capsule, false)) return memory;
@@ -197,12 +199,12 @@ std::optional<ArrayMemory> dlpack_memory(py::handle object) {
 }
 
 py::capsule dlpack_capsule(const Buffer<>& buffer, bool versioned) {
-  // The first protocol cannot say it.
+  // The first protocol cannot mark memory as read-only.
   if (!versioned && is_read_only(buffer)) {
     throw py::buffer_error(
         "the Buffer is read only, which DLPack before 1.0 cannot say: copy it first");
   }
-  return versioned ? given<dl::ManagedVersioned>(buffer) : given<dl::Managed>(buffer);
+  return versioned ? exported<dl::ManagedVersioned>(buffer) : exported<dl::Managed>(buffer);
 }
 
 }  // namespace retrograde::python

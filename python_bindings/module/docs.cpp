@@ -21,7 +21,7 @@ const char* row(const std::string& name) {
 }  // namespace
 
 const char* documentation(std::initializer_list<const char*> scopes, const std::string& name) {
-  // in_ and lambda_ are words of Python without the underscore.
+  // in_ and lambda_ have an underscore because the words without it are keywords of Python.
   const std::string bare = name.size() > 1 && name.back() == '_' && name[name.size() - 2] != '_'
                                ? name.substr(0, name.size() - 1)
                                : name;

@@ -1,4 +1,4 @@
-// docs_table.h -- docstrings by the names of C++, sorted: what tools/make_docs.py writes.
+// docs_table.h -- the table of docstrings that tools/make_docs.py writes, sorted by C++ name.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// enumerations.cpp -- what directives and compilations choose among.
+// enumerations.cpp -- binds the enumerations of directives and compilation.
 #include "bind_all.h"
 #include "binding.h"
 #include "frontend/run/module.h"
@@ -8,7 +8,7 @@ namespace retrograde::python {
 
 namespace {
 
-// Of those whose enumerators C++ lists by name (directive_choices.h), in order.
+// Binds an enumeration whose enumerators C++ lists by name, in order (directive_choices.h).
 template <class E>
 void bind_choices(py::module_& m) {
   py::enum_<E> e(m, graph::Choices<E>::name, documentation(graph::Choices<E>::name));

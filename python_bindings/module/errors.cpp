@@ -1,7 +1,7 @@
-// errors.cpp -- exceptions of the library as exceptions of Python, with the four parts of their messages.
+// errors.cpp -- translates exceptions of the library to Python exceptions with the four parts of their messages.
 //
-// The classes are Python's own (retrograde/_errors.py), so that they can be pickled and inherit from what programs
-// catch anyway.
+// The classes are defined in Python (retrograde/_errors.py), so that they can be pickled and inherit from built-in
+// exceptions.
 #include "bind_all.h"
 #include "binding.h"
 #include "diagnostics/error.h"

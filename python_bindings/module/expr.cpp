@@ -1,4 +1,4 @@
-// expr.cpp -- Expr and Tuple.
+// expr.cpp -- binds Expr and Tuple.
 #include "bind_all.h"
 #include "binding.h"
 #include "ir/print.h"

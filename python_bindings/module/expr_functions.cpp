@@ -1,4 +1,4 @@
-// expr_functions.cpp -- functions of Exprs: choice, arithmetic, functions of real numbers, types, hints.
+// expr_functions.cpp -- binds functions of Exprs: selection, arithmetic, functions of real numbers, casts, hints.
 #include <algorithm>
 
 #include "autodiff/straight_through.h"
@@ -17,7 +17,7 @@ using Binary = Expr (*)(Expr, Expr);
 
 void unary(py::module_& m, const char* name, Unary f) { def(m, name, f, arg("x")); }
 
-// Numbers take the type of the other operand: see operands().
+// A binary function; plain numbers take the type of the other operand, see operands().
 void binary(py::module_& m, const char* name, Binary f, const char* a, const char* b) {
   def(
       m, name,
@@ -37,7 +37,7 @@ std::vector<py::object> objects(const py::args& args) {
   return result;
 }
 
-// min(a, b, c): of any number.
+// A function of two or more arguments: min(a, b, c).
 void folded(py::module_& m, const char* name, Binary f) {
   def(m, name, [f](const py::args& args) {
     std::vector<Expr> all = operands(objects(args));
@@ -54,7 +54,7 @@ bool is_tuple(const py::object& object) {
          (py::isinstance<FuncRef>(object) && object.cast<const FuncRef&>().size() > 1);
 }
 
-// Tuples of one size, whose numbers take the types of what stands in their places in the others.
+// Tuples of one size; a plain number takes the type of the other Tuples' element at the same place.
 std::vector<Tuple> matched_tuples(const std::vector<py::object>& values) {
   const auto is_list = [](const py::object& value) {
     return py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value);
@@ -90,7 +90,7 @@ std::vector<Tuple> matched_tuples(const std::vector<py::object>& values) {
   return result;
 }
 
-// select(c0, v0, c1, v1, ..., otherwise): of Exprs, or of Tuples.
+// select(c0, v0, c1, v1, ..., otherwise) on Exprs or Tuples.
 py::object select_of(const py::args& args) {
   const size_t n = args.size();
   if (n < 3 || n % 2 == 0)
@@ -149,7 +149,7 @@ void bind_arithmetic(py::module_& m) {
   def(
       m, "lerp",
       [](const py::object& zero, const py::object& one, const py::object& weight) {
-        // Ends that are numbers are of the floating type that the weight has.
+        // If both ends are plain numbers, they take the floating-point type of the weight.
         const bool are_numbers = is_plain_number(zero) && is_plain_number(one);
         std::vector<Expr> ends =
             operands(are_numbers && (PyFloat_Check(zero.ptr()) || PyFloat_Check(one.ptr()))

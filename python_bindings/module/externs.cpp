@@ -1,6 +1,6 @@
-// externs.cpp -- C functions that pipelines call: stages computed outside, functions in expressions.
+// externs.cpp -- binds extern stages and calls of C functions in expressions.
 //
-// A C function is an address, or a function of ctypes, which stays alive with what refers to it.
+// A C function is given as an address or as a ctypes function, which stays alive as long as it is referred to.
 #include "bind_all.h"
 #include "binding.h"
 #include "c_address.h"
@@ -22,16 +22,16 @@ ExternFuncArgument argument_of(py::handle object) {
   return object.cast<Buffer<>>();
 }
 
-std::vector<ExternFuncArgument> arguments_of(const py::iterable& given) {
+std::vector<ExternFuncArgument> arguments_of(const py::iterable& objects) {
   std::vector<ExternFuncArgument> result;
-  for (py::handle one : given) result.push_back(argument_of(one));
+  for (py::handle one : objects) result.push_back(argument_of(one));
   return result;
 }
 
-std::vector<Type> types_of(const py::object& given) {
-  if (py::isinstance<py::list>(given) || py::isinstance<py::tuple>(given))
-    return given.cast<std::vector<Type>>();
-  return {given.cast<Type>()};
+std::vector<Type> types_of(const py::object& objects) {
+  if (py::isinstance<py::list>(objects) || py::isinstance<py::tuple>(objects))
+    return objects.cast<std::vector<Type>>();
+  return {objects.cast<Type>()};
 }
 
 void bind_argument(py::module_& m) {
@@ -83,7 +83,7 @@ void bind_signature(py::module_& m) {
       .def("signature", &ExternCFunction::signature);
 }
 
-// What is set stays with the Pipeline or Func that it is set for: functions of ctypes, too.
+// The Pipeline or Func keeps the functions that are set alive, including ctypes functions.
 template <class Self>
 void bind_externs_of(Class<Self> c) {
   c.def(
@@ -113,7 +113,7 @@ void bind_externs(py::module_& m) {
   bind_define_extern(m);
   bind_signature(m);
   bind_jit_extern(m);
-  // The types of the arguments are those of the C function.
+  // The types of the arguments determine the C signature.
   def(
       m, "call_c_function",
       [](const std::string& function, Type result, const std::vector<Expr>& args) {

@@ -1,4 +1,5 @@
-// func.cpp -- Func: making, defining and describing one; func_schedule.cpp and func_running.cpp have the rest.
+// func.cpp -- binds the construction, definition and accessors of Func. func_schedule.cpp binds its directives and
+// func_running.cpp binds running and compiling.
 #include "bind_all.h"
 #include "binding.h"
 #include "call_site.h"
@@ -11,12 +12,12 @@ namespace retrograde::python {
 
 namespace {
 
-// Values in the types that earlier definitions have: `f[x] = 0` of a float Func stores 0.0.
-std::vector<Expr> values_for(const Func& f, const py::sequence& given) {
+// Values converted to the types of earlier definitions: `f[x] = 0` on a float Func stores 0.0.
+std::vector<Expr> values_for(const Func& f, const py::sequence& objects) {
   std::vector<Expr> values;
   const std::vector<Type>& types = value_types(*f.function());
-  for (size_t i = 0; i < given.size(); i++) {
-    const py::object value = given[i];
+  for (size_t i = 0; i < objects.size(); i++) {
+    const py::object value = objects[i];
     const bool known = i < types.size();
     values.push_back(known ? operand_for(types[i], value) : py::cast<Expr>(value));
   }
@@ -26,7 +27,7 @@ std::vector<Expr> values_for(const Func& f, const py::sequence& given) {
 void assign(const Func& f, const py::object& index, const py::object& value) {
   FuncRef ref(f.function(), coordinates(index));
   if (py::isinstance<Updated>(value)) {
-    // f[x] += e: Python stores what += gave back. The update is there already.
+    // Python assigns the result of f[x] += e to f[x]; the update has been added already.
     if (value.cast<Updated>().func == f.function()) return;
     throw py::type_error("what += gave back belongs to another Func");
   }
@@ -74,7 +75,7 @@ void bind_making(FuncClass& c) {
       .def("__setitem__", &assign, py::arg("index"), py::arg("value"));
 }
 
-// One Expr, or a Tuple of them.
+// An Expr if there is one value, otherwise a Tuple.
 py::object value_or_tuple(const Tuple& values) {
   return values.size() == 1 ? py::cast(values[0]) : py::cast(values);
 }
@@ -115,7 +116,7 @@ void bind_describing(FuncClass& c) {
       });
 }
 
-// Its value as a number, or of a Tuple as a tuple of them.
+// The value as a number, or a tuple of numbers for a Tuple.
 py::object evaluated(const Tuple& values) {
   Func f("evaluated");
   f() = values;
@@ -132,7 +133,7 @@ void bind_func(py::module_& m) {
   FuncClass c(m, "Func", {"LoopDirectives", "Runnable"});
   bind_making(c);
   bind_describing(c);
-  // lambda_(x, y, e): the last argument is the value.
+  // In lambda_(x, y, e) the last argument is the value.
   def(m, "lambda_", [](const py::args& args) {
     if (args.size() == 0) throw py::type_error("the last argument is the value");
     const Expr value = py::cast<Expr>(args[args.size() - 1]);

@@ -1,4 +1,4 @@
-// func_class.h -- the class Func, which several files bind.
+// func_class.h -- the Python class Func, whose methods are bound in several files.
 #pragma once
 
 #include "binding.h"
@@ -7,12 +7,12 @@ namespace retrograde::python {
 
 using FuncClass = Class<Func>;
 
-// What f[x] += e gives back, for Python to "store" in f[x].
+// The result of f[x] += e, which Python then assigns to f[x].
 struct Updated {
   graph::FuncPtr func;
 };
 
-// The class that bind_func made, for those that add to it.
+// The class that bind_func created, to add methods to.
 template <class T>
 Class<T> reopened(py::module_& module, const char* name,
                   std::initializer_list<const char*> inherited) {

@@ -1,4 +1,4 @@
-// func_ref.cpp -- a Func at a point: read as an Expr, updated by += and its like.
+// func_ref.cpp -- binds a Func at a point, which reads as an Expr and is updated by +=, -=, *= and /=.
 #include "bind_all.h"
 #include "func_class.h"
 
@@ -8,14 +8,14 @@ namespace {
 
 Updated done(const graph::FuncPtr& func) { return {func}; }
 
-// A number in the type of the Func, once it has one.
+// The operand of an update; a plain number takes the type of the Func, if that is known.
 Expr operand_of(const FuncRef& ref, int value, py::handle object) {
   const std::vector<Type>& types = value_types(*ref.function());
   if (value < static_cast<int>(types.size())) return operand_for(types[value], object);
   return py::reinterpret_borrow<py::object>(object).cast<Expr>();
 }
 
-// `op` is one of FuncRef's, for whatever stands on the right-hand side.
+// Applies one of FuncRef's update operators to any kind of right-hand side.
 template <class Op>
 void bind_update(Class<FuncRef>& c, const char* name, Op op) {
   c.def(

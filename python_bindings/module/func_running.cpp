@@ -1,4 +1,4 @@
-// func_running.cpp -- Func: running it, and compiling it to files.
+// func_running.cpp -- binds running Funcs and compiling them to files.
 #include "bind_all.h"
 #include "func_class.h"
 #include "runnable.h"

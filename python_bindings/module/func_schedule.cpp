@@ -1,4 +1,4 @@
-// func_schedule.cpp -- Func: where it is computed and stored, what is known of its size, its wrappers.
+// func_schedule.cpp -- binds the directives of Func: compute and storage levels, bounds, wrappers.
 #include "bind_all.h"
 #include "frontend/data/param.h"
 #include "func_class.h"
@@ -10,7 +10,7 @@ namespace {
 
 using py::arg;
 
-// An RDom of one variable stands for it.
+// Passes a loop as Var or RVar; a one-dimensional RDom means its variable.
 template <class Give>
 Func& at_loop(const Func& consumer, const VarOrRVar& var, Give give) {
   return give(LoopLevel(consumer, var));
@@ -111,7 +111,7 @@ void bind_func_schedule(py::module_& m) {
   bind_wrappers(c);
   bind_watching(c);
   bind_loop_directives(c);
-  // f.compute_with(g, x): the first stage of g.
+  // In f.compute_with(g, x), g means its first stage.
   py::implicitly_convertible<Func, Stage>();
   reopened<Stage>(m, "Stage", {})
       .def(py::init([](const Func& f) { return Stage(f); }), py::arg("f"));

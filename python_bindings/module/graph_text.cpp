@@ -1,5 +1,5 @@
-// graph_text.cpp -- a pipeline as text, and the pipeline that a text describes: operators of PyTorch that another
-// process is to have, too (retrograde/torch/_pickling.py).
+// graph_text.cpp -- converts a pipeline to text and back, to pickle operators of PyTorch for other processes
+// (retrograde/torch/_pickling.py).
 #include <cstring>
 
 #include "bind_all.h"
@@ -32,7 +32,7 @@ void check_is_text(const graph::Graph& described) {
   }
 }
 
-// Describes a Buffer that a program names: name, type, (min, extent) of each dimension, elements.
+// A Buffer that a pipeline uses, as a tuple: name, type, (min, extent) of each dimension, elements.
 py::tuple described(const graph::ParameterContents& literal) {
   const auto contents = std::static_pointer_cast<frontend::BufferContents>(literal.buffer_owner);
   const Buffer<> dense = Buffer<>(contents).copy_to_planar();
@@ -44,7 +44,7 @@ py::tuple described(const graph::ParameterContents& literal) {
       py::bytes(reinterpret_cast<const char*>(dense.data()), dense.size_in_bytes()));
 }
 
-// The text, and the Buffers that it names.
+// The text of a pipeline, and the Buffers that it uses.
 py::tuple describe_pipeline(const Pipeline& pipeline) {
   std::vector<graph::FuncPtr> outputs;
   for (const Func& f : pipeline.outputs()) outputs.push_back(f.function());
@@ -82,14 +82,14 @@ py::object parameter_object(const Parameter& parameter) {
   return parameter->is_buffer ? py::cast(ImageParam(parameter)) : py::cast(Param<>(parameter));
 }
 
-// Outputs, and the parameters by name. What the compiler adds to the pipeline gets other names than those of the text.
+// The outputs and the parameters by name. Names that the compiler generates later differ from those of the text.
 py::tuple pipeline_described(const std::string& text, const py::list& buffers) {
-  const graph::Graph made = graph::parse_graph(text);
+  const graph::Graph parsed = graph::parse_graph(text);
   py::list outputs;
   py::dict parameters;
-  for (const graph::FuncPtr& f : made.funcs) graph::claim_name(f->name);
-  for (const graph::FuncPtr& f : made.outputs) outputs.append(Func(f));
-  for (const Parameter& parameter : made.parameters) {
+  for (const graph::FuncPtr& f : parsed.funcs) graph::claim_name(f->name);
+  for (const graph::FuncPtr& f : parsed.outputs) outputs.append(Func(f));
+  for (const Parameter& parameter : parsed.parameters) {
     graph::claim_name(parameter->name);
     if (!parameter->is_literal) {
       parameters[py::str(parameter->name)] = parameter_object(parameter);

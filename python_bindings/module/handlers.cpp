@@ -1,5 +1,5 @@
-// handlers.cpp -- what compiled code calls back: `print` is a function of Python; the others are C functions, of
-// ctypes or by their address.
+// handlers.cpp -- binds JITHandlers. `print` is a Python function; the others are C functions, given as ctypes
+// functions or addresses.
 #include "frontend/run/jit_handlers.h"
 
 #include "bind_all.h"
@@ -15,8 +15,8 @@ namespace retrograde::python {
 
 namespace {
 
-// The attribute is the address, None where the runtime's own is called. What is set stays for good: compiled code
-// calls it while anyone, in C++ too, has the Func or Pipeline, which no object of Python's sees the end of.
+// A handler as an attribute: an address, or None for the runtime's own. A function that is set is kept alive forever,
+// because compiled code may call it as long as any C++ object holds the Func or Pipeline.
 template <class Pointer>
 void bind_pointer(Class<JITHandlers>& c, const char* name, Pointer JITHandlers::*field) {
   c.def_property(
@@ -31,7 +31,7 @@ void bind_pointer(Class<JITHandlers>& c, const char* name, Pointer JITHandlers::
       });
 }
 
-// realize() tells Python what a handler of Python's raised, once it is back: it may be on any thread.
+// A Python print function may run on any thread; realize() raises its exception after the call.
 std::function<void(const char*)> printer_of(const std::optional<py::function>& print) {
   if (!print) return nullptr;
   return [print = Callback(*print)](const char* message) {
@@ -67,7 +67,7 @@ void bind_class(py::module_& m) {
       });
 }
 
-// For the package `halide` (retrograde/compat), which sends prints and warnings where Halide's does.
+// Process-wide handlers for the package `halide` (retrograde/compat), which prints like Halide's package.
 void bind_defaults(py::module_& m) {
   m.def("_set_default_print", [](const std::optional<py::function>& print) {
     JITHandlers handlers = frontend::default_handlers();
@@ -76,9 +76,9 @@ void bind_defaults(py::module_& m) {
   });
   m.def("_warn_of_rounding", &warn_of_rounding);
   m.def("_set_warning_handler", [](const std::optional<py::function>& tell) {
-    const std::function<void(const char*)> told = printer_of(tell);
-    set_warning_handler(told ? [told](const std::string& text) { told(text.c_str()); }
-                             : WarningHandler());
+    const std::function<void(const char*)> printer = printer_of(tell);
+    set_warning_handler(printer ? [printer](const std::string& text) { printer(text.c_str()); }
+                                : WarningHandler());
   });
 }
 

@@ -1,4 +1,4 @@
-// image_param.cpp -- ImageParam, OutputImageParam and their Dimensions; Argument.
+// image_param.cpp -- binds ImageParam, OutputImageParam, their Dimensions, and Argument.
 #include "frontend/data/image_param.h"
 #include "any_stride.h"
 #include "bind_all.h"

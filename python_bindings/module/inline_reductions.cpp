@@ -1,4 +1,4 @@
-// inline_reductions.cpp -- sum, product, maximum ...: reductions inside expressions.
+// inline_reductions.cpp -- binds reductions inside expressions: sum, product, maximum, ...
 #include "frontend/language/inline_reductions.h"
 
 #include "bind_all.h"

@@ -1,4 +1,4 @@
-// integer_functions.cpp -- arithmetic on integers with the width of its result said; updates at several points.
+// integer_functions.cpp -- binds widening, saturating and rounding integer arithmetic, and updates at several points.
 #include "bind_all.h"
 #include "binding.h"
 #include "frontend/language/integer_ops.h"
@@ -45,7 +45,7 @@ void bind_integer_functions(py::module_& m) {
       arg("type"), arg("e"), arg("lowest"));
   def(m, "concat_bits", &concat_bits, arg("parts"));
   def(m, "user_context_value", &user_context_value);
-  // Numbers take the type of the other points.
+  // Plain numbers take the type of the other points.
   const auto points_of = [](const py::args& points) {
     return operands(points.cast<std::vector<py::object>>());
   };

@@ -1,4 +1,4 @@
-// loop_directives.h -- the directives that Func and Stage have in common.
+// loop_directives.h -- binds the loop directives that Func and Stage share.
 #pragma once
 
 #include <vector>
@@ -10,7 +10,7 @@ namespace retrograde::python {
 
 using Alignment = std::vector<std::pair<VarOrRVar, LoopAlignStrategy>>;
 
-// reorder(x, y) and reorder([x, y])
+// Loops given as arguments or as one list: reorder(x, y) and reorder([x, y]).
 inline std::vector<VarOrRVar> loops_of(const py::args& args) {
   std::vector<VarOrRVar> loops;
   const auto add = [&](const auto& self, py::handle object) -> void {

@@ -39,7 +39,7 @@ PYBIND11_MODULE(_retrograde, module) {
   bind_boundary_conditions(module);
   bind_inline_reductions(module);
   bind_operators(module);
-  // What Halide's Python package calls otherwise than its C++.
+  // Names that differ between Halide's Python package and its C++ library.
   const auto also = [&](const char* name, const char* cls, const char* member) {
     module.attr(name) = module.attr(cls).attr(member);
   };

@@ -1,4 +1,4 @@
-// module_files.cpp -- Module: lowered functions on their way to files, and what makes one of several.
+// module_files.cpp -- binds Module, link_modules and multi-target compilation.
 #include "frontend/run/module.h"
 
 #include "bind_all.h"

@@ -1,4 +1,5 @@
-// numbers.cpp -- see numbers.h, and operands() of casters.h.
+// numbers.cpp -- converts Python's and NumPy's numbers, and chooses the types of plain numbers (operands() in
+// casters.h).
 #include "numbers.h"
 
 #include <algorithm>
@@ -22,7 +23,7 @@ bool is_numpy_scalar(py::handle object) {
          py::hasattr(object, "shape") && py::len(object.attr("shape")) == 0;
 }
 
-// An int that fits 64 bits, signed or not.
+// An int of at most 64 bits, signed or unsigned.
 struct Integer {
   bool is_negative = false;
   uint64_t bits = 0;  // two's complement
@@ -72,7 +73,7 @@ Expr rounded_constant(py::handle number, Type type) {
   return ir::make_const(type, value);
 }
 
-// A plain number in the type of an operand beside it; as it is where it does not fit.
+// A plain number in the type of the other operand; in its own type if it does not fit.
 Expr beside(Type type, py::handle number) {
   if (PyFloat_Check(number.ptr())) {
     const double value = PyFloat_AS_DOUBLE(number.ptr());
@@ -94,7 +95,7 @@ Expr beside(Type type, py::handle number) {
   return ir::make_const(type.element_of(), value.as_signed());
 }
 
-// What plain ints and plain floats become beside these.
+// The types that plain ints and plain floats take next to the given operands.
 struct Beside {
   std::optional<Type> any, floating;
 };

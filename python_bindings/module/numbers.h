@@ -1,4 +1,4 @@
-// numbers.h -- Python's and NumPy's numbers as constants.
+// numbers.h -- converts Python's and NumPy's numbers to constants.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -12,12 +12,12 @@ namespace retrograde::python {
 
 namespace py = pybind11;
 
-// bool; int as int32, or the 64-bit type that holds it; float as float32; NumPy's scalars as what they are.
-// OverflowError where an int has more than 64 bits.
+// A number as a constant. bool is bool, int is int32 or the 64-bit type that holds it, and float is float32. NumPy's
+// scalars keep their types. Throws OverflowError if an int has more than 64 bits.
 std::optional<Expr> number_from(py::handle object);
-// Whether a plain float that float32 does not hold is a RuntimeWarning where it is rounded to that.
+// Chooses whether rounding a plain float to float32 raises a RuntimeWarning if the value changes.
 void warn_of_rounding(bool warns);
-// A number as a value of a type. OverflowError or TypeError where it cannot be one.
+// A number as a value of a type. Throws OverflowError or TypeError if it does not fit.
 ir::Scalar scalar_of(Type type, py::handle number);
 py::object object_of(const ir::Scalar& value);
 

@@ -1,5 +1,5 @@
-// operators.cpp -- Python's operators for Expr and for all that stands for one: Var, RVar, RDom, Param, a Func at a
-// point. They are made once, of objects, and given to each class.
+// operators.cpp -- Python's operators for Expr and all classes that convert to it: Var, RVar, RDom, Param, a Func at a
+// point. The functions take any objects, are created once, and are added to each class.
 #include <functional>
 
 #include "bind_all.h"
@@ -31,12 +31,12 @@ bool are_bools(const Expr& a, const Expr& b) {
   return a.defined() && b.defined() && a.type().is_bool() && b.type().is_bool();
 }
 
-// Of conditions they are && and ||: Python's own cannot be given a meaning.
+// & and | on conditions mean && and ||, because Python's `and` and `or` cannot be overloaded.
 Expr and_of(Expr a, Expr b) { return are_bools(a, b) ? a && b : a & b; }
 Expr or_of(Expr a, Expr b) { return are_bools(a, b) ? a || b : a | b; }
 Expr xor_of(Expr a, Expr b) { return are_bools(a, b) ? a != b : a ^ b; }
 Expr not_of(const Expr& a) { return a.defined() && a.type().is_bool() ? !a : ~a; }
-// Rounds down; of floats, too.
+// Division that rounds down, also for floats.
 Expr floor_divided(Expr a, Expr b) {
   const Expr quotient = a / b;
   return quotient.type().is_float() ? floor(quotient) : quotient;
@@ -44,7 +44,7 @@ Expr floor_divided(Expr a, Expr b) {
 
 struct Named {
   const char* name;      // "__add__"
-  const char* reversed;  // "__radd__"; null for comparisons, which Python turns around itself
+  const char* reversed;  // "__radd__"; null for comparisons, which Python reverses itself
   Binary op;
 };
 const Named binary_operators[] = {
@@ -102,7 +102,7 @@ void bind_operators(py::module_& m) {
   for (const char* name :
        {"Expr", "Var", "RVar", "RDom", "Param", "FuncRef", "FuncTupleElementRef"}) {
     const py::object cls = m.attr(name);
-    // Setting __eq__ of a class that has no hash of its own leaves the hash alone.
+    // Setting __eq__ after the class exists does not remove its hash.
     add_to(cls);
   }
 }

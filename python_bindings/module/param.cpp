@@ -1,4 +1,4 @@
-// param.cpp -- Param: the type is an argument here, not of the class.
+// param.cpp -- binds Param, whose type is an argument of the constructor.
 #include "frontend/data/param.h"
 #include "bind_all.h"
 #include "binding.h"
@@ -12,8 +12,8 @@ void set(Param<>& param, const py::object& value) {
   frontend::set_scalar(*param.parameter(), scalar_of(param.type(), value));
 }
 
-Param<> made(Type type, const std::string& name, const py::object& value, const py::object& min,
-             const py::object& max) {
+Param<> make_param(Type type, const std::string& name, const py::object& value,
+                   const py::object& min, const py::object& max) {
   Param<> param(type, name);
   if (!value.is_none()) set(param, value);
   if (!min.is_none()) param.set_min_value(operand_for(type, min));
@@ -25,10 +25,10 @@ Param<> made(Type type, const std::string& name, const py::object& value, const 
 
 void bind_param(py::module_& m) {
   Class<Param<>>(m, "Param")
-      .def(py::init(&made), py::arg("type"), py::arg("name") = "", py::arg("value") = py::none(),
-           py::arg("min") = py::none(), py::arg("max") = py::none())
+      .def(py::init(&make_param), py::arg("type"), py::arg("name") = "",
+           py::arg("value") = py::none(), py::arg("min") = py::none(), py::arg("max") = py::none())
       .def(py::init([](Type type, const py::object& value) {
-             return made(type, "", value, py::none(), py::none());
+             return make_param(type, "", value, py::none(), py::none());
            }),
            py::arg("type"), py::arg("value"))
       .def("name", &Param<>::name)

@@ -1,4 +1,4 @@
-// pipeline.cpp -- Pipeline.
+// pipeline.cpp -- binds Pipeline.
 #include "bind_all.h"
 #include "runnable.h"
 

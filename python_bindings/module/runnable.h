@@ -1,4 +1,4 @@
-// runnable.h -- what Func and Pipeline have in common: running in process, compiling to files.
+// runnable.h -- binds the methods that Func and Pipeline share: running in process and compiling to files.
 #pragma once
 
 #include "binding.h"
@@ -13,7 +13,7 @@ inline std::vector<Func> outputs_of(const Pipeline& p) { return p.outputs(); }
 inline std::string asked_of(const Func& f) { return "realize " + quoted(f.name()); }
 inline std::string asked_of(const Pipeline&) { return "realize the Pipeline"; }
 
-// The C++ object of a Python one, with what keeps it.
+// The C++ object of a Python object, and a reference that keeps it alive.
 template <class Self>
 struct Pinned {
   explicit Pinned(const py::object& object) : self(object.cast<Self*>()), kept(keep(object)) {}
@@ -78,7 +78,7 @@ void bind_runs(Class<Self>& c) {
       .def("infer_arguments", &Self::infer_arguments);
 }
 
-// compile_to_<what>(filename, args, function_name, target)
+// Binds compile_to_<kind>(filename, args, function_name, target).
 template <class Self, class Compile>
 void bind_file(Class<Self>& c, const char* name, Compile compile) {
   using py::arg;

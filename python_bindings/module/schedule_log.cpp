@@ -1,4 +1,4 @@
-// schedule_log.cpp -- schedules as values, and what they cost.
+// schedule_log.cpp -- binds ScheduleLog and the reports of schedules' costs.
 #include "bind_all.h"
 #include "binding.h"
 #include "frontend/run/kernel_report.h"

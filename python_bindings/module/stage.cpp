@@ -1,4 +1,4 @@
-// stage.cpp -- LoopLevel, and Stage: the schedule of one definition.
+// stage.cpp -- binds LoopLevel and Stage.
 #include "bind_all.h"
 #include "loop_directives.h"
 

@@ -1,4 +1,4 @@
-// tangents.cpp -- forward mode, products with second derivatives, whole Jacobians and Hessians.
+// tangents.cpp -- binds forward mode, Hessian-vector products, Jacobians and Hessians.
 #include "autodiff/tangents.h"
 
 #include "autodiff/jacobian.h"

@@ -1,4 +1,4 @@
-// target.cpp -- Target, its enumerations, and the targets of this machine.
+// target.cpp -- binds Target, its enumerations, and the targets of this machine.
 #include "ir/target.h"
 
 #include "bind_all.h"

@@ -1,4 +1,4 @@
-// tensor_memory.cpp -- see tensor_memory.h.
+// tensor_memory.cpp -- reads the memory of tensors through PyTorch's Python methods.
 #include "tensor_memory.h"
 
 #include <sys/mman.h>
@@ -14,15 +14,15 @@ namespace retrograde::python {
 
 namespace {
 
-// A name as the interpreter keeps it: looked up by address.
+// An interned attribute name, which the interpreter compares by address.
 struct Name {
   explicit Name(const char* text) : object(PyUnicode_InternFromString(text)) {}
   PyObject* object;
 };
 
-py::object checked(PyObject* made) {
-  if (!made) throw py::error_already_set();
-  return py::reinterpret_steal<py::object>(made);
+py::object checked(PyObject* result) {
+  if (!result) throw py::error_already_set();
+  return py::reinterpret_steal<py::object>(result);
 }
 
 int part(PyObject* number, const char* what) {
@@ -72,7 +72,7 @@ Runtime::Buffer<> buffer_of_tensor(py::handle tensor, Type type) {
   halide_dimension_t dimensions[most];
   for (int axis = 0; axis < rank; axis++) {
     const int extent = part(PyTuple_GET_ITEM(sizes.ptr(), axis), "extents");
-    // An axis of one element or none has any stride, as it leads nowhere.
+    // The stride of an axis with at most one element is arbitrary.
     const int stride = extent > 1 ? part(PyTuple_GET_ITEM(strides.ptr(), axis), "strides") : 1;
     dimensions[rank - 1 - axis] = halide_dimension_t(0, extent, stride);
   }
@@ -83,7 +83,7 @@ void use_huge_pages(uintptr_t first, size_t bytes) {
 #ifdef MADV_HUGEPAGE
   constexpr uintptr_t page = 2 << 20;
   const uintptr_t begin = (first + page - 1) / page * page, end = (first + bytes) / page * page;
-  // Only advice: failure changes nothing.
+  // Failure is harmless, since this is only advice.
   if (begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
 #else
   (void)first, (void)bytes;

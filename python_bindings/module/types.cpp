@@ -1,4 +1,4 @@
-// types.cpp -- Type; and what else names one: a dtype of NumPy, a text.
+// types.cpp -- binds Type, and converts NumPy dtypes and names to it.
 #include "bind_all.h"
 #include "binding.h"
 #include "ir/parse.h"
@@ -19,7 +19,7 @@ std::optional<Type> type_named(const std::string& name) {
   return {};
 }
 
-// NumPy's name for the elements of a Buffer of this type.
+// The NumPy dtype of a type's elements.
 py::object dtype_of(Type type) {
   const std::string name = type.is_bool() ? "bool" : to_string(type.element_of());
   return py::module_::import("numpy").attr("dtype")(name);
@@ -29,7 +29,7 @@ py::object dtype_of(Type type) {
 
 std::optional<Type> type_from(py::handle object) {
   if (py::isinstance<py::str>(object)) return type_named(object.cast<std::string>());
-  // numpy.dtype, and its scalar types: what has a name of ours.
+  // numpy.dtype and NumPy's scalar types, if they have a name that is a Type.
   if (py::hasattr(object, "kind") && py::hasattr(object, "name")) {
     if (py::hasattr(object, "isnative") && !object.attr("isnative").cast<bool>()) return {};
     return type_named(py::str(object.attr("name")));

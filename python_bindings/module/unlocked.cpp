@@ -1,4 +1,4 @@
-// unlocked.cpp -- see unlocked.h.
+// unlocked.cpp -- the worker thread, and waiting for it while polling for signals.
 #include "unlocked.h"
 
 #include <unistd.h>
@@ -22,7 +22,7 @@ struct Job {
   bool done = false;
 };
 
-// One thread that does what the main thread asks for, one job after another.
+// A thread that runs the main thread's jobs one after another.
 class Worker {
  public:
   void start(std::shared_ptr<Job> job) {
@@ -32,12 +32,12 @@ class Worker {
     }
     changed_.notify_all();
   }
-  // Whether the job has ended within the time.
+  // Waits for the job; returns whether it ended within the time.
   bool wait(const Job& job, std::chrono::milliseconds time) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, time, [&] { return job.done; });
   }
-  // Another job is not to come: the thread ends behind the present one.
+  // Makes the thread end after the current job.
   void retire() {
     std::lock_guard lock(mutex_);
     retired_ = true;
@@ -51,7 +51,7 @@ class Worker {
       } catch (...) {
         job->error = std::current_exception();
       }
-      job->work = nullptr;  // lets go of what it kept
+      job->work = nullptr;  // releases the objects that it held
       std::lock_guard lock(self->mutex_);
       job->done = true;
       self->changed_.notify_all();
@@ -70,7 +70,7 @@ class Worker {
   bool retired_ = false;
 };
 
-// The main thread's, and no one else's: needs no lock. A child of fork() has no threads, and so gets a new one.
+// The worker of the main thread, which alone uses it, so there is no lock. After fork() the child starts a new one.
 struct Hired {
   std::shared_ptr<Worker> worker;
   pid_t process = 0;
@@ -80,7 +80,8 @@ Hired hired;
 Worker& worker() {
   if (hired.worker && hired.process == getpid()) return *hired.worker;
   if (hired.worker)
-    new std::shared_ptr<Worker>(std::move(hired.worker));  // its locks are those of a parent
+    new std::shared_ptr<Worker>(
+        std::move(hired.worker));  // leaked: its locks belong to the parent process
   hired = {std::make_shared<Worker>(), getpid()};
   std::thread([self = hired.worker] { Worker::loop(self); }).detach();
   return *hired.worker;
@@ -92,7 +93,7 @@ bool is_main_thread() {
   return PyThread_get_thread_ident() == main_thread;
 }
 
-// The GIL is held while signals are looked at, and only then.
+// Waits for a job. Holds the GIL only while it polls for signals.
 void wait_for(const std::shared_ptr<Job>& job, Worker& worker) {
   const auto interval = std::chrono::milliseconds(20);
   while (true) {
@@ -132,7 +133,7 @@ void run_unlocked(Work work) {
   Worker& on = worker();
   on.start(job);
   wait_for(job, on);
-  // Taken from the job, of which the other thread may let go later than this one.
+  // Moved out of the job, because the other thread may release the job later than this one.
   if (std::exception_ptr error = std::exchange(job->error, nullptr))
     std::rethrow_exception(std::move(error));
 }

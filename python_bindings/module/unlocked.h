@@ -1,10 +1,10 @@
-// unlocked.h -- compiling and running without the GIL, so that other threads of Python go on, and so that Ctrl-C
-// is seen.
+// unlocked.h -- compiles and runs without the GIL, so that other Python threads continue and Ctrl-C works.
 //
-// Signals reach Python's main thread only, and only while it is in Python: a main thread that computes for an hour
-// sees nothing. So what it asks for runs on a thread of ours, while it waits and looks for signals. Where one raises
-// (KeyboardInterrupt), the work is left to itself: it owns all that it touches, so it ends when it ends, and its
-// results go nowhere. Parallel loops end with their next task (see `Interruption`). Other threads compute themselves.
+// Only Python's main thread handles signals, and only while it executes Python code. So work that the main thread
+// requests runs on a worker thread, while the main thread waits and polls for signals. If a signal handler raises
+// (KeyboardInterrupt), the work is abandoned: it owns everything that it accesses, so it can finish later, and its
+// results are discarded. Parallel loops stop at their next task (see `Interruption`). Other threads run their work
+// themselves.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -18,17 +18,17 @@ namespace retrograde::python {
 
 namespace py = pybind11;
 
-// A reference that may be let go on any thread, with or without the GIL.
+// A reference that may be released on any thread, with or without the GIL.
 using Kept = std::shared_ptr<void>;
 Kept keep(py::object object);
 
-// Whether the caller of work went away.
+// Set when the caller has abandoned the work.
 using Interruption = std::shared_ptr<std::atomic<bool>>;
 
-// Rethrows what `work` throws; error_already_set for an interruption.
+// Runs `work` and rethrows its exceptions; throws error_already_set for an interruption.
 void run_unlocked(std::function<void(const Interruption&)> work);
 
-// What `work`, which may not touch Python, returns.
+// The result of `work`, which must not use Python.
 template <class Work>
 auto unlocked(Work work) {
   using Result = std::invoke_result_t<Work, const Interruption&>;

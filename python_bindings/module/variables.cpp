@@ -1,4 +1,4 @@
-// variables.cpp -- Var, RVar, RDom, Range.
+// variables.cpp -- binds Var, RVar, RDom and Range.
 #include "bind_all.h"
 #include "binding.h"
 #include "frontend/data/image_param.h"

@@ -1,4 +1,4 @@
-// watching.cpp -- warnings, what passes took, and the cache of compiled pipelines on disk.
+// watching.cpp -- binds warnings, times of compiler passes, and the compile cache on disk.
 #include <mutex>
 
 #include "bind_all.h"
@@ -14,7 +14,7 @@ namespace {
 
 using py::arg;
 
-// As a `with` block: what was told on the compiler's threads waits until somebody asks for it.
+// A context manager that collects pass times from the compiler's threads until they are read.
 class PassTimes {
  public:
   void enter() {
@@ -43,7 +43,7 @@ class PassTimes {
  private:
   mutable std::mutex mutex_;
   std::vector<Row> reports_;
-  std::unique_ptr<PassObserver> observer_;  // goes first
+  std::unique_ptr<PassObserver> observer_;  // destroyed first
 };
 
 void bind_passes(py::module_& m) {

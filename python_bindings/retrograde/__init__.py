@@ -1,4 +1,4 @@
-"""Array pipelines whose first product is the gradient.
+"""Array pipelines and their gradients, compiled for CPUs and CUDA devices.
 
     import numpy, retrograde as rg
     x, y = rg.Var("x"), rg.Var("y")
@@ -6,16 +6,16 @@
     f[x, y] = x + 10 * y
     a = numpy.asarray(f.realize([4, 3]))     # a[y, x] == f[x, y], always
 
-Names are those of the C++ library, whose documentation they carry; what they mean in Python alone is said in
-python_bindings/README.md. `retrograde.runtime` runs what was compiled ahead of time, and needs nothing of the compiler.
+Names and documentation are those of the C++ library; python_bindings/README.md describes what differs in Python.
+`retrograde.runtime` runs functions that were compiled ahead of time, without the compiler.
 """
 import importlib.util as _util
 
 from ._errors import CompileError, Error, InternalError, RuntimeError, Unsupported, UserError
 
-HalideError = Error  # as Halide's package calls it
+HalideError = Error  # name in Halide's package
 __all__ = ["CompileError", "Error", "HalideError", "InternalError", "Unsupported", "UserError"]
-# Names that Python itself has: reached as retrograde.sum, never brought in by `import *`.
+# Names of built-ins: available as retrograde.sum, but not imported by `import *`.
 _BUILTIN = {"RuntimeError", "abs", "max", "min", "pow", "print", "round", "sum"}  # and vars
 
 if _util.find_spec("retrograde._retrograde") is None:
@@ -30,7 +30,7 @@ else:
     from ._linking import *
     from ._names import funcs, vars
 
-    lambda_func = lambda_  # as Halide's package calls it
+    lambda_func = lambda_  # name in Halide's package
     for _name in ("abs", "max", "min", "pow", "print", "round", "sum", "_"):
         globals()[_name] = getattr(_retrograde, _name)
     for _n in range(10):

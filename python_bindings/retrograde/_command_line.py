@@ -1,4 +1,4 @@
-"""The program that build files call to run a generator; its command line is that of generators in C++."""
+"""The command line of programs with generators, which build files call. Its flags are those of generators in C++."""
 import os
 import sys
 
@@ -31,13 +31,13 @@ def usage():
 
 
 def read(words):
-    """The flags, and the params apart."""
+    """The flags and the generator parameters of a command line."""
     flags, params, rest = {}, {}, list(words)
     while rest:
         word = rest.pop(0)
         if word in FLAGS:
             if not rest:
-                raise error(CompileError, ASKED, "every flag has a value", f"{word} has none", "Put it behind the flag")
+                raise error(CompileError, ASKED, "every flag has a value", f"{word} has none", "Put it after the flag")
             flags[FLAGS[word]] = rest.pop(0)
         elif "=" in word and not word.startswith("-"):
             key, _, value = word.partition("=")
@@ -72,7 +72,7 @@ def files_of(flags, base, default):
     for word in flags["emit"].split(",") if "emit" in flags else default:
         if word not in info:
             raise error(CompileError, f'emit a file of type "{word}"', f"the types of -e are {', '.join(info)}",
-                        f'"{word}" is none of them', "Name one or more of these, with commas between")
+                        f'"{word}" is not one of them', "Name one or more of these, with commas between")
         kind, extension = info[word]
         files[kind] = os.path.join(flags["folder"], base + extension)
     return files
@@ -100,7 +100,7 @@ def run(flags, params):
 
 
 def main(argv=None):
-    """Runs what the command line says. What goes wrong is one line on the standard error stream, and exit status 1."""
+    """Runs the generator that the command line names. An error prints one line to standard error and exits with 1."""
     words = sys.argv[1:] if argv is None else list(argv)
     if not words or {"-h", "--help"} & set(words):
         print(usage(), end="", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""What a notebook shows: of a Func its loops, of a Buffer its picture."""
+"""Display in notebooks: a Func shows its loops, a Buffer its picture."""
 import html
 import struct
 import zlib
@@ -8,11 +8,11 @@ import numpy
 from . import _retrograde as rg
 from ._errors import Error
 
-LARGEST = 1024  # pixels along a side; larger pictures are thinned
+LARGEST = 1024  # pixels along a side; larger pictures are subsampled
 
 
 def loops_as_html(func):
-    """The loops after scheduling; of what cannot be lowered yet, what it is and why."""
+    """The scheduled loops as HTML. If the Func cannot be lowered yet, its repr and the error."""
     try:
         text = func.loop_nest()
     except Error as problem:
@@ -21,8 +21,8 @@ def loops_as_html(func):
 
 
 def as_bytes(a):
-    """Values as brightness: bytes as they are, wider unsigned ones by their high bits, floats of [0, 1]; what lies
-    outside of that, and signed integers, between their least and their largest value."""
+    """Values as brightness. Bytes are kept, wider unsigned integers use their high bits, and floats map [0, 1].
+    Signed integers, and floats outside of [0, 1], are scaled between their smallest and largest value."""
     if a.dtype == bool:
         return a * numpy.uint8(255)
     if a.dtype.kind == "u":
@@ -36,7 +36,7 @@ def as_bytes(a):
 
 
 def png(pixels):
-    """[y, x] or [y, x, channel] of bytes as a PNG file."""
+    """A PNG file of the bytes pixels[y, x] or pixels[y, x, channel]."""
     height, width = pixels.shape[:2]
     channels = 1 if pixels.ndim == 2 else pixels.shape[2]
     rows = numpy.zeros((height, 1 + width * channels), numpy.uint8)  # each row begins with its filter: none
@@ -51,11 +51,11 @@ def png(pixels):
 
 
 def picture(buffer):
-    """PNG of a Buffer over x and y, or over x, y and up to four channels; None where it is no picture."""
+    """A PNG file of a Buffer over x and y, or over x, y and up to four channels; None for other Buffers."""
     if not buffer.defined() or buffer.dimensions() not in (1, 2, 3) or 0 in buffer.shape:
         return None
     if buffer.type() == rg.BFloat(16):
-        return None  # which NumPy does not have
+        return None  # NumPy has no bfloat16
     a = numpy.asarray(buffer)
     if a.ndim == 3 and a.shape[0] > 4:
         return None

@@ -1,12 +1,12 @@
-"""The exceptions of the library. Each carries the four parts of its message: what was `asked`, the `rule` that this
-breaks, the `evidence`, and what to do `instead`."""
+"""The exceptions of the library. Each has the four parts of its message as attributes: the request (`asked`), the
+`rule` that it breaks, the `evidence`, and advice on what to do `instead`."""
 import builtins
 
 __all__ = ["Error", "UserError", "CompileError", "RuntimeError", "Unsupported", "InternalError"]
 
 
 class Error(Exception):
-    """Base of all: catch this to catch everything the library reports."""
+    """Base of all exceptions of the library."""
 
     asked = rule = evidence = instead = ""
 
@@ -16,21 +16,21 @@ class UserError(Error):
 
 
 class CompileError(UserError):
-    """Found while a pipeline is defined, scheduled or compiled."""
+    """An error that is found while a pipeline is defined, scheduled or compiled."""
 
 
 class RuntimeError(UserError, builtins.RuntimeError):
-    """Found while a compiled pipeline is called. `code` is what it returned, 0 when the check came before the call."""
+    """An error that is found while a compiled pipeline is called. `code` is its result; 0: a check failed."""
 
     code = 0
 
 
 class Unsupported(Error, builtins.NotImplementedError):
-    """Legal, but a known gap of this compiler."""
+    """The program is legal, but this compiler does not support it yet."""
 
 
 class InternalError(Error):
-    """A bug of the library. `pass_name` and `ir_before` are what a report of it needs."""
+    """A bug in the library. `pass_name` and `ir_before`, the program before the pass, belong in a bug report."""
 
     pass_name = ir_before = ""
 
@@ -39,7 +39,7 @@ for _class in (Error, UserError, CompileError, RuntimeError, Unsupported, Intern
     _class.__module__ = "retrograde"
 
 def error(cls, asked, rule, evidence, instead):
-    """An exception of this class with the four parts, and their text."""
+    """An exception of class `cls` with the four parts of its message."""
     made = cls(f"cannot {asked}: {rule}; {evidence}. {instead}.")
     made.asked, made.rule, made.evidence, made.instead = asked, rule, evidence, instead
     return made

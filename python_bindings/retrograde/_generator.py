@@ -1,4 +1,4 @@
-"""Generators: classes that make a pipeline for given parameters and targets.
+"""Generators: classes that build a pipeline for given parameters and targets.
 
     @rg.generator(name="brighten")
     class Brighten:
@@ -12,13 +12,13 @@
             self.output[x, y] = self.input[x, y] * self.gain + self.offset
             self.output.vectorize(x, self.natural_vector_size("float32"))
 
-    Brighten(gain=3.0).realize([640, 480])      # in process: inputs are set as ImageParams and Params are
-    Brighten.call(photo_func, 1.0)              # inside of another pipeline
+    Brighten(gain=3.0).realize([640, 480])      # in process; set the inputs, which are ImageParams and Params, first
+    Brighten.call(photo_func, 1.0)              # inside another pipeline
     if __name__ == "__main__":
         rg.main()                               # python brighten.py -g brighten -o . target=host gain=3.0
 
-In an instance an input is an ImageParam or a Param, an output a Func; of arrays (`count=3`) it is a list of them. Types
-and dimensions that a class leaves open are given as `input.type` and `input.dim`, or in `configure(self)`.
+In an instance, an input is an ImageParam or a Param, and an output is a Func; arrays (`count=3`) are lists. Types and
+dimensions that a class leaves open are set by the parameters `input.type` and `input.dim`, or in `configure(self)`.
 """
 import copy
 import enum
@@ -29,25 +29,25 @@ from ._errors import CompileError, error
 __all__ = ["Generator", "GeneratorParam", "InputBuffer", "InputScalar", "OutputBuffer", "OutputScalar",
            "alias", "create_callable_from_generator", "generator", "generators"]
 
-generators = {}  # by name: what @generator registered
+generators = {}  # the classes that @generator registered, by name
 
 
-# ---- what a class declares ----
+# ---- declarations ----
 
 class GeneratorParam:
-    """A value that the build chooses, of the type of its default: a bool, number, str, Type, Target or enumerator."""
+    """A compile-time parameter with the type of its default: a bool, number, str, Type, Target or enumerator."""
 
     def __init__(self, default, *, min=None, max=None, choices=None):
         self.default, self.min, self.max, self.choices = default, min, max, choices
 
     def read(self, name, value):
-        """`value`, or what its text says, checked."""
+        """The value of this parameter from `value`, which may be text; raises CompileError if it is not allowed."""
         asked = f'give the generator param "{name}" the value {value!r}'
         try:
             read = self._read(value)
         except (ValueError, KeyError, TypeError) as problem:
             kind = type(self.default).__name__
-            raise error(CompileError, asked, f"it is a value of type {kind}", f"it is none: {problem}",
+            raise error(CompileError, asked, f"it is a value of type {kind}", f"it is not: {problem}",
                         f"Write it as {self.default!r} is written") from None
         below, above = self.min is not None and read < self.min, self.max is not None and read > self.max
         if below or above:
@@ -71,7 +71,7 @@ class GeneratorParam:
 
 
 class _Port:
-    """An input or output as it is declared."""
+    """The declaration of an input or output."""
 
     def __init__(self, type=None, dimensions=None, *, count=None):
         self.types = None if type is None else self._types(type)
@@ -79,7 +79,7 @@ class _Port:
 
     @staticmethod
     def _types(type):
-        """One or several, of which Python's own number types are some."""
+        """A list of Types from one type or several, which may be Python's bool, int and float."""
         own = {bool: "bool", int: "int32", float: "float32"}
         return [rg.Type(own.get(t, t)) for t in (type if isinstance(type, (list, tuple)) else [type])]
 
@@ -94,7 +94,7 @@ class _Port:
 
 
 class InputBuffer(_Port):
-    """An image, in an instance an ImageParam."""
+    """An input image; in an instance it is an ImageParam."""
 
     role = "input"
 
@@ -103,7 +103,7 @@ class InputBuffer(_Port):
 
 
 class InputScalar(_Port):
-    """A number, in an instance a Param. `value`, `min` and `max` as of a Param."""
+    """An input number; in an instance it is a Param. `value`, `min` and `max` are those of Param."""
 
     role = "input"
 
@@ -116,7 +116,7 @@ class InputScalar(_Port):
 
 
 class OutputBuffer(_Port):
-    """What the pipeline computes, in an instance a Func; several types are those of a Tuple."""
+    """An output; in an instance it is a Func. Several types declare a Tuple."""
 
     role = "output"
 
@@ -138,7 +138,7 @@ def _listed(value):
 
 
 class Generator:
-    """Base of generators; @generator adds it where a class has none."""
+    """Base of generators; @generator adds it to classes without it."""
 
     _name = ""
 
@@ -194,13 +194,13 @@ class Generator:
         else:
             port.count = int(value)
 
-    # ---- what a generator writes ----
+    # ---- methods that generators override, and declarations ----
 
     def configure(self):
-        """Before anything is made: may add inputs and outputs, and set what the class left open."""
+        """Called first: may add inputs and outputs, and set types and dimensions that the class leaves open."""
 
     def generate(self):
-        """Defines the outputs, and schedules."""
+        """Defines and schedules the outputs."""
         raise NotImplementedError(f"{type(self).__name__} has no generate()")
 
     def add_input(self, name, port):
@@ -212,7 +212,7 @@ class Generator:
         """The declaration of an input or output, for configure()."""
         return self._ports[name]
 
-    # ---- what it may ask ----
+    # ---- methods for use in generate() ----
 
     def name(self):
         return self._name
@@ -230,21 +230,21 @@ class Generator:
         return self._target.natural_vector_size(rg.Type(type))
 
     def add_requirement(self, condition, *message):
-        """Of the pipeline, when it is generated: see Pipeline.add_requirement."""
+        """Adds a requirement to the pipeline once it is generated; see Pipeline.add_requirement."""
         self._requirements.append((condition, *message))
 
     def trace_pipeline(self):
-        """Tells the trace handler when a call begins and when it ends."""
+        """Reports the begin and end of each call to the trace handler."""
         self._traced = True
 
-    # ---- what is made of it ----
+    # ---- results ----
 
     def inputs(self):
-        """ImageParams and Params, in the order in which they are declared."""
+        """The ImageParams and Params in the order of declaration."""
         return self._made("input")
 
     def outputs(self):
-        """Funcs, in the order in which they are declared."""
+        """The output Funcs in the order of declaration."""
         return self._made("output")
 
     def _made(self, role):
@@ -252,11 +252,11 @@ class Generator:
         return [one for name, port in self._ports.items() if port.role == role for one in _listed(getattr(self, name))]
 
     def pipeline(self):
-        """The Pipeline of the outputs; generates it when it is asked for first."""
+        """The Pipeline of the outputs; the first call generates it."""
         if self._pipeline is None:
             for name, port in self._ports.items():
                 setattr(self, name, self._given[name] if name in self._given else port.make(name))
-            self._pipeline = ()  # so that generate() may ask for what is made
+            self._pipeline = ()  # allows generate() to call inputs() and outputs()
             self.generate()
             self._pipeline = rg.Pipeline(self._made("output"))
             for requirement in self._requirements:
@@ -273,7 +273,7 @@ class Generator:
         return self.pipeline().realize(*args, **named)
 
     def compile_to_callable(self):
-        """A function of the inputs and then the outputs."""
+        """A function that takes the inputs, then the outputs."""
         return self.pipeline().compile_to_callable(self.inputs(), self._target)
 
     def build_module(self, function_name=""):
@@ -283,8 +283,8 @@ class Generator:
         return module
 
     def build_gradient_module(self, function_name=""):
-        """The gradient's function: the inputs and, for each output y, `_grad_loss_for_y`, the gradient of a loss at
-        it; out come `_grad_loss_y_wrt_a` for every image a."""
+        """A module with the gradient. Its function takes the inputs and, for each output y, `_grad_loss_for_y`, the
+        gradient of a loss with respect to y. It computes `_grad_loss_y_wrt_a` for every output y and image a."""
         images = [i for i in self.inputs() if isinstance(i, rg.ImageParam)]
         seeds, gradients, names = [], [], {}
         for output in self.outputs():
@@ -305,8 +305,8 @@ class Generator:
 
     @classmethod
     def call(cls, *inputs, target=None, **params):
-        """Its outputs as Funcs of a larger pipeline, made of Funcs, images, arrays and Exprs: one, or a tuple. Params
-        stand in a dict: `generator_params={"gain": 3.0}`."""
+        """The output Funcs, one or a tuple, for inputs that are Funcs, images, arrays or Exprs of a larger pipeline.
+        Generator parameters go into a dict: `generator_params={"gain": 3.0}`."""
         made = cls(target, **params.pop("generator_params", {}))
         names = [name for name, port in made._ports.items() if port.role == "input"]
         given = dict(zip(names, inputs))
@@ -336,12 +336,12 @@ def _one_input(port, value):
 
 
 def _plain(func):
-    """The name that the user gave: without the number that makes it unique."""
+    """The user's name for a Func, without the number that makes it unique."""
     return func.name().split("$")[0]
 
 
 def create_callable_from_generator(target, name, params=None):
-    """A function of the inputs, then the outputs, that a registered generator makes with these values of its params."""
+    """Compiles a registered generator, with these values of its parameters, to a function of inputs and outputs."""
     if name not in generators:
         raise error(CompileError, f'make the generator "{name}"',
                     "a generator is created by the name that it is registered under",
@@ -350,7 +350,7 @@ def create_callable_from_generator(target, name, params=None):
 
 
 def alias(**aliases):
-    """Registers more generators: the class with other values of its params. `@alias(wide={"radius": 4})` stands above
+    """Registers the class under more names, with other values of its parameters. Put `@alias(wide={"radius": 4})` above
     `@generator`."""
     def register(cls):
         for name, given in aliases.items():
@@ -362,7 +362,7 @@ def alias(**aliases):
 
 
 def generator(name=""):
-    """Registers a class under a name, for main() and command lines; it becomes a Generator."""
+    """Registers a class under a name, for main() and command lines, and makes it a Generator."""
     def register(cls):
         if not issubclass(cls, Generator):
             body = {k: v for k, v in vars(cls).items() if k not in ("__dict__", "__weakref__")}

@@ -1,4 +1,4 @@
-"""Shared libraries of compiled pipelines, for retrograde.runtime and others who load them."""
+"""Links compiled pipelines into shared libraries, for retrograde.runtime and other programs."""
 import os
 import subprocess
 import tempfile
@@ -11,8 +11,8 @@ __all__ = ["compile_to_shared_library", "link_shared_library"]
 
 
 def link_shared_library(filename, static_libraries):
-    """A shared library of what static libraries hold, by the system's C compiler (the environment's CC, or cc). It
-    needs the C library, and libsleef where pipelines use vector math; nothing of the compiler."""
+    """Links static libraries into a shared library with the system's C compiler (CC in the environment, or cc). The
+    result needs the C library, and libsleef if pipelines use vector math, but not the Retrograde compiler."""
     cc = os.environ.get("CC", "cc")
     command = [cc, "-shared", "-o", str(filename), "-Wl,--whole-archive", *[str(one) for one in static_libraries],
                "-Wl,--no-whole-archive", "-Wl,-z,defs", "-static-libgcc", "-pthread", "-ldl", "-l:libstdc++.a",
@@ -29,8 +29,8 @@ def link_shared_library(filename, static_libraries):
 
 
 def compile_to_shared_library(source, filename, arguments=(), function_name="", target=None):
-    """Compiles a Func or Pipeline, with arguments as of compile_to_object, or a Module, with the runtime, into a shared
-    library."""
+    """Compiles `source` and the runtime into a shared library. `source` is a Module, or a Func or Pipeline with
+    arguments as for compile_to_object."""
     module = source
     if not isinstance(source, rg.Module):
         module = source.compile_to_module(list(arguments), function_name, target)

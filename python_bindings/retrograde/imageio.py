@@ -1,30 +1,30 @@
-"""Pictures as arrays in the order of planes, `picture[channel, y, x]`, so that a Func reads them as f(x, y, channel).
+"""Reads and writes pictures as planar arrays, `picture[channel, y, x]`, which a Func reads as f(x, y, channel).
 
     image = rg.Buffer(retrograde.imageio.imread("photo.png"))
     retrograde.imageio.imwrite("out.png", numpy.asarray(result))
 
-Grey pictures are `picture[y, x]`. Files are read and written by the package imageio, or by Pillow where that is missing.
+Grey pictures are `picture[y, x]`. The package imageio reads and writes the files, or Pillow if imageio is missing.
 """
 import numpy as np
 
 
 def is_interleaved(im):
-    """Whether the channels of `im[channel, y, x]` lie side by side in memory."""
+    """Whether the channels of each pixel of `im[channel, y, x]` are adjacent in memory."""
     return im.ndim == 3 and im.strides[0] == im.itemsize and im.strides[2] == im.shape[0] * im.itemsize
 
 
 def copy_to_interleaved(im):
-    """The same picture, in new memory with the channels of a pixel side by side; grey ones as they are."""
+    """A copy of the picture in which the channels of each pixel are adjacent in memory."""
     return np.moveaxis(np.moveaxis(im, 0, 2).copy(), 2, 0) if im.ndim == 3 else im.copy()
 
 
 def copy_to_planar(im):
-    """The same picture, in new memory plane by plane."""
+    """A copy of the picture with one plane after another in memory."""
     return im.copy(order="C")
 
 
 def imread(uri, format=None, **kwargs):
-    """The picture in a file."""
+    """Reads a picture: `im[channel, y, x]`, or `im[y, x]` if it is grey."""
     pixels = _read(uri, format, kwargs)
     return copy_to_planar(np.moveaxis(pixels, 2, 0)) if pixels.ndim == 3 else pixels
 

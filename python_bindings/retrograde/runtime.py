@@ -1,12 +1,12 @@
-"""Runs functions that were compiled ahead of time, without the compiler: Python and ctypes alone.
+"""Runs functions that were compiled ahead of time, without the compiler, using only NumPy and ctypes.
 
     from retrograde import runtime
     brighten = runtime.load("libbrighten.so", "brighten")
     brighten(photo, 2.0, out)                   # or by name: brighten(photo, gain=2.0, output=out)
 
-A library comes from `retrograde.compile_to_shared_library`, or from linking what a generator wrote. Arrays are NumPy's,
-or what NumPy can see without a copy; nothing is copied, with the axis rule of the package: a[y, x] == f[x, y]. Errors
-are `retrograde.RuntimeError`, with the library's code and text. The GIL is free during a call.
+A library comes from `retrograde.compile_to_shared_library`, or from linking the static library of a generator. Arrays
+are NumPy's, or objects that NumPy can view without a copy; no data is copied. The axis rule of the package applies:
+a[y, x] == f[x, y]. Errors are `retrograde.RuntimeError`, with the library's code and message. A call releases the GIL.
 """
 import ctypes
 import threading
@@ -67,7 +67,7 @@ ERROR_HANDLER = CFUNCTYPE(None, c_void_p, c_char_p)
 # ---- arguments ----
 
 class Argument:
-    """What a function takes in one place: `name`, `kind`, `dtype`, `dimensions`, and, of scalars, `default`."""
+    """An argument of a function: its `name`, `kind`, `dtype` and `dimensions`, and for scalars the `default`."""
 
     KINDS = ("scalar", "input", "output")
 
@@ -78,7 +78,7 @@ class Argument:
 
     @property
     def dtype(self):
-        """NumPy's; of bfloat16, which it does not have, that of its bits."""
+        """The NumPy dtype; uint16, the bits, for bfloat16, which NumPy lacks."""
         if self.code == BFLOAT:
             return numpy.dtype("uint16")
         if self.code == HANDLE:
@@ -89,7 +89,7 @@ class Argument:
 
     @property
     def field(self):
-        """Of halide_scalar_value_t."""
+        """The field of halide_scalar_value_t."""
         if self.code == UINT and self.bits == 1:
             return "b"
         return {INT: "i", UINT: "u", FLOAT: "f"}.get(self.code, "handle") + (str(self.bits) if self.code < 3 else "")
@@ -98,7 +98,7 @@ class Argument:
         return value.u16 if self.bits == 16 and self.code >= FLOAT else getattr(value, self.field)
 
     def scalar(self, given):
-        """The value in memory, as the function reads it."""
+        """The value as an array whose memory the function reads."""
         dtype = self.dtype
         array = numpy.asarray(given)
         if array.shape != () or array.dtype.kind not in ("iub" if dtype.kind in "iu" else "iubf"):
@@ -114,7 +114,7 @@ class Argument:
 
 
 class _Image:
-    """An array as a halide_buffer_t; its axes are the buffer's dimensions in reverse."""
+    """An array as a halide_buffer_t, with the axes in reverse as its dimensions."""
 
     def __init__(self, argument, given):
         array = given if isinstance(given, numpy.ndarray) else numpy.asarray(given)
@@ -147,10 +147,10 @@ class _Image:
 # ---- functions ----
 
 class Function:
-    """A function of a library: call it with its arguments in the order of `arguments`, or by name."""
+    """A function of a library. Call it with arguments in the order of `arguments`, or by name."""
 
     def __init__(self, library, name):
-        self._library = library  # alive as long as its functions
+        self._library = library  # keeps the library loaded
         self._call = getattr(library, name + "_argv")
         self._call.argtypes, self._call.restype = [POINTER(c_void_p)], c_int
         describe = getattr(library, name + "_metadata")
@@ -165,8 +165,8 @@ class Function:
         self._run(kept)
 
     def required(self, *args, **named):
-        """The regions that inputs need for outputs of these shapes: {name: [(min, extent), ...]} in the order of
-        Funcs, innermost dimension first. Arguments as of a call; inputs that are None are asked for."""
+        """The regions of the inputs that outputs of these shapes require: {name: [(min, extent), ...]}, innermost
+        dimension first. Arguments are those of a call; inputs may be None."""
         values = self._ordered(args, named)
         kept = []
         for argument, value in zip(self.arguments, values):
@@ -209,7 +209,7 @@ class Function:
         return f"<{self.name} for {self.target}: {', '.join(repr(a) for a in self.arguments)}>"
 
 
-_said = threading.local()  # what the call of this thread was told
+_said = threading.local()  # the error message of this thread's call
 
 
 @ERROR_HANDLER
@@ -218,12 +218,12 @@ def _on_error(context, message):
 
 
 def load(path, name):
-    """The function `name` of a shared library. Its errors are exceptions from then on, and print nothing."""
+    """Loads the function `name` of a shared library. Its errors become exceptions instead of printing and aborting."""
     library = ctypes.CDLL(str(path))
     try:
         set_handler = library.halide_set_error_handler
     except AttributeError:
-        pass  # the runtime is elsewhere
+        pass  # the runtime is in another library
     else:
         set_handler.argtypes, set_handler.restype = [ERROR_HANDLER], c_void_p
         set_handler(_on_error)

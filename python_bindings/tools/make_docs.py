@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""make_docs -- the comments of the public headers as a table of docstrings, for the extension module.
+"""make_docs -- writes the comments of the public headers as a table of docstrings for the extension module.
 
     make_docs.py ROOT OUT.cpp
 
-Who writes a comment in a header writes the docstring: names and comments are found as `tools/api_table` finds them.
+A header's comment is thereby also the Python docstring. Names and comments are found as in `tools/api_table`.
 """
 import re
 import sys
@@ -13,7 +13,7 @@ sys.dont_write_bytecode = True
 
 
 def paragraph(lines):
-    """Lines of a comment as text: what is indented (loops, pictures) keeps its lines."""
+    """Joins the lines of a comment into paragraphs; indented lines (loops, diagrams) stay separate."""
     out = []
     for line in lines:
         joins = out and line and not line.startswith(" ") and out[-1] and not out[-1].startswith(" ")
@@ -25,7 +25,7 @@ def paragraph(lines):
 
 
 def raw_comment_above(reader, at):
-    """As the reader's comment_above, with the indentation inside of it."""
+    """The reader's comment_above, but with the indentation inside the comment."""
     above, i = [], at - 1
     while reader.is_comment(i):
         above.insert(0, re.sub(r"^\s*// ?", "", reader.lines[i]).rstrip())
@@ -35,20 +35,14 @@ def raw_comment_above(reader, at):
 
 def docstring(reader, name):
     lines = [line for line in raw_comment_above(reader, name.line - 1) if not re.match(r"-{3,}", line)]
-    text = paragraph(lines) or reader.comment_behind(name.line - 1) or name.comment
+    text = as_sentence(paragraph(lines) or reader.comment_behind(name.line - 1) or name.comment)
     text = re.sub(r"\s*Requires:\s*", "\n\nRequires: ", text).strip()
     return text if text.endswith((".", ":", ")", "\n")) or not text else text + "."
 
 
-def snake(name):
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
-
-
-def with_title(reader, name, text):
-    """Of the class that the header is called after, what the header says of it goes first."""
-    is_named_so = name.kind in ("class", "struct") and snake(name.name) == Path(reader.header).stem and not name.scope
-    title = reader.title() if is_named_so else ""
-    return f"{title[:1].upper()}{title[1:]}.\n\n{text}".strip() if title and title not in text else text
+def as_sentence(text):
+    """Capitalises the first word, unless it is a name or the start of code: `x`, `sqrt(...)`."""
+    return re.sub(r"^[a-z]{2,}(?=[\s,;:.]|$)", lambda word: word.group(0).capitalize(), text)
 
 
 def docstrings(root):
@@ -60,8 +54,8 @@ def docstrings(root):
     for header in public_headers(root) + [h for h in more if h not in public_headers(root)]:
         reader = HeaderReader(root, header)
         for name in reader.read():
-            text = with_title(reader, name, docstring(reader, name))
-            # Of overloads the one that says most; a comment of its own before that of a group.
+            text = docstring(reader, name)
+            # Keeps the longest comment of all overloads.
             if len(text) > len(found.get(name.full, "")):
                 found[name.full] = text
     return found

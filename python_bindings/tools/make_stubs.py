@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""make_stubs -- the extension module's classes and functions as type stubs, for editors and type checkers.
+"""make_stubs -- writes type stubs of the extension module, for editors and type checkers.
 
-    make_stubs.py FOLDER        the folder that holds the package retrograde; writes its .pyi files
+    make_stubs.py FOLDER        writes the .pyi files of the package retrograde in this folder
 
-Signatures and docstrings are the module's own, which has them from the C++ code and the headers' comments: there is
-nothing to keep in step. What an argument takes beyond its class (casters.h) is said by the unions below.
+Signatures and docstrings are read from the compiled module, which has them from the C++ code and the comments of the
+headers, so the stubs always agree with it. The unions below list what an argument accepts beyond its class
+(casters.h).
 """
 import inspect
 import keyword
@@ -14,7 +15,7 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 
-# What stands for what in an argument.
+# The union that an argument of each class accepts.
 LIKE = {
     "Expr": "ExprLike", "Tuple": "TupleLike", "Type": "TypeLike", "Buffer": "ArrayLike", "VarOrRVar": "LoopLike",
     "Range": "RangeLike", "Func": "FuncLike", "AdjointInput": "InputLike", "Direction": "DirectionLike",
@@ -41,7 +42,7 @@ SIGNATURE = re.compile(r"^(?:\d+\. )?(\w+)\((.*)\)(?: -> (.*))?$")
 
 
 def split_arguments(text):
-    """By the commas that no bracket or quote encloses."""
+    """Splits at the commas outside of brackets and quotes."""
     parts, depth, begin, quote = [], 0, 0, ""
     for i, c in enumerate(text):
         if quote:
@@ -66,7 +67,7 @@ class Writer:
     # ---- types ----
 
     def type_of(self, text, is_argument):
-        """As the stub writes it; what is no type of Python is Any."""
+        """A type as the stub writes it; C++ types without a Python class become Any."""
         text = re.sub(r"retrograde\._retrograde\.", "", text.strip())
         text = re.sub(r"\bTuple\[", "tuple_of[", text)
         text = re.sub(r"\bCallable\b(?=\[)", "function", text)
@@ -92,14 +93,14 @@ class Writer:
     def arguments(self, text):
         given = [self.argument(part) for part in split_arguments(text)]
         given = [re.sub(r"^self: .*", "self", part) for part in given]
-        # pybind11 has no name for what was given none
+        # arguments without a name
         return ", ".join(re.sub(r"^arg(\d+): ", r"__arg\1: ", part) for part in given)
 
     # ---- functions ----
 
     @staticmethod
     def overloads(function):
-        """(signature, documentation) of each."""
+        """The signature and the documentation of each overload."""
         text = inspect.getdoc(function) or ""
         first, _, rest = text.partition("\n")
         if "Overloaded function." not in text.split("\n\n")[0] + text.split("\n\n", 2)[min(1, text.count("\n\n"))]:
@@ -173,7 +174,7 @@ class Writer:
         return self.lines.append(f"{indent}{name}: Any\n")
 
     def operator(self, name, indent):
-        """Of Expr and its like: made of objects, so that signatures say nothing."""
+        """Operators of Expr and similar classes, whose real signatures only mention `object`."""
         if re.fullmatch(r"__r?(add|sub|mul|truediv|floordiv|mod|pow|and|or|xor|lshift|rshift)__", name):
             self.lines.append(f"{indent}def {name}(self, other: ExprLike) -> Expr: ...\n")
         elif name in ("__lt__", "__le__", "__gt__", "__ge__"):

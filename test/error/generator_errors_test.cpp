@@ -93,7 +93,7 @@ TEST(GeneratorErrors, ParamsAreSetBeforeGenerate) {
   expect_error({"generate() has run"}, [&] { simple->count.set(2); });
 }
 
-// rule: the value is what the input declares
+// rule: the value matches the declaration of the input
 TEST(GeneratorErrors, InputsFitTheirDeclaration) {
   const GeneratorContext context(get_host_target());
   expect_error({"it has 1 and was given 0"}, [&] { context.apply<Simple>(); });
@@ -278,7 +278,7 @@ TEST(GeneratorErrors, EachPhaseHasWhatItMayDo) {
 // rule: configure() is the place for that
 TEST(GeneratorErrors, WhatIsMadeIsTakenAfterwards) {
   auto simple = GeneratorContext(get_host_target()).create<Simple>();
-  expect_error({"what generate() defines"}, [&] { simple->get_pipeline(); });
+  expect_error({"that generate() defines"}, [&] { simple->get_pipeline(); });
   expect_error({"its outputs are \"out\""}, [&] { simple->output_funcs("off"); });
   simple->apply(Buffer<float>(4));
   expect_error({"Do it in configure()"}, [&] { simple->in.set_type(Float(32)); });
@@ -290,7 +290,7 @@ TEST(GeneratorErrors, NumbersForOpenPartsAreWholeAndNotNegative) {
   expect_mentions(refusal("in.dim", "two"), {"\"two\" was given"});
 }
 
-// rule: its size is said once, and not negative
+// rule: its size is set once, and not negative
 TEST(GeneratorErrors, SizesOfArraysAreSaidOnce) {
   class Fixed : public Generator<Fixed> {
    public:
@@ -329,7 +329,7 @@ TEST(GeneratorErrors, SeparateGradientsAreByInputsOfFloats) {
     }
   };
   auto bytes = GeneratorContext(get_host_target()).create<OfBytes>();
-  expect_error({"gradients are by floating-point inputs", "it has none"},
+  expect_error({"gradients are with respect to floating-point inputs", "it has none"},
                [&] { bytes->build_separate_gradients(); });
 }
 

@@ -113,7 +113,7 @@ TEST_F(GpuRules, KernelsAreNotLaunchedByParallelLoops) {
 }
 
 TEST_F(GpuRules, OtherDevicesAreUnsupported) {
-  expect_error<Unsupported>({"made for CUDA"}, [&] { out.gpu_blocks(x, DeviceAPI::OpenCL); });
+  expect_error<Unsupported>({"generated for CUDA"}, [&] { out.gpu_blocks(x, DeviceAPI::OpenCL); });
   expect_error<Unsupported>({"Hexagon"}, [&] { out.hexagon(x); });
   expect_error<UserError>({"a directive for GPUs names a GPU", "names the host"},
                           [&] { out.gpu_blocks(x, DeviceAPI::Host); });

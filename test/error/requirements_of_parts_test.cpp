@@ -46,7 +46,7 @@ TEST_F(RequirementsOfParts, Handles) {
          [&] { AutoscheduleOptions::from_string("without=stripes"); });
   expect("threads and bytes are whole numbers, 0 or more",
          [&] { AutoscheduleOptions::from_string("threads=-1"); });
-  expect("it stands for a Param or an ImageParam", [&] { Parameter().name(); });
+  expect("it refers to a Param or an ImageParam", [&] { Parameter().name(); });
   Param<int> gain("gain");
   expect("this is for buffers", [&] { Parameter(gain.parameter()).buffer(); });
   expect("it needs outputs", [&] { Pipeline().outputs(); });
@@ -58,14 +58,14 @@ TEST_F(RequirementsOfParts, Handles) {
 // ---- compiled functions ----
 
 TEST_F(RequirementsOfParts, CompiledFunctions) {
-  expect("the list of arguments holds inputs, and outputs follow by themselves",
+  expect("the list of arguments holds inputs, and outputs are appended automatically",
          [&] { f.compile_to_module({Argument("out", Argument::OutputBuffer, Int(32), 2)}, "f"); });
   expect("a C function that it calls must be in this process, or among its JIT externs", [&] {
     Func g("g");
     g(x) = call_c_function<int, int>("nobody_wrote_this", x);
     g.realize({4});
   });
-  expect<Unsupported>("pipelines live in the process that defines them",
+  expect<Unsupported>("a pipeline exists only in the process that defines it",
                       [&] { serialize_pipeline(Pipeline(f)); });
 }
 
@@ -182,7 +182,7 @@ TEST_F(RequirementsOfParts, ReportsOnDerivatives) {
   Func whole("whole");
   whole(x) = cast<int>(image(x));
   expect<Unsupported>("derivatives are of floats", [&] { check_gradients(whole, {4}); });
-  expect("a range is one of a floating input that the output depends on", [&] {
+  expect("a range belongs to a floating input that the output depends on", [&] {
     check_stability(line, {4}, {.ranges = {{other, 0, 1}}});
   });
 }
@@ -201,7 +201,7 @@ class Scaling : public Generator<Scaling> {
 };
 
 TEST_F(RequirementsOfParts, EstimatesOfInputs) {
-  expect("a dimension goes by the name of the input's argument",
+  expect("a dimension has the name of one of the input's arguments",
          [&] { GeneratorContext(get_host_target()).create<Scaling>()->build_module("scaling"); });
 }
 

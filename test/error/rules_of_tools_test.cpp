@@ -20,7 +20,7 @@ using internal::GeneratorFactory, internal::GeneratorRegistry;
 
 TEST_F(Rules, ModulesHoldFunctions) {
   Module m("m", get_host_target());
-  expect("a module gives functions that were appended to it",
+  expect("a module has the functions that were appended to it",
          [&] { m.get_function_by_name("missing"); });
   expect("a module contains other modules", [&] { m.append(m); });
 }
@@ -233,7 +233,7 @@ TEST_F(Rules, PartsOfAGenerator) {
   expect("numbers of dimensions and of elements are whole", [&] {
     create()->set_generator_param_values({{"out.dim", "-1"}});
   });
-  expect("the Pipeline is made of what generate() defines", [&] { create()->get_pipeline(); });
+  expect("the Pipeline has the outputs that generate() defines", [&] { create()->get_pipeline(); });
   expect("all are given, in their order",
          [&] { GeneratorContext(get_host_target()).create<RuleGenerator>()->apply(); });
 }
@@ -254,7 +254,7 @@ TEST_F(Rules, PartsOfACompiledGenerator) {
          [&] { context.create<ByteGenerator>()->build_gradient_module("g"); });
   expect("gradients are of outputs with one value",
          [&] { context.create<RuleGenerator>()->build_gradient_module("g"); });
-  expect("gradients are by floating-point inputs",
+  expect("gradients are with respect to floating-point inputs",
          [&] { context.create<ByteGenerator>()->build_separate_gradients("g"); });
   const GeneratorFactory factory = [](const GeneratorContext& c) {
     return ByteGenerator::create(c);

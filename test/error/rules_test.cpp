@@ -25,7 +25,7 @@ TEST_F(Rules, OperandsOfOperators) {
   expect("it takes float32", [&] { fast_pow(2.5f, cast<double>(x)); });
   expect("its condition is of type bool", [&] { print_when(Expr(x), 1); });
   expect("its condition is of type bool", [&] { require(Expr(x), 1); });
-  expect("it gives the value of its first argument", [&] { print(std::vector<Expr>{}); });
+  expect("it returns its first argument", [&] { print(std::vector<Expr>{}); });
   expect("only numbers have one", [&] { Handle().max(); });
   expect("only numbers have one", [&] { Handle().min(); });
 }
@@ -52,7 +52,7 @@ TEST_F(Rules, SeveralPointsInOneDefinition) {
   expect("a first definition is for all points", [&] { g(scatter(x, y)) = gather(1, 2); });
   g(x) = 0;
   expect("scatter() names the places on the left-hand side", [&] { g(gather(1, 2)) = 3; });
-  expect("an update's scatter() and gather() have as many points",
+  expect("scatter() and gather() of an update have the same number of points",
          [&] { g(scatter(1, 2)) = gather(1, 2, 3); });
 }
 
@@ -144,7 +144,7 @@ TEST_F(Rules, SpecializationsHaveConditions) {
 
 TEST_F(Rules, Devices) {
   expect<Unsupported>("loops run on the CPU or a CUDA device", [&] { f.hexagon(x); });
-  expect<Unsupported>("code for GPUs is made for CUDA",
+  expect<Unsupported>("code for GPUs is generated for CUDA",
                       [&] { f.gpu_blocks(x, DeviceAPI::OpenCL); });
   expect<Unsupported>("storage lies in memory that a CPU or a CUDA device has", [&] {
     Func g("g");
@@ -386,7 +386,7 @@ TEST_F(Rules, BuffersAndTheirDimensions) {
   expect("a dimension is numbered from 0", [&] { b.dim(3); });
   expect("dimensions are not negative", [&] { ImageParam(Int(32), -1); });
   const std::string said = error_of([&] { b.copy_from(Buffer<int>(4)); });
-  expect_mentions(said, {"both Buffers have one type and as many dimensions"});
+  expect_mentions(said, {"both Buffers have the same type and number of dimensions"});
 }
 
 TEST_F(Rules, ArgumentsOfCompiledFunctions) {
@@ -397,7 +397,7 @@ TEST_F(Rules, ArgumentsOfCompiledFunctions) {
   expect("every argument is listed once", [&] { compile({p, q, p}); });
   expect("the list of arguments holds every Param and ImageParam that it uses",
          [&] { compile({p}); });
-  expect("an argument is what the pipeline uses under its name", [&] {
+  expect("an argument agrees with what the pipeline uses under its name", [&] {
     compile({Argument("p", Argument::InputScalar, Float(32), 0, ArgumentEstimates()), q});
   });
 }

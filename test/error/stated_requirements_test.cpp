@@ -140,8 +140,8 @@ TEST_F(StatedRequirements, BoxesOfBordersAreIntegers) {
 
 TEST_F(StatedRequirements, ShapesOfBuffers) {
   Buffer<int> row(3), plane(3, 4);
-  expect("a new dimension stands before, between or behind", [&] { row.embed(4, 0); });
-  expect("a new dimension stands before, between or behind", [&] { row.embedded(-1, 0); });
+  expect("a new dimension is inserted before, between or after", [&] { row.embed(4, 0); });
+  expect("a new dimension is inserted before, between or after", [&] { row.embedded(-1, 0); });
   expect("a storage order names each dimension once", [&] { plane.transpose({0, 0}); });
   expect("a storage order names each dimension once", [&] { plane.transpose({1}); });
   expect("all Buffers have the same extents",

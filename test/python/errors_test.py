@@ -41,7 +41,7 @@ class Classes(unittest.TestCase):
     def test_unsupported(self):
         f = rg.Func("f")
         f[x] = 0
-        with self.assertRaisesRegex(rg.Unsupported, "made for CUDA"):
+        with self.assertRaisesRegex(rg.Unsupported, "generated for CUDA"):
             f.gpu_blocks(x, rg.DeviceAPI.OpenCL)
 
     def test_they_can_be_pickled(self):

@@ -447,7 +447,7 @@ TEST(Warnings, NameARequirementThatNeverHolds) {
   g(x) = f(x) + require(p > 0, x, "p is positive");
   const std::vector<std::string> found = warnings_of(Pipeline(g));
   ASSERT_EQ(found.size(), 1u);
-  expect_mentions(found[0], {"\"f", "requires what never holds", "is false"});
+  expect_mentions(found[0], {"\"f", "has a requirement that never holds", "is false"});
 }
 
 TEST(Warnings, NameFloatsThatTheTargetLacks) {

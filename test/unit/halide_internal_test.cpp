@@ -311,8 +311,8 @@ TEST(Functions, LoopsSayWhatTheyAre) {
 
 TEST(Functions, OfNothingAreErrors) {
   const Function nothing;
-  expect_error({"a Function is that of a Func"}, [&] { nothing.name(); });
-  expect_error({"a Function is that of a Func"}, [&] { Func of(nothing); });
+  expect_error({"a Function belongs to a Func"}, [&] { nothing.name(); });
+  expect_error({"a Function belongs to a Func"}, [&] { Func of(nothing); });
   Var x("x");
   Func f("f");
   f(x) = x;
@@ -640,9 +640,10 @@ TEST(Autoschedulers, AreNamedWithWhatTheyAreTold) {
   EXPECT_EQ(results.machine_params_string.rfind("8,", 0), 0u);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_NE(warnings[0].find("\"beam_size\""), std::string::npos);
-  expect_error({"the built-in autoscheduler is told of the machine", "\"beam_size\""}, [&] {
-    Pipeline(f).apply_autoscheduler(get_host_target(), {"Retrograde", {{"beam_size", "4"}}});
-  });
+  expect_error(
+      {"the built-in autoscheduler takes parameters of the machine", "\"beam_size\""}, [&] {
+        Pipeline(f).apply_autoscheduler(get_host_target(), {"Retrograde", {{"beam_size", "4"}}});
+      });
   expect_error({"\"Nobody\""},
                [&] { Pipeline(f).apply_autoscheduler(get_host_target(), {"Nobody"}); });
   EXPECT_EQ((AutoschedulerParams{"A", {{"k", "v"}}}).to_string(),

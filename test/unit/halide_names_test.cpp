@@ -447,7 +447,7 @@ TEST(Copies, ChangeNothing) {
 
 // ---- unsupported uses ----
 
-// rule: buffers of arguments are memory of the CPU
+// rule: argument buffers lie in the memory of the CPU
 // rule: storage lies in the memory of the CPU
 TEST(Refusals, SayWhatIsNotThere) {
   Buffer<float> buffer(3);

@@ -1,5 +1,5 @@
-// Halide.h -- Retrograde under Halide's names: put this folder first on the include path, and a
-// pipeline written for Halide 14 to 21 compiles as it stands.
+// Halide.h -- Retrograde under Halide's names. With this folder first on the include path, a pipeline that was written
+// for Halide 14 to 21 compiles without changes.
 #pragma once
 
 #include <retrograde/retrograde.h>
@@ -7,7 +7,7 @@
 #include "generator/execute_generator.h"
 #include "porting/internal.h"
 
-// Programs rely on these.
+// Halide.h of Halide includes these headers, and programs rely on that.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -51,8 +51,8 @@
 #include <string.h>
 #include <unistd.h>
 
-// Not an alias: HalideBuffer.h opens namespace Halide for Halide::Runtime. Name by name: what Halide
-// does not have stays in namespace retrograde, so that programs can have such names themselves.
+// Namespace Halide cannot be an alias, since HalideBuffer.h opens it for Halide::Runtime. Names are imported one by
+// one: names that Halide lacks stay in namespace retrograde, so programs may define them.
 // clang-format off
 namespace Halide {
 using ::retrograde::_; using ::retrograde::_0; using ::retrograde::_1; using ::retrograde::_2;
@@ -151,27 +151,28 @@ namespace ConciseCasts = ::retrograde::ConciseCasts;
 constexpr int AnyDims = Runtime::AnyDims;
 using GeneratorParamsMap = std::map<std::string, std::string>;
 
-// Errors are always exceptions here.
+// Always true: errors are exceptions.
 inline bool exceptions_enabled() { return true; }
 
-// Deep programs are compiled on a stack of its own, as large as they need.
+// Has no effect: programs are compiled on a separate, large stack; see diagnostics/large_stack.h.
 inline void set_compiler_stack_size(size_t) {}
 inline size_t get_compiler_stack_size() { return size_t{1} << 30; }
 
-// A namespace of its own: ours has another name, so that programs which add to this one can still
-// say Internal:: behind `using namespace Halide`.
+// Halide::Internal is a separate namespace. Retrograde's has another name, so Internal:: stays unambiguous after
+// `using namespace Halide` in programs that add to this namespace.
 namespace Internal {
 using namespace ::retrograde::internal;
 using namespace ::retrograde::porting;
 using ::retrograde::Dimension;
 using ::retrograde::ForType;
-// As Halide: warnings are printed unless a program says otherwise. Silenced by
-// retrograde::set_warning_handler({}), or by a reporter or WarningScope that takes them.
+// Warnings are printed by default, as in Halide. retrograde::set_warning_handler({}) silences them; a reporter or a
+// WarningScope receives them instead.
 inline const bool prints_warnings = ::retrograde::porting::print_warnings_by_default();
 }  // namespace Internal
 }  // namespace Halide
 
-// An Expr finds these without Internal:: in front, as it does where its base class lives in Internal.
+// Makes argument-dependent lookup find these for Exprs without Internal::, as in Halide, where the base class of Expr
+// is in Internal.
 namespace retrograde::ir {
 using porting::can_prove;
 using porting::is_const;
@@ -184,7 +185,7 @@ using porting::is_pure;
 using porting::simplify;
 }  // namespace retrograde::ir
 
-// ---- macros that programs use ----
+// ---- Halide's macros ----
 
 #define HALIDE_VERSION_MAJOR 21
 #define HALIDE_VERSION_MINOR 0
@@ -194,7 +195,7 @@ using porting::simplify;
 #define HALIDE_WITH_EXCEPTIONS
 #endif
 
-// Throws CompileError unless the condition holds: _halide_user_assert(x.defined()) << "no x\n";
+// Stream a message that is thrown unless the condition holds: _halide_user_assert(x.defined()) << "no x\n";
 #define RETROGRADE_REPORT(condition, kind)                                                     \
   (condition)                                                                                  \
       ? (void)0                                                                                \
@@ -223,14 +224,14 @@ using porting::simplify;
 #endif
 #define HALIDE_NO_USER_CODE_INLINE __attribute__((noinline))
 
-// Declared by what registers generators: at global scope.
+// Halide's registration macros declare this at global scope.
 namespace halide_register_generator {
 struct halide_global_ns;
 }
 #define HALIDE_REGISTER_GENERATOR(...) RETROGRADE_REGISTER_GENERATOR(__VA_ARGS__)
 #define HALIDE_REGISTER_GENERATOR_ALIAS(...) RETROGRADE_REGISTER_GENERATOR_ALIAS(__VA_ARGS__)
 
-// name(a1, ...): calls the C function of that name, by `call`.
+// Defines name(a1, ...), which calls the C function of that name through `call`.
 #define RETROGRADE_EXTERN_1(call, rt, name, t1) \
   Halide::Expr name(const Halide::Expr& a1) { return ::retrograde::call<rt, t1>(#name, a1); }
 #define RETROGRADE_EXTERN_2(call, rt, name, t1, t2)                   \
@@ -291,7 +292,7 @@ struct halide_global_ns;
   _halide_user_assert((e).type() == (t)) << "argument " << (k) << " of " << #name \
                                          << " has the type " << (t) << ", not " << (e).type()
 
-// HALIDE_DECLARE_EXTERN_*: names types behind handles; here all handles are alike.
+// These macros of Halide name the types behind handles. Here all handles have one type, so they are empty.
 #define HALIDE_DECLARE_EXTERN_SIMPLE_TYPE(T)
 #define HALIDE_DECLARE_EXTERN_STRUCT_TYPE(T)
 #define HALIDE_DECLARE_EXTERN_CLASS_TYPE(T)

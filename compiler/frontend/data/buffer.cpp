@@ -1,4 +1,4 @@
-// buffer.cpp -- checks of Buffers, and their place in Exprs.
+// buffer.cpp -- allocation and checks of Buffers, and the Exprs that load from them.
 #include "frontend/data/buffer.h"
 
 #include <algorithm>
@@ -60,7 +60,7 @@ std::string sizes_text(const std::vector<int>& sizes) {
   return out;
 }
 
-// Throws where the caller of the runtime's Buffer would write through a null pointer.
+// Throws if there is no memory; the runtime's Buffer would write through a null pointer.
 void* allocate_or_throw(size_t bytes) {
   void* block = std::malloc(bytes);
   if (!block) {
@@ -74,8 +74,7 @@ void* allocate_or_throw(size_t bytes) {
 
 namespace {
 
-// Strides of dense elements: each is the product of the extents of the inner dimensions. HalideBuffer.h multiplies
-// these in 32 bits.
+// The stride of a dense dimension is the product of the inner extents, which HalideBuffer.h multiplies in 32 bits.
 void check_strides(const std::vector<int>& sizes, const std::vector<int>& storage_order,
                    const std::string& asked) {
   int64_t stride = 1;
@@ -158,7 +157,7 @@ Runtime::Buffer<> allocate_buffer(halide_type_t type, const std::vector<int>& si
 
 namespace {
 
-// Dimensions by the distance of their elements, nearest first.
+// Dimensions from the smallest stride to the largest.
 std::vector<int> order_in_memory(const Runtime::Buffer<>& buffer) {
   std::vector<int> order(static_cast<size_t>(buffer.dimensions()));
   std::iota(order.begin(), order.end(), 0);
@@ -260,7 +259,7 @@ void check_embed(const Runtime::Buffer<>& buffer, const std::string& name, int d
   const std::string asked =
       text("embed the Buffer ", quoted(name), " as dimension ", d, " of another");
   if (d >= 0 && d <= buffer.dimensions()) return check_new_dimension(buffer, asked);
-  user_error(asked, "a new dimension stands before, between or behind those that are there",
+  user_error(asked, "a new dimension is inserted before, between or after the existing ones",
              text("it has ", buffer.dimensions(), " dimensions"),
              text("Give a number from 0 to ", buffer.dimensions()));
 }
@@ -272,7 +271,7 @@ void check_same_shape(const Runtime::Buffer<>& buffer, const std::string& name,
     is_same = buffer.dim(d).extent() == other.dim(d).extent();
   if (is_same) return;
   user_error("visit the values of the Buffer " + quoted(name) + " and of others",
-             "all Buffers have the same extents", "those of one of them are others",
+             "all Buffers have the same extents", "one of them has other extents",
              "Crop them to one size first");
 }
 
@@ -295,7 +294,7 @@ void check_in_bounds(const Runtime::Buffer<>& buffer, const std::string& name, c
     return text("access (", out, ") of the Buffer ", quoted(name));
   };
   for (int d = buffer.dimensions(); d < count; d++) {
-    if (at[d] == 0) continue;  // Halide's users write scalar(0)
+    if (at[d] == 0) continue;  // Halide programs write scalar(0)
     user_error(place(), "an access gives one coordinate for each dimension",
                text("it has ", buffer.dimensions(), " dimensions"), "Give that many coordinates");
   }
@@ -303,7 +302,7 @@ void check_in_bounds(const Runtime::Buffer<>& buffer, const std::string& name, c
     user_error(place(), "the buffer must have memory", "it has only a shape", "Call allocate()");
   for (int d = 0; d < std::min(count, buffer.dimensions()); d++) {
     const auto dim = buffer.dim(d);
-    // One past the end has an address: where a loop over pointers stops.
+    // One past the end is allowed: loops over pointers take its address.
     if (at[d] >= dim.min() && at[d] <= dim.max() + 1) continue;
     user_error(place(), "a coordinate lies inside the buffer, or one past its end",
                text("dimension ", d, " covers [", dim.min(), ", ", dim.max(), "]"),

@@ -1,5 +1,5 @@
-// devices.cpp -- Buffers on GPUs: what the runtime's own Buffer would assert is checked here, and codes
-// of the runtime become exceptions with its text.
+// devices.cpp -- runtime calls on the GPU memory of Buffers. Conditions that the runtime's own Buffer would assert
+// are checked first, and error codes become exceptions with the runtime's message.
 #include "frontend/data/devices.h"
 
 #include "diagnostics/error.h"
@@ -10,8 +10,8 @@
 namespace retrograde {
 namespace {
 
-// How many Buffers share device memory stands in a private member of the runtime's Buffer, which tells
-// nobody and ends the process when it frees what is shared. An explicit instantiation may name it.
+// The runtime's Buffer counts the sharers of device memory in a private member, without an accessor, and aborts when
+// it frees shared memory. An explicit instantiation may name a private member, which gives us the count.
 using CountMember = Runtime::DeviceRefCount* Runtime::Buffer<>::*;
 CountMember count_member();
 template <CountMember member>
@@ -30,7 +30,7 @@ bool is_shared(const Runtime::Buffer<>& buffer) {
 const halide_device_interface_t* get_device_interface_for_device_api(DeviceAPI device,
                                                                      const Target& target,
                                                                      const char* error_site) {
-  // A target that nobody named leaves devices open.
+  // An unknown target allows every device.
   if (!target.has_unknowns() && !target.supports_device_api(device)) {
     if (!error_site) return nullptr;
     user_error(error_site, "the target has a feature of the device",
@@ -48,8 +48,8 @@ const halide_device_interface_t* get_device_interface_for_device_api(DeviceAPI d
 
 namespace frontend {
 
-// The runtime's Buffer ends the process when it drops device memory that is newer, or that cannot be
-// freed. What cannot be is tried again by the runtime, and nobody is left to be told.
+// The runtime's Buffer aborts when it drops device memory that is newer or that cannot be freed. Here an error of
+// device_free is ignored: no caller is left to report it to, and the runtime retries the release.
 void leave_device(Runtime::Buffer<>& buffer) {
   if (!buffer.has_device_allocation()) return;
   buffer.set_device_dirty(false);
@@ -83,7 +83,7 @@ const halide_device_interface_t* DeviceCall::interface_of(DeviceAPI device,
   return found;
 }
 
-// ---- what must hold ----
+// ---- checks ----
 
 void DeviceCall::check_not_newer_on_device() const {
   if (!buffer_.device_dirty()) return;
@@ -98,15 +98,15 @@ void DeviceCall::check_not_newer_on_host() const {
              halide_error_code_host_and_device_dirty);
 }
 
-void DeviceCall::check_sole_owner(Runtime::BufferDeviceOwnership wanted) const {
-  const bool frees = wanted == Runtime::BufferDeviceOwnership::Allocated;
-  if (buffer_.device_ownership() != wanted && frees) {
+void DeviceCall::check_sole_owner(Runtime::BufferDeviceOwnership expected) const {
+  const bool frees = expected == Runtime::BufferDeviceOwnership::Allocated;
+  if (buffer_.device_ownership() != expected && frees) {
     call_error(asked(), "only memory that the Buffer allocated is freed",
                "its device memory was wrapped, or is a part of another Buffer's",
                "Detach it, or free the Buffer that it is a part of",
                halide_error_code_device_free_failed);
   }
-  if (buffer_.device_ownership() != wanted) {
+  if (buffer_.device_ownership() != expected) {
     call_error(asked(), "only memory that was wrapped is detached", "its device memory was not",
                "Free it", halide_error_code_device_detach_native_failed);
   }

@@ -1,5 +1,5 @@
-// devices.h -- Buffers with memory on a GPU: CUDA's devices, by the driver or the simulated one
-// (RETROGRADE_GPU=simulated in the environment).
+// devices.h -- operations on the GPU memory of Buffers. Devices are CUDA's, reached through its driver or simulated
+// on the CPU (RETROGRADE_GPU=simulated in the environment).
 #pragma once
 
 #include <HalideBuffer.h>
@@ -14,19 +14,20 @@ struct JITUserContext;
 
 namespace Runtime = ::Halide::Runtime;
 
-// What HalideRuntime.h's functions want for memory on such a device. Default_GPU: CUDA, or the known
-// target's. Null for Host and None, and without an error site for what a known target has not.
+// The device interface that functions of HalideRuntime.h take for memory on `device`. Default_GPU selects the
+// target's device, or CUDA if the target is unknown. The result is null for Host and None. It is also null if the
+// target lacks the device and `error_site` is null; with an error site that case throws.
 // Requires: devices are CUDA's (Unsupported); the target has a feature of the device.
 const halide_device_interface_t* get_device_interface_for_device_api(
     DeviceAPI device, const Target& target = Target(), const char* error_site = nullptr);
 
 namespace frontend {
 
-// As if it had never had device memory.
+// Releases the buffer's device memory and clears its dirty marks; elements that are newer there are lost.
 void leave_device(Runtime::Buffer<>& buffer);
 
-// One call of the runtime on a Buffer's device memory. They throw RuntimeError with what the runtime says;
-// the error handler of `user`, where there is one, is told instead, and the code comes back.
+// One runtime call on a Buffer's device memory. A failure throws RuntimeError with the runtime's message; if `user`
+// has an error handler, it receives the message and the call returns the error code.
 class DeviceCall {
  public:
   DeviceCall(Runtime::Buffer<>& buffer, const std::string& name, const char* method,
@@ -39,10 +40,11 @@ class DeviceCall {
   int free() const;
   int wrap(DeviceAPI, uint64_t handle, const Target&) const;
   int detach() const;
-  // Its memory on devices is its own: no other Buffer has a part in it.
+  // Checks that no other Buffer uses the device memory.
   void check_sole_owner(Runtime::BufferDeviceOwnership) const;
-  // The newest elements are not on a device.
+  // Checks that the device's elements are not newer than the host's.
   void check_not_newer_on_device() const;
+  // Checks that the host's elements are not newer than the device's.
   void check_not_newer_on_host() const;
 
  private:

@@ -1,4 +1,4 @@
-// image_param.cpp -- ImageParam, and the facts and promises about the shapes of buffers.
+// image_param.cpp -- image parameters, and promises about the shapes of buffers.
 #include "frontend/data/image_param.h"
 
 #include <algorithm>
@@ -70,7 +70,8 @@ void Dimension::set(Expr graph::BufferConstraint::*field, Expr value, const char
   if (constant && *constant < 0 && field == &graph::BufferConstraint::extent) {
     user_error(asked, "an extent is not negative", text("it is ", *constant), "Give 0 or more");
   }
-  // A promise about an entity in terms of itself is kept weakly: it must not own itself.
+  // A promise may mention the parameter that it is about. That reference is weak, so the parameter does not own
+  // itself.
   if (value.defined()) {
     value = ir::rewrite(
         value, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) -> Expr {
@@ -163,7 +164,7 @@ int OutputImageParam::host_alignment() const {
 OutputImageParam& OutputImageParam::store_in(MemoryType memory) {
   if (memory != MemoryType::Auto && memory != MemoryType::Heap) {
     unsupported("store the buffer " + quoted(name()) + " in another memory",
-                "buffers of arguments are memory of the CPU", "that memory belongs to a device",
+                "argument buffers lie in the memory of the CPU", "that memory belongs to a device",
                 "Leave it out");
   }
   return *this;

@@ -51,7 +51,7 @@ Scalar get_scalar(const ParameterContents& parameter, Type type) {
     user_error(asked, "a value must have been set", "it has none", "Call set() first");
   if (type != parameter.type) {
     user_error(text(asked, " as ", to_string(type)), "the types must agree",
-               "it is of type " + to_string(parameter.type), "Use it as what it is");
+               "it is of type " + to_string(parameter.type), "Use it with its own type");
   }
   return *parameter.value;
 }

@@ -21,7 +21,7 @@ Parameter::Parameter(const Type& type, bool is_buffer, int dimensions, const std
 
 graph::ParameterContents& Parameter::checked(const char* asked) const {
   if (!contents_) {
-    user_error(std::string(asked) + " a Parameter", "it stands for a Param or an ImageParam",
+    user_error(std::string(asked) + " a Parameter", "it refers to a Param or an ImageParam",
                "it was made without one", "Take it from parameter(), or give it a type");
   }
   return *contents_;
@@ -61,7 +61,7 @@ void Parameter::set_estimate(const Expr& value) {
 }  // namespace retrograde
 
 void retrograde::frontend::refuse_serialization(const char* asked) {
-  unsupported(asked, "pipelines live in the process that defines them",
+  unsupported(asked, "a pipeline exists only in the process that defines it",
               "a graph of Funcs has no form as bytes",
               "Compile it ahead of time with compile_to_static_library(), or name a folder for the "
               "compile cache");

@@ -1,4 +1,4 @@
-// realization.h -- the buffers that hold the values of a realized Func, one for each.
+// realization.h -- the Buffers that hold the values of a realized Func.
 #pragma once
 
 #include <utility>
@@ -8,8 +8,10 @@
 
 namespace retrograde {
 
+// The result of realize(): one Buffer for each value of the Func.
 class Realization {
  public:
+  // Wraps Buffers, one for each value.
   // Requires: it holds at least one Buffer; its Buffers must be defined.
   explicit Realization(std::vector<Buffer<>> buffers);
   Realization(std::initializer_list<Buffer<>> buffers)
@@ -19,18 +21,19 @@ class Realization {
       Realization(Buffer<T, Dims>& first, Rest&&... rest)
       : Realization(std::vector<Buffer<>>{first, Buffer<>(std::forward<Rest>(rest))...}) {}
 
-  size_t size() const { return buffers_.size(); }  // how many Buffers
+  size_t size() const { return buffers_.size(); }  // number of Buffers
+  // The Buffer of value i.
   // Requires: its Buffers are numbered from 0.
   const Buffer<>& operator[](size_t i) const { return buffers_[checked(i)]; }
   Buffer<>& operator[](size_t i) { return buffers_[checked(i)]; }
-  // Of a Func with one value.
+  // The Buffer of a Func with a single value.
   // Requires: it must hold exactly one.
   template <typename T, int Dims>
   operator Buffer<T, Dims>() const {
     check_one_value();
     return buffers_[0].template as<T, Dims>();
   }
-  // Waits for the work on devices that uses its Buffers.
+  // Waits for device work that uses any of the Buffers.
   int device_sync() {
     for (Buffer<>& buffer : buffers_) buffer.device_sync();
     return 0;

@@ -1,6 +1,6 @@
-// serialization.h -- names of later Halide releases for storing pipelines as bytes: Unsupported. A
-// Func graph has no form outside the process; what compile_to_static_library writes has, and the
-// compile cache on disk keeps machine code from run to run.
+// serialization.h -- stubs of later Halide releases' functions for serialized pipelines; all throw Unsupported.
+// A graph of Funcs exists only in the process that built it. compile_to_static_library writes machine code to a
+// file, and the compile cache on disk keeps it between runs.
 #pragma once
 
 #include <map>
@@ -15,15 +15,18 @@ namespace frontend {
 [[noreturn]] void refuse_serialization(const char* asked);
 }
 
-// Requires: pipelines live in the process that defines them (Unsupported).
+// Always throws: a pipeline has no serialized form.
+// Requires: a pipeline exists only in the process that defines it (Unsupported).
 template <typename... Args>
 void serialize_pipeline(const Pipeline&, Args&&...) {
   frontend::refuse_serialization("serialize a Pipeline");
 }
+// Always throws: a pipeline has no serialized form.
 template <typename... Args>
 Pipeline deserialize_pipeline(Args&&...) {
   frontend::refuse_serialization("deserialize a Pipeline");
 }
+// Always throws: a pipeline has no serialized form.
 template <typename... Args>
 std::map<std::string, Parameter> deserialize_parameters(Args&&...) {
   frontend::refuse_serialization("deserialize the parameters of a Pipeline");

@@ -1,8 +1,7 @@
-// boundary_conditions.cpp -- one coordinate map for each condition.
+// boundary_conditions.cpp -- maps coordinates into the bounds, one map for each condition.
 //
-// A coordinate that is inside already is marked likely, and also clamped: in the middle of a loop
-// the whole map simplifies to the coordinate itself, and everywhere its bounds are those of the
-// box.
+// The branch for coordinates inside the bounds is marked likely, and also clamped. So the map simplifies to the
+// coordinate itself in the steady state of a loop, and its range is never larger than the bounds.
 #include "frontend/language/boundary_conditions.h"
 
 #include "ir/literal.h"
@@ -18,7 +17,7 @@ Expr clamp_into(const Expr& x, const Expr& min, const Expr& extent) {
   return clamp(x, min, min + extent - 1);
 }
 
-// `outside` where x leaves the box; x itself in it.
+// x inside the bounds, `outside` elsewhere.
 Expr inside_or(const Expr& x, const Expr& min, const Expr& extent, const Expr& outside) {
   return select(x < min || x > min + extent - 1, outside, clamp_into(likely(x), min, extent));
 }
@@ -37,7 +36,7 @@ Expr mirror(const Expr& x, const Expr& min, const Expr& extent) {
   return inside_or(x, min, extent, clamp_into(min + reflected, min, extent));
 }
 
-// A box of one element: the period is 0, and so is the remainder.
+// With a single element the period is 0, and the remainder by 0 is 0.
 Expr mirror_inside(const Expr& x, const Expr& min, const Expr& extent) {
   const Expr last = extent - 1;
   const Expr within_two = (x - min) % (2 * last);
@@ -134,7 +133,7 @@ Func constant_exterior(const Func& source, const Tuple& value, const Region& bou
   for (size_t i = 0; i < value.size(); i++) {
     const Expr constant = ir::literal_in(source.output_types()[i], value[i],
                                          "apply constant_exterior to " + quoted(source.name()),
-                                         "the value outside is one of the type inside");
+                                         "the value outside has the type of the values inside");
     values.push_back(ir::make_select(outside, constant, likely(inside[i])));
   }
   Func result("constant_exterior");

@@ -1,16 +1,15 @@
-// boundary_conditions.h -- Funcs that are defined everywhere, made from what is defined in a box.
+// boundary_conditions.h -- extends Funcs and images beyond their bounds, so that stencils can read past the border.
 //
-// Inside the box all of them are the source. Outside, with a = min and b = min + extent - 1 of a
-// dimension:
-//   constant_exterior   a value that is given
+// Inside the bounds each result equals the source. Outside, for a dimension with the elements abcd:
+//   constant_exterior   a constant
 //   repeat_edge         the nearest element:                    aaa|abcd|ddd
 //   repeat_image        the box again and again:                bcd|abcd|abc
 //   mirror_image        the box mirrored, edges twice:          cba|abcd|dcb
 //   mirror_interior     the box mirrored, edges once:           dcb|abcd|cba
-//                       (of one element: that element everywhere)
-// Sources: a Func with bounds, or a Buffer or ImageParam, whose own bounds are the default. A
-// dimension whose min or extent is an undefined Expr is left alone, as are dimensions beyond the
-// bounds. Loops are cut so that the inside costs nothing extra.
+//                       (a single element: that element everywhere)
+// The source is a Func with bounds, or a Buffer or ImageParam, whose own bounds are the default. A dimension without
+// bounds, or whose min or extent is an undefined Expr, is not extended. Loop partitioning separates the interior,
+// which then costs nothing extra.
 #pragma once
 
 #include <type_traits>
@@ -20,14 +19,19 @@
 
 namespace retrograde::BoundaryConditions {
 
+// Extends `source` by a constant: points outside of `bounds` have the value `value`.
 // Requires: it must have a definition; there are bounds for at most its dimensions; bounds are
 // integers; an extent is not negative; there is one constant for each value; the value outside is a
-// defined expression; the value outside is one of the type inside.
+// defined expression; the value outside has the type of the values inside.
 Func constant_exterior(const Func& source, const Tuple& value, const Region& bounds);
 Func constant_exterior(const Func& source, const Expr& value, const Region& bounds);
+// Extends `source` by its border: a point outside has the value of the nearest element inside.
 Func repeat_edge(const Func& source, const Region& bounds);
+// Extends `source` periodically: the box repeats in every direction.
 Func repeat_image(const Func& source, const Region& bounds);
+// Extends `source` by mirroring it; the border elements appear twice.
 Func mirror_image(const Func& source, const Region& bounds);
+// Extends `source` by mirroring it around its border elements, which appear once.
 Func mirror_interior(const Func& source, const Region& bounds);
 
 namespace detail {
@@ -48,7 +52,7 @@ Region bounds_of(const T& image) {
     return Range{Expr(image.dim(d).min()), Expr(image.dim(d).extent())};
   });
 }
-// min, extent, min, extent ...
+// Reads bounds in the order min, extent, min, extent, ...
 inline void collect(Region&) {}
 template <typename... Rest>
 void collect(Region& bounds, Expr min, Expr extent, Rest&&... rest) {

@@ -1,4 +1,4 @@
-// expr_ops.cpp -- type rules of the operators that are calls.
+// expr_ops.cpp -- type rules and checks of the operators and functions on Exprs.
 #include "frontend/language/expr_ops.h"
 
 #include "graph/random_sequence.h"
@@ -80,8 +80,8 @@ Expr shift(Op op, Expr a, Expr b) {
   const char* name = ir::op_info(op).name;
   check_integer(a, name);
   check_integer(b, name);
-  // The amount keeps its sign, and one too large to be held in the width of `a` stays at least that
-  // width.
+  // The saturating cast keeps the sign of the amount. An amount too large for the width of `a` stays at least as
+  // large as that width.
   b = saturating_cast(b.type().with_bits(a.type().bits()), b);
   if (a.type().lanes() != b.type().lanes()) {
     if (a.type().is_scalar()) a = ir::make_broadcast(a, b.type().lanes());
@@ -110,7 +110,7 @@ Expr integer_power(const Expr& x, int64_t exponent) {
                        : ir::make_one(x.type()) / power_by_squaring(x, -exponent);
 }
 
-// Every call without a seed is another stream.
+// Calls without a seed draw from different streams.
 Expr random(Type type, Expr seed) {
   if (!seed.defined()) {
     seed = Expr(int32_t{-1} - graph::next_random_stream());
@@ -205,14 +205,14 @@ Expr absd(Expr a, Expr b) {
 
 namespace {
 
-// A constant of a type that C++ gives to literals, which says nothing of the type that is wanted.
+// A constant whose type is the one that C++ gives to literals, so the type does not show the user's intent.
 bool is_literal(const Expr& e) {
   const Type type = e.type();
   return ir::is_const(e) && type.is_scalar() &&
          (type == Int(32) || type == Float(32) || type == Float(64));
 }
 
-// A literal takes the type of the other end; a float one only another floating type.
+// A literal takes the type of the other end; a float literal only takes another floating-point type.
 void match_ends(Expr& zero, Expr& one) {
   const std::string asked = text("apply lerp to ", zero, " and ", one);
   const auto match = [&](Expr& end, const Expr& other) {
@@ -236,7 +236,7 @@ void match_ends(Expr& zero, Expr& one) {
              "Cast them to double, or write zero + (one - zero) * weight");
 }
 
-// The literals 0 and 1 are weights too.
+// The integer literals 0 and 1 are valid weights too.
 Expr checked_weight(const Expr& zero, Expr weight) {
   const auto constant = ir::as_const_int(weight);
   const bool is_end = constant && weight.type() == Int(32) && (*constant == 0 || *constant == 1);
@@ -253,15 +253,14 @@ Expr checked_weight(const Expr& zero, Expr weight) {
   }
   if (!zero.type().is_float()) return weight;
   if (weight.type().is_float()) return ir::cast_to(zero.type(), weight);
-  const auto whole = static_cast<double>(weight.type().max_uint());
-  return ir::cast_to(zero.type(), weight) / ir::make_const(zero.type(), whole);
+  const auto largest = static_cast<double>(weight.type().max_uint());
+  return ir::cast_to(zero.type(), weight) / ir::make_const(zero.type(), largest);
 }
 
 }  // namespace
 
-// Of integers the result is rounded to the nearest, after the weight was brought to their width,
-// rounding down: for n bits to w / (2^n - 1), where a float weight times 2^n - 1 is rounded as floats
-// are (as doubles are for 32 bits).
+// Integers of n bits are interpolated with a weight w / (2^n - 1). The given weight is converted to w by rounding down;
+// a float weight is multiplied by 2^n - 1 in float, or in double for 32 bits. The result is rounded to nearest.
 Expr lerp(Expr zero, Expr one, Expr weight) {
   check_defined(zero, "lerp");
   check_defined(one, "lerp");
@@ -410,13 +409,13 @@ namespace frontend {
 
 namespace {
 
-// The call with these arguments behind those that stand first; it gives the first of them.
+// A call with the arguments `first` and then `values`, whose result is the first of `values`.
 Expr call_with(Op op, std::vector<Expr> first, const std::vector<Expr>& values) {
   const char* what = op_info(op).name;
   for (const Expr& condition : first) check_condition(condition, what);
   if (values.empty())
-    user_error(text("apply ", what), "it gives the value of its first argument",
-               "it was given none", "Give it a value");
+    user_error(text("apply ", what), "it returns its first argument", "it was given none",
+               "Give it a value");
   for (const Expr& value : values) check_defined(value, what);
   first.insert(first.end(), values.begin(), values.end());
   return call_op(op, values[0].type(), std::move(first));

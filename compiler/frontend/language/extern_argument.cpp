@@ -1,4 +1,4 @@
-// extern_argument.cpp -- stages that a C function computes.
+// extern_argument.cpp -- checks and definition of extern stages, which a C function computes.
 #include "frontend/language/extern_argument.h"
 
 #include "frontend/language/func.h"
@@ -66,8 +66,8 @@ const std::string& Func::extern_function_name() const {
 
 namespace graph {
 
-// 1. It has no definition yet. 2. There is a name, and a type. 3. The variables differ. 4. Funcs
-// among the arguments are defined. 5. Exprs are scalars over parameters.
+// Checks: 1. `f` has no definition yet. 2. There is a name, and a type. 3. The variables differ. 4. Func arguments are
+// defined. 5. Exprs are scalars over parameters.
 void define_extern(const FuncPtr& f, ExternDefinition definition, const std::vector<Type>& types,
                    const std::vector<std::string>& variables, const std::string& asked) {
   if (f->is_defined())

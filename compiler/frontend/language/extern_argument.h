@@ -1,5 +1,4 @@
-// extern_argument.h -- what Func::define_extern hands to the C function: Funcs and images as
-// buffers, Exprs as scalars.
+// extern_argument.h -- arguments that Func::define_extern passes to the C function.
 #pragma once
 
 #include <memory>
@@ -11,9 +10,11 @@
 
 namespace retrograde {
 
+// One argument of an extern stage. Funcs and images are passed as halide_buffer_t*, Exprs as scalars.
 // Requires: every argument is a defined expression.
 struct ExternFuncArgument {
-  ExternFuncArgument() = default;
+  ExternFuncArgument() = default;  // an undefined argument
+  // Converts a Func, an image, an Expr, a Param or a number to an argument.
   ExternFuncArgument(graph::FuncPtr func);
   template <typename T, int Dims>
   ExternFuncArgument(const Buffer<T, Dims>& buffer) : ExternFuncArgument(buffer.parameter()) {}
@@ -25,19 +26,23 @@ struct ExternFuncArgument {
   ExternFuncArgument(std::shared_ptr<graph::ParameterContents> image);
   ExternFuncArgument(const OutputImageParam& image) : ExternFuncArgument(image.parameter()) {}
 
-  bool defined() const { return defined_; }
+  bool defined() const { return defined_; }  // whether it holds anything
+  // Whether it is a Func.
   bool is_func() const { return defined_ && contents.kind == graph::ExternArgument::Kind::Func; }
+  // Whether it is a scalar.
   bool is_expr() const { return defined_ && contents.kind == graph::ExternArgument::Kind::Expr; }
+  // Whether it is a Buffer that the program names.
   bool is_buffer() const {
     return defined_ && contents.kind == graph::ExternArgument::Kind::Buffer &&
            contents.buffer->is_literal;
   }
+  // Whether it is an ImageParam.
   bool is_image_param() const {
     return defined_ && contents.kind == graph::ExternArgument::Kind::Buffer &&
            !contents.buffer->is_literal;
   }
 
-  graph::ExternArgument contents;
+  graph::ExternArgument contents;  // the argument as the graph stores it
 
  private:
   bool defined_ = false;

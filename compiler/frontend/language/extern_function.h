@@ -1,4 +1,4 @@
-// extern_function.h -- C functions of scalars in expressions.
+// extern_function.h -- calls of scalar C functions inside expressions.
 #pragma once
 
 #include <string>
@@ -9,13 +9,13 @@
 namespace retrograde {
 
 namespace frontend {
-// UserError when the arguments have other types than the function.
+// Throws UserError if the types of the arguments differ from the declared ones.
 Expr checked_extern_call(const std::string& function, Type result, const std::vector<Type>& types,
                          const std::vector<Expr>& args, bool is_pure = false);
 }  // namespace frontend
 
-// function(args...), a C function from Ts... to R of this process, or of the JIT externs. It is
-// taken to depend on its arguments alone; a vector calls it lane by lane.
+// Calls the C function R function(Ts...), a symbol of this process or of the JIT externs. The result must
+// depend on the arguments alone; vector code calls the function lane by lane.
 // Requires: every argument is a defined expression; its arguments have the types that it was
 // declared with.
 template <typename R, typename... Ts, typename... Args>
@@ -24,8 +24,8 @@ Expr call_c_function(const std::string& function, const Args&... args) {
   return frontend::checked_extern_call(function, type_of<R>(), {type_of<Ts>()...}, {Expr(args)...});
 }
 
-// The same of a function that does nothing but compute its value: what does not change in a loop is
-// computed once, before it, where the loop runs at all.
+// Calls a C function that has no side effects. A call that does not change in a loop is computed once before
+// the loop, if the loop runs at all.
 // Requires: every argument is a defined expression; its arguments have the types that it was
 // declared with.
 template <typename R, typename... Ts, typename... Args>

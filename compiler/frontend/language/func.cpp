@@ -1,5 +1,4 @@
-// func.cpp -- the handle of a Func: accessors, and the directives about where it is computed and
-// stored.
+// func.cpp -- construction and accessors of Func, and its directives about compute and storage levels.
 #include "frontend/language/func.h"
 
 #include "graph/define.h"
@@ -86,7 +85,7 @@ const graph::Definition& Func::checked_update(int index, const char* asked) cons
              text("it has ", num_update_definitions(), " update definitions"), "Name one of them");
 }
 
-// What leaves the Func may outlive it: references to it are strong again.
+// The returned Exprs may outlive the Func, so their references to it become strong.
 std::vector<Expr> Func::update_args(int index) const {
   return ir::mapped(
       checked_update(index, "take the arguments of update").args,
@@ -118,7 +117,7 @@ std::vector<RVar> Func::rvars(int index) const {
   return ir::numbered(loops, [&](size_t i) { return RVar(domain, static_cast<int>(i)); });
 }
 
-// ---- running it ----
+// ---- running ----
 
 Pipeline& Func::pipeline_to(const char* asked) {
   check_defined(asked + quoted(name()));
@@ -141,7 +140,7 @@ std::vector<Argument> Func::infer_arguments() const {
   return Pipeline(*this).infer_arguments();
 }
 
-// There before the definition, too, of a Func that was declared with types and dimensions.
+// A Func that was declared with types and dimensions has outputs before it is defined.
 void Func::check_has_outputs(const std::string& asked) const {
   if (defined() || func_->required_types.empty()) return check_defined(asked);
   graph::make_outputs(*func_);

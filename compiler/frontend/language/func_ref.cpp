@@ -1,4 +1,4 @@
-// func_ref.cpp -- reads, definitions and updates through f(x, y).
+// func_ref.cpp -- definitions and updates by assignment to f(x, y), and reads of it.
 #include "frontend/language/func_ref.h"
 
 #include <algorithm>
@@ -57,16 +57,16 @@ Expr Tuple::operator[](size_t i) const {
   return exprs_[i];
 }
 
-// _ on the left stands for as many dimensions as are missing, or in a first definition for the
-// implicit variables that the right-hand side uses.
+// Expands _ on the left-hand side: to the missing dimensions if the number of dimensions is known, and otherwise to
+// the implicit variables that the right-hand side uses.
 std::vector<Expr> FuncRef::left_args(const std::vector<Expr>& values) const {
   if (frontend::placeholder_position(args_) < 0) return args_;
-  const int given = static_cast<int>(args_.size()) - 1;
+  const int named_count = static_cast<int>(args_.size()) - 1;
   int count = frontend::implicit_count(values);
   if (func_->is_defined())
-    count = func_->dimensions() - given;
+    count = func_->dimensions() - named_count;
   else if (func_->required_dimensions >= 0)
-    count = func_->required_dimensions - given;
+    count = func_->required_dimensions - named_count;
   return frontend::expand_placeholder(args_, std::max(count, 0));
 }
 
@@ -175,7 +175,7 @@ FuncTupleElementRef::FuncTupleElementRef(FuncRef ref, int index) : ref_(ref), in
   ref_.element(index);  // checks that the Func is defined and has this value
 }
 
-// The other values are written back as they are: the definition stays a plain one of all values.
+// The update stores all values of the point; the others are stored back unchanged.
 Stage FuncTupleElementRef::operator=(const Expr& value) {
   FuncRef here(ref_.func_, ref_.left_args({value}));
   return here.define(ir::numbered(here.size(), [&](size_t i) {

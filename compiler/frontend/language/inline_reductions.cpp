@@ -1,4 +1,4 @@
-// inline_reductions.cpp -- finds what an inline reduction runs over, and what its Func depends on.
+// inline_reductions.cpp -- finds the domain of an inline reduction and the arguments of its Func, and defines the Func.
 #include "frontend/language/inline_reductions.h"
 
 #include <unordered_set>
@@ -14,12 +14,12 @@ namespace {
 
 using DomainPtr = std::shared_ptr<graph::ReductionDomainContents>;
 
-// An inline reduction, taken apart.
+// The parts of an inline reduction.
 struct Reduction {
   DomainPtr domain;
   Expr body;               // over `args` and the variables of the domain
-  std::vector<Expr> args;  // of the Func that is made
-  std::vector<Expr> at;    // what the enclosing expression passes for them
+  std::vector<Expr> args;  // arguments of the new Func
+  std::vector<Expr> at;    // the values that the enclosing expression passes for them
 };
 
 class Finder {
@@ -82,7 +82,7 @@ class Finder {
       result.args.push_back(ir::variable(v.name));
       result.at.push_back(Expr(&v));
     } else if (domain) {
-      // A variable of an enclosing reduction is one value for us.
+      // A variable of an enclosing reduction is a fixed value here, passed as an argument.
       const Var fresh;
       renamed_[v.name] = fresh;
       result.args.push_back(fresh);
@@ -101,12 +101,12 @@ void check_undefined(const Func& f, const char* name) {
              "the Func that is given must have no definition", "it has one", "Give a new Func");
 }
 
-// Over the whole domain, even when the body uses only part of its variables, or none.
+// The update runs over the whole domain, even if the body uses only some of its variables, or none.
 void update(const Func& f, const Reduction& reduction, const std::vector<Expr>& values) {
   graph::define_update(f.function(), reduction.args, values, reduction.domain);
 }
 
-// What a reduction begins with, and how it takes one more value.
+// The initial value of a reduction, and the function that combines it with another value.
 struct Fold {
   Expr (*initial)(Type);
   Expr (*combine)(Expr, Expr);
@@ -128,7 +128,7 @@ Expr reduce(const Fold& fold, const DomainPtr& domain, const Expr& e, const Func
   return f(reduction.at);
 }
 
-// Coordinates first, then the value. Only a strictly better element replaces the best one so far.
+// The result holds the coordinates, then the value. Only a strictly better element replaces the best so far.
 Tuple reduce_place(bool is_max, const DomainPtr& domain, const Expr& e, const Func& f,
                    const char* name) {
   check_undefined(f, name);

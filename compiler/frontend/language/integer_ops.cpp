@@ -13,7 +13,7 @@ Expr user_context_value() {
 
 namespace {
 
-// The operands of a division in a signed type that holds both, the divisor from 1 to 256.
+// The operands of a division, cast to a signed type that holds both; the divisor is in [1, 256].
 struct Division {
   Type type;  // of the result
   Expr numerator, divisor;
@@ -60,7 +60,7 @@ Expr fast_integer_divide_round_to_zero(const Expr& numerator, const Expr& diviso
 
 namespace {
 
-// A literal beside an expression of another type must fit it, as in a + 300.
+// A literal takes the type of the other operand and must fit it, as in a + 300.
 Type match_operands(Expr& a, Expr& b, const char* what) {
   const bool is_literal_a = ir::is_const(a), is_literal_b = ir::is_const(b);
   if (is_literal_a != is_literal_b && a.defined() && b.defined()) {
@@ -77,7 +77,7 @@ Type match_operands(Expr& a, Expr& b, const char* what) {
 
 }  // namespace
 
-// ---- twice the bits ----
+// ---- widening ----
 
 namespace {
 
@@ -123,7 +123,7 @@ Expr widening_sub(const Expr& a, const Expr& b) {
   return cast(wide, a) - cast(wide, b);
 }
 
-// ---- clamped ----
+// ---- saturating ----
 
 Expr saturating_add(const Expr& a, const Expr& b) {
   check_integers(a, b, "saturating_add");
@@ -144,7 +144,7 @@ Type wide_like(const Expr& a, const Expr& b, const char* what) {
   return wide_type(a, a, what).with_code(a.type().code());
 }
 
-// The highest bit that is shifted out is added: nothing overflows, as (e + half) >> amount might.
+// Adds the highest bit that is shifted out. This cannot overflow, unlike (e + half) >> amount.
 Expr rounded_shift(const Expr& e, const Expr& amount) {
   const Expr one = ir::make_one(amount.type()), zero = ir::make_zero(amount.type());
   const Expr lost = (e >> (amount - one)) & ir::make_one(e.type());
@@ -191,7 +191,7 @@ Expr rounding_mul_shift_right(const Expr& a, const Expr& b, const Expr& q) {
   return saturating_cast(narrow, rounded_shift(product, q));
 }
 
-// ---- a narrow operand beside a wide one ----
+// ---- one narrow operand ----
 
 namespace {
 
@@ -218,7 +218,7 @@ Expr widen_right_sub(const Expr& a, const Expr& b) {
   return a - widened_like(a, b, "widen_right_sub");
 }
 
-// ---- means. Of 64 bits bit by bit: a = 2 (a >> 1) + (a & 1), so that no sum overflows ----
+// ---- means: 64-bit operands use a = 2 (a >> 1) + (a & 1), so that no sum overflows ----
 
 Expr halving_add(Expr a, Expr b) {
   const Type type = match_operands(a, b, "halving_add");
@@ -241,7 +241,7 @@ Expr halving_sub(Expr a, Expr b) {
   return (a >> 1) - (b >> 1) - (~a & b & 1);
 }
 
-// ---- parts of a number ----
+// ---- bit fields ----
 
 Expr extract_bits(Type type, const Expr& e, const Expr& lowest) {
   frontend::check_defined(e, "extract_bits");
@@ -272,11 +272,11 @@ Expr concat_bits(const std::vector<Expr>& parts) {
     user_error(asked, "the result has 8, 16, 32 or 64 bits", text("it would have ", total),
                "Give another number of parts");
   }
-  const Type whole = UInt(total), part_bits = parts[0].type().with_code(TypeCode::UInt);
+  const Type result_type = UInt(total), part_bits = parts[0].type().with_code(TypeCode::UInt);
   Expr result;
   for (size_t i = 0; i < parts.size(); i++) {
-    const Expr bits = cast(whole, reinterpret(part_bits, parts[i]));
-    const Expr placed = bits << cast(whole, static_cast<int>(i) * part_bits.bits());
+    const Expr bits = cast(result_type, reinterpret(part_bits, parts[i]));
+    const Expr placed = bits << cast(result_type, static_cast<int>(i) * part_bits.bits());
     result = result.defined() ? result | placed : placed;
   }
   return result;

@@ -1,16 +1,17 @@
-// lambda.h -- Funcs made in passing: lambda(x, y, x + y); and the value of a single expression.
+// lambda.h -- anonymous Funcs, as in lambda(x, y, x + y), and evaluation of a single expression.
 #pragma once
 
 #include "frontend/language/func.h"
 
 namespace retrograde {
 
+// An anonymous Func of the implicit variables in `e`.
 inline Func lambda(const Expr& e) {
   Func f("lambda");
   f(_) = e;
   return f;
 }
-// lambda(x, y, ..., e): the last argument is the value.
+// An anonymous Func lambda(x, y, ..., e) whose value is the last argument.
 template <typename... Rest>
 Func lambda(const Var& x, Rest&&... rest) {
   std::vector<Expr> args{x, Expr(std::forward<Rest>(rest))...};
@@ -47,7 +48,7 @@ T evaluate(const Expr& e) {
   Buffer<T> result = f.realize();
   return result();
 }
-// evaluate(Tuple(a, b), &x, &y)
+// Evaluates several expressions: evaluate(Tuple(a, b), &x, &y).
 // Requires: there is one result for each value.
 template <typename... Results>
 requires(sizeof...(Results) >= 1) void evaluate(const Tuple& values, Results*... results) {
@@ -60,7 +61,7 @@ requires(sizeof...(Results) >= 1) void evaluate(const Tuple& values, Results*...
   i = 0;
   ((*results = realization[i++].template as<Results>()()), ...);
 }
-// The same: an expression without loops has nothing that a device would do faster.
+// The same as evaluate(); an expression without loops gains nothing from a device.
 template <typename T>
 T evaluate_may_gpu(const Expr& e) {
   return evaluate<T>(e);

@@ -19,7 +19,7 @@ std::string variable_name(const std::string& domain, size_t i) {
   return i < 4 ? domain + "." + variable_letters[i] : domain + "." + std::to_string(i);
 }
 
-// Bounds are int32 and may depend on parameters and on the pure variables of no definition.
+// Bounds are int32. They may depend on parameters, not on the pure variables of a definition.
 Expr checked_bound(const Expr& e, const std::string& domain, const char* which) {
   const std::string asked = text("make the RDom ", quoted(domain));
   if (!e.defined())
@@ -29,7 +29,7 @@ Expr checked_bound(const Expr& e, const std::string& domain, const char* which) 
     user_error(asked, text("its ", which, " must be an integer"),
                text(e, " has type ", to_string(e.type())), "Convert it with cast<int>");
   }
-  // Names that a Let inside binds are no variables of the program's.
+  // Names that a Let binds are not variables of the program.
   walk(simplification::expand_lets(e), [&](const ir::Variable& v) {
     if (!v.symbol.defined() || graph::domain_of(v)) {
       user_error(asked, "its bounds must be known before any loop starts",
@@ -52,7 +52,7 @@ void check_extent(const Expr& extent, const std::string& name) {
 
 RVar::RVar() : name_(ir::unique_name("r")) {}
 
-// The variables of a domain have dots in their names: "r.x".
+// Names of a domain's variables contain a dot: "r.x".
 RVar::RVar(const std::string& name) : name_(name) {
   static_cast<void>(Var(name.substr(name.rfind('.') + 1)));
 }
@@ -119,7 +119,7 @@ RVar RDom::operator[](int i) const {
 const RVar RDom::only_variable() const {
   if (dimensions() != 1) {
     user_error("use an RDom as a variable",
-               "only a domain of one variable stands for that variable",
+               "only a domain of one variable converts to that variable",
                text("it has ", dimensions(), " variables"), "Name the variable: r.x, r.y or r[i]");
   }
   return RVar(domain_, 0);

@@ -1,4 +1,4 @@
-// reinterpret_bits.h -- the bits of a C++ value as another type of the same size.
+// reinterpret_bits.h -- reinterprets the bits of a C++ value as another type of the same size.
 #pragma once
 
 #include <bit>
@@ -6,6 +6,7 @@
 
 namespace retrograde::internal {
 
+// The bits of a C++ value as a value of another type of the same size.
 //   uint32_t bits = reinterpret_bits<uint32_t>(1.0f);   // 0x3f800000
 template <typename To, typename From>
 To reinterpret_bits(const From& from) {

@@ -7,8 +7,7 @@ namespace retrograde {
 
 namespace {
 
-// Parameters and their sizes are known when the call begins; nothing else is. `part` is the
-// condition or what its message shows.
+// Only parameters and their sizes are known when the call begins. `part` is the condition or a value of its message.
 void check_uses_parameters_only(const Expr& part, const std::string& asked) {
   const auto refuse = [&](const std::string& evidence) {
     user_error(asked, "a requirement is checked once, before anything is computed", evidence,

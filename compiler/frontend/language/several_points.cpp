@@ -1,13 +1,12 @@
-// Several points become one more variable of the reduction domain, innermost and unrolled:
+// several_points.cpp -- turns the points of scatter() into an innermost, unrolled variable of the reduction domain:
 //
 //   f(scatter(a, b), y) = gather(u, v)
 //       =>   RDom k(0, 2);  f(select(k == 0, a, b), y) = select(k == 0, u, v)
 //
-// What is read of f itself is what was there before the update: without an RDom, of a copy of f as
-// it was; over one, whose iterations may read what earlier ones stored, k is no loop but numbers
-// points that each iteration computes before it stores the first
-// (graph::ReductionVariable::numbers_points). Where no point reads what an earlier one of its
-// iteration stores, k is a loop all the same: such updates have adjoints.
+// All reads of f must come before the stores. An update without an RDom reads a copy of f. An update over an RDom may
+// read values that earlier iterations stored; there k is not a loop but numbers the points, and each iteration computes
+// all points before it stores the first (graph::ReductionVariable::numbers_points). If no point reads what an earlier
+// point of its iteration stores, k is a loop anyway, because such updates have adjoints.
 #include "frontend/language/several_points.h"
 
 #include <algorithm>
@@ -109,12 +108,12 @@ class SeveralPoints {
         std::ranges::all_of(places, [](const Call* call) { return call->name == scatter_name; });
     if (!is_named)
       user_error(asked_, "scatter() names the places on the left-hand side",
-                 "gather() stands there", "Write f(scatter(a, b)) = gather(u, v)");
+                 "gather() is on the left-hand side", "Write f(scatter(a, b)) = gather(u, v)");
     for (const Call* call : all) {
       const int points = static_cast<int>(call->args.size());
       if (points_ == 0) points_ = points;
       if (points == points_) continue;
-      user_error(asked_, "all of an update's scatter() and gather() have as many points",
+      user_error(asked_, "all scatter() and gather() of an update have the same number of points",
                  text("one has ", points_, " and one has ", points), "Give as many to each");
     }
   }
@@ -133,7 +132,7 @@ class SeveralPoints {
                                              : std::vector<Expr>();
   }
 
-  // The user's domain with the number of the point: as the innermost loop, or as none.
+  // Adds k to the user's domain. `at_once`: k numbers points and is not a loop.
   void make_domain(bool at_once) {
     const graph::ReductionVariable number{number_, Expr(0), Expr(points_), at_once};
     domain_ = std::make_shared<ReductionDomainContents>();
@@ -162,10 +161,10 @@ class SeveralPoints {
     }
   }
 
-  // ---- whether the points of an iteration may be stored as soon as they are computed ----
+  // ---- can each point be stored as soon as it is computed? ----
 
   bool may_take_turns() const {
-    std::vector<std::vector<Expr>> stored;  // places of the points so far
+    std::vector<std::vector<Expr>> stored;  // coordinates of the earlier points
     for (int i = 0; i < points_; ++i) {
       std::vector<Expr> place = of_point(args_, i), all = of_point(values_, i);
       all.insert(all.end(), place.begin(), place.end());
@@ -197,7 +196,7 @@ class SeveralPoints {
   std::vector<Expr> at_point(const std::vector<Expr>& exprs) const {
     return mapped(exprs, [&](const Expr& e) { return rebound(chosen(e)); });
   }
-  // The points of e; one for all where it names none.
+  // e at the point k; e itself if it contains no scatter() or gather().
   Expr chosen(const Expr& e) const {
     if (packs_in({e}).empty()) return e;
     const Expr point = variable(number_, Int(32), SymbolRef(domain_));

@@ -1,4 +1,4 @@
-// several_points.h -- f(scatter(a, b)) = gather(u, v): several points in one update definition.
+// several_points.h -- update definitions that store to several points: f(scatter(a, b)) = gather(u, v).
 #pragma once
 
 #include <vector>
@@ -7,10 +7,10 @@
 
 namespace retrograde::frontend {
 
-// Whether scatter() or gather() stands in one of them.
+// Whether one of the expressions contains scatter() or gather().
 bool names_several_points(const std::vector<Expr>& exprs);
 
-// The update f(args) = values; scatter() is among args.
+// Adds the update f(args) = values, whose args contain scatter().
 void define_several_points(const FuncPtr& f, const std::vector<Expr>& args,
                            const std::vector<Expr>& values);
 

@@ -24,7 +24,7 @@ const std::string& checked_name(const std::string& name) {
   if (!is_identifier(name)) {
     user_error("make a Var named " + quoted(name),
                "the name of a Var is an identifier: letters, digits, _ and $",
-               quoted(name) + " is none", "Choose a name such as \"x\" or \"x_outer\"");
+               quoted(name) + " is not", "Choose a name such as \"x\" or \"x_outer\"");
   }
   return name;  // NOLINT(bugprone-return-const-ref-from-parameter): used within the full expression
 }
@@ -39,14 +39,14 @@ std::string name_from(const char* text, const char* of) {
 }
 }  // namespace frontend
 
-// Counted by themselves: print_loop_nest shows "v$0" as v0, and so on.
+// Generated names of Vars have a counter of their own; print_loop_nest shows "v$0" as v0.
 Var::Var() : expr_() {
   static std::atomic<uint64_t> next{0};
   name_ = text("v$", next++);
   expr_ = ir::variable(name_);
 }
 
-// An implicit variable says how many dimensions its definition has, even in f(_) * 0.
+// An implicit variable determines how many dimensions its definition has, even in f(_) * 0.
 Var::Var(const std::string& name)
     : name_(checked_name(name)),
       expr_(is_implicit() ? ir::loose_variable(name_) : ir::variable(name_)) {}
@@ -59,7 +59,7 @@ namespace frontend {
 
 namespace {
 
-// Coordinates are int32; floats are refused because a rounding rule would have to be guessed.
+// Coordinates are int32. Floats are rejected because their rounding would be a guess.
 Expr as_coordinate(const Expr& e, int dimension, const std::string& what) {
   const std::string asked = text("read dimension ", dimension, " of ", what);
   if (!e.defined())

@@ -1,5 +1,4 @@
-// call.cpp -- from values of parameters to the argument vector of compiled code, and back to an
-// exception.
+// call.cpp -- turns values of parameters into the argument vector of compiled code, and error codes into exceptions.
 #include "frontend/run/call.h"
 
 #include <atomic>
@@ -33,7 +32,7 @@ void check_limits(const ParameterContents& parameter, const Scalar& value,
 
 void check_buffer(const halide_buffer_t* buffer, const std::string& name, Type type, int dimensions,
                   bool with_memory, const std::string& asked) {
-  const auto what = [&] { return "the buffer for " + quoted(name); };  // of errors only
+  const auto what = [&] { return "the buffer for " + quoted(name); };  // built only for errors
   if (!buffer)
     call_error(asked, what() + " must not be null", "a null halide_buffer_t* was given",
                "Give a buffer");
@@ -95,10 +94,10 @@ void* Arguments::bind_scalar(const ParameterPtr& parameter) {
 
 void* Arguments::bind_buffer(const ParameterPtr& parameter, bool is_query) {
   const ParamMap::Entry* entry = map_.find(parameter);
-  halide_buffer_t* given = entry ? entry->raw_buffer() : parameter->buffer;
-  if (given) {
-    check_buffer(given, parameter->name, parameter->type, parameter->dimensions, true, asked_);
-    return given;
+  halide_buffer_t* bound = entry ? entry->raw_buffer() : parameter->buffer;
+  if (bound) {
+    check_buffer(bound, parameter->name, parameter->type, parameter->dimensions, true, asked_);
+    return bound;
   }
   if (!is_query) {
     call_error(asked_, text("the ImageParam ", quoted(parameter->name), " needs a buffer"),
@@ -131,7 +130,7 @@ JITHandlers merged(JITHandlers handlers, const JITHandlers& first) {
 
 namespace {
 
-// Beside what the program itself prints.
+// Prints to stdout, through the same buffer as the program's own output.
 void default_print(const char* message) {
   std::fputs(message, stdout);
   std::fflush(stdout);
@@ -147,7 +146,7 @@ DefaultHandlers& defaults() {
   return result;
 }
 
-// The handlers of a call: the caller's, else the pipeline's, else the process's.
+// The handlers of a call. The caller's take precedence over the pipeline's, and these over the process's.
 JITHandlers handlers_of(const JITHandlers& own, const JITUserContext* user) {
   JITHandlers handlers = defaults().are_set ? merged(default_handlers(), own) : own;
   return user ? merged(std::move(handlers), user->handlers) : handlers;

@@ -1,5 +1,4 @@
-// call.h -- one call of compiled code: its arguments, checked and in place; its handlers; its
-// error.
+// call.h -- calls of compiled code: checks and binds the arguments, selects the handlers, and reports the error.
 #pragma once
 
 #include <string>
@@ -11,21 +10,21 @@
 
 namespace retrograde::frontend {
 
-// Checks that do not depend on the code: null, type, dimensions, extents, memory. RuntimeError.
+// Checks that do not depend on the code: null, type, rank, extents, memory. Throws RuntimeError.
 void check_buffer(const halide_buffer_t* buffer, const std::string& name, Type type, int dimensions,
                   bool with_memory, const std::string& asked);
 // The bytes of a scalar as generated code reads them.
 uint64_t scalar_bits(const Scalar& value);
-// RuntimeError when the value is outside of the parameter's limits.
+// Throws RuntimeError if the value is outside of the parameter's limits.
 void check_limits(const ParameterContents& parameter, const Scalar& value,
                   const std::string& asked);
 
-// What compiled code is called with: values from `map`, and what it does not name from the
-// parameters. Scalars and query buffers live here while it runs.
+// The argument vector of a call. Values come from `map`, or from the parameters if the map has none. Holds
+// scalars and query buffers during the call.
 class Arguments {
  public:
   using ParameterPtr = std::shared_ptr<ParameterContents>;
-  // `is_query`: an image without a buffer gets an empty one, for the code to write its region into.
+  // `is_query`: an image without a buffer gets an empty one, whose shape the code then sets.
   Arguments(const CompiledPipeline& code, std::vector<halide_buffer_t*> outputs, bool is_query,
             std::string asked, const ParamMap& map);
   void* const* argv() const { return argv_.data(); }
@@ -50,15 +49,15 @@ class Arguments {
   void* bind_buffer(const ParameterPtr& parameter, bool is_query);
 };
 
-// Handlers with others in front of them.
+// Combines handlers; those of `first` take precedence.
 JITHandlers merged(JITHandlers handlers, const JITHandlers& first);
 
-// Runs what checks and binds the arguments of a call. A RuntimeError goes to the handler of errors
-// where there is one: then its code is returned, which is not 0.
+// Runs `prepare`, which checks and binds the arguments of a call. If there is an error handler, it receives a
+// RuntimeError, and the nonzero code is returned.
 int prepared(const JITHandlers& own, JITUserContext* user, FunctionRef<void()> prepare);
 
-// Runs it. The handlers of `user` go before `own`. RuntimeError for an error; where a handler was
-// told of it, the error code is returned instead.
+// Runs compiled code. Handlers of `user` take precedence over `own`. An error throws RuntimeError; if an
+// error handler receives it, its code is returned instead.
 int call(const CompiledPipeline& code, const JITHandlers& own, void* const* argv,
          const std::string& asked, JITUserContext* user);
 

@@ -1,4 +1,4 @@
-// callable.cpp -- arguments in the caller's order, brought into the order of compiled code.
+// callable.cpp -- maps arguments from the caller's order to the order of compiled code.
 #include "frontend/run/callable.h"
 
 #include "frontend/run/call.h"
@@ -11,7 +11,7 @@ namespace {
 
 using ParameterPtr = std::shared_ptr<graph::ParameterContents>;
 
-// One argument of the function, and where compiled code has it.
+// One argument of the function, and its position in the arguments of compiled code.
 struct Place {
   std::string name;
   Type type;
@@ -42,12 +42,11 @@ struct Callable::Contents {
   std::shared_ptr<CompiledPipeline> code;
   JITHandlers handlers;
   std::vector<Place> places;    // one for each argument, in the caller's order
-  std::vector<Place> literals;  // Buffers that the program itself names
-  std::string asked;            // how errors begin
+  std::vector<Place> literals;  // Buffers embedded in the program
+  std::string asked;            // begins every message
 };
 
-// Every argument is one of the code's, or one that the outputs do not need, which is taken and left
-// alone.
+// An argument that the outputs do not need is accepted and ignored; all others are arguments of the code.
 Callable Pipeline::callable(const std::vector<Argument>& args, const Target& target) {
   auto contents = std::make_shared<Callable::Contents>();
   contents->name = spec().name;
@@ -118,7 +117,8 @@ int Callable::call(JITUserContext* context, const std::vector<Value>& values) co
   const int refused = frontend::prepared(handlers, context, [&] { check(values); });
   if (refused != 0) return refused;
   const std::string& asked = contents_->asked;
-  std::vector<void*> argv(contents_->code->arguments().size() + 1);  // one more: for those unused
+  std::vector<void*> argv(contents_->code->arguments().size() +
+                          1);  // one more, for unused arguments
   std::vector<uint64_t> scalars(values.size());
   const int unfit = frontend::prepared(handlers, context, [&] { bind(values, argv, scalars); });
   if (unfit != 0) return unfit;

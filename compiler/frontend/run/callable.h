@@ -1,5 +1,5 @@
-// callable.h -- a compiled pipeline as a function: its arguments come with each call, in the order
-// that it was compiled for, and then the output buffers.
+// callable.h -- a compiled pipeline as a function. A call passes the arguments in the order that the pipeline was
+// compiled for, then the output buffers.
 //
 //   Callable brighten = f.compile_to_callable({image, gain});
 //   brighten(in, 2.0f, out);
@@ -20,9 +20,10 @@
 namespace retrograde {
 
 namespace frontend {
-struct DynamicCall;  // of other languages, which know at run time how many arguments there are
+// Calls with an argument list that is known at run time only, for other languages.
+struct DynamicCall;
 
-// Whether the first of some arguments is a context, or what derives from one.
+// Whether the first argument is a JITUserContext* or a pointer to a derived class.
 template <typename... Args>
 inline constexpr bool starts_with_context = false;
 template <typename First, typename... Rest>
@@ -30,14 +31,15 @@ inline constexpr bool starts_with_context<First, Rest...> =
     std::is_convertible_v<First, JITUserContext*>;
 }  // namespace frontend
 
+// A compiled pipeline as a function object.
 class Callable {
  public:
-  Callable() = default;
-  bool defined() const { return contents_ != nullptr; }  // whether it was compiled
+  Callable() = default;                                  // an undefined function
+  bool defined() const { return contents_ != nullptr; }  // whether there is compiled code
 
-  // Scalars of exactly the parameters' types, and buffers; a JITUserContext* may stand first.
-  // Returns 0; RuntimeError for an error of the call, whose code is returned when a handler was
-  // told of it. May be called from several threads at once.
+  // Runs the pipeline. Arguments are scalars of exactly the parameters' types, and buffers; a JITUserContext*
+  // may precede them. Returns 0. An error throws RuntimeError; if an error handler receives it instead, the
+  // call returns the error code. Calls may run on several threads at once.
   // Requires: only what was compiled can be called; it takes its arguments, then its output buffers
   // (RuntimeError); what is a buffer must be a buffer, and what is a scalar must be a scalar
   // (RuntimeError); a value must be of type T, its parameter's (RuntimeError); a buffer must have
@@ -51,7 +53,7 @@ class Callable {
     return call(nullptr, {value_of(args)...});
   }
 
-  // Checked now instead of at the first call.
+  // The Callable as a std::function; argument types are checked here rather than at the first call.
   template <typename... Args>
   std::function<int(Args...)> make_std_function() const {
     std::vector<Value> shapes{shape_of<Args>()...};
@@ -68,13 +70,13 @@ class Callable {
   template <typename... Args>
   using First = std::tuple_element_t<0, std::tuple<Args..., void>>;
 
-  // An argument, or the kind of one.
+  // An argument, or a description of the arguments that a parameter accepts.
   struct Value {
     halide_buffer_t* buffer = nullptr;
     ir::Scalar scalar;
     bool is_buffer = false;
-    Type type;            // bits() == 0: of any type
-    int dimensions = -1;  // of a buffer; -1: of any
+    Type type;            // bits() == 0: any type
+    int dimensions = -1;  // of a buffer; -1: any
   };
 
   template <typename T, int Dims>
@@ -107,7 +109,7 @@ class Callable {
     }
   }
   explicit Callable(std::shared_ptr<const Contents> contents) : contents_(std::move(contents)) {}
-  // Whether arguments of these kinds fit.
+  // Checks that arguments of these types fit.
   void check(const std::vector<Value>& values) const;
   int call(JITUserContext* context, const std::vector<Value>& values) const;
   void bind(const std::vector<Value>& values, std::vector<void*>& argv,

@@ -1,5 +1,4 @@
-// compile_to.cpp -- what compile_to_* are made of: arguments matched by name, then everything goes
-// through a Module.
+// compile_to.cpp -- implements compile_to_*: matches the arguments by name and compiles through a Module.
 #include <algorithm>
 #include <cctype>
 #include <set>
@@ -15,7 +14,7 @@ namespace {
 using ParameterPtr = std::shared_ptr<graph::ParameterContents>;
 using Files = std::map<OutputFileType, std::string>;
 
-// Names of Funcs may hold what a C identifier cannot.
+// The Func's name as a C identifier; names of Funcs may contain other characters.
 std::string default_name(const PipelineSpec& pipeline) {
   std::string name = pipeline.name;
   for (char& c : name) {
@@ -30,7 +29,7 @@ bool is_c_identifier(const std::string& name) {
       name, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; });
 }
 
-// Parts between "::", which only mangled names may have.
+// Checks the parts between "::", which only mangled names may have.
 void check_function_name(const std::string& name, const Target& target) {
   const std::string asked = "compile a pipeline to the function " + quoted(name);
   size_t begin = 0;
@@ -64,7 +63,7 @@ ir::LoweredArgument lowered_argument(const Argument& argument, const ParameterPt
   return result;
 }
 
-// The listed arguments in their order, and then what is to be embedded.
+// The listed arguments in their order, then the Buffers that are embedded in the code.
 class Inputs {
  public:
   Inputs(const PipelineSpec& pipeline, const std::vector<Argument>& args, std::string asked)
@@ -95,7 +94,8 @@ class Inputs {
 
   void check(const Argument& argument, std::set<std::string>& names) const {
     if (argument.is_output()) {
-      user_error(asked_, "the list of arguments holds inputs, and outputs follow by themselves",
+      user_error(asked_,
+                 "the list of arguments holds inputs, and outputs are appended automatically",
                  quoted(argument.name) + " is an output", "Leave it out");
     }
     if (!names.insert(argument.name).second) {
@@ -108,7 +108,7 @@ class Inputs {
         parameter->dimensions == argument.dimensions) {
       return;
     }
-    user_error(asked_, "an argument is what the pipeline uses under its name",
+    user_error(asked_, "an argument agrees with what the pipeline uses under its name",
                "the Argument " + quoted(argument.name) + " differs in kind, type or dimensions",
                "List the Param, ImageParam or Buffer itself");
   }
@@ -130,7 +130,7 @@ Argument output_argument(const ir::LoweredArgument& lowered) {
   return result;
 }
 
-// Estimates given to the Func serve its output buffer.
+// Estimates of a Func also apply to its output buffer.
 void add_estimates(const std::vector<graph::FuncPtr>& outputs, std::vector<Argument>& args) {
   for (Argument& argument : args) {
     if (!argument.is_output() || !argument.argument_estimates.buffer_estimates.empty()) continue;

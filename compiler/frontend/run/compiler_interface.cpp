@@ -1,4 +1,4 @@
-// compiler_interface.cpp -- the compiler of programs that link the front end alone: none.
+// compiler_interface.cpp -- weak definitions for programs that link the front end without the compiler; all throw.
 #include "frontend/run/compiler_interface.h"
 
 #include "diagnostics/error.h"
@@ -10,7 +10,7 @@ namespace retrograde {
               "it is linked with the front end alone", "Link libretrograde");
 }
 
-// Weak: the definitions of compiler/jit, compiler/aot and compiler/tuning win wherever they are linked in.
+// If compiler/jit, compiler/aot and compiler/tuning are linked, their definitions replace these weak ones.
 __attribute__((weak)) Compiler& default_compiler() { no_compiler(); }
 __attribute__((weak)) ModuleCompiler& module_compiler() { no_compiler(); }
 __attribute__((weak)) ScheduleReport explain_schedule(const PipelineSpec&,

@@ -1,4 +1,4 @@
-// jit_handlers.cpp -- checks of handlers, and of C functions that are called by name.
+// jit_handlers.cpp -- default handlers, and checks of handlers and of C functions that are called by name.
 #include "frontend/run/jit_handlers.h"
 
 #include "diagnostics/error.h"

@@ -72,7 +72,7 @@ internal::LoweredFunc Module::get_function_by_name(const std::string& name) cons
     names += (names.empty() ? "" : ", ") + quoted(function.name);
   }
   user_error("find the function " + quoted(name) + " in the module " + quoted(this->name()),
-             "a module gives functions that were appended to it",
+             "a module has the functions that were appended to it",
              names.empty() ? "it has none" : "it has " + names, "Name one of them");
 }
 
@@ -180,7 +180,7 @@ void check_targets(const std::string& asked, const std::vector<Target>& targets,
   }
 }
 
-// What changes how the function is called must be the same for all.
+// All targets must agree on the features that change the function's signature or symbol.
 void check_interface(const std::string& asked, const std::vector<Target>& targets) {
   for (Target::Feature feature : {Target::UserContext, Target::CPlusPlusMangling}) {
     for (const Target& target : targets) {

@@ -1,4 +1,4 @@
-// param_map.cpp -- what a value must be to stand for a parameter.
+// param_map.cpp -- checks that a value fits its parameter.
 #include "frontend/run/param_map.h"
 
 namespace retrograde {
@@ -18,7 +18,7 @@ ir::Scalar ParamMap::checked(const graph::ParameterContents& parameter, const ir
 }
 
 Buffer<> ParamMap::checked(const ImageParam& image, const Buffer<>& buffer) {
-  image.name();  // an error where it has none
+  image.name();  // throws if it is undefined
   if (buffer.defined()) frontend::check_image(*image.parameter(), buffer);
   return buffer;
 }

@@ -1,4 +1,4 @@
-// pipeline.cpp -- compiling on demand, the buffers of the outputs, bounds queries.
+// pipeline.cpp -- compiles pipelines on demand, allocates output buffers, and runs bounds queries.
 #include "frontend/run/pipeline.h"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace {
 
 using ParameterPtr = std::shared_ptr<graph::ParameterContents>;
 
-// What compiled code was made from. Equal stamps: nothing that it depends on has changed.
+// The versions of everything that compiled code depends on. Code is up to date if its stamp is equal.
 struct Stamp {
   std::vector<std::pair<graph::FuncPtr, uint64_t>> funcs;
   std::vector<std::pair<ParameterPtr, uint64_t>> parameters;
@@ -49,7 +49,7 @@ std::string names_of(const std::vector<graph::FuncPtr>& outputs) {
   return listed(outputs, [](const graph::FuncPtr& f) { return quoted(f->name); });
 }
 
-// Minima, extents and strides of buffers, one after the other.
+// Mins, extents and strides of all buffers, concatenated.
 std::vector<int32_t> shapes_of(const std::vector<halide_buffer_t*>& buffers) {
   std::vector<int32_t> result;
   for (const halide_buffer_t* buffer : buffers) {
@@ -61,8 +61,8 @@ std::vector<int32_t> shapes_of(const std::vector<halide_buffer_t*>& buffers) {
   return result;
 }
 
-// A region may depend on the shape of another buffer, or on its own: a call that is a query is
-// repeated until its buffers keep their shapes. False when a call fails.
+// Repeats a bounds query until no buffer changes its shape, since a region may depend on the shape of another buffer or
+// on its own. Returns false if a call fails.
 template <class Call>
 bool ask_until_settled(const std::vector<halide_buffer_t*>& buffers, const std::string& asked,
                        const Call& call) {
@@ -77,9 +77,8 @@ bool ask_until_settled(const std::vector<halide_buffer_t*>& buffers, const std::
              "Set buffers by hand, or give bounds that stay the same once they are met");
 }
 
-// The answer to a query, and at least [0, size) in each dimension: then the call itself says what
-// is wrong with that. Its strides are the answer's, unless it is larger, or they put elements onto
-// each other.
+// Enlarges the result of a query to at least [0, size) in each dimension; if that is wrong, the call reports it. The
+// strides stay unless the buffer grows, or elements would share addresses.
 void enlarge_to(Runtime::Buffer<>& buffer, const std::vector<int32_t>& sizes,
                 const std::string& asked) {
   std::vector<int> extents;
@@ -287,7 +286,7 @@ std::vector<Buffer<>> Pipeline::make_outputs(const std::vector<int32_t>& sizes,
   return result;
 }
 
-// The values of a Tuple are computed point by point.
+// The values of a Tuple are computed together at each point, so their buffers have one shape.
 static void check_one_shape(const halide_buffer_t& first, const halide_buffer_t& other,
                             const graph::FuncContents& f, const std::string& asked) {
   for (int d = 0; d < f.dimensions(); d++) {
@@ -303,10 +302,10 @@ static void check_one_shape(const halide_buffer_t& first, const halide_buffer_t&
   }
 }
 
-std::vector<halide_buffer_t*> Pipeline::checked_outputs(const RealizationArg& given,
+std::vector<halide_buffer_t*> Pipeline::checked_outputs(const RealizationArg& requested,
                                                         bool with_memory) const {
   const std::string asked = "realize " + names_of(checked().outputs);
-  const std::vector<halide_buffer_t*>& buffers = given.buffers();
+  const std::vector<halide_buffer_t*>& buffers = requested.buffers();
   size_t count = 0;
   for (const graph::FuncPtr& f : contents_->outputs) count += f->types.size();
   if (buffers.size() != count) {
@@ -326,7 +325,7 @@ std::vector<halide_buffer_t*> Pipeline::checked_outputs(const RealizationArg& gi
   return buffers;
 }
 
-// ---- what a schedule costs ----
+// ---- the cost of a schedule ----
 
 ScheduleReport Pipeline::explain_schedule(const Target& target, const std::vector<int32_t>& sizes,
                                           const ExplainOptions& options) const {
@@ -348,11 +347,11 @@ ScheduleReport Pipeline::explain_schedule(const RealizationArg& outputs, const T
 
 // ---- calling ----
 
-void Pipeline::run(JITUserContext* context, const RealizationArg& given, const Target& target,
+void Pipeline::run(JITUserContext* context, const RealizationArg& requested, const Target& target,
                    const ParamMap& map) const {
   const JITHandlers& handlers = checked().handlers;
   std::vector<halide_buffer_t*> outputs;
-  const auto check = [&] { outputs = checked_outputs(given, true); };
+  const auto check = [&] { outputs = checked_outputs(requested, true); };
   if (frontend::prepared(handlers, context, check) != 0) return;
   const auto code = compiled(target);
   const std::string asked = "realize " + names_of(contents_->outputs);
@@ -374,7 +373,7 @@ Realization Pipeline::run(JITUserContext* context, const std::vector<int32_t>& s
   const auto call = [&] {
     return frontend::call(*code, handlers, arguments->argv(), asked, context) == 0;
   };
-  // Without memory the call is a query of what the outputs must be; no elements need none.
+  // With outputs that have no memory, the call is a query of their shape. Empty outputs need no query.
   const bool needs_no_query = std::find(sizes.begin(), sizes.end(), 0) != sizes.end() ||
                               contents_->target.has_feature(Target::NoBoundsQuery);
   const bool succeeds = frontend::prepared(handlers, context, bind) == 0 &&
@@ -389,7 +388,7 @@ Realization Pipeline::run(JITUserContext* context, const std::vector<int32_t>& s
   return Realization(std::move(buffers));
 }
 
-// Outputs without memory are asked for, too.
+// The query also covers outputs without memory.
 void Pipeline::infer(JITUserContext* context, const std::vector<halide_buffer_t*>& outputs,
                      const Target& target, const ParamMap& map) const {
   const auto code = compiled(target);

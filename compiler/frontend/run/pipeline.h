@@ -1,4 +1,4 @@
-// pipeline.h -- one or more output Funcs, compiled and run together.
+// pipeline.h -- Pipeline: one or more output Funcs that are compiled and run together.
 #pragma once
 
 #include <memory>
@@ -24,34 +24,39 @@ class Func;
 
 struct JITExtern;
 
+// One or more output Funcs that are compiled and run together.
 // Requires: it needs outputs.
 class Pipeline : public Runnable<Pipeline> {
  public:
+  // The buffers that realize() computes into.
   using RealizationArg = retrograde::RealizationArg;
 
-  Pipeline() = default;
+  Pipeline() = default;  // a pipeline without outputs
+  // A pipeline with one output.
   Pipeline(const Func& output);
+  // A pipeline with several outputs.
   // Requires: a Pipeline has at least one output; an output needs a definition; its outputs are
   // different Funcs; Funcs may not depend on each other in a circle; every Func that is used needs
   // a definition; parameters of one pipeline have different names.
   Pipeline(const std::vector<Func>& outputs);
 
   bool defined() const { return contents_ != nullptr; }  // whether it has outputs
-  std::vector<Func> outputs() const;                     // in the order given
+  std::vector<Func> outputs() const;                     // the outputs in the given order
+  // Func `index` of all Funcs of the pipeline, producers before consumers.
   // Requires: Funcs are numbered from 0.
-  Func get_func(size_t index) const;  // of all Funcs, producers first
+  Func get_func(size_t index) const;
 
-  void invalidate_cache();  // forgets what was compiled
-  // Tells the trace handler when a call begins and when it ends.
+  void invalidate_cache();  // discards the compiled code
+  // Reports the begin and end of each call to the trace handler.
   void trace_pipeline();
-  std::string loop_nest(const Target& target = Target()) const;  // its loops, after scheduling
-  void print_loop_nest() const;                                  // to the standard error stream
+  std::string loop_nest(const Target& target = Target()) const;  // the scheduled loops as text
+  void print_loop_nest() const;                   // prints the scheduled loops to stderr
   std::vector<Argument> infer_arguments() const;  // Params and ImageParams that it uses
-  JITHandlers& jit_handlers();                    // what its compiled code calls back
+  JITHandlers& jit_handlers();                    // handlers of in-process calls
 
-  // Calls fail with the message, whose parts may be Exprs, unless the condition holds. It may use
-  // Params and sizes of images, but no Func and no Var; it holds for every pipeline that has the
-  // first output among its outputs.
+  // Makes calls fail with the message unless the condition holds. The condition and the parts of the message
+  // may use Params and sizes of images, but neither Funcs nor Vars. The requirement belongs to the first
+  // output and applies to every pipeline that has it among its outputs.
   // Requires: a requirement is checked once, before anything is computed; a requirement is a
   // condition of type bool; every part of its message is a defined expression.
   void add_requirement(const Expr& condition, const std::vector<Expr>& message);
@@ -62,21 +67,25 @@ class Pipeline : public Runnable<Pipeline> {
   }
 
   // ---- automatic schedules; see autoscheduler.h ----
+
+  // Schedules the pipeline with the autoscheduler `name`, or with the default one.
   AutoSchedulerResults auto_schedule(const std::string& name, const Target& target,
                                      const MachineParams& machine = {}) const;
   AutoSchedulerResults auto_schedule(const Target& target, const MachineParams& machine = {}) const;
-  // By the built-in one, which these options say more to.
+  // Schedules the pipeline with the built-in autoscheduler and the given options.
   // Requires: options of the autoscheduler name Funcs of the pipeline; a Func is stored or inlined;
   // what is inlined has one pure definition and is no output; what is inlined stays small enough to
   // compile; what is stored has bounds that are known.
   AutoSchedulerResults auto_schedule(const Target& target, const AutoscheduleOptions& options,
                                      const MachineParams& machine = {}) const;
-  // By name, with what the scheduler is told: see AutoschedulerParams.
-  // Requires: the built-in autoscheduler is told of the machine.
+  // Schedules the pipeline with an autoscheduler that is selected and configured by name and text.
+  // Requires: the built-in autoscheduler takes parameters of the machine.
   AutoSchedulerResults apply_autoscheduler(const Target& target,
                                            const AutoschedulerParams& params) const;
-  // Its Funcs that got no directive stay without: gradients are computed where they are read, too.
+  // Keeps the compiler from scheduling Funcs without directives; gradients are then inlined into their
+  // consumers too.
   void unscheduled();
+  // Registers an autoscheduler under a name.
   static void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler) {
     retrograde::add_autoscheduler(name, scheduler);
   }
@@ -87,29 +96,32 @@ class Pipeline : public Runnable<Pipeline> {
                                                                  const F& scheduler) {
     retrograde::add_autoscheduler(name, scheduler);
   }
+  // Selects the autoscheduler that auto_schedule() without a name uses.
   static void set_default_autoscheduler_name(const std::string& name) {
     retrograde::set_default_autoscheduler_name(name);
   }
 
   // ---- schedules as values; see schedule_log.h ----
-  ScheduleLog schedule_log() const;  // what was given to its Funcs, in the order given
-  // Gives all of a log to the Funcs of the same names.
+  ScheduleLog schedule_log() const;  // all directives of its Funcs, in order
+  // Applies the directives of a log to the Funcs of the same names.
   // Requires: every Func that it names is one of the program; every image that it names is one of
   // the program; the target of a directive exists.
   void apply_schedule(const ScheduleLog& log);
 
-  // ---- what a schedule costs; see schedule_report.h ----
-  // For outputs over [0, size) in each dimension, all of one shape; without sizes, as their
-  // estimates say.
+  // ---- the cost of a schedule; see schedule_report.h ----
+
+  // Reports the cost of the schedule per stage, for outputs over [0, size) in each dimension. All outputs
+  // have one shape; without sizes their estimates are used.
   // Requires: it takes one size for each dimension (RuntimeError); sizes are not negative
   // (RuntimeError).
   ScheduleReport explain_schedule(const Target& target = Target(),
                                   const std::vector<int32_t>& sizes = {},
                                   const ExplainOptions& options = {}) const;
-  // For such buffers, into which it is run where times are measured.
+  // Reports the cost for the given output buffers; measurements write into them.
   ScheduleReport explain_schedule(const RealizationArg& outputs, const Target& target = Target(),
                                   const ExplainOptions& options = {}) const;
 
+  // The pipeline as the compiler takes it.
   PipelineSpec spec() const;
 
  private:
@@ -129,7 +141,7 @@ class Pipeline : public Runnable<Pipeline> {
   std::vector<Buffer<>> make_outputs(const std::vector<int32_t>& sizes, bool with_memory) const;
   std::vector<halide_buffer_t*> checked_outputs(const RealizationArg& outputs,
                                                 bool with_memory) const;
-  // Over [0, size) in each dimension, or over the given buffers.
+  // The outputs are computed over [0, size) in each dimension, or over the given buffers.
   Realization run(JITUserContext* context, const std::vector<int32_t>& sizes, const Target& target,
                   const ParamMap& map) const;
   void run(JITUserContext* context, const RealizationArg& outputs, const Target& target,
@@ -144,20 +156,23 @@ class Pipeline : public Runnable<Pipeline> {
   std::shared_ptr<Contents> contents_;
 };
 
-// A C function behind a name that a pipeline calls; or a Pipeline, compiled with it, that an extern
-// stage calls. It takes user_context_value(), which may be left out, then what it uses of images,
-// then of Params, each in the order of their names, then its outputs:
+// The implementation of a C name that a pipeline calls: a C function, or a Pipeline, which is compiled with
+// the caller and computes an extern stage. A Pipeline takes user_context_value(), which may be omitted, then
+// the images that it uses, then its Params, each sorted by name, then its outputs:
 //   blur: uses the ImageParam "in" and the Param "radius"
 //   f.define_extern("blur", {user_context_value(), g, radius}, Float(32), 2);
 //   f.set_jit_externs({{"blur", JITExtern(blur)}});
 struct JITExtern {
+  // A pipeline as the implementation.
   // Requires: it needs outputs; a pipeline that is called by name gets its arguments.
   explicit JITExtern(Pipeline pipeline);
   explicit JITExtern(const Func& func);
+  // A C function as the implementation.
   explicit JITExtern(ExternCFunction function) : function_(std::move(function)) {}
   template <typename R, typename... Args>
   explicit JITExtern(R (*f)(Args...)) : JITExtern(ExternCFunction(f)) {}
-  const Pipeline& pipeline() const { return pipeline_; }
+  const Pipeline& pipeline() const { return pipeline_; }  // the pipeline, or an undefined one
+  // The C function, if it is one.
   const ExternCFunction& extern_c_function() const { return function_; }
 
  private:

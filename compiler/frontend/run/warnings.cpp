@@ -1,16 +1,15 @@
-// warnings.cpp -- looks at definitions and schedules as they stand: nothing is compiled, and a
-// program without findings means the same as one with them.
+// warnings.cpp -- finds suspicious definitions and directives without compiling. Findings never change a program:
 //
 //   f(x) = g(x);  f(x) = h(x)              the first definition is computed and thrown away
-//   f.vectorize(x, 8), f.update() bare     the update was forgotten
+//   f.vectorize(x, 8), f.update() without  the update was forgotten
 //   f.vectorize(x, 1)                      a vector of one lane
-//   f.update().atomic() alone              nothing runs at the same time
+//   f.update().atomic() alone              no loop of the update is parallel or vectorized
 //   RDom r(0, 0)                           the update never runs
-//   f.specialize(true)                     a condition that no call decides
+//   f.specialize(true)                     a constant condition
 //   require(1 > 2, ...)                    every call fails
 //   f.bound(x, 0, 9) of an inlined f       no loop runs over f's region
 //   a gradient without a schedule          the compiler chooses one
-//   float16 without f16c                   each conversion is a function of many instructions
+//   float16 without f16c                   each conversion takes many instructions
 #include "frontend/run/warnings.h"
 
 #include <algorithm>
@@ -28,7 +27,7 @@
 namespace retrograde::frontend {
 namespace {
 
-// Whether it stores every element anew, whatever was there.
+// Whether the update overwrites every element independently of its old value.
 bool overwrites_all(const FuncContents& f, const Definition& update) {
   if (update.predicate.defined() || !update.rvars.empty()) return false;
   for (size_t d = 0; d < f.args.size(); d++) {
@@ -43,7 +42,7 @@ std::string words_for_stage(const FuncContents& f, int stage) {
   return stage == 0 ? quoted(f.name) : text("update ", stage - 1, " of ", quoted(f.name));
 }
 
-// How many Funcs nobody scheduled, where adjoints are among them.
+// Number of Funcs without directives; 0 if there are no adjoints among them.
 size_t unscheduled_beside_adjoints(const std::vector<FuncPtr>& funcs) {
   size_t count = 0;
   bool has_adjoints = false;
@@ -74,9 +73,10 @@ class Findings {
     const size_t count = unscheduled_beside_adjoints(funcs);
     if (count == 0) return;
     add("performance note: the compiler schedules the gradient " + quoted(output.name),
-        text("of its ", funcs.size(), " Funcs ", count, " have no directive, adjoints among them"),
-        "Give them schedules, call Pipeline::auto_schedule() to see and edit what it chooses, say "
-        "set_autoschedule() how it is to choose, or Pipeline::unscheduled() for no schedule");
+        text(count, " of its ", funcs.size(), " Funcs have no directive, adjoints among them"),
+        "Schedule them, call Pipeline::auto_schedule() to see and edit the schedule, set its "
+        "options "
+        "with set_autoschedule(), or call Pipeline::unscheduled() for no schedule");
   }
 
   void note_slow_floats(const FuncContents& f, const Target& target) {
@@ -103,12 +103,12 @@ class Findings {
         "Add the feature f16c where the machine has it, or keep values in float32");
   }
 
-  // Outputs are computed over what a call asks for, and what has updates in loops of its own.
+  // Outputs and Funcs with updates always have loops of their own, so their bounds are not idle.
   void find_idle_bounds(const FuncContents& f) {
     if (f.is_extern() || !f.updates.empty()) return;
     if (f.schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined) return;
     for (const graph::Bound& bound : f.schedule.bounds) {
-      add("what is said of the bounds of " + quoted(bound.var) + " of " + quoted(f.name) +
+      add("the directive about the bounds of " + quoted(bound.var) + " of " + quoted(f.name) +
               " changes nothing",
           quoted(f.name) + " is inlined: it is computed at each point that its consumers read",
           "Compute it in a loop or at root, or leave the bounds out");
@@ -121,9 +121,9 @@ class Findings {
       if (s == 1 && is_undef(f.pure->values[0])) return;
       const std::string earlier =
           s == 1 ? "its first definition" : text("its first ", s, " definitions");
-      add(words_for_stage(f, s) + " hides what is defined before",
-          "it stores every element and reads none of " + quoted(f.name) + ", so that " + earlier +
-              " decide nothing",
+      add(words_for_stage(f, s) + " hides the earlier definitions",
+          "it stores every element and reads none of " + quoted(f.name) + ", so " + earlier +
+              (s == 1 ? " has no effect" : " have no effect"),
           "Leave them out, or give the new values a Func of their own");
       return;
     }
@@ -142,8 +142,8 @@ class Findings {
     for (int s = 1; any && s < f.stage_count(); s++) {
       if (f.stage(s).schedule.is_given) continue;
       add(words_for_stage(f, s) + " has no schedule",
-          "other definitions of " + quoted(f.name) + " have one, and it holds for them alone",
-          text("Schedule it through update(", s - 1, "), or say update(", s - 1,
+          "other definitions of " + quoted(f.name) + " have one, which applies to them alone",
+          text("Schedule it through update(", s - 1, "), or call update(", s - 1,
                ").unscheduled()"));
     }
   }
@@ -161,7 +161,7 @@ class Findings {
   void find_failing_requirement(const FuncContents& f, int s) {
     walk(f.stage(s), [&](const Call& call) {
       if (!call.is_op(Op::require) || as_const_int(call.args[0]) != 0) return;
-      add(words_for_stage(f, s) + " requires what never holds",
+      add(words_for_stage(f, s) + " has a requirement that never holds",
           "the condition does not depend on the call, and is false",
           "Require a condition on parameters or facts about buffers");
     });
@@ -216,7 +216,8 @@ std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs, bool w
     findings.look_at(*f, with_hidden);
     findings.note_slow_floats(*f, target);
   }
-  const bool may_be_placed = unscheduled_beside_adjoints(funcs) > 0;  // by the compiler
+  const bool may_be_placed =
+      unscheduled_beside_adjoints(funcs) > 0;  // the compiler may choose levels
   for (const FuncPtr& f : funcs) {
     if (!may_be_placed && !std::ranges::count(outputs, f)) findings.find_idle_bounds(*f);
   }
@@ -225,7 +226,7 @@ std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs, bool w
 }
 
 namespace {
-// Not shared: a scope is of the thread that opened it.
+// A scope belongs to the thread that opened it.
 thread_local std::function<void(const std::string&)> listener;
 
 struct ProcessHandler {

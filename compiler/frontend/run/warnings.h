@@ -1,14 +1,13 @@
-// warnings.h -- what is legal in a pipeline but hardly meant: definitions that no result needs,
-// updates without a schedule beside definitions that have one, loops that run once as vectors. And
-// what is slower than it need be, as performance notes: a gradient that nobody scheduled; kernels whose
-// arrays lie in local memory, which compiling alone finds.
+// warnings.h -- warnings about pipelines that are legal but probably not intended: definitions that no result needs,
+// unscheduled updates of a scheduled Func, vectorized loops of one iteration. Performance notes report what is slower
+// than necessary: a gradient without a schedule, or kernels whose arrays are in local memory (known once compiled).
 //
 //   {
 //     WarningScope scope([](const std::string& warning) { log(warning); });
-//     f.realize({64});  // compiles f: its warnings are told
+//     f.realize({64});  // compiles f, which reports its warnings
 //   }
-// Without a scope, the handler of the process is told; there is none unless a program sets one.
-// Halide.h sets one that prints; set_warning_handler({}) silences it.
+// Outside of scopes, warnings go to the handler of the process, if a program has set one. Halide.h sets one that
+// prints; set_warning_handler({}) silences it.
 #pragma once
 
 #include <functional>
@@ -19,13 +18,14 @@
 
 namespace retrograde {
 
-// A message for each finding, producers before consumers. Nothing is compiled.
+// One message for each finding, producers before consumers. Compiles nothing.
 std::vector<std::string> warnings_of(const Pipeline& pipeline);
 
-// While it lives, what this thread compiles tells its warnings to `tell`, once for a compilation.
-// Of several scopes the innermost is told.
+// While a scope exists, each compilation on this thread sends its warnings to the scope's function once.
+// Nested scopes: the innermost one receives them.
 class WarningScope {
  public:
+  // Opens a scope whose warnings go to `tell`.
   explicit WarningScope(std::function<void(const std::string&)> tell);
   ~WarningScope();
   WarningScope(const WarningScope&) = delete;
@@ -35,21 +35,22 @@ class WarningScope {
   std::function<void(const std::string&)> tell_, outer_;
 };
 
-// What is told to nobody's scope, by any thread: the handler must bear that. A null one: nobody.
-// The one before comes back.
+// Receives a warning. Must be thread-safe.
 using WarningHandler = std::function<void(const std::string&)>;
+// Sets the handler for warnings outside of all scopes, on every thread, and returns the previous one. A null
+// handler discards them.
 WarningHandler set_warning_handler(WarningHandler handler);
 
 namespace frontend {
-// With a target, also of what is slow on it.
+// With a target, also reports what is slow on it.
 std::vector<std::string> warnings_of(const std::vector<FuncPtr>& outputs, bool with_hidden = true,
                                      const Target& target = {});
-// To the scope around, if there is one.
+// Sends warnings to the enclosing scope, if there is one.
 void tell_warnings(const std::vector<FuncPtr>& outputs, const Target& target);
 void tell_warning(const std::string& warning);
 bool has_warning_scope();
-// Tells the handler of the process, unless a scope is told when the Func is compiled, that the last
-// definition of the Func hides those before.
+// Warns the process's handler that the last definition of the Func hides the earlier ones, unless a scope
+// will receive that warning when the Func is compiled.
 void warn_of_hidden_definitions(const FuncContents& f);
 }  // namespace frontend
 

@@ -1,4 +1,4 @@
-// autoschedule_options.cpp -- the options as text, as generators take them.
+// autoschedule_options.cpp -- the options of the built-in autoscheduler as text, as generators take them.
 #include "frontend/schedule/autoschedule_options.h"
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace retrograde {
 
 namespace {
 
-// In the order of the decisions.
+// Names in the order of the enumeration.
 const std::vector<std::string>& names_of_decisions() {
   static const std::vector<std::string> names{
       "scatter_strategy", "cut_reductions", "register_tiles", "layout_staging", "join_sweeps",
@@ -67,7 +67,7 @@ class OptionsReader {
       user_error(
           asked_, "options of the autoscheduler are parts of a name and a value",
           quoted(part) +
-              " is none: names are \"without\", \"store\", \"inline\", \"threads\", \"memory\", "
+              " is not: names are \"without\", \"store\", \"inline\", \"threads\", \"memory\", "
               "\"search\" and \"deterministic\"",
           "Write for example without=strips+slices,threads=4");
     }
@@ -78,7 +78,7 @@ class OptionsReader {
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end()) {
       user_error(asked_, "the decisions of the autoscheduler have names",
-                 quoted(name) + " is none of " + listed(names, quoted), "Name one of these");
+                 quoted(name) + " is not one of " + listed(names, quoted), "Name one of these");
     }
     return all_decisions()[static_cast<size_t>(found - names.begin())];
   }
@@ -98,7 +98,7 @@ class OptionsReader {
     const auto [stop, error] = std::from_chars(value.data(), end, result);
     if (error != std::errc() || stop != end || result < 0) {
       user_error(asked_, "threads and bytes are whole numbers, 0 or more",
-                 quoted(value) + " is none", "Write for example threads=4");
+                 quoted(value) + " is not such a number", "Write for example threads=4");
     }
     return result;
   }

@@ -1,14 +1,13 @@
-// autoschedule_options.h -- what the built-in autoscheduler is told: which of its decisions it may
-// make, what it stores and inlines, for how many threads, whether it searches.
+// autoschedule_options.h -- options of the built-in autoscheduler: the decisions that it may make, Funcs to store or
+// inline, the number of threads, a memory budget, and whether it searches.
 //
 //   AutoscheduleOptions options;
 //   options.without = {Decision::Strips};
 //   options.store = {blurred, "heavy"};
-//   pipeline.auto_schedule(target, options);   // all of a pipeline, now
-//   gradient.set_autoschedule(options);        // what nobody scheduled of a gradient, when compiled
+//   pipeline.auto_schedule(target, options);   // schedules all of a pipeline now
+//   gradient.set_autoschedule(options);        // schedules the unscheduled Funcs of a gradient when it is compiled
 //
-// Whatever it is told, its schedule is legal and the results are right; Funcs that were given a
-// directive keep their schedules.
+// Options never make a schedule illegal or a result wrong. Funcs with directives keep their schedules.
 #pragma once
 
 #include <cstdint>
@@ -21,59 +20,67 @@ namespace retrograde {
 
 class Func;
 
-// What the autoscheduler decides beyond which Funcs are computed at root, and that their rows are
-// vectors and their outermost loops tasks.
+// The autoscheduler's optional decisions. It always chooses which Funcs to compute at root, vectorizes their rows and
+// splits their outermost loops into parallel chunks.
 enum class Decision : uint8_t {
-  ScatterStrategy,  // sums at places that data decide: their layout, lanes and unrolled taps
-  CutReductions,    // sums to a few elements in lanes and rows, which are tasks
-  RegisterTiles,    // how many sums of a reduction are kept in registers
-  LayoutStaging,  // copies of what lies apart, square tiles of transposed reads, planes that share
-                  // places that data decide, sums along the rows of what they read
-  JoinSweeps,     // reductions that load the same in the same loops
-  Slices,         // what one Func alone reads slice by slice, in its loops
-  TaskSizes,      // parallel loops beyond the outermost, where that is short
-  Strips,         // chains of stencils in strips, with windows of rows
-  Choices         // a copy of the body for each value of a small dimension that chooses
+  ScatterStrategy,  // scatters at data-dependent indices: layout, vector lanes and unrolled taps
+  CutReductions,    // split reductions to few elements: lanes, and rows as parallel chunks
+  RegisterTiles,    // register tiling of reductions
+  LayoutStaging,  // packed copies of strided operands, square tiles of transposed reads, planes that
+                  // share data-dependent indices, sums along the rows of their operands
+  JoinSweeps,     // fusion of the loops of reductions that load the same values
+  Slices,         // Funcs with a single consumer that reads slice by slice, computed in its loops
+  TaskSizes,      // parallel loops inside a short outermost loop
+  Strips,         // chains of stencils in strips, with sliding windows of rows
+  Choices         // one copy of the body for each value of a small dimension that selects a case
 };
+// All decisions, in the order of the enumeration.
 const std::vector<Decision>& all_decisions();
-// In small letters: "cut_reductions".
+// The name in lower case: "cut_reductions".
 std::string to_string(Decision decision);
 
-// A Func of a pipeline, by itself or by its name.
+// A Func of a pipeline, given as a Func or by its name.
 struct FuncName {
+  // The name of a Func.
   FuncName(const Func& func);
   FuncName(std::string name) : name(std::move(name)) {}
   FuncName(const char* name) : name(name) {}
+  // Whether the names are equal.
   friend bool operator==(const FuncName&, const FuncName&) = default;
 
-  std::string name;
+  std::string name;  // the name
 };
 
+// Options of the built-in autoscheduler.
 struct AutoscheduleOptions {
-  std::set<Decision> without = {};     // not made
-  std::vector<FuncName> store = {};    // computed at root
-  std::vector<FuncName> inlined = {};  // computed where they are read
-  // That run at once: loops are cut into four tasks for each, 8 at least; of one thread none is
-  // parallel. 0: what the MachineParams say, if these are not the generic ones; else 8 tasks.
+  std::set<Decision> without = {};     // decisions that it does not make
+  std::vector<FuncName> store = {};    // Funcs to compute at root
+  std::vector<FuncName> inlined = {};  // Funcs to inline
+  // Number of threads to schedule for. Parallel loops are split into four chunks per thread, 8 at least; with
+  // one thread no loop is parallel. 0: the parallelism of the MachineParams unless these are the generic
+  // ones; otherwise 8 chunks.
   int threads = 0;
-  // That a call takes at most, inputs and outputs too: where more would be alive at once, Funcs are
-  // computed again instead of stored, as far as that goes. Sizes that are not known count as nothing.
-  // 0: inputs, outputs and twice the largest Func of the program that is differentiated; and what
-  // stays in the caches; and nothing is computed again that takes much longer than its way to memory.
+  // Maximum bytes alive at once in a call, inputs and outputs included. If the schedule would exceed it,
+  // Funcs are recomputed instead of stored, as far as possible. Unknown sizes count as 0. 0 means: inputs,
+  // outputs, twice the largest Func of the differentiated program, and everything that fits the caches; then
+  // no Func is recomputed if that takes much longer than its memory round trip.
   int64_t memory_budget = 0;
-  // The rules' schedule is where a beam search begins, over what they decide, by the time that a model
-  // of the machine predicts (docs/autoscheduler.md). It takes seconds, wants sizes that are known or
-  // estimated, and never takes a schedule that the model says is slower. The same program, options
-  // and figures of the machine have the same schedule; another machine, or number of threads, may have
-  // another, and with it other last bits.
+  // Starts a beam search from the schedule of the rules, over the decisions that they make, guided by the
+  // cost model (docs/autoscheduler.md). It takes seconds, needs sizes that are known or estimated, and never
+  // chooses a schedule that the model predicts to be slower. The result depends only on the program, the
+  // options and the figures of the machine. Another machine or number of threads may get another schedule,
+  // whose last bits may differ.
   bool search = false;
-  // false: sums at places that data decide may be atomic() updates, in parallel, where that takes
-  // less memory or makes the only tasks. Then bits may differ from run to run.
+  // false: scatters at data-dependent indices may become parallel atomic() updates, if that takes less memory
+  // or is the only source of parallelism. Results may then differ in the last bits from run to run.
   bool deterministic = true;
 
+  // Whether all options are equal.
   friend bool operator==(const AutoscheduleOptions&, const AutoscheduleOptions&) = default;
-  // As parts with commas between: "without=strips+slices,store=blurred+heavy,inline=brighter,threads=4,memory=64000000,search=true,deterministic=false".
+  // The options as text, separated by commas:
+  // "without=strips+slices,store=blurred+heavy,inline=brighter,threads=4,memory=64000000,search=true,deterministic=false".
   std::string to_string() const;
+  // Parses the text that to_string() writes.
   // Requires: options of the autoscheduler are parts of a name and a value; the decisions of the
   // autoscheduler have names; threads and bytes are whole numbers, 0 or more; search and deterministic
   // are true or false.

@@ -1,4 +1,4 @@
-// autoscheduler.cpp -- the schedulers that this process has loaded.
+// autoscheduler.cpp -- the registry of autoschedulers, and auto_schedule() of a pipeline.
 #include "frontend/schedule/autoscheduler.h"
 
 #include <dlfcn.h>
@@ -31,7 +31,7 @@ Loaded& loaded() {
   return result;
 }
 
-// One number and the comma behind it.
+// Parses one number and the comma after it.
 template <typename T>
 bool take_number(const char*& at, const char* end, bool last, T& value) {
   const auto [stop, error] = std::from_chars(at, end, value);
@@ -40,7 +40,7 @@ bool take_number(const char*& at, const char* end, bool last, T& value) {
   return true;
 }
 
-// "blur" means libblur.so; anything with a slash or a dot is a file as it stands.
+// "blur" means libblur.so; a name with a slash or a dot is a file name.
 std::string library_file(const std::string& library) {
   return library.find_first_of("/.") == std::string::npos ? "lib" + library + ".so" : library;
 }
@@ -75,15 +75,15 @@ namespace {
 
 const char* const machine_keys[] = {"parallelism", "last_level_cache_size", "balance"};
 
-// Parameters that are not given are those of the generic machine.
+// Missing parameters have the values of the generic machine.
 MachineParams machine_of(const AutoschedulerParams& params) {
   std::string values;
   for (size_t i = 0; i < std::size(machine_keys); i++) {
     const MachineParams generic = MachineParams::generic();
     const std::string defaults[] = {text(generic.parallelism), text(generic.last_level_cache_size),
                                     text(generic.balance)};
-    const auto given = params.extra.find(machine_keys[i]);
-    values += (i ? "," : "") + (given == params.extra.end() ? defaults[i] : given->second);
+    const auto entry = params.extra.find(machine_keys[i]);
+    values += (i ? "," : "") + (entry == params.extra.end() ? defaults[i] : entry->second);
   }
   return MachineParams(values);
 }
@@ -95,7 +95,7 @@ AutoschedulerParams params_of(const std::string& name, const MachineParams& mach
            {machine_keys[2], text(machine.balance)}}};
 }
 
-// What the built-in scheduler has no use for.
+// Parameters that the built-in autoscheduler ignores.
 std::string unknown_keys(const AutoschedulerParams& params) {
   std::vector<std::string> keys;
   for (const auto& [key, value] : params.extra) {
@@ -111,7 +111,7 @@ bool is_of_halide(const std::string& name) {
 
 }  // namespace
 
-// Plugins call it as they are loaded, where nothing may be thrown: find_autoscheduler tells of it.
+// Plugins call this from static initialisers, which must not throw; find_autoscheduler reports the error instead.
 void frontend::add_autoscheduler(const std::string& name, const AutoschedulerParamsFn& scheduler) {
   std::lock_guard lock(loaded().mutex);
   if (!scheduler) {
@@ -182,9 +182,9 @@ void load_plugin(const std::string& library) {
              reason ? reason : "it cannot", "Give its path");
 }
 
-// ---- of a pipeline ----
+// ---- auto_schedule ----
 
-// Its Funcs are shared, its options are not.
+// The copy of the pipeline shares the Funcs but has options of its own.
 AutoSchedulerResults Pipeline::auto_schedule(const Target& target,
                                              const AutoscheduleOptions& options,
                                              const MachineParams& machine) const {
@@ -212,7 +212,7 @@ std::string frontend::scheduler_for(const AutoschedulerParams& params) {
     if (asked != built_in_autoscheduler || unknown_keys(params).empty()) return asked;
     user_error(
         "schedule automatically with " + params.to_string(),
-        "the built-in autoscheduler is told of the machine",
+        "the built-in autoscheduler takes parameters of the machine",
         "it knows parallelism, last_level_cache_size and balance, not " + unknown_keys(params),
         "Leave them out, or give AutoscheduleOptions");
   }

@@ -1,10 +1,11 @@
-// autoscheduler.h -- functions that schedule a whole pipeline, by name.
+// autoscheduler.h -- registry of autoschedulers, functions that schedule a whole pipeline.
 //
-// One is built in: pipeline.auto_schedule(target). It computes at root, in parallel and vectorized,
-// what is dear to compute again, inlines the rest, and keeps what a user scheduled; what else it is
-// told: autoschedule_options.h. Of the machine it takes threads and the last-level cache, unless they
-// are the generic ones. Others live in libraries of their own, plugins, which register them when they are loaded:
-// load_plugin("libgreedy.so"); pipeline.auto_schedule("Greedy", target).
+// pipeline.auto_schedule(target) runs the built-in one. It computes Funcs that are expensive to recompute at root, in
+// parallel and vectorized, inlines the others, and keeps the directives of the user; autoschedule_options.h lists its
+// options. From the MachineParams it takes threads and last-level cache, unless they are the generic values.
+// Others are plugins: shared libraries that register their autoschedulers when they are loaded.
+//   load_plugin("libgreedy.so");
+//   pipeline.auto_schedule("Greedy", target);
 #pragma once
 
 #include <cstdint>
@@ -28,60 +29,64 @@ void add_autoscheduler(
     const std::string& name,
     const std::function<void(const Pipeline&, const Target&, const AutoschedulerParams&,
                              AutoSchedulerResults*)>& scheduler);
-// The name of the one that is there for what is asked; a warning where it is another.
+// The registered name that `params` select; warns if it differs from the requested one.
 std::string scheduler_for(const AutoschedulerParams& params);
 }  // namespace frontend
 
-// The machine that a schedule is made for. As text: "parallelism,last_level_cache_size,balance".
+// The machine that a schedule is for. As text: "parallelism,last_level_cache_size,balance".
 struct MachineParams {
-  int parallelism = 16;
-  uint64_t last_level_cache_size = 16 * 1024 * 1024;
+  int parallelism = 16;                               // number of threads
+  uint64_t last_level_cache_size = 16 * 1024 * 1024;  // in bytes
   float balance = 40;  // cost of a load from the last-level cache, in operations
 
-  MachineParams() = default;
+  MachineParams() = default;  // the generic machine
   MachineParams(int parallelism, uint64_t last_level_cache_size, float balance)
       : parallelism(parallelism), last_level_cache_size(last_level_cache_size), balance(balance) {}
+  // Parses the text form.
   // Requires: they are the threads, the bytes of the last-level cache and the cost of a load.
   explicit MachineParams(const std::string& text);
-  static MachineParams generic() { return {}; }
-  std::string to_string() const;
+  static MachineParams generic() { return {}; }  // the default values
+  std::string to_string() const;                 // the text form
+  // Whether all values are equal.
   friend bool operator==(const MachineParams&, const MachineParams&) = default;
 };
 
-// A scheduler by name, with what it is told as text: parallelism, last_level_cache_size and balance
-// are those of MachineParams. The names of Halide's schedulers mean the built-in one, which says so in
-// a warning and does not know the rest of what they are told.
+// An autoscheduler's name and its parameters as text. parallelism, last_level_cache_size and balance are
+// those of MachineParams. Names of Halide's autoschedulers select the built-in one, which says so in a
+// warning and ignores their other parameters.
 struct AutoschedulerParams {
-  std::string name;
-  std::map<std::string, std::string> extra;
+  std::string name;                          // name of the autoscheduler
+  std::map<std::string, std::string> extra;  // parameters by name
 
-  AutoschedulerParams() = default;
+  AutoschedulerParams() = default;  // the default autoscheduler
   AutoschedulerParams(const std::string& name, const std::map<std::string, std::string>& extra = {})
       : name(name), extra(extra) {}
   std::string to_string() const;  // autoscheduler=NAME autoscheduler.KEY=VALUE ...
 };
 
+// The schedule that an autoscheduler chose.
 struct AutoSchedulerResults {
-  std::string scheduler_name;
-  Target target;
-  std::string machine_params_string;
-  std::string schedule_source;  // the schedule as C++
-  std::vector<uint8_t> featurization;
-  // Of the built-in scheduler: the bytes that a call takes at most, inputs and outputs too, and what
-  // was allowed. They may be more: then no schedule that it knows takes less. Sizes that are not known
-  // count as nothing.
+  std::string scheduler_name;          // the autoscheduler that ran
+  Target target;                       // the target that it scheduled for
+  std::string machine_params_string;   // the MachineParams as text
+  std::string schedule_source;         // the schedule as C++
+  std::vector<uint8_t> featurization;  // data of the autoscheduler's own
+  // Bytes alive at once in a call, inputs and outputs included, and the limit. Set by the built-in
+  // autoscheduler. The bytes may exceed the limit if it knows no schedule that takes less. Unknown sizes
+  // count as 0.
   int64_t memory_bytes = 0, memory_budget_bytes = 0;
-  SearchedSchedules search;                  // with AutoscheduleOptions::search
-  AutoschedulerParams autoscheduler_params;  // of apply_autoscheduler
+  SearchedSchedules search;                  // set with AutoscheduleOptions::search
+  AutoschedulerParams autoscheduler_params;  // set by apply_autoscheduler
 };
 
+// A function that schedules the Funcs of a pipeline.
 using AutoSchedulerFn =
     std::function<void(const Pipeline& pipeline, const Target& target, const MachineParams& machine,
                        AutoSchedulerResults* results)>;
 
-// A null function takes the name away.
+// Registers an autoscheduler under a name; a null function removes the name.
 void add_autoscheduler(const std::string& name, const AutoSchedulerFn& scheduler);
-// One that is given all that it is told.
+// A function that schedules a pipeline and receives all parameters.
 using AutoschedulerParamsFn =
     std::function<void(const Pipeline& pipeline, const Target& target,
                        const AutoschedulerParams& params, AutoSchedulerResults* results)>;
@@ -91,19 +96,20 @@ requires(std::is_invocable_v<F, const Pipeline&, const Target&, const Autoschedu
                                                                             const F& scheduler) {
   frontend::add_autoscheduler(name, AutoschedulerParamsFn(scheduler));
 }
-// Names of all that are there.
+// Names of all registered autoschedulers.
 std::vector<std::string> autoscheduler_names();
+// Name of the built-in autoscheduler.
 inline constexpr const char* built_in_autoscheduler = "Retrograde";
-// The one that auto_schedule() without a name means: the built-in one, unless another was set; ""
-// means that again.
+// Selects the autoscheduler that auto_schedule() without a name uses; "" selects the built-in one.
 // Requires: an autoscheduler is loaded from a plugin before it is used.
 void set_default_autoscheduler_name(const std::string& name);
+// The autoscheduler that auto_schedule() without a name uses.
 std::string default_autoscheduler_name();
-// By its name; the error where there is none lists those that are there.
+// The autoscheduler of this name. If there is none, the error lists the registered names.
 // Requires: autoschedulers have different names; an autoscheduler is loaded from a plugin before it
 // is used.
 AutoSchedulerFn find_autoscheduler(const std::string& name);
-// Opens a shared library; its static initialisers register what it holds.
+// Opens a shared library, whose static initialisers register autoschedulers.
 // Requires: it is a shared library that can be opened.
 void load_plugin(const std::string& library);
 

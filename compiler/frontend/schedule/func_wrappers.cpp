@@ -1,4 +1,4 @@
-// func_wrappers.cpp -- Func::in and clone_in, and copies between memories.
+// func_wrappers.cpp -- Func::in, clone_in and copy_input, and copies between host and device.
 #include <algorithm>
 
 #include "frontend/language/func.h"
@@ -43,10 +43,10 @@ Func Func::clone_in(const std::vector<Func>& fs) {
 
 Func Func::copy_to_device(DeviceAPI) {
   unsupported("copy " + quoted(name()) + " to a device", "storage lies in the memory of the CPU",
-              "no code is generated for devices", "Leave it out");
+              "kernels copy the data that they need by themselves", "Leave it out");
 }
 
-// f(x, y) = g(x, y), and nothing more.
+// Whether the definition is f(x, y) = g(x, y).
 static bool is_plain_copy(const graph::FuncContents& f) {
   if (!f.pure || f.is_extern() || !f.updates.empty() || f.pure->values.size() != 1) return false;
   const ir::Call* read = f.pure->values[0].as<ir::Call>();
@@ -60,7 +60,7 @@ static bool is_plain_copy(const graph::FuncContents& f) {
 Func Func::copy_to_host() {
   if (!is_plain_copy(*func_)) {
     user_error("copy " + quoted(name()) + " to the host",
-               "a copy is the same values at the same coordinates",
+               "a copy has the same values at the same coordinates",
                defined() ? text("its definition is another one") : text("it has no definition"),
                "Copy a wrapper: " + name() + ".in().copy_to_host()");
   }

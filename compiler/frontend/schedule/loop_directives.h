@@ -1,10 +1,9 @@
-// loop_directives.h -- the schedule of one definition: its loops. A Stage has these methods, and so
-// has a Func, for its first definition.
+// loop_directives.h -- directives that schedule the loops of one definition. Stage has these methods, and Func has
+// them for its first definition.
 //
-// Directives change in which order and how the points of a definition are computed, never what is
-// computed. A stage starts with one loop for each variable: the reduction variables innermost, in
-// their order, then the pure variables. All directives name loops by Var or RVar and throw
-// CompileError when that breaks a rule.
+// Directives change the order and the manner in which the points of a definition are computed, never the values. A
+// stage starts with one loop for each variable: the reduction variables innermost, in their order, then the pure
+// variables. Directives name loops by Var or RVar. They throw CompileError if a rule is broken.
 #pragma once
 
 #include <string>
@@ -25,7 +24,7 @@ class Stage;
 
 namespace frontend {
 
-// What the methods below are made of.
+// Helpers of the methods below.
 ReorderLoops reorder_of(const std::vector<VarOrRVar>& vars);
 std::vector<VarOrRVar> loops_at(const SchedulePlace& place);
 VarOrRVar fresh_like(const VarOrRVar& var);
@@ -40,6 +39,7 @@ void check_device(const SchedulePlace& place, const std::vector<VarOrRVar>& loop
 
 }  // namespace frontend
 
+// The loop directives of Stage and Func.
 // Requires: a name must be a loop of this stage; the loops of a stage have different names; only
 // what is computed somewhere has loops; a size has one value in each call: it is made of parameters
 // and facts about buffers.
@@ -48,11 +48,12 @@ class LoopDirectives {
  public:
   // ---- the shape of the loops ----
 
+  // Splits a loop into an outer loop and an inner loop of `factor` iterations. split(x, xo, xi, f):
   //   for x in [0, n):        for xo in [0, ceil(n / f)):
   //     body(x)          =>     for xi in [0, f):
   //                               body(xo * f + xi)
-  // What happens when f does not divide n is the tail strategy's: see TailStrategy. ShiftInwards is
-  // for first definitions; a loop over a reduction variable takes GuardWithIf or Predicate.
+  // The tail strategy decides what happens if f does not divide n; see TailStrategy. ShiftInwards applies to first
+  // definitions only; a loop over a reduction variable takes GuardWithIf or Predicate.
   // Requires: the factor must be a defined expression; a factor is an integer; a factor is at least
   // 1; a factor fits an int32; the two new loops have different names; a loop over a reduction
   // variable runs exactly over its domain; an update definition does not run a point twice.
@@ -60,25 +61,27 @@ class LoopDirectives {
               const Expr& factor, TailStrategy tail = TailStrategy::Auto) {
     return give(graph::SplitLoop{old.name(), outer.name(), inner.name(), factor, tail});
   }
+  // Fuses two nested loops into one. fuse(x, y, t):
   //   for y in [0, m):           for t in [0, n * m):
   //     for x in [0, n):    =>     body(t % n, t / n)
   //       body(x, y)
-  // The fused loop runs as the outer one did. A pure loop with a reduction loop gives the latter.
+  // The fused loop has the kind of the outer one. A pure loop and a reduction loop give a reduction loop.
   // Requires: it takes two loops; iterations that run at the same time must not touch the same
   // element.
   Self& fuse(const VarOrRVar& inner, const VarOrRVar& outer, const VarOrRVar& fused) {
     return give(graph::FuseLoops{inner.name(), outer.name(), fused.name()});
   }
+  // Renames a loop. rename(x, t):
   //   for x:          for t:
   //     body(x)   =>    body(t)
   Self& rename(const VarOrRVar& old_name, const VarOrRVar& new_name) {
     return give(graph::RenameLoop{old_name.name(), new_name.name()});
   }
-  // Innermost first; loops that are not named keep their places. reorder(y, x):
+  // Reorders loops, innermost first; loops that are not named keep their places. reorder(y, x):
   //   for y:            for x:
   //     for x:     =>     for y:
   //       body(x, y)        body(x, y)
-  // Reduction loops change places among each other only where that is known to change no result.
+  // Reduction loops are reordered among each other only if the results are known not to change.
   // Requires: each loop is named once; the order of reduction loops may change only where it
   // changes no result.
   Self& reorder(const std::vector<VarOrRVar>& vars) { return give(frontend::reorder_of(vars)); }
@@ -86,7 +89,7 @@ class LoopDirectives {
   Self& reorder(const VarOrRVar& x, const VarOrRVar& y, Rest&&... rest) {
     return reorder(std::vector<VarOrRVar>{x, y, VarOrRVar(std::forward<Rest>(rest))...});
   }
-  // Splits both and runs block after block: loops xi, yi, xo, yo, innermost first.
+  // Splits two loops and reorders them to run tile by tile. The loops are xi, yi, xo, yo, innermost first.
   //   for y:                 for yo:
   //     for x:                 for xo:
   //       body(x, y)     =>      for yi:
@@ -128,32 +131,35 @@ class LoopDirectives {
 
   // ---- how a loop runs ----
 
+  // Runs the iterations in order on one thread, as loops do by default.
   Self& serial(const VarOrRVar& var) { return give(graph::RunLoop{var.name(), ForType::Serial}); }
-  //   for y:          parallel for y:      iterations are shared out to threads
+  // Distributes the iterations over threads.
+  //   for y:          parallel for y:
   //     body(y)   =>    body(y)
-  // A loop over a reduction variable only where its iterations are independent, the update is
-  // atomic(), or race conditions are allowed.
+  // A reduction loop can be parallel if its iterations are independent, the update is atomic(), or race conditions
+  // are allowed.
   // Requires: iterations that run at the same time must not touch the same element; a parallel loop
   // is not inside of a vectorized one.
   Self& parallel(const VarOrRVar& var) {
     return give(graph::RunLoop{var.name(), ForType::Parallel});
   }
+  // Computes all iterations at once, one per vector lane. The extent must be constant.
   //   for x in [0, 4):      body(ramp(0, 1, 4))
   //     body(x)         =>
-  // Of a loop of constant extent; the same rule for reduction variables.
+  // Reduction loops follow the rule of parallel().
   // Requires: iterations that run at the same time must not touch the same element; the extent of a
   // vectorized loop must be a constant, or have a constant above it; vectors have at most 4096 lanes;
   // loops around the calls of a C function are serial, parallel or unrolled.
   Self& vectorize(const VarOrRVar& var) {
     return give(graph::RunLoop{var.name(), ForType::Vectorized});
   }
+  // Replaces the loop by one copy of the body for each iteration. The extent must be constant.
   //   for x in [0, 2):      body(0)
   //     body(x)         =>  body(1)
-  // Of a loop of constant extent.
   // Requires: the extent of an unrolled loop must be a constant, or have a constant above it.
   Self& unroll(const VarOrRVar& var) { return give(graph::RunLoop{var.name(), ForType::Unrolled}); }
-  // The same after a split; the outer loop keeps the name of `var`, except that a parallel loop is
-  // the outer one.
+  // Splits a loop and runs the new outer loop in parallel. vectorize and unroll with a factor also split, and apply to
+  // the new inner loop. The outer loop keeps the name of `var`.
   //   parallel(y, 4):            vectorize(x, 8), unroll(x, 8):
   //     parallel for y:            for x:
   //       for y' in [0, 4):          vectorized (unrolled) for x' in [0, 8):
@@ -173,22 +179,25 @@ class LoopDirectives {
     const VarOrRVar copies = frontend::fresh_like(var);
     return split(var, var, copies, factor, tail).unroll(copies);
   }
-  // Whether boundary conditions and tails get loops of their own:
+  // Chooses whether loop partitioning separates boundary conditions and tails from the steady state:
   //   for x in [0, n):                     for x in [0, 1):     body with its tests
   //     body(x), with boundary tests  =>   for x in [1, n - 1): body without tests
   //                                        for x in [n - 1, n): body with its tests
-  // Auto leaves it to the compiler, Never keeps one loop, Always cuts wherever a test can be
-  // removed.
+  // Auto leaves the choice to the compiler, Never keeps one loop, and Always partitions wherever that removes a test.
   Self& partition(const VarOrRVar& var, Partition partition) {
     return give(graph::PartitionLoop{var.name(), partition});
   }
+  // Keeps each of these loops in one piece.
   Self& never_partition(const std::vector<VarOrRVar>& vars) {
     return partition_all(vars, Partition::Never);
   }
+  // Partitions each of these loops wherever that removes a test.
   Self& always_partition(const std::vector<VarOrRVar>& vars) {
     return partition_all(vars, Partition::Always);
   }
+  // Keeps every loop of the stage in one piece.
   Self& never_partition_all() { return never_partition(frontend::loops_at(place())); }
+  // Partitions every loop of the stage wherever that removes a test.
   Self& always_partition_all() { return always_partition(frontend::loops_at(place())); }
   template <std::convertible_to<VarOrRVar>... Rest>
   Self& never_partition(const VarOrRVar& x, Rest&&... rest) {
@@ -201,50 +210,49 @@ class LoopDirectives {
 
   // ---- reductions ----
 
-  // What an iteration reads and writes of one element is indivisible, so that loops over reduction
-  // variables may run in parallel (atomic operations or locks) or be vectorized (a reduction of the
-  // vector, then one update):
+  // Makes each read-modify-write of an element indivisible. Reduction loops may then run in parallel, by atomic
+  // operations or locks, or be vectorized, by a reduction of the vector followed by one update:
   //   f(g(r)) += h(r)
   //   parallel for r:                parallel for r:
   //     f[g(r)] = f[g(r)] + h(r)  =>   atomic: f[g(r)] = f[g(r)] + h(r)
-  // The update must be proven associative and commutative when such a loop is asked for; of floats,
-  // and of ties in argmin and its like, in exact arithmetic only: results may then depend on the
-  // order of threads. `override_associativity_test`: the caller vouches for it.
+  // For such a loop the update must be provably associative and commutative. The proof assumes exact arithmetic, so
+  // rounding of floats, and the winner among ties of argmin, may depend on the order of threads.
+  // override_associativity_test: skips the proof; the caller guarantees the property.
   // Requires: an atomic update is associative and commutative; an atomic update reads no element of
   // its Func but the one that it writes; the values of a Tuple are updated under a lock, which must
   // not be left (Unsupported).
   Self& atomic(bool override_associativity_test = false) {
     return give(graph::MakeAtomic{override_associativity_test});
   }
-  // Loops over reduction variables may run in parallel or as vectors although their iterations
-  // touch the same elements: results may then be any of those that races give.
+  // Permits parallel and vectorized reduction loops whose iterations access the same elements. The result is then any
+  // that a race can produce.
   Self& allow_race_conditions() { return give(graph::AllowRaces{}); }
 
   // ---- where it runs ----
 
-  // Runs this stage inside the loops of another one, down to the given loop, after it:
+  // Fuses the loops of this stage with those of another one, from the outermost down to the given loop. In the shared
+  // loop the other stage runs first:
   //   for y: for x: f(x, y)               for y:
   //   for y: for x: g(x, y)          =>     for x: f(x, y)
   //   g.compute_with(f, y)                  for x: g(x, y)
-  // Both are computed at the same place, and neither reads the other. An update may join the stage
-  // before it, f.update().compute_with(Stage(f), y), so that sums start where they are in the cache:
-  // each iteration then touches what the stage before has made in it, and nothing else. Where their ranges differ the
-  // common loop covers both, shifted as `align` says, and each runs only within its own:
-  // AlignStart lets the ranges begin together, AlignEnd end together, NoAlign and Auto shift
-  // nothing. The stage that joins has no specializations.
-  // Requires: a stage joins the loops of another one down to a loop; within one Func, a stage joins
-  // the stage before it; stages of one Func that share loops touch the same elements in each
-  // iteration; the stage has loops; a stage that joins the loops of another one has no
-  // specializations; the loop level is set before the pipeline is compiled; both stages belong to
-  // the pipeline and are computed somewhere; both stages have loops; both stages are computed at
-  // one place; both stages are computed at the same place; compute_with names one stage; the level
-  // is a loop of both stages; both stages have the same loops down to the level; loops that run as
-  // one are of one kind; loops that run as one are partitioned alike; what is prefetched in shared
-  // loops is prefetched by the stage whose loops they are; one of the stages that share loops is
-  // the first; Funcs that share loops do not depend on each other; the stages of a Func run one
-  // after another, also where others run with them; what is computed together is computed after all
-  // that any of it reads; Funcs that share loops are computed whenever any of them is needed
-  // (Unsupported).
+  // Both stages must be computed at the same place, and neither may read the other. An update may also join the stage
+  // before it, f.update().compute_with(Stage(f), y), so that sums start while their elements are in the cache. Each
+  // iteration then accesses only elements that the stage before computed in the same iteration.
+  // If the ranges of the loops differ, the shared loop covers both, and each stage runs only within its own range.
+  // `align` shifts the ranges: AlignStart makes them begin together, AlignEnd end together; NoAlign and Auto do not
+  // shift. The stage that joins must not be specialized.
+  // Requires: a stage joins the loops of another one down to a loop; of its own Func, a
+  // stage joins the one before it; stages of one Func that share loops touch the same elements in
+  // each iteration; the stage has loops; a stage that joins the loops of another one has no specializations;
+  // the loop level is set before the pipeline is compiled; both stages belong to the pipeline and
+  // are computed somewhere; both stages have loops; both stages are computed at one place; both
+  // stages are computed at the same place; compute_with names one stage; the level is a loop of
+  // both stages; both stages have the same loops down to the level; loops that run as one are of
+  // one kind; loops that run as one are partitioned alike; what is prefetched in shared loops is
+  // prefetched by the stage whose loops they are; one of the stages that share loops is the first;
+  // Funcs that share loops do not depend on each other; the stages of a Func run one after another,
+  // also where others run with them; what is computed together is computed after all that any of it
+  // reads; Funcs that share loops are computed whenever any of them is needed (Unsupported).
   Self& compute_with(const LoopLevel& level,
                      const std::vector<std::pair<VarOrRVar, LoopAlignStrategy>>& align) {
     graph::ComputeWith with{{{}, level.contents()}};
@@ -267,24 +275,23 @@ class LoopDirectives {
     return compute_with(frontend::level_of(stage, var), align);
   }
 
-  // A second schedule for when `condition`, over parameters only, holds: the returned stage, which
-  // starts as a copy of the schedule so far. Directives given to the general stage afterwards are
-  // not its own.  f.specialize(n > 64).vectorize(x, 8):
+  // Adds a second schedule, which runs if `condition` over parameters holds. The returned stage holds it. It starts as
+  // a copy of the schedule so far; later directives of the general stage do not affect it.
+  // f.specialize(n > 64).vectorize(x, 8):
   //   for x:          if n > 64: for x: for x' in [0, 8): body   (vectorized)
   //     body(x)   =>  else:      for x: body(x)
-  // Conditions are tried in the order given; the same condition gives the same stage again.
+  // Conditions are tested in order. The same condition returns the same stage again.
   // Requires: the condition is a defined expression; the condition is of type bool; the condition
   // has one value in each call: it is made of parameters and facts about buffers; specialize_fail
   // is the last of a stage's specializations; a stage that joins the loops of another one has no
   // specializations.
   Stage specialize(const Expr& condition);
-  // When none of the conditions holds, the call fails with this message instead of running the
-  // general schedule.
+  // Makes the call fail with this message, instead of running the general schedule, if no condition holds.
   // Requires: the message says something; specialize_fail is the last of a stage's specializations.
   void specialize_fail(const std::string& message) { give(graph::SpecializeFail{message}); }
 
-  // Fetches into the cache what iteration `from + offset` reads of an image or Func, at every
-  // iteration of `at`, which is `from` or a loop inside of it. g.prefetch(f, x, x, 2):
+  // Prefetches into the cache the region of a Func or image that iteration `from + offset` reads. The prefetch happens
+  // in every iteration of `at`, which is `from` or a loop inside it. g.prefetch(f, x, x, 2):
   //   for x:                for x:
   //     g(x) = 2 * f(x)  =>   prefetch(f[x + 2])
   //                           g(x) = 2 * f(x)
@@ -307,7 +314,7 @@ class LoopDirectives {
                  PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf) {
     return prefetch(image.parameter(), at, from, std::move(offset), strategy);
   }
-  // Deprecated in Halide: `at` and `from` are one loop.
+  // Halide's deprecated form, in which `at` and `from` are the same loop.
   template <typename T>
   Self& prefetch(const T& source, const VarOrRVar& var, int offset = 1,
                  PrefetchBoundStrategy strategy = PrefetchBoundStrategy::GuardWithIf) {
@@ -316,23 +323,22 @@ class LoopDirectives {
 
   // ---- GPUs ----
   //
-  // Loops over blocks, the outer ones, become the grid of a kernel, and loops over threads in them its
-  // blocks; of each kind at most three, the innermost of which is x. What is between and inside of
-  // them stays loops:
+  // Up to three outer loops over blocks become the grid of a kernel, and up to three loops over threads inside them
+  // become its blocks. The innermost of each kind is dimension x. Other loops between and inside them stay loops:
   //   gpu_blocks(xo), gpu_threads(xi):
   //   for xo:              kernel<<<extent of xo, extent of xi>>>:
   //     for xi:        =>    body(block.x, thread.x)
   //       body(xo, xi)
-  // Funcs computed at a loop over blocks, or at a loop in it, are computed by all threads of the block
-  // and lie in memory that these share; what is computed inside of threads is a thread's own.
-  // The target has the feature CUDA. Only CUDA devices are known (Unsupported).
+  // All threads of a block compute Funcs whose compute level is a loop over blocks, or a loop between blocks and
+  // threads; such Funcs lie in shared memory. A Func that is computed inside the loops over threads is private to a
+  // thread. The target needs the feature CUDA; other devices are Unsupported.
 
-  // Loops whose iterations are threads of a block: at most 1,024 altogether.
-  // Requires: iterations that run at the same time must not touch the same element; a directive for
-  // GPUs names a GPU; code for GPUs is made for CUDA (Unsupported); the target has a GPU; threads belong
-  // to blocks; blocks consist of threads; threads compute vectors, and no vector has threads; a kernel
-  // computes, and calls nothing of the host (Unsupported); kernels are launched by one thread of the
-  // host (Unsupported).
+  // Maps loops to the threads of a block, at most 1,024 in all.
+  // Requires: iterations that run at the same time must not touch the same element; a directive for GPUs
+  // names a GPU; code for GPUs is generated for CUDA (Unsupported); the target has a GPU; threads belong to
+  // blocks; blocks consist of threads; threads compute vectors, and no vector has threads; a kernel computes,
+  // and calls nothing of the host (Unsupported); kernels are launched by one thread of the host
+  // (Unsupported).
   Self& gpu_threads(const VarOrRVar& x, DeviceAPI device = DeviceAPI::Default_GPU) {
     return run_on_gpu(ForType::GpuThread, {x}, device);
   }
@@ -344,13 +350,12 @@ class LoopDirectives {
                     DeviceAPI device = DeviceAPI::Default_GPU) {
     return run_on_gpu(ForType::GpuThread, {x, y, z}, device);
   }
-  // A loop whose iterations are lanes of a warp: the innermost over threads, of an extent of at most 32.
-  // What gpu_threads requires.
+  // Maps a loop to the lanes of a warp. It must be the innermost loop over threads, with at most 32 iterations; the
+  // rules of gpu_threads apply.
   Self& gpu_lanes(const VarOrRVar& x, DeviceAPI device = DeviceAPI::Default_GPU) {
     return run_on_gpu(ForType::GpuLane, {x}, device);
   }
-  // Loops whose iterations are blocks of a grid.
-  // What gpu_threads requires.
+  // Maps loops to the blocks of a grid; the rules of gpu_threads apply.
   Self& gpu_blocks(const VarOrRVar& x, DeviceAPI device = DeviceAPI::Default_GPU) {
     return run_on_gpu(ForType::GpuBlock, {x}, device);
   }
@@ -362,7 +367,7 @@ class LoopDirectives {
                    DeviceAPI device = DeviceAPI::Default_GPU) {
     return run_on_gpu(ForType::GpuBlock, {x, y, z}, device);
   }
-  // Blocks and threads at once.
+  // Maps loops to blocks and threads: gpu_blocks and gpu_threads in one call.
   Self& gpu(const VarOrRVar& block_x, const VarOrRVar& thread_x,
             DeviceAPI device = DeviceAPI::Default_GPU) {
     return gpu_blocks(block_x, device).gpu_threads(thread_x, device);
@@ -377,13 +382,13 @@ class LoopDirectives {
     return gpu_blocks(block_x, block_y, block_z, device)
         .gpu_threads(thread_x, thread_y, thread_z, device);
   }
-  // The whole stage in one thread of one block.
-  // Requires: code for GPUs is made for CUDA (Unsupported).
+  // Runs the whole stage on one thread of one block.
+  // Requires: code for GPUs is generated for CUDA (Unsupported).
   Self& gpu_single_thread(DeviceAPI device = DeviceAPI::Default_GPU) {
     return run_on_gpu(ForType::GpuBlock, {Var::outermost()}, device);
   }
-  // Tiles, a block each, a thread for each of their points; blocks keep the names of the loops where
-  // none are given. gpu_tile(x, y, xi, yi, 16, 8):
+  // Tiles up to three loops, with one block for each tile and one thread for each point of a tile. Without names for
+  // the loops over blocks, these keep the names of the original loops. gpu_tile(x, y, xi, yi, 16, 8):
   //   for y:                 gpu_block for y, x:
   //     for x:         =>      gpu_thread for yi in [0, 8), xi in [0, 16):
   //       body(x, y)             body(16 * x + xi, 8 * y + yi)
@@ -424,14 +429,16 @@ class LoopDirectives {
   }
 
   // ---- accelerators: Unsupported ----
+
+  // Always throws: there is no code for Hexagon.
   // Requires: loops run on the CPU or a CUDA device (Unsupported).
   Self& hexagon(const VarOrRVar& x = Var::outermost()) {
     frontend::check_device(place(), {x}, DeviceAPI::Hexagon);
     return self();
   }
 
-  // Substitutes these Funcs into this definition, now: what later directives look at, such as
-  // rfactor, is what came of it. Other users of the Funcs still call them.
+  // Inlines these Funcs into this definition immediately, so that later directives, such as rfactor, see the result.
+  // Other consumers still call the Funcs.
   //   g(x) = x * x                    g(x) = x * x
   //   f(x) = g(x) + g(x + 1)     =>   f(x) = x * x + (x + 1) * (x + 1)
   // Requires: an inlined Func has one pure definition; an inlined Func has no schedule of its own.
@@ -440,13 +447,16 @@ class LoopDirectives {
   Self& eager_inline(const Func& first, const Rest&... rest) {
     return eager_inline(std::vector<Func>{first, rest...});
   }
-  // Hints that what this stage stores, or loads (of these Funcs), is not used again soon. They change
-  // no value, and today no code either: all stores and loads go through the caches.
+  // Hints that stored values are not read again soon. Today this changes no code: all stores go through the caches.
   Self& stream_stores() { return hint(); }
+  // Hints that loaded values, of all Funcs or the given ones, are not read again soon. Today this changes no code: all
+  // loads go through the caches.
   Self& stream_loads() { return hint(); }
   Self& stream_loads(const std::vector<Func>&) { return hint(); }
 
-  void unscheduled() { give(graph::Unscheduled{}); }  // says that no directive was forgotten
+  // States that this stage has no directives on purpose, which silences warnings.
+  void unscheduled() { give(graph::Unscheduled{}); }
+  // The schedule as the compiler stores it.
   const graph::StageLoops& get_schedule() const { return place().schedule(); }
 
  private:
@@ -464,12 +474,12 @@ class LoopDirectives {
     for (const VarOrRVar& var : vars) partition(var, how);
     return self();
   }
-  // What is asked for is refused before the loop is split.
+  // Checks a directive before the loop is split, so that an illegal one leaves the stage unchanged.
   void check_run(const VarOrRVar& var, ForType kind) const {
     graph::Directive run = graph::RunLoop{var.name(), kind};
     graph::check_directive(place(), run);
   }
-  // All are checked before the first is given.
+  // Checks all loops before it changes the first.
   Self& run_on_gpu(ForType kind, const std::vector<VarOrRVar>& loops, DeviceAPI device) {
     frontend::check_device(place(), loops, device);
     for (const VarOrRVar& loop : loops) check_run(loop, kind);

@@ -1,4 +1,4 @@
-// loop_level.cpp -- handles of loop levels.
+// loop_level.cpp -- LoopLevel, the handle of a place to compute or store a Func.
 #include "frontend/schedule/loop_level.h"
 
 #include "frontend/language/func.h"

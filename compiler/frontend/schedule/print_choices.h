@@ -1,5 +1,4 @@
-// print_choices.h -- targets, codes of types, and what schedules choose among, as text:
-// std::cout << tail.
+// print_choices.h -- stream output of targets, type codes, loop levels and the enumerations of directives.
 #pragma once
 
 #include <iosfwd>
@@ -10,7 +9,7 @@
 
 namespace retrograde {
 
-// Enumerators by their names in C++; a target as target(x86-64-linux-avx2), as Halide writes it.
+// Prints enumerators by their C++ names, and a target as target(x86-64-linux-avx2), as Halide does.
 std::ostream& operator<<(std::ostream& out, const Target& target);
 std::ostream& operator<<(std::ostream& out, TypeCode code);  // int, uint, float, bfloat, handle
 std::ostream& operator<<(std::ostream& out, DeviceAPI device);

@@ -1,4 +1,4 @@
-// stage.cpp -- what schedules of loops are made of; graph/give_directive.h has the rules.
+// stage.cpp -- helpers of the loop directives; graph/give_directive.h has their rules.
 #include "frontend/schedule/stage.h"
 
 #include <algorithm>
@@ -53,7 +53,7 @@ PrefetchData prefetch_of(const SchedulePlace& place, const Func& f, PrefetchData
                "it needs a definition first", "it has none", "Define it: f(x, y) = ...");
   }
   prefetch.source = f.name();
-  // Weak: what is prefetched may be any Func of the pipeline.
+  // A weak reference avoids a cycle: the prefetched Func may be any Func of the pipeline.
   prefetch.symbol = SymbolRef::weak(f.function()->shared_from_this());
   return prefetch;
 }
@@ -70,7 +70,7 @@ PrefetchData prefetch_of(const SchedulePlace& place,
   return prefetch;
 }
 
-// Directives for other devices are declared so that programs written for them build.
+// Directives for unsupported devices are declared, and throw, so that programs that mention them compile.
 void check_device(const SchedulePlace& place, const std::vector<VarOrRVar>& loops,
                   DeviceAPI device) {
   if (device == DeviceAPI::Default_GPU || device == DeviceAPI::CUDA) return;
@@ -83,7 +83,7 @@ void check_device(const SchedulePlace& place, const std::vector<VarOrRVar>& loop
     user_error(asked + "a GPU", "a directive for GPUs names a GPU", "it names the host",
                "Leave the device out, or use parallel, vectorize and tile");
   }
-  unsupported(asked + "a GPU", "code for GPUs is made for CUDA",
+  unsupported(asked + "a GPU", "code for GPUs is generated for CUDA",
               "the directive names another kind of device",
               "Leave the device out, or give DeviceAPI::CUDA");
 }

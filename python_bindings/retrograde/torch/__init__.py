@@ -1,4 +1,4 @@
-"""Operators of PyTorch made of pipelines, with their gradients.
+"""Operators of PyTorch that run pipelines, with their gradients.
 
     import retrograde as rg, torch
     from retrograde.torch import operator
@@ -9,14 +9,14 @@
     weights = torch.ones(3, requires_grad=True)
     op(torch.rand(64), weights).sum().backward()          # weights.grad is there
 
-Tensors have any strides and are not copied; the axis rule is the package's: t[y, x] == f[x, y]. Those of CUDA run as
-kernels on the stream that is current, with the schedule that auto_schedule() gives for the device; numbers are best
-left on the CPU, for kernels take them as arguments.
-Gradients are pipelines, made when they are first asked for, of exactly those inputs that want one; they are operators
-themselves, so that they are differentiated again, as often as one likes. Their bits are the same from run to run.
+Tensors may have any strides and are not copied. The axis rule of the package applies: t[y, x] == f[x, y]. On CUDA
+tensors an operator runs as kernels on the current stream, with the schedule of auto_schedule() for the device. Leave
+numbers on the CPU, because kernels take them as arguments.
+The gradient pipeline for a set of inputs is built when it is first needed. Gradients are operators themselves, so they
+can be differentiated again, any number of times. Their results are bit-identical from run to run.
 
-An operator is registered through torch.library (_library.py), so that PyTorch knows what it does: autograd in both
-modes, torch.compile, vmap, autocast, torch.ops.ns.name. _plan.py is what runs.
+An operator is registered through torch.library (_library.py), which gives it autograd in both modes, torch.compile,
+vmap, autocast and torch.ops.ns.name. _plan.py runs the pipelines.
 """
 from ._operator import Operator, operator
 from ._plan import DTYPES

@@ -1,6 +1,4 @@
-"""The devices on which operators run besides the CPU: where their tensors are, what is compiled for them, and the
-stream that all of it is put into.
-"""
+"""The CUDA devices that operators run on: the place of the tensors, the target to compile for, and the stream."""
 import functools
 import os
 
@@ -9,11 +7,11 @@ import torch
 from .. import _retrograde as rg
 from .._errors import Unsupported, error
 
-_KNOWN = 90, 86, 80, 75  # capabilities that code is made for; one runs on later devices, too
+_KNOWN = 90, 86, 80, 75  # compute capabilities to compile for; code for one also runs on later devices
 
 
 class Device:
-    """At `place`, one of PyTorch's; of a compute capability, as in 86 for 8.6."""
+    """A device at `place`, a torch.device, with a compute capability such as 86 for 8.6."""
 
     def __init__(self, place, capability):
         known = next((c for c in _KNOWN if c <= capability), None)
@@ -24,11 +22,11 @@ class Device:
         self.place, self.target = place, f"{rg.get_host_target()}-cuda-cuda_capability_{known}"
 
     def current(self):
-        """Within it the device's context is the thread's, which is where calls look for one."""
+        """A context manager that makes the device's CUDA context current for this thread, as calls require."""
         return torch.cuda.device(self.place)
 
     def stream(self):
-        """The address of the driver's."""
+        """The driver's handle of the current stream."""
         return torch.cuda.current_stream(self.place).cuda_stream
 
     def empty(self, shape, dtype):
@@ -37,7 +35,7 @@ class Device:
 
 @functools.lru_cache(maxsize=None)
 def device_of(place):
-    """Of tensors at this place."""
+    """The Device of tensors at this place."""
     if place.type != "cuda":
         raise error(Unsupported, f"run an operator on {place}", "its tensors are the CPU's or CUDA's",
                     f"given are some on {place}", "Move the tensors with tensor.cpu()")

@@ -1,19 +1,19 @@
-"""What PyTorch is told of an operator, through torch.library.
+"""Registers operators with PyTorch through torch.library.
 
-Two operators are registered for one of ours: `name(a, b, ...)`, and `name_derivative(tensors, path)`, which is all of
-its derivatives of every order and both modes (a path says which: Plan.derived). Both are registered when the operator is
-made, so that a compiled graph that PyTorch kept on disk finds them. Each has a kernel for
+An operator registers two names: `name(a, b, ...)`, and `name_derivative(tensors, path)` for its derivatives of every
+order and both modes. The path selects a derivative; see Plan.derived. Both are registered when the operator is created,
+so that compiled graphs that PyTorch has cached on disk find them. Each has a kernel for
 
     CPU            runs the pipeline
-    CUDA           runs it as kernels, on the stream that is current
-    Meta (fake)    the shapes and types of the results
-    Autograd       autograd.Function with backward and jvp, which call the derivative operator
-    Autocast       the types of the pipeline, whatever the mode says
-    vmap, Batched  a batched call: the kernels take batches as they are
+    CUDA           runs it as kernels, on the current stream
+    Meta (fake)    returns the shapes and types of the results
+    Autograd       an autograd.Function with backward and jvp, which call the derivative operator
+    Autocast       casts to the types of the pipeline, whatever the mode
+    vmap, Batched  makes one batched call, since the kernels accept batches
 
-PyTorch 1.13 has no vmap and no functorch transforms of such operators; all else is the same there.
+With PyTorch 1.13 there is no vmap and there are no functorch transforms of such operators; all else is the same.
 
-Calls for which the dispatcher has nothing to decide go past it (_direct.py).
+Calls that need nothing from the dispatcher bypass it (_direct.py).
 """
 import threading
 
@@ -36,14 +36,14 @@ if hasattr(torch, "func"):
 
 
 def _library(namespace):
-    """The namespace's own, kept as long as the process lives: operators cannot be taken back."""
+    """The library of a namespace. It lives as long as the process, because operators cannot be unregistered."""
     if namespace not in _libraries:
         _libraries[namespace] = torch.library.Library(namespace, "FRAGMENT" if _HAS_FRAGMENTS else "DEF")
     return _libraries[namespace]
 
 
 def register(operator):
-    """Defines both operators; returns the way in."""
+    """Defines both operators; returns the object that calls them."""
     namespace, name = operator.name.split("::")
     with _lock:
         if operator.name in _names or hasattr(getattr(torch.ops, namespace), name):
@@ -59,8 +59,8 @@ def register(operator):
 
 
 class Calls:
-    """The kernels of one operator, and the way in for both of its names. Inside, all calls are (path, tensors), a tuple
-    each, and give a list."""
+    """The kernels of an operator and of its derivatives, and calls of both. Internally every call takes a path and
+    tensors, two tuples, and returns a list."""
 
     def __init__(self, operator, library, namespace, name):
         self.operator, self._last, self._functions = operator, {}, {}
@@ -89,13 +89,13 @@ class Calls:
         return lambda *tensors: tuple(kernel((), tensors))
 
     def __call__(self, path, tensors):
-        """What the dispatcher does, without it where it has nothing to decide."""
+        """Calls the operator, directly if possible and otherwise through the dispatcher."""
         if is_compiling() or not is_direct(tensors):
             return self.dispatch(path, tensors)
         return self.direct(path, tensors)
 
     def direct(self, path, tensors):
-        """Where is_direct(tensors)."""
+        """A call without the dispatcher; requires is_direct(tensors)."""
         if torch.is_grad_enabled() and _any_requires_grad(*tensors):
             return self.differentiably(path)(self.run, *tensors)
         return self.run(path, tensors)
@@ -109,7 +109,7 @@ class Calls:
     # ---- the kernels ----
 
     def run(self, path, tensors):
-        last = self._last.get(path)  # most calls are of the sizes of the one before
+        last = self._last.get(path)  # most calls have the same sizes as the previous one
         if last is not None:
             results = last(tensors)
             if results is not None:
@@ -130,8 +130,8 @@ class Calls:
             return self.below(path, tensors)
         if not _are_transforms_active():
             return list(self.differentiably(path)(self.below, *tensors))
-        # As autograd.Function.apply, but of one level of functorch's transforms: that of the kernel that calls it;
-        # inner levels come back through the dispatcher. Autograd turns modes off that are inner levels' as well.
+        # Like autograd.Function.apply, but for one level of functorch's transforms, that of the calling kernel; inner
+        # levels return through the dispatcher. Autograd also disables modes that belong to inner levels.
         grad, forward = torch.is_grad_enabled(), torch._C._is_fwd_grad_enabled()
 
         def below(path, tensors):
@@ -142,14 +142,14 @@ class Calls:
             return list(self.differentiably(path)(below, *tensors))
 
     def differentiably(self, path):
-        """A function of what runs (path, tensors), and of the tensors, whose results autograd knows."""
+        """A function of a runner of (path, tensors) and of the tensors, whose results autograd records."""
         function = self._functions.get(path)
         if function is None:
             function = self._functions.setdefault(path, _function_of(self, path))
         return function
 
     def below(self, path, tensors):
-        """The kernels behind autograd's."""
+        """Calls the kernels below autograd."""
         if is_direct(tensors):
             return self.run(path, tensors)
         guard = torch._C._AutoDispatchBelowAutograd()
@@ -165,7 +165,7 @@ class Calls:
         with torch.autocast("cpu", enabled=False), torch.autocast("cuda", enabled=False):
             return self.dispatch(path, cast)
 
-    # ---- vmap: the vmapped dimension in front of the other batch dimensions ----
+    # ---- vmap: puts the vmapped dimension in front of the other batch dimensions ----
 
     def vmap_operator(self, info, dims, *tensors):
         results = self.dispatch((), self._batched((), tensors, dims))
@@ -176,8 +176,9 @@ class Calls:
         return results, [0] * len(results)
 
     def take_batch(self, path, tensors):
-        """What autograd maps over gradients by, and jacobian and hessian over vectors: an older vmap, whose tensors hide
-        a dimension for each of its levels. The innermost one that a tensor has comes to the front, and goes back."""
+        """The kernel for an older vmap, which autograd uses for batches of gradients, and jacobian and hessian for
+        vectors. Its tensors hide one dimension for each level. The innermost hidden dimension of any tensor moves to
+        the front for the call, and back afterwards."""
         level, has_level = _innermost_level(tensors)
         shown = [torch._remove_batch_dim(t, level, 1, 0) if has else t for t, has in zip(tensors, has_level)]
         results = self.dispatch(path, self._batched(path, shown, [0 if has else None for has in has_level]))
@@ -196,9 +197,9 @@ class Calls:
 
 
 def _innermost_level(tensors):
-    """Of the older vmap: its number, and which of the tensors have it."""
+    """The innermost level of the older vmap in the tensors, and a list of which tensors have it."""
     for level in range(count_maps(), 0, -1):
-        # One that has it not is expanded to the size that is asked for.
+        # A tensor without this level is expanded to the given size.
         has_level = [torch._remove_batch_dim(t, level, 1, 0).shape[0] == torch._remove_batch_dim(t, level, 2, 0).shape[0]
                      for t in tensors]
         if any(has_level):
@@ -228,7 +229,7 @@ def _mask(places):
 
 
 def _function_of(calls, path):
-    """Of one path: what a call hands over besides are its tensors alone, since autograd looks at each argument."""
+    """The autograd.Function of one path. The path is not an argument of calls, because autograd inspects each one."""
     class Call(torch.autograd.Function):
         @staticmethod
         def forward(ctx, below, *tensors):
@@ -246,10 +247,10 @@ def _function_of(calls, path):
             results = [None] * len(tensors)
             if wanted and given:
                 step = GRADIENT, _mask(wanted), _mask(given)
-                # Dense ones: autograd's seeds of sums have stride 0, for which pipelines would be compiled anew.
+                # Dense seeds: autograd's seeds of sums have stride 0, for which pipelines would be recompiled.
                 gradients = calls((*path, *step), (*tensors, *(seeds[i].contiguous() for i in given)))
                 for i, gradient in zip(wanted, gradients):
-                    # Of an item that the batch shares.
+                    # Sums the gradient of a tensor that all items of the batch share.
                     shape = tensors[i].shape
                     results[i] = gradient if gradient.shape == shape else gradient.sum_to_size(shape)
             return (None, *results)

@@ -1,4 +1,4 @@
-"""operator(): a pipeline as an operator of PyTorch."""
+"""operator(): creates an operator of PyTorch from a pipeline."""
 import inspect
 import itertools
 import re
@@ -15,36 +15,37 @@ from ._pickling import Function, describe, described
 from ._plan import Plan, is_image
 
 _numbers = itertools.count()
-MOST_SIZES = 8  # for which an operator is compiled, each alone
+MOST_SIZES = 8  # maximum number of sizes for which an operator is compiled separately
 
 
 def operator(name, pipeline=None, inputs=None, outputs=None, *, sizes=None):
-    """An operator with the name "ns::name": a function of tensors for ImageParams, and of tensors or numbers for
-    Params, in the order of `inputs`. It gives a tensor for a Func, and a tuple of them for a list or a Pipeline.
+    """Creates the operator "ns::name". It takes tensors for ImageParams, and tensors or numbers for Params, in the
+    order of `inputs`. It returns a tensor for a Func, and a tuple of tensors for a list of Funcs or a Pipeline.
 
-    `outputs` (or `sizes`): the sizes of the results in the order of Funcs, innermost first, of each where there are
-    several; or a function of the tensors that gives them; None: those of the first image. Under torch.compile with
-    dynamic shapes it should read t.shape, not len(t), which is a number of that one call.
+    `outputs` (or `sizes`) gives the sizes of the result, innermost first, or a list of these for several results. It
+    may also be a function that computes them from the tensors. None means the sizes of the first image. Under torch.compile
+    with dynamic shapes the function should read t.shape rather than len(t), which is a constant of a single call.
 
-    Without a name, operator(pipeline, inputs, outputs) finds one.
+    Without a name, operator(pipeline, inputs, outputs) generates one.
 
-    `pipeline` may also be a function that gives (pipeline, inputs) or (pipeline, inputs, outputs): of an element type,
-    "float32", so that one definition is an operator on tensors of each floating-point type; the first tensor that is
-    of float32 in the definition for float32 says which. A function of two arguments, (type, shapes), is also called
-    with the shapes of tensors, as PyTorch orders them: what it defines is compiled for these alone, which is faster
-    than code for all. It is called with None for others, after MOST_SIZES of them."""
+    `pipeline` may also be a function of an element type such as "float32" that returns (pipeline, inputs) or
+    (pipeline, inputs, outputs). Then one definition serves tensors of all floating-point types. The first input that is
+    float32 in the definition for "float32" determines the type of a call.
+    A function of two arguments, (type, shapes), also receives the shapes of the tensors, in PyTorch's order. Its result
+    is compiled for these shapes only, which is faster than general code. After MOST_SIZES different shapes, it is
+    called with None for all others."""
     if not isinstance(name, str):
         name, pipeline, inputs, outputs = None, name, pipeline, outputs if inputs is None else inputs
     return _registered(Operator(name, pipeline, inputs, sizes if outputs is None else outputs))
 
 
-# The operators of this process, by name and by the mark in their pickles. A name that the user did not choose is
-# another operator's in another process.
+# The operators of this process, by name and by the unique mark in their pickles. Generated names are not unique across
+# processes.
 _by_name, _by_mark, _registering = {}, {}, threading.RLock()
 
 
 def _registered(operator):
-    """The operator, or one that a pickle has made of the same definition before."""
+    """Registers the operator, or returns one with the same definition that was restored from a pickle."""
     with _registering:
         known = _by_name.get(operator.name)
         if known is not None and known._is_restored and known._signature() == operator._signature():
@@ -55,7 +56,7 @@ def _registered(operator):
 
 
 def _restored(name, mark, signature, definition, description):
-    """What a pickle stands for."""
+    """Restores an operator from the contents of a pickle."""
     with _registering:
         known = _by_mark.get(mark) or (name and _by_name.get(name))
         if known is None:
@@ -83,7 +84,7 @@ def _funcs(pipeline):
 
 
 def _shapes(outputs, inputs, count):
-    """What Plan takes, of what users give."""
+    """The shapes of the results as a function of the tensors, from the user's argument `outputs`."""
     if outputs is None:
         first = next((i for i, parameter in enumerate(inputs) if is_image(parameter)), None)
         if first is None:
@@ -100,7 +101,7 @@ def _shapes(outputs, inputs, count):
 
 
 def _identifiers(names):
-    """Names of arguments of a schema: words, each once."""
+    """Unique identifiers from names, for the arguments of a schema."""
     made = []
     for name in names:
         word = re.sub(r"\W", "_", name)
@@ -110,7 +111,7 @@ def _identifiers(names):
 
 
 class Operator:
-    """See `operator`. `overload` and `derivative` are what torch.library knows."""
+    """An operator of PyTorch; see `operator`. `overload` and `derivative` are those of torch.library."""
 
     overload = derivative = None
 
@@ -131,7 +132,7 @@ class Operator:
                         "this one is not", "Choose one like that")
         plan = self._plan_of(definition)
         self.results, self.argument_names = len(plan.outputs), _identifiers(plan.names)
-        # The tensor whose type chooses the definition.
+        # The index of the tensor whose type selects the definition.
         self._by = next((i for i, d in enumerate(plan.dtypes) if d == torch.float32), None) if self._define else None
         self._plans[torch.float32 if self._by is not None else None] = plan
         self._parameters = plan
@@ -140,7 +141,7 @@ class Operator:
         self._calls = _library.register(self)
 
     def _signature(self):
-        """What tells it from another operator of its name: names, types and ranks of inputs, types of results."""
+        """Properties that distinguish operators of one name: names, types and ranks of inputs, types of results."""
         plan = self._parameters
         return ([(name, str(dtype), rank) for name, dtype, rank in zip(plan.names, plan.dtypes, plan.ranks)],
                 [str(dtype) for dtype in plan.result_dtypes])
@@ -168,7 +169,7 @@ class Operator:
         return Plan(self.name, funcs, inputs, _shapes(outputs, list(inputs), len(funcs)), sizes)
 
     def plan_for(self, path, tensors):
-        """What runs for tensors of these types and sizes, which are known."""
+        """The plan for tensors of these types and, if the definition uses them, sizes."""
         if not self._knows_sizes:
             return self.plan(path, tensors)
         key = [tensors[self._by].dtype if self._by is not None else None]
@@ -176,16 +177,16 @@ class Operator:
             shape = t.shape
             if len(shape) != rank:
                 if len(shape) < rank:
-                    return self.plan(path, tensors)  # which refuses it
+                    return self.plan(path, tensors)  # reports the error
                 shape = shape[len(shape) - rank:]
             key.append(shape)
         key = tuple(key)
         plan = self._sized.get(key)
         if plan is None:
-            generic = self.plan(path, tensors)  # first: it refuses types that there are none of
+            generic = self.plan(path, tensors)  # first, because it rejects unsupported types
             generic.check(tensors)
             if any(0 in shape for shape in key[1:]):
-                return generic  # there is next to nothing to be done
+                return generic  # there is almost nothing to compute
             with self._lock:
                 if key not in self._sized:
                     if len(self._sized) >= MOST_SIZES:
@@ -197,10 +198,10 @@ class Operator:
         return plan.derived(path) if path else plan
 
     def plan(self, path, tensors):
-        """What runs for tensors of these types, and of any sizes."""
+        """The plan for tensors of these types and of any sizes."""
         dtype = tensors[self._by].dtype if self._by is not None else None
         if dtype is not None and not dtype.is_floating_point:
-            dtype = torch.float32  # refused there
+            dtype = torch.float32  # rejected later
         plan = self._plans.get(dtype)
         if plan is None:
             with self._lock:
@@ -222,7 +223,7 @@ class Operator:
                     f"{len(tensors)} arguments are given", "Give one for each")
 
     def _as_tensors(self, tensors):
-        """Numbers stand for Params."""
+        """Converts numbers for Params to tensors."""
         of = next((t.dtype for t in tensors if isinstance(t, torch.Tensor) and t.dtype.is_floating_point), None)
         made = []
         for tensor, dtype, parameter in zip(tensors, self._parameters.dtypes, self._parameters.inputs):
@@ -236,5 +237,5 @@ class Operator:
         return tuple(made)
 
     def made(self):
-        """The paths of the derivatives that were made: Plan.derived."""
+        """The paths of the derivatives that exist; see Plan.derived."""
         return sorted({path for plan in [*self._plans.values(), *self._sized.values()] for path in plan.made()})

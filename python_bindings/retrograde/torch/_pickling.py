@@ -1,9 +1,9 @@
-"""Operators in pickles: deep copies, torch.save of whole modules, arguments of workers.
+"""Pickles operators, for deep copies, torch.save of whole modules, and arguments of worker processes.
 
-An operator is registered once in a process and never changes, so a copy of it is itself. A pickle of it has its name and
-a description that makes it again where a process has no such operator: the function that defines it, or its pipeline as
-text with the Buffers that it names. Functions that a module holds are stored by their names, as pickles store them;
-others (lambdas, functions inside of functions) by their code, which is of one version of Python.
+An operator is registered once in a process and never changes, so a copy is the operator itself. A pickle holds its name
+and a description from which another process can create it: the function that defines it, or its pipeline as text with
+the Buffers that it uses. Functions of a module are stored by name, as pickles do. Others (lambdas, nested functions)
+are stored as code, which works in one version of Python only.
 """
 import dis
 import importlib
@@ -17,7 +17,7 @@ from .._errors import CompileError, error
 
 
 class Function:
-    """A function in a pickle. What it mentions is stored with it: modules by their names, all else as pickles do."""
+    """A function in a pickle. The globals that it uses are stored too: modules by name, all others as pickles do."""
 
     def __init__(self, function):
         self.function = function
@@ -86,7 +86,7 @@ def _function_of_code(magic, code, module, name, cells, defaults, keywords, ment
 
 
 def describe(funcs, single, inputs, outputs):
-    """The arguments of operator() in a form that a pickle takes."""
+    """The arguments of operator() in a form that can be pickled."""
     text, buffers = rg._describe_pipeline(rg.Pipeline(funcs))
     kinds = [(parameter.name(), str(parameter.type()),
               parameter.dimensions() if isinstance(parameter, rg.ImageParam) else None) for parameter in inputs]
@@ -94,7 +94,7 @@ def describe(funcs, single, inputs, outputs):
 
 
 def described(text, buffers, single, kinds, outputs):
-    """What `describe` was given: (pipeline, inputs, outputs)."""
+    """The inverse of `describe`: (pipeline, inputs, outputs)."""
     funcs, found = rg._pipeline_described(text, buffers)
     inputs = []
     for name, kind, dimensions in kinds:  # the pipeline need not read all of them

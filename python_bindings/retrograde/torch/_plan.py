@@ -1,7 +1,7 @@
 """A pipeline as a function of tensors, with the pipelines of its derivatives.
 
-Tensors may have more dimensions than their parameters, in front of them: a batch. These are broadcast as PyTorch
-broadcasts, and each item of the batch is a call of its own.
+Tensors may have additional leading dimensions, which form a batch. Batch dimensions are broadcast as in PyTorch, and
+each item of the batch is a separate call.
 """
 import functools
 import itertools
@@ -20,12 +20,12 @@ DTYPES = {torch.float16: rg.Float(16), torch.bfloat16: rg.BFloat(16), torch.floa
 TYPES = {str(kind): dtype for dtype, kind in DTYPES.items()}
 GRADIENT, TANGENT = 0, 1  # the steps of a path: see Plan.derived
 _CPU = torch.device("cpu")
-_HUGE = 32 << 20  # bytes, from which malloc maps memory for each block
+_HUGE = 32 << 20  # bytes; malloc maps new memory for each block of at least this size
 _numbers = itertools.count()
 
 
 def dtype_of(thing):
-    """The element type of a Func or parameter as PyTorch's."""
+    """The torch.dtype of a Func's or parameter's elements."""
     if str(thing.type()) not in TYPES:
         raise error(CompileError, f'make an operator of "{thing.name()}"', "its elements are those of a tensor",
                     f"they are {thing.type()}", f"Use one of {', '.join(TYPES)}")
@@ -33,7 +33,7 @@ def dtype_of(thing):
 
 
 def bits(mask):
-    """The places of its ones."""
+    """The positions of the bits that are set."""
     return [i for i in range(mask.bit_length()) if mask >> i & 1]
 
 
@@ -42,8 +42,8 @@ def is_image(parameter):
 
 
 class Plan:
-    """Of Funcs, and the parameters that they read; `shapes`: those of the outputs, as PyTorch orders them, from the
-    tensors of one item; `sizes`: the shapes of the inputs where the plan is for these alone, or None."""
+    """A compiled pipeline with outputs and inputs. `shapes` computes the shapes of the outputs, in PyTorch's order,
+    from the tensors of one batch item. `sizes` holds the shapes of the inputs if the plan is for these only, or None."""
 
     def __init__(self, name, outputs, inputs, shapes, sizes=None):
         self.name, self.outputs, self.inputs, self._shapes = name, list(outputs), list(inputs), shapes
@@ -60,7 +60,7 @@ class Plan:
         self._last_kinds, self.expected = None, None  # see _expect
         self._lock, self._callable, self._derived = threading.RLock(), None, {}
         self._on_devices = {}  # compiled, by target
-        self._result_shapes, self._seeds = None, 0  # so many of the last inputs are seeds
+        self._result_shapes, self._seeds = None, 0  # _seeds: number of seeds, which are the last inputs
         if sizes is not None:
             self._result_shapes = shapes([torch.empty(size, dtype=dtype, device="meta")
                                           for size, dtype in zip(sizes, self.dtypes)])
@@ -69,10 +69,10 @@ class Plan:
             for f, size in zip(self.outputs, self._result_shapes):
                 _set_bounds(f.output_buffer(), size)
 
-    # ---- what it is given ----
+    # ---- arguments ----
 
     def check(self, tensors):
-        """The rules that shapes and types break before anything runs: TypeError. Whether there is a batch."""
+        """Raises TypeError if types or ranks do not fit. Returns whether there is a batch."""
         if len(tensors) != len(self.inputs):
             self._refuse(tensors)
         has_batch = False
@@ -94,7 +94,7 @@ class Plan:
                     "Convert them with tensor.to(dtype); dimensions in front of an image's own are a batch")
 
     def batch(self, tensors):
-        """The sizes of the batch; () for none."""
+        """The sizes of the batch; () without a batch."""
         leading = [t.shape[:t.dim() - rank] for t, rank in zip(tensors, self.ranks) if t.dim() > rank]
         if not leading:
             return ()
@@ -106,7 +106,7 @@ class Plan:
                         f"given are {shapes}", "Give each tensor the same leading sizes, or none") from None
 
     def shapes(self, tensors, batch):
-        """Those of the results."""
+        """The shapes of the results."""
         if self._result_shapes is not None:
             return [batch + shape for shape in self._result_shapes] if batch else self._result_shapes
         if batch:
@@ -114,17 +114,17 @@ class Plan:
                        for t, rank in zip(tensors, self.ranks)]
         return [batch + shape for shape in self._shapes(tensors)]
 
-    # ---- what it does ----
+    # ---- calls ----
 
     def fake(self, tensors):
-        """Results without values, for those who ask what shapes they would have."""
+        """Results without values, which only have shapes and types."""
         self.check(tensors)
         device = self.place(tensors)
         return [torch.empty(shape, dtype=dtype, device=device)
                 for shape, dtype in zip(self.shapes(tensors, self.batch(tensors)), self.result_dtypes)]
 
     def place(self, tensors):
-        """The device of the images; None where there are none."""
+        """The device of the images; None without images."""
         devices = {t.device for t, image in zip(tensors, self._images) if image}
         if len(devices) > 1:
             places = ", ".join(f"{name} on {t.device}" for name, t in zip(self.names, tensors))
@@ -146,14 +146,14 @@ class Plan:
         return results
 
     def run_on(self, device, tensors):
-        """The same where images are a device's (_device.py): its stream has work to do then."""
+        """Runs on images of a device (_device.py). The work is queued in its current stream."""
         batch = self.batch(tensors) if self.check(tensors) else ()
         with device.current():
             results = [device.empty(shape, dtype)
                        for shape, dtype in zip(self.shapes(tensors, batch), self.result_dtypes)]
             if self._is_trivial(tensors, results):
                 return results
-            # A number is an argument of kernels, so the host must know it.
+            # Numbers are kernel arguments, so they must be on the host.
             tensors = [t if image else t.cpu() for t, image in zip(tensors, self._images)]
             call = functools.partial(self._call_on, device)
             if batch:
@@ -163,9 +163,9 @@ class Plan:
         return results
 
     def run_on_device(self, tensors):
-        """On the device that the images are on."""
+        """Runs on the device of the images."""
         place = self.place(tensors)
-        if place is None or place.type == "cpu":  # numbers alone are elsewhere
+        if place is None or place.type == "cpu":  # only numbers are on another device
             return self.run([t.cpu() for t in tensors])
         return self.run_on(device_of(place), tensors)
 
@@ -178,8 +178,8 @@ class Plan:
             call([t[at] for t in wide], [t[at] for t in results])
 
     def _is_trivial(self, tensors, results):
-        """Of no elements, or linear in tensors of none, a gradient by its seeds: then filled with zeros. The pipeline's
-        own loops may have no fewer than one iteration."""
+        """Whether nothing need run: the results are empty, or the seeds of a gradient are, and the results are then
+        filled with zeros. The loops of a pipeline must have at least one iteration."""
         if self._seeds and all(t.numel() == 0 for t in tensors[-self._seeds:]):
             for result in results:
                 result.zero_()
@@ -203,31 +203,32 @@ class Plan:
         found._call_tensors_on_device((*tensors, *results), device.stream())
 
     def _compile_for(self, target):
-        """What nobody scheduled gets a schedule, in a copy: one for the CPU is none for a device."""
+        """Compiles a copy with an automatic schedule for the target, unless the user gave directives."""
         return rg.Pipeline(self.outputs)._scheduled_copy(target).compile_to_callable(self.inputs, target)
 
     def _expect(self, tensors, shapes):
-        """Of sizes that came twice in a row, expected(tensors) then is run(), or gives None for tensors of others: a
-        shorter way. Not where the shapes of results come from more than those of tensors."""
+        """After two calls with the same sizes, sets `expected`, a faster run() that returns None for other sizes. It is
+        not set if the shapes of the results depend on more than the shapes of the tensors."""
         kinds = [(t.dtype, tuple(t.shape)) for t in tensors]
         if kinds != self._last_kinds:
             self._last_kinds = kinds
             return
         try:
             alone = self.shapes([torch.empty(shape, dtype=dtype, device="meta") for dtype, shape in kinds], ())
-        except Exception:  # a user's function asks tensors for values, and they have none
+        except Exception:  # a user's function reads values, which these tensors lack
             return
         if [tuple(one) for one in alone] == [tuple(one) for one in shapes]:
             makers = [_maker(tuple(one), dtype) for one, dtype in zip(shapes, self.result_dtypes)]
             self.expected = rg._ExpectedCall(self._callable, kinds, makers)
 
-    # ---- its derivatives ----
+    # ---- derivatives ----
 
     def derived(self, path):
-        """The plan that a path leads to: steps of three numbers each.
-        GRADIENT, wanted, given: of the inputs and a seed for each of the outputs `given`, by the inputs `wanted`;
-        TANGENT, given, 0: of the inputs and a tangent for each of those `given`, all outputs' tangents.
-        Sets are the bits of a number."""
+        """The plan of a derivative. A path consists of steps of three numbers; sets of inputs or outputs are bit masks.
+        GRADIENT, wanted, given: takes the inputs and a seed for each output in `given`; computes the gradients with
+        respect to the inputs in `wanted`.
+        TANGENT, given, 0: takes the inputs and a tangent for each input in `given`; computes the tangents of all
+        outputs."""
         if not path:
             return self
         step = tuple(path[:3])
@@ -238,7 +239,7 @@ class Plan:
         return self._derived[step].derived(path[3:])
 
     def made(self):
-        """The paths of all derivatives that were made."""
+        """The paths of all derivatives that exist."""
         return sorted(step + rest for step, plan in self._derived.items() for rest in [(), *plan.made()])
 
     def _gradient(self, wanted, given):
@@ -275,16 +276,16 @@ class Plan:
 
 
 def _maker(shape, dtype):
-    """A function that makes a result. One like another takes half as long as one by its sizes: where it matters,
-    which is where a tensor is small, there is another."""
+    """A function that creates a result tensor. For small tensors it copies the layout of another tensor, which takes
+    half as long as creating one from sizes."""
     if math.prod(shape) <= 4096:
         return functools.partial(torch.empty_like, torch.empty(shape, dtype=dtype, device=_CPU))
     return functools.partial(_empty, shape, dtype)
 
 
 def _empty(shape, dtype):
-    """A result without values. A large one is new memory each time, whose pages are faulted in when they are written:
-    fewer, larger ones where the system has some, as for large arrays of NumPy and for temporaries of a pipeline."""
+    """A result tensor without values. A large one is new memory in each call, and writing it causes page faults. Huge
+    pages reduce their number, as for large NumPy arrays and for temporaries of a pipeline."""
     result = torch.empty(shape, dtype=dtype, device=_CPU)
     size = result.numel() * result.element_size()
     if size >= _HUGE:
@@ -293,13 +294,13 @@ def _empty(shape, dtype):
 
 
 def _set_bounds(buffer, size):
-    """Of an image or an output, as PyTorch orders its sizes."""
+    """Promises the bounds of an image or an output; `size` is in PyTorch's order."""
     for d, extent in enumerate(reversed(size)):
         buffer.dim(d).set_bounds(0, extent)
 
 
 def _sum(parts, parameter):
-    """One Func for each input, of its own type: parts may be shared, and wider."""
+    """The sum of the parts of a gradient as a Func with the type of the parameter; the parts may be wider."""
     return _as(parameter.type(), parameter.dimensions() if is_image(parameter) else 0, parts)
 
 

@@ -1,4 +1,4 @@
-// retrograde.h -- everything that a pipeline's author needs, in one include.
+// retrograde.h -- includes the whole public interface.
 #pragma once
 
 #include "autodiff/custom_derivative.h"

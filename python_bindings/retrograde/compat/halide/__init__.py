@@ -1,13 +1,13 @@
-"""Programs written for Halide's Python package, as they stand: with this folder's parent on PYTHONPATH,
+"""Runs programs written for Halide's Python package without changes. With this folder's parent on PYTHONPATH,
 
     import halide as hl
 
-is Retrograde under that name, with what Halide's package does otherwise:
+imports Retrograde under that name, with the behaviour of Halide's package:
 
-- prints of pipelines and warnings of the compiler go to sys.stdout, also of pipelines that the same process makes by
-  `import retrograde`, and the same objects have reprs such as <halide.Var 'x'>;
-- a float that float32 does not hold is a RuntimeWarning where it is rounded to that;
-- an index beyond the variables of an RDom, or below 0, is a KeyError; argmin and argmax are tuples of Python.
+- text that pipelines print, and warnings of the compiler, go to sys.stdout, and objects have reprs such as
+  <halide.Var 'x'>; both also apply to pipelines that the process builds through `import retrograde`;
+- rounding a Python float to float32 raises a RuntimeWarning if the value changes;
+- an RDom index out of range raises KeyError; argmin and argmax return Python tuples.
 """
 import atexit as _atexit
 import sys as _sys

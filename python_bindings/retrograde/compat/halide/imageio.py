@@ -1,2 +1,2 @@
-"""Pictures, under the name of Halide's package: see retrograde.imageio."""
+"""retrograde.imageio under the name that Halide's package uses."""
 from retrograde.imageio import *  # noqa: F401,F403
