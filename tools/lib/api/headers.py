@@ -118,9 +118,9 @@ class HeaderReader:
 
     def __init__(self, root, header):
         self.header = header
-        raw = (root / "compiler" / header).read_text()
-        self.lines = raw.split("\n")
-        self.text = PREPROCESSOR.sub(lambda m: re.sub(r"[^\n]", " ", m.group(0)), raw)
+        self.raw = (root / "compiler" / header).read_text()
+        self.lines = self.raw.split("\n")
+        self.text = PREPROCESSOR.sub(lambda m: re.sub(r"[^\n]", " ", m.group(0)), self.raw)
         self.code = without_comments(self.text)
         self.names = []
 
@@ -282,6 +282,14 @@ class HeaderReader:
         above, i = [], at - 1
         while self.is_comment(i):
             above.insert(0, self.lines[i].lstrip()[2:].strip())
+            i -= 1
+        return above
+
+    def raw_comment_above(self, at):
+        """The same with the indentation inside of it: loop nests keep their shape."""
+        above, i = [], at - 1
+        while self.is_comment(i):
+            above.insert(0, re.sub(r"^\s*// ?", "", self.lines[i]).rstrip())
             i -= 1
         return above
 

@@ -1,0 +1,80 @@
+"""How Sphinx builds the documentation site. `tools/docs` prepares the folder of sources and runs it; see there.
+
+The sources are links to the repository's folders, beside pages that are written anew at every build (reference/,
+tutorials/, gallery.md). So a relative link between two pages is right in the repository and on the site.
+"""
+import os
+import re
+import sys
+from pathlib import Path
+
+sources = Path(os.environ["SITE_SOURCES"])
+sys.path[:0] = [os.environ["SITE_TOOLS"], str(sources / "python")]
+
+from sphinx.ext.autodoc.mock import _MockModule  # noqa: E402
+
+from pages.comments import rst_of_comment  # noqa: E402
+
+project = "Retrograde"
+author = "the authors of Retrograde"
+release = os.environ["SITE_VERSION"]
+copyright = f"{author}, MIT licence"
+
+extensions = ["myst_parser", "breathe", "sphinx.ext.autodoc", "sphinx_copybutton"]
+root_doc = "index"
+include_patterns = [
+    "index.md", "gallery.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/*.md", "apps/README.md", "apps/*/README.md",
+    "python_bindings/*.md", "test/tutorials/**/README.md", "test/tutorials/README.md", "tools/README.md",
+    "tutorials/**", "reference/**"]
+exclude_patterns = ["apps/common/*", "apps/images/*"]
+nitpicky = False  # signatures name types of the standard library, which have no page
+
+# ---- Markdown ----
+myst_enable_extensions = ["colon_fence"]
+myst_heading_anchors = 3  # links to headings, as repositories show them
+
+# ---- C++: the XML that tools/lib/pages/cpp_reference.py writes ----
+breathe_projects = {"retrograde": str(sources / "xml")}
+breathe_default_project = "retrograde"
+breathe_show_include = False
+cpp_maximum_signature_line_length = 100
+
+# ---- Python: the stubs and modules that tools/lib/pages/python_package.py writes ----
+autodoc_mock_imports = ["numpy", "torch"]
+_MockModule.__version__ = "2.0"  # retrograde.torch asks torch for it
+autodoc_member_order = "bysource"
+autodoc_typehints_format = "short"
+add_module_names = False
+
+# ---- appearance ----
+html_theme = "furo"
+html_title = f"Retrograde {release}"
+html_static_path = [str(Path(__file__).parent / "static")]
+html_css_files = ["site.css"]
+html_show_sphinx = False
+html_copy_source = False
+html_theme_options = {
+    "light_css_variables": {"color-brand-primary": "#8a3b12", "color-brand-content": "#a04a18"},
+    "dark_css_variables": {"color-brand-primary": "#f0a070", "color-brand-content": "#f0a070"},
+}
+pygments_style = "friendly"
+pygments_dark_style = "monokai"
+
+
+def comment_as_text(app, what, name, obj, options, lines):
+    """Docstrings of the stubs are comments of the headers."""
+    lines[:] = rst_of_comment(list(lines)).split("\n")
+
+
+def prepare_page(app, docname, source):
+    """README.md of the repository is the home page; the READMEs of tutorials list their programs."""
+    up = r"\.\./" * docname.count("/")
+    source[0] = re.sub(rf"\]\(({up})README\.md(?=[#)])", r"](\1index.md", source[0])
+    appended = sources / "appended" / f"{docname}.md"
+    if appended.exists():
+        source[0] += appended.read_text()
+
+
+def setup(app):
+    app.connect("autodoc-process-docstring", comment_as_text)
+    app.connect("source-read", prepare_page)
