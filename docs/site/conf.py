@@ -13,7 +13,7 @@ sys.path[:0] = [os.environ["SITE_TOOLS"], str(sources / "python")]
 
 from sphinx.ext.autodoc.mock import _MockModule  # noqa: E402
 
-from pages.comments import rst_of_comment  # noqa: E402
+from pages.comments import rst_of_comment, sentence  # noqa: E402
 
 project = "Retrograde"
 author = "the authors of Retrograde"
@@ -45,6 +45,7 @@ _MockModule.__version__ = "2.0"  # retrograde.torch asks torch for it
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 add_module_names = False
+toc_object_entries = False  # the list beside a page names its classes
 
 # ---- appearance ----
 html_theme = "furo"
@@ -61,9 +62,20 @@ pygments_style = "friendly"
 pygments_dark_style = "monokai"
 
 
+def parent_documentation(name):
+    """What the class of a member says: retrograde.Func.in_ => that of Func."""
+    found = sys.modules["retrograde"]
+    for part in name.split(".")[1:-1]:
+        found = getattr(found, part, None)
+    return found.__doc__ if isinstance(found, type) else None
+
+
 def comment_as_text(app, what, name, obj, options, lines):
-    """Docstrings of the stubs are comments of the headers."""
-    lines[:] = rst_of_comment(list(lines)).split("\n")
+    """Docstrings of the stubs are comments of the headers; a member without one repeats that of its class."""
+    text = "\n".join(lines).strip()
+    if text == (parent_documentation(name) or "").strip():
+        text = ""
+    lines[:] = rst_of_comment((text if "\n" in text else sentence(text)).split("\n")).split("\n")
 
 
 def prepare_page(app, docname, source):

@@ -215,7 +215,7 @@ class HeaderReader:
 
     def name_of(self, bare, begin, owner):
         operator = OPERATOR.search(bare)
-        conversion = None if operator else re.search(r"\boperator\s+([\w:<>&\s*]+?)\s*\(\s*\)", bare)
+        conversion = None if operator else re.search(r"\boperator\s+([\w:<>&,\s*]+?)\s*\(\s*\)", bare)
         using = re.match(r"using\s+(\w+)\s*=|using\s+[\w:]+::(\w+)\s*$|typedef\b.*\b(\w+)\s*$", bare, re.S)
         if using:
             return self.add(next(g for g in using.groups() if g), "type", begin, owner)

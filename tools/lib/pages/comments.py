@@ -13,8 +13,10 @@ def capitalised(text):
 
 
 def sentence(text):
-    """A caption as a sentence: `how many Buffers` => `How many Buffers.`"""
-    return capitalised(text) + ("" if not text or text[-1] in ".:;!?" else ".")
+    """A caption as a sentence: `how many Buffers` => `How many Buffers.`; code stays: `f(_) = e`."""
+    if not re.match(r"[A-Za-z][a-z]*([ ,:;.]|$)", text):
+        return text
+    return capitalised(text) + ("" if text[-1] in ".:;!?" else ".")
 
 
 def inline(text):

@@ -1,4 +1,6 @@
 """The pages of the C++ reference: one for each public header, listed by topic."""
+import textwrap
+
 from pages.comments import inline
 from pages.writing import heading, slug, toctree
 
@@ -43,13 +45,18 @@ def page(header, classes, groups):
     parts = [heading(header.file, "="), header.introduction(), ".. cpp:namespace:: retrograde\n"]
     parts += [class_section(kind, name) for kind, name in classes]
     parts += [group_section(caption, group, bool(classes)) for caption, group in groups]
+    parts += [concept_section(*concept) for concept in header.concepts()]
     return "\n".join(parts)
 
 
 def class_section(kind, name):
-    return heading(inline(name), "-") + f"\n.. doxygen{kind}:: {name}\n   :members:\n"
+    return heading(inline(name), "-") + f"\n.. doxygen{kind}:: {name}\n   :members:\n   :undoc-members:\n"
+
+
+def concept_section(declaration, text):
+    return f"\n.. cpp:concept:: {declaration}\n\n" + textwrap.indent(text, "   ") + "\n"
 
 
 def group_section(caption, group, follows_classes):
     title = caption[:1].upper() + caption[1:] or ("Functions and types" if follows_classes else "Names")
-    return heading(inline(title), "-") + f"\n.. doxygengroup:: {group}\n   :content-only:\n"
+    return heading(inline(title), "-") + f"\n.. doxygengroup:: {group}\n   :content-only:\n   :members:\n   :undoc-members:\n"

@@ -49,6 +49,16 @@ def without_arguments(name):
         name = shorter
 
 
+def qualify_conversions(compound):
+    """Doxygen takes conversions to `Space::Name` for members of Space, or does not qualify them."""
+    for member in compound.iter("memberdef"):
+        if member.findtext("name").startswith("operator "):
+            for wrong in member.findall("qualifiedname"):
+                member.remove(wrong)
+            name = f"{compound.findtext('compoundname')}::{member.findtext('name')}"
+            ET.SubElement(member, "qualifiedname").text = name
+
+
 class DoxygenOutput:
     """The compounds of Doxygen's XML, each with its names as users write them."""
 
@@ -58,6 +68,8 @@ class DoxygenOutput:
         self.namespaces = [c for c in compounds if c.get("kind") == "namespace"]
         self.classes = [c for c in compounds if c.get("kind") in ("class", "struct")]
         self.spaces = {c.findtext("compoundname") for c in self.namespaces}
+        for compound in self.namespaces + self.classes:
+            qualify_conversions(compound)
 
     def space_of(self, qualified):
         return max((space for space in self.spaces if qualified.startswith(space + "::")), key=len, default="")
@@ -104,7 +116,7 @@ class Reference:
                 and re.sub(r"\s+", "", without_arguments(name)) in self.public[header.path])
 
     def public_members(self, members):
-        return [m for m in members if self.is_public(m, m.findtext("qualifiedname") or m.findtext("name"))]
+        return [m for m in members if self.is_public(m, m.findtext("qualifiedname"))]
 
     def by_caption(self, header, members):
         """Sorted by line; neighbours under one caption together."""
@@ -135,7 +147,8 @@ class Reference:
         members = without_repetitions(self.public_members(m for part in parts for m in part.iter("memberdef")))
         inner = {c.get("id") for c in public}
         for part in list(compound):
-            if part.tag in ("sectiondef", "includes") or part.tag == "innerclass" and part.get("refid") not in inner:
+            is_hidden = part.tag == "innerclass" and part.get("refid") not in inner
+            if is_hidden or part.tag in ("sectiondef", "includes", "derivedcompoundref"):
                 compound.remove(part)
         for caption, group in self.by_caption(header, members):
             compound.append(section(caption or "Members", group))

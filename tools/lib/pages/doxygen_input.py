@@ -16,7 +16,8 @@ class Header:
 
     def __init__(self, root, path):
         self.path, self.reader = path, HeaderReader(root, path)
-        self.names = [name for name in self.reader.read() if name.is_public]
+        begin = next(i for i, line in enumerate(self.reader.lines) if line.startswith("namespace retrograde"))
+        self.names = [name for name in self.reader.read() if name.is_public and name.line > begin]
         self.original_line = []  # of each line of text(), counted from 1
 
     @property
@@ -50,6 +51,17 @@ class Header:
             if re.match(r"(\};|class|struct|enum|namespace)\b", text) and i < line - 1:
                 return ""
         return ""
+
+    def concepts(self):
+        """(declaration, explanation as reStructuredText): Breathe knows none."""
+        for name in self.names:
+            if name.kind == "concept":
+                template = re.search(rf"(template\s*<[^{{}};]*>)\s*concept\s+{name.name}\b", self.reader.code)
+                yield f"{template.group(1)} {name.name}", rst_of_comment(self.own_comment(name))
+
+    def head_of(self, name):
+        """The first line of its declaration."""
+        return self.reader.lines[name.line - 1]
 
     def text(self):
         above, out = self.explanations(), []

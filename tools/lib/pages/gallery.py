@@ -16,7 +16,7 @@ Programs in the language, each with its numbers, its gradients checked, and a co
 def write_gallery(root, work):
     apps = sorted(path.parent for path in root.glob("apps/*/README.md") if (path.parent / "demo").exists()
                   or path.parent.name == "learned_retouching")
-    cards = [app_card(app) for app in apps]
+    cards = sorted(map(app_card, apps), key=lambda card: not card[3])  # those with a picture first
     tutorials = [card for folder in ("gradients", "gpu") for card in tutorial_cards(root, folder)]
     (work / "gallery.md").write_text(OPENING + cards_text(cards) + "\n## Tutorials\n" + cards_text(tutorials)
                                      + "\n```{toctree}\n:hidden:\n\n" + "\n".join(card[2] for card in cards) + "\n```\n")
@@ -32,7 +32,7 @@ def app_card(folder):
 def first_paragraph(text):
     """The first sentence below the title."""
     paragraph = " ".join(text.split("\n\n")[1].split())
-    return re.match(r".+?[.:](?=\s|$)", paragraph + " ").group(0).rstrip(":") + ""
+    return re.match(r".+?(?=[.:](\s|$))", paragraph + ".").group(0) + "."
 
 
 def tutorial_cards(root, folder):

@@ -19,10 +19,13 @@ PACKAGE_FILES = ["_generator.py", "_linking.py", "_names.py", "_command_line.py"
 
 # ---- which names there are ----
 
+def read_stub(stubs):
+    return ast.parse((stubs / "retrograde/_retrograde.pyi").read_text())
+
+
 def stub_names(stubs):
     """(name, is a class) of what the extension module gives; an underscore in front hides a name."""
-    tree = ast.parse((stubs / "retrograde/_retrograde.pyi").read_text())
-    named = [node for node in tree.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))]
+    named = [node for node in read_stub(stubs).body if isinstance(node, (ast.ClassDef, ast.FunctionDef))]
     names = {node.name: isinstance(node, ast.ClassDef) for node in named if not node.name.startswith("_")}
     return sorted(names.items())
 
@@ -81,4 +84,4 @@ def page(title, module, names, opening=""):
 
 
 def class_section(name):
-    return heading(name, "-") + f"\n.. autoclass:: {name}\n   :members:\n   :undoc-members:\n   :show-inheritance:\n"
+    return heading(name, "-") + f"\n.. autoclass:: {name}\n   :members:\n   :undoc-members:\n"
