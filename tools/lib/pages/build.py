@@ -1,19 +1,26 @@
-"""Builds the documentation site: prepares a folder of sources, then runs Sphinx on it."""
+"""Builds the documentation site: prepares a folder of sources, then runs Sphinx on it.
+
+    build.py ROOT STUBS OUTPUT      as tools/docs calls it
+"""
 import os
 import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
-from api.headers import public_headers
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+sys.dont_write_bytecode = True
 
-from pages.cpp_pages import write_cpp_pages
-from pages.cpp_reference import Reference, run_doxygen
-from pages.doxygen_input import Header
-from pages.gallery import write_gallery
-from pages.python_package import write_python_package
-from pages.python_pages import write_python_pages
-from pages.tutorials import write_tutorials
+from api.headers import public_headers  # noqa: E402
+
+from pages.cpp_pages import write_cpp_pages  # noqa: E402
+from pages.cpp_reference import Reference, run_doxygen  # noqa: E402
+from pages.doxygen_input import Header  # noqa: E402
+from pages.gallery import write_gallery  # noqa: E402
+from pages.python_package import write_python_package  # noqa: E402
+from pages.python_pages import write_python_pages  # noqa: E402
+from pages.tutorials import write_tutorials  # noqa: E402
 
 # What pages link to: all of it is in the folder of sources, as in the repository.
 LINKED = ["apps", "bench", "cmake", "compiler", "docs", "python_bindings", "runtime", "test", "tools",
@@ -56,5 +63,10 @@ def run_sphinx(root, work, output):
     shutil.rmtree(output, ignore_errors=True)
     environment = {**os.environ, "SITE_SOURCES": str(work), "SITE_TOOLS": str(root / "tools/lib"),
                    "SITE_VERSION": version(root), "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, "-m", "sphinx", "-b", "html", "-W", "--keep-going", "-q", "-c", root / "docs/site", "-d", work / "doctrees", work, output]
+    command = [sys.executable, "-m", "sphinx", "-b", "html", "-W", "--keep-going", "-q", "-c", root / "docs/site",
+               "-d", work / "doctrees", work, output]
     return subprocess.run(command, env=environment).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(build(*(Path(argument).resolve() for argument in sys.argv[1:4])))
