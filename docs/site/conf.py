@@ -13,6 +13,7 @@ sys.path[:0] = [os.environ["SITE_TOOLS"], str(sources / "python")]
 
 from sphinx.ext.autodoc.mock import _MockModule  # noqa: E402
 
+from api.headers import HeaderReader, public_headers  # noqa: E402
 from pages.comments import rst_of_comment, sentence  # noqa: E402
 
 project = "Retrograde"
@@ -62,18 +63,14 @@ pygments_style = "friendly"
 pygments_dark_style = "monokai"
 
 
-def parent_documentation(name):
-    """What the class of a member says: retrograde.Func.in_ => that of Func."""
-    found = sys.modules["retrograde"]
-    for part in name.split(".")[1:-1]:
-        found = getattr(found, part, None)
-    return found.__doc__ if isinstance(found, type) else None
+TITLES = {HeaderReader(sources, header).title() for header in public_headers(sources)}
 
 
 def comment_as_text(app, what, name, obj, options, lines):
-    """Docstrings of the stubs are comments of the headers; a member without one repeats that of its class."""
+    """Docstrings of the stubs are comments of the headers; what has none has the title of its header, which is not
+    shown again for each name."""
     text = "\n".join(lines).strip()
-    if text == (parent_documentation(name) or "").strip():
+    if text.rstrip(".") in TITLES and what != "class":
         text = ""
     lines[:] = rst_of_comment((text if "\n" in text else sentence(text)).split("\n")).split("\n")
 

@@ -1,7 +1,7 @@
 """The pages of the C++ reference: one for each public header, listed by topic."""
 import textwrap
 
-from pages.comments import inline
+from pages.comments import capitalised, inline, sentence
 from pages.writing import heading, slug, toctree
 
 TOPICS = [
@@ -30,7 +30,7 @@ def write_cpp_pages(folder, headers, contents):
         (folder / f"{header.page}.rst").write_text(page(header, *contents[header.path]))
     for topic, _ in TOPICS:
         (folder / f"{slug(topic)}.rst").write_text(topic_page(topic, shown))
-    listed = toctree([slug(topic) for topic, _ in TOPICS])
+    listed = toctree([slug(topic) for topic, _ in TOPICS], depth=2)
     (folder / "index.rst").write_text(heading("C++ reference", "=") + OPENING + listed)
 
 
@@ -58,5 +58,7 @@ def concept_section(declaration, text):
 
 
 def group_section(caption, group, follows_classes):
-    title = caption[:1].upper() + caption[1:] or ("Functions and types" if follows_classes else "Names")
-    return heading(inline(title), "-") + f"\n.. doxygengroup:: {group}\n   :content-only:\n   :members:\n   :undoc-members:\n"
+    title, _, text = caption.partition(": ")
+    title = capitalised(title) or ("Functions and types" if follows_classes else "Names")
+    text = f"\n{inline(sentence(text))}\n" if text else ""
+    return heading(inline(title), "-") + text + f"\n.. doxygengroup:: {group}\n   :content-only:\n   :members:\n   :undoc-members:\n"

@@ -186,6 +186,7 @@ class Reference:
 
     def write_compound(self, compound, members):
         for member in members:
+            member.set("inline", "no")  # where a function is defined is not the reader's business
             show_constraint(member)
         entry = ET.SubElement(self.index, "compound", refid=compound.get("id"), kind=compound.get("kind"))
         ET.SubElement(entry, "name").text = compound.findtext("compoundname")

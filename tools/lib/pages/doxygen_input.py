@@ -48,7 +48,7 @@ class Header:
             caption = SECTION.search(text.strip()) if self.reader.is_comment(i) else None
             if caption:
                 return caption.group(1)
-            if re.match(r"(\};|class|struct|enum|namespace)\b", text) and i < line - 1:
+            if re.match(r"\};|(class|struct|enum|namespace)\b.*\{", text) and i < line - 1:
                 return ""
         return ""
 

@@ -51,7 +51,7 @@ def write_page(root, work, program, pictures):
     end, comment = opening_comment(lines)
     source = "/" + str(program.relative_to(root))
     parts = [heading(program.stem.replace("_", " ").capitalize(), "="), rst_of_comment(comment),
-             picture(root, program, pictures), f"\nThe program: :download:`{program.name} <{source}>`\n"]
+             picture(root, program, pictures), f"\nThe program: :download:`{program.name} <{source}>`{twin(root, program)}\n"]
     parts += [code(source, *part) for part in parts_of(lines, end)]
     path = work / f"{page_name(root, program)}.rst"
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -71,6 +71,17 @@ def opening_comment(lines):
 def picture(root, program, folder):
     name = f"test/tutorials/{folder}/pictures/{program.stem}.svg"
     return f"\n.. image:: /{name}\n   :alt: what the program draws\n" if folder and (root / name).exists() else ""
+
+
+def twin(root, program):
+    """A link to the same program in the other language."""
+    folder = root / "test/tutorials"
+    name = str(program.relative_to(folder).with_suffix(""))
+    is_python = program.suffix == ".py"
+    other = name.removeprefix("python/") if is_python else f"python/{name}"
+    if not (folder / other).with_suffix(".cpp" if is_python else ".py").exists():
+        return ""
+    return f". The same :doc:`in {'C++' if is_python else 'Python'} </tutorials/{other}>`."
 
 
 def parts_of(lines, begin):

@@ -11,6 +11,6 @@ def slug(title):
     return re.sub(r"\W+", "_", title.lower()).strip("_")
 
 
-def toctree(entries, hidden=False):
-    options = "   :hidden:\n" if hidden else "   :maxdepth: 1\n"
+def toctree(entries, hidden=False, depth=1):
+    options = "   :hidden:\n" if hidden else f"   :maxdepth: {depth}\n"
     return f"\n.. toctree::\n{options}\n" + "".join(f"   {entry}\n" for entry in entries)
