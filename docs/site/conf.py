@@ -24,10 +24,9 @@ copyright = f"{author}, MIT licence"
 extensions = ["myst_parser", "breathe", "sphinx.ext.autodoc", "sphinx_copybutton"]
 root_doc = "index"
 include_patterns = [
-    "index.md", "gallery.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/*.md", "apps/README.md", "apps/*/README.md",
-    "python_bindings/*.md", "test/tutorials/**/README.md", "test/tutorials/README.md", "tools/README.md",
-    "tutorials/**", "reference/**"]
-exclude_patterns = ["apps/common/*", "apps/images/*"]
+    "index.md", "gallery.md", "folders.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/*.md", "python_bindings/*.md",
+    "*/README.md", "*/*/README.md", "*/*/*/README.md", "tutorials/**", "reference/**"]
+exclude_patterns = ["appended/**"]  # what prepare_page() adds to others
 nitpicky = False  # signatures name types of the standard library, which have no page
 
 # ---- Markdown ----
@@ -75,10 +74,19 @@ def comment_as_text(app, what, name, obj, options, lines):
     lines[:] = rst_of_comment((text if "\n" in text else sentence(text)).split("\n")).split("\n")
 
 
+def page_of_link(docname, link):
+    """README.md of the repository is the home page; a folder's page is its README, or that of a folder around it."""
+    folder = (sources / docname).parent
+    if os.path.normpath(folder / link) == str(sources / "README.md"):
+        return link[:-len("README.md")] + "index.md"
+    if not (folder / link).is_dir():
+        return link
+    return f"{link}/README.md" if (folder / link / "README.md").exists() else page_of_link(docname, f"{link}/..")
+
+
 def prepare_page(app, docname, source):
-    """README.md of the repository is the home page; the READMEs of tutorials list their programs."""
-    up = r"\.\./" * docname.count("/")
-    source[0] = re.sub(rf"\]\(({up})README\.md(?=[#)])", r"](\1index.md", source[0])
+    """The READMEs of tutorials list their programs."""
+    source[0] = re.sub(r"\]\(([\w./-]+)(?=[#)])", lambda match: f"]({page_of_link(docname, match[1])}", source[0])
     appended = sources / "appended" / f"{docname}.md"
     if appended.exists():
         source[0] += appended.read_text()

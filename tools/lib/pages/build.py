@@ -42,7 +42,8 @@ def build(root, stubs, output):
 def link_repository(root, work):
     for name in LINKED:
         (work / name).symlink_to(root / name)
-    (work / "index.md").symlink_to(root / "docs/site/index.md")
+    for page in ("index.md", "folders.md"):
+        (work / page).symlink_to(root / "docs/site" / page)
 
 
 def write_reference(root, stubs, work):
