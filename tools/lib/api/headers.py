@@ -294,10 +294,13 @@ class HeaderReader:
         return above
 
     def comment_behind(self, at):
+        return spoken([self.raw_comment_behind(at)])
+
+    def raw_comment_behind(self, at):
         for line in self.lines[at:at + 6]:
             behind = re.search(r"//\s*(.*)", re.sub(r'"(?:\\.|[^"\\])*"', "", line))
             if behind:
-                return spoken([behind.group(1)])
+                return behind.group(1)
             if ";" in line or "{" in line:
                 break
         return ""

@@ -60,7 +60,7 @@ def version(root):
 
 def run_sphinx(root, work, output):
     """Anew, so that no page of an earlier build stays; warnings are errors. In one process: Sphinx cannot merge what
-    several have read of partial specializations."""
+    several have read of partial specialisations."""
     shutil.rmtree(output, ignore_errors=True)
     environment = {**os.environ, "SITE_SOURCES": str(work), "SITE_TOOLS": str(root / "tools/lib"),
                    "SITE_VERSION": version(root), "PYTHONDONTWRITEBYTECODE": "1"}

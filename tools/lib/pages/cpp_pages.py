@@ -11,9 +11,9 @@ TOPICS = [
     ("Expressions, types and targets", "ir/"), ("Errors and observers", "diagnostics/"),
     ("Schedules as files", "graph/")]
 OPENING = """
-Programs include ``<retrograde/retrograde.h>``, which holds all of this, in ``namespace retrograde``. Each page shows the
-names of one header with their signatures; "Requires" lists the rules whose violation throws ``CompileError``, or the kind
-of error that stands behind the rule. The tests of every name and rule: :doc:`/docs/api`.
+Programs include ``<retrograde/retrograde.h>``, which holds all of this, in ``namespace retrograde``. Each page shows
+the names of one header with their signatures. "Requires" lists rules; breaking one throws ``CompileError``, or the kind
+of error in parentheses behind it. :doc:`/docs/api` names the test of every name and rule.
 """
 
 
@@ -61,4 +61,5 @@ def group_section(caption, group, follows_classes):
     title, _, text = caption.partition(": ")
     title = capitalised(title) or ("Functions and types" if follows_classes else "Names")
     text = f"\n{inline(sentence(text))}\n" if text else ""
-    return heading(inline(title), "-") + text + f"\n.. doxygengroup:: {group}\n   :content-only:\n   :members:\n   :undoc-members:\n"
+    directive = f"\n.. doxygengroup:: {group}\n   :content-only:\n   :members:\n   :undoc-members:\n"
+    return heading(inline(title), "-") + text + directive

@@ -133,17 +133,17 @@ class Reference:
     def write_classes(self, header):
         found = [c for c in self.doxygen.classes
                  if self.header_of(c) is header and self.is_public(c, c.findtext("compoundname"))]
-        specialized = [c for c in found if "<" in c.findtext("compoundname")]
-        found = [c for c in found if c not in specialized]
+        specialised = [c for c in found if "<" in c.findtext("compoundname")]
+        found = [c for c in found if c not in specialised]
         outer = [c for c in found if "::" not in self.doxygen.name_of(c.findtext("compoundname"))]
         for compound in found:
-            self.write_class(header, compound, found, specialized)
+            self.write_class(header, compound, found, specialised)
         return [(c.get("kind"), c.findtext("compoundname")) for c in sorted(outer, key=self.line_of)]
 
-    def write_class(self, header, compound, public, specialized):
-        """With the members of its specializations: users see one template, and Sphinx knows no constrained ones."""
+    def write_class(self, header, compound, public, specialised):
+        """With the members of its specialisations: users see one template, and Sphinx knows no constrained ones."""
         name = compound.findtext("compoundname")
-        parts = [compound] + [c for c in specialized if without_arguments(c.findtext("compoundname")) == name]
+        parts = [compound] + [c for c in specialised if without_arguments(c.findtext("compoundname")) == name]
         members = without_repetitions(self.public_members(m for part in parts for m in part.iter("memberdef")))
         inner = {c.get("id") for c in public}
         for part in list(compound):
@@ -204,9 +204,11 @@ def section(caption, members):
 
 
 def without_repetitions(members):
-    """Specializations of a template repeat each other's constructors."""
-    parts = ("templateparamlist", "requiresclause", "name", "argsstring")
-    text_of = lambda member: tuple("".join(part.itertext()) for tag in parts for part in member.findall(tag))
+    """Specialisations of a template repeat each other's constructors."""
+    def text_of(member):
+        parts = ("templateparamlist", "requiresclause", "name", "argsstring")
+        return tuple("".join(part.itertext()) for tag in parts for part in member.findall(tag))
+
     return list({text_of(member): member for member in reversed(members)}.values())
 
 

@@ -86,4 +86,4 @@ class Header:
 
     def own_comment(self, name):
         lines = [line for line in self.reader.raw_comment_above(name.line - 1) if not SECTION.search(line)]
-        return lines or [sentence(self.reader.comment_behind(name.line - 1))]
+        return lines or [sentence(self.reader.raw_comment_behind(name.line - 1))]

@@ -18,8 +18,9 @@ def write_gallery(root, work):
                   or path.parent.name == "learned_retouching")
     cards = sorted(map(app_card, apps), key=lambda card: not card[3])  # those with a picture first
     tutorials = [card for folder in ("gradients", "gpu") for card in tutorial_cards(root, folder)]
-    (work / "gallery.md").write_text(OPENING + cards_text(cards) + "\n## Tutorials\n" + cards_text(tutorials)
-                                     + "\n```{toctree}\n:hidden:\n\n" + "\n".join(card[2] for card in cards) + "\n```\n")
+    pages = "\n```{toctree}\n:hidden:\n\n" + "\n".join(page for _, _, page, _ in cards) + "\n```\n"
+    (work / "gallery.md").write_text(
+        OPENING + cards_text(cards) + "\n## Tutorials\n" + cards_text(tutorials) + pages)
 
 
 def app_card(folder):

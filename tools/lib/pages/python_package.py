@@ -4,7 +4,6 @@ The extension module itself is not loaded, so that a site can be built where its
 module that executes: base classes first, annotations as text, and overloads that keep the documentation of all of them.
 """
 import ast
-import re
 import shutil
 
 HEAD = '''\
@@ -86,8 +85,3 @@ def executable(source, node):
     decorators = "".join(f"@{ast.unparse(decorator)}\n" for decorator in getattr(node, "decorator_list", []))
     is_bare = isinstance(node, ast.AnnAssign) and node.value is None
     return decorators + source + (" = None" if is_bare else "")
-
-
-def like_names(stubs):
-    """The unions of the stub: what an argument takes beyond its class."""
-    return re.findall(r"^(\w+Like) = ", (stubs / "retrograde/_retrograde.pyi").read_text(), re.M)

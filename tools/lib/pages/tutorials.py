@@ -51,7 +51,8 @@ def write_page(root, work, program, pictures):
     end, comment = opening_comment(lines)
     source = "/" + str(program.relative_to(root))
     parts = [heading(program.stem.replace("_", " ").capitalize(), "="), rst_of_comment(comment),
-             picture(root, program, pictures), f"\nThe program: :download:`{program.name} <{source}>`{twin(root, program)}\n"]
+             picture(root, program, pictures),
+             f"\nThe program: :download:`{program.name} <{source}>`{twin(root, program)}\n"]
     parts += [code(source, *part) for part in parts_of(lines, end)]
     path = work / f"{page_name(root, program)}.rst"
     path.parent.mkdir(parents=True, exist_ok=True)
