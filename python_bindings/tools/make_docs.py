@@ -24,18 +24,9 @@ def paragraph(lines):
     return "\n".join(out).strip()
 
 
-def raw_comment_above(reader, at):
-    """The reader's comment_above, but with the indentation inside the comment."""
-    above, i = [], at - 1
-    while reader.is_comment(i):
-        above.insert(0, re.sub(r"^\s*// ?", "", reader.lines[i]).rstrip())
-        i -= 1
-    return above
-
-
 def docstring(reader, name):
-    lines = [line for line in raw_comment_above(reader, name.line - 1) if not re.match(r"-{3,}", line)]
-    text = as_sentence(paragraph(lines) or reader.comment_behind(name.line - 1) or name.comment)
+    lines = [line for line in reader.raw_comment_above(name.line - 1) if not re.match(r"-{3,}", line)]
+    text = paragraph(lines) or reader.comment_behind(name.line - 1) or name.comment
     text = re.sub(r"\s*Requires:\s*", "\n\nRequires: ", text).strip()
     return text if text.endswith((".", ":", ")", "\n")) or not text else text + "."
 

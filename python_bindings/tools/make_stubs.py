@@ -141,8 +141,8 @@ class Writer:
     def enumeration(self, cls, indent):
         for name in cls.__members__:
             if not keyword.iskeyword(name):  # DeviceAPI.None is reached by getattr alone
-                self.lines.append(f"{indent}    {name}: {cls.__name__}\n")
-        self.lines.append(f"{indent}    __members__: Dict[str, {cls.__name__}]\n{indent}    name: str\n{indent}    value: int\n"
+                self.lines.append(f"{indent}    {name}: {cls.__qualname__}\n")
+        self.lines.append(f"{indent}    __members__: Dict[str, {cls.__qualname__}]\n{indent}    name: str\n{indent}    value: int\n"
                           f"{indent}    def __int__(self) -> int: ...\n")
 
     def class_(self, name, cls, indent=""):

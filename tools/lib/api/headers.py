@@ -118,9 +118,9 @@ class HeaderReader:
 
     def __init__(self, root, header):
         self.header = header
-        raw = (root / "compiler" / header).read_text()
-        self.lines = raw.split("\n")
-        self.text = PREPROCESSOR.sub(lambda m: re.sub(r"[^\n]", " ", m.group(0)), raw)
+        self.raw = (root / "compiler" / header).read_text()
+        self.lines = self.raw.split("\n")
+        self.text = PREPROCESSOR.sub(lambda m: re.sub(r"[^\n]", " ", m.group(0)), self.raw)
         self.code = without_comments(self.text)
         self.names = []
 
@@ -215,7 +215,7 @@ class HeaderReader:
 
     def name_of(self, bare, begin, owner):
         operator = OPERATOR.search(bare)
-        conversion = None if operator else re.search(r"\boperator\s+([\w:<>&\s*]+?)\s*\(\s*\)", bare)
+        conversion = None if operator else re.search(r"\boperator\s+([\w:<>&,\s*]+?)\s*\(\s*\)", bare)
         using = re.match(r"using\s+(\w+)\s*=|using\s+[\w:]+::(\w+)\s*$|typedef\b.*\b(\w+)\s*$", bare, re.S)
         if using:
             return self.add(next(g for g in using.groups() if g), "type", begin, owner)
@@ -285,11 +285,22 @@ class HeaderReader:
             i -= 1
         return above
 
+    def raw_comment_above(self, at):
+        """The same with the indentation inside of it: loop nests keep their shape."""
+        above, i = [], at - 1
+        while self.is_comment(i):
+            above.insert(0, re.sub(r"^\s*// ?", "", self.lines[i]).rstrip())
+            i -= 1
+        return above
+
     def comment_behind(self, at):
+        return spoken([self.raw_comment_behind(at)])
+
+    def raw_comment_behind(self, at):
         for line in self.lines[at:at + 6]:
             behind = re.search(r"//\s*(.*)", re.sub(r'"(?:\\.|[^"\\])*"', "", line))
             if behind:
-                return spoken([behind.group(1)])
+                return behind.group(1)
             if ";" in line or "{" in line:
                 break
         return ""

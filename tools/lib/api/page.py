@@ -7,6 +7,8 @@ from api.tests import read_tests, tests_of_names, tests_of_rules
 
 OPENING = [
     "# The public names and requirements", "",
+    "The test of every public name and of every requirement that the headers state. Signatures and explanations are in "
+    "the reference of the documentation site, which `tools/docs` builds.", "",
     "Written by `tools/api_table` from the headers' comments, the messages and the tests; `ctest -R api_table` "
     "fails when it is stale, when a name or requirement has no test, when a message breaks a rule that no header "
     "states, or a header states one that no message breaks.", ""]
@@ -50,8 +52,8 @@ class Page:
     def table_of_names(self):
         out = ["## Names", ""]
         for header, names in by_header(self.names):
-            out += [f"### {header}", "", "| name | what | test |", "|---|---|---|"]
-            out += [f"| `{n.full}` | {cell(n.comment)} | {shown(self.test_of_name.get(n))} |" for n in names]
+            out += [f"### {header}", "", "| name | test |", "|---|---|"]
+            out += [f"| `{n.full}` | {shown(self.test_of_name.get(n))} |" for n in names]
             out.append("")
         return out
 
