@@ -1,6 +1,6 @@
-// Generates the part of docs/gpu.md that schedules a convolution: after each directive, the
-// compiler's loops and kernels and the counts of the simulated device. RETROGRADE_UPDATE_GOLDEN=1
-// writes it; read the difference before you commit it.
+// Generates the section of docs/gpu.md that schedules a convolution and compares it with the file: after each
+// directive the loops and kernels as the compiler prints them, and the counts of the simulated device.
+// RETROGRADE_UPDATE_GOLDEN=1 rewrites the section; read the difference before you commit it.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -20,12 +20,12 @@
 namespace retrograde {
 namespace {
 
-// Must be set before the first use of a device.
+// Selects the simulated device before any code asks for a device.
 [[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
 
 constexpr int width = 256, height = 128;
 
-// A fixed target, so that the page is the same on every machine.
+// A fixed capability, not this machine's: the page must be the same everywhere.
 Target with_gpu() {
   return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
 }
@@ -62,38 +62,38 @@ struct Step {
 const std::vector<Step>& steps() {
   static const std::vector<Step> all = {
       STEP((out.gpu_tile(x, y, xi, yi, 32, 8)),
-           "A block for each tile of 32 x 8 points, a thread for each point. What a point needs of "
-           "`sum` is computed by its thread, and stays in its registers."),
+           "One block per tile of 32 x 8 points, one thread per point. Each thread computes the\n"
+           "value of `sum` that its point needs and keeps it in registers."),
       STEP((sum.update().unroll(r.x).unroll(r.y)),
-           "Nine products in a row in place of two loops. A device's memory sees the same."),
-      STEP(
-          (image.compute_at(out, x).gpu_threads(x, y)),
-          "The threads of a block copy the 34 x 10 points that the block needs into shared memory, "
-          "wait for one another, and read them there nine times. A block gets the threads of its "
-          "largest stage; those that are too many for `out` have nothing to do in it."),
-      STEP(
-          (image.reorder_storage(y, x)),
-          "What not to do: columns first, in shared memory. Neighbours in x are 10 words apart, so "
-          "that two of a warp's threads ask the same of its 32 banks, which serve them in turn."),
-      STEP(
-          (image.align_storage(y, 11)),
-          "A column of 11 words: an odd number, so that neighbours of a row no longer ask the same "
-          "bank. What is left is between rows: a row of 34 threads is more than a warp, so that "
-          "warps have threads of two."),
+           "Replaces the two loops over the reduction by nine products in sequence. Device memory\n"
+           "sees the same accesses."),
+      STEP((image.compute_at(out, x).gpu_threads(x, y)),
+           "The threads of a block copy the 34 x 10 points that the block reads into shared\n"
+           "memory, wait at a barrier, and then read each point up to nine times. A block has as\n"
+           "many threads as its largest stage needs; the surplus threads are idle while `out` is\n"
+           "computed."),
+      STEP((image.reorder_storage(y, x)),
+           "A bad choice, for illustration: columns first in shared memory. Neighbours in x are\n"
+           "then 10 words apart, so that pairs of threads of a warp access the same one of 32\n"
+           "banks, which serves them one after the other."),
+      STEP((image.align_storage(y, 11)),
+           "Pads each column to 11 words. The number is odd, so that neighbours in a row no\n"
+           "longer share a bank. The remaining conflicts are between rows: a row has 34 threads,\n"
+           "more than a warp, so that a warp has threads of two rows."),
   };
   return all;
 }
 
-// The program with the first `count` directives.
+// The convolution with the directives of the first `count` steps.
 Convolution scheduled(size_t count) {
   Convolution c;
   for (size_t i = 0; i < count; ++i) steps()[i].give(c);
   return c;
 }
 
-// ---- contents ----
+// ---- the contents of the page ----
 
-// The numbers in names depend on the process.
+// Removes the numbers of generated names, which count up within a process.
 std::string without_numbers(const std::string& text) {
   return std::regex_replace(text, std::regex("\\.?\\$\\d+"), "");
 }
@@ -141,12 +141,12 @@ std::string table(const Counted* before, const Counted& after) {
   text += row(
       "copies to the device", [](const Counted& c) { return c.copies; }, before, after);
   add("threads", &P::threads);
-  add("barriers of blocks", &P::barriers);
-  add("bytes of device memory that threads asked for", &P::global_bytes);
-  add("sectors of 32 bytes that this takes", &P::global_sectors);
-  add("sectors, were each request's bytes dense", &P::ideal_sectors);
-  add("requests of shared memory by warps", &P::shared_requests);
-  add("passes over banks beyond one for each", &P::bank_conflicts);
+  add("block barriers", &P::barriers);
+  add("bytes of device memory accessed by threads", &P::global_bytes);
+  add("32-byte sectors accessed", &P::global_sectors);
+  add("32-byte sectors if the bytes of each request were dense", &P::ideal_sectors);
+  add("shared-memory requests by warps", &P::shared_requests);
+  add("bank conflicts (additional passes)", &P::bank_conflicts);
   return text;
 }
 
@@ -184,10 +184,10 @@ std::string written() {
   out << beginning << "\n```cpp\n"
       << "image(x, y) = in(x, y);\n"
       << "sum(x, y) += image(x + r.x, y + r.y) * weights(r.x, r.y);  // RDom r(0, 3, 0, 3)\n"
-      << "out(x, y) = sum(x, y);\n```\n\nover " << width << " x " << height
-      << " points. Without a directive the host computes it:\n\n```text\n"
+      << "out(x, y) = sum(x, y);\n```\n\nThe output has " << width << " x " << height
+      << " points. Without directives the host computes it:\n\n```text\n"
       << without_numbers(Pipeline(scheduled(0).out).loop_nest(get_host_target()))
-      << "```\n\nThe figures below are those of one run on the simulated device.\n\n";
+      << "```\n\nThe tables count one run on the simulated device.\n\n";
   Counted before, after;
   for (size_t count = 1; count <= steps().size(); ++count) {
     out << section(count, count > 1 ? &before : nullptr, after);

@@ -1,4 +1,4 @@
-// Compiling a pipeline to a library, without running it: ahead_of_time_use.cpp calls it.
+// Compiles pipelines to libraries without running them. ahead_of_time_use.cpp calls the libraries.
 #include "Halide.h"
 
 #include <cstdio>
@@ -10,7 +10,7 @@ int main(int argc, char** argv) {
   const std::string folder = argc > 1 ? argv[1] : ".";
   Var x("x"), y("y");
 
-  // What the function will take: an image, two scalars, in the order of the list below.
+  // The arguments of the function, in the order of the list below: an image and two scalars.
   ImageParam input(UInt(8), 2, "input");
   Param<uint8_t> offset("offset");
   Param<float> strength("strength");
@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
   sharp.compile_to_static_library(folder + "/sharpen", {input, offset, strength}, "sharpen");
   printf("sharpen takes an image and two scalars, and gives an image\n");
 
-  // Several outputs are several buffers behind the inputs.
+  // Several outputs become several buffer arguments after the inputs.
   Func low("low"), high("high");
   low(x, y) = min(input(x, y), offset);
   high(x, y) = max(input(x, y), offset);

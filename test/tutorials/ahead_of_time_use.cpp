@@ -1,5 +1,5 @@
-// Calls what ahead_of_time.cpp compiled. Nothing of a compiler is needed here: the header that was
-// written, and the header of buffers.
+// Calls the libraries of ahead_of_time.cpp. The program contains no compiler; it includes the
+// generated header and the header of buffers.
 #include "sharpen.h"
 #include "split_range.h"
 
@@ -26,7 +26,7 @@ int main() {
   printf("sharpen returned %d: %d %d %d, sum %ld\n", code, output(0, 0), output(100, 50),
          output(199, 99), sum);
 
-  // Any part of it, wherever its buffer stands.
+  // Any region of the output, at any coordinates.
   Buffer<uint8_t> corner(16, 8);
   corner.set_min(180, 90);
   code = sharpen(input, 3, 0.75f, corner);
@@ -37,7 +37,7 @@ int main() {
   printf("split_range returned %d: %d %d, %d %d\n", code, low(3, 4), high(3, 4), low(60, 9),
          high(60, 9));
 
-  // Through an array of pointers.
+  // The same call through an array of pointers.
   uint8_t offset = 3;
   float strength = 0.75f;
   Buffer<uint8_t> again(200, 100);
@@ -47,7 +47,7 @@ int main() {
   again.for_each_element([&](int x, int y) { differences += again(x, y) != output(x, y); });
   printf("sharpen_argv returned %d: %d differences\n", code, differences);
 
-  // What it takes is data too.
+  // Metadata describes the arguments.
   const halide_filter_metadata_t* metadata = sharpen_metadata();
   printf("%s:", metadata->name);
   for (int i = 0; i < metadata->num_arguments; i++) {
@@ -64,7 +64,7 @@ int main() {
   printf("too small: code %d, %d error, message %s\n", code, errors,
          last_error[0] ? "given" : "missing");
 
-  // A buffer without memory asks what is needed.
+  // A buffer without memory is a bounds query: the call returns the required regions.
   Buffer<uint8_t> query(nullptr, 0, 0);
   code = split_range(query, 100, low, high);
   printf("query returned %d: %d x %d\n", code, query.width(), query.height());

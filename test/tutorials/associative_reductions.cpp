@@ -1,4 +1,4 @@
-// Reductions in parallel and in vectors: rfactor makes partial results of an associative update.
+// Parallel and vectorized reductions: rfactor splits an associative update into partial results.
 #include "Halide.h"
 
 #include <cstdio>
@@ -12,12 +12,12 @@ int main() {
       [&](int i, int j) { image(i, j) = (uint8_t)((i * 7 + j * 11 + i * j) % 32); });
 
   {
-    // A histogram as it is written: one serial loop.
+    // A histogram as written: one serial loop.
     Func serial("serial");
     RDom r(image);
     serial(x) = 0;
     serial(image(r.x, r.y)) += 1;
-    // The same with a partial histogram for each row, all rows in parallel.
+    // The same histogram from one partial histogram per row, with all rows in parallel.
     Func rows("rows");
     RDom s(image);
     rows(x) = 0;
@@ -43,7 +43,8 @@ int main() {
     printf("sum: %d\n", out());
   }
   {
-    // Tuples too, when all their values together are associative: the darkest value and its place.
+    // Tuples work if all their values together are associative: here the darkest value and its
+    // position.
     Func best("best");
     RDom r(0, 96, 0, 64);
     Expr value = (r.x * 37 + r.y * 53) % 101 + cast<int>(image(r.x, r.y)) + 1;

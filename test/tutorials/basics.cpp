@@ -6,13 +6,13 @@
 using namespace Halide;
 
 int main() {
-  // A Func maps points to values. Nothing is computed here: the definition is data.
+  // A Func maps points to values. A definition is data: it computes nothing.
   Func checker("checker");
   Var column("column"), row("row");
   Expr square = (column / 8 + row / 8) % 2;
   checker(column, row) = select(square == 0, 40, 200) + column;
 
-  // Realizing it computes every point of a rectangle that starts at the origin.
+  // realize() computes every point of a rectangle that starts at the origin.
   Buffer<int32_t> board = checker.realize({32, 16});
   printf("%d x %d x %d, %d dimensions\n", board.width(), board.height(), board.channels(),
          board.dimensions());
@@ -21,7 +21,7 @@ int main() {
     printf("\n");
   }
 
-  // The same Func serves any size, and more than one definition of other Funcs.
+  // The same Func can be realized at any size, and several other Funcs can read it.
   Func inverted;
   inverted(column, row) = 255 - checker(column, row);
   Buffer<int32_t> small = inverted.realize({4, 2});
@@ -33,7 +33,7 @@ int main() {
   Buffer<double> value = answer.realize();
   printf("answer: %g\n", value());
 
-  // What is known of it.
+  // Properties of a Func.
   printf("%s: %d arguments, first \"%s\", defined: %d\n", checker.name().c_str(),
          checker.dimensions(), checker.args()[0].name().c_str(), (int)checker.defined());
   return 0;

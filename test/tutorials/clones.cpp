@@ -15,7 +15,7 @@ int count(JITUserContext*, const halide_trace_event_t* event) {
 int main() {
   Var x("x"), y("y");
   {
-    // f is inlined into h, and its copy is computed at root for g.
+    // f is inlined into h; its clone is computed at root for g.
     Func f("f"), g("g"), h("h"), both("both");
     f(x, y) = x * 3 + y;
     g(x, y) = f(x, y) + f(x - 1, y) + f(x, y - 1);
@@ -30,7 +30,7 @@ int main() {
     printf("%d stores into the copy, %d %d\n", stores, out(0, 0), out(9, 6));
   }
   {
-    // A copy of a Func with an update, for several consumers.
+    // A clone of a Func with an update, for several consumers.
     Func f("f"), a("a"), b("b"), c("c"), sum("sum");
     RDom r(0, 5);
     f(x) = x;

@@ -1,4 +1,4 @@
-// Machine code for other machines, from this one.
+// Cross-compilation: machine code for other targets.
 #include "Halide.h"
 
 #include <cstdio>
@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
     const std::string file = folder + "/mask_for_" + name;
     mask.compile_to_file(file, args, "mask_between", target);
 
-    // The object says which machine it is for: bytes 18 and 19 of an ELF file.
+    // Bytes 18 and 19 of an ELF file name its machine.
     unsigned char header[32] = {};
     FILE* object = fopen((file + ".o").c_str(), "rb");
     size_t size = object ? fread(header, 1, sizeof header, object) : 0;
@@ -33,7 +33,7 @@ int main(int argc, char** argv) {
            target.to_string().c_str());
   }
 
-  // Targets are values: features can be asked for and set.
+  // Targets are values whose features can be queried and set.
   Target t;
   t.os = Target::Linux;
   t.arch = Target::ARM;

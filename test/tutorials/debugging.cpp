@@ -1,4 +1,4 @@
-// Looking into a pipeline: print, print_when, traces of stores, loop nests, lowered statements.
+// Debugging a pipeline: print, print_when, traces of stores, loop nests, lowered statements.
 #include "Halide.h"
 
 #include <cstdio>
@@ -12,25 +12,25 @@ int main(int argc, char** argv) {
   Var x("x"), y("y");
 
   {
-    // print() gives its first argument, and shows all of them each time it is evaluated.
+    // print() returns its first argument, and prints all arguments each time it is evaluated.
     Func squares("squares");
     squares(x) = print(x * x, "is the square of", x);
     squares.realize({4});
   }
   {
-    // print_when() shows them where a condition holds.
+    // print_when() prints only where a condition holds.
     Func product("product");
     product(x, y) = print_when(x == 3 && y > 1, x * y, "<- product at", x, y);
     product.realize({5, 4});
   }
   {
-    // print of values of other types.
+    // print() of other types.
     Func mixed("mixed");
     mixed(x) = print(cast<float>(x) / 4, cast<uint8_t>(x + 250), cast<double>(x) / 8, x == 2);
     mixed.realize({3});
   }
   {
-    // A trace tells of every value that is stored.
+    // A trace reports every stored value.
     Func traced("traced");
     traced(x, y) = x + 10 * y;
     traced.trace_stores();
@@ -45,7 +45,7 @@ int main(int argc, char** argv) {
     producer.compute_root().parallel(y);
     consumer.print_loop_nest();
 
-    // Splits, what slides, and where it is stored.
+    // The loops after splits and compute_at.
     Func rows("rows"), stencil("stencil");
     Var xo("xo"), xi("xi");
     rows(x, y) = x - y;
@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
     stencil.print_loop_nest();
   }
   {
-    // What remains of it before machine code is made, as text and as a page.
+    // The lowered statement, just before code generation, as text and as HTML.
     Func lowered("lowered");
     lowered(x, y) = x + y;
     lowered.vectorize(x, 8).parallel(y);
@@ -71,7 +71,7 @@ int main(int argc, char** argv) {
     }
   }
   {
-    // An expression can be shown without being run.
+    // An expression can be inspected without running it.
     Expr e = (x + 3) * y;
     printf("its type has %d bits\n", e.type().bits());
   }

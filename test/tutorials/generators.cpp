@@ -1,5 +1,5 @@
-// Generators: pipelines as classes, with params that a build file sets. Their program is linked
-// with the main() that comes with the compiler; generators_use.cpp calls what it makes.
+// Generators: pipelines as classes, with params that a build file sets. The program is linked with
+// the main() that comes with the compiler. generators_use.cpp calls the libraries that it writes.
 #include "Halide.h"
 
 namespace {

@@ -1,4 +1,4 @@
-// Generators used in the program that they stand in: created, given params and inputs, run.
+// Generators used in the same program: created, configured, given inputs, run.
 #include "Halide.h"
 
 #include <cstdio>
@@ -38,7 +38,7 @@ int main() {
   Func source("source");
   source(x, y) = x + y * 3;
 
-  // One after the other.
+  // One generator reads the result of another.
   auto scale = context.create<Scale>();
   scale->factor.set(5);
   scale->apply(source);
@@ -53,7 +53,7 @@ int main() {
     printf("\n");
   }
 
-  // Its output is a Func that others may use.
+  // The output of a generator is a Func that other Funcs can read.
   auto twice = context.apply<Scale>(source);
   Func combined("combined");
   combined(x, y) = twice->output(x, y) + source(x, y);

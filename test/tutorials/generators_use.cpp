@@ -1,4 +1,5 @@
-// Calls the functions that generators.cpp made: one generator with two sets of params, another one.
+// Calls the functions compiled by generators.cpp: one generator with two sets of params, and a
+// second generator.
 #include "blend.h"
 #include "mean_3x3.h"
 #include "mean_5x5_zero.h"

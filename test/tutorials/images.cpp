@@ -1,4 +1,4 @@
-// Images: made in memory, read and written as files, brightened with a Param.
+// Images: created in memory, read from and written to files, brightened with a Param.
 #include "Halide.h"
 #include "halide_image_io.h"
 
@@ -21,7 +21,7 @@ int main(int argc, char** argv) {
       [&](int x, int y, int c) { drawn(x, y, c) = (uint8_t)(x * 4 + y * 3 * (c + 1)); });
   Halide::Tools::save_image(drawn, folder + "/drawn.ppm");
 
-  // What comes back has the same pixels.
+  // The file contains the same pixels.
   Buffer<uint8_t> loaded = Halide::Tools::load_image(folder + "/drawn.ppm");
   int differences = 0;
   loaded.for_each_element([&](int x, int y, int c) {

@@ -1,5 +1,5 @@
-// What a pipeline that runs in this process calls: handlers for printing, errors, memory, parallel
-// loops, and a context that they get.
+// Handlers of JIT-compiled pipelines: printing, errors, memory, parallel loops, and the context
+// that they receive.
 #include "Halide.h"
 
 #include <atomic>
@@ -62,7 +62,7 @@ int main() {
     printf("%d, tasks %d\n", out(9, 6), (int)tasks);
   }
   {
-    // With a handler, an error is told there, and nothing is thrown.
+    // An error handler receives errors; nothing is thrown.
     ImageParam input(Int(32), 1, "input");
     Func f("f");
     f(x) = input(x + 5);
@@ -74,7 +74,7 @@ int main() {
     printf("the error names the input: %d\n", (int)(error_text.find("input") != std::string::npos));
   }
   {
-    // Without one, it is an exception.
+    // Without an error handler, errors are exceptions.
     Param<int> divisor("divisor");
     divisor.set_range(1, 10);
     divisor.set(11);
@@ -89,7 +89,7 @@ int main() {
     printf("exceptions: %d\n", (int)exceptions_enabled());
   }
   {
-    // What is wrong with a definition is found before anything runs.
+    // Errors in a definition are found before anything runs.
     Func f("f");
     Var z("z");
     try {

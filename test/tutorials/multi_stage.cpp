@@ -1,4 +1,5 @@
-// Pipelines of several stages: where producers are computed, and how often.
+// Pipelines of several stages: compute and storage levels of producers, and how often each value is
+// computed.
 #include "Halide.h"
 
 #include <cstdio>
@@ -32,19 +33,20 @@ void run(const char* title, const std::function<void(Func, Func, Var, Var)>& sch
 
 int main() {
   Var xo("xo"), yo("yo"), xi("xi"), yi("yi");
-  // Substituted into its consumer: never stored.
+  // Inlined into its consumer: never stored.
   run("inline", [](Func, Func, Var, Var) {});
-  // All of it first: 17 x 13 points.
+  // At root: all 17 x 13 points first.
   run("root", [](Func wave, Func, Var, Var) { wave.compute_root(); });
-  // As much as one row of the consumer needs: two rows, for each of 12.
+  // In each of the consumer's 12 rows: the two rows that it reads.
   run("at y", [](Func wave, Func edges, Var, Var y) { wave.compute_at(edges, y); });
-  // Stored for all rows and computed as needed: what the row before needed is still there.
+  // Stored at root and computed per row: values of the previous row are still available (sliding
+  // window).
   run("at y, stored at root",
       [](Func wave, Func edges, Var, Var y) { wave.store_root().compute_at(edges, y); });
   run("at x", [](Func wave, Func edges, Var x, Var) { wave.compute_at(edges, x); });
   run("at x, stored at y",
       [](Func wave, Func edges, Var x, Var y) { wave.store_at(edges, y).compute_at(edges, x); });
-  // A tile at a time.
+  // One tile at a time.
   run("tiled", [&](Func wave, Func edges, Var x, Var y) {
     edges.tile(x, y, xo, yo, xi, yi, 8, 4);
     wave.compute_at(edges, xo);
@@ -54,7 +56,7 @@ int main() {
     wave.compute_at(edges, xo);
   });
 
-  // A blur with its input clamped to the image.
+  // A blur whose input is clamped to the image.
   Buffer<uint16_t> image(20, 10);
   image.for_each_element([&](int i, int j) { image(i, j) = (uint16_t)((i * 31 + j * 17) % 255); });
   Var x("x"), y("y");

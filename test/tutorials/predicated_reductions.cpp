@@ -1,4 +1,4 @@
-// Reduction domains that are not boxes.
+// Predicated reductions: reduction domains that are not boxes.
 #include "Halide.h"
 
 #include <cstdio>
@@ -25,7 +25,7 @@ int main() {
     show(Buffer<int>(disk.realize({9, 7})));
   }
   {
-    // A triangle: two conditions, both must hold.
+    // A triangle: two conditions that must both hold.
     Func triangle("triangle");
     RDom r(0, 8, 0, 8);
     r.where(r.x <= r.y);
@@ -51,7 +51,7 @@ int main() {
     printf("%d bright pixels, sum %d\n", count(), sum());
   }
   {
-    // The condition may depend on where one stands, and the update may still be scheduled.
+    // The condition may depend on pure variables, and the update can still be scheduled.
     Func prefix("prefix");
     RDom r(0, 32);
     r.where(r < x * 3);

@@ -1,5 +1,4 @@
-// One Func, many orders: what each directive does to the loops, seen by recording the order in
-// which points are stored.
+// Loop directives: the effect of each on the order of stores, recorded by a trace.
 #include "Halide.h"
 
 #include <cstdio>
@@ -51,14 +50,14 @@ int main() {
   show("vectorize", [&](Func f, Var x, Var) { f.split(x, xo, xi, 2).vectorize(xi); });
   show("unroll", [&](Func f, Var x, Var) { f.split(x, xo, xi, 2).unroll(xi); });
   show("columns", [&](Func f, Var x, Var y) { f.split(y, yo, yi, 2).reorder(yi, x, yo); });
-  // 6 is no multiple of 4: the last block moves inwards and computes two points again.
+  // 4 does not divide 6: the last block shifts inwards and recomputes two points.
   show("inwards", [&](Func f, Var x, Var) { f.split(x, xo, xi, 4); });
   show("guarded", [&](Func f, Var x, Var) { f.split(x, xo, xi, 4, TailStrategy::GuardWithIf); });
   show("nested", [&](Func f, Var x, Var y) {
     f.tile(x, y, xo, yo, xi, yi, 2, 2).fuse(xo, yo, tile).unroll(yi);
   });
 
-  // In parallel the order is nobody's business, only the result.
+  // The order of a parallel loop is unspecified, so only the result is shown.
   Func g("g");
   Var x("x"), y("y");
   g(x, y) = x * 100 + y;

@@ -1,4 +1,4 @@
-// Regions that do not begin at the origin.
+// Regions that do not start at the origin.
 #include "Halide.h"
 
 #include <cstdio>
@@ -10,7 +10,7 @@ int main() {
   Var x("x"), y("y");
   distance(x, y) = abs(x) + abs(y);
 
-  // A Buffer has a min in each dimension; it is computed where it stands.
+  // A Buffer has a min in each dimension; realize() computes the region that the Buffer covers.
   Buffer<uint32_t> around(7, 5);
   around.set_min(-3, -2);
   distance.realize(around);
@@ -19,7 +19,7 @@ int main() {
     printf("\n");
   }
 
-  // Moving it is renaming its points.
+  // Translating a Buffer renames its coordinates and moves no data.
   Buffer<uint32_t> elsewhere(4, 3);
   elsewhere.set_min(100, 50);
   distance.realize(elsewhere);
@@ -30,7 +30,7 @@ int main() {
   printf("moved: dim 0 is [%d, %d], at its corner %d\n", elsewhere.dim(0).min(),
          elsewhere.dim(0).max(), (int)elsewhere(0, 0));
 
-  // An input may be read at any place that it covers.
+  // An input can be read at any coordinate that it covers.
   Buffer<uint8_t> samples(10);
   samples.set_min(-4);
   for (int i = -4; i < 6; i++) samples(i) = (uint8_t)(i + 4);
@@ -42,7 +42,7 @@ int main() {
   for (int i = -4; i < 5; i++) printf("%d ", window(i));
   printf("\n");
 
-  // What a Func needs of its input follows from what is asked of it.
+  // Bounds inference: the required region of an input follows from the region of the output.
   ImageParam input(UInt(8), 2, "input");
   Func shifted("shifted");
   shifted(x, y) = input(x - 2, y + 3) + input(x + 1, y);

@@ -1,11 +1,11 @@
-// Several values at each point.
+// Tuples: several values per point.
 #include "Halide.h"
 
 #include <cstdio>
 
 using namespace Halide;
 
-// A fraction as a Tuple of two integers, with arithmetic of its own.
+// A fraction as a Tuple of two integers, with its own arithmetic.
 struct Fraction {
   Expr over, under;
   Fraction(Expr numerator, Expr denominator) : over(numerator), under(denominator) {}
@@ -30,14 +30,14 @@ int main() {
     Buffer<float> sines = r[1];
     printf("%d buffers: %d %.4f\n", (int)r.size(), sums(3, 2), sines(3, 2));
 
-    // One of its values, in another definition.
+    // Another definition can read a single value of the Tuple.
     Func scaled("scaled");
     scaled(x, y) = both(x, y)[1] * both(x, y)[0];
     Buffer<float> out = scaled.realize({4, 3});
     printf("%.4f\n", out(2, 1));
   }
   {
-    // Into buffers of one's own.
+    // Results written to existing Buffers.
     Func pair("pair");
     pair(x) = {x * 2, cast<uint8_t>(x + 1)};
     Buffer<int> first(5);
@@ -46,7 +46,7 @@ int main() {
     printf("%d %d, outputs %d\n", first(4), second(4), pair.outputs());
   }
   {
-    // The place of the largest value, by hand and by name.
+    // The position of the largest value: by hand and with argmax.
     Func source("source"), largest("largest");
     source(x) = (x * 29) % 97;
     RDom r(1, 63);
@@ -61,7 +61,7 @@ int main() {
     printf(", by name %d at %d\n", named_value, named_place);
   }
   {
-    // A type of one's own: the golden ratio by its continued fraction 1 + 1 / (1 + 1 / (1 + ...)).
+    // A user-defined type: the golden ratio by its continued fraction 1 + 1 / (1 + 1 / (1 + ...)).
     Func convergent("convergent");
     RDom next(1, 11);
     convergent(x) = Fraction(1, 1);
@@ -70,7 +70,7 @@ int main() {
     Buffer<int> over = found[0], under = found[1];
     for (int i = 0; i < 12; i++) printf("%d/%d ", over(i), under(i));
 
-    // Which is the first above 1.6 and below 1.62?
+    // The first convergent above 1.6 and below 1.62.
     RDom all(0, 12);
     Fraction candidate = convergent(all);
     Expr is_near = Fraction(8, 5) < candidate && candidate < Fraction(81, 50);
@@ -78,7 +78,7 @@ int main() {
     printf("- number %d\n", evaluate<int>(argmax(cast<int>(is_near))[0]));
   }
   {
-    // Euclid's algorithm: pairs (a, b) become (b, a % b) until b is 0. How many steps that takes.
+    // Euclid's algorithm: pairs (a, b) become (b, a % b) until b is 0. The program counts the steps.
     Func pair("pair"), steps("steps");
     Var step("step");
     RDom later(1, 7);

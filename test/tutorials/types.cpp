@@ -1,4 +1,4 @@
-// The types of expressions, and how they meet.
+// Types of expressions and their promotion rules.
 #include "Halide.h"
 
 #include <cstdio>
@@ -23,7 +23,7 @@ int main() {
   printf("type_of: %s %s %s\n", name(type_of<uint16_t>()).c_str(), name(type_of<double>()).c_str(),
          name(type_of<bool>()).c_str());
 
-  // Where two types meet: the wider one, floats before integers, signed before unsigned.
+  // The type of a + b: floats win over integers, wider types over narrower, signed over unsigned.
   const Type types[] = {UInt(8), Int(8), UInt(32), Int(16), Float(32), Float(64)};
   for (Type a : types) {
     for (Type b : types) printf(" %-8s", name((as(a) + as(b)).type()).c_str());
@@ -54,7 +54,7 @@ int main() {
   for (int i = 0; i < 11; i++) printf("%d:%d:%d ", d(i), m(i), t(i));
   printf("\n");
 
-  // One function for every type: a product that fits, of integers in twice their bits.
+  // One function for every type: a product that cannot overflow, as integers get twice their bits.
   auto product = [](Expr a, Expr b) {
     const Type type = a.type(), fits = type.is_float() ? type : type.with_bits(2 * type.bits());
     return cast(fits, a) * cast(fits, b);
@@ -64,7 +64,7 @@ int main() {
          evaluate<int32_t>(product(cast<int16_t>(-32768), cast<int16_t>(-3))),
          evaluate<double>(product(Expr(0.25), Expr(3.0))), name(product(low, low).type()).c_str());
 
-  // Bits as they are.
+  // Reinterpreting bits.
   printf("bits of 1.0f: %x, and back %g\n", evaluate<uint32_t>(reinterpret<uint32_t>(Expr(1.0f))),
          evaluate<float>(reinterpret<float>(Expr((uint32_t)0x40490fdb))));
   return 0;

@@ -1,4 +1,4 @@
-// Defining a Func in several steps: updates, reduction domains, histograms, scans, inline sums.
+// Update definitions: reduction domains, histograms, scans, inline reductions.
 #include "Halide.h"
 
 #include <cstdio>
@@ -17,7 +17,7 @@ void show(const char* title, const Buffer<T>& values) {
 int main() {
   Var x("x"), y("y");
   {
-    // Later definitions change points of earlier ones.
+    // Update definitions change points of earlier definitions.
     Func f("f");
     f(x) = x;
     f(3) = 100;
@@ -27,7 +27,7 @@ int main() {
     printf("%d updates\n", f.num_update_definitions());
   }
   {
-    // A reduction domain is a loop: here, powers of two.
+    // A reduction domain is a loop, here over powers of two.
     Func powers("powers");
     RDom r(1, 9);
     powers(x) = 1;
@@ -35,7 +35,7 @@ int main() {
     show("powers", Buffer<int>(powers.realize({10})));
   }
   {
-    // Scatter: a histogram, and its running sum.
+    // A scatter (a histogram) and a scan (its running sum).
     Buffer<uint8_t> image(40, 30);
     image.for_each_element([&](int i, int j) { image(i, j) = (uint8_t)((i * j + i) % 8); });
     Func histogram("histogram"), cumulative("cumulative");
@@ -50,7 +50,7 @@ int main() {
     show("cumulative", Buffer<int>(cumulative.realize({8})));
   }
   {
-    // Two dimensions of reduction, and a schedule for the update alone.
+    // A two-dimensional reduction, with a schedule for the update only.
     Func table("table");
     RDom r(0, 4, 0, 3);
     table(x, y) = 0;
@@ -61,7 +61,7 @@ int main() {
     printf("table        %d %d %d\n", out(0, 0), out(7, 0), out(7, 5));
   }
   {
-    // Sums and extremes inside an expression.
+    // Inline reductions: sums and extrema inside an expression.
     Func source("source"), stats("stats");
     source(x) = (x * 37) % 16;
     RDom r(0, 16);
@@ -70,7 +70,7 @@ int main() {
     show("stats", Buffer<int>(stats.realize({4})));
   }
   {
-    // Exponential smoothing runs along rows; rows are independent.
+    // Exponential smoothing is a scan along rows; rows are independent and run in parallel.
     Func smooth("smooth");
     RDom r(1, 7);
     smooth(x, y) = cast<float>((x * 5 + y) % 4);

@@ -1,4 +1,4 @@
-// Func::in: another Func between a producer and its consumers, with a schedule of its own.
+// Func::in: a wrapper between a producer and its consumers, with its own schedule.
 #include "Halide.h"
 
 #include <cstdio>
@@ -22,7 +22,7 @@ int checksum(const Buffer<int>& image) {
 int main() {
   Var x("x"), y("y"), xo("xo"), yo("yo"), xi("xi"), yi("yi");
   {
-    // One consumer reads the wrapper; the other still reads f.
+    // One consumer reads the wrapper; the other reads f.
     Func f("f"), g("g"), h("h"), both("both");
     f(x, y) = x * y + x;
     g(x, y) = f(x, y) + f(x + 1, y);
@@ -56,7 +56,7 @@ int main() {
     printf("all consumers: %d stores into the wrapper, checksum %d\n", stores, checksum(out));
   }
   {
-    // A tile of the input is copied to a place of its own before it is used.
+    // Staging: each tile of the input is copied to local storage before it is used.
     Buffer<int> image(40, 30);
     image.for_each_element([&](int i, int j) { image(i, j) = (i * 3 + j * 5) % 17; });
     ImageParam input(Int(32), 2, "input");
@@ -70,7 +70,7 @@ int main() {
     printf("staged tiles: checksum %d\n", checksum(out));
   }
   {
-    // The output itself: a reduction into registers, stored once.
+    // A wrapper of the output: the reduction stays in registers and is stored once.
     Func product("product");
     RDom k(0, 12);
     product(x, y) = 0;

@@ -1,7 +1,7 @@
-// Checking a gradient, and reading what it says of itself.
+// Checking and explaining gradients.
 //
-// check_gradients compares adjoints with differences, the complex step and tangents, in double.
-// explanations() says how each adjoint is made, what is kept, and why a gradient is zero.
+// check_gradients compares adjoints with finite differences, the complex step and tangents, in double.
+// explanations() reports how each adjoint is computed, what is stored, and why a gradient is zero.
 #include <retrograde/retrograde.h>
 
 #include <algorithm>
@@ -29,8 +29,7 @@ int main(int argc, char** argv) {
   loss() = 0.0f;
   loss() += pow(model(r), 2);
 
-  // ---- Is it right? Differences of a function with steps say nothing at the steps, so the step is left
-  // out of what is checked. ----
+  // ---- Is it right? Finite differences fail at steps, so the step function is left out of the check. ----
   Func smooth("smooth"), smooth_loss("smooth_loss");
   smooth(x) = tanh(a(x) * a(x + 1)) * looked_up(x);
   smooth_loss() = 0.0f;
@@ -38,12 +37,14 @@ int main(int argc, char** argv) {
   GradientReport report = check_gradients(smooth_loss);
   claim(report.worst_error < 1e-8, "adjoints in double agree with differences to eight digits");
   for (const GradientReport::Input& input : report.inputs)
-    claim(input.dot_product_error < 1e-12, "and with tangents to twelve: " + input.name);
-  claim(report.complex_step_refused.empty(), "the complex step, exact to rounding, was possible");
+    claim(input.dot_product_error < 1e-12, "and with tangents to twelve digits: " + input.name);
+  claim(report.complex_step_refused.empty(),
+        "the complex step, exact up to rounding, was possible");
   for (const GradientReport::Input& input : report.inputs)
-    claim(input.own_precision_error < 1e-4, "in float32, as it will run, four digits are right");
+    claim(input.own_precision_error < 1e-4,
+          "in float32, as the program runs, four digits are correct");
 
-  // ---- Would it have been noticed if it were wrong? A rule that forgets a factor of two. ----
+  // ---- Would an error be noticed? This rule omits a factor of two. ----
   Func wrong("wrong"), wrong_loss("wrong_loss");
   wrong(x) = a(x) * a(x);
   custom_adjoint(wrong, {a}, [a](const AdjointContext& context) {
@@ -56,9 +57,10 @@ int main(int argc, char** argv) {
   wrong_loss() += wrong(r);
   GradientCheckOptions quick;
   quick.directions = 1;
-  claim(check_gradients(wrong_loss, {}, quick).worst_error > 0.1, "a wrong rule is found");
+  claim(check_gradients(wrong_loss, {}, quick).worst_error > 0.1,
+        "check_gradients finds the wrong rule");
 
-  // ---- What does it say of itself? ----
+  // ---- Explanations of the gradient. ----
   Derivative d = propagate_adjoints(loss);
   std::printf("\nIn short:\n%s\n", d.explain().c_str());
   std::printf("Fact by fact:\n%s\n", d.explain(Detail::All).c_str());
@@ -70,25 +72,25 @@ int main(int argc, char** argv) {
   };
   claim(says(Explanation::Kind::Built, a.name()), "built: the gradient by a is a gather");
   claim(says(Explanation::Kind::Scattered, table.name()),
-        "scattered: data decide where the table is read, so its gradient is a scatter");
+        "scattered: the table is read at data-dependent indices, so its gradient is a scatter");
   Derivative by_places = propagate_adjoints(loss);
-  by_places(places);  // of integers: asked for all the same
+  by_places(places);  // integers have no derivative; requested on purpose
   bool zero = false;
   for (const Explanation& fact : by_places.explanations())
     zero = zero || fact.kind == Explanation::Kind::Zero;
-  claim(zero, "zero: what has no slope is told, with the reason");
+  claim(zero, "zero: the gradient by integers is zero, and the reason is reported");
 
-  // ---- And what does it cost? ----
+  // ---- The cost of the gradient. ----
   const GradientOperations operations = d.operations();
   claim(operations.ratio() && *operations.ratio() < 6,
-        "all slopes together take a few times the operations of the program");
+        "the whole gradient takes at most six times the operations of the program");
 
   std::vector<double> central, richardson;
   for (const GradientReport::Step& step : report.inputs.front().steps) {
     central.push_back(std::log10(std::max(step.central_error, 1e-16)));
     richardson.push_back(std::log10(std::max(step.richardson_error, 1e-16)));
   }
-  Picture picture("Checking: log10 of the error of differences, for smaller and smaller steps");
+  Picture picture("Checking: log10 of the error of finite differences, for decreasing steps");
   picture.curve("central differences", central, -16, 0);
   picture.curve("extrapolated", richardson, -16, 0);
   picture.write(argc, argv, "checking_and_explaining");

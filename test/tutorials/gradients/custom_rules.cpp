@@ -1,7 +1,8 @@
-// Rules of your own.
+// User-defined derivatives.
 //
-// A derivative that is right may still be of no use: that of a step is 0. custom_adjoint says how adjoints
-// pass a Func, whatever its definition is; straight_through does the common case in one expression.
+// A correct derivative may still be useless: the derivative of a step function is 0. custom_adjoint defines
+// how adjoints pass through a Func, whatever its definition is. straight_through covers the common case in
+// one expression.
 #include <retrograde/retrograde.h>
 
 #include <cmath>
@@ -13,8 +14,8 @@ using namespace retrograde;
 const int n = 32;
 
 int main(int argc, char** argv) {
-  // A signal that is stored with levels of a quarter, after a gain. Which gain and offset come closest to
-  // what is wanted after storing?
+  // A signal gets a gain and an offset and is stored in steps of a quarter. Which gain and offset bring the
+  // stored signal closest to `wanted`?
   Buffer<float> signal(n), wanted(n);
   for (int i = 0; i < n; ++i) {
     signal(i) = std::sin(0.4f * static_cast<float>(i));
@@ -30,18 +31,18 @@ int main(int argc, char** argv) {
   loss() = 0.0f;
   loss() += pow(stored(r) - wanted(r), 2) / n;
 
-  // ---- Without a rule: zero, and the reason is told. ----
+  // ---- Without a rule the gradient is zero, and the reason is reported. ----
   Derivative flat = propagate_adjoints(loss);
   auto value_of = [](Func f) { return Buffer<float>(f.realize())(); };
   claim(value_of(flat(gain)) == 0.0f && value_of(flat(offset)) == 0.0f,
-        "rounding has the derivative 0, and so has all before it");
+        "rounding has derivative 0, and so do its inputs");
   bool told = false;
   for (const Explanation& fact : flat.explanations())
     told = told || (fact.kind == Explanation::Kind::Zero && fact.detail.find("round") != std::string::npos);
-  claim(told, "explanations() says that it is round that stops the gradient");
+  claim(told, "explanations() names round as the reason");
 
-  // ---- A rule: what reaches `stored` passes on to `scaled` as if nothing had been rounded. A rule gives
-  // an adjoint, over the whole input, for each input that it is made for. ----
+  // ---- A rule: the adjoint of `stored` passes on to `scaled` unchanged, as if nothing had been rounded. A
+  // rule returns an adjoint, over the whole input, for each input that it covers. ----
   custom_adjoint(stored, {scaled}, [scaled](const AdjointContext& context) {
     Func passed("passed");
     Var i("i");
@@ -61,7 +62,7 @@ int main(int argc, char** argv) {
               losses.front());
   claim(losses.back() < 0.1 * losses.front(), "with the rule, gain and offset are learned through the rounding");
 
-  // ---- The same without a Func of its own: one value with another's derivative. ----
+  // ---- The same without a separate Func: one expression's value with another's derivative. ----
   Func inside("inside"), other("other");
   inside(x) = straight_through(round(4.0f * scaled(x)) / 4.0f, scaled(x));
   other() = 0.0f;
@@ -71,7 +72,7 @@ int main(int argc, char** argv) {
             std::abs(value_of(e(offset)) - value_of(by_offset)) < 1e-5f,
         "straight_through gives the same gradient");
 
-  // ---- Nothing is dropped: what a rule does not speak of, and somebody asks for, is an error. ----
+  // ---- Nothing is dropped silently: a requested gradient that the rule does not cover is an error. ----
   Func mixed("mixed"), sum("sum");
   mixed(x) = scaled(x) * wanted(x);
   sum() = 0.0f;
@@ -89,9 +90,9 @@ int main(int argc, char** argv) {
     refusal = error.what();
   }
   std::printf("\n%s\n\n", refusal.c_str());
-  claim(refusal.find("mixed") != std::string::npos, "an input that a rule forgets is an error");
+  claim(refusal.find("mixed") != std::string::npos, "a requested input that the rule does not cover is an error");
 
-  Picture picture("Rules of your own: the loss, learned through rounding");
+  Picture picture("User-defined derivatives: the loss, learned through rounding");
   picture.curve("", losses, 0, losses.front());
   picture.write(argc, argv, "custom_rules");
 }

@@ -1,7 +1,8 @@
 // Forward mode and Hessians.
 //
-// propagate_tangents asks the other question: the inputs move like this, how does everything move? A
-// tangent of a gradient is a product with the Hessian; a few of them are all of it.
+// propagate_tangents answers the question that reverse mode does not: if the inputs move in this direction,
+// how do all values move? The tangent of a gradient is a product with the Hessian, and a few such products
+// give the whole Hessian.
 #include <retrograde/retrograde.h>
 
 #include <cmath>
@@ -21,7 +22,7 @@ double dot(const Vector& a, const Vector& b) {
 
 Vector values(const Buffer<float>& b) { return {b.begin(), b.end()}; }
 
-// The solution of H s = g by conjugate gradients: H is known by its products alone.
+// Solves H s = g by conjugate gradients, which need only products with H.
 template <typename Product>
 Vector solve(const Product& product, const Vector& g) {
   Vector s(n, 0.0), rest = g, along = g;
@@ -39,7 +40,7 @@ Vector solve(const Product& product, const Vector& g) {
 }
 
 int main(int argc, char** argv) {
-  // A line through noisy points, as smooth as possible, that keeps away from large values.
+  // Fits a smooth line to noisy points; a fourth-order term penalises large values.
   Buffer<float> line(n), points(n), v(n);
   for (int i = 0; i < n; ++i) {
     points(i) = std::sin(0.3f * static_cast<float>(i)) + static_cast<float>(i * 7 % 5) / 8;
@@ -52,13 +53,13 @@ int main(int argc, char** argv) {
   loss() += 0.5f * pow(line(all) - points(all), 2) + 0.25f * pow(line(all), 4);
   loss() += 4.0f * pow(line(pairs + 1) - line(pairs), 2);
 
-  // ---- Forward and reverse mode see one matrix from two sides: <J v, w> = <v, J^T w>. ----
+  // ---- Forward and reverse mode see the same matrix from two sides: <J v, w> = <v, J^T w>. ----
   Func gradient = propagate_adjoints(loss)(line);
   const double slope = Buffer<float>(propagate_tangents(loss, {{line, v}})(loss).realize())();
   claim(std::abs(slope - dot(values(gradient.realize({n})), values(v))) < 1e-3,
         "the tangent along v is the gradient times v");
 
-  // ---- The tangent of the gradient: H v, without H. ----
+  // ---- The tangent of the gradient is H v. H itself is never formed. ----
   Func hv = hessian_vector_product(loss, line, {{line, v}});
   const float h = 1.0f / 256;
   const Vector here = values(gradient.realize({n})), product = values(hv.realize({n}));
@@ -68,11 +69,11 @@ int main(int argc, char** argv) {
   double worst = 0;
   for (int i = 0; i < n; ++i)
     worst = std::max(worst, std::abs((there[i] - here[i]) / h - product[i]));
-  claim(worst < 0.05, "a difference of gradients is about H v");
+  claim(worst < 0.05, "a finite difference of gradients is close to H v");
 
-  // ---- All of H: elements that do not meet share a product. ----
+  // ---- The whole Hessian: columns that share no row share a product. ----
   Jacobian matrix = hessian(loss, line);
-  claim(matrix.colours() == 3, "neighbours meet and nobody else: three products, however long the line");
+  claim(matrix.colours() == 3, "only neighbours interact: three products suffice for any length");
   Buffer<float> dense = matrix.dense().realize({n, n});
   Vector by_rows(n, 0.0);
   for (int i = 0; i < n; ++i)
@@ -81,7 +82,7 @@ int main(int argc, char** argv) {
   for (int i = 0; i < n; ++i) worst = std::max(worst, std::abs(by_rows[i] - product[i]));
   claim(worst < 1e-3, "its product with v is H v");
 
-  // ---- What it is for: Newton's method against steps downhill. ----
+  // ---- An application: Newton's method compared with gradient descent. ----
   Buffer<float> direction(n);
   Func any = hessian_vector_product(loss, line, {{line, direction}});
   auto times_h = [&](const Vector& u) {
@@ -104,11 +105,11 @@ int main(int argc, char** argv) {
     const Vector step = solve(times_h, values(gradient.realize({n})));
     for (int i = 0; i < n; ++i) line(i) -= static_cast<float>(step[i]);
   }
-  claim(newton[6] < -4, "six steps of Newton bring the gradient below 1e-4");
-  claim(downhill[11] > -2, "twelve steps downhill do not bring it below 1e-2");
+  claim(newton[6] < -4, "six Newton steps bring the gradient below 1e-4");
+  claim(downhill[11] > -2, "twelve steps of gradient descent do not bring it below 1e-2");
 
   Picture picture("Forward mode and Hessians: log10 of the gradient's size over 12 steps");
-  picture.curve("downhill", downhill, -6, 1);
+  picture.curve("gradient descent", downhill, -6, 1);
   picture.curve("Newton", newton, -6, 1);
   picture.write(argc, argv, "forward_mode_and_hessians");
 }

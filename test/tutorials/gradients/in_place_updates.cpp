@@ -1,7 +1,8 @@
-// In-place updates, and the versions that they overwrite.
+// In-place updates.
 //
-// An update may overwrite a value that its own derivative needs. The sweep then keeps versions of it,
-// within a budget that you can set, and says so. Or you forbid it, and are told what to write instead.
+// An update may overwrite a value that its own derivative needs. Reverse mode then stores versions of the
+// value, within a budget that you can set, and reports this. You can also forbid it; the error message then
+// says how to rewrite the program.
 #include <retrograde/retrograde.h>
 
 #include <cmath>
@@ -16,7 +17,7 @@ int main(int argc, char** argv) {
   for (int i = 0; i < n; ++i) a(i) = i == 3 ? 0.0f : 0.75f + 0.125f * static_cast<float>(i);
   RDom r(0, n);
 
-  // ---- Sums overwrite nothing that matters: the slope of f + a is 1, whatever f was. ----
+  // ---- A sum needs none of its overwritten values: the derivative of f + a by a is 1 for every f. ----
   Func total("total");
   total() = 0.0f;
   total() += a(r);
@@ -24,9 +25,10 @@ int main(int argc, char** argv) {
   Buffer<float> ones = of_sum(a).realize({n});
   bool right = true;
   for (int i = 0; i < n; ++i) right = right && ones(i) == 1.0f;
-  claim(right, "a sum needs no versions: even Overwritten::Refuse has nothing to refuse");
+  claim(right, "a sum needs no versions, so Overwritten::Refuse accepts it");
 
-  // ---- Products do: the slope by a factor is the product of the others, made of f as it was. ----
+  // ---- A product does: the derivative by a factor is the product of the other factors, which includes
+  // earlier values of f. ----
   auto product_of = [&](const std::string& name) {
     Func product(name);
     product() = 1.0f;
@@ -43,14 +45,14 @@ int main(int argc, char** argv) {
     worst = std::max(worst, std::abs(slopes(k) - others));
     all[k] = slopes(k);
   }
-  claim(worst < 1e-6, "also where a factor is 0: nothing was divided by it");
+  claim(worst < 1e-6, "the gradient is correct even where a factor is 0: nothing is divided by it");
 
   bool kept = false;
   for (const Explanation& fact : of_product.explanations())
     kept = kept || fact.kind == Explanation::Kind::Version;
-  claim(kept, "explanations() says that versions were kept");
+  claim(kept, "explanations() reports the stored versions");
 
-  // ---- Who may not spend the memory says so, and is told what to do. ----
+  // ---- Limits on memory: the error names the Func and the remedy. ----
   auto refusal = [&](const AdjointOptions& options) -> std::string {
     try {
       propagate_adjoints(product_of("forbidden"), options);
@@ -63,9 +65,9 @@ int main(int argc, char** argv) {
   const std::string budget = refusal({.version_bytes = 16});  // 8 steps of 4 bytes need more
   std::printf("\n%s\n\n%s\n\n", never.c_str(), budget.c_str());
   claim(never.find("forbidden") != std::string::npos, "Overwritten::Refuse names the Func");
-  claim(budget.find("16") != std::string::npos, "so does a budget that is too small, with its bytes");
+  claim(budget.find("16") != std::string::npos, "a budget that is too small is an error that states its bytes");
 
-  // ---- Versions that you keep yourself, in a dimension of your own, need no permission. ----
+  // ---- If a dimension of your own holds the versions, nothing is overwritten. ----
   Var i("i");
   Func steps("steps"), last("last");
   steps(i) = 1.0f;
@@ -77,7 +79,7 @@ int main(int argc, char** argv) {
   for (int k = 0; k < n; ++k) worst = std::max<double>(worst, std::abs(same(k) - slopes(k)));
   claim(worst < 1e-6, "a Func with its steps along a dimension has the same gradient");
 
-  Picture picture("In-place updates: slopes of a product by its 8 factors, of which the fourth is 0");
+  Picture picture("In-place updates: gradient of a product by its 8 factors; the fourth is 0");
   for (int k = 0; k < n; ++k) {
     picture.cells(40 + 50 * k, 60, 40, {{all[k]}}, 0, 1.5);
     picture.text(40 + 50 * k, 130, std::to_string(all[k]).substr(0, 5));

@@ -1,7 +1,7 @@
-// Learn a blur: the first gradient.
+// Learn a blur: a first gradient.
 //
-// A picture was blurred by somebody, with a kernel that we do not know. We have the picture before and
-// after. The kernel is found by gradient descent on the difference.
+// A picture was blurred with an unknown kernel, and we have the picture before and after. Gradient descent
+// on the difference finds the kernel.
 #include <retrograde/retrograde.h>
 
 #include <cmath>
@@ -11,9 +11,9 @@
 using namespace retrograde;
 
 int main(int argc, char** argv) {
-  // ---- What is given. ----
+  // ---- The input: a sharp picture, and the same picture blurred. ----
   const int size = 48;
-  const float truth[3][3] = {{1, 2, 1}, {2, 4, 2}, {1, 2, 1}};  // sixteenths; nobody tells us
+  const float truth[3][3] = {{1, 2, 1}, {2, 4, 2}, {1, 2, 1}};  // in sixteenths; the program does not use it to learn
   Buffer<float> sharp(size + 2, size + 2), given(size, size);
   for (int y = 0; y < size + 2; ++y)
     for (int x = 0; x < size + 2; ++x)
@@ -26,7 +26,7 @@ int main(int argc, char** argv) {
     }
   }
 
-  // ---- The model, and how wrong it is: both are written forward only. ----
+  // ---- The model and the loss. Both are forward code only. ----
   Buffer<float> kernel(3, 3);
   kernel.fill(0.0f);
   Var x("x"), y("y");
@@ -37,12 +37,12 @@ int main(int argc, char** argv) {
   loss() = 0.0f;
   loss() += pow(blur(pixels.x, pixels.y) - given(pixels.x, pixels.y), 2) / (size * size);
 
-  // ---- The gradient is a Func like any other: it has the dimensions of what it is taken by. ----
+  // ---- The gradient is a Func with the dimensions of the variable that it differentiates by. ----
   Derivative d = propagate_adjoints(loss);
   Func gradient = d(kernel);
-  claim(gradient.dimensions() == 2, "the gradient by a kernel of two dimensions has two dimensions");
+  claim(gradient.dimensions() == 2, "the gradient by a two-dimensional kernel has two dimensions");
 
-  // It says what a small step does to the loss, in every direction at the same time.
+  // Each element is the slope of the loss along one tap.
   auto loss_now = [&] { return Buffer<float>(loss.realize())(); };
   Buffer<float> slopes = gradient.realize({3, 3});
   const float step = 1.0f / 16;
@@ -52,9 +52,9 @@ int main(int argc, char** argv) {
   const float before = loss_now();
   kernel(1, 1) += step;
   claim(std::abs((after - before) / (2 * step) - slopes(1, 1)) < 0.001f * std::abs(slopes(1, 1)),
-        "a difference of losses along one tap is the slope of that tap");
+        "a finite difference along one tap agrees with the gradient");
 
-  // ---- Downhill. ----
+  // ---- Gradient descent. ----
   std::vector<double> losses;
   for (int n = 0; n < 60; ++n) {
     losses.push_back(std::log10(loss_now()));
@@ -65,8 +65,8 @@ int main(int argc, char** argv) {
   float worst = 0;
   for (int j = 0; j < 3; ++j)
     for (int i = 0; i < 3; ++i) worst = std::max(worst, std::abs(kernel(i, j) - truth[j][i] / 16));
-  claim(losses.back() < losses.front() - 6, "the loss fell to less than a millionth");
-  claim(worst < 1e-3f, "all nine taps are right to a thousandth");
+  claim(losses.back() < losses.front() - 6, "the loss fell below a millionth of its start");
+  claim(worst < 1e-3f, "all nine taps are correct to 1e-3");
 
   Picture picture("Learn a blur: log10 of the loss over 60 steps; the kernel that was learned");
   picture.curve("", losses, -14, 0);

@@ -1,8 +1,8 @@
-// Loops over time, and memory.
+// Loops over time: checkpointing.
 //
-// A simulation of n steps overwrites its state n times, and the way back needs every state. Keeping all
-// costs n states of memory. Keeping a few and computing the steps between them again costs time, and less
-// than one would think. The gradient is the same, to the last bit.
+// A simulation of n steps overwrites its state n times, and the backward pass needs every state. Storing
+// all of them takes the memory of n states. Storing a few and recomputing the steps between them takes time
+// instead, but less than one might expect. The gradient has the same bits in either case.
 #include <retrograde/retrograde.h>
 
 #include <cmath>
@@ -13,7 +13,7 @@ using namespace retrograde;
 
 const int pendulums = 16, steps = 200;
 
-// Pendulums that start at given angles: the sum of squares of the angles at the end, wanted ones taken off.
+// Pendulums that start at the angles `start`. The loss is the squared distance of the final angles from `wanted`.
 Func miss(const Buffer<float>& start, const Buffer<float>& wanted) {
   Var x("x");
   Func state("state"), loss("loss");
@@ -36,7 +36,7 @@ int main(int argc, char** argv) {
     return propagate_adjoints(miss(start, wanted), options);
   };
 
-  // ---- All states, or a few: the same bits. ----
+  // ---- All states or a few: the gradient has the same bits. ----
   Buffer<float> all = gradient_with({.overwritten = Overwritten::Store})(start).realize({pendulums});
   std::vector<double> works, memories;
   bool same = true;
@@ -48,20 +48,20 @@ int main(int argc, char** argv) {
     memories.push_back(*d.operations().gradient.bytes().value());
     std::printf("%2d states: %9.0f operations, %7.0f bytes\n", states, works.back(), memories.back());
   }
-  claim(same, "1 to 32 kept states of 200 give the bits that all of them give");
+  claim(same, "1 to 32 stored states of 200 give the same bits as storing all");
 
-  // ---- What it costs: with s states, r n - C(s + r, r - 1) steps again (docs/derivatives.md). ----
-  claim(works[5] < works[2] && works[2] < works[0], "more states, fewer steps again");
+  // ---- The cost: s states need r n - C(s + r, r - 1) recomputed steps (docs/derivatives.md). ----
+  claim(works[5] < works[2] && works[2] < works[0], "more states, fewer recomputed steps");
   claim(memories[0] < memories[2] && memories[2] < memories[5], "and more memory");
-  claim(works[3] < works[0] / 8, "eight states already save seven eighths of what one state costs");
+  claim(works[3] < works[0] / 8, "eight states already save seven eighths of the operations of one state");
 
-  // ---- A budget in bytes does the same: it holds as many states as fit. ----
+  // ---- A budget in bytes works the same way: it holds as many states as fit. ----
   Derivative within = gradient_with({.checkpoint_bytes = 4096});
   Buffer<float> budget = within(start).realize({pendulums});
   for (int i = 0; i < pendulums; ++i) same = same && budget(i) == all(i);
-  claim(same, "a budget in bytes gives them, too");
+  claim(same, "a budget in bytes gives the same bits");
 
-  // ---- What it is for: where must the pendulums start to end where we want them? ----
+  // ---- An application: where must the pendulums start to end where we want them? ----
   Func loss = miss(start, wanted);
   Func gradient = propagate_adjoints(loss, {.checkpoint_states = 8})(start);
   std::vector<double> losses;
@@ -70,9 +70,9 @@ int main(int argc, char** argv) {
     Buffer<float> g = gradient.realize({pendulums});
     for (int i = 0; i < pendulums; ++i) start(i) -= 0.4f * g(i);
   }
-  claim(losses.back() < 0.01 * losses.front(), "forty steps downhill: the miss falls below a hundredth");
+  claim(losses.back() < 0.01 * losses.front(), "forty steps of descent bring the loss below a hundredth");
 
-  Picture picture("Loops over time: operations of the gradient, with 1, 2, 4 ... 32 kept states of 200");
+  Picture picture("Loops over time: operations of the gradient, with 1, 2, 4 ... 32 stored states of 200");
   std::vector<double> logs;
   for (double w : works) logs.push_back(std::log10(w));
   picture.curve("log10 of operations", logs, std::log10(works.back()) - 0.2, std::log10(works[0]) + 0.2);

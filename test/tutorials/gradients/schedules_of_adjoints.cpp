@@ -1,8 +1,8 @@
 // Schedules of adjoints.
 //
-// What propagate_adjoints makes are Funcs: compute_root, parallel, vectorize, compute_at mean for them
-// what they mean for yours. Those that you say nothing about get a schedule of their own. A schedule
-// never changes what is computed.
+// propagate_adjoints creates Funcs, so that compute_root, parallel, vectorize and compute_at work as for
+// your own Funcs. The compiler schedules those that have no directives. A schedule never changes the
+// values.
 #include <retrograde/retrograde.h>
 
 #include <chrono>
@@ -47,8 +47,8 @@ int main(int argc, char** argv) {
     for (int x = 0; x <= size; ++x) image(x, y) = static_cast<float>((7 * x + x * y) % 29) / 16;
   Buffer<float> plain, chosen, by_hand;
 
-  // ---- 1. As plainly as can be: everything at root, one element after the other. A directive on an
-  // adjoint says that you schedule it yourself. ----
+  // ---- 1. The plainest schedule: everything at root, in serial loops. A directive on an adjoint turns off
+  // the compiler's own schedule. ----
   Program first(image);
   Derivative d = propagate_adjoints(first.loss);
   Func slow = d(image);
@@ -56,15 +56,15 @@ int main(int argc, char** argv) {
   slow.compute_root();
   const double plain_ms = milliseconds(slow, plain);
 
-  // ---- 2. Nothing said: what is read several times and costs something is computed at root, in parallel
-  // and in vectors. ----
+  // ---- 2. No directives: the compiler computes Funcs that are read several times and are not cheap at
+  // root, in parallel and vectorized. ----
   Program second(image);
   Func unscheduled = propagate_adjoints(second.loss)(image);
   const double chosen_ms = milliseconds(unscheduled, chosen);
-  claim(largest_difference(plain, chosen) < 1e-5, "the schedule that is chosen changes no value");
+  claim(largest_difference(plain, chosen) < 1e-5, "the compiler's schedule changes no value");
 
-  // ---- 3. By hand: rows of the gradient in parallel and in vectors, the adjoint of `edges` a row at a
-  // time just before it is needed. The gradient's dimensions have names, as any Func's. ----
+  // ---- 3. By hand: rows of the gradient in parallel and vectorized, and the adjoint of `edges` one strip
+  // at a time, just before it is needed. The gradient's dimensions have names like those of any Func. ----
   Program third(image);
   Derivative e = propagate_adjoints(third.loss);
   Func gradient = e(image), edges_adj = e(third.edges);
@@ -75,15 +75,16 @@ int main(int argc, char** argv) {
       gx, 8, TailStrategy::GuardWithIf);
   edges_adj.compute_at(gradient, rows).vectorize(ex, 8, TailStrategy::GuardWithIf);
   const double by_hand_ms = milliseconds(gradient, by_hand);
-  claim(largest_difference(plain, by_hand) < 1e-5, "neither does a schedule by hand");
+  claim(largest_difference(plain, by_hand) < 1e-5, "a schedule by hand changes no value either");
 
-  // ---- All that was made can be looked at, and scheduled, in the order in which it is computed. ----
+  // ---- funcs() returns all generated Funcs in the order in which they are computed, for inspection or
+  // scheduling. ----
   claim(e.funcs().size() >= 3, "funcs() has the adjoints of soft, edges and the image");
-  std::printf("plain %.2f ms, chosen %.2f ms, by hand %.2f ms\n", plain_ms, chosen_ms, by_hand_ms);
+  std::printf("plain %.2f ms, default %.2f ms, by hand %.2f ms\n", plain_ms, chosen_ms, by_hand_ms);
 
   Picture picture("Schedules of adjoints: milliseconds of one gradient of 513 x 513 pixels");
   const double bars[] = {plain_ms, chosen_ms, by_hand_ms};
-  const char* const names[] = {"compute_root", "nothing said", "by hand"};
+  const char* const names[] = {"compute_root", "default", "by hand"};
   for (int n = 0; n < 3; ++n) {
     const int cells = std::max(1, static_cast<int>(20 * bars[n] / plain_ms));
     picture.text(20, 74 + 50 * n, names[n]);

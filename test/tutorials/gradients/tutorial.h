@@ -1,4 +1,4 @@
-// tutorial.h -- what these programs share: claims that are checked, and pictures.
+// tutorial.h -- code that the tutorials share: checked claims, and pictures.
 #pragma once
 
 #include <algorithm>
@@ -8,18 +8,18 @@
 #include <string>
 #include <vector>
 
-// Says what was found, and ends the program where it is not so.
+// Prints the claim, and ends the program with status 1 if it does not hold.
 inline void claim(bool holds, const std::string& what) {
   std::printf("%s %s\n", holds ? "yes:" : "NO:", what.c_str());
   if (!holds) std::exit(1);
 }
 
-// An SVG: curves over 0, 1, 2, ..., and grids of gray cells. Numbers are written with three digits.
+// An SVG with curves over 0, 1, 2, ... and grids of grey cells. Numbers have three digits.
 class Picture {
  public:
   explicit Picture(const std::string& title) { text(20, 22, title); }
 
-  // Curves of one chart share a scale; `low` and `high` are its ends.
+  // `low` and `high` are the ends of the vertical axis, which all curves of a chart share.
   void curve(const std::string& name, const std::vector<double>& ys, double low, double high) {
     static const char* const colours[] = {"#1b6ca8", "#c8553d", "#4f772d", "#7b2d8b"};
     const std::string colour = colours[curves_ % 4];
@@ -32,7 +32,7 @@ class Picture {
     body_ += "<polyline fill='none' stroke-width='2' stroke='" + colour + "' points='" + points + "'/>\n";
     text(330, 40.0 + 18 * curves_++, name, colour);
   }
-  // Rows of cells with their top left corner at (x, y); `low` is white and `high` black.
+  // Rows of cells; the top left corner is at (x, y). `low` is white and `high` is black.
   void cells(double x, double y, double side, const std::vector<std::vector<double>>& rows, double low,
              double high) {
     for (size_t r = 0; r < rows.size(); ++r) {
@@ -50,14 +50,14 @@ class Picture {
              "' font-family='sans-serif' font-size='13' fill='" + colour + "'>" + words + "</text>\n";
   }
 
-  // Into the folder that the program was given; nowhere when it was given none.
+  // Writes the file into the folder that the command line names; does nothing if it names none.
   void write(int argc, char** argv, const std::string& name) const {
     if (argc < 2) return;
     std::ofstream file(std::string(argv[1]) + "/" + name + ".svg");
     file << "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 480 260'>\n"
          << "<rect width='480' height='260' fill='white'/>\n"
          << body_ << "</svg>\n";
-    claim(file.good(), "the picture is in " + std::string(argv[1]));
+    claim(file.good(), "the picture was written to " + std::string(argv[1]));
   }
 
  private:

@@ -1,8 +1,8 @@
 // What is a seed?
 //
-// A program with many outputs has no single gradient: it has a matrix J of slopes, a row for each
-// output. Reverse mode gives one sum of rows, w^T J, and the seed is w: the weight of each output. A
-// loss is the case with one output, whose weight is 1.
+// A program with many outputs has a Jacobian J instead of a single gradient, with one row per output.
+// Reverse mode computes a weighted sum of the rows, w^T J. The seed is w, the weight of each output. A loss
+// is the special case of one output with weight 1.
 #include <retrograde/retrograde.h>
 
 #include <cmath>
@@ -36,9 +36,9 @@ int main(int argc, char** argv) {
       right = right && slopes(i) == expected;
     }
   }
-  claim(right, "a seed of one 1 gives one row of the matrix, exactly");
+  claim(right, "a seed with a single 1 gives one row of J exactly");
 
-  // ---- Any other seed gives the sum of the rows, each by its weight: all of it in one sweep. ----
+  // ---- Any other seed gives a weighted sum of the rows, in a single sweep. ----
   Buffer<float> weights(outputs);
   for (int k = 0; k < outputs; ++k) weights(k) = 0.5f - 0.125f * static_cast<float>(k);
   Buffer<float> swept = propagate_adjoints(f, weights)(a).realize({n});
@@ -50,7 +50,7 @@ int main(int argc, char** argv) {
   }
   claim(worst < 1e-6, "a seed w gives w^T J");
 
-  // ---- A loss makes its own seed: how it changes with each output. ----
+  // ---- For a loss, the seed is its derivative by each output. ----
   Func loss("loss"), by_hand("by_hand");
   RDom r(0, outputs);
   loss() = 0.0f;
@@ -60,18 +60,18 @@ int main(int argc, char** argv) {
   Buffer<float> of_seed = propagate_adjoints(f, by_hand, {{0, outputs}})(a).realize({n});
   worst = 0;
   for (int i = 0; i < n; ++i) worst = std::max<double>(worst, std::abs(of_loss(i) - of_seed(i)));
-  claim(worst < 1e-5, "the gradient of a loss is the sweep with d loss / d f as its seed");
+  claim(worst < 1e-5, "the gradient of a loss is the sweep with seed d loss / d f");
 
-  // ---- The bounds say which outputs count. Outside of them the seed is not even read. ----
+  // ---- The bounds select the outputs that count. Outside them the seed is not even read. ----
   Func ones("ones");
   ones(x) = 1.0f;
   Buffer<float> first = propagate_adjoints(f, ones, {{0, 3}})(a).realize({n});
   claim(first(0) == a(1) && first(3) == a(2) && first(4) == 0.0f,
-        "outputs outside of the bounds contribute nothing");
+        "outputs outside the bounds contribute nothing");
 
-  Picture picture("What is a seed: the matrix J of f(x) = a(x) a(x + 1), a row for each seed");
+  Picture picture("What is a seed: the Jacobian of f(x) = a(x) a(x + 1), one row per seed");
   picture.cells(60, 40, 18, matrix, 0, 2.5);
   picture.text(300, 60, "row k: the seed is 1 at k");
-  picture.text(300, 80, "column i: slopes by a(i)");
+  picture.text(300, 80, "column i: derivatives by a(i)");
   picture.write(argc, argv, "what_is_a_seed");
 }

@@ -1,4 +1,4 @@
-"""Compiling a pipeline to a library, without running it: ahead_of_time_use.py calls it."""
+"""Compiles pipelines to libraries without running them."""
 import os
 import sys
 
@@ -7,7 +7,7 @@ import retrograde as rg
 folder = sys.argv[1] if len(sys.argv) > 1 else "."
 x, y = rg.Var("x"), rg.Var("y")
 
-# What the function will take: an image, two scalars, in the order of the list below.
+# The arguments of the function, in the order of the list below: an image and two scalars.
 image, offset, strength = rg.ImageParam("uint8", 2, "input"), rg.Param("uint8", "offset"), rg.Param("float32", "strength")
 
 clamped = rg.BoundaryConditions.repeat_edge(image)
@@ -21,7 +21,7 @@ arguments = [image, offset, strength]
 sharp.compile_to_static_library(folder + "/sharpen", arguments, "sharpen")
 print("sharpen takes an image and two scalars, and gives an image")
 
-# Several outputs are several buffers behind the inputs.
+# Several outputs become several buffer arguments after the inputs.
 low, high = rg.Func("low"), rg.Func("high")
 low[x, y] = rg.min(image[x, y], offset)
 high[x, y] = rg.max(image[x, y], offset)

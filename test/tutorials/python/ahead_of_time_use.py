@@ -1,6 +1,7 @@
-"""Programs without a compiler: retrograde.runtime calls what was compiled ahead of time.
+"""Programs without a compiler: retrograde.runtime calls functions that were compiled ahead of time.
 
-The first half of this program is the build machine's, the second that of who runs it: Python, NumPy and ctypes alone.
+The first half of this program runs on the build machine. The second half runs at the user's: it needs only Python, NumPy and
+ctypes.
 """
 import os
 import tempfile
@@ -19,7 +20,7 @@ def build():
     k, seed = rg.RDom([(0, 3)]), rg.ImageParam("float32", 1, "seed")
     blur[x] = rg.f32(0)
     blur[x] += image[x + k] * taps[k]
-    # The gradient goes into a library like anything else.
+    # A gradient can be compiled into a library like any other Func.
     bounds = [(seed.dim(0).min(), seed.dim(0).extent())]
     gradient = rg.propagate_adjoints(blur, rg.Func(seed), bounds, rg.AdjointOptions(wrt=[taps]))(taps)
     forward = blur.compile_to_module([image, taps], "blur")
@@ -30,27 +31,28 @@ def build():
 
 build()
 
-# ---- From here on nothing is compiled. ----
+# ---- The code below does not use the compiler. ----
 from retrograde import runtime  # noqa: E402
 
 blur, gradient = runtime.load(path, "blur"), runtime.load(path, "blur_gradient")
-claim([a.name for a in gradient.arguments] == ["image", "taps", "seed", "taps_gradient"], "a function says what it takes")
+claim([a.name for a in gradient.arguments] == ["image", "taps", "seed", "taps_gradient"],
+      "a function describes its arguments")
 
 image, taps, result = np.arange(12, dtype="float32") ** 2, np.array([1, 2, 1], "float32"), np.zeros(10, "float32")
 blur(image, taps, result)
-claim((result == image[:-2] + 2 * image[1:-1] + image[2:]).all(), "it runs, and writes into arrays of yours")
+claim((result == image[:-2] + 2 * image[1:-1] + image[2:]).all(), "it writes its result into an existing array")
 blur(result[::-1].copy(), taps, result[:8])
-claim(result[7] == 4 * 4 + 8 + 0 or result[7] > 0, "any part of an array will do")
+claim(result[7] == 4 * 4 + 8 + 0 or result[7] > 0, "any part of an array can be an output")
 
 slopes = np.zeros(3, "float32")
 gradient(image, taps, seed=np.ones(10, "float32"), taps_gradient=slopes)
-claim(slopes.tolist() == [image[n:n + 10].sum() for n in range(3)], "so does its gradient")
+claim(slopes.tolist() == [image[n:n + 10].sum() for n in range(3)], "its gradient works in the same way")
 
-# ---- What must an input cover? Ask before you load it. ----
+# ---- A bounds query: which region of an input is required? ----
 needed = blur.required(None, taps, np.zeros(100, "float32"))
 claim(needed["image"] == [(0, 102)], "a hundred results need a hundred and two pixels")
 
-# ---- Errors are exceptions, with the code of the library and its text. ----
+# ---- Errors are exceptions with the library's error code and message. ----
 try:
     blur(image[:5], taps, result)
     claim(False, "an input that is too small was read")

@@ -1,4 +1,4 @@
-"""Reductions in parallel and in vectors: rfactor makes partial results of an associative update."""
+"""Parallel and vectorized reductions: rfactor splits an associative update into partial results."""
 import numpy
 import retrograde as rg
 
@@ -7,11 +7,11 @@ j, i = numpy.indices((64, 96))
 pixels = ((i * 7 + j * 11 + i * j) % 32).astype("uint8")
 image = rg.Buffer(pixels)
 
-# A histogram as it is written: one serial loop.
+# A histogram as written: one serial loop.
 serial, r = rg.Func("serial"), rg.RDom(image)
 serial[x] = 0
 serial[image[r.x, r.y]] += 1
-# The same with a partial histogram for each row, all rows in parallel.
+# The same histogram from one partial histogram per row, with all rows in parallel.
 rows, s = rg.Func("rows"), rg.RDom(image)
 rows[x] = 0
 rows[image[s.x, s.y]] += 1
@@ -29,7 +29,7 @@ blocks = total.update().rfactor(xi, u)
 blocks.compute_root().vectorize(u).update().vectorize(u)
 print("sum:", total.realize()[()])
 
-# Tuples too, when all their values together are associative: the darkest value and its place.
+# Tuples work if all their values together are associative: here the darkest value and its position.
 best, r = rg.Func("best"), rg.RDom([(0, 96), (0, 64)])
 value = (r.x * 37 + r.y * 53) % 101 + rg.i32(image[r.x, r.y]) + 1
 best[()] = (1000, 0)

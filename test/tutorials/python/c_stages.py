@@ -1,7 +1,7 @@
-"""Stages that are computed outside: C functions by ctypes, with their gradients.
+"""Extern stages: C functions through ctypes, with gradients.
 
-A pipeline may call C functions of scalars in expressions, and of whole buffers as stages. Here they are written in Python,
-for which ctypes makes C functions; those of any shared library are the same.
+A pipeline can call C functions on scalars in expressions, and C functions on buffers as stages. Here they are written in
+Python and turned into C functions by ctypes; functions of a shared library work in the same way.
 """
 import ctypes
 
@@ -17,12 +17,12 @@ f = rg.Func("f")
 f[x] = rg.call_c_function("hypot", "float64", [rg.f64(x), rg.f64(4)])
 claim(f.realize([4])[3] == 5, "hypot(3, 4) is 5")
 
-# ---- A stage: it is asked which part of its input it needs, and then to compute. ----
+# ---- A stage. It is called first to ask which region of its input it needs, and then to compute. ----
 Image = ctypes.POINTER(runtime.halide_buffer_t)
 
 
 def values(image):
-    """One dimension as an array of NumPy."""
+    """A one-dimensional buffer as a NumPy array."""
     data = ctypes.cast(image.host, ctypes.POINTER(ctypes.c_float))
     return np.ctypeslib.as_array(data, (image.dim[0].extent,))
 
@@ -30,7 +30,7 @@ def values(image):
 @ctypes.CFUNCTYPE(ctypes.c_int, Image, Image)
 def cumulate(source, result):
     source, result = source[0], result[0]
-    if not source.host:  # which region of the source?
+    if not source.host:  # a bounds query: which region of the source is needed?
         source.dim[0].min, source.dim[0].extent = 0, result.dim[0].min + result.dim[0].extent
     else:
         values(result)[:] = np.cumsum(values(source))[result.dim[0].min:]
@@ -47,7 +47,8 @@ running.set_jit_externs(CUMULATE)
 claim(np.asarray(running.realize([n])).tolist() == [0, 1, 5, 14, 30, 55], "running sums of squares")
 
 
-# ---- Its gradient: nobody can look inside, so a rule says it. The adjoint of a running sum runs from the end. ----
+# ---- Its gradient: the compiler cannot see inside the function, so a rule defines the adjoint. The adjoint of a running
+# sum is a running sum from the end. ----
 def rule(context):
     adjoint, rest = rg.Func("squares_adj"), rg.RDom([(0, n)])
     adjoint[i] = rg.f32(0)
@@ -61,4 +62,4 @@ loss[()] = rg.f32(0)
 loss[()] += running[r]
 gradient = rg.propagate_adjoints(loss)(image)
 want = [2 * v * (n - v) for v in range(n)]
-claim(np.asarray(gradient.realize([n])).tolist() == want, "each square is in the sums behind it")
+claim(np.asarray(gradient.realize([n])).tolist() == want, "the gradient counts each square in all sums that include it")

@@ -4,7 +4,7 @@ from tracing import stores_told_to
 
 x, y = rg.Var("x"), rg.Var("y")
 
-# f is inlined into h, and its copy is computed at root for g.
+# f is inlined into h; its clone is computed at root for g.
 f, g, h, both = (rg.Func(name) for name in ("f", "g", "h", "both"))
 f[x, y] = x * 3 + y
 g[x, y] = f[x, y] + f[x - 1, y] + f[x, y - 1]
@@ -18,7 +18,7 @@ both.jit_handlers().custom_trace = stores_told_to(lambda event: lanes.append(eve
 out = both.realize([10, 7])
 print(f"{sum(lanes)} stores into the copy, {out[0, 0]} {out[9, 6]}")
 
-# A copy of a Func with an update, for several consumers.
+# A clone of a Func with an update, for several consumers.
 f, a, b, c, total = (rg.Func(name) for name in ("f", "a", "b", "c", "sum"))
 r = rg.RDom([(0, 5)])
 f[x] = x

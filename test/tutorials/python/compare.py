@@ -1,6 +1,6 @@
-"""compare -- a program in Python must print what the same program in C++ prints.
+"""compare -- checks that a Python program prints the same as its C++ counterpart.
 
-    compare.py WORK SCRIPT PROGRAM     each runs in a folder of its own below WORK; both streams are compared
+    compare.py WORK SCRIPT PROGRAM     runs each in its own folder below WORK; compares both streams
 """
 import difflib
 import shutil

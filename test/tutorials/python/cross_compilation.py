@@ -1,4 +1,4 @@
-"""Machine code for other machines, from this one."""
+"""Cross-compilation: machine code for other targets."""
 import sys
 
 import retrograde as rg
@@ -16,13 +16,13 @@ for name in ("x86-64-linux-sse41", "x86-64-linux-avx-avx2-fma", "arm-64-linux",
     target = rg.Target(name)
     file = f"{folder}/mask_for_{name}"
     mask.compile_to_file(file, [depth, nearest, farthest], "mask_between", target)
-    # The object says which machine it is for: bytes 18 and 19 of an ELF file.
+    # Bytes 18 and 19 of an ELF file name its machine.
     with open(file + ".o", "rb") as object_file:
         header = object_file.read(32)
     print("%-42s %d bytes read, '%s', %d bits, machine %d, text \"%s\""
           % (name, len(header), header[1:4].decode(), header[4] * 32, header[18] + 256 * header[19], target.to_string()))
 
-# Targets are values: features can be asked for and set.
+# Targets are values whose features can be queried and set.
 t = rg.Target()
 t.os, t.arch, t.bits = rg.Target.OS.Linux, rg.Target.Arch.ARM, 64
 t.set_feature(rg.Target.Feature.NoAsserts)

@@ -1,4 +1,4 @@
-"""Looking into a pipeline: print, print_when, traces of stores, loop nests, lowered statements."""
+"""Debugging a pipeline: print, print_when, traces of stores, loop nests, lowered statements."""
 import sys
 from pathlib import Path
 
@@ -7,22 +7,22 @@ import retrograde as rg
 folder = sys.argv[1] if len(sys.argv) > 1 else "."
 x, y = rg.Var("x"), rg.Var("y")
 
-# print() gives its first argument, and shows all of them each time it is evaluated.
+# print() returns its first argument, and prints all arguments each time it is evaluated.
 squares = rg.Func("squares")
 squares[x] = rg.print(x * x, "is the square of", x)
 squares.realize([4])
 
-# print_when() shows them where a condition holds.
+# print_when() prints only where a condition holds.
 product = rg.Func("product")
 product[x, y] = rg.print_when((x == 3) & (y > 1), x * y, "<- product at", x, y)
 product.realize([5, 4])
 
-# print of values of other types.
+# print() of other types.
 mixed = rg.Func("mixed")
 mixed[x] = rg.print(rg.f32(x) / 4, rg.u8(x + 250), rg.f64(x) / 8, x == 2)
 mixed.realize([3])
 
-# A trace tells of every value that is stored.
+# A trace reports every stored value.
 traced = rg.Func("traced")
 traced[x, y] = x + 10 * y
 traced.trace_stores()
@@ -36,7 +36,7 @@ consumer.reorder(y, x).parallel(x)
 producer.compute_root().parallel(y)
 consumer.print_loop_nest()
 
-# Splits, what slides, and where it is stored.
+# The loops after splits and compute_at.
 rows, stencil, xo, xi = rg.Func("rows"), rg.Func("stencil"), rg.Var("xo"), rg.Var("xi")
 rows[x, y] = x - y
 stencil[x, y] = rows[x, y] + rows[x + 1, y]
@@ -44,7 +44,7 @@ stencil.split(x, xo, xi, 4).vectorize(xi).unroll(y, 2)
 rows.compute_at(stencil, xo).vectorize(x, 4)
 stencil.print_loop_nest()
 
-# What remains of it before machine code is made, as text and as a page.
+# The lowered statement, just before code generation, as text and as HTML.
 lowered = rg.Func("lowered")
 lowered[x, y] = x + y
 lowered.vectorize(x, 8).parallel(y)
@@ -54,6 +54,6 @@ for name in ("lowered.stmt", "lowered.html"):
     contents = Path(folder, name).read_text()
     print("%s: names the Func: %d, and its parallel loop: %d" % (name, "lowered" in contents, "parallel" in contents))
 
-# An expression can be shown without being run.
+# An expression can be inspected without running it.
 e = (x + 3) * y
 print("its type has", e.type().bits(), "bits")

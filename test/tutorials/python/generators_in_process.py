@@ -1,4 +1,4 @@
-"""Generators used in the program that they stand in: created, given params and inputs, run."""
+"""Generators used in the same program: created, configured, given inputs, run."""
 import numpy
 import retrograde as rg
 
@@ -29,13 +29,13 @@ class Threshold:
 source = rg.Func("source")
 source[x, y] = x + y * 3
 
-# One after the other.
+# One generator reads the result of another.
 scaled = Scale.call(source, generator_params={"factor": 5}).realize([8, 4])
 print("scaled:", scaled[1, 0], scaled[7, 3])
 for row in numpy.asarray(Threshold.call(scaled, 30).realize([8, 4])):
     print("".join("%4d" % value for value in row))
 
-# Its output is a Func that others may use.
+# The output of a generator is a Func that other Funcs can read.
 combined = rg.Func("combined")
 combined[x, y] = Scale.call(source)[x, y] + source[x, y]
 print("combined:", combined.realize([8, 4])[7, 3])

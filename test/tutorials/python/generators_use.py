@@ -1,5 +1,5 @@
-"""Generators: pipelines as classes, with params that a build file sets. This file is the program that makes libraries of
-them, `generators_use.py -g local_mean ...`; without arguments it makes three, and calls what they hold."""
+"""Generators: pipelines as classes, with params that a build file sets. With arguments (`generators_use.py -g local_mean
+...`) this program compiles a generator to a library; without arguments it compiles three libraries and calls them."""
 import enum
 import subprocess
 import sys
@@ -72,7 +72,7 @@ class Blend:
 
 
 def library(folder, generator, name, *params):
-    """What build files do: run the program, link what it wrote."""
+    """Does the work of a build file: runs the program and links its output."""
     command = [sys.executable, "-B", __file__, "-g", generator, "-f", name, "-o", folder, "-e", "static_library",
                "target=host", *params]
     subprocess.run(command, check=True)

@@ -1,5 +1,5 @@
-"""Images: made in memory, read and written as files, brightened with a Param. Arrays of NumPy are images: [c, y, x] is
-planar in memory, and a Func's (x, y, c)."""
+"""Images: created in memory, read from and written to files, brightened with a Param. NumPy arrays serve as images: the
+axes [c, y, x] are planar in memory, and become a Func's (x, y, c)."""
 import sys
 from pathlib import Path
 
@@ -10,7 +10,7 @@ folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
 
 
 def save_image(pixels, path):
-    """A PPM file: colours innermost."""
+    """Writes a PPM file, in which colours are innermost."""
     channels, height, width = pixels.shape
     path.write_bytes(b"P6\n%d %d\n255\n" % (width, height) + pixels.transpose(1, 2, 0).tobytes())
 
@@ -26,7 +26,7 @@ c, y, x = np.indices((3, 32, 48))
 drawn = (x * 4 + y * 3 * (c + 1)).astype(np.uint8)
 save_image(drawn, folder / "drawn.ppm")
 
-# What comes back has the same pixels.
+# The file contains the same pixels.
 loaded = load_image(folder / "drawn.ppm")
 print(f"loaded {loaded.shape[2]} x {loaded.shape[1]} x {loaded.shape[0]}, {(loaded != drawn).sum()} differences")
 

@@ -1,5 +1,5 @@
-"""What a pipeline that runs in this process calls: handlers for printing, errors, memory, parallel loops. `print` is a
-function of Python; the others are C functions, here of ctypes."""
+"""Handlers of JIT-compiled pipelines: printing, errors, memory, parallel loops. The handler `print` is a Python function;
+the others are C functions, here made by ctypes."""
 import ctypes
 
 import retrograde as rg
@@ -59,7 +59,7 @@ f.jit_handlers().custom_do_par_for = backwards
 out = f.realize([10, 7])
 print(f"{out[9, 6]}, tasks {counts['tasks']}")
 
-# With a handler, an error is told there, and nothing is raised.
+# An error handler receives errors; nothing is raised.
 told = []
 image, f = rg.ImageParam("int32", 1, "input"), rg.Func("f")
 f[x] = image[x + 5]
@@ -71,7 +71,7 @@ image.set(small)
 f.realize([20])
 print("the error names the input: %d" % (b"input" in told[0]))
 
-# Without one, it is an exception.
+# Without an error handler, errors are exceptions.
 divisor = rg.Param("int32", "divisor", 11, min=1, max=10)
 f = rg.Func("f")
 f[x] = x / divisor
@@ -82,7 +82,7 @@ except rg.RuntimeError as error:
     print("thrown, and it names the Param: %d" % ("divisor" in str(error)))
 print("exceptions: 1")
 
-# What is wrong with a definition is found before anything runs.
+# Errors in a definition are found before anything runs.
 f, z = rg.Func("f"), rg.Var("z")
 try:
     f[x] = x + z

@@ -1,4 +1,4 @@
-"""Pipelines of several stages: where producers are computed, and how often."""
+"""Pipelines of several stages: compute and storage levels of producers, and how often each value is computed."""
 import numpy
 import retrograde as rg
 from tracing import stores_told_to
@@ -18,19 +18,19 @@ def run(title, schedule):
 
 
 xo, yo, xi, yi = (rg.Var(name) for name in ("xo", "yo", "xi", "yi"))
-# Substituted into its consumer: never stored.
+# Inlined into its consumer: never stored.
 run("inline", lambda wave, edges, x, y: None)
-# All of it first: 17 x 13 points.
+# At root: all 17 x 13 points first.
 run("root", lambda wave, edges, x, y: wave.compute_root())
-# As much as one row of the consumer needs: two rows, for each of 12.
+# In each of the consumer's 12 rows: the two rows that it reads.
 run("at y", lambda wave, edges, x, y: wave.compute_at(edges, y))
-# Stored for all rows and computed as needed: what the row before needed is still there.
+# Stored at root and computed per row: values of the previous row are still available (sliding window).
 run("at y, stored at root", lambda wave, edges, x, y: wave.store_root().compute_at(edges, y))
 run("at x", lambda wave, edges, x, y: wave.compute_at(edges, x))
 run("at x, stored at y", lambda wave, edges, x, y: wave.store_at(edges, y).compute_at(edges, x))
 
 
-# A tile at a time.
+# One tile at a time.
 def tiled(wave, edges, x, y):
     edges.tile(x, y, xo, yo, xi, yi, 8, 4)
     wave.compute_at(edges, xo)
@@ -44,7 +44,7 @@ def tiled_and_vectorized(wave, edges, x, y):
 run("tiled", tiled)
 run("tiled and vectorized", tiled_and_vectorized)
 
-# A blur with its input clamped to the image, an array of NumPy: a[y, x] is image[x, y].
+# A blur whose input is clamped to the image, a NumPy array: a[y, x] is image[x, y].
 j, i = numpy.indices((10, 20))
 image = ((i * 31 + j * 17) % 255).astype("uint16")
 x, y = rg.Var("x"), rg.Var("y")

@@ -1,4 +1,4 @@
-"""Reduction domains that are not boxes."""
+"""Predicated reductions: reduction domains that are not boxes."""
 import numpy
 import retrograde as rg
 
@@ -12,7 +12,7 @@ disk[r.x, r.y] = r.x + r.y
 for line in numpy.asarray(disk.realize([9, 7])):
     print("".join("%3d" % value for value in line))
 
-# A triangle: two conditions, both must hold.
+# A triangle: two conditions that must both hold.
 triangle, r = rg.Func("triangle"), rg.RDom([(0, 8), (0, 8)])
 r.where(r.x <= r.y)
 r.where(r.y < 6)
@@ -30,7 +30,7 @@ bright[()] = (bright[()][0] + 1, bright[()][1] + rg.i32(image[r.x, r.y]))
 count, total = bright.realize()
 print(f"{count[()]} bright pixels, sum {total[()]}")
 
-# The condition may depend on where one stands, and the update may still be scheduled.
+# The condition may depend on pure variables, and the update can still be scheduled.
 prefix, r, xo, xi = rg.Func("prefix"), rg.RDom([(0, 32)]), rg.Var("xo"), rg.Var("xi")
 r.where(r < x * 3)
 prefix[x] = 0

@@ -1,4 +1,4 @@
-"""One Func, many orders: what each directive does to the loops, seen by recording the order in which points are stored."""
+"""Loop directives: the effect of each on the order of stores, recorded by a trace."""
 import numpy
 import retrograde as rg
 from tracing import stores_told_to
@@ -35,12 +35,12 @@ show("tile", lambda f, x, y: f.tile(x, y, xo, yo, xi, yi, 3, 2))
 show("vectorize", lambda f, x, y: f.split(x, xo, xi, 2).vectorize(xi))
 show("unroll", lambda f, x, y: f.split(x, xo, xi, 2).unroll(xi))
 show("columns", lambda f, x, y: f.split(y, yo, yi, 2).reorder(yi, x, yo))
-# 6 is no multiple of 4: the last block moves inwards and computes two points again.
+# 4 does not divide 6: the last block shifts inwards and recomputes two points.
 show("inwards", lambda f, x, y: f.split(x, xo, xi, 4))
 show("guarded", lambda f, x, y: f.split(x, xo, xi, 4, rg.TailStrategy.GuardWithIf))
 show("nested", lambda f, x, y: f.tile(x, y, xo, yo, xi, yi, 2, 2).fuse(xo, yo, tile).unroll(yi))
 
-# In parallel the order is nobody's business, only the result.
+# The order of a parallel loop is unspecified, so only the result is shown.
 g, x, y = rg.Func("g"), rg.Var("x"), rg.Var("y")
 g[x, y] = x * 100 + y
 g.tile(x, y, xo, yo, xi, yi, 16, 8).fuse(xo, yo, tile).parallel(tile).vectorize(xi, 4)

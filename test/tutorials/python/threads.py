@@ -1,7 +1,7 @@
-"""Python goes on while pipelines run: threads, and values for one call.
+"""Threads: concurrent calls, and parameter values for one call.
 
-The GIL is free while a pipeline compiles or runs, so threads of Python work beside each other. What changes from call to
-call is given to the call, not set in the Param that all share.
+The GIL is released while a pipeline compiles or runs, so that Python threads run concurrently. Values that differ between
+calls are passed to the call instead of being set in the Param, which all threads share.
 """
 import threading
 import time
@@ -17,7 +17,7 @@ image, curve = rg.ImageParam("float32", 2, "image"), rg.Func("curve")
 curve[x, y] = rg.pow(image[x, y], exponent)
 curve.compile_jit()
 
-# ---- Eight calls at once, each with its own values. ----
+# ---- Eight concurrent calls, each with its own values. ----
 pictures = [np.full((20, 30), n + 1, "float32") for n in range(8)]
 
 
@@ -28,7 +28,7 @@ def call(n):
 with ThreadPoolExecutor(8) as pool:
     results = list(pool.map(call, range(8)))
 claim(all((result == (n + 1) ** 2).all() for n, result in enumerate(results)), "eight threads, eight images")
-claim(exponent.get() == 1, "what was set stays as it was")
+claim(exponent.get() == 1, "the value set in the Param does not change")
 
 # ---- A thread counts while the main thread waits for a pipeline. ----
 slow, r = rg.Func("slow"), rg.RDom([(0, 20_000_000)])
@@ -49,8 +49,8 @@ thread.start()
 slow.realize([1])
 done.set()
 thread.join()
-claim(counted[0] > 5, "it counted meanwhile")
+claim(counted[0] > 5, "the other thread counted meanwhile")
 
-# ---- How many threads a pipeline takes is said to its handlers. ----
+# ---- The handlers of a pipeline limit the number of its threads. ----
 curve.jit_handlers().thread_limit = 1
 claim((call(2) == 9).all(), "one thread gives the same result")

@@ -1,4 +1,4 @@
-"""For the tutorials: what traces tell. A handler is a C function of ctypes."""
+"""Trace handlers for the tutorials. A handler is a C function made by ctypes."""
 import ctypes
 
 from retrograde.runtime import halide_trace_event_t
@@ -8,7 +8,7 @@ STORE = 1
 
 
 def stores_told_to(tell):
-    """A custom_trace that tells of every store."""
+    """Returns a custom_trace handler that passes every store event to `tell`."""
     def handler(context, event):
         if event[0].event == STORE:
             tell(event[0])

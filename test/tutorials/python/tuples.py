@@ -1,11 +1,11 @@
-"""Several values at each point."""
+"""Tuples: several values per point."""
 import retrograde as rg
 
 x, y = rg.Var("x"), rg.Var("y")
 
 
 class Fraction:
-    """A fraction as a Tuple of two integers, with arithmetic of its own."""
+    """A fraction as a Tuple of two integers, with its own arithmetic."""
 
     def __init__(self, over, under):
         self.over, self.under = rg.Expr(over), rg.Expr(under)
@@ -29,19 +29,19 @@ both[x, y] = (x + y, rg.sin(rg.f32(x * y)))
 sums, sines = both.realize([4, 3])
 print("2 buffers: %d %.4f" % (sums[3, 2], sines[3, 2]))
 
-# One of its values, in another definition.
+# Another definition can read a single value of the Tuple.
 scaled = rg.Func("scaled")
 scaled[x, y] = both[x, y][1] * both[x, y][0]
 print("%.4f" % scaled.realize([4, 3])[2, 1])
 
-# Into buffers of one's own.
+# Results written to existing Buffers.
 pair = rg.Func("pair")
 pair[x] = (x * 2, rg.u8(x + 1))
 first, second = rg.Buffer("int32", [5]), rg.Buffer("uint8", [5])
 pair.realize([first, second])
 print(f"{first[4]} {second[4]}, outputs {pair.outputs()}")
 
-# The place of the largest value, by hand and by name.
+# The position of the largest value: by hand and with argmax.
 source, largest = rg.Func("source"), rg.Func("largest")
 source[x] = (x * 29) % 97
 r = rg.RDom([(1, 63)])
@@ -52,21 +52,21 @@ place, value = largest.realize()
 named = rg.evaluate(rg.argmax(source[rg.RDom([(0, 64)])]))
 print(f"largest: {value[()]} at {place[()]}, by name {named[1]} at {named[0]}")
 
-# A type of one's own: the golden ratio by its continued fraction 1 + 1 / (1 + 1 / (1 + ...)).
+# A user-defined type: the golden ratio by its continued fraction 1 + 1 / (1 + 1 / (1 + ...)).
 convergent, later = rg.Func("convergent"), rg.RDom([(1, 11)])
 convergent[x] = Fraction(1, 1).values()
 before = Fraction(convergent[later - 1][0], convergent[later - 1][1])
 convergent[later] = (before.inverse() + Fraction(1, 1)).values()
 line = "".join("%d/%d " % point for point in zip(*convergent.realize([12])))
 
-# Which is the first above 1.6 and below 1.62?
+# The first convergent above 1.6 and below 1.62.
 every = rg.RDom([(0, 12)])
 candidate = Fraction(convergent[every][0], convergent[every][1])
 is_near = (Fraction(8, 5) < candidate) & (candidate < Fraction(81, 50))
 convergent.compute_root()
 print(line + "- number %d" % rg.evaluate(rg.argmax(rg.i32(is_near))[0]))
 
-# Euclid's algorithm: pairs (a, b) become (b, a % b) until b is 0. How many steps that takes.
+# Euclid's algorithm: pairs (a, b) become (b, a % b) until b is 0. The program counts the steps.
 pair, steps, step, later = rg.Func("pair"), rg.Func("steps"), rg.Var("step"), rg.RDom([(1, 7)])
 pair[x, y, step] = (x + 1, y + 1)
 a, b = pair[x, y, later - 1][0], pair[x, y, later - 1][1]

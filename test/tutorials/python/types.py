@@ -1,4 +1,4 @@
-"""The types of expressions, and how they meet."""
+"""Types of expressions and their promotion rules."""
 import retrograde as rg
 
 
@@ -17,7 +17,7 @@ for t in [rg.UInt(8), rg.UInt(16), rg.UInt(32), rg.UInt(64), rg.Int(8), rg.Int(1
     print("%-8s %d bytes, uint %d, int %d, float %d" % (name(t), t.bytes(), t.is_uint(), t.is_int(), t.is_float()))
 print("type_of:", name(rg.Type("uint16")), name(rg.Type("float64")), name(rg.Type(bool)))
 
-# Where two types meet: the wider one, floats before integers, signed before unsigned.
+# The type of a + b: floats win over integers, wider types over narrower, signed over unsigned.
 types = [rg.UInt(8), rg.Int(8), rg.UInt(32), rg.Int(16), rg.Float(32), rg.Float(64)]
 for a in types:
     print("".join(" %-8s" % name((of(a) + of(b)).type()) for b in types))
@@ -42,7 +42,7 @@ quotients[x] = ((x - 5) / 3, (x - 5) % 3, rg.i32(rg.f32(x - 5) / 3))
 print("".join("%d:%d:%d " % point for point in zip(*quotients.realize([11]))))
 
 
-# One function for every type: a product that fits, of integers in twice their bits.
+# One function for every type: a product that cannot overflow, as integers get twice their bits.
 def product(a, b):
     t = a.type()
     fits = t if t.is_float() else t.with_bits(2 * t.bits())
@@ -53,6 +53,6 @@ low, high = rg.i8(-128), rg.i8(127)
 print("product: %d %d %g, as %s" % (rg.evaluate(product(low, high)), rg.evaluate(product(rg.i16(-32768), rg.i16(-3))),
                                     rg.evaluate(product(rg.f64(0.25), rg.f64(3.0))), name(product(low, low).type())))
 
-# Bits as they are.
+# Reinterpreting bits.
 print("bits of 1.0f: %x, and back %g" % (rg.evaluate(rg.reinterpret("uint32", rg.f32(1.0))),
                                          rg.evaluate(rg.reinterpret("float32", rg.u32(0x40490fdb)))))

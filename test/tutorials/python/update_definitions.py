@@ -1,4 +1,4 @@
-"""Defining a Func in several steps: updates, reduction domains, histograms, scans, inline sums."""
+"""Update definitions: reduction domains, histograms, scans, inline reductions."""
 import numpy
 import retrograde as rg
 
@@ -9,7 +9,7 @@ def show(title, values):
     print("%-12s" % title + "".join(" %g" % v for v in numpy.asarray(values)))
 
 
-# Later definitions change points of earlier ones.
+# Update definitions change points of earlier definitions.
 f = rg.Func("f")
 f[x] = x
 f[3] = 100
@@ -18,13 +18,13 @@ f[x] *= 2
 show("points", f.realize([6]))
 print(f.num_update_definitions(), "updates")
 
-# A reduction domain is a loop: here, powers of two.
+# A reduction domain is a loop, here over powers of two.
 powers, r = rg.Func("powers"), rg.RDom([(1, 9)])
 powers[x] = 1
 powers[r] = powers[r - 1] * 2
 show("powers", powers.realize([10]))
 
-# Scatter: a histogram, and its running sum.
+# A scatter (a histogram) and a scan (its running sum).
 j, i = numpy.indices((30, 40))
 image = rg.Buffer(((i * j + i) % 8).astype("uint8"))
 histogram, cumulative, pixels = rg.Func("histogram"), rg.Func("cumulative"), rg.RDom(image)
@@ -37,7 +37,7 @@ histogram.compute_root()
 show("histogram", histogram.realize([8]))
 show("cumulative", cumulative.realize([8]))
 
-# Two dimensions of reduction, and a schedule for the update alone.
+# A two-dimensional reduction, with a schedule for the update only.
 table, r, yo, yi = rg.Func("table"), rg.RDom([(0, 4), (0, 3)]), rg.Var("yo"), rg.Var("yi")
 table[x, y] = 0
 table[x, y] += (x + r.x) * (y + r.y)
@@ -45,14 +45,14 @@ table.update().split(y, yo, yi, 2).parallel(yo).vectorize(x, 4)
 out = table.realize([8, 6])
 print("table       ", out[0, 0], out[7, 0], out[7, 5])
 
-# Sums and extremes inside an expression.
+# Inline reductions: sums and extrema inside an expression.
 source, stats, r = rg.Func("source"), rg.Func("stats"), rg.RDom([(0, 16)])
 source[x] = (x * 37) % 16
 stats[x] = rg.select(x == 0, rg.sum(source[r]), x == 1, rg.maximum(source[r]), x == 2, rg.minimum(source[r]),
                      rg.product(source[1 + r % 3]))
 show("stats", stats.realize([4]))
 
-# Exponential smoothing runs along rows; rows are independent.
+# Exponential smoothing is a scan along rows; rows are independent and run in parallel.
 smooth, r = rg.Func("smooth"), rg.RDom([(1, 7)])
 smooth[x, y] = rg.f32((x * 5 + y) % 4)
 smooth[r, y] = smooth[r - 1, y] * 0.5 + smooth[r, y] * 0.5

@@ -1,4 +1,4 @@
-"""Func.in_: another Func between a producer and its consumers, with a schedule of its own."""
+"""Func.in_: a wrapper between a producer and its consumers, with its own schedule."""
 import numpy
 import retrograde as rg
 from tracing import stores_told_to
@@ -16,7 +16,7 @@ def checksum(image):
     return (a * (1 + i + 3 * j)).sum()
 
 
-# One consumer reads the wrapper; the other still reads f.
+# One consumer reads the wrapper; the other reads f.
 f, g, h, both = (rg.Func(name) for name in ("f", "g", "h", "both"))
 f[x, y] = x * y + x
 g[x, y] = f[x, y] + f[x + 1, y]
@@ -48,7 +48,7 @@ counting(both, lanes)
 out = both.realize([8, 6])
 print(f"all consumers: {sum(lanes)} stores into the wrapper, checksum {checksum(out)}")
 
-# A tile of the input is copied to a place of its own before it is used.
+# Staging: each tile of the input is copied to local storage before it is used.
 j, i = numpy.indices((30, 40))
 image = rg.ImageParam("int32", 2, "input")
 image.set(((i * 3 + j * 5) % 17).astype("int32"))
@@ -59,7 +59,7 @@ blur.tile(x, y, xo, yo, xi, yi, 16, 8)
 clamped.in_(blur).compute_at(blur, xo).vectorize(x, 4)
 print("staged tiles: checksum", checksum(blur.realize([40, 30])))
 
-# The output itself: a reduction into registers, stored once.
+# A wrapper of the output: the reduction stays in registers and is stored once.
 product, k = rg.Func("product"), rg.RDom([(0, 12)])
 product[x, y] = 0
 product[x, y] += (x + k) * (k - y)

@@ -1,7 +1,7 @@
-"""Checking a gradient, and reading what it says of itself.
+"""Checking and explaining gradients.
 
-check_gradients compares adjoints with differences, the complex step and tangents, in double. explanations() says how each
-adjoint is made, what is kept, and why a gradient is zero.
+check_gradients compares adjoints with finite differences, the complex step and tangents, in double. explanations()
+reports how each adjoint is computed, what is stored, and why a gradient is zero.
 """
 import numpy as np
 import retrograde as rg
@@ -19,8 +19,7 @@ model[x] = rg.tanh(a[x] * a[x + 1]) * looked_up[x] + rg.floor(8 * a[x]) / 8
 loss[()] = rg.f32(0)
 loss[()] += rg.pow(model[r], 2)
 
-# ---- Is it right? Differences of a function with steps say nothing at the steps, so the step is left out of what is
-# checked. ----
+# ---- Is it right? Finite differences fail at steps, so the step function is left out of the check. ----
 smooth, smooth_loss = rg.Func("smooth"), rg.Func("smooth_loss")
 smooth[x] = rg.tanh(a[x] * a[x + 1]) * looked_up[x]
 smooth_loss[()] = rg.f32(0)
@@ -28,13 +27,13 @@ smooth_loss[()] += rg.pow(smooth[r], 2)
 report = rg.check_gradients(smooth_loss)
 claim(report.worst_error < 1e-8, "adjoints in double agree with differences to eight digits")
 for given in report.inputs:
-    claim(given.dot_product_error < 1e-12, "and with tangents to twelve: " + given.name)
-claim(not report.complex_step_refused, "the complex step, exact to rounding, was possible")
+    claim(given.dot_product_error < 1e-12, "and with tangents to twelve digits: " + given.name)
+claim(not report.complex_step_refused, "the complex step, exact up to rounding, was possible")
 for given in report.inputs:
-    claim(given.own_precision_error < 1e-4, "in float32, as it will run, four digits are right")
+    claim(given.own_precision_error < 1e-4, "in float32, as the program runs, four digits are correct")
 
 
-# ---- Would it have been noticed if it were wrong? A rule that forgets a factor of two. ----
+# ---- Would an error be noticed? This rule omits a factor of two. ----
 def half(context):
     adjoint = rg.Func("half")
     adjoint[i] = context.adjoint()[i] * a[i]  # should be 2 a(i)
@@ -47,9 +46,9 @@ rg.custom_adjoint(wrong, [a], half)
 wrong_loss[()] = rg.f32(0)
 wrong_loss[()] += wrong[r]
 quick = rg.GradientCheckOptions(directions=1)
-claim(rg.check_gradients(wrong_loss, [], quick).worst_error > 0.1, "a wrong rule is found")
+claim(rg.check_gradients(wrong_loss, [], quick).worst_error > 0.1, "check_gradients finds the wrong rule")
 
-# ---- What does it say of itself? ----
+# ---- Explanations of the gradient. ----
 d = rg.propagate_adjoints(loss)
 print(f"\nIn short:\n{d.explain()}")
 print(f"Fact by fact:\n{d.explain(rg.Detail.All)}")
@@ -61,11 +60,11 @@ def says(kind, subject):
 
 claim(says(rg.Explanation.Kind.Built, a.name()), "built: the gradient by a is a gather")
 claim(says(rg.Explanation.Kind.Scattered, table.name()),
-      "scattered: data decide where the table is read, so its gradient is a scatter")
+      "scattered: the table is read at data-dependent indices, so its gradient is a scatter")
 by_places = rg.propagate_adjoints(loss)
-by_places(places)  # of integers: asked for all the same
+by_places(places)  # integers have no derivative; requested on purpose
 claim(any(fact.kind == rg.Explanation.Kind.Zero for fact in by_places.explanations()),
-      "zero: what has no slope is told, with the reason")
+      "zero: the gradient by integers is zero, and the reason is reported")
 
-# ---- And what does it cost? ----
-claim(d.operations().ratio() < 6, "all slopes together take a few times the operations of the program")
+# ---- The cost of the gradient. ----
+claim(d.operations().ratio() < 6, "the whole gradient takes at most six times the operations of the program")

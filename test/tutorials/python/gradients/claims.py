@@ -1,9 +1,9 @@
-"""For the tutorials: what they say is checked."""
+"""Checked claims for the tutorials."""
 import sys
 
 
 def claim(holds, what):
-    """Says what was found, and ends the program where it is not so."""
+    """Prints the claim, and ends the program with status 1 if it does not hold."""
     print("yes:" if holds else "NO:", what)
     if not holds:
         sys.exit(1)

@@ -1,14 +1,14 @@
-"""Rules of your own.
+"""User-defined derivatives.
 
-A derivative that is right may still be of no use: that of a step is 0. custom_adjoint says how adjoints pass a Func,
-whatever its definition is; straight_through does the common case in one expression.
+A correct derivative may still be useless: the derivative of a step function is 0. custom_adjoint defines how adjoints
+pass through a Func, whatever its definition is. straight_through covers the common case in one expression.
 """
 import numpy as np
 import retrograde as rg
 from claims import claim
 
-# A signal that is stored with levels of a quarter, after a gain. Which gain and offset come closest to what is wanted
-# after storing?
+# A signal gets a gain and an offset and is stored in steps of a quarter. Which gain and offset bring the stored signal
+# closest to `wanted`?
 n = 32
 values = np.sin(np.float32(0.4) * np.arange(n, dtype="float32"))
 signal, wanted = rg.Buffer(values), rg.Buffer(np.round(4 * (1.7 * values + 0.6)) / 4)
@@ -25,16 +25,16 @@ def value_of(f):
     return f.realize()[()]
 
 
-# ---- Without a rule: zero, and the reason is told. ----
+# ---- Without a rule the gradient is zero, and the reason is reported. ----
 flat = rg.propagate_adjoints(loss)
 claim(value_of(flat(gain)) == 0 and value_of(flat(offset)) == 0,
-      "rounding has the derivative 0, and so has all before it")
+      "rounding has derivative 0, and so do its inputs")
 told = any(fact.kind == rg.Explanation.Kind.Zero and "round" in fact.detail for fact in flat.explanations())
-claim(told, "explanations() says that it is round that stops the gradient")
+claim(told, "explanations() names round as the reason")
 
 
-# ---- A rule: what reaches `stored` passes on to `scaled` as if nothing had been rounded. A rule gives an adjoint, over the
-# whole input, for each input that it is made for. ----
+# ---- A rule: the adjoint of `stored` passes on to `scaled` unchanged, as if nothing had been rounded. A rule returns
+# an adjoint, over the whole input, for each input that it covers. ----
 def pass_on(context):
     passed = rg.Func("passed")
     passed[i] = context.adjoint()[i]
@@ -52,7 +52,7 @@ for step in range(40):
     offset.set(offset.get() - down_offset)
 claim(losses[-1] < 0.1 * losses[0], "with the rule, gain and offset are learned through the rounding")
 
-# ---- The same without a Func of its own: one value with another's derivative. ----
+# ---- The same without a separate Func: one expression's value with another's derivative. ----
 inside, other = rg.Func("inside"), rg.Func("other")
 inside[x] = rg.straight_through(rg.round(4 * scaled[x]) / 4, scaled[x])
 other[()] = rg.f32(0)
@@ -61,7 +61,7 @@ e = rg.propagate_adjoints(other)
 claim(abs(value_of(e(gain)) - value_of(by_gain)) < 1e-5 and abs(value_of(e(offset)) - value_of(by_offset)) < 1e-5,
       "straight_through gives the same gradient")
 
-# ---- Nothing is dropped: what a rule does not speak of, and somebody asks for, is an error. ----
+# ---- Nothing is dropped silently: a requested gradient that the rule does not cover is an error. ----
 mixed, total = rg.Func("mixed"), rg.Func("sum")
 mixed[x] = scaled[x] * wanted[x]
 total[()] = rg.f32(0)
@@ -72,4 +72,4 @@ try:
     rg.propagate_adjoints(total, rg.AdjointOptions(wrt=[wanted]))
 except rg.CompileError as error:
     refusal = str(error)
-claim("mixed" in refusal, "an input that a rule forgets is an error")
+claim("mixed" in refusal, "a requested input that the rule does not cover is an error")

@@ -1,7 +1,7 @@
 """Schedules of adjoints.
 
-What propagate_adjoints makes are Funcs: compute_root, parallel, vectorize, compute_at mean for them what they mean for
-yours. Those that you say nothing about get a schedule of their own. A schedule never changes what is computed.
+propagate_adjoints creates Funcs, so that compute_root, parallel, vectorize and compute_at work as for your own Funcs.
+The compiler schedules those that have no directives. A schedule never changes the values.
 """
 import time
 
@@ -34,8 +34,8 @@ def milliseconds(f):
     return 200 * (time.perf_counter() - begin), result
 
 
-# ---- 1. As plainly as can be: everything at root, one element after the other. A directive on an adjoint says that you
-# schedule it yourself. ----
+# ---- 1. The plainest schedule: everything at root, in serial loops. A directive on an adjoint turns off the compiler's
+# own schedule. ----
 edges, loss = program()
 d = rg.propagate_adjoints(loss)
 slow = d(image)
@@ -43,13 +43,14 @@ d(edges).compute_root()
 slow.compute_root()
 plain_ms, plain = milliseconds(slow)
 
-# ---- 2. Nothing said: what is read several times and costs something is computed at root, in parallel and in vectors. ----
+# ---- 2. No directives: the compiler computes Funcs that are read several times and are not cheap at root, in parallel
+# and vectorized. ----
 edges, loss = program()
 chosen_ms, chosen = milliseconds(rg.propagate_adjoints(loss)(image))
-claim(np.abs(plain - chosen).max() < 1e-5, "the schedule that is chosen changes no value")
+claim(np.abs(plain - chosen).max() < 1e-5, "the compiler's schedule changes no value")
 
-# ---- 3. By hand: rows of the gradient in parallel and in vectors, the adjoint of `edges` a row at a time just before it is
-# needed. The gradient's dimensions have names, as any Func's. ----
+# ---- 3. By hand: rows of the gradient in parallel and vectorized, and the adjoint of `edges` one strip at a time, just
+# before it is needed. The gradient's dimensions have names like those of any Func. ----
 edges, loss = program()
 e = rg.propagate_adjoints(loss)
 gradient, edges_adj = e(image), e(edges)
@@ -58,8 +59,8 @@ claim(len(gradient.args()) == 2, "the gradient by an image has the image's dimen
 gradient.compute_root().split(gy, rows, gy, 32, GUARD).parallel(rows).vectorize(gx, 8, GUARD)
 edges_adj.compute_at(gradient, rows).vectorize(edges_adj.args()[0], 8, GUARD)
 by_hand_ms, by_hand = milliseconds(gradient)
-claim(np.abs(plain - by_hand).max() < 1e-5, "neither does a schedule by hand")
+claim(np.abs(plain - by_hand).max() < 1e-5, "a schedule by hand changes no value either")
 
-# ---- All that was made can be looked at, and scheduled, in the order in which it is computed. ----
+# ---- funcs() returns all generated Funcs in the order in which they are computed, for inspection or scheduling. ----
 claim(len(e.funcs()) >= 3, "funcs() has the adjoints of soft, edges and the image")
-print("plain %.2f ms, chosen %.2f ms, by hand %.2f ms" % (plain_ms, chosen_ms, by_hand_ms))
+print("plain %.2f ms, default %.2f ms, by hand %.2f ms" % (plain_ms, chosen_ms, by_hand_ms))
