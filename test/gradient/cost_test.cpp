@@ -22,18 +22,18 @@ enum class Reason { Zeros, Stable, Steps, Again, InPlace };
 const char* text_of(Reason reason) {
   switch (reason) {
     case Reason::Zeros:
-      return "most elements of the gradient are never read and set to 0";
+      return "most elements of the input are never read; their gradient is set to 0";
     case Reason::Stable:
-      return "the program is one function, whose stable partials are several operations";
+      return "the program is one function, whose stable partials take several operations";
     case Reason::Steps:
-      return "the nonlinear parts of a step are computed again, running backward and for the "
+      return "the nonlinear parts of a step are recomputed, for the backward run and for the "
              "inputs";
     case Reason::Again:
-      return "some values are computed again, which takes less time than memory does";
+      return "some values are recomputed, which is faster than loading them";
     case Reason::InPlace:
       break;
   }
-  return "every iteration reads what others overwrite, which is computed again";
+  return "every iteration reads values that others overwrite; they are recomputed";
 }
 
 const std::map<std::string, Reason> exceptions = {
@@ -107,21 +107,29 @@ double median() {
 std::string page() {
   std::ostringstream out;
   out << std::fixed << std::setprecision(1);
-  out << "# What gradients cost\n\nWritten by `test/gradient/cost_test.cpp`. Operations of a "
-         "gradient "
-         "by all inputs, over those of its\nprogram, as `Derivative::operations()` counts them "
-         "(loads and stores, additions, products, functions)\nunder the default schedules: at most "
-      << limit << " times, on all but " << exceptions.size() << " of " << costs().size()
-      << " programs; the median is " << median() << ".\n\n"
-      << "The exceptions, each a constant factor, whatever the size:\n\n| program | ratio | reason "
-         "|\n|---|---|---|\n";
+  out << R"(# Operation counts of gradients
+
+The ratio of a program is the number of operations of its gradient with respect to all inputs, divided by the number
+of operations of the program. `Derivative::operations()` counts both under the default schedules: loads and stores,
+additions, products and function calls. The ratio is at most )"
+      << limit << " for all but " << exceptions.size() << " of " << costs().size()
+      << " programs; the median is " << median() << R"(.
+
+`test/gradient/cost_test.cpp` computes the ratios and writes this page. `tools/bench gradients` measures run times.
+
+## Exceptions
+
+Each exception is a constant factor, independent of the size.
+
+| program | ratio | reason |
+|---|---|---|
+)";
   for (const Cost& cost : costs()) {
     const auto listed = exceptions.find(cost.name);
     if (listed == exceptions.end()) continue;
     out << "| `" << cost.name << "` | " << cost.ratio() << " | " << text_of(listed->second)
         << " |\n";
   }
-  out << "\nRun times: `tools/bench gradients`.\n";
   return out.str();
 }
 

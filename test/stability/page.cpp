@@ -7,23 +7,23 @@ namespace retrograde::stability {
 
 namespace {
 
-const char* const introduction = R"(# Stability: how many digits gradients keep
+const char* const introduction = R"(# Stability: the accuracy of gradients
 
-Written by `test/stability/stability_suite_test.cpp`, which runs every program below, differentiated by the
-compiler, in float32 and as machine code, on every combination of ordinary and extreme numbers (1 or 2 inputs) or
-1,500 random sets of them (more inputs), and compares with true gradients.
+This page shows how accurate float32 gradients are at ordinary and at extreme inputs. `test/stability` differentiates
+every program below with the compiler, runs the gradient as machine code and compares it with the true gradient.
+Programs with 1 or 2 inputs run on every combination of ordinary and extreme numbers, others on 1,500 random ones.
 
-- **A cell** bounds the error of a gradient, relative to its largest element, on cases whose most extreme number is
-  of that kind: *large* is above 50 (exp leaves its range), *tiny* below 1e-18 (the square vanishes), *huge* above
-  1e18 (the square overflows). 1e-6 is a few roundings; "none" means that no digit is left; "–" that no true gradient
-  exists there.
-- **Every gradient of these cells is finite**: where the true gradient is, and the chain rule has a way through
-  float32 at all. A cell that says "not finite" is an exception: what rounding left of a cancellation overflows.
-- **outside**: cases in which it has none, because a value of the program itself on the path taken, or the exact
-  adjoint of one, overflows, vanishes or has lost all its digits in float32. How many of their gradients are finite,
-  and the error of these. Written in another way, the program may have none of them.
+- **A column** holds the cases whose most extreme number is of that kind. *large* numbers are above 50, where exp may
+  overflow; *tiny* ones are below 1e-18, where the square vanishes; *huge* ones are above 1e18, where it overflows.
+- **A cell** bounds the error of the gradient relative to its largest element. 1e-6 is a few roundings; "none" means no
+  correct digit. "–" means that no case of the column has a true gradient.
+- **Finite gradients.** Every gradient in these columns is finite if the true gradient is. "not finite" marks an
+  exception: the rounding error of a cancellation overflows.
+- **outside** holds the cases that float32 cannot represent: a value on the path taken, or its exact adjoint, overflows,
+  vanishes or loses all its digits. The cell states how many of their gradients are finite, and the error of those.
+  Another formulation of the program may avoid such cases.
 
-Bounds are powers of ten, at least twice what was measured.
+Bounds are powers of ten, at least twice the measured error. `test/stability/stability_suite_test.cpp` writes the page.
 )";
 
 constexpr double smallest_bound = 1e-6, no_digit = 1;
