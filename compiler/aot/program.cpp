@@ -76,8 +76,7 @@ const halide_buffer_t* embedded_buffer(const ir::LoweredArgument& argument,
   if (parameter && parameter->is_literal && parameter->buffer && parameter->buffer->host)
     return parameter->buffer;
   user_error("compile the function " + quoted(function),
-             "a Buffer that is no argument is embedded with its data",
-             quoted(argument.name) + " has none",
+             "a Buffer that is not an argument has data", quoted(argument.name) + " has none",
              "Give it data, or add it to the list of arguments");
 }
 

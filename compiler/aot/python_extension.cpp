@@ -226,7 +226,7 @@ bool is_bfloat(const ExportArgument& argument) { return argument.type.is_bfloat(
 void check_scalar(const DeclaredFunction& function, const ExportArgument& argument) {
   if (argument.is_buffer() || !argument.type.is_float() || argument.type.bits() > 16) return;
   unsupported("write a Python module of " + quoted(function.name),
-              "Python has numbers for the scalars",
+              "Python supports the scalars' types",
               quoted(argument.name) + " is of type " + to_string(argument.type),
               "Take a float32 and cast it");
 }

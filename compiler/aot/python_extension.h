@@ -22,7 +22,7 @@
 namespace retrograde::aot {
 
 // Without functions: defines a module whose functions are in other files.
-// Requires: Python has numbers for the scalars (Unsupported).
+// Requires: Python supports the scalars' types (Unsupported).
 std::string python_extension_text(const std::string& module_name, const Target& target,
                                   const std::vector<DeclaredFunction>& functions);
 

@@ -38,8 +38,7 @@ std::string scalar_type(const ExportArgument& argument) {
            : type.bits() == 32 ? "at::kInt"
                                : "at::kLong";
   if (type.is_uint() && type.bits() == 8) return "at::kByte";
-  unsupported("write a wrapper for PyTorch",
-              "what PyTorch calls has tensors and numbers that PyTorch has",
+  unsupported("write a wrapper for PyTorch", "PyTorch supports the types of all arguments",
               quoted(argument.name) + " holds " + to_string(type), "Use another element type");
 }
 
@@ -61,7 +60,7 @@ TorchFunction torch_function_of(const DeclaredFunction& declared, const Target& 
       declared.name, declared.signature.user_context, target.has_gpu_feature(), {}, {}, {}};
   if (name_parts(declared.name).size() > 1) {
     unsupported("write a wrapper for PyTorch of " + quoted(declared.name),
-                "what PyTorch calls has a name of C", "it is in a namespace",
+                "the function's name is a C name", "it is in a namespace",
                 "Leave the namespace out");
   }
   for (const ExportArgument& argument : declared.signature.arguments) {

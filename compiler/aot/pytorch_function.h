@@ -19,8 +19,7 @@ struct TorchFunction {
   std::vector<ExportArgument> inputs, outputs, images;  // images: the inputs that are buffers
 };
 
-// Requires: what PyTorch calls has tensors and numbers that PyTorch has (Unsupported); what PyTorch
-// calls has a name of C (Unsupported).
+// Requires: PyTorch supports the types of all arguments (Unsupported); the function's name is a C name (Unsupported).
 TorchFunction torch_function_of(const DeclaredFunction& declared, const Target& target);
 
 // The argument's name as a C++ identifier.

@@ -38,8 +38,7 @@ bool has_runtime_object(const Target& target) { return !embedded_object(target).
 std::string runtime_object(const Target& target) {
   if (std::string object = embedded_object(target); !object.empty()) return object;
   unsupported("add the runtime for target " + quoted(target.to_string()),
-              "a runtime is there for this machine and for those that a cross compiler was found "
-              "for when the compiler was built",
+              "the compiler was built with a runtime for the target",
               "there is none for this target",
               "Add \"no_runtime\" to the target, compile the folder runtime for it and link that");
 }

@@ -74,7 +74,9 @@ AtomicScatters::AtomicScatters(const std::vector<FuncPtr>& outputs,
       sizes_(sizes) {
   if (!is_on_ || !request.atomic_parts) return;
   const Readers readers(outputs, stored);
-  const auto is_free = [&](const FuncPtr& f) { return !is_touched(*f) && !but.contains(f.get()); };
+  const auto is_free = [&](const FuncPtr& f) {
+    return !has_directives(*f) && !but.contains(f.get());
+  };
   for (const FuncPtr& sum : stored) {
     if (!is_free(sum) || sum->is_extern() || sum->updates.size() != 1 || sum->args.empty())
       continue;

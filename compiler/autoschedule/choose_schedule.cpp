@@ -62,7 +62,7 @@ std::string reason_against(const std::vector<FuncPtr>& outputs, const ScheduleRe
                    "Search for a target without one, or leave the search out");
   }
   const std::vector<FuncPtr> order = topological_order(outputs);
-  const auto is_left = [](const FuncPtr& f) { return !f->is_extern() && !is_touched(*f); };
+  const auto is_left = [](const FuncPtr& f) { return !f->is_extern() && !has_directives(*f); };
   if (std::ranges::none_of(order, is_left)) {
     return note_of(outputs, "a search is for what nobody scheduled", "every Func has a directive",
                    "Search before anything else schedules them");

@@ -34,7 +34,7 @@ class PlaceFinder {
                       listed(some, [](const FuncPtr& f) { return quoted(f->name); })),
                  "Name one of them, or give the Func itself");
     }
-    return is_touched(**found) ? nullptr : *found;
+    return has_directives(**found) ? nullptr : *found;
   }
 
   void check_stored(const FuncPtr& f) const {

@@ -133,7 +133,7 @@ FuncPtr sum_rows(const FuncPtr& f, int stage) { return cut(f, stage); }
 void cut_reductions(const std::vector<FuncPtr>& outputs, const SizeEstimate& sizes,
                     const std::unordered_set<const Symbol*>& but) {
   for (const FuncPtr& f : topological_order(outputs)) {
-    if (is_touched(*f) || f->is_extern() || but.contains(f.get())) continue;
+    if (has_directives(*f) || f->is_extern() || but.contains(f.get())) continue;
     for (int s = 1; s < f->stage_count(); ++s) {
       if (is_long_sum(*f, f->stage(s), sizes)) cut(f, s);
     }

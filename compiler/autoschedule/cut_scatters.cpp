@@ -88,7 +88,7 @@ void cut_rows(const FuncPtr& f) {
 void cut_scatters(const std::vector<FuncPtr>& outputs, const SizeEstimate& sizes,
                   const std::unordered_set<const Symbol*>& but) {
   for (const FuncPtr& f : topological_order(outputs)) {
-    if (is_touched(*f) || f->is_extern() || but.contains(f.get())) continue;
+    if (has_directives(*f) || f->is_extern() || but.contains(f.get())) continue;
     if (is_worth_parts(*f, sizes)) cut_rows(f);
   }
 }

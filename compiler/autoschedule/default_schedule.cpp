@@ -145,7 +145,7 @@ void name_inlined(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr
   for (const FuncPtr& f : order) {
     const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
     const bool is_inlined = f->schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined;
-    if (is_inlined && !is_touched(*f) && f->is_pure() && !is_output) Func(f).compute_inline();
+    if (is_inlined && !has_directives(*f) && f->is_pure() && !is_output) Func(f).compute_inline();
   }
 }
 
@@ -201,7 +201,7 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   std::vector<FuncPtr> given;    // loops, at root
   std::vector<FuncPtr> started;  // sums of these, in their tiles
   for (const FuncPtr& f : stored) {
-    if (is_touched(*f)) continue;
+    if (has_directives(*f)) continue;
     Func(f).compute_root();
     if (f->is_extern() || limits.levels.contains(f.get()) || atomic.schedule(f)) continue;
     if (request.makes(Decision::ScatterStrategy) && schedule_scatter(f, slices, sizes)) {
@@ -220,14 +220,14 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   if (may_choose) unroll_choices(given, fixed, sizes);
   const auto give_rows = [&](const FuncPtr& sum, const std::vector<size_t>& dimensions) {
     std::erase(started, sum);
-    graph::take_back_loops(*sum);
+    graph::reset_loops(*sum);
     SizeEstimate of_rows = sizes;
     for (const size_t d : dimensions) of_rows = of_rows.with_extent(*sum, d, 1);
     give_loops(sum, request, of_rows, started);
   };
   const auto give_tile = [&](const FuncPtr& sum, const RegisterTile& tile) {
     std::erase(started, sum);
-    graph::take_back_loops(*sum);
+    graph::reset_loops(*sum);
     for (int s = 0; s < sum->stage_count(); ++s) give_loops_of_tile(sum, s, tile, request, sizes);
   };
   move_and_join({outputs, stored, given, whole, before, sizes}, request, give_rows, give_tile);

@@ -150,7 +150,7 @@ using LoopNames = std::map<std::string, std::string>;  // of the sum's loops: th
 
 // Gives the reader, whatever loops it has, those of the sum's tiles.
 LoopNames give_passed_loops(const FuncPtr& reader, const PassedLoops& passed, int lanes) {
-  graph::take_back_loops(*reader);
+  graph::reset_loops(*reader);
   Stage stage(reader, 0);
   LoopNames names;
   std::map<size_t, std::string> parts;  // of dimensions; in the end of those in the tile

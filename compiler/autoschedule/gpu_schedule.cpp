@@ -142,7 +142,7 @@ GpuSchedule schedule_on_gpu(const std::vector<FuncPtr>& outputs, const std::vect
                             const ScheduleRequest& request) {
   std::vector<FuncPtr> free;
   std::ranges::copy_if(stored, std::back_inserter(free),
-                       [](const FuncPtr& f) { return !is_touched(*f); });
+                       [](const FuncPtr& f) { return !has_directives(*f); });
   for (const FuncPtr& f : free) Func(f).compute_root();
   std::erase_if(free, [&](const FuncPtr& f) { return f->is_extern() || but.contains(f.get()); });
   const std::vector<FuncPtr> made =

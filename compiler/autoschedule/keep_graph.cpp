@@ -69,7 +69,7 @@ std::string file_name(const std::string& name, const std::string& contents) {
 void keep_graph(const std::string& name, const std::vector<FuncPtr>& outputs) {
   const char* folder = std::getenv("RETROGRADE_GRAPHS");
   if (!folder || !*folder) return;
-  const auto is_left = [](const FuncPtr& f) { return !f->is_extern() && !is_touched(*f); };
+  const auto is_left = [](const FuncPtr& f) { return !f->is_extern() && !has_directives(*f); };
   if (std::ranges::none_of(topological_order(outputs), is_left)) return;
   const std::string contents = text_with_sizes(outputs);
   std::ofstream(std::string(folder) + "/" + file_name(name, contents)) << contents;

@@ -18,7 +18,7 @@ bool is_one_of(const FuncPtr& f, const std::vector<FuncPtr>& some) {
 }
 
 bool is_block_of_sums(const FuncContents& f) {
-  return f.made && f.made->blocks > 0 && !is_touched(f);
+  return f.made && f.made->blocks > 0 && !has_directives(f);
 }
 
 bool calls_host(const Call& call) {

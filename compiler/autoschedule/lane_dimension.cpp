@@ -38,7 +38,7 @@ LaneDimensions::LaneDimensions(const std::vector<FuncPtr>& outputs,
   const auto may_turn = [&](const FuncPtr& f) {
     const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
     return f->is_pure() && !f->is_extern() && !f->made && !is_output && f->args.size() > 1 &&
-           !is_touched(*f) && 2 * sizes.extent(*f, 0).value_or(lanes) <= lanes;
+           !has_directives(*f) && 2 * sizes.extent(*f, 0).value_or(lanes) <= lanes;
   };
   std::optional<StoredReads> reads;
   for (auto f = stored.rbegin(); f != stored.rend(); ++f) {  // readers first

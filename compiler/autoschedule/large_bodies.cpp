@@ -30,7 +30,7 @@ std::vector<FuncPtr> large_bodies(const std::vector<FuncPtr>& outputs,
   }
   std::optional<PlacementLimits> limits;  // large bodies are rare, and these take an analysis
   const auto can_move = [&](const FuncPtr& f) {
-    if (is_touched(*f)) return false;
+    if (has_directives(*f)) return false;
     if (!limits) limits = placement_limits(order);
     return !limits->stay.contains(f.get());
   };

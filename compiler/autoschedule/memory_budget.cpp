@@ -171,7 +171,7 @@ class BudgetedSchedule {
     const PlacementLimits limits = placement_limits(order);
     std::unordered_map<std::string, FuncPtr> result;
     for (const FuncPtr& f : order) {
-      const bool may_move = f->is_pure() && !is_touched(*f) && !is_among(f, outputs_) &&
+      const bool may_move = f->is_pure() && !has_directives(*f) && !is_among(f, outputs_) &&
                             !limits.need_root.contains(f.get()) && !limits.levels.contains(f.get());
       const auto is_it = [&](const FuncName& named) { return named.name == f->name; };
       if (may_move && std::ranges::none_of(request_.options.store, is_it)) result[f->name] = f;

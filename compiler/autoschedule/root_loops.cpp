@@ -72,7 +72,7 @@ FuncPtr block_of(const Definition& stage) {
       const auto* call = e.as<Call>();
       const FuncPtr callee = call && call->call_type == CallType::Func ? func_of(*call) : nullptr;
       const bool is_block = callee && callee->made && callee->made->blocks > 0;
-      if (is_block && !is_touched(*callee)) result = callee;
+      if (is_block && !has_directives(*callee)) result = callee;
       return true;
     });
   });

@@ -204,7 +204,7 @@ class ReadOfTiles {
 FuncPtr inlined_source(const Call& call) {
   const FuncPtr source = call.call_type == CallType::Func ? func_of(call) : nullptr;
   const bool is_free = source && source->is_pure() && !source->is_extern() &&
-                       !is_touched(*source) && !source->args.empty() &&
+                       !has_directives(*source) && !source->args.empty() &&
                        source->schedule.compute_level.kind == graph::LoopLevel::Kind::Inlined;
   return is_free ? source : nullptr;
 }

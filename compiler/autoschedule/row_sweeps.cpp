@@ -73,7 +73,9 @@ class SweepFinder {
   const StageReads reads_;
   std::vector<RowSweep> sweeps_;
 
-  bool may_schedule(const FuncPtr& f) const { return !but_.contains(f.get()) && !is_touched(*f); }
+  bool may_schedule(const FuncPtr& f) const {
+    return !but_.contains(f.get()) && !has_directives(*f);
+  }
 
   bool may_move(const FuncPtr& f) const {
     const bool is_output = std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
@@ -260,7 +262,7 @@ void sweep_rows(const std::vector<FuncPtr>& outputs, std::vector<FuncPtr>& store
   if (!has_large) return;
   for (const RowSweep& sweep : SweepFinder(outputs, stored, but, sizes).find())
     SweepScheduler(sweep).give();
-  std::erase_if(stored, [](const FuncPtr& f) { return is_touched(*f); });
+  std::erase_if(stored, [](const FuncPtr& f) { return has_directives(*f); });
 }
 
 }  // namespace retrograde::autoschedule

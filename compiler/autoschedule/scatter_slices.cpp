@@ -77,7 +77,7 @@ std::optional<size_t> dimension_of(const FuncContents& reader,
 }
 
 bool may_be_reader(const FuncContents& f) {
-  return !is_touched(f) && f.is_pure() && !f.is_extern() && f.args.size() > 1;
+  return !has_directives(f) && f.is_pure() && !f.is_extern() && f.args.size() > 1;
 }
 
 // The slices of a scatter whose dimensions `apart` have places of their own for each value.
@@ -117,7 +117,7 @@ SlicedScatters::SlicedScatters(const std::vector<FuncPtr>& outputs,
   std::optional<Reads> reads;
   for (const FuncPtr& f : stored) {
     const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
-    const auto lanes = is_touched(*f) || is_output || but.contains(f.get())
+    const auto lanes = has_directives(*f) || is_output || but.contains(f.get())
                            ? std::nullopt
                            : scatter_lanes(*f, sizes);
     if (!lanes) continue;

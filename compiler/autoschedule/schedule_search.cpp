@@ -124,7 +124,7 @@ class SearchSteps {
     std::vector<std::pair<double, std::string>> weights;
     for (const FuncPtr& f : topological_order(outputs)) {
       const bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
-      if (!f->is_pure() || is_touched(*f) || is_output || is_said(request, f->name)) continue;
+      if (!f->is_pure() || has_directives(*f) || is_output || is_said(request, f->name)) continue;
       const auto use = uses.find(f.get());
       if (use == uses.end() || use->second.reads <= 1) continue;
       const auto elements = static_cast<double>(sizes.bytes(*f)) / total_bytes(f->types);

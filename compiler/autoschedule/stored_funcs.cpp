@@ -63,13 +63,14 @@ class StorageChooser {
   std::vector<FuncPtr> choose() {
     for (const FuncPtr& f : order_) count_reads(*f);
     const bool by_hand =
-        !limits_ && std::any_of(order_.begin(), order_.end(),
-                                [](const FuncPtr& f) { return !is_adjoint(f) && is_touched(*f); });
+        !limits_ && std::any_of(order_.begin(), order_.end(), [](const FuncPtr& f) {
+          return !is_adjoint(f) && has_directives(*f);
+        });
     std::vector<FuncPtr> result;
     for (const FuncPtr& f : order_) {  // producers first: the cost of what is inlined is known
       uses_[f.get()].operations = operations(*f);
       uses_[f.get()].share_of_way = share_of_way(*f);
-      if (is_touched(*f)) continue;
+      if (has_directives(*f)) continue;
       // Who schedules the primal means an untouched primal Func to be inlined, unless that
       // explodes.
       const bool left_inline = by_hand && !is_adjoint(f);

@@ -43,7 +43,7 @@ MachineLimits limits_of(const ScheduleRequest& request) {
 
 TaskSizes::TaskSizes(const std::vector<FuncPtr>& order) {
   for (const FuncPtr& f : order) {
-    if (is_touched(*f)) touched_.insert(f.get());
+    if (has_directives(*f)) touched_.insert(f.get());
   }
 }
 

@@ -156,7 +156,7 @@ std::vector<Values> realize_values(Func& f, const Shape& shape) {
 
 Func scheduled_for(const Func& f, const Shape& shape) {
   for (const FuncPtr& each : topological_order({f.function()})) {
-    if (is_touched(*each) || each->is_extern()) return f;
+    if (has_directives(*each) || each->is_extern()) return f;
   }
   Func copy(graph::copy_graph({f.function()}).outputs[0]);
   const std::vector<Var> args = copy.args();

@@ -48,9 +48,8 @@ llvm::CallInst* FunctionContext::call_runtime(const std::string& name, llvm::Typ
                                               const std::vector<Value*>& args,
                                               const std::vector<Value*>* more) {
   if (!frame.context) {
-    unsupported("run a part of a pipeline on a GPU",
-                "a kernel computes, and calls nothing of the host", "it would call " + quoted(name),
-                "Compute that part on the host");
+    unsupported("run a part of a pipeline on a GPU", "a kernel cannot call functions of the host",
+                "it would call " + quoted(name), "Compute that part on the host");
   }
   std::vector<Value*> all = {frame.context};
   all.insert(all.end(), args.begin(), args.end());

@@ -21,6 +21,10 @@ struct NamedEntities {
   ParameterPtr buffer_of_fact(const std::string& name) const;
 };
 
+// Declares the types that graph text omits where it mentions a Func, an image or a parameter.
+void declare(const FuncContents& f, NameTypes& types);
+void declare(const ParameterContents& parameter, NameTypes& types);
+
 // Attaches symbols to the calls and variables in expressions of `f` (null: outside of Funcs):
 // Funcs, images, parameters, buffer metadata, and the variables of `domain` (may be null).
 class Binder {

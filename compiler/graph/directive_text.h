@@ -19,7 +19,7 @@ std::optional<Directive> parse_directive(const std::string& line);
 bool equal(const Directive& a, const Directive& b);
 
 // The arguments of a line such as "name(a, b, _)"; _ gives an undefined one.
-std::vector<Expr> parse_arguments(const std::string& line);
+std::vector<Expr> parse_arguments(const std::string& line, const NameTypes& declared = {});
 std::string print_argument(const Expr& e);  // "_" when undefined
 
 }  // namespace retrograde::graph

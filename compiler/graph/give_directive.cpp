@@ -109,7 +109,7 @@ void give_directive(const SchedulePlace& place, Directive directive) {
   log_directive(place, std::move(directive));
 }
 
-void take_back_loops(FuncContents& f) {
+void reset_loops(FuncContents& f) {
   std::erase_if(f.log, [](const LoggedDirective& logged) { return logged.stage >= 0; });
   for (int s = 0; s < f.stage_count(); ++s) {
     Definition& stage = f.stage(s);
@@ -119,7 +119,7 @@ void take_back_loops(FuncContents& f) {
   f.version++;
 }
 
-bool is_touched(const FuncContents& f) {
+bool has_directives(const FuncContents& f) {
   if (f.schedule.is_given) return true;
   for (int s = 0; s < f.stage_count(); ++s) {
     if (f.stage(s).schedule.is_given) return true;

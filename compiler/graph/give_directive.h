@@ -34,11 +34,11 @@ void log_directive(const SchedulePlace& place, Directive directive);
 
 // Resets the schedules of all stages to the loops of their definitions. No Func may be computed in
 // these loops or fused with them.
-void take_back_loops(FuncContents& f);
+void reset_loops(FuncContents& f);
 
 // Whether the Func or one of its stages has directives, apart from those about sizes (bounds,
 // alignments of bounds, estimates).
-bool is_touched(const FuncContents& f);
+bool has_directives(const FuncContents& f);
 
 // The index of this schedule's specialization for the condition; -1 when there is none.
 int specialization_for(const StageLoops& schedule, const Expr& condition);

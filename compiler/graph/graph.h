@@ -20,8 +20,8 @@
 //       place x
 //       place `r$0.y`
 //       loop(`r$0.y`, 0, 5)              points(k, 0, 2): two points updated together
-//       where (`r$0.y` < x)
-//       value (blur(x, `r$0.y`):float32 + 1f)
+//       where `r$0.y` < x
+//       value blur(x, `r$0.y`) + 1f
 //     schedule
 //       compute_at(loop(out, x, 0))
 //   output blur

@@ -11,17 +11,18 @@ namespace retrograde::ir {
 bool touches_several_elements(const Stmt& update) {
   Substitution lets;
   walk(update, [&](const LetStmt& let) { lets[let.name] = substitute(let.value, lets); });
-  const auto in_full = [&](const Expr& index) { return substitute(index, lets); };
+  const auto expand_lets_in_scope = [&](const Expr& index) { return substitute(index, lets); };
   std::unordered_map<std::string, Expr> stored;
   bool several = false;
   walk(update, [&](const Store& store) {
-    const Expr index = in_full(store.index);
+    const Expr index = expand_lets_in_scope(store.index);
     const auto first = stored.emplace(store.name, index).first;
     several |= !equal(first->second, index);
   });
   return several || any_node(update, [&](const Load& load) {
            const auto element = stored.find(load.name);
-           return element != stored.end() && !equal(in_full(load.index), element->second);
+           return element != stored.end() &&
+                  !equal(expand_lets_in_scope(load.index), element->second);
          });
 }
 

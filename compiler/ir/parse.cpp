@@ -1,5 +1,4 @@
-// Recursive descent over IR text; print.cpp shows the language. Also accepts operators without
-// parentheses, with C's precedence.
+// A recursive-descent parser of IR text; print.cpp shows the language.
 #include "ir/parse.h"
 
 #include <algorithm>
@@ -110,7 +109,7 @@ class Parser {
     take();
     return result;
   }
-  // The type behind a mention of a name, or the one that its name implies.
+  // The type written after a mention of a name, or else the implied one.
   Type type_suffix(NameUse use, const std::string& name, int lanes, int component = 0) {
     const Type result = accept(":") ? type() : types_.implied(use, name, lanes, component);
     types_.mention(use, name, use == NameUse::Variable ? result : result.element_of(), component);

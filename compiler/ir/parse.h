@@ -7,9 +7,11 @@
 #include "ir/expr.h"
 
 namespace retrograde::ir {
+class NameTypes;
+
 // Throws UserError with line, column, the expected and the found token.
 Expr parse_expr(const std::string& text);
-// With the types of names that the text itself does not declare.
+// `declared` holds types of names that the text itself does not declare.
 Expr parse_expr(const std::string& text, const NameTypes& declared);
 Stmt parse_stmt(const std::string& text);
 }  // namespace retrograde::ir

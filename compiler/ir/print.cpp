@@ -1,19 +1,19 @@
-// IR text.
+// Prints IR as text.
 //
 // Expressions
 //   3  2.5f  7_u8  1.5_f64  true  nan_f32  "text"    immediates: int32, float32, others by suffix
 //   x  y:float32  `odd name`                         variables
-//   a + b * c  min(a, b)  !c  select(c, a, b)        C's precedence; parentheses only where it asks for them
-//   float32x8(v)  reinterpret<int32>(v)
+//   a + b * c  min(a, b)  !c  select(c, a, b)        C's precedence, no redundant parentheses
+//   float32x8(v)  reinterpret<int32>(v)              casts
 //   ramp(b, s, 8)  broadcast(v, 8)  shuffle(u, v; 0, 2, 1)  reduce(add, v, 1)
 //   a[i]:float32  a[i if p]:float32                  loads
 //   floor(v)  abs<uint32>(v)                         operators; <type> unless the first argument's
 //   f(x, y).1:float32  image in(x, y):uint8  extern hypotf(x, y):float32
 //   (let t = v in body)
 //   {#0 = v; #1 = w; body}                           nodes that a large expression uses repeatedly
-// A type behind a colon is left out where it is known: from the name's declaration (let, for, allocate, realize), else
-// from its first store or mention. What is mentioned first without a type is int32. A load has the lanes of its index,
-// a call those of its arguments, unless a type says otherwise.
+// The type after a colon is omitted where it is known: from the name's declaration (let, for, allocate, realize),
+// otherwise from its first store or mention. A first mention without a type means int32. A load has the lanes of its
+// index and a call those of its arguments, unless a type is written.
 // Statements
 //   let t = v                                        its body is the rest of the block
 //   assert(c, e)  free a  evaluate v  a[i if p] = v  f(x, y if p) = {u, v}
@@ -22,7 +22,7 @@
 //                                                    gpu_block, gpu_thread, gpu_lane
 //   launch k blocks(x, y, z) threads(32, 8, 1) shared(bytes) {..}
 //   realize f(float32, int8) auto [min, extent], [min, extent] {..}
-//   allocate a[elements]:float32 heap {..}           of a kernel's shared memory: gpu_shared at bytes {..}
+//   allocate a[elements]:float32 heap {..}           in a kernel's shared memory: gpu_shared at bytes {..}
 #include "ir/print.h"
 
 #include <algorithm>
@@ -111,6 +111,11 @@ class Sharing {
   std::vector<Expr> order_;
 };
 
+bool is_comparison(Kind kind) {
+  const InfixOperator* op = infix_operator(kind);
+  return op->precedence > infix_operator(Kind::And)->precedence && op->precedence < sum_precedence;
+}
+
 // Appends text and expressions in turn.
 class ExprPrinter {
  public:
@@ -147,7 +152,7 @@ class ExprPrinter {
     types_.mention(use, name, use == NameUse::Variable ? type : type.element_of(), component);
     if (!is_implied) put(':' + to_string(type));
   }
-  // An operand that binds as tightly as `precedence` needs no parentheses.
+  // An operand that is parenthesised if it binds less tightly than `precedence`.
   struct Operand {
     const Expr& e;
     int precedence;
@@ -185,7 +190,7 @@ class ExprPrinter {
         [&](const Reinterpret& n) { write("reinterpret<", to_string(n.type), ">(", n.value, ")"); },
         [&](const Binary& n) {
           if (const InfixOperator* op = infix_operator(n.kind)) {
-            // C would read a comparison of comparisons from left to right; few readers would.
+            // Parentheses around a comparison of comparisons help readers; the parser needs none.
             const int left = is_comparison(n.kind) ? sum_precedence : op->precedence;
             return write(Operand{n.a, left}, " ", op->symbol, " ",
                          Operand{n.b, std::max(left, op->precedence + 1)});

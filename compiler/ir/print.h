@@ -12,12 +12,14 @@ std::ostream& operator<<(std::ostream& out, const Type& type);
 std::ostream& operator<<(std::ostream& out, const Expr& e);
 std::ostream& operator<<(std::ostream& out, const Stmt& s);
 namespace ir {
+class NameTypes;
+
 // A function object rather than functions: argument-dependent lookup must not find it where a user
 // writes print(e), an operator of the language.
 struct PrintFunction {
   std::string operator()(const Expr& e) const;
   std::string operator()(const Stmt& s) const;
-  // Leaves out the types that `types` implies, and adds those of the names that it mentions.
+  // Omits the types that `types` implies, and adds the names that `e` mentions.
   std::string operator()(const Expr& e, NameTypes& types) const;
 };
 inline constexpr PrintFunction print{};

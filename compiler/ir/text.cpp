@@ -33,7 +33,7 @@ std::string kind_word(Kind op) {
 
 namespace {
 
-// Precedences are C's.
+// Precedences are C's; sum_precedence is that of + and -.
 constexpr InfixOperator infix_operators[] = {
     {Kind::Or, "||", 0}, {Kind::And, "&&", 1}, {Kind::EQ, "==", 2}, {Kind::NE, "!=", 2},
     {Kind::LT, "<", 3},  {Kind::LE, "<=", 3},  {Kind::GT, ">", 3},  {Kind::GE, ">=", 3},

@@ -19,6 +19,7 @@ struct InfixOperator {
   const char* symbol;
   int precedence;
 };
+constexpr int sum_precedence = 4, prefix_precedence = 6;
 // Null when `kind` is not an infix operator.
 const InfixOperator* infix_operator(Kind kind);
 const InfixOperator* infix_operator(const std::string& symbol);
@@ -28,24 +29,25 @@ bool read_type(const std::string& word, Type& type);
 // The name, in back quotes when it is no identifier or is reserved.
 std::string quote_name(const std::string& name);
 
-// What a mention of a name names: a variable, the elements of a buffer, the values of a Func or C function.
+// The kinds of names: variables, buffers with their elements, Funcs and C functions with their values.
 enum class NameUse : char { Variable = 'v', Buffer = '[', Call = '(' };
 
-// The types that names have where the text leaves them out. A declaration (let, for, allocate, realize) says a name's
-// type; without one, its first mention does. A first mention without a type is of int32. The printer and the parser
-// each keep such a table and meet the names in the same order, so that they agree.
+// The types of names, which allow the text to omit most of them. A declaration (let, for, allocate, realize) fixes a
+// name's type; without one, the first mention does. A first mention without a type means int32. Printer and parser
+// each keep such a table and visit names in the same order, so they agree.
 class NameTypes {
  public:
   NameTypes() = default;
-  // On top of `outer`, which stays as it is and must outlive this.
+  // Adds to the names of `outer`, which is not changed and must outlive this table.
   explicit NameTypes(const NameTypes* outer) : outer_(outer) {}
 
   void declare(NameUse use, const std::string& name, Type type, int component = 0);
-  // The type of a mention without one; `lanes` are those of its index or arguments. A variable has its own.
+  // The type of a mention without a written type. Loads and calls have the lanes of their index or arguments, `lanes`;
+  // the lanes of a variable are part of its type.
   Type implied(NameUse use, const std::string& name, int lanes, int component = 0) const;
-  // A mention of this type: it settles the type of a name that has none.
+  // Records a mention of this type: the first one fixes the type of an undeclared name.
   void mention(NameUse use, const std::string& name, Type type, int component = 0);
-  // Of every component of a Func.
+  // The same for every component of a Func.
   void declare_components(const std::string& func, const std::vector<Type>& types);
   void mention_components(const std::string& func, const std::vector<Expr>& values);
 
@@ -57,6 +59,6 @@ class NameTypes {
   std::unordered_map<std::string, Type> types_;
 };
 
-int lanes_of(const std::vector<Expr>& args);  // of a call with these arguments
+int lanes_of(const std::vector<Expr>& args);  // the lanes of a call with these arguments
 
 }  // namespace retrograde::ir

@@ -118,8 +118,7 @@ class CallRewriter : public ir::Rewriter {
     const std::string given =
         listed(call.args, [](const Expr& arg) { return to_string(arg.type()); });
     user_error(
-        "call the pipeline " + quoted(call.name),
-        "a pipeline that is called by name gets its arguments",
+        "call the pipeline " + quoted(call.name), "a call of a pipeline passes all its arguments",
         text("it takes ", listed(taken), " and was given ", given, ", where a handle is a buffer"),
         "Give images and Params in the order of their names");
   }

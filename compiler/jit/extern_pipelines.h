@@ -27,7 +27,7 @@ using ExternPipelines = std::map<std::string, ExternPipeline>;
 
 ExternPipelines compile_extern_pipelines(const PipelineSpec& caller, const Target& target);
 
-// Requires: a pipeline that is called by name gets all its arguments.
+// Requires: a call of a pipeline passes all its arguments.
 Stmt call_pipelines(const Stmt& body, const ExternPipelines& pipelines);
 
 }  // namespace retrograde::jit

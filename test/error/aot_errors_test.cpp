@@ -129,7 +129,7 @@ TEST_F(AotErrors, WrappersForPyTorchOfWhatItHasNot) {
   expect_error<Unsupported>({"tensors and numbers that PyTorch has", "\"wide\" holds uint16"}, [&] {
     wide.compile_to({{OutputFileType::pytorch_wrapper, path("a")}}, {}, "a", host);
   });
-  expect_error<Unsupported>({"what PyTorch calls has a name of C", "n::a"}, [&] {
+  expect_error<Unsupported>({"the function's name is a C name", "n::a"}, [&] {
     f.compile_to({{OutputFileType::pytorch_wrapper, path("a")}}, {in, gain}, "n::a",
                  host.with_feature(Target::CPlusPlusMangling));
   });
@@ -141,7 +141,7 @@ TEST_F(AotErrors, PythonModulesOfScalarsThatPythonHasNot) {
   Func wide("wide");
   wide(x) = half;
   expect_error<Unsupported>(
-      {"Python has numbers for the scalars", "\"half\" is of type float16"}, [&] {
+      {"Python supports the scalars' types", "\"half\" is of type float16"}, [&] {
         wide.compile_to({{OutputFileType::python_extension, path("a")}}, {half}, "a", host);
       });
   EXPECT_TRUE(is_empty());
@@ -163,7 +163,7 @@ TEST_F(AotErrors, TargetsWithoutACodeGenerator) {
   EXPECT_TRUE(is_empty());
 }
 
-// rule: a runtime is there for this machine
+// rule: the compiler was built with a runtime
 TEST_F(AotErrors, RuntimeForAMachineThatThereIsNoneFor) {
   expect_error<Unsupported>({"add the runtime for target \"mips-32-linux\"", "no_runtime"}, [&] {
     compile_standalone_runtime(path("a.o"), Target("mips-32-linux"));

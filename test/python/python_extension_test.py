@@ -158,7 +158,7 @@ class Modules(unittest.TestCase):
     def test_scalars_that_python_has_not(self):
         f, half = rg.Func("f"), rg.Param("float16", "half")
         f[x] = half
-        with self.assertRaisesRegex(rg.Unsupported, "Python has numbers for the scalars"):
+        with self.assertRaisesRegex(rg.Unsupported, "Python supports the scalars' types"):
             write(f, [half], "f")
 
 

@@ -517,7 +517,7 @@ TEST(ExternPipeline, ItsErrorsAreThoseOfTheCall) {
   expect_error<RuntimeError>({"too large: 30"}, [&] { outer.out.realize({6}); });
 }
 
-// rule: a pipeline that is called by name gets its arguments
+// rule: a call of a pipeline passes all its arguments
 TEST(ExternPipeline, ArgumentsThatDoNotFitAreErrors) {
   Inner inner;
   CallsInner too_few({}, true), wrong({Expr(3.0f)}, true), too_many({Expr(3), Expr(4)}, true);

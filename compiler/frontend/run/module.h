@@ -104,9 +104,9 @@ class Module {
   // Requires: an output file's folder must exist and be writable; a module is compiled to machine
   // code, LLVM's formats, statements and headers (Unsupported); only generators have stubs and
   // schedules (Unsupported); functions of a module and its submodules have different names; a
-  // module and its submodules are made for one target (Unsupported); what PyTorch calls has tensors
-  // and numbers that PyTorch has (Unsupported); what PyTorch calls has a name of C
-  // (Unsupported); Python has numbers for the scalars (Unsupported).
+  // module and its submodules are made for one target (Unsupported); PyTorch supports the types of all arguments
+  // (Unsupported); the function's name is a C name
+  // (Unsupported); Python supports the scalars' types (Unsupported).
   void compile(const std::map<OutputFileType, std::string>& output_files) const;
   // The object file as bytes.
   Buffer<uint8_t> compile_to_buffer() const;
@@ -127,8 +127,7 @@ Module link_modules(const std::string& name, const std::vector<Module>& modules)
 
 // Writes the runtime as an object file, a static library, or both, and returns the files. A python_extension
 // file holds the definition of a Python module whose functions are in other files.
-// Requires: a runtime is there for this machine and for those that a cross compiler was found for
-// when the compiler was built (Unsupported).
+// Requires: the compiler was built with a runtime for the target (Unsupported).
 void compile_standalone_runtime(const std::string& object_filename, const Target& target);
 std::map<OutputFileType, std::string> compile_standalone_runtime(
     const std::map<OutputFileType, std::string>& output_files, const Target& target);

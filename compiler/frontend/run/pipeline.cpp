@@ -161,7 +161,7 @@ Pipeline::Contents& Pipeline::checked() const {
 
 void Pipeline::unscheduled() {
   for (const graph::FuncPtr& f : graph::topological_order(checked().outputs)) {
-    if (graph::is_touched(*f)) continue;
+    if (graph::has_directives(*f)) continue;
     for (int s = 0; s < std::max(f->stage_count(), 1); ++s)
       graph::give_directive({f, s}, graph::Unscheduled{});
   }

@@ -164,7 +164,7 @@ class Pipeline : public Runnable<Pipeline> {
 //   f.set_jit_externs({{"blur", JITExtern(blur)}});
 struct JITExtern {
   // A pipeline as the implementation.
-  // Requires: it needs outputs; a pipeline that is called by name gets its arguments.
+  // Requires: it needs outputs; a call of a pipeline passes all its arguments.
   explicit JITExtern(Pipeline pipeline);
   explicit JITExtern(const Func& func);
   // A C function as the implementation.

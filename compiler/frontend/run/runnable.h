@@ -196,7 +196,7 @@ class Runnable {
   // Requires: a function's name is an identifier of C; C functions have no namespace; the list of arguments
   // holds inputs, and outputs are appended automatically; every argument is listed once; an argument agrees
   // with what the pipeline uses under its name; the list of arguments holds every Param and ImageParam that
-  // it uses; a Buffer that is no argument is embedded with its data.
+  // it uses; a Buffer that is not an argument has data.
   Module compile_to_module(const Args& args, const std::string& function_name = "",
                            const Target& target = get_target_from_environment(),
                            LinkageType linkage = LinkageType::ExternalPlusMetadata) {

@@ -47,7 +47,7 @@ size_t unscheduled_beside_adjoints(const std::vector<FuncPtr>& funcs) {
   size_t count = 0;
   bool has_adjoints = false;
   for (const FuncPtr& f : funcs) {
-    if (is_touched(*f) || f->is_extern()) continue;
+    if (has_directives(*f) || f->is_extern()) continue;
     ++count;
     has_adjoints = has_adjoints || f->made;
   }

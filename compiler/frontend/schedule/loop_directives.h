@@ -336,8 +336,8 @@ class LoopDirectives {
   // Maps loops to the threads of a block, at most 1,024 in all.
   // Requires: iterations that run at the same time must not touch the same element; a directive for GPUs
   // names a GPU; code for GPUs is generated for CUDA (Unsupported); the target has a GPU; threads belong to
-  // blocks; blocks consist of threads; threads compute vectors, and no vector has threads; a kernel computes,
-  // and calls nothing of the host (Unsupported); kernels are launched by one thread of the host
+  // blocks; blocks consist of threads; threads compute vectors, and no vector has threads; a kernel cannot call
+  // functions of the host (Unsupported); kernels are launched by one thread of the host
   // (Unsupported).
   Self& gpu_threads(const VarOrRVar& x, DeviceAPI device = DeviceAPI::Default_GPU) {
     return run_on_gpu(ForType::GpuThread, {x}, device);

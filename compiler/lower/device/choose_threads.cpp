@@ -12,7 +12,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 #include "lower/device/kernel.h"
-#include "lower/in_full.h"
+#include "lower/expand_lets_in_scope.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
 #include "simplify/facts.h"
@@ -64,7 +64,7 @@ class ThreadChooser {
              text("there are ", dimension + 1, " loops over threads in each other"),
              "Fuse two of them, or keep one serial");
     }
-    const Expr extent = simplify(in_full(loop.extent, lets_));
+    const Expr extent = simplify(expand_lets_in_scope(loop.extent, lets_));
     if (any_node(extent, [](const Load&) { return true; })) {
       refuse(loop, "the number of threads does not depend on data",
              text("the loop runs ", extent, " times"),

@@ -67,7 +67,7 @@ class KernelMaker : public StatementRewriter {
   static void check_statements(const Stmt& body, const For& loop) {
     const auto refuse = [&](const std::string& evidence, const std::string& instead) {
       unsupported("run GPU blocks of " + describe_loop(loop.name),
-                  "a kernel computes, and calls nothing of the host", evidence, instead);
+                  "a kernel cannot call functions of the host", evidence, instead);
     };
     walk(
         body,

@@ -13,7 +13,7 @@
 #include "diagnostics/error.h"
 #include "ir/visit.h"
 #include "lower/device/kernel.h"
-#include "lower/in_full.h"
+#include "lower/expand_lets_in_scope.h"
 #include "lower/nests/copy_statement.h"
 #include "simplify/facts.h"
 #include "simplify/simplify.h"
@@ -77,7 +77,7 @@ class ThreadMapper {
   // An upper bound of the extent. Lets hold the ends of tiles, so the bound may only appear with lets expanded.
   int64_t largest(const Expr& extent) const {
     simplification::Facts facts;
-    const Expr full = simplify(in_full(extent, lets_));
+    const Expr full = simplify(expand_lets_in_scope(extent, lets_));
     return std::min({facts.upper_bound(ir::sum_of(extent)), facts.upper_bound(ir::sum_of(full)),
                      facts.range(full).max});
   }

@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "ir/build.h"
-#include "lower/in_full.h"
+#include "lower/expand_lets_in_scope.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::lower {
@@ -25,7 +25,8 @@ void SizeBounds::bind(const std::string& name, const Expr& min, const Expr& max)
 }
 
 void SizeBounds::enter(const For& loop) {
-  bind(loop.name, in_full(loop.min, lets_), in_full(loop.min + loop.extent - 1, lets_));
+  bind(loop.name, expand_lets_in_scope(loop.min, lets_),
+       expand_lets_in_scope(loop.min + loop.extent - 1, lets_));
 }
 
 void SizeBounds::leave(const For& loop) {
@@ -34,7 +35,7 @@ void SizeBounds::leave(const For& loop) {
 }
 
 Expr SizeBounds::most(const Expr& size) {
-  const Expr e = simplify(in_full(cast_to(Int(32), size), lets_));
+  const Expr e = simplify(expand_lets_in_scope(cast_to(Int(32), size), lets_));
   facts_.forget();
   const int64_t constant = std::min(facts_.range(e).max, facts_.upper_bound(ir::sum_of(e)));
   // Larger constants are loose bounds; the symbolic bound is preferred to them.

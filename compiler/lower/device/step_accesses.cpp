@@ -5,7 +5,7 @@
 
 #include "analysis/interval.h"
 #include "ir/build.h"
-#include "lower/in_full.h"
+#include "lower/expand_lets_in_scope.h"
 #include "lower/walk_in_bounds.h"
 #include "simplify/simplify.h"
 
@@ -82,7 +82,8 @@ void find_divisors(const Expr& e, const std::string& loop, int64_t& common) {
 }  // namespace
 
 Interval StepSurroundings::range_of(const For& loop) const {
-  const Expr min = simplify(in_full(loop.min, lets_)), extent = in_full(loop.extent, lets_);
+  const Expr min = simplify(expand_lets_in_scope(loop.min, lets_)),
+             extent = expand_lets_in_scope(loop.extent, lets_);
   return {min, simplify(min + extent - 1)};
 }
 
@@ -105,8 +106,8 @@ std::vector<Access> StepSurroundings::accesses_of(const Stmt& step) {
   std::vector<Access> result = known->second.second;
   for (Access& access : result) {
     if (!access.elements.is_bounded()) continue;
-    access.elements =
-        without_loads({in_full(access.elements.min, lets_), in_full(access.elements.max, lets_)});
+    access.elements = without_loads({expand_lets_in_scope(access.elements.min, lets_),
+                                     expand_lets_in_scope(access.elements.max, lets_)});
   }
   return result;
 }
@@ -129,7 +130,7 @@ Access StepSurroundings::in_any_iteration(const Access& access, const For& loop)
 }
 
 bool StepSurroundings::can_prove_runs(const For& loop) {
-  return can_prove_below(0, in_full(loop.extent, lets_));
+  return can_prove_below(0, expand_lets_in_scope(loop.extent, lets_));
 }
 
 bool StepSurroundings::can_prove_below(const Expr& a, const Expr& b) {

@@ -6,7 +6,7 @@
 
 #include "analysis/linear.h"
 #include "ir/visit.h"
-#include "lower/in_full.h"
+#include "lower/expand_lets_in_scope.h"
 #include "simplify/facts.h"
 #include "simplify/simplify.h"
 
@@ -63,7 +63,7 @@ class AccessWalker : public Rewriter {
       base = ramp->base;
     }
     if (!base.type().is_scalar()) return std::nullopt;
-    base = in_full(base, lets_);
+    base = expand_lets_in_scope(base, lets_);
     // Inner loops first, because their minima may depend on outer loops.
     std::vector<std::string> names;
     simplification::BoundsMap bounds;
@@ -117,8 +117,8 @@ class AccessWalker : public Rewriter {
 
  private:
   Stmt in_loop(const Stmt& s, const For& loop) {
-    LoopAround around{loop.name, in_full(loop.min, lets_),
-                      largest_extent(in_full(loop.extent, lets_)).value_or(0)};
+    LoopAround around{loop.name, expand_lets_in_scope(loop.min, lets_),
+                      largest_extent(expand_lets_in_scope(loop.extent, lets_)).value_or(0)};
     if (is_gpu_thread(loop.runs)) around.thread = thread_depth(loop.body);
     loops_.push_back(std::move(around));
     Stmt result = children(s);

@@ -5,7 +5,7 @@
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/markers.h"
-#include "lower/in_full.h"
+#include "lower/expand_lets_in_scope.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::lower {
@@ -114,7 +114,9 @@ bool BoundedExtents::count_names(const Expr& e, int& left) const {
 }
 
 std::optional<int64_t> BoundedExtents::largest(const Expr& extent, int64_t most) const {
-  const auto full = [&](const Expr& e) { return simplify(without_likely(in_full(e, values_))); };
+  const auto full = [&](const Expr& e) {
+    return simplify(without_likely(expand_lets_in_scope(e, values_)));
+  };
   Facts facts;
   for (const For* loop : loops_) {
     const Expr min = full(loop->min);

@@ -61,7 +61,7 @@ Stmt realize_place(const LoopedFunc& f, const Box& room, const Stmt& stmt) {
   return make_realize(place_name(f.name()), f.func->types, f.schedule.memory, ranges, stmt);
 }
 
-// By how many iterations a producer may be ahead in folded storage; 0: any number.
+// The number of iterations that a producer may be ahead in folded storage; 0 means any number.
 int room_in_folds(const std::vector<Fold>& folds, const std::vector<Slide>& slides,
                   const Box& touched) {
   const auto extent = [](const Interval& side) {
@@ -126,11 +126,13 @@ Stmt NestStorage::fold(const LoopedFunc& f, const Box& touched, const std::vecto
   return stmt;
 }
 
-// If each value is computed only once, into an element of its own, the producer may run ahead without limit. In storage
-// folded to F coordinates, of which an iteration accesses W and computes S, it may be (F - W) / S further iterations
-// ahead.
-void NestStorage::note_async_room(const LoopedFunc& f, const std::vector<Slide>& slides,
-                                  const Box& touched) {
+// Along one loop, a sliding window computes each value once, into an element of its own. The producer may then run
+// ahead of its consumer as far as the storage allows: in storage folded to F coordinates, of which an iteration
+// accesses W and computes S, by (F - W) / S further iterations. Under several loops, the window starts again in each
+// iteration of the outer ones and overwrites elements that the consumer may still read. This is harmless only if
+// nothing is folded and the same value is written; an update definition writes other values in between.
+void NestStorage::note_async_room(const LoopedFunc& f, const std::vector<Loop>& loops,
+                                  const std::vector<Slide>& slides, const Box& touched) {
   const std::vector<Fold>& folds = folds_.at(f.name());
   const bool is_folded =
       std::ranges::any_of(folds, [](const Fold& fold) { return fold.factor.defined(); });

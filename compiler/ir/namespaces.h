@@ -1,7 +1,9 @@
-// rooms.h -- each folder of the compiler is a room with a namespace of its name, and says without a
-// prefix what the rooms below are called; bottom up, as in docs/architecture.md. What users write is
-// in `retrograde`, which has a LoopLevel and a print of its own: rooms that see it too say
-// graph::LoopLevel and ir::print. `simplify` is a function, its room therefore `simplification`.
+// namespaces.h -- the namespaces of the compiler's folders, bottom up.
+//
+// Each folder has a namespace of its own name and imports the namespaces of the layers below it (docs/architecture.md),
+// so that code refers to their names without a prefix. `simplify` is a function, so its folder's namespace is
+// `simplification`. User code lives in `retrograde`, which has its own LoopLevel and print; folders that see both
+// write graph::LoopLevel and ir::print.
 #pragma once
 
 // clang-format off
