@@ -1,8 +1,8 @@
 // fuzz.h -- the driver that all fuzzers share: options, limits, shrinking and reports.
 //
-// Machine code checks its accesses (Target::CheckedAccesses) unless RG_JIT_TARGET names a target. Each program runs in a
-// separate process with limits of time and memory, so a crash or a hang is a finding like a wrong result. A finding is
-// shrunk (testing/choices.h) and printed with its choices. Refusals are counted by their rule.
+// Machine code checks its accesses (Target::CheckedAccesses) unless RG_JIT_TARGET names a target. Each program runs in
+// a separate process with limits of time and memory, so a crash or a hang is a finding like a wrong result. A finding
+// is shrunk (testing/choices.h) and printed with its choices. Refusals are counted by their rule.
 //
 //   --seed N | --from N, --count N | --seconds N    one program, or several from N on; prints progress every 30 s
 //   --choices LIST       the program that a finding was shrunk to
