@@ -48,7 +48,7 @@ void check_inputs(const std::string& asked, const Func& func,
     check_is_floating(asked, shape.types, text("the input ", quoted(shape.name), " has type"),
                       "Leave it out: nothing is propagated to integers");
     if (is_given_twice(inputs, i)) {
-      user_error(asked, "each input is listed once", text(quoted(shape.name), " is there twice"),
+      user_error(asked, "each input is listed once", text(quoted(shape.name), " is listed twice"),
                  "Leave one out");
     }
     if (symbol == func.function().get() || !depends_on(func, symbol)) {
@@ -116,7 +116,7 @@ void custom_adjoint(const Func& func, const std::vector<AdjointInput>& inputs, C
   check_inputs(asked, func, inputs);
   if (reads && !func.is_extern()) {
     user_error(asked, "what a Func reads is told for extern stages only",
-               quoted(func.name()) + " has definitions, which say it",
+               quoted(func.name()) + " has definitions, which show what it reads",
                "Leave the last argument out");
   }
   CustomDerivatives rules = rules_of(func);

@@ -202,7 +202,7 @@ Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Reg
     user_error(asked_of_adjoints(output), "an adjoint has as many values as its Func",
                text(quoted(adjoint.name()), " has ", adjoint.outputs(), " and ",
                     quoted(output.name()), " has ", output.outputs()),
-               "Define it as a Tuple of as many values, zeros for what does not count");
+               "Define it as a Tuple of as many values, with zeros for values without an adjoint");
   }
   Seed seed{output.function(), box_of(output_bounds), {}};
   for (size_t k = 0; k < output.types().size(); ++k) {

@@ -257,7 +257,7 @@ bool Jacobian::by_rows() const { return result_->by_rows; }
 Expr Jacobian::colour(const std::vector<Expr>& element) const {
   if (element.size() != result_->coloured_dimensions) {
     user_error(result_->asked, "an element has a coordinate in each dimension",
-               text(element.size(), " are given of ", result_->coloured_dimensions),
+               text(element.size(), " of ", result_->coloured_dimensions, " are given"),
                "Give one Expr a dimension");
   }
   return result_->colours.of(element);

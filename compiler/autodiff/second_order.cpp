@@ -9,8 +9,7 @@ Func hessian_vector_product(const Func& loss, const AdjointInput& wrt,
   const Derivative first = propagate_adjoints(loss, {.overwritten = overwritten, .wrt = {wrt}});
   if (!first.has(wrt)) {
     user_error(text("differentiate ", quoted(loss.name()), " twice"),
-               "the input is a float that the loss depends on",
-               "it has no gradient by what was given",
+               "the input is a float that the loss depends on", "it has no gradient by this input",
                "Differentiate by something that the loss depends on");
   }
   Func gradient = first.of(wrt);

@@ -81,7 +81,7 @@ class Checker {
     return "check the gradients of " + retrograde::quoted(output_.name());
   }
 
-  // ---- inputs and weights ----
+  // ---- the requested inputs ----
 
   bool is_wanted(const Input& input) const {
     for (const AdjointInput& w : options_.wrt) {

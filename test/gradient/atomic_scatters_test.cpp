@@ -38,7 +38,7 @@ void expect_none(const Func& f, const AutoscheduleOptions& options) {
   EXPECT_EQ(results.schedule_source.find("atomic"), std::string::npos) << results.schedule_source;
 }
 
-// A table of a million floats, read at so many places: its gradient is a scatter in eight parts.
+// A table of a million floats, read two million times: its gradient is a scatter in eight parts.
 struct TableGradient {
   static constexpr int elements = 1 << 20, reads = 2 << 20;
   Buffer<float> table = numbers(elements), weights = numbers(reads);

@@ -126,7 +126,7 @@ TEST_F(CheckGradients, OutputsWithDimensionsAndUpdates) {
   EXPECT_LT(report.worst_error, 1e-8) << report.to_json();
 }
 
-// What nobody scheduled is not computed again for each read: four filters in a row would take 25^4
+// Unscheduled Funcs are not recomputed for each read: four filters in a row would take 25^4
 // terms for each element.
 TEST_F(CheckGradients, FiltersOfFiltersThatNobodyScheduled) {
   const Buffer<float> picture = random_image({40, 40}, 0.1, 0.5, 2);

@@ -451,7 +451,7 @@ TEST(Checkpoints, MoreStepsAtRunTimeThanATableMayHaveFailTheCall) {
 
 // ---- refusals ----
 
-// With two states, four million steps are computed again some ten thousand times over.
+// With two states, each of four million steps is recomputed some ten thousand times.
 TEST(Checkpoints, SchedulesOfTooManyStepsAreErrors) {
   Buffer<float> start = line(7);
   Func u("u");

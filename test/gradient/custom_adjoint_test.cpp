@@ -454,7 +454,7 @@ TEST_F(CustomAdjointErrors, OfTheFunc) {
 TEST_F(CustomAdjointErrors, OfTheInputs) {
   Func other("other"), undefined("undefined");
   other(x) = 1.0f;
-  expect_mentions(when_given({g, g}), {"listed once", "is there twice"});
+  expect_mentions(when_given({g, g}), {"listed once", "is listed twice"});
   expect_mentions(when_given({other}), {"does not depend on \"other"});
   expect_mentions(when_given({f}), {"is listed itself"});
   expect_mentions(when_given({count}), {"only floating-point", "has type int32"});

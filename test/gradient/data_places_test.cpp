@@ -16,7 +16,7 @@
 namespace retrograde {
 namespace {
 
-// An image of so many channels, read between its pixels where a flow says.
+// An image with a number of channels, interpolated where a flow points.
 struct Warp {
   Warp(int size, int channels)
       : size(size),

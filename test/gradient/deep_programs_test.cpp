@@ -95,7 +95,7 @@ TEST(DeepPrograms, TimeGrowsWithTheLevels) {
   EXPECT_LT(many, 8 * few + 0.5) << few << " s for 4 levels";
 }
 
-// The schedule as text is made when somebody looks, and is short: names of regions stay names.
+// The text of the schedule is built on demand, and is short: names of regions stay names.
 TEST(DeepPrograms, LoopNestsAndStatementsAreShort) {
   const Module module = module_of(interpolation(10, Border::None));
   const double start = seconds();

@@ -120,7 +120,7 @@ TEST(Explain, ConstantExteriorsAreOneGather) {
   }
 }
 
-// Each input is told who reads it, and what stands in between.
+// Each zero names the consumers of the input and the operations that block its derivative.
 TEST(Explain, ZerosSayWhichReaderStopsThem) {
   std::vector<Buffer<float>> a;
   for (unsigned k = 0; k < 8; ++k) a.push_back(line(9, k + 1));

@@ -131,7 +131,7 @@ TEST(GradientLookup, BuffersThatNothingReadsAreNotTakenForEachOther) {
   }
 }
 
-// A Param that nobody wants a gradient of scales places that nothing bounds from above.
+// A Param whose gradient is not requested scales indices without an upper bound.
 TEST(GradientLookup, AParamThatNobodyAskedForDoesNotStandInTheWay) {
   Squares s;
   Param<float> step("step");

@@ -501,7 +501,7 @@ TEST_F(Jacobians, Errors) {
     jacobian(pair, a, {{0, 4}}, {.compression = Compression::Rows});
   });
   Jacobian j = jacobian(f, a, {{0, 4}});
-  expect_error({"2 are given of 1"}, [&] { j.colour({x, x}); });
+  expect_error({"2 of 1 are given"}, [&] { j.colour({x, x}); });
   Func scalar("scalar");
   scalar() = a(0) * a(1);
   expect_error({"constant offsets", "dense()"}, [&] { jacobian(scalar, a, {}).band(); });

@@ -19,7 +19,7 @@ constexpr uint64_t first_program = 0, programs = 200;
 constexpr uint64_t first_program = 0, programs = 8;
 #endif
 
-// As far as so many of the interpreter go.
+// As far as the budget of interpreter operations allows.
 constexpr uint64_t operations = 20'000'000;
 
 // The largest difference, relative to the largest element.

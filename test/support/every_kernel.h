@@ -13,7 +13,7 @@ namespace retrograde::every_kernel {
 const std::vector<Type>& types();
 
 // A function with a kernel for each kind of node and each operator that devices have, named after it, which
-// stores its values in every type that it takes, in vectors of so many lanes. `types`: those that may occur.
+// stores its values in every type that it takes, in vectors of `lanes` lanes. `types`: those that may occur.
 ir::LoweredFunction of_everything(int lanes, const std::vector<Type>& types);
 
 // Operations that only a host supports: a function with a kernel that uses it, named after the operator or the node

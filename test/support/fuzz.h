@@ -1,14 +1,14 @@
-// What fuzzers share. Accesses of the machine code are checked (Target::CheckedAccesses) unless RG_JIT_TARGET
-// names a target. Each program runs in a process of its own under limits of time and
-// memory, so that a crash or a hang is a finding like a wrong result. A finding is shrunk (testing/
-// choices.h) and printed with its choices. Refusals are counted by their rule.
+// fuzz.h -- the driver that all fuzzers share: options, limits, shrinking and reports.
 //
-//   --seed N | --from N, --count N | --seconds N    one program, or so many from one on; a line every 30 s
-//                                                    says how far it is
+// Machine code checks its accesses (Target::CheckedAccesses) unless RG_JIT_TARGET names a target. Each program runs in
+// a separate process with limits of time and memory, so a crash or a hang is a finding like a wrong result. A finding
+// is shrunk (testing/choices.h) and printed with its choices. Refusals are counted by their rule.
+//
+//   --seed N | --from N, --count N | --seconds N    one program, or several from N on; prints progress every 30 s
 //   --choices LIST       the program that a finding was shrunk to
-//   --compile PERCENT    of how many programs what takes machine code is checked, too
+//   --compile PERCENT    the share of programs for which the checks that need machine code run, too
 //   --no-shrink, --print, --refusals                print the programs, print refusals
-//   --want TEXT          a refusal whose message has this text is a finding, to see what is refused
+//   --want TEXT          a refusal whose message contains TEXT is a finding, to show what is refused
 //
 // Exit code: 0 nothing found, 1 something found, too much refused or nothing tried, 2 bad arguments.
 #pragma once

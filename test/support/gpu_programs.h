@@ -26,7 +26,7 @@ inline void PrintTo(const Program& program, std::ostream* out) { *out << program
 // As tests have them, or larger by a factor in each dimension.
 std::vector<Program> all(int scale = 1);
 Program named(const std::string& name, int scale = 1);
-// The sum of so many values: of each thread, of a block's threads, of all.
+// The sum of this many values: in each thread, over the threads of a block, over all blocks.
 Program reduction(int values);
 float reduced_value(int i);
 

@@ -1,5 +1,5 @@
 // Parallel loops on a number of threads that does not depend on the machine: a context for
-// realize(). Threads take iterations as they come, last ones first when asked for.
+// realize(). Threads take iterations as they come, last ones first on request.
 #pragma once
 
 #include <atomic>

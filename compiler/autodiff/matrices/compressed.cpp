@@ -100,7 +100,7 @@ std::optional<Colouring> Compressed::linear_colours(const isl::set& differences,
   if (!ranges) {
     unsupported(text("compress the derivative in ", quoted(query_.output->name)),
                 "elements that one element may depend on must lie within constant bounds",
-                "the pattern has entries without bounds: a place depends on data, or a reduction "
+                "the pattern has entries without bounds: an index depends on data, or a reduction "
                 "runs over a range that is not constant",
                 "Give constant bounds, of the output and of Buffers, or use products with "
                 "single directions");

@@ -57,7 +57,7 @@ class Planner {
     if (plan_.needs_values() && again + 4 * steps > most_rows) {
       user_error(c_.asked(), text("a schedule has at most ", most_rows, " actions"),
                  text(steps, " steps with room for ", states,
-                      states == 1 ? " state compute " : " states compute ", again, " steps again"),
+                      states == 1 ? " state recompute " : " states recompute ", again, " steps"),
                  "Give a larger budget: AdjointOptions::checkpoint_states");
     }
     return static_cast<int>(states);
@@ -138,7 +138,7 @@ class Planner {
       if (!calls(index, f_)) return;
       unsupported(
           c_.asked(), "a checkpointed loop forgets the values that its steps saw",
-          text("where ", ir::print(leaf.leaf), " is read depends on values of ", quoted(f_->name)),
+          text("an index of ", ir::print(leaf.leaf), " depends on values of ", quoted(f_->name)),
           "Leave out the budget and pass AdjointOptions{.overwritten = "
           "Overwritten::Store}");
     });

@@ -45,7 +45,7 @@ class UpdateDifferentiation {
     unsupported(c_.asked(),
                 "adjoints pass backward through iterations that each update one point at a time",
                 text("an iteration updates ", number_of_points(c_.definition), " points of ",
-                     quoted(f_->name), " at once, from what stood at them"),
+                     quoted(f_->name), " at once, from their old values"),
                 text("Give the iterations a dimension, as in f(x, t + 1) = ... f(x, t), give ",
                      quoted(f_->name), " a custom_adjoint, or propagate_tangents"));
   }

@@ -17,7 +17,7 @@ float& element(halide_buffer_t* b, const int* at) {
 
 }  // namespace
 
-// out = sin(in), of at most three dimensions: in is needed where out is asked for.
+// out = sin(in), of at most three dimensions: the region of in is that of out.
 extern "C" __attribute__((visibility("default"))) int adversary_sine(halide_buffer_t* in,
                                                                      halide_buffer_t* out) {
   if (is_query(in)) {

@@ -17,7 +17,7 @@ enum class Extents : uint8_t {
   Constant,
   One,         // element in each dimension
   Parameters,  // known when it runs
-  Huge,        // so many elements along the last dimension that it is compiled only
+  Huge,        // too many elements along the last dimension to run: compiled only
   Estimated    // parameters, with estimates that are wrong
 };
 
@@ -26,7 +26,7 @@ class GradientPipeline {
   // The program must outlive it.
   GradientPipeline(const AdversaryProgram& program, Extents extents);
 
-  // A fresh copy of all, scheduled by nobody.
+  // A new copy of all Funcs, without directives.
   Pipeline copy() const;
   // Of a copy that is scheduled: the same at root in serial loops, but for what is inlined there.
   Pipeline in_serial_loops_like(const std::vector<graph::FuncPtr>& scheduled) const;
