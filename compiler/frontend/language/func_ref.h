@@ -14,7 +14,8 @@ namespace retrograde {
 class FuncTupleElementRef;
 
 // A Func at a point: f(x, y). The first assignment defines f at all points; later ones add update
-// definitions. f(x) += e on an undefined f first defines it as 0 everywhere, *= and /= as 1. A string as a
+// definitions. f(x) += e on an undefined f first defines it as 0 everywhere, *= and /= as 1. A
+// string as a
 // value is the address of its characters, which live as long as the compiled code.
 class FuncRef {
  public:
@@ -29,19 +30,21 @@ class FuncRef {
   // variables; the arguments of a first definition are Vars; the arguments of a first
   // definition are different Vars; a definition has the dimensions that the Func was declared
   // with; a right-hand side that uses _ needs _ on the left-hand side; every variable on the
-  // right-hand side stands on the left-hand side, or is of an RDom; a parameter and a pure
+  // right-hand side appears on the left-hand side, or belongs to an RDom; a parameter and a pure
   // variable of one definition have different names; constants of int32 and int64 do not overflow.
   Stage operator=(const Expr& value);
   Stage operator=(const Tuple& values);
   Stage operator=(const FuncRef& value);
   FuncRef(const FuncRef&) = default;
   // Adds an update that combines the value with this point: f(x) += e means f(x) = f(x) + e.
-  // Requires: a Func is updated after its first definition; all definitions of a Func have as many
-  // arguments; coordinates are integers; all definitions of a Func have as many values; all
+  // Requires: a Func is updated after its first definition; all definitions of a Func have the
+  // same number of arguments; coordinates are integers; all definitions of a Func have the same
+  // number of values; all
   // definitions of a Func have the same types; all reduction variables of one definition come from
-  // one RDom; a pure variable stands at its own place in every reference of a Func to itself, so that
+  // one RDom; a pure variable keeps its position in every reference of a Func to itself, so that
   // its iterations are independent; the bounds of a reduction domain are known before its update
-  // runs; a Func that a C function computes has no updates; a Func is complete when another Func uses
+  // runs; a Func that a C function computes has no updates; a Func is complete when another Func
+  // uses
   // it.
 #define RETROGRADE_UPDATE(op)      \
   Stage operator op(Expr value);   \
@@ -94,7 +97,8 @@ requires(sizeof...(Rest) >= 1 && (std::is_convertible_v<Rest, Expr> && ...)) Exp
   return select(c0, Expr(v0), select(c1, Expr(v1), Expr(std::forward<Rest>(rest))...));
 }
 
-// One value of a Tuple-valued Func at a point: f(x)[1]. Assigning to it updates this value and leaves the
+// One value of a Tuple-valued Func at a point: f(x)[1]. Assigning to it updates this value and
+// leaves the
 // others.
 class FuncTupleElementRef {
  public:
