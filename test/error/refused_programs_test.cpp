@@ -116,8 +116,8 @@ TEST_F(Refused, ExteriorsOfAnotherType) {
   const auto with = [&](const Expr& value) {
     return BoundaryConditions::constant_exterior(f, value, {{0, 10}});
   };
-  expect_error({"the type of the values inside", "300 has no place in uint8"}, [&] { with(300); });
-  expect_error({"3.5 has no place in uint8"}, [&] { with(3.5f); });
+  expect_error({"the type of the values inside", "300 does not fit uint8"}, [&] { with(300); });
+  expect_error({"3.5 does not fit uint8"}, [&] { with(3.5f); });
   EXPECT_EQ(with(255).type(), UInt(8));
 }
 

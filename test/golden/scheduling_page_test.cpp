@@ -289,7 +289,7 @@ std::string view_of(const Directive& directive, bool is_scheduled) {
   // Removes the numbers of generated names, which count up within a process. A memoization key holds
   // the name letter by letter, and its hash.
   const std::string keys = replaced(text, "\\d+, (\\d+_u8, )+", "..., ");
-  return replaced(replaced(keys, "(_key:handle), \\d+", "$1, ..."), "\\$\\d+", "");
+  return replaced(replaced(keys, "(memoization_key), \\d+", "$1, ..."), "\\$\\d+", "");
 }
 
 std::string section(const Directive& d) {

@@ -15,12 +15,12 @@ namespace retrograde::fuzz {
 namespace {
 
 constexpr uint64_t first_seed = 1000;
-constexpr int programs_per_shard = 80;
+constexpr int programs_per_shard = 50;
 constexpr int shards = 4;
 #ifdef RETROGRADE_MANY_PROGRAMS
-constexpr int step = 1;  // 320 programs
+constexpr int step = 1;  // 200 programs
 #else
-constexpr int step = 2;  // 160 programs: every second shard
+constexpr int step = 2;  // 100 programs: every second shard
 #endif
 constexpr double max_refused_fraction = 0.15;  // of one shard
 constexpr double max_unstable_fraction = 0.1;

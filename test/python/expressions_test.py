@@ -245,7 +245,7 @@ class Functions(unittest.TestCase):
 class Texts(unittest.TestCase):
     def test_repr_shows_what_it_is(self):
         self.assertEqual(repr(x), "Var('x')")
-        self.assertEqual(repr(x + 1), "<retrograde.Expr int32 (x + 1)>")
+        self.assertEqual(repr(x + 1), "<retrograde.Expr int32 x + 1>")
         self.assertEqual(str(rg.f32(x) * 2), "(float32(x) * 2f)")
         self.assertEqual(repr(rg.Expr()), "<retrograde.Expr undefined>")
         self.assertEqual(repr(rg.Tuple(x, 1)), "<retrograde.Tuple (x, 1)>")

@@ -35,7 +35,7 @@ class HalidePackage(unittest.TestCase):
         self.assertEqual(repr(x), "<halide.Var 'x'>")
         self.assertEqual(repr(hl.Int(32, 8)), "<halide.Type int32x8>")
         self.assertEqual(repr(hl.Target("x86-64-linux")), "<halide.Target x86-64-linux>")
-        self.assertEqual(repr(hl.Expr(x) + 1), "<halide.Expr of type int32: (x + 1)>")
+        self.assertEqual(repr(hl.Expr(x) + 1), "<halide.Expr of type int32: x + 1>")
         self.assertEqual(repr(hl.Func("shown")), "<halide.Func 'shown'>")
         self.assertTrue(repr(hl.Buffer(hl.UInt(8), [3])).startswith("<halide.Buffer "))
 

@@ -37,7 +37,7 @@ param float32 gain
   finite
 func in32(x, y) float32
   define
-    value float32(image input(x, y):uint8)
+    value float32(image input(x, y))
   schedule
     compute_at(loop(blur, y, 1))
     store_at(root)
@@ -47,7 +47,7 @@ func blur(x, y) float32
     value 0f
     split(x, xo, xi, 8, GuardWithIf)
     run(xi, Vectorized)
-    specialize (gain:float32 == 1f)
+    specialize gain == 1f
       split(x, xo, xi, 16, GuardWithIf)
       run(xi, Unrolled)
     end
@@ -55,8 +55,8 @@ func blur(x, y) float32
     place x
     place y
     loop(r.x, 0, 3)
-    where (r.x < y)
-    value (blur(x, y):float32 + (in32((x + r.x), y):float32 * gain:float32))
+    where r.x < y
+    value blur(x, y) + in32(x + r.x, y) * gain
     run(y, Parallel)
 output blur
 )";
@@ -75,7 +75,7 @@ TEST(GraphText, AParsedGraphRuns) {
     value (3 * x)
 func out(x) int32
   define
-    value (slope((x + 1)) - slope(x))
+    value slope(x + 1) - slope(x)
   update
     place 2
     value 40
@@ -175,7 +175,7 @@ TEST(GraphText, WhatIsReadIsThere) {
   expect_error({rule, "no image of it is called \"other\""},
                [] { parse_graph(with("image input(x, y)", "image other(x, y)")); });
   expect_error({rule, "no Func of it is called \"other\""},
-               [] { parse_graph(with("in32((x + r.x), y)", "other(x, y)")); });
+               [] { parse_graph(with("in32(x + r.x, y)", "other(x, y):float32")); });
 }
 
 TEST(GraphText, BrokenGraphsAreBlamedOnThePass) {
@@ -185,11 +185,11 @@ TEST(GraphText, BrokenGraphsAreBlamedOnThePass) {
     expect_error<InternalError>({rule, "some_pass"}, check);
   };
   expect_broken(with("value 0f", "value 0"), "values have the types of the Func");
-  expect_broken(with("in32((x + r.x), y)", "in32((x + r.x))"), "a coordinate for each dimension");
-  expect_broken(with("in32((x + r.x), y):float32", "float32(in32((x + r.x), y))"),
+  expect_broken(with("in32(x + r.x, y)", "in32(x + r.x)"), "a coordinate for each dimension");
+  expect_broken(with("in32(x + r.x, y)", "float32(in32(x + r.x, y):uint8)"),
                 "the type of the value that it reads");
-  expect_broken(with("(r.x < y)", "(r.x < z)"), "a variable belongs to its definition");
-  expect_broken(with("where (r.x < y)", "where r.x"), "predicates are of type bool");
+  expect_broken(with("r.x < y", "r.x < z"), "a variable belongs to its definition");
+  expect_broken(with("where r.x < y", "where r.x"), "predicates are of type bool");
 }
 
 }  // namespace

@@ -86,10 +86,9 @@ TEST_F(IntervalTest, TheLastOfTilesBeginsBeforeTheirEnd) {
   scope.push("a", {0, 48});
   scope.push("b", {n + 15, n + 63});
   const Expr a = var("a"), b = var("b"), from = var("from");
-  EXPECT_EQ(bounds(a + (b - a) / 16 * 16), "[n, (n + 63)]");
+  EXPECT_EQ(bounds(a + (b - a) / 16 * 16), "[n, n + 63]");
   EXPECT_EQ(bounds(from + (b - from) / 16 * 16),
-            "[(from + ((((n - from) + 15) / 16) * 16)), ((from + ((((n - from) + 15) / 16) * 16)) "
-            "+ 48)]");
+            "[from + (n - from + 15) / 16 * 16, from + (n - from + 15) / 16 * 16 + 48]");
 }
 
 TEST_F(IntervalTest, ClampBoundsTheUnbounded) {

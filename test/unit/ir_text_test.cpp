@@ -123,18 +123,55 @@ TEST(IrText, SharedNodesKeepTheTextSmall) {
   expect_round_trip(e);
 }
 
-TEST(IrText, OperatorsNeedNoParentheses) {
-  const Expr x = variable("x"), y = variable("y");
-  EXPECT_TRUE(
-      equal(parse_expr("x + y * 2 < y - 1 - x && !(x == y)"), x + y * 2 < y - 1 - x && !(x == y)));
+void expect_text(const Expr& e, const std::string& text) {
+  EXPECT_EQ(print(e), text);
+  expect_round_trip(e);
+}
+
+TEST(IrText, ParenthesesStandOnlyWherePrecedenceNeedsThem) {
+  const Expr x = variable("x"), y = variable("y"), c = variable("c", Bool());
+  expect_text(x + y * 2 < y - 1 - x && !(x == y), "x + y * 2 < y - 1 - x && !(x == y)");
+  expect_text(x - (y - 1), "x - (y - 1)");
+  expect_text((x + y) * (x / (y * 2)), "(x + y) * (x / (y * 2))");
+  expect_text((c || x < y) && c, "(c:bool || x < y) && c");
+  expect_text((x < y) == c, "(x < y) == c:bool");
+  expect_text(x * Expr(-3) - Expr(-2), "x * -3 - -2");
+}
+
+TEST(IrText, TheFirstMentionGivesANameItsType) {
+  const Expr i = variable("i");
+  const Expr load = make_load(Float(32), "a", i), next = make_load(Float(32), "a", i + 1);
+  expect_text(load + next, "a[i]:float32 + a[i + 1]");
+  expect_text(make_load(Int(32), "b", make_load(Int(32), "b", i)), "b[b[i]]");
+  // The lanes of a load are those of its index; one name may have two types.
+  const Expr lanes = make_ramp(i, Expr(1), 4);
+  expect_text(make_load(Float(32, 4), "a", lanes) * make_broadcast(load, 4),
+              "a[ramp(i, 1, 4)]:float32x4 * broadcast(a[i], 4)");
+  expect_text(cast(Float(64), load) + make_load(Float(64), "a", i),
+              "float64(a[i]:float32) + a[i]:float64");
+  expect_text(call_func("f", Float(32), {i}, 1, {}) + call_func("f", Float(32), {i + 1}, 1, {}),
+              "f(i).1:float32 + f(i + 1).1");
+}
+
+TEST(IrText, DeclarationsAndStoresGiveNamesTheirTypes) {
+  const std::string text =
+      "realize f(uint8, float32) auto [0, n] {\n"
+      "  f(0) = {f(1) + 1_u8, f(1).1 * 2f}\n"
+      "}\n"
+      "let t = 2f\n"
+      "for (x, 0, n) {\n"
+      "  b[x] = t * 3f\n"
+      "  b[x] = b[x] - c[x]:float32\n"
+      "}\n";
+  EXPECT_EQ(print(parse_stmt(text)), text);
 }
 
 TEST(IrText, AStatementReadsAsItWasWritten) {
   const std::string text =
-      "let n = (a.extent.0 + 3)\n"
+      "let n = a.extent.0 + 3\n"
       "allocate buf[10_i64]:float32 heap {\n"
       "  parallel for (x, 0, n) {\n"
-      "    buf[x if (x < 5)] = (floor(buf[x]:float32) * 2f)\n"
+      "    buf[x if x < 5] = floor(buf[x]) * 2f\n"
       "  }\n"
       "  free buf\n"
       "}\n";

@@ -27,7 +27,7 @@ TEST(MakeNamesUnique, RenamesAllButTheFirstBinding) {
 TEST(MakeNamesUnique, LeavesNamesOfArgumentsToThem) {
   Stmt s = ir::parse_stmt("{ let code = 3 assert((code == 0), code) } out(0) = {code:int32}");
   const std::string text = ir::print(lower::make_names_unique(s, {"code"}).stmt);
-  expect_mentions(text, {"let code.$1 = 3", "assert((code.$1 == 0), code.$1)", "out(0) = {code}"});
+  expect_mentions(text, {"let code.$1 = 3", "assert(code.$1 == 0, code.$1)", "out(0) = {code}"});
 }
 
 // The results of argument checks have names of their own.

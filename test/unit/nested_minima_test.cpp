@@ -1,5 +1,5 @@
-// Nested minima in PTX: see codegen/part_minima.h.
-#include "codegen/part_minima.h"
+// Nested minima in PTX: see codegen/nested_minima.h.
+#include "codegen/nested_minima.h"
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ size_t count(const std::string& text, const std::string& part) {
   return found;
 }
 
-TEST(PartMinima, EverySecondOfAChainIsUnsigned) {
+TEST(NestedMinima, EverySecondOfAChainIsUnsigned) {
   const std::string parted = rewrite_nested_minima(
       function("\tneg.s32 \t%r4, %r2;\n\tmin.s32 \t%r5, %r1, %r4;\n\tmin.s32 \t%r6, %r3, %r5;\n"));
   EXPECT_NE(parted.find("\tmin.s32 \t%r5, %r1, %r4;\n"), std::string::npos) << parted;
@@ -33,7 +33,7 @@ TEST(PartMinima, EverySecondOfAChainIsUnsigned) {
       << parted;
 }
 
-TEST(PartMinima, AreThoseOfEachTypeAndOfLoops) {
+TEST(NestedMinima, AreThoseOfEachTypeAndOfLoops) {
   for (const std::string name : {"min.s32", "max.s32", "min.s16", "max.s16"}) {
     const std::string chain = "\t" + name + " \t%a, %b, %c;\n\t" + name + " \t%d, %a, 5;\n",
                       loop = "$L__BB0_1:\n\t" + name +
@@ -43,12 +43,12 @@ TEST(PartMinima, AreThoseOfEachTypeAndOfLoops) {
   }
 }
 
-TEST(PartMinima, EverythingElseIsAsItWas) {
+TEST(NestedMinima, EverythingElseIsAsItWas) {
   const std::string clamp =
       "\tmin.s32 \t%r2, %r1, 255;\n\tmax.s32 \t%r3, %r2, 0;\n\tmin.u32 \t%r4, %r1, %r2;\n"
       "\tmin.u32 \t%r5, %r4, %r2;\n\tmin.f32 \t%f2, %f1, %f1;\n\tmin.f32 \t%f3, %f2, %f1;\n"
       "\tmin.s64 \t%rd2, %rd1, %rd1;\n\tmin.s64 \t%rd3, %rd2, %rd1;\n";
-  EXPECT_EQ(part_minima(function(clamp)), function(clamp));
+  EXPECT_EQ(rewrite_nested_minima(function(clamp)), function(clamp));
   // Register names are local to a function.
   const std::string two =
       function("\tmin.s32 \t%r2, %r1, 255;\n") + function("\tmin.s32 \t%r3, %r2, 255;\n");

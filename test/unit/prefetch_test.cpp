@@ -44,7 +44,7 @@ TEST(Prefetch, TheBoxOfALaterIterationIsAskedFor) {
   const size_t at = text.find("prefetch in");
   ASSERT_NE(at, std::string::npos) << text;
   const std::string line = text.substr(at, text.find('\n', at) - at);
-  expect_mentions(line, {".s0.y + 2), 2]"});
+  expect_mentions(line, {".s0.y + 2, 2]"});
   blur.expect_right();
 }
 

@@ -199,7 +199,7 @@ TEST_F(AppImages, AnUnknownSuffixIsRefusedBeforeAnythingIsWritten) {
       apps::write_image(folder_ / name, {1, 1, 8, {0, 0, 0}});
       FAIL() << "wrote " << name;
     } catch (const retrograde::UserError& error) {
-      EXPECT_NE(std::string(error.what()).find("suffix says how it is stored"), std::string::npos);
+      EXPECT_NE(std::string(error.what()).find("suffix selects its format"), std::string::npos);
     }
   }
   EXPECT_TRUE(fs::is_empty(folder_));

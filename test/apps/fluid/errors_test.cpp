@@ -94,9 +94,9 @@ TEST_F(FluidErrors, TheStartHasTheShapeOfTheEnd) {
 
 TEST_F(FluidErrors, NothingIsOptimizedByFactorsFromZero) {
   run_on(picture_, "--viscosity 0");
-  expect_refused({"optimize the viscosity", "by factors", "--viscosity a small number"});
+  expect_refused({"optimize the viscosity", "as a logarithm", "--viscosity a small positive number"});
   run_on(picture_, "--diffusion 0 --optimize diffusion");
-  expect_refused({"optimize the diffusion", "by factors"});
+  expect_refused({"optimize the diffusion", "as a logarithm"});
   expect_no_results();
 }
 
@@ -106,7 +106,7 @@ TEST_F(FluidErrors, NamesMustBeKnown) {
   run_on(picture_, "--method magic");
   expect_refused({"magic", "lbfgs"});
   run_on(picture_, "--method newton_cg");
-  expect_refused({"newton_cg", "second derivatives"});
+  expect_refused({"newton_cg", "Hessian-vector products"});
   run_on(picture_, "--solver guess");
   expect_refused({"guess", "direct or jacobi"});
 }

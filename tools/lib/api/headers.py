@@ -237,6 +237,8 @@ class HeaderReader:
                 return None
             if is_constructor:
                 return self.add(name, "constructor", begin, owner)
+            if not owner and call.string[:call.start()].endswith("::"):
+                return None  # a member that is defined outside its class, which declares it
             return self.add(name, "function", begin, owner)
         concept = re.match(r"concept\s+(\w+)", bare)
         if concept:
