@@ -1,4 +1,4 @@
-// Programs as in the suite, at sizes at which their gradients run in parallel: what is measured.
+// Programs like those of the suite, at sizes at which their gradients run in parallel; these are the ones measured.
 #pragma once
 
 #include <span>

@@ -1,4 +1,4 @@
-// Central differences with a bound on what they can tell.
+// Central differences with a bound on their accuracy.
 #include <cmath>
 
 #include "gradient/adversary/probe.h"

@@ -1,5 +1,5 @@
-// fuzz_adjoints -- looks for programs that propagate_adjoints gets wrong; its arguments:
-// support/fuzz.h.
+// fuzz_adjoints -- searches for programs that propagate_adjoints differentiates wrongly. support/fuzz.h describes its
+// arguments.
 #include "support/fuzz.h"
 #include "gradient/adversary/check.h"
 

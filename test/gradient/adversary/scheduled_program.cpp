@@ -28,7 +28,7 @@ AutoscheduleOptions choose_options(Choices& choices) {
   return options;
 }
 
-// A few hundred states are no large program: its options are the default ones.
+// A program with a few hundred states does not count as large: it keeps the default options.
 AdversaryProgram large(Choices& choices, fuzz::LargeSizes sizes) {
   return {fuzz::make_large_program(choices, sizes), {}, false, {}};
 }
