@@ -35,10 +35,10 @@ struct ApartLimits {
   size_t memory_bytes = 0;  // of address space; 0: no limit
 };
 
-// Ends what a process sends whose function returned.
+// The byte that a process sends last if its function has returned.
 constexpr char has_returned = '\n';
 
-// Whether the other end was closed in time.
+// Returns whether the other end was closed in time.
 inline bool read_all(int from, std::chrono::steady_clock::time_point end, std::string& text) {
   char chunk[4096];
   while (true) {
