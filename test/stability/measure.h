@@ -1,4 +1,4 @@
-// Measures the adjoint of a problem, in float32 and as machine code, against its true gradient.
+// Measures the error of a problem's adjoint, in float32 and as machine code, against its true gradient.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace retrograde::stability {
 
-// Cases whose true gradient is finite in float32.
+// A cell of the result table: the cases whose true gradient is finite in float32.
 struct Cell {
   int cases = 0;
   int lost = 0;            // came out infinite or NaN
