@@ -120,7 +120,8 @@ std::map<Point, int> visits_of_gathers(const Case& c, const Inversion& inversion
   for (const Gather& g : inversion.gathers) {
     std::vector<std::pair<int64_t, int64_t>> box;
     std::vector<std::string> names;
-    std::map<std::string, std::pair<int64_t, int64_t>> used;  // by visited points, of each variable
+    std::map<std::string, std::pair<int64_t, int64_t>>
+        used;  // the range of each variable over visited points
     for (size_t d = 0; d < g.lhs.size(); ++d) {
       if (!g.pure[d]) continue;
       names.push_back(c.query.target_args[d]);

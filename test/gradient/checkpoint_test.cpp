@@ -227,7 +227,7 @@ Func counted(const Buffer<float>& start, const Expr& n) {
 }
 
 TEST(Checkpoints, StepsAreComputedAgainAsOftenAsTheBinomialBoundSays) {
-  Buffer<float> start = line(1);  // what does not depend on x runs once in a vector
+  Buffer<float> start = line(1);  // values that do not depend on x are computed once for a vector
   for (auto [n, s, again] : {std::tuple(10, 1, 45),
                              {10, 3, 15},
                              {10, 10, 9},

@@ -16,7 +16,8 @@ namespace retrograde {
 namespace {
 
 constexpr int many = 12'000'000;
-constexpr float huge = 5e36f;  // of which two lanes of a block can add up their terms
+constexpr float huge =
+    5e36f;  // two lanes of a block can add up terms of this size without overflow
 
 struct Nature {
   const char* name;
@@ -58,7 +59,7 @@ void expect_sums(const Buffer<float>& found, const Terms& terms) {
   }
 }
 
-using Schedule = std::function<void(Func)>;  // of the Func that sums
+using Schedule = std::function<void(Func)>;  // schedules the Func that sums
 
 // loss = sum over e and row of gain(e) * terms(e, row): the gradient sums each column.
 void check_gather(int elements, Terms& terms, const Schedule& schedule = nullptr) {

@@ -117,7 +117,7 @@ const std::vector<Shape>& shapes() {
        },
        6},
       {"(1 - x*x) / (1 + x*x)", [](Expr x, Expr) { return (1.0f - x * x) / (1.0f + x * x); },
-       [](Real x, Real) {  // by x*x it is denormal from 1e9 on
+       [](Real x, Real) {  // as a quotient by x*x it is denormal from 1e9 on
          return std::fabs(x) > 1e9L ? std::nanl("") : -4 * x / (1 + x * x) / (1 + x * x);
        },
        8},

@@ -10,13 +10,13 @@ namespace access_table {
 struct UpdateShape {
   bool is_gather =
       true;             // no index on its left-hand side runs over its reduction or depends on data
-  long iterations = 1;  // of its reduction domain, for each element; -1: parametric
+  long iterations = 1;  // iterations of its reduction domain for each element; -1: parametric
 };
 
 struct Outcome {
   std::string error;  // empty: there is a gradient
   std::vector<UpdateShape> updates;
-  std::vector<float> gradient;  // of the input, dimension 0 innermost
+  std::vector<float> gradient;  // the adjoint of the input, dimension 0 innermost
 
   bool is_gather() const {
     for (const UpdateShape& u : updates) {

@@ -12,7 +12,7 @@ namespace retrograde::gradient {
 
 namespace {
 
-constexpr std::clock_t longest = 3 * CLOCKS_PER_SEC;  // of the columns of one matrix
+constexpr std::clock_t longest = 3 * CLOCKS_PER_SEC;  // time limit for the columns of one matrix
 
 // The product of two regions: the dimensions of `a`, then those of `b`.
 oracle::Region joined(const oracle::Region& a, const oracle::Region& b) {

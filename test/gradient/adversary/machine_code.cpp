@@ -57,7 +57,7 @@ class Compiled {
       try {
         compare(i, scheduled(gradients_[i], funcs, choices), ", scheduled");
         ++compared;
-      } catch (const UserError& error) {  // of the schedule
+      } catch (const UserError& error) {  // the schedule is refused
         decide_by_access(error);
       } catch (const Unsupported&) {
       }
@@ -157,7 +157,7 @@ int compare_machine_code(Subject& s, const Derivative& derivative, const Gradien
   if (!code.compare_unscheduled()) return 0;
   try {
     if (twin) code.compare_twin(*twin);
-  } catch (const UserError& error) {  // what a C function reads must have bounds, and no versions
+  } catch (const UserError& error) {  // operands of a C function must have bounds, and no versions
     decide_by_access(error);
   } catch (const Unsupported&) {
   }

@@ -68,7 +68,8 @@ class Motion {
   Motion operator+(const Motion& other) const;
   std::vector<AdjointInput> inputs() const;
   std::vector<Direction> directions() const;
-  oracle::Region region(size_t input) const;  // of input i; none of `scale`, the last
+  oracle::Region region(
+      size_t input) const;  // the region of input i; empty for `scale`, the last one
   void move(double by) const;
   // <gradients, directions>; `of` gives the gradient by an input, undefined where there is none.
   Product along(const std::function<Func(const AdjointInput&)>& of) const;
@@ -85,10 +86,10 @@ struct Subject {
   Weights weights;
   std::vector<Buffer<float>> w = {};  // one for each value of the output
   Func seed = {};
-  double largest = 0;  // of the magnitudes summed up in the primal
+  double largest = 0;  // the largest sum of magnitudes in the primal
   std::clock_t begun = std::clock();
   Region bounds() const;
-  AdjointOptions options() const;  // by inputs only
+  AdjointOptions options() const;  // options that request gradients by inputs only
   // The interpreter has already taken long: expensive checks that have not begun are skipped.
   bool is_late() const;
 };

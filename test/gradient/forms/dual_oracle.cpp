@@ -180,7 +180,7 @@ class Evaluation {
         const Wide v = RETROGRADE_WIDE(hypot)(x, b.v);
         return combine(v, {{&a, x / v}, {&b, b.v / v}}, false);
       }
-      case Op::pow: {  // by a constant
+      case Op::pow: {  // the exponent is a constant
         const Wide p = operand(call.args[1]).v, v = RETROGRADE_WIDE(pow)(x, p);
         return combine(v, {{&a, p * RETROGRADE_WIDE(pow)(x, p - 1)}}, false);
       }

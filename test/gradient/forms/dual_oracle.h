@@ -27,7 +27,7 @@ using Place = std::array<double, leaf_count>;  // x, y, z
 struct TrueGradient {
   bool is_usable = false;  // finite, and no value leaves the normal range of the type
   std::array<double, leaf_count> slope{};  // rounded to double
-  std::array<double, leaf_count> reach{};  // of rounding
+  std::array<double, leaf_count> reach{};  // the effect of rounding
 };
 
 TrueGradient true_gradient(const Expr& e, const Place& at, uint64_t seed);
