@@ -40,7 +40,7 @@ ScheduleLog part_of(const ScheduleLog& log, Choices& choices) {
 
 struct Built {
   RandomProgram program;
-  ScheduleLog schedule;  // of a part, or none
+  ScheduleLog schedule;  // a partial schedule, or none
 };
 Built build(uint64_t seed, bool has_schedule) {
   Choices choices(seed);

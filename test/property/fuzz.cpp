@@ -27,7 +27,7 @@ constexpr int watched_by_pages = 25;  // percent
 
 std::vector<std::string> without;
 std::string only;
-std::string style;  // of the programs; empty: one or the other
+std::string style;  // the style of the programs; empty: either one
 
 // Removes every use of the directive from the schedule, with the directives that depend on it.
 ScheduleLog leave_out(ScheduleLog log, const std::string& directive) {

@@ -23,7 +23,7 @@ constexpr int step = 1;  // 320 programs
 #else
 constexpr int step = 2;  // 160 programs: every second shard
 #endif
-constexpr double max_refused_fraction = 0.15;  // of one shard
+constexpr double max_refused_fraction = 0.15;  // the share of one shard's programs
 constexpr double max_unstable_fraction = 0.1;
 
 // The random styles, under the names that the fuzzer uses.
