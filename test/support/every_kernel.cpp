@@ -105,7 +105,7 @@ Type unsigned_form(Type type) { return type.is_int() ? type.with_code(TypeCode::
 // ---- kinds of nodes ----
 
 void Kernel::add_loads() {
-  store_all(types(), [&](Type t) {  // of places that data say
+  store_all(types(), [&](Type t) {  // data-dependent indices
     return make_load(wide(t), memory("in", t), operand(Int(32)));
   });
   store_all(types(), [&](Type t) {  // strided
@@ -326,8 +326,8 @@ In Kernel::add(Kind kind) {
     case Kind::Assert:
       return In::HostsAlone;
     case Kind::StringImm:  // parts of what is printed
-    case Kind::Call:       // by their operators
-    case Kind::Free:       // of what a host allocated
+    case Kind::Call:       // covered by their operators
+    case Kind::Free:       // frees memory that a host allocated
     case Kind::Provide:    // before storage is flat
     case Kind::Realize:
     case Kind::Prefetch:

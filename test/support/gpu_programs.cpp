@@ -193,7 +193,7 @@ Func bilateral_grid(bool on_gpu, int scale) {
            zf * along_y(x / cell, y / cell, zi + 1, channel);
   };
   out(x, y) = sliced(0) / max(sliced(1), 1e-3f);
-  grid.compute_root();  // which each of its readers would make anew
+  grid.compute_root();  // otherwise each of its consumers would recompute it
   for (const Func& f : {grid, along_z, along_x, along_y, out}) tiled(f, on_gpu, 8, 8);
   if (on_gpu) grid.update().gpu_tile(x, y, xi, yi, 4, 4, TailStrategy::GuardWithIf);
   return out;

@@ -15,7 +15,8 @@ namespace retrograde {
 inline std::string same_numbers(const std::string& text) {
   static const std::regex name(
       "(^|[^A-Za-z_0-9$.]|\\.(?=[A-Za-z_0-9]+\\$))([A-Za-z_][A-Za-z_0-9$]*)");
-  std::map<std::string, std::map<std::string, size_t>> numbers;  // of each name without: those seen
+  std::map<std::string, std::map<std::string, size_t>>
+      numbers;  // for each name without its number: the numbers seen
   std::string result;
   auto at = text.begin();
   for (std::sregex_iterator it(text.begin(), text.end(), name), end; it != end; ++it) {
