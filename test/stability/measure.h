@@ -12,12 +12,13 @@ namespace retrograde::stability {
 // A cell of the result table: the cases whose true gradient is finite in float32.
 struct Cell {
   int cases = 0;
-  int lost = 0;            // came out infinite or NaN
-  double worst_error = 0;  // of the others, relative to the case's largest derivative
+  int lost = 0;  // came out infinite or NaN
+  double worst_error =
+      0;  // the worst error of the other cases, relative to their largest derivative
   std::string lost_at, worst_at;
 };
 struct Row {
-  std::array<Cell, extreme_count> cells;  // by the case's most extreme number
+  std::array<Cell, extreme_count> cells;  // indexed by the most extreme number of a case
   Cell left;  // the program's values or adjoints leave float32 (traced.h), whatever the numbers
 };
 

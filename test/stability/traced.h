@@ -50,7 +50,7 @@ class Tape {
   }
 
   struct Gradient {
-    Reals adjoints;  // of the inputs
+    Reals adjoints;  // the adjoints of the inputs
     bool has_left = false;
   };
   Gradient differentiate(const Traced& output, size_t inputs) const {
