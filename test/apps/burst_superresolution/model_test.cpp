@@ -242,7 +242,7 @@ TEST(Noise, AsksForSmoothness) {
   EXPECT_EQ(weight(0.02, 0.5), 0.5);
   EXPECT_TRUE(smoothness_for(0.02, ramp, size, Colours::Rgb, 0.0).empty());
   const auto opponent = smoothness_for(0.02, ramp, size, Colours::Opponent, {});
-  EXPECT_TRUE(std::isfinite(opponent[1].weight));  // of differences that are 0
+  EXPECT_TRUE(std::isfinite(opponent[1].weight));  // although all differences are 0
   EXPECT_GT(opponent[1].weight, opponent[0].weight);
   const auto given = smoothness_for(0.02, ramp, size, Colours::Opponent, 0.5);
   EXPECT_NEAR(given[1].weight / given[0].weight, opponent[1].weight / opponent[0].weight, 1e-6);
