@@ -24,7 +24,7 @@ void for_each_node(const Func& output, ir::FunctionRef<void(const Expr&)> visit)
 }
 
 int narrowest_float(const Func& output) {
-  int bits = 64;  // approximate precision of the mantissa
+  int bits = 64;  // the width of the type, a rough measure of its mantissa
   for_each_node(output, [&](const Expr& e) {
     if (e.type().is_float()) bits = std::min(bits, e.type().is_bfloat() ? 8 : e.type().bits());
   });
