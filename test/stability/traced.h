@@ -5,7 +5,7 @@
 // float32, which decides branches. Operations record themselves with their exact partials on the Tape of their inputs;
 // Tape::differentiate walks it backwards. An adjoint of exactly 0 stays 0, whatever it is multiplied by.
 //
-// A number `has_left` float32 if its own value is not finite, or shares no digit with the exact one. A gradient has left
+// A number `has_left` float32 if its own value is not finite, or has no digit of the exact one. A gradient has left
 // float32 if a number on its path has, or if the exact adjoint of such a number, or a contribution to it, is beyond
 // float32's largest number or below its smallest. A float32 program cannot be expected to be right in these cases.
 #pragma once
