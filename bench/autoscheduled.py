@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""autoscheduled.py -- compares our autoscheduler, Halide's autoschedulers and schedules by hand on the kernels.
+"""autoscheduled.py -- compares our autoscheduler, Halide's autoschedulers and manual schedules on the kernels.
 
-All of them run in turn, in one run.
+All of them take turns within one run.
 
     autoscheduled.py PROGRAMS [--kernel NAME]... [--rounds N] [--threads N] [--no-halide] [--output FILE]
 
 PROGRAMS is the folder of bench_kernels_retrograde and bench_machine. Halide is the wheel from the Python
 package index, as in operators/operators.py, with each of its autoschedulers and 60 s for search and
-compilation. Results are checked against those of the schedules by hand. README.md explains the figures.
+compilation. Results are checked against those of the manual schedules. README.md explains the figures.
 """
 import argparse
 import json
@@ -32,7 +32,7 @@ def kernel_names():
 
 
 def error_of(workers, scratch):
-    """The largest error of the autoscheduled results relative to those by hand, by norm."""
+    """The largest error of the autoscheduled results relative to those of the manual schedules, by norm."""
     found = []
     for worker in workers:
         path = os.path.join(scratch, worker.name)

@@ -34,7 +34,7 @@ def ms(value):
 
 
 def pairs(report):
-    """Kernels, or gradients, in process beside Halide 14's."""
+    """Kernels or gradients, compiled in process, compared with Halide 14's."""
     rows, done = [], [r for r in report if not r.get("failure")]
     for r in report:
         name = f"{r['kernel']} ({r['threads']})"

@@ -6,7 +6,7 @@ order the measurements.
 
     model.py PROGRAMS [--program NAME]... [--threads N] [--seconds S] [--output FILE] [--plot FILE]
 
-PROGRAMS is the folder of bench_operators_retrograde and bench_kernels_retrograde. The machine's figures are
+PROGRAMS is the folder of bench_operators_retrograde and bench_kernels_retrograde. The parameters of the machine are
 those that RETROGRADE_MACHINE names or that were measured before (tools/tune --machine); they never depend on
 a program. Stages that take less than 5 us are left out, because the profiler samples every millisecond.
 """
@@ -34,7 +34,7 @@ def programs():
 
 
 def explain(options, kind, name):
-    """The report of one program, or why there is none."""
+    """The report of one program, or the reason for which it has none."""
     worker = os.path.join(options.programs, f"bench_{kind}_retrograde")
     command = [worker, name, "full", str(options.threads)]
     if kind == "kernels":

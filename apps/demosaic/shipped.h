@@ -7,7 +7,7 @@
 
 namespace demosaic {
 
-// Those that are installed among 2, 9 and 15 filters of 5 x 5 and 7 x 7.
+// The network shapes that are installed, out of those with 2, 9 and 15 filters of 5 x 5 and 7 x 7.
 std::vector<Shape> shipped_shapes();
 
 // "relaxed_9_5.json"

@@ -257,7 +257,10 @@ def largest_error(ours, theirs):
 
 
 def compiled_side(program, options):
-    """None if torch.compile takes longer than COMPILE_SECONDS; a scan becomes one operator per row."""
+    """(the program through torch.compile, None), or (None, the error) if it fails or takes over COMPILE_SECONDS.
+
+    Scans take that long, because torch.compile turns them into one operator per row.
+    """
     def too_long(*_):
         raise TimeoutError(f"not compiled within {COMPILE_SECONDS} s")
 

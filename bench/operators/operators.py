@@ -97,7 +97,7 @@ class Worker:
             self.fail(failed)
 
     def answer(self, expected, seconds=RUN_SECONDS):
-        """The numbers after `expected` in its next line."""
+        """Reads the worker's next line, which must begin with `expected`, and returns the numbers after it."""
         end = time.monotonic() + seconds
         with selectors.DefaultSelector() as selector:
             selector.register(self.process.stdout, selectors.EVENT_READ)
@@ -215,7 +215,7 @@ def run_in_turn(workers, rounds):
 
 
 def compare(workers, reference, options, scratch):
-    """Errors against float64, by name, of each C++ worker that has run."""
+    """The errors of each C++ worker that has run, relative to float64, by name."""
     double = Worker("float64", reference, options.threads, 5 * RUN_SECONDS)
     if double.failure:
         return {"reference": double.failure}
@@ -235,7 +235,7 @@ def compare(workers, reference, options, scratch):
 
 
 def memory_of(worker, inputs_mb):
-    """The memory that a run adds, plus the inputs."""
+    """The memory of an operator: what a run allocates, plus the inputs."""
     try:
         return worker.ask("memory", "memory")[1] + inputs_mb
     except Failed:
@@ -280,7 +280,7 @@ def figures(name, workers, errors, machine, scratch):
 
 
 def spread(times):
-    """The width of the middle half."""
+    """The interquartile range."""
     if len(times) < 4:
         return max(times) - min(times)
     low, _, high = statistics.quantiles(times, n=4)

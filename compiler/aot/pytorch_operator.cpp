@@ -207,7 +207,7 @@ void add_gradients(const TorchFunction& function, TextValues& values) {
                  {"gradient_results", joined(results)}});
 }
 
-// What autograd saves during a call, and the gradient that it returns for each argument.
+// Adds the values that autograd saves during a call, and the gradient that it returns for each argument.
 void add_backward_pass(const TorchFunction& function, TextValues& values) {
   std::vector<std::string> restored, gradients;
   std::string save_numbers, find_wanted;

@@ -12,8 +12,8 @@
 
 namespace retrograde {
 
-// Gradients by inputs that the output does not depend on. They are built when first looked up; later look-ups return
-// the same Func.
+// Gradients by inputs that the output does not depend on. Each is built when it is first requested; later requests
+// return the same Func.
 class ZeroGradients {
  public:
   // `facts` are the explanations of the synthesis. Throws CompileError if they show that the gradient exists but was

@@ -11,8 +11,8 @@
 namespace retrograde::codegen {
 namespace {
 
-// So many instructions take LLVM several times as long as starting a thread, transferring them and initialising LLVM
-// for them.
+// From this number of instructions on, LLVM takes several times as long to compile them as it takes to start a thread,
+// transfer them to it and initialise LLVM there.
 constexpr unsigned worth_a_thread = 300;
 // Fewer instructions do not make a part on their own.
 constexpr unsigned small_function = 100;

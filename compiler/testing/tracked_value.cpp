@@ -37,8 +37,8 @@ double rounding_residual(Kind kind, const Scalar& a, const Scalar& b, const Scal
   return std::fabs((a.f - (r - virtual_y)) + (y - virtual_y));
 }
 
-// What a cast to a narrower float rounds off. float32(float64(a) * float64(b)) is the product of
-// float32 exactly, and a compiler that computes it so may contract it: then this rounding is gone.
+// The rounding error of a cast to a narrower float. float32(float64(a) * float64(b)) is exactly the product of float32,
+// and a compiler that computes it so may contract it: then this rounding is gone.
 double narrowing_residual(const Scalar& a, const Scalar& result) {
   if (!a.type.is_float() || !result.type.is_float()) return 0;
   return std::isfinite(result.f) ? std::fabs(a.f - result.f) : 0;

@@ -1,6 +1,6 @@
-// Every gather found for an access is checked by enumeration: over small domains each point of the
-// stage must be visited exactly once, at the element that it reads. Beside that, the shape: how
-// many gathers, how many iterations.
+// Tests the inversion of accesses (autodiff/inversion) by enumeration: over small domains, the gathers of an access
+// must visit each point of the stage exactly once, at the element that it reads. They also check the shape of the
+// result: the number of gathers and of their iterations.
 #include "autodiff/inversion/access_inversion.h"
 #include "autodiff/inversion/inversion_cost.h"
 
@@ -21,7 +21,7 @@ namespace {
 
 using Env = std::map<std::string, int64_t>;
 
-// `table` stands for data: any integer function of the arguments.
+// `table` represents data: any integer function of the arguments.
 int64_t table(const std::vector<int64_t>& args) {
   int64_t h = 7;
   for (int64_t a : args) h = (h * 31 + a * 17 + 3) % 1009;
@@ -98,8 +98,8 @@ std::map<Point, int> visits_of_stage(const Case& c) {
   return visits;
 }
 
-// A reduction domain is as small as enumeration says: some element needs its first step, some its
-// last.
+// Checks by enumeration that a reduction domain is as small as possible: some element needs its first iteration, some
+// its last.
 void expect_no_smaller_domain(const Gather& g, const Env& params,
                               const std::map<std::string, std::pair<int64_t, int64_t>>& used) {
   if (!g.rdom) return;
@@ -113,14 +113,15 @@ void expect_no_smaller_domain(const Gather& g, const Env& params,
   }
 }
 
-// Elements from far outside the read region too: there nothing may be visited.
+// Visits by the gathers, including elements far outside the read region: nothing may be visited there.
 std::map<Point, int> visits_of_gathers(const Case& c, const Inversion& inversion, int64_t reach,
                                        bool expect_smallest = true) {
   std::map<Point, int> visits;
   for (const Gather& g : inversion.gathers) {
     std::vector<std::pair<int64_t, int64_t>> box;
     std::vector<std::string> names;
-    std::map<std::string, std::pair<int64_t, int64_t>> used;  // by visited points, of each variable
+    std::map<std::string, std::pair<int64_t, int64_t>>
+        used;  // the range of each variable over visited points
     for (size_t d = 0; d < g.lhs.size(); ++d) {
       if (!g.pure[d]) continue;
       names.push_back(c.query.target_args[d]);
@@ -185,7 +186,7 @@ Case make_case(std::vector<LoopVariable> vars, std::vector<Expr> indices, Env pa
   return result;
 }
 
-// Product of the constant extents of each gather, in order.
+// The number of iterations of each gather (the product of its constant extents), in order.
 std::vector<int64_t> iterations(const Inversion& inversion, const Env& params) {
   std::vector<int64_t> result;
   for (const Gather& g : inversion.gathers) {
@@ -269,7 +270,7 @@ TEST(AccessInversion, ShiftsAndMasksArePowersOfTwo) {
 TEST(AccessInversion, ConditionsAsNumbersAreSelects) {
   EXPECT_TRUE(all_gather(check(make_case({x10}, {x + cast_to(Int(32), x > 4)}))));
 }
-// 2^40 paths lead from the index to x.
+// The index is a DAG with 2^40 paths to x.
 TEST(AccessInversion, SharedPartsOfAnIndexAreFollowedOnce) {
   Expr index = x;
   for (int i = 0; i < 40; ++i) index = (index + index) / 2;
@@ -379,8 +380,8 @@ TEST(AccessInversion, TriangularPredicate) {
   EXPECT_TRUE(all_gather(check(c)));
 }
 
-// Bilateral slicing: the cell of the grid is an affine function of the pixel, clamped at the
-// border; depth is data.
+// Bilateral slicing: the grid cell is an affine function of the pixel, clamped at the border; the depth is
+// data-dependent.
 TEST(AccessInversion, SlicedGridGathersPixelsOfACell) {
   const int size = 8, cells = 4;
   auto cell = [&](const Expr& v) {
@@ -398,7 +399,7 @@ TEST(AccessInversion, SlicedGridGathersPixelsOfACell) {
   }
 }
 
-// A box around the points that read an element would be far larger than those.
+// The bounding box of the points that read an element is far larger than their number.
 TEST(AccessInversion, ScattersWhereTheInverseIsDearer) {
   Case k = make_case({loop("x", 0, 1023)}, {(3 * x) % 32 + x / 32});
   k.query.region = {loop("y0", 0, 62)};
@@ -413,7 +414,7 @@ TEST(AccessInversion, ScattersWhereTheInverseIsDearer) {
   EXPECT_FALSE(invert_or_scatter(cheap.query).gathers[0].scatters);
 }
 
-// It took half a minute to find gathers for such an access.
+// Without a limit, the search for gathers of such an access took half a minute.
 TEST(AccessInversion, ScattersWhereTheSearchTakesTooLong) {
   Case k = make_case({loop("x", 0, 63)}, {((7 * x) % 16) * 32 + (x / 3) % 32 + x % 5});
   EXPECT_EQ(k.query.operations, isl_operations);
@@ -424,8 +425,8 @@ TEST(AccessInversion, ScattersWhereTheSearchTakesTooLong) {
   expect_mentions(chosen.note, {"was given up"});
 }
 
-// isl stops wherever its budget ends: what it has found by then is no answer. With the least budget
-// that gives gathers at all they are the right ones.
+// isl stops wherever its budget ends, and a partial result must not count as an answer. The smallest budget that yields
+// gathers at all must yield the right ones.
 TEST(AccessInversion, IsRightWithTheLeastBudgetThatIsEnough) {
   const Expr w = var("w"), h = var("h"), p = var("p");
   Case k = make_case({loop("x", -2, 2)},
@@ -447,7 +448,7 @@ TEST(AccessInversion, IsRightWithTheLeastBudgetThatIsEnough) {
                                                                        << describe(least);
 }
 
-// Random quasi-affine accesses, by enumeration.
+// Random quasi-affine accesses, checked by enumeration.
 class RandomAccess {
  public:
   explicit RandomAccess(unsigned seed) : random_(seed) {}

@@ -1,6 +1,6 @@
-// Every quasi-affine access becomes a gather whose left-hand sides are pure variables or fixed
-// indices, with the right values; beside it, what Halide 14 makes of the same line. The oracle of
-// the values evaluates the pipeline on unit vectors: nothing of differentiation is in it.
+// Every quasi-affine access becomes a gather, whose left-hand sides are pure variables or fixed indices, with the right
+// values. The table also shows how Halide 14 differentiates the same line. The expected values come from evaluating the
+// pipeline on unit vectors, without any differentiation.
 #include <gtest/gtest.h>
 
 #include <iostream>

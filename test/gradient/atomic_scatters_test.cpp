@@ -1,5 +1,5 @@
-// Sums at places that data decide where bits may differ from run to run: parts live one for each
-// thread, large scatters run in parallel; and where they may not, neither happens.
+// Tests sums at data-dependent indices. Where bits may differ from run to run, each thread has one privatised copy and
+// large scatters run in parallel; where they may not differ, neither happens.
 #include "autoschedule/atomic_scatters.h"
 
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ void expect_none(const Func& f, const AutoscheduleOptions& options) {
   EXPECT_EQ(results.schedule_source.find("atomic"), std::string::npos) << results.schedule_source;
 }
 
-// A table of a million floats, read two million times: its gradient is a scatter in eight parts.
+// A table of a million floats, read two million times: its gradient is a scatter into eight privatised copies.
 struct TableGradient {
   static constexpr int elements = 1 << 20, reads = 2 << 20;
   Buffer<float> table = numbers(elements), weights = numbers(reads);
@@ -54,7 +54,7 @@ struct TableGradient {
     mine.jit_handlers().thread_limit = threads;
     return mine.realize({elements});
   }
-  // One term after the other, in double.
+  // The expected gradient, summed term by term in double.
   std::vector<double> expected() const {
     std::vector<double> sums(elements);
     for (int i = 0; i < reads; ++i) sums[static_cast<size_t>(places(i))] += weights(i);
@@ -78,7 +78,7 @@ TEST(AtomicScatters, PartsOfALargeSumLiveOneForEachThread) {
   const auto after = atomic.auto_schedule(get_host_target(), in_any_order());
   EXPECT_EQ(before.schedule_source.find("atomic"), std::string::npos);
   EXPECT_NE(after.schedule_source.find("atomic"), std::string::npos) << after.schedule_source;
-  // Parts are 8 MB each, in double.
+  // Each privatised copy takes 8 MB, in double.
   EXPECT_LT(after.memory_bytes, before.memory_bytes - (32 << 20));
   EXPECT_EQ(count_wrong(any.realized(atomic), any.expected()), 0u);
   EXPECT_EQ(count_wrong(fixed.realized(ordered), fixed.expected()), 0u);
@@ -109,7 +109,7 @@ TEST(AtomicScatters, GradientsAreCompiledSoToo) {
   EXPECT_EQ(count_wrong(program.realized(pipeline), program.expected()), 0u);
 }
 
-// Forward, as a user writes it: it has no parts.
+// A forward histogram as a user writes it: it has no privatised copies.
 struct Histogram {
   Func sums{"sums"};
   Histogram(const Buffer<int>& places, const Buffer<float>& weights, int bins) {

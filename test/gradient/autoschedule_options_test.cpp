@@ -1,5 +1,5 @@
-// The autoscheduler under options: without each of its decisions, with Funcs to store and to inline,
-// for so many threads. Schedules are legal, and results those of the interpreter.
+// Tests the options of the autoscheduler: each decision switched off, Funcs to store and to inline, a number of
+// threads. Schedules must be legal, and results must agree with the interpreter.
 #include "frontend/schedule/autoschedule_options.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ struct Program {
   bool has_estimates = true;
 };
 
-// Smoothed down and across, of which a weighted sum of squares is wanted.
+// An image smoothed down and across, the weighted sum of its squares, and the gradient of that sum.
 Program stencils() {
   const Buffer<float> image = random_image({90, 70}, -1, 1, 1);
   Var x("x"), y("y");
@@ -45,7 +45,7 @@ Program stencils() {
   return {{loss, propagate_adjoints(loss)(image)}, {{}, {90, 70}}};
 }
 
-// The same way forward alone, of an image of any size.
+// The same smoothing without a gradient, of an image of any size.
 Program smoothing() {
   ImageParam image(Float(32), 2);
   image.set(random_image({70, 50}, -1, 1, 1));
@@ -57,7 +57,7 @@ Program smoothing() {
   return {{down}, {{60, 40}}, false};
 }
 
-// Layers that mix channels.
+// Convolution layers that mix channels.
 Program convolution() {
   const Buffer<float> image = random_image({40, 24, 6}, -1, 1, 1);
   const Buffer<float> weights = random_image({3, 3, 6, 8}, -1, 1, 2);
@@ -71,7 +71,7 @@ Program convolution() {
   return {{layer, d(image), d(weights)}, {{38, 22, 8}, {40, 24, 6}, {3, 3, 6, 8}}};
 }
 
-// Products of many rows, of which tiles read pieces.
+// A matrix product of many rows, whose tiles read pieces of them.
 Program product() {
   const Buffer<float> left = random_image({96, 80}, -1, 1, 1);
   const Buffer<float> right = random_image({64, 96}, -1, 1, 2);
@@ -84,7 +84,7 @@ Program product() {
   return {{sums, d(left), d(right)}, {{64, 80}, {96, 80}, {64, 96}}};
 }
 
-// An image read at places that data decide.
+// An image read at data-dependent indices.
 Program warp() {
   const int size = 40, channels = 16;
   const Buffer<float> image = random_image({size, size, channels}, -1, 1, 1);
@@ -96,7 +96,7 @@ Program warp() {
           {{size, size, channels}, {size, size, channels}, {size, size, 2}}};
 }
 
-// A choice among sums and differences, read at constants.
+// A selection among sums and differences, read at constant indices.
 Program bands() {
   const Buffer<float> image = random_image({60, 40}, -1, 1, 1);
   Var x("x"), y("y"), b("b");
@@ -109,7 +109,7 @@ Program bands() {
   return {{loss, propagate_adjoints(loss)(image)}, {{}, {60, 40}}};
 }
 
-// Differences of an image to itself, shifted, each smoothed; few planes, and transposed reads.
+// Differences between an image and shifted copies of itself, each smoothed; few planes, and transposed reads.
 Program shifts() {
   const Buffer<float> image = random_image({44, 30}, -1, 1, 1);
   Var x("x"), y("y"), s("s");
@@ -140,7 +140,7 @@ std::vector<std::string> names_of_programs() {
   return names;
 }
 
-// Values of all outputs, evaluated point by point in double.
+// Expected values of all outputs, evaluated point by point in double.
 const std::vector<oracle::Array>& expected_of(const std::string& name) {
   static std::map<std::string, std::vector<oracle::Array>> known;
   std::vector<oracle::Array>& result = known[name];
@@ -206,7 +206,7 @@ void expect_right_without(const std::string& name, const std::set<Decision>& wit
   expect_right(name, scheduled_without(name, without), how);
 }
 
-// A case for each program: what it is to compute is interpreted once.
+// One case for each program; its expected values are interpreted once.
 class EachProgram : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(EachProgram, IsRightWithoutAnyOfTheDecisions) {
@@ -325,7 +325,7 @@ TEST_F(Places, BoundsOfWhatIsStoredAreKnown) {
   }
 }
 
-// Each level reads the one before at nine places: seven of them are 9^7 copies.
+// Each level reads the one before at nine places: inlining seven of them makes 9^7 copies.
 TEST_F(Places, BodiesThatGrowWithoutEndAreNotInlined) {
   Func last = cheap;
   AutoscheduleOptions options;
@@ -400,7 +400,7 @@ TEST(AutoscheduleOptions, RefuseTruthInOtherWords) {
   }
 }
 
-// A program is compiled again if its options change.
+// A program is recompiled if its options change.
 TEST_F(Places, OptionsOfAGradientTakeEffectWhenItIsCompiledNext) {
   Func gradient = propagate_adjoints(gradient::weighted_sum(sums, {30}))(image);
   const std::string before = gradient.loop_nest();

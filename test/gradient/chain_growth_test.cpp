@@ -1,6 +1,6 @@
-// How the work of the compiler grows with the number of stages: a chain of stencils with its
-// gradient, from the program to the statement that LLVM is given. Work is counted, not timed: in
-// bytes that are allocated, which whatever copies or builds something has to ask for.
+// Tests that the compiler's work grows linearly with the number of stages. The program is a chain of stencils with its
+// gradient, compiled up to the statement that LLVM receives. Work is measured in allocated bytes instead of time,
+// because any code that copies or builds something must allocate.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -31,7 +31,7 @@ void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 namespace retrograde {
 namespace {
 
-// Bytes by part of the compiler.
+// Allocated bytes by part of the compiler.
 using Work = std::map<std::string, double>;
 
 class Laps {
@@ -81,7 +81,7 @@ Work work_of_chain(int stages) {
   return laps.work;
 }
 
-// One expression of many statements, as a loop of the user's language unrolls it.
+// One expression of many statements, as the unrolled loop of a host program builds it.
 Stmt lower_statements(int statements, Laps& laps) {
   Buffer<float> image(64, 64), factor(64, 64);
   Var x("x"), y("y");
@@ -104,19 +104,19 @@ Work work_of_statements(int statements) {
   return laps.work;
 }
 
-// What a program four times as long asks for.
+// Checks that a program four times as long allocates about four times as much.
 void expect_linear(const Work& some, const Work& many) {
   double all = 0;
   for (const auto& [part, bytes] : many) all += bytes;
   for (const auto& [part, bytes] : many) {
     if (bytes < all / 1000) continue;
-    // n log n would be 1.18.
+    // Growth by n log n would give 1.18.
     EXPECT_LT(std::log(bytes / some.at(part)) / std::log(4), 1.2) << part;
   }
 }
 
 TEST(ChainGrowth, EachStageCostsEveryPartOfTheCompilerAsMuch) {
-  work_of_chain(8);  // what is set up once
+  work_of_chain(8);  // warms up what is initialised once
   const Work some = work_of_chain(120);
   expect_linear(some, work_of_chain(480));
 }
@@ -127,7 +127,7 @@ TEST(ChainGrowth, EachUnrolledStatementCostsEveryPartOfTheCompilerAsMuch) {
   expect_linear(some, work_of_statements(800));
 }
 
-// The steady state of such a loop would save a clamp beside hundreds of sines.
+// A separate loop body for the interior would save only a clamp beside hundreds of sines.
 TEST(ChainGrowth, ABodyOfManyStatementsIsNotCopiedForItsBorders) {
   constexpr int statements = 800;
   Laps laps;

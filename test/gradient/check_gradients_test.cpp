@@ -1,4 +1,4 @@
-// check_gradients finds right gradients right and wrong ones wrong. A wrong gradient is made with
+// Tests that check_gradients accepts right gradients and reports wrong ones. A wrong gradient is made with
 // stop_gradient, whose derivative is not that of the values; lost digits by a cancellation.
 #include <map>
 #include <nlohmann/json.hpp>
@@ -50,7 +50,7 @@ TEST_F(CheckGradients, ARightGradientHasSmallErrors) {
   EXPECT_EQ(report.complex_step_refused, "");
 }
 
-// Differences run the primal some seventy times.
+// Differences run the primal about seventy times.
 TEST_F(CheckGradients, NothingIsCompiledTwice) {
   Func f("f"), loss("loss");
   RDom all(0, 12, 0, 9);
@@ -126,8 +126,8 @@ TEST_F(CheckGradients, OutputsWithDimensionsAndUpdates) {
   EXPECT_LT(report.worst_error, 1e-8) << report.to_json();
 }
 
-// Unscheduled Funcs are not recomputed for each read: four filters in a row would take 25^4
-// terms for each element.
+// Unscheduled Funcs are not recomputed for each read: recomputation would give four filters in a row 25^4 terms for
+// each element.
 TEST_F(CheckGradients, FiltersOfFiltersThatNobodyScheduled) {
   const Buffer<float> picture = random_image({40, 40}, 0.1, 0.5, 2);
   Buffer<float> weights = random_image({5, 5}, 0.03, 0.05, 3);
@@ -156,7 +156,7 @@ TEST_F(CheckGradients, AWrongGradientIsFound) {
   EXPECT_LT(report.inputs[0].dot_product_error, 1e-12) << "both modes stop there";
 }
 
-// factor 2: right. The rule reads a Buffer of its own, which needs a copy in double, too.
+// factor 2: the right rule. The rule reads a Buffer of its own, which also needs a copy in double.
 void give_rules(const Func& f, const ImageParam& image, float adjoint_factor,
                 float tangent_factor) {
   Buffer<float> half(1);

@@ -1,5 +1,5 @@
-// check_stability finds what was built to be unstable, names the Func, and leaves stable pipelines
-// alone.
+// Tests that check_stability finds pipelines built to be unstable, names the unstable Func, and reports nothing for
+// stable ones.
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -50,7 +50,8 @@ TEST_F(CheckStability, OverflowOfAnIntermediateValueIsFoundWhereItHappens) {
   EXPECT_GT(result(report.cases[1], square.name(), false).lost, 0);
 }
 
-// In updates: the iteration, or that the sum itself left the range; 0 * inf in no predicate's way.
+// The report on an update names the iteration, or says that the accumulated value itself left the range. Terms that a
+// predicate excludes do not count.
 TEST_F(CheckStability, TheIterationOfAnUpdateIsNamed) {
   Func sums("sums"), product("product"), odd("odd");
   RDom r(0, 3), all(0, 16);
@@ -165,7 +166,6 @@ TEST_F(CheckStability, DeclaredRangesAreDrawnFromAndTheirEndsTried) {
   EXPECT_TRUE(pole.first_non_finite->is_adjoint);
 }
 
-// 60000 is a float16, its double is none: the ends are those of the type.
 TEST_F(CheckStability, OutputsMayBeginAnywhere) {
   Func f("f");
   f(x) = image(x + 5) * 2.0f;
@@ -175,6 +175,7 @@ TEST_F(CheckStability, OutputsMayBeginAnywhere) {
   EXPECT_GE(report.cases[1].first_non_finite->at[0], -5);
 }
 
+// The extremes are those of the input's type: 60000 is finite in float16, but twice as much is not.
 TEST_F(CheckStability, NarrowFloatsGoToTheirOwnEnds) {
   ImageParam narrow(Float(16), 1, "narrow");
   Func values("values"), f("f");

@@ -1,6 +1,6 @@
-// Loops over time, run backward from a few kept states. Oracles: central differences; the gradient
-// that keeps all versions, bit by bit; the memory that the profiler sees; the steps that the
-// interpreter evaluates.
+// Tests checkpointing: loops over time that run backward from a few kept states. Oracles: central differences; the
+// gradient that keeps all versions, bit by bit; the memory that the profiler reports; the steps that the interpreter
+// evaluates.
 #include <atomic>
 
 #include "autodiff/time/revolve.h"
@@ -12,7 +12,7 @@ namespace {
 
 Var x("x"), y("y");
 
-// u(x) pushed by a force for n steps, nonlinear in u.
+// A state u(x), pushed by a force for n steps, nonlinear in u.
 Program pushed(int n) {
   Buffer<float> start = line(7), stiffness = line(1, 4), force = plane(7, n);
   Func u("pushed_u");
@@ -22,7 +22,7 @@ Program pushed(int n) {
   return {weighted_sum(u, {7}), {start, stiffness, force}};
 }
 
-// A row that every step sweeps from left to right, in place: iterations of one step see each other.
+// A row that every step sweeps from left to right in place: iterations of one step depend on each other.
 Program swept(int n) {
   Buffer<float> start = line(8), weights = line(3, 4);
   Func u("swept_u");
@@ -33,7 +33,7 @@ Program swept(int n) {
   return {weighted_sum(u, {8}), {start, weights}};
 }
 
-// Position and velocity of pendulums.
+// Positions and velocities of pendulums.
 Program pendulums(int n) {
   Buffer<float> angle = line(5), gravity = line(5, 9);
   Func u("pendulum"), end("end");
@@ -46,7 +46,7 @@ Program pendulums(int n) {
   return {weighted_sum(end, {5}), {angle, gravity}};
 }
 
-// Two rows that take turns.
+// Two rows that alternate as source and destination.
 Program diffusion(int n) {
   Buffer<float> start = line(9), k = line(9, 3);
   Func u("two_rows");
@@ -58,7 +58,7 @@ Program diffusion(int n) {
   return {weighted_sum(u, {9, 2}), {start, k}};
 }
 
-// Only some steps push some elements; time starts elsewhere.
+// Only some steps push some elements; time does not start at 0.
 Program predicated(int n) {
   Buffer<float> start = line(6), gain = line(6, 5);
   Func u("predicated_u");
@@ -69,7 +69,7 @@ Program predicated(int n) {
   return {weighted_sum(u, {6}), {start, gain}};
 }
 
-// The values that a step needs are known without its state, so nothing is kept.
+// A step needs no values of the state for its derivative, so nothing is kept.
 Program linear(int n) {
   Buffer<float> start = line(6), decay = plane(6, n, 8);
   Func u("linear_u");
@@ -101,7 +101,7 @@ Program steered(int n) {
   return {weighted_sum(end, {6}), {start, gain}};
 }
 
-// Double states, of float32 inputs.
+// States in double, inputs in float32.
 Program wide(int n) {
   Buffer<float> start = line(4), gain = line(4, 7);
   Func u("wide_u"), end("end");
@@ -124,7 +124,7 @@ Program twice(int n) {
   return {weighted_sum(u, {5}), {start, gain}};
 }
 
-// One number, without dimensions.
+// A single number, without dimensions.
 Program number(int n) {
   Buffer<float> start = line(1), factors = line(n, 7), gain = line(1, 2);
   Func u("number_u"), loss("loss");
@@ -159,9 +159,9 @@ std::vector<double> values_of(const Func& gradient, const Buffer<float>& like, b
   return result;
 }
 
-// In float32, operation by operation. What a step contributes to inputs without a time axis is
-// summed from the last step to the first, and without a budget in another order: only rounded
-// alike.
+// Bits agree in float32, operation by operation. Contributions of steps to inputs without a time axis are an exception:
+// they are summed from the last step to the first, and without a budget in another order, so they agree only up to
+// rounding.
 TEST(Checkpoints, GradientsAreTheBitsOfTheStoredOnes) {
   for (const NamedLoop& c : cases) {
     for (int n : {3, 7}) {
@@ -216,7 +216,7 @@ extern "C" __attribute__((visibility("default"))) float checkpoint_test_counted(
   return value;
 }
 
-// Every evaluation of a step passes through the C function.
+// A C function counts the evaluations of a step.
 Func counted(const Buffer<float>& start, const Expr& n) {
   Func u("counted_u");
   RDom t(0, n);
@@ -227,7 +227,7 @@ Func counted(const Buffer<float>& start, const Expr& n) {
 }
 
 TEST(Checkpoints, StepsAreComputedAgainAsOftenAsTheBinomialBoundSays) {
-  Buffer<float> start = line(1);  // what does not depend on x runs once in a vector
+  Buffer<float> start = line(1);  // values that do not depend on x are computed once for a vector
   for (auto [n, s, again] : {std::tuple(10, 1, 45),
                              {10, 3, 15},
                              {10, 10, 9},
@@ -243,7 +243,7 @@ TEST(Checkpoints, StepsAreComputedAgainAsOftenAsTheBinomialBoundSays) {
   }
 }
 
-// Bytes that were allocated at one time, as the profiler reports them.
+// The peak of allocated bytes, as the profiler reports it.
 TEST(Checkpoints, MemoryGrowsWithTheStatesAndNotWithTheSteps) {
   Buffer<float> start = line(100);
   auto peak = [&](int n, const AdjointOptions& options) {
@@ -264,8 +264,7 @@ TEST(Checkpoints, MemoryGrowsWithTheStatesAndNotWithTheSteps) {
   EXPECT_EQ(peak(500, {.checkpoint_bytes = 10 * 400 + 399}), ten);
 }
 
-// A parameter and an image without a time axis cost no memory for each step, however many steps
-// contribute to them.
+// A parameter and an image without a time axis take no memory for each step, however many steps contribute to them.
 TEST(Checkpoints, GradientsOfWhatEveryStepReadsTakeNoMemoryForEachStep) {
   Buffer<float> start = line(50), k = line(50, 3);
   auto peak = [&](int n) {
@@ -298,8 +297,8 @@ TEST(Checkpoints, OperationsFollowTheSchedule) {
     Program p = pushed(100);
     Derivative d = propagate_adjoints(p.loss, {.wrt = {p.inputs[0]}, .checkpoint_states = s});
     double again = static_cast<double>(autodiff::revolve_advances(100, s));
-    // 7 sines in each step that is run: for the loss, again, and to reverse it; there a cosine,
-    // too.
+    // Each step that is run takes 7 sines: for the loss, for the recomputation, and for its reversal, which also takes
+    // a cosine.
     EXPECT_EQ(d.operations().gradient.nonlinear().value(), 7 * (100 + again + 100 + 100));
   }
 }
@@ -327,7 +326,7 @@ TEST(Checkpoints, ALoopOfOneStepNeedsNoCheckpointAndIsNoError) {
   expect_gradient(p.loss, p.inputs[0], {.checkpoint_states = 3});
 }
 
-// Extents of space and the gradient by a Param may be known at run time only.
+// Spatial extents and the gradient by a Param may be known at run time only.
 TEST(Checkpoints, SpaceMayHaveExtentsOfRunTime) {
   Param<int> width("width");
   Param<float> gain("gain");
@@ -352,7 +351,7 @@ TEST(Checkpoints, SpaceMayHaveExtentsOfRunTime) {
 
 // ---- a number of steps that is known at run time only ----
 
-// The same bits as with a constant number of steps, for every number and every budget.
+// Bits are the same as with a constant number of steps, for every number and every budget.
 TEST(Checkpoints, TheNumberOfStepsMayBeAParam) {
   Buffer<float> start = line(5), gain = line(1, 7);
   auto loss_of = [&](const Expr& n) {
@@ -383,7 +382,7 @@ TEST(Checkpoints, TheNumberOfStepsMayBeAParam) {
   }
 }
 
-// A row that every step sweeps in place, as many times as an image has rows; a force for each step.
+// A row that every step sweeps in place, once for each row of an image, with a force for each step.
 TEST(Checkpoints, TheNumberOfStepsMayBeAnExtentOfAnInput) {
   ImageParam force(Float(32), 2, "force");
   Buffer<float> start = line(8), weights = line(2, 4);
@@ -451,7 +450,7 @@ TEST(Checkpoints, MoreStepsAtRunTimeThanATableMayHaveFailTheCall) {
 
 // ---- refusals ----
 
-// With two states, each of four million steps is recomputed some ten thousand times.
+// With two states, each of the four million steps would be recomputed some ten thousand times.
 TEST(Checkpoints, SchedulesOfTooManyStepsAreErrors) {
   Buffer<float> start = line(7);
   Func u("u");

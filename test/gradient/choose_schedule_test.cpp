@@ -1,5 +1,5 @@
-// Schedules that a search finds by predicted time: legal, right, never worse than those of the rules by
-// what is predicted; what it says of the runner-up, and of programs that it cannot search.
+// Tests schedules that a search finds by predicted time: they are legal, right, and never predicted to be slower than
+// the schedules of the rules. Also tests the report on the runner-up, and on programs that cannot be searched.
 #include "autoschedule/choose_schedule.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ AutoscheduleOptions searching() {
   return options;
 }
 
-// Noise is taken away along edges, of which a weighted sum is wanted, and its gradient.
+// Edge-preserving denoising, the weighted sum of its result, and the gradient of that sum.
 struct Smoothing {
   static constexpr int width = 300, height = 200;
   Buffer<float> image = random_image({width, height}, -1, 1, 1);
@@ -45,7 +45,7 @@ struct Smoothing {
   }
 };
 
-// What the schedule made has numbers in its names that differ from build to build.
+// Removes the numbers in names of generated Funcs, which differ from build to build.
 std::string without_numbers(const std::string& source) {
   return std::regex_replace(source, std::regex("_[0-9][0-9]+"), "");
 }
@@ -81,7 +81,7 @@ TEST(ChooseSchedule, APipelineGetsDirectivesOfTheBest) {
   const auto expected = by_rules.realized(by_rules.pipeline());
   const auto found = program.realized(pipeline);
   for (size_t i = 0; i < found.size(); ++i) expect_close(expected[i], found[i]);
-  // What was taken is what the log says: predicted alike when it stands there as a user's.
+  // The log describes the chosen schedule: applied as user directives, it gives the same prediction.
   EXPECT_NEAR(pipeline.explain_schedule().predicted_ms, results.search.predicted_ms,
               1e-3 * results.search.predicted_ms);
 }
@@ -115,7 +115,7 @@ TEST(ChooseSchedule, TheReportShowsTheRunnerUp) {
   EXPECT_NE(asked.to_json().find("\"runner_up_ms\""), std::string::npos);
 }
 
-// Nothing fails: the report has the parts of an error.
+// Nothing fails, but the report has the parts of an error.
 TEST(ChooseSchedule, WithoutSizesTheRulesAreKept) {
   ImageParam image(Float(32), 2, "unsized");
   Func out("out");

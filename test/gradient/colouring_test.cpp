@@ -1,7 +1,7 @@
-// Colours of patterns: linear forms (colouring.h) and greedy colours of explicit graphs
-// (graph_colouring.h), checked by their definitions on random patterns, against known optima, and
-// against the fewest that any assignment of colours can do on small graphs. And how long the search
-// for a pattern may take.
+// Tests the colouring of sparsity patterns: linear forms (colouring.h) and greedy colours of explicit graphs
+// (graph_colouring.h). They are checked by their definitions on random patterns, against known optima, and on small
+// graphs against the smallest number of colours that any assignment needs. Also tests limits on the time that the
+// search for a pattern may take.
 #include "autodiff/matrices/colouring.h"
 
 #include <gtest/gtest.h>
@@ -144,7 +144,7 @@ TEST(StarColouring, KnownCounts) {
   EXPECT_EQ(star_colouring(Adjacency(4)).count, 1);
 }
 
-// The fewest colours by trying every assignment.
+// The smallest number of colours, by trying every assignment.
 int fewest(const Adjacency& graph) {
   auto n = static_cast<int>(graph.size());
   for (int colours = 1;; ++colours) {
@@ -211,7 +211,7 @@ TEST(Compression, PatternsThatTakeTooLongToFindAreRefused) {
       [&] { Compressed::make(query); });
 }
 
-// Pieces in steps, which isl joins by their hull: it crashes when its operations end there.
+// A pattern of pieces in steps, which isl joins by their hull. isl crashes if its budget of operations ends there.
 TEST(Compression, PiecesAreJoinedWhateverIsLeftOfTheOperations) {
   for (unsigned long operations : {1, 50, 400}) {
     IslContext context;
@@ -225,7 +225,7 @@ TEST(Compression, PiecesAreJoinedWhateverIsLeftOfTheOperations) {
   }
 }
 
-// Wherever the operations end, between the pattern and its last entry.
+// The budget of operations ends anywhere between the pattern and its last entry.
 TEST(Compression, IsFoundOrRefusedForAnyNumberOfOperations) {
   const Expr place = variable("p");
   int found = 0, refused = 0;

@@ -1,9 +1,9 @@
-// The cheap-gradient principle: a gradient takes at most 5 times the operations of its program,
-// however many inputs it is for (Griewank and Walther, Evaluating Derivatives, 2nd edition, 4.6:
-// 3 to 4 in theory). Counted by operation_count.h, which small tests of its own check, over every
-// program of the suite and the large ones. Exceptions are listed here, each with its reason, and
-// only those that are one; docs/gradient_costs.md is written from them
-// (RETROGRADE_UPDATE_GOLDEN=1).
+// Tests the cheap-gradient principle: a gradient takes at most 5 times the operations of its program, regardless of the
+// number of inputs (Griewank and Walther, Evaluating Derivatives, 2nd edition, 4.6: 3 to 4 in theory).
+//
+// operation_count.h counts the operations, which has small tests of its own. The test covers every program of the suite
+// and the large ones. It lists the exceptions, each with its reason, and checks that each one is still needed.
+// RETROGRADE_UPDATE_GOLDEN=1 writes docs/gradient_costs.md.
 #include <cstdlib>
 #include <fstream>
 #include <iomanip>
@@ -51,7 +51,7 @@ const std::map<std::string, Reason> exceptions = {
     {"tree_of_products", Reason::Again},
 };
 
-// Its domain is empty: nothing to compare with.
+// The domain is empty, so there is nothing to compare with.
 const std::string without_elements = "shift_of_no_elements";
 
 struct Cost {

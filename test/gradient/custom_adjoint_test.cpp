@@ -1,6 +1,6 @@
-// custom_adjoint and custom_tangent: rules that are right agree with differences in double and with
-// what is synthesized without them; rules that differ from the definitions show in the gradient
-// exactly; what a rule leaves out is an error. Extern stages run as machine code, in custom_extern.
+// Tests custom_adjoint and custom_tangent. Right rules agree with differences in double and with the generated
+// derivative; rules that differ from the definitions show exactly in the gradient; incomplete rules are errors.
+// custom_extern_test covers extern stages, which run as machine code.
 #include "autodiff/custom_derivative.h"
 
 #include <thread>
@@ -24,7 +24,7 @@ class CustomAdjoints : public ::testing::Test {
   double at(const Func& f, int point) {
     return evaluate(f, all).values[static_cast<size_t>(point)].scalar.as_double();
   }
-  // f(x) = sin(a(x)) whose rule says that the slope is `slope` wherever it is.
+  // f(x) = sin(a(x)), with a rule that says that the slope is `slope` everywhere.
   Func with_slope(float slope) {
     Func f("f");
     f(x) = sin(a(x));
@@ -44,7 +44,7 @@ class CustomAdjoints : public ::testing::Test {
     loss() += f(r) * cast<float>(r + 1);
     return loss;
   }
-  // Over its whole domain, zero elsewhere.
+  // Defined over its whole domain, zero elsewhere.
   Func input() {
     Func g("g");
     g(x) = select(x >= 0 && x < 6, a(clamp(x, 0, 5)) * 2.0f, 0.0f);
@@ -133,7 +133,7 @@ TEST_F(CustomAdjoints, GiveParametersSumsOverTheRegion) {
   EXPECT_THROW(only(a), CompileError);
 }
 
-// A softmax: two Funcs, of which the rule's Func reads one.
+// A softmax of two Funcs, one of which the rule reads.
 struct Softmax {
   Func exponential{"exponential"}, total{"total"}, f{"softmax"};
   Softmax(const Buffer<float>& a, const Var& x) {
@@ -260,7 +260,8 @@ TEST_F(CustomAdjoints, AreDifferentiatedAgain) {
   RDom r(0, 6);
   along() = 0.0f;
   along() += propagate_adjoints(loss)(a)(r)*a(r);
-  Func reverse = propagate_adjoints(along)(a);  // (H + d/da) a: the gradient counts once more
+  Func reverse =
+      propagate_adjoints(along)(a);  // (H + d/da) a: the gradient is counted a second time
   Func gradient = propagate_adjoints(loss)(a);
   Func expected_third = propagate_tangents(expected, {{a, a}})(expected);
   for (int n = 0; n < 6; ++n) {
@@ -271,7 +272,7 @@ TEST_F(CustomAdjoints, AreDifferentiatedAgain) {
   expect_machine_code_agrees(found, all);
 }
 
-// The slope of the slope is a rule of its own, which is not the derivative of the first.
+// The slope of the slope is a rule of its own, which is not the derivative of the first one.
 TEST_F(CustomAdjoints, HaveFuncsWithRulesOfTheirOwn) {
   Func f("f");
   f(x) = sin(a(x));
@@ -337,7 +338,7 @@ TEST_F(CustomAdjoints, AreNotRunWhereNothingBehindThemIsWanted) {
   EXPECT_THROW(propagate_adjoints(sum_of(h), {.wrt = {a}}), int);
 }
 
-// A zero from a consumer that chose another branch stays 0 where the input has an infinite partial.
+// A zero from a consumer that chose another branch stays 0 even if the input has an infinite partial.
 TEST_F(CustomAdjoints, ZerosStayStrongBehindARule) {
   Func g("g"), f("f"), h("h");
   Buffer<float> b(6);

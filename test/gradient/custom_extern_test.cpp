@@ -1,6 +1,6 @@
-// custom_adjoint of extern stages, whose adjoint is an extern stage too: C functions, forward and
-// backward, in machine code, against the same program written with ordinary Funcs and synthesized;
-// second derivatives by rules of the adjoint stage; refusals where there is no rule.
+// Tests custom_adjoint on extern stages whose adjoints are extern stages too. C functions compute both in machine code;
+// the expected values come from the same program written with ordinary Funcs. Also tests second derivatives by rules of
+// the adjoint stage, and refusals where there is no rule.
 #include <HalideRuntime.h>
 
 #include "autodiff/custom_derivative.h"
@@ -108,7 +108,7 @@ class CustomExternStages : public ::testing::Test {
         },
         reads);
   }
-  // in_adj(x) = 2 in(x) out_adj(x) + out_adj(x + 1) / 2 is bilinear; by ordinary Funcs this time.
+  // in_adj(x) = 2 in(x) out_adj(x) + out_adj(x + 1) / 2 is bilinear; its rule uses ordinary Funcs.
   static void give_rule_of_adjoint(const Func& adj, const Func& in, const Func& out_adj) {
     custom_adjoint(
         adj, {in, out_adj},

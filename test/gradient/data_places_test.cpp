@@ -16,7 +16,7 @@
 namespace retrograde {
 namespace {
 
-// An image with a number of channels, interpolated where a flow points.
+// An image with several channels, interpolated at positions that a flow gives.
 struct Warp {
   Warp(int size, int channels)
       : size(size),
@@ -60,7 +60,7 @@ struct Warp {
   Func u{"u"}, v{"v"}, warped{"warped"};
 };
 
-// Without the numbers that a process puts behind names.
+// Removes the numbers that a process appends to names.
 std::string plain(const std::string& text) {
   return std::regex_replace(text, std::regex("\\$[0-9]+"), "");
 }
@@ -71,7 +71,7 @@ std::string log_of(const std::vector<Func>& outputs) {
   return plain(graph::schedule_log(autoschedule::schedule_unscheduled(funcs)).to_text());
 }
 
-// A copy in which every sum is at root, in plain loops.
+// A copy in which every sum is at root, in serial loops.
 Pipeline in_plain_loops(const std::vector<Func>& outputs) {
   std::vector<graph::FuncPtr> funcs;
   for (const Func& f : outputs) funcs.push_back(f.function());
@@ -104,7 +104,7 @@ void expect_same_values(Warp& warp) {
   }
 }
 
-// 18 MiB in double: too much for private parts.
+// In double, this scatter takes 18 MiB: too much for privatised copies.
 TEST(ScatterSlices, AreComputedInTheLoopsOfTheirOnlyReader) {
   Warp warp(136, 128);
   const std::vector<Func> outputs = warp.outputs();
@@ -114,7 +114,7 @@ TEST(ScatterSlices, AreComputedInTheLoopsOfTheirOnlyReader) {
   expect_same_values(warp);
 }
 
-// Channels that make no whole slice.
+// The number of channels is not a multiple of the slice.
 TEST(ScatterSlices, MayBeIncomplete) {
   Warp warp(139, 127);
   const std::vector<Func> outputs = warp.outputs();
@@ -158,7 +158,7 @@ TEST(LookUps, OfSeveralPlanesShareTheirPlaces) {
   }
 }
 
-// Planes outside of a block of rows, and what both coordinates read, read once.
+// Planes are outside of a block of rows, and values that both coordinates read are loaded once.
 TEST(LookUps, ThatAreSummedRunPlaneAfterPlane) {
   Warp warp(67, 21);
   const std::string log = log_of(warp.outputs());
@@ -167,7 +167,7 @@ TEST(LookUps, ThatAreSummedRunPlaneAfterPlane) {
   expect_same_values(warp);
 }
 
-// A Func that reads a single element does not use it.
+// A Func that reads a single element has no use for this loop order.
 TEST(LookUps, OfATableKeepTheirLoops) {
   const Buffer<float> table = gradient::random_image({256, 3}, 0, 1, 1);
   const Buffer<float> seed = gradient::random_image({40, 30, 3}, -1, 1, 3);
@@ -180,7 +180,7 @@ TEST(LookUps, OfATableKeepTheirLoops) {
   EXPECT_EQ(log.find("ci, Unrolled"), std::string::npos) << log;
 }
 
-// A grid of a few coefficients: few elements, in many parts.
+// A grid of a few coefficients: few elements, in many privatised copies.
 TEST(SumsOfParts, LieAsTheParts) {
   const int size = 400, cells = 20;
   const Buffer<float> guide = gradient::random_image({size, size}, 0, 7, 1);
@@ -206,7 +206,7 @@ TEST(SumsOfParts, LieAsTheParts) {
   expect_close(adjoint.realize({cells, cells, 8, 12}), expected);
 }
 
-// Two Funcs between what is read across and its reader are computed inline.
+// Two Funcs between the transposed read and its consumer are computed inline.
 TEST(TransposedReads, AreSeenThroughWhatIsInline) {
   const Buffer<float> image = gradient::random_image({64, 64}, -1, 1, 1);
   const Buffer<float> other = gradient::random_image({64, 64}, -1, 1, 2);

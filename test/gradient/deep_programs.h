@@ -1,5 +1,5 @@
-// Programs whose stages halve and double their images many times, as users write them, with and
-// without boundary conditions: pyramids, multi-grid, U-shaped nets, means of patches.
+// Deep multi-resolution programs as users write them: pyramids, multigrid, U-shaped nets, means of patches. Their
+// stages halve and double images many times, with and without boundary conditions.
 #pragma once
 
 #include <functional>
@@ -26,7 +26,7 @@ Func bordered(const Image& image, Border border) {
 
 class Pyramids {
  public:
-  // Fills the holes of an image of 4 channels, the last of which says how much is known.
+  // Fills the holes of an image with 4 channels, the last of which is the confidence of a pixel.
   template <typename Image>
   Func interpolation(const Image& input, int levels, Border border) {
     std::vector<Func> down(levels), up(levels);
@@ -52,7 +52,7 @@ class Pyramids {
     return result;
   }
 
-  // Contrast around 8 brightnesses.
+  // Local contrast around 8 brightness levels.
   template <typename Image>
   Func local_laplacian(const Image& input, int levels, Border border) {
     const int brightnesses = 8;
@@ -117,7 +117,7 @@ class Pyramids {
     return made(bordered(input, Border::Zero), levels);
   }
 
-  // Each pixel the mean of a window, weighted by how much patches are alike.
+  // Non-local means: each pixel is the mean of a window, weighted by the similarity of patches.
   template <typename Image>
   Func means_of_patches(const Image& input, int patch, int window, Border border) {
     const Func image = bordered(input, border);

@@ -1,6 +1,5 @@
-// Gradients of programs that halve and double their images many times: made and compiled in time
-// that grows with the program, in process and ahead of time, by bounds that stay small; and right,
-// at odd and even sizes.
+// Tests gradients of deep multi-resolution programs. They are generated and compiled, in process and ahead of time, in
+// time that grows linearly with the program, their bounds stay small, and their values are right at odd and even sizes.
 #include "gradient/deep_programs.h"
 
 #include <ctime>
@@ -16,10 +15,10 @@
 namespace retrograde::deep {
 namespace {
 
-// Seconds of this process, whatever else the machine does.
+// CPU time of this process in seconds, independent of the machine's load.
 double seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-// The gradient of an output of sizes that are known at run time only, by all of its inputs.
+// The gradient of an output by all of its inputs, with sizes that are known at run time only.
 Pipeline gradient_at_run_time(const Func& output, const std::vector<ImageParam>& by) {
   const ImageParam seed(Float(32), output.dimensions(), "seed");
   Region region;
@@ -74,7 +73,7 @@ const std::vector<Named>& programs() {
   return all;
 }
 
-// A module is what compile_to_object and generators go through: statements, no machine code yet.
+// compile_to_object and generators lower to a module first: statements, no machine code yet.
 TEST(DeepPrograms, ModulesTakeSeconds) {
   for (const Named& program : programs()) {
     const double start = seconds();
@@ -83,7 +82,7 @@ TEST(DeepPrograms, ModulesTakeSeconds) {
   }
 }
 
-// Twice the levels are twice the Funcs.
+// Doubling the levels doubles the number of Funcs.
 TEST(DeepPrograms, TimeGrowsWithTheLevels) {
   const auto time = [](int levels) {
     const double start = seconds();
@@ -95,7 +94,7 @@ TEST(DeepPrograms, TimeGrowsWithTheLevels) {
   EXPECT_LT(many, 8 * few + 0.5) << few << " s for 4 levels";
 }
 
-// The text of the schedule is built on demand, and is short: names of regions stay names.
+// The text of the schedule is built on demand and stays short, because names of regions are not expanded.
 TEST(DeepPrograms, LoopNestsAndStatementsAreShort) {
   const Module module = module_of(interpolation(10, Border::None));
   const double start = seconds();
@@ -116,7 +115,7 @@ TEST(DeepPrograms, ObjectsAndMachineCodeTakeSeconds) {
   EXPECT_LT(seconds() - start, 40);
 }
 
-// Along a random direction, in double; steps so small that hardly any brightness passes a kink.
+// The slope along a random direction, in double. Steps are so small that hardly any brightness passes a kink.
 double slope_along(const Func& loss, Buffer<float>& image, const std::vector<float>& direction) {
   const auto moved = [&](float by) {
     const auto move = [&](float step) {

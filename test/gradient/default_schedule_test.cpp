@@ -1,4 +1,4 @@
-// The default schedule of adjoints without directives, and its interaction with users' directives.
+// Tests the default schedule of adjoints without directives, and its interaction with users' directives.
 #include "autoschedule/default_schedule.h"
 
 #include <gtest/gtest.h>
@@ -49,8 +49,8 @@ TEST_F(DefaultSchedule, LeavesPipelinesWithoutAdjointsAlone) {
   EXPECT_EQ(autoschedule::schedule_unscheduled({loss.function()})[0], loss.function());
 }
 
-// Levels, each of half the sides of the one before, put together again: f3 is copied 27 times into
-// f0 by way of the levels in between, and so on.
+// A pyramid whose levels each have half the width and height of the one before, put together again. Inlined, f3 would
+// be copied 27 times into f0 through the levels in between, and so on.
 std::vector<Func> pyramid_of(const Func& image, int levels) {
   Var x("x"), y("y");
   std::vector<Func> down{image}, up;
@@ -112,7 +112,7 @@ TEST_F(UnscheduledPyramid, OfWhichAllIsToBeInlinedIsRefused) {
       });
 }
 
-// Where the place is decided by data, no region is known that could be computed before.
+// Data-dependent indices have no known region that could be computed in advance.
 TEST_F(UnscheduledPyramid, ThatIsReadAnywhereStaysInline) {
   Buffer<int> place(32);
   place.fill(3);
@@ -148,7 +148,7 @@ TEST_F(DefaultSchedule, AHandScheduleOfThePrimalKeepsItsInlinedFuncsInlined) {
   EXPECT_FALSE(is_stored(d(a), heavy));
 }
 
-// The schedule cuts it; what that gives it is no directive of the user's.
+// The scheduler splits the reduction; the directives that this adds do not count as the user's.
 TEST_F(DefaultSchedule, ALossThatIsCutLeavesTheRestOfThePrimalToTheSchedule) {
   Func sum("sum");
   RDom r(0, 80, 0, 80);
@@ -177,7 +177,7 @@ void expect_all_likely(const Expr& condition) {
   EXPECT_TRUE(call && call->is_op(ir::Op::likely)) << print(condition);
 }
 
-// f(x, y) += a(x + r, y): the gradient reads the adjoint at x - r, which is inside but for a
+// f(x, y) += a(x + r, y): the gradient reads the adjoint at x - r, which is inside the adjoint's domain except at a
 // border.
 TEST_F(DefaultSchedule, ConditionsOfAGatherOverAStencilAreTestedInItsBordersOnly) {
   Buffer<float> wide(640, 4), weights(5);
@@ -192,7 +192,7 @@ TEST_F(DefaultSchedule, ConditionsOfAGatherOverAStencilAreTestedInItsBordersOnly
   expect_all_likely(adjoint->updates.back().predicate);
 }
 
-// Half of the iterations of a triangle are outside: its loops get their ends instead.
+// Half of the iterations of a triangle are outside of it: its loop bounds are tightened instead.
 TEST_F(DefaultSchedule, ConditionsOfATriangleAreNoBorders) {
   Buffer<float> wide(640);
   Func f("f"), sum("sum");
@@ -251,7 +251,7 @@ TEST_F(DefaultSchedule, ScattersToFewElementsHaveElementsForEachLane) {
   EXPECT_EQ(parts_of_adjoint(d, many).dimensions(), 2) << "element, part";
 }
 
-// Kernels of 3 x 3: vectors along their rows would be four fifths empty.
+// Kernels of 3 x 3: vectors along their rows would leave four fifths of the lanes empty.
 void expect_sums_in_lanes(int side, Type in) {
   constexpr int channels = 9;
   const Buffer<float> image = gradient::random_image({side + 2, side + 2, channels}, -1, 1, 4);
@@ -278,7 +278,7 @@ void expect_sums_in_lanes(int side, Type in) {
   });
 }
 
-// A warp: each pixel reads four corners of a cell that a flow names, in every channel.
+// A warp: in every channel, each pixel reads the four corners of a cell that a flow selects.
 struct Warp {
   static constexpr int width = 37, height = 29;
   Buffer<float> image, flow{width, height, 2};
@@ -298,7 +298,7 @@ struct Warp {
     RDom r(0, width, 0, height, 0, channels);
     loss() += warped(r.x, r.y, r.z) * (r.x + 2 * r.y - r.z);
   }
-  // The gradient by the image, summed in double.
+  // The expected gradient by the image, summed in double.
   std::vector<double> expected() const {
     std::vector<double> sums(image.number_of_elements());
     const size_t plane = width * height;
@@ -346,7 +346,7 @@ TEST_F(DefaultSchedule, CornersOfACellAreTapsOfOneScatter) {
 TEST_F(DefaultSchedule, SmallKernelsOfManyChannelsAreSummedInLanes) {
   expect_sums_in_lanes(70, Float(64));
 }
-// Too few terms for sums in double, and enough for lanes.
+// The sums have too few terms to need double, and enough for vector lanes.
 TEST_F(DefaultSchedule, SmallKernelsOfSmallPicturesAreSummedInLanes) {
   expect_sums_in_lanes(40, Float(32));
 }
@@ -369,7 +369,8 @@ TEST_F(DefaultSchedule, ReductionsKeepATileOfTheirSumsInRegisters) {
   EXPECT_EQ(loops.back().runs, ForType::Parallel);
 }
 
-// Taps inside of channels, whatever the order that the user wrote; a recurrence keeps its own.
+// The taps are the inner loops and the channels the outer ones, whatever order the user wrote; a recurrence keeps its
+// own order.
 TEST_F(DefaultSchedule, SumsOfShiftedRowsAreTakenRowByRow) {
   Buffer<float> image(66, 66, 8), kernels(3, 3, 8, 8), seed(64, 64, 8);
   Var c("c");
@@ -396,8 +397,8 @@ TEST_F(DefaultSchedule, SumsOfShiftedRowsAreTakenRowByRow) {
   EXPECT_FALSE(shifts(2));
 }
 
-// The rows of the matrix on the right, each from a place of its own, are used for more of the result
-// than where they lie side by side; and of a row, more vectors are taken at once.
+// If each row of the right matrix lies at a place of its own in memory, a tile uses it for more elements of the result
+// than if rows are contiguous, and reads more vectors of a row at once.
 TEST_F(DefaultSchedule, TilesUseWhatComesFromAfarMoreOften) {
   Buffer<float> matrix(64, 64), line(256);
   RDom k(0, 64);
@@ -439,7 +440,7 @@ TEST_F(DefaultSchedule, TilesFitTheRegisters) {
   EXPECT_EQ(sums(64), 0) << "no tile of one vector";
 }
 
-// The log of the schedule that all of `output` gets, and whether its values are those without one.
+// Returns the log of the schedule for all of `output`, and checks that its values equal the unscheduled ones.
 std::string log_of(const Func& output, const std::vector<int32_t>& sizes,
                    const Target& target = get_host_target()) {
   const graph::GraphCopy copy = graph::copy_graph({output.function()});
@@ -456,8 +457,8 @@ std::string log_of(const Func& output, const std::vector<int32_t>& sizes,
   return pipeline.schedule_log().to_text();
 }
 
-// The log of a layer that mixes 32 channels of an image so wide: a tile reads a piece of each plane,
-// for every channel of the result again. What is inline is computed once an element of the copy.
+// The log of a layer that mixes 32 channels of an image of this width: a tile reads a piece of each plane, again for
+// every channel of the result. Inlined producers are computed once for each element of the packed copy.
 std::string log_of_mixing(int width, int channels) {
   const Buffer<float> image = gradient::random_image({width, 12, 32}, -1, 1, 1);
   const Buffer<float> weights = gradient::random_image({32, channels}, -1, 1, 2);
@@ -474,13 +475,13 @@ TEST_F(DefaultSchedule, WhatATileReadsFromManyPlanesIsPacked) {
   EXPECT_NE(log.find("inner.in(inner_in_mixed"), std::string::npos) << log;
 }
 
-// A pass of its own would write all of the sums, for the tiles to read.
+// An initialisation pass of its own would write all of the sums, and the tiles would read them again.
 TEST_F(DefaultSchedule, SumsStartInTheirTiles) {
   const std::string log = log_of_mixing(125, 32);
   EXPECT_NE(log.find(".update(0).compute_with(loop(mixed"), std::string::npos) << log;
 }
 
-// Each row of the result reads three of the image, of which two are those of the next one.
+// Each row of the result reads three rows of the image, two of which the next row reads too.
 TEST_F(DefaultSchedule, RowsOfAStencilShareWhatIsPacked) {
   const Buffer<float> image = gradient::random_image({128, 130, 32}, -1, 1, 1);
   const Buffer<float> weights = gradient::random_image({3, 3, 32, 32}, -1, 1, 2);
@@ -494,7 +495,7 @@ TEST_F(DefaultSchedule, RowsOfAStencilShareWhatIsPacked) {
   EXPECT_NE(log.find(".update(0).split(y, y, yi,"), std::string::npos) << log;
 }
 
-// Lanes across the rows of an image read each element from a line of its own: the copy is turned.
+// Lanes across the rows of an image read each element from a cache line of its own, so the image is packed transposed.
 TEST_F(DefaultSchedule, WhatLanesReadAcrossRowsIsCopiedTurned) {
   for (const auto& [rows, columns] : {std::pair{64, 256}, std::pair{60, 299}}) {
     const Buffer<float> keys = gradient::random_image({rows, columns}, -1, 1, 1);
@@ -508,7 +509,7 @@ TEST_F(DefaultSchedule, WhatLanesReadAcrossRowsIsCopiedTurned) {
   }
 }
 
-// A panel of all rows is too large to stay in a near cache: one of a block of them is copied at once.
+// A panel of all rows is too large for the inner caches, so one block of rows is packed at a time.
 TEST_F(DefaultSchedule, PanelsOfLongProductsArePackedBlockByBlock) {
   constexpr int rows = 40, inner = 1100, columns = 512;
   const Buffer<float> left = gradient::random_image({inner, rows}, -1, 1, 1);
@@ -521,7 +522,7 @@ TEST_F(DefaultSchedule, PanelsOfLongProductsArePackedBlockByBlock) {
   EXPECT_NE(log.find("blocks"), std::string::npos) << log;
 }
 
-// Each tile of the weights' gradient would read all of the image: it does so in chunks of rows.
+// Each tile of the weights' gradient would read the whole image, so tiles share chunks of rows.
 TEST_F(DefaultSchedule, TilesOfLongSumsShareChunksOfLargeImages) {
   constexpr int channels = 64;
   const auto log_for = [&](int width, int height) {
@@ -538,8 +539,8 @@ TEST_F(DefaultSchedule, TilesOfLongSumsShareChunksOfLargeImages) {
   EXPECT_EQ(log_for(32, 32).find("chunks"), std::string::npos) << "caches hold it";
 }
 
-// All blocks of a chunk read the same few rows again and again: without conditions at their ends. The seed is read
-// inside of its box alone, so its rows lie as they should already.
+// All blocks of a chunk read the same few rows repeatedly. The packed copy is padded with zeros, so that these reads
+// need no conditions at the row ends. The seed is read only inside of its box, so its rows need no packing.
 TEST_F(DefaultSchedule, BlocksOfAChunkReadRowsCopiedThroughZerosAround) {
   constexpr int channels = 16;
   const auto log_for = [&](bool has_zeros, const char* target) {
@@ -566,12 +567,12 @@ TEST_F(DefaultSchedule, BlocksOfAChunkReadRowsCopiedThroughZerosAround) {
     EXPECT_EQ(log.find("sums_adj_in_"), std::string::npos) << log;
 }
 
-// Few tiles use what one has read: its rows are in the cache yet.
+// Few tiles use the values that one tile has read, so their rows are still in the cache.
 TEST_F(DefaultSchedule, WhatFewTilesUseIsNotPacked) {
   EXPECT_EQ(log_of_mixing(128, 8).find("inner_in_mixed"), std::string::npos);
 }
 
-// Three planes are too few tasks: their rows are tasks, too.
+// Three planes are too few parallel chunks, so their rows are chunks, too.
 TEST_F(DefaultSchedule, FewPlanesAreCutIntoTasksOfRows) {
   const Buffer<float> image = gradient::random_image({40, 30, 3}, -1, 1, 1);
   const Buffer<float> seed = gradient::random_image({40, 30, 3}, -1, 1, 2);
@@ -585,7 +586,7 @@ TEST_F(DefaultSchedule, FewPlanesAreCutIntoTasksOfRows) {
   EXPECT_EQ(loops[loops.size() - 2].runs, ForType::Parallel);
 }
 
-// The parts of a sum over three long planes are rows, which are many, and not planes.
+// A sum over three long planes is split over the rows, which are many, instead of the planes.
 TEST_F(DefaultSchedule, PartsOfASumAreManyWhereItsLastLoopIsShort) {
   const Buffer<float> image = gradient::random_image({64, 320, 3}, 0.5f, 1, 1);
   Buffer<float> gamma(1);
@@ -607,7 +608,7 @@ TEST_F(DefaultSchedule, PartsOfASumAreManyWhereItsLastLoopIsShort) {
   EXPECT_TRUE(has_parts);
 }
 
-// Gradients by the two coordinates at which an image is read: both sum over the four corners.
+// Both gradients by the coordinates at which an image is read sum over the same four corners.
 TEST_F(DefaultSchedule, SumsThatLookTheSamePlacesUpShareTheirLoops) {
   const int size = 40, channels = 6;
   const Buffer<float> image = gradient::random_image({size, size, channels}, -1, 1, 1);
@@ -631,7 +632,8 @@ TEST_F(DefaultSchedule, SumsThatLookTheSamePlacesUpShareTheirLoops) {
   EXPECT_NE(log.find("u_adj.update(0).compute_with(loop(v_adj"), std::string::npos) << log;
 }
 
-// A kernel of 11 x 11: no side of the tile has rests, and sums to few elements have lanes and tasks.
+// A kernel of 11 x 11: its tiles have no remainder on any side, and sums to few elements use vector lanes and parallel
+// chunks.
 TEST_F(DefaultSchedule, TilesFitTheSizesThatAreKnown) {
   Buffer<float> left(11, 64), right(64, 64);
   Func product("product");
@@ -660,7 +662,7 @@ autoschedule::RegisterTile tile_of_layer(int width) {
   return tile.value_or(autoschedule::RegisterTile());
 }
 
-// 17 vectors are no pairs, of which one more is computed, but rows of two images would be read at once.
+// 17 vectors do not divide into pairs. A tile computes one vector more instead of reading rows of two images at once.
 TEST_F(DefaultSchedule, TilesReadRowsOfOneImage) {
   for (int width : {256, 272, 240}) {
     const autoschedule::RegisterTile tile = tile_of_layer(width);
@@ -729,7 +731,7 @@ TEST_F(DefaultSchedule, SumsToAFewElementsAreCut) {
   }
 }
 
-// One chain of additions in float32 is off by 1e-3 here.
+// One chain of additions in float32 would be off by 1e-3 here.
 TEST_F(DefaultSchedule, LossesAreSummedInLanesAndRows) {
   for (bool is_flat : {false, true}) {
     const int width = is_flat ? 3'000'001 : 3001, height = is_flat ? 1 : 1001;
@@ -759,8 +761,8 @@ bool has_select(const Expr& e) {
   return ir::any_node(e, [](const ir::Select&) { return true; });
 }
 
-// Twice as large, the nearest inside: the first element is read four times, the others twice, at
-// places that are one sum for all of them.
+// Upsampling by two with clamped borders: the first element is read four times, the others twice, all at indices of one
+// sum.
 TEST_F(DefaultSchedule, BordersReadMoreOftenLeaveThePlacesOfTheInteriorAlone) {
   const Buffer<float> small = gradient::random_image({64, 5}, -1, 1, 4);
   const Buffer<float> seed = gradient::random_image({128, 5}, -1, 1, 6);
@@ -779,7 +781,7 @@ TEST_F(DefaultSchedule, BordersReadMoreOftenLeaveThePlacesOfTheInteriorAlone) {
   }
 }
 
-// Reads of `read` in the last stage of `reader`.
+// The number of reads of `read` in the last stage of `reader`.
 double reads(const Func& reader, const Func& read) {
   const graph::FuncContents& f = *reader.function();
   const graph::Definition& stage = f.stage(f.stage_count() - 1);
@@ -830,7 +832,7 @@ TEST_F(DefaultSchedule, KnowsHowOftenAnElementIsRead) {
   EXPECT_EQ(reads(parts, heavy), 1) << "y goes over the rows of a part";
 }
 
-// Each of six sums over the pixels takes the adjoint of a place, which looks the image up four times.
+// Each of six sums over the pixels takes the adjoint of a position, which gathers from the image four times.
 TEST_F(DefaultSchedule, WhatManyCutSumsReadIsStored) {
   ImageParam image(Float(32), 2, "image"), motion(Float(32), 1, "motion");
   Func u("u"), v("v"), seen("seen"), error("error");
@@ -880,7 +882,7 @@ TEST_F(DefaultSchedule, TilesWhatItReadsAcross) {
   EXPECT_EQ(loops[3].runs, ForType::Parallel);
 }
 
-// The adjoint of `planes` has updates of one plane each, of which z is no loop.
+// The adjoint of `planes` has updates of one plane each, which have no loop over z.
 TEST_F(DefaultSchedule, TilesAPlaneThatIsReadAcross) {
   Buffer<float> planes(32, 32, 32);
   Func sum("sum");
@@ -894,7 +896,7 @@ TEST_F(DefaultSchedule, TilesAPlaneThatIsReadAcross) {
   EXPECT_EQ(adjoint.stage(1).schedule.dims[3].runs, ForType::Parallel);
 }
 
-// A recursive filter beside a schedule by hand that says nothing of it.
+// A recursive filter in a pipeline with a manual schedule that does not mention it.
 TEST_F(DefaultSchedule, AScanIsNotComputedAgainForEachElement) {
   Func scan("scan"), squares("squares"), total("total");
   RDom r(1, 31), all(0, 32, 0, 32);
@@ -922,7 +924,7 @@ TEST_F(DefaultSchedule, AHandScheduleKeepsSmallReductionsThatAreReadOnceInline) 
   EXPECT_FALSE(is_stored(propagate_adjoints(total)(a), window));
 }
 
-// A warp whose privatised copies would take as much as 32 images.
+// Privatised copies of this warp would take as much memory as 32 images.
 TEST(PrivateParts, TakeNoMoreThanABudget) {
   Var x("x"), y("y"), c("c");
   ImageParam image(Float(32), 3, "image"), flow(Float(32), 3, "flow");
@@ -955,7 +957,7 @@ TEST(PrivateParts, AreFewerForLargeTargets) {
                   {"8 privatised copies of 8388608 bytes each, as many as fit 67108864"});
 }
 
-// As many as fit is known when the pipeline runs; the bits are those of any number of threads.
+// The number of copies that fit is known when the pipeline runs; bits are the same on any number of threads.
 TEST(PrivateParts, OfSizesKnownAtRunTime) {
   Var x("x");
   ImageParam image(Float(32), 1, "image"), place(Int(32), 1, "place");

@@ -1,5 +1,5 @@
-// The rule table: total, right against central differences in double, and as conventional at kinks
-// and poles as it says.
+// Tests the table of derivative rules: it covers all operators, agrees with central differences in double, and follows
+// its stated conventions at kinks and poles.
 #include "autodiff/rules/derivative_rules.h"
 
 #include <gtest/gtest.h>
@@ -35,7 +35,7 @@ Scalar eval(const Expr& e, const Env& env) {
 
 const ValueRanges nothing_known;
 
-// Leaves are Variables that count as reads of images: every one is wanted.
+// Leaves are variables that count as reads of images; the gradient by every one is requested.
 Env gradient(const Expr& e, const Env& env, double seed = 1) {
   SweepResult sweep = sweep_reverse(
       {e}, {make_const(adjoint_type(e.type()), seed)},
@@ -93,7 +93,7 @@ TEST(DerivativeRules, AnOperatorWithoutARuleIsFound) {
   EXPECT_THROW(derivative_rule(Op::none), InternalError);
 }
 
-// Partials over every combination of these, one operand or two, with the value.
+// Visits the partials and the value for every combination of these samples, with one operand or two.
 void for_each_partial(Op o, const std::vector<double>& samples,
                       FunctionRef<void(const Env&, double value, double partial)> visit) {
   const size_t arity = static_cast<size_t>(op_info(o).arity);
@@ -108,7 +108,7 @@ void for_each_partial(Op o, const std::vector<double>& samples,
   }
 }
 
-// But the strong products, whose poles are those of other operators.
+// Strong products are excluded: their poles come from other operators.
 bool is_function_of_numbers(Op o) {
   return derivative_rule(o).cls == RuleClass::Smooth && op_info(o).arity <= 2 &&
          o != Op::strong_mul && o != Op::strong_div;
@@ -143,7 +143,7 @@ TEST(DerivativeRules, ValuesLevelOffWhereTheOperatorsRowSays) {
   }
 }
 
-// Points inside each operator's domain; every smooth operator must be listed.
+// Points inside of each operator's domain; every smooth operator must be listed.
 TEST(DerivativeRules, SmoothOperatorsAgreeWithCentralDifferences) {
   const std::map<Op, std::vector<Env>> points = {
       {Op::abs, {{{"x", 0.7}}, {{"x", -1.3}}}},
@@ -207,8 +207,7 @@ TEST(DerivativeRules, SharedNodesAreVisitedOnce) {
   EXPECT_DOUBLE_EQ(gradient(e, {{"x", 1}})["x"], 1);
 }
 
-// docs/derivatives.md: at a tie the primal takes the second operand, which gets all of the
-// derivative.
+// At a tie the primal takes the second operand, which gets all of the derivative (docs/derivatives.md).
 TEST(DerivativeRules, TiesOfMinAndMaxGoToTheSecondOperand) {
   for (const double at : {0.5, 0.0, -3.0}) {
     for (const Expr& e : {min(x, y), max(x, y)}) {
@@ -219,7 +218,7 @@ TEST(DerivativeRules, TiesOfMinAndMaxGoToTheSecondOperand) {
   }
 }
 
-// A clamp is a max of a min: at its bounds they are the second operands.
+// A clamp is a max of a min, in which the bounds are the second operands.
 TEST(DerivativeRules, ClampsAreFlatAtTheirBounds) {
   for (const double at : {0.0, 1.0})
     EXPECT_EQ(gradient(clamp(x, num(0), num(1)), {{"x", at}})["x"], 0) << at;
@@ -277,7 +276,7 @@ TEST(DerivativeRules, LargeArgumentsDoNotOverflowInThePartials) {
   EXPECT_NEAR(gradient(op(Op::asinh, {x}), {{"x", 1e200}})["x"] * 1e200, 1, 1e-12);
 }
 
-// 1 / y overflows; the derivative does not.
+// 1 / y overflows, but the derivative does not.
 TEST(DerivativeRules, APowerWithoutAPoleIsDividedLast) {
   const Expr square = op(Op::pow, {x / y, num(2)});
   EXPECT_NEAR(gradient(square, {{"x", 0x1p-1070}, {"y", 0x1p-1045}})["x"] * 0x1p-1021, 1, 1e-15);
@@ -308,7 +307,7 @@ TEST(DerivativeRules, CallsOfCFunctionsAreRefusedOnlyWhereTheGradientIsWanted) {
   EXPECT_EQ(sweep.leaves.size(), 1u);
 }
 
-// As a user's helper function makes them, called twice, or two values of a Tuple.
+// Equal nodes arise from a user's helper function that is called twice, or from two values of a Tuple.
 TEST(DerivativeRules, EqualNodesAreOne) {
   auto leaf = [] { return op(Op::exp, {variable("x", f64) * num(2)}); };
   SweepResult sweep = sweep_reverse(
@@ -335,7 +334,7 @@ TEST(DerivativeRules, ReadsOfTwoImagesOfOneNameAreTwo) {
   EXPECT_EQ(sweep.leaves.size(), 2u);
 }
 
-// An update looks for its own reads among the leaves.
+// Leaves must not be rewritten, because an update looks for its own reads among them.
 TEST(DerivativeRules, LeavesStayAsTheyAre) {
   const Expr read = call_image("image", f64, {variable("i") - variable("i")}, {});
   SweepResult sweep = sweep_reverse(
@@ -365,7 +364,7 @@ TEST(DerivativeRules, TheLogisticFunctionKeepsItsDigitsAtBothEnds) {
   expect_central_differences(x / (op(Op::exp, {y * x}) + num(1)), {{"x", 1.2}, {"y", -0.7}});
 }
 
-// Points of the rule's domain, as numbers that are exact in float32.
+// Points of the rule's domain that are exact in float32.
 std::vector<Env> ulp_points(Op o) {
   std::vector<Env> points;
   uint32_t state = 12345;
@@ -426,7 +425,7 @@ TEST(DerivativeRules, HalfPrecisionAccumulatesInFloat32) {
   EXPECT_EQ(adjoint_type(Float(64)), Float(64));
 }
 
-// This program links no back end.
+// This program is linked without a back end.
 TEST(FrontEndAlone, SaysWhatToLink) {
   Func f("f");
   Var x("x");

@@ -1,5 +1,5 @@
-// explain() says what was built and how large it is, what scatters and why, what an update kept,
-// what is zero and what was left out. The texts are the oracle: each names the Func and the reason.
+// Tests explain(): it describes the gradient's Funcs and their size, scatters and their reasons, values kept for
+// updates, gradients that are zero, and gradients that are left out. The expected texts name the Func and the reason.
 #include <algorithm>
 
 #include "gradient/programs_suite.h"
@@ -84,7 +84,7 @@ TEST(Explain, ZerosAndWhatWasNotRequestedSayWhy) {
   expect_line(only, Explanation::Kind::NotRequested, b.name(), "no requested gradient");
 }
 
-// Between a loop over time that is folded and the output, copies stand for the Funcs of the user.
+// Between a loop over time that is folded and the output, copies replace the user's Funcs.
 TEST(Explain, RequestedFuncsOfAFoldedLoopAreNoStrangers) {
   Buffer<float> a = line(5);
   Func f("explained_f"), last("explained_last");
@@ -100,7 +100,7 @@ TEST(Explain, RequestedFuncsOfAFoldedLoopAreNoStrangers) {
   EXPECT_NE(Buffer<float>(d(last).realize({5}))(2), 0.0f);
 }
 
-// A clamp behind a selection that takes it inside only: no borders to gather.
+// A clamp inside of a selection that takes only interior points: there are no borders to gather.
 TEST(Explain, ConstantExteriorsAreOneGather) {
   ImageParam a(Float(32), 3, "explained_a");
   Func padded = BoundaryConditions::constant_exterior(a, 0.5f), f("explained_f");
@@ -170,7 +170,7 @@ TEST(Explain, WhatTheOutputDoesNotDependOnIsZeroAndSaysSo) {
   expect_error({"1 updates", "Name one"}, [&] { all(g, 1); });
 }
 
-// The account of a small pipeline, whole, and in short.
+// The complete report on a small pipeline, in full and in short form.
 TEST(Explain, TheAccountOfASmallPipeline) {
   Buffer<float> image = line(10), kernel = line(3, 2);
   ImageParam in(Float(32), 1, "told_in"), weights(Float(32), 1, "told_kernel");

@@ -1,6 +1,6 @@
-// Partials at infinite, NaN, denormal, huge and tiny operands are what docs/derivatives.md says, in
-// float32 and double, in the interpreter and as machine code. Oracle: the partials in long double
-// by the C library, rounded, and at infinities and poles the column of the table, written out here.
+// Tests partials at infinite, NaN, denormal, huge and tiny operands against docs/derivatives.md, in float32 and double,
+// in the interpreter and as machine code. The expected values are partials in long double by the C library, rounded. At
+// infinities and poles they are the column of the table, written out here.
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -24,7 +24,7 @@ struct Operands {
   Real most;      // the largest finite number of the type
   Real quotient;  // x / y, rounded to the type
 };
-// Partials by x, y, w. As many as the operator has operands.
+// The partials by x, y and w, as many as the operator has operands.
 using Partials = std::function<std::vector<Real>(const Operands&)>;
 
 struct Row {
@@ -190,7 +190,7 @@ std::vector<T> extremes(int arity) {
   return all;
 }
 
-// Numbers of T between the two; those of the type's spacing at `expected`.
+// How many numbers of T are between the two, at the type's spacing around `expected`.
 template <typename T>
 double ulps(T found, Real expected) {
   if (std::isnan(found) || std::isnan(expected))
@@ -202,7 +202,7 @@ double ulps(T found, Real expected) {
   return static_cast<double>(std::fabs(found - expected) / (std::nextafter(size, 2 * size) - size));
 }
 
-// The operands of a row, at points 0 to count - 1.
+// The operands of a row, as images with points 0 to count - 1.
 template <typename T>
 struct Points {
   Buffer<T> x, y, w, ones;
@@ -257,7 +257,7 @@ void check(const Row& row) {
   }
 }
 
-// Approximations have the partials of what they approximate, through their own value.
+// Fast approximations have the partials of the exact function, expressed by their own value.
 TEST(ExtremeOperands, EveryOperatorWithPartialsIsListed) {
   std::set<std::string> listed = {"fast_exp", "fast_pow",     "fast_sin",
                                   "fast_cos", "fast_inverse", "fast_inverse_sqrt"};

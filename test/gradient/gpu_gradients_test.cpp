@@ -1,5 +1,5 @@
-// The programs of the gradient suite under Pipeline::auto_schedule for a GPU: losses and all gradients are
-// kernels on the simulated device, and what the CPU gives within rounding.
+// Schedules the programs of the gradient suite for a GPU with Pipeline::auto_schedule. Losses and all gradients run as
+// kernels on the simulated device, and agree with the CPU up to rounding.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,7 +18,7 @@ Target with_gpu() {
   return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
 }
 
-// The loss and its gradients by all inputs, in memory of their own.
+// Buffers for the loss and its gradients by all inputs.
 struct Outputs {
   explicit Outputs(const Program& program) : funcs{program.loss} {
     const Derivative d = propagate_adjoints(program.loss);

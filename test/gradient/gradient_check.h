@@ -1,5 +1,4 @@
-// Gradients of small programs against central differences in double, element by element, in the
-// interpreter.
+// Checks gradients of small programs against central differences in double, element by element, in the interpreter.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -19,8 +18,8 @@
 
 namespace retrograde::gradient {
 
-// Values that are exact in float32, far from each other's kinks: odd multiples of 2^-7 in (low,
-// high).
+// Random values that are exact in float32: odd multiples of 2^-7 in (low, high), so that none is close to another's
+// kink.
 inline Buffer<float> random_image(const std::vector<int>& sizes, double low, double high,
                                   unsigned seed) {
   Buffer<float> result(sizes);
@@ -63,7 +62,7 @@ inline double evaluate_scalar(const Func& f) {
   return evaluate(f, region).values[0].scalar.as_double();
 }
 
-// d loss / d element of `image`, Richardson extrapolated: the error is of fourth order in the step.
+// The derivative of loss by one element of `image`. Richardson extrapolation makes the error fourth order in the step.
 inline double difference(const Func& loss, Buffer<float>& image, const std::vector<int>& point) {
   float& element = image.get()->operator()(point.data());
   const float center = element;
@@ -88,15 +87,14 @@ inline Buffer<float> run_on_threads(Func& gradient, const oracle::Region& region
   return result;
 }
 
-// Bit for bit; NaNs too.
+// Compares bit by bit; NaNs too.
 inline bool same_bits(const Buffer<float>& a, const Buffer<float>& b) {
   return std::memcmp(a.data(), b.data(), a.size_in_bytes()) == 0;
 }
 
-// The gradient as machine code, under its default schedule, in float32: each element within the
-// rounding that the interpreter allows it, and the same bits on every number of threads. Where a
-// rounding could tip a decision, as of a place from floats, nothing is known but that both take the
-// same side: these are held to 1e-4 of the largest.
+// Checks the gradient as machine code, under its default schedule, in float32. Each element must be within the rounding
+// that the interpreter allows it, and have the same bits on every number of threads. If a rounding could tip a
+// decision, such as an index computed from floats, the element only has to agree to 1e-4 of the largest one.
 inline void expect_machine_code_agrees(Func gradient, const oracle::Region& region) {
   const oracle::Array expected = oracle::Interpreter({.rounding = oracle::Rounding::Contraction})
                                      .realize(gradient.function(), region)
@@ -157,8 +155,8 @@ inline void expect_gradient(const Func& loss, Buffer<float>& image,
   expect_gradient(loss, d, image);
 }
 
-// An image read at places that data decide, between its pixels: by image(i, j, c) and flow(x, y, 0..1)
-// in pixels, both of `size` by `size`.
+// Bilinear interpolation of an image at data-dependent indices: image(i, j, c) at the pixel positions flow(x, y, 0..1),
+// both of `size` by `size`.
 inline Func bilinear_warp(const Buffer<float>& image, const Buffer<float>& flow) {
   const int size = image.dim(0).extent();
   Var x("x"), y("y"), c("c");

@@ -79,7 +79,7 @@ TEST_F(Gradients, UpdateThatReachesElementsWithoutBounds) {
   expect_error<Unsupported>({"\"f", "bounds", "Clamp"}, [&] { propagate_adjoints(loss); });
 }
 
-// What others read has bounds: the elements beyond them count where the update reads them.
+// Values that other Funcs read have bounds: elements beyond them count where the update reads them.
 TEST_F(Gradients, UpdateThatReadsElementsWithoutBounds) {
   for (bool accumulates : {false, true}) {
     Func reads("reads");
@@ -133,7 +133,7 @@ TEST_F(Gradients, ZeroGradientsSayWhy) {
   EXPECT_EQ(d(a).num_update_definitions(), 0);
 }
 
-// Sizes whose slots have no 32-bit numbers: refused before anything is allocated.
+// Sizes whose number of elements has no 32-bit index are refused before anything is allocated.
 TEST(GradientErrors, SizesBeyondThirtyTwoBitsAreRefused) {
   Var x("x");
   const int n = 50000;

@@ -1,4 +1,4 @@
-// Looking up gradients: each look-up gives a gradient, zeros with a reason, or an error.
+// Tests how a Derivative finds gradients: each request returns a gradient, zeros with a reason, or an error.
 #include <gtest/gtest.h>
 
 #include "gradient/gradient_check.h"
@@ -121,7 +121,7 @@ TEST(GradientLookup, OutputsWithDimensionsNeedAnAdjoint) {
                [&] { propagate_adjoints(s.f); });
 }
 
-// Nothing else holds the parameter of a Buffer that no Func reads.
+// No other object holds the parameter of a Buffer that no Func reads, so its address may be reused.
 TEST(GradientLookup, BuffersThatNothingReadsAreNotTakenForEachOther) {
   Squares s;
   const Derivative d = propagate_adjoints(s.loss);

@@ -1,6 +1,6 @@
-// Second and third derivatives: Hessian-vector products against differences of the gradient in
-// double, their symmetry <H v, w> = <v, H w>, over random programs too; third derivatives against
-// differences of the products.
+// Tests second and third derivatives: Hessian-vector products against differences of the gradient in double, and their
+// symmetry <H v, w> = <v, H w>, also over random programs. Third derivatives are checked against differences of the
+// products.
 #include "autodiff/second_order.h"
 #include "frontend/data/param.h"
 #include "gradient/gradient_check.h"
@@ -25,7 +25,7 @@ double dot(const std::vector<double>& a, const std::vector<double>& b) {
   return sum;
 }
 
-// d f / d image along v, element by element; the error is of fourth order in the step.
+// The derivative of f when `image` moves along v, element by element; the error is of fourth order in the step.
 std::vector<double> differences(const Func& f, Buffer<float>& image, const Buffer<float>& v,
                                 const oracle::Region& region) {
   Buffer<float> kept = image.copy();

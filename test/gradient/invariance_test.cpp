@@ -1,5 +1,5 @@
-// Funcs that cancel are found, and nothing else is: their adjoint is 0, and says why. Forward mode,
-// which follows every path, is the oracle for the gradients.
+// Tests the detection of Funcs whose contributions cancel: exactly these have the adjoint 0, with the reason in
+// explain(). Forward mode, which follows every path, gives the expected gradients.
 #include "autodiff/rules/invariance.h"
 
 #include "autodiff/tangents.h"
@@ -23,7 +23,7 @@ class Invariance : public ::testing::Test {
     s(y) += e(r, y);
     p(x, y) = e(x, y) / s(y);
   }
-  // Weighted, so that no symmetry hides a wrong gradient.
+  // A weighted loss, so that no symmetry hides a wrong gradient.
   Func loss_of(const Func& f, const Expr& extra = 0.0f) {
     Func loss("loss");
     RDom q(0, n, 0, rows);
@@ -35,7 +35,7 @@ class Invariance : public ::testing::Test {
     return autodiff::cancelling_funcs(graph::topological_order({loss.function()}))
         .contains(m.function().get());
   }
-  // In double.
+  // Checks the gradient in double.
   void expect_right(const Func& loss) {
     oracle::Array gradient = evaluate(propagate_adjoints(loss)(a), {{0, 0}, {n, rows}});
     for (int j = 0; j < rows; ++j) {
@@ -167,7 +167,7 @@ TEST_F(Invariance, NotOfAMeanThatIsSubtracted) {
   expect_right(loss_of(f));
 }
 
-// Expressions over what shifts and what scales: every gradient agrees with the tangents, and some
+// Random expressions over terms that shift and terms that scale: every gradient agrees with the tangents, and some
 // programs cancel.
 class RandomInvariance : public Invariance {
  protected:

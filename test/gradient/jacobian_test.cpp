@@ -1,6 +1,6 @@
-// Whole Jacobians and Hessians: dense() against central differences in double, entry by entry;
-// band(), diagonal and both compressions against dense(); against products with unit vectors;
-// numbers of colours against what is known for the pattern; machine code; third derivatives.
+// Tests complete Jacobians and Hessians: dense() against central differences in double, entry by entry; band(),
+// diagonal and both compressions against dense() and against products with unit vectors. Also tests numbers of colours
+// against known values for the pattern, machine code, and third derivatives.
 #include "autodiff/jacobian.h"
 
 #include "autodiff/custom_derivative.h"
@@ -32,7 +32,7 @@ class Jacobians : public ::testing::Test {
     return evaluate(f, one).values[0].scalar.as_double();
   }
 
-  // dense() of f over `sizes` by `image`, against differences.
+  // Checks dense() of f over `sizes` by `image` against differences.
   void expect_right(const Func& f, const Point& sizes, Buffer<float>& image, const Jacobian& j,
                     double tolerance = 1e-5) {
     oracle::Region rows = region_from_zero(sizes), columns = oracle::region_of(*image.raw_buffer());
@@ -132,7 +132,7 @@ TEST_F(Jacobians, OfDownsamplingHaveThoseOfABlockOrOne) {
   expect_right(f, {3}, a, rows);
 }
 
-// The value is one more dimension of the input; a value that is not read costs no colour.
+// The Tuple's value index is one more dimension of the input; a value that is not read costs no colour.
 TEST_F(Jacobians, ByATupleHaveItsValuesAsOneMoreDimension) {
   Func pair("pair"), f("f");
   pair(x) = Tuple(a(x) + 1.0f, 7, 2.0f * a(x));
@@ -197,7 +197,7 @@ TEST_F(Jacobians, OfBordersStayNarrow) {
   expect_right(f, {n}, a, j);
 }
 
-// Which reads which has pieces without integer points: isl 0.25 ends by a signal when it joins them.
+// The pattern of mirrored borders has pieces without integer points: isl 0.25 crashes when it joins them.
 TEST_F(Jacobians, OfMirroredBorders) {
   Buffer<float> wide = random_image({10}, 0.25, 1.5, 3);
   wide.set_min({-2});
@@ -365,7 +365,7 @@ TEST_F(SparseHessians, OfDenseLossesHaveAColourAnElement) {
   expect_hessian(loss, a, n);
 }
 
-// One element meets all others: as columns they all conflict in its row, as a star they do not.
+// One element interacts with all others: as columns they all conflict in its row, in a star colouring they do not.
 TEST_F(SparseHessians, OfArrowsHaveTwoColours) {
   Func f("f");
   f(x) = sin(a(Expr(0)) * a(x)) + exp(a(x)) * a(x);
@@ -376,7 +376,7 @@ TEST_F(SparseHessians, OfArrowsHaveTwoColours) {
   EXPECT_EQ(entries.at({4, 5}).scalar.as_double(), 0.0);
 }
 
-// A rule's "second derivatives" need not be symmetric: then no entry is read off its transpose.
+// A custom rule's "second derivatives" need not be symmetric: then no entry may be read off its transpose.
 TEST_F(SparseHessians, OfRulesReadEachEntryInItsRow) {
   Func f("f");
   f(x) = a(Expr(0)) * a(x);
@@ -461,7 +461,7 @@ TEST_F(SparseHessians, BlocksBetweenInputs) {
   EXPECT_NEAR(at(hessian_diagonal(loss, gain).diagonal, {}), twice, 1e-12);
 }
 
-// A rule for adjoints alone leaves rows only.
+// With a rule for adjoints alone, only rows can be computed.
 TEST_F(Jacobians, OfCustomAdjointsGoByRows) {
   Func g("g"), f("f");
   g(x) = floor(a(x));

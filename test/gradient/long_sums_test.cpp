@@ -1,6 +1,5 @@
-// Adjoints that sum millions of float32 terms are right to 1e-6 of the sum of absolute values,
-// under every schedule, whether they gather or scatter. Oracle: the same terms, added in long
-// double.
+// Tests adjoints that sum millions of float32 terms: they are right to 1e-6 of the sum of absolute values, under every
+// schedule, as gathers and as scatters. The expected values are the same terms, added in long double.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +16,8 @@ namespace retrograde {
 namespace {
 
 constexpr int many = 12'000'000;
-constexpr float huge = 5e36f;  // of which two lanes of a block can add up their terms
+constexpr float huge =
+    5e36f;  // two lanes of a block can add up terms of this size without overflow
 
 struct Nature {
   const char* name;
@@ -44,7 +44,7 @@ Terms terms_of(const Nature& nature, int count = many) {
   return result;
 }
 
-// Term i belongs to element i % elements.
+// Checks sums in which term i belongs to element i % elements.
 void expect_sums(const Buffer<float>& found, const Terms& terms) {
   const size_t elements = static_cast<size_t>(found.width());
   std::vector<long double> value(elements), absolute(elements);
@@ -59,7 +59,7 @@ void expect_sums(const Buffer<float>& found, const Terms& terms) {
   }
 }
 
-using Schedule = std::function<void(Func)>;  // of the Func that sums
+using Schedule = std::function<void(Func)>;  // schedules the Func that sums
 
 // loss = sum over e and row of gain(e) * terms(e, row): the gradient sums each column.
 void check_gather(int elements, Terms& terms, const Schedule& schedule = nullptr) {
@@ -77,7 +77,7 @@ void check_gather(int elements, Terms& terms, const Schedule& schedule = nullptr
   expect_sums(d(gain).realize({elements}), terms);
 }
 
-// loss = sum over i of table(i % elements, by data) * terms(i)
+// loss = sum over i of table(i % elements, data-dependent) * terms(i)
 void check_scatter(int elements, Terms& terms) {
   Func loss("loss");
   Buffer<float> table(elements), all(terms.data(), static_cast<int>(terms.size()));
@@ -110,7 +110,7 @@ TEST(LongSums, OfScattersToFewAndToManyElements) {
   check_scatter(1000, cancelling);
 }
 
-// Of float32, before they are added in double: longer ones where a lane has many.
+// Blocks of terms are added in float32, and their sums in double. Blocks are longer if a lane has many terms.
 TEST(LongSums, HaveBlocksOf32TermsAndShortOnesOf16) {
   const auto terms_of_a_block = [](int columns, int rows) {
     Var x("x");
@@ -162,8 +162,8 @@ TEST(LongSums, UnderSchedulesByHand) {
 
 // ---- sums that are carried from element to element ----
 
-// loss = sum of terms(i) * f(i), f the running sum of a: the gradient by a sums the terms from each
-// element on, which was added up as a suffix sum.
+// loss = sum of terms(i) * f(i), where f is the running sum of a: the gradient by a sums the terms from each element
+// on, accumulated as a suffix sum.
 TEST(CarriedSums, OfAPrefixSumAreRight) {
   for (const Nature& nature : {natures()[0], natures()[1], natures()[4]}) {
     SCOPED_TRACE(nature.name);
@@ -209,7 +209,7 @@ TEST(CarriedSums, OfASummedAreaTableAreRight) {
   }
 }
 
-// f(i) = f(i - 1) + (keep(i) - 1) f(i - 1): a factor that is not constant may be 1 everywhere; in a
+// f(i) = f(i - 1) + (keep(i) - 1) f(i - 1): a factor that is not constant may be 1 everywhere. f is one value of a
 // Tuple, whose other value decays.
 TEST(CarriedSums, OfFactorsThatDataGiveAreRight) {
   const int n = 3'000'000;
@@ -241,8 +241,8 @@ Derivative filter_gradient(const Buffer<float>& a, float decay, int length) {
   return propagate_adjoints(loss, {.wrt = {a}});
 }
 
-// Scans that a constant below 1 damps, or that carry few elements, stay in float32. The carried term holds each value
-// of the step twice; as a tree it would have 2^40 nodes.
+// Scans that are damped by a constant below 1, or that carry few elements, stay in float32. The carried term uses each
+// value of the step twice; expanded as a tree it would have 2^40 nodes.
 TEST(CarriedSums, OfStepsThatUseTheirValuesTwiceAreFoundInTime) {
   const int n = 100;
   Buffer<float> input(n);
@@ -287,8 +287,8 @@ TEST(LongSums, ShortOnesStayInFloat32) {
   expect_mentions(d.explain(Detail::All), {"accumulates in double"});
 }
 
-// loss = sum of p h(i), computed in 16 bits: the gradient by p and by a sum of three values each
-// are beyond what 16 bits could add up, and beyond their range.
+// loss = sum of p h(i), computed in 16 bits: neither the gradient by p nor a sum of three values each can be
+// accumulated in 16 bits, and both exceed its range.
 void check_narrow(Type type, int count) {
   Var x("x");
   Func narrow("narrow"), scaled("scaled"), spread("spread"), loss("loss");

@@ -1,5 +1,5 @@
-// The memory that scheduled gradients take: what the scheduler says it is, and what a budget does to
-// it, both as the allocations of the run.
+// Tests the memory of scheduled gradients: the scheduler's prediction, and the effect of a memory budget, both against
+// the allocations of a run.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -20,7 +20,7 @@ namespace {
 
 using gradient::random_image;
 
-// Bytes that compiled code has allocated and not freed, now and at the most.
+// Counts the bytes that compiled code has allocated and not freed, now and at the peak.
 struct Allocations {
   static constexpr size_t header = 128;  // also the alignment
   static inline std::atomic<int64_t> now{0}, most{0};
@@ -74,7 +74,7 @@ struct Program {
   }
 };
 
-// Several planes of weights, each of which several sums read.
+// Several planes of weights, each read by several sums.
 Program weighted(int planes) {
   const Buffer<float> image = random_image({160, 120}, 0, 1, 1);
   Var x("x"), y("y"), p("p");
@@ -93,7 +93,7 @@ Program weighted(int planes) {
   return {{out, d(image)}, {{160, 120}, {160, 120}}, {image}};
 }
 
-// Steps of which each reads the one before, and its gradient all of them.
+// Steps that each read the previous one, and a gradient that reads all of them.
 Program steps(int count) {
   const Buffer<float> image = random_image({200, 150}, 0, 1, 1);
   Var x("x"), y("y");
@@ -123,8 +123,8 @@ Program relaxed(int count) {
   return {{state, d(rhs)}, {{200, 150}, {200, 150}}, {rhs}};
 }
 
-// Places that a few numbers of each frame decide, what is there, and the gradient of its squares by these numbers: eight
-// sums of one chain of values.
+// Samples images at positions that a few numbers of each frame determine, and differentiates the squares of the samples
+// by these numbers: eight sums over one chain of values.
 Program placed(int frames) {
   const Buffer<float> numbers = random_image({8, frames}, 0, 0.1, 1),
                       seen = random_image({200, 150, frames}, 0, 1, 2);
@@ -180,7 +180,7 @@ void expect_same(const Outcome& a, const Outcome& b) {
   }
 }
 
-// Names of the programs do not matter: what is alive is.
+// Only the live buffers matter, not the programs' names.
 TEST(MemoryBudget, WhatIsSaidIsWhatIsAllocated) {
   for (const Program& program : {weighted(4), weighted(12), steps(3), steps(9), relaxed(24)}) {
     const Outcome found = run(program, {});
@@ -216,8 +216,8 @@ TEST(MemoryBudget, WhatCannotBeKeptIsSaidAndRuns) {
   expect_same(small, large);
 }
 
-// By default inputs, outputs and twice the largest Func of the program, where that is more than what
-// stays in the caches.
+// The default budget is inputs, outputs and twice the largest Func of the program, or the size of the caches if that is
+// larger.
 TEST(MemoryBudget, IsTwiceTheLargestFuncByDefault) {
   const Program program = weighted(12);
   const Outcome found = run(program, {});
@@ -232,8 +232,8 @@ double predicted_ms(const Program& program, const AutoscheduleOptions& options) 
   return pipeline.explain_schedule(Realization(program.buffers()), target).predicted_ms;
 }
 
-// Each of a chain is cheap to compute again, all of them are not: what the last one takes is that of all before, for each
-// of its readers.
+// Each Func of a chain is cheap to recompute, but all of them are not: recomputing the last one recomputes all before
+// it, for each of its consumers.
 TEST(MemoryBudget, CountsWhatAChainComputesAgain) {
   const Program program = placed(13);
   AutoscheduleOptions large;
@@ -241,8 +241,8 @@ TEST(MemoryBudget, CountsWhatAChainComputesAgain) {
   EXPECT_LT(predicted_ms(program, {}), 1.5 * predicted_ms(program, large));
 }
 
-// The sum of their adjoints is made as they are: what is alive at once is the same for more steps.
-// A linear program's output is its derivative at the input: <A b, s> = <b, A^T s>.
+// The adjoints of the steps are accumulated as they are computed, so the peak memory does not grow with the number of
+// steps. Expected values: a linear program's output is its derivative at the input, <A b, s> = <b, A^T s>.
 TEST(MemoryBudget, AdjointsOfStepsAreAddedUpWhenTheyAreMade) {
   const Outcome few = run(relaxed(12), {}), many = run(relaxed(36), {});
   const int64_t image = 200 * 150 * 4;

@@ -1,6 +1,6 @@
-// Derivatives of derivatives, to depth: closed forms of higher derivatives (up to the sixth), by
-// adjoints of adjoints, tangents of tangents and both mixed in every order; mixed partials do not
-// depend on the order in which they are taken; through reductions, updates and custom adjoints.
+// Tests deeply nested derivatives against closed forms, up to the sixth derivative: adjoints of adjoints, tangents of
+// tangents and both mixed in every order. Mixed partials must not depend on the order in which they are taken. The
+// programs include reductions, updates and custom adjoints.
 #include "autodiff/custom_derivative.h"
 #include "autodiff/jacobian.h"
 #include "autodiff/second_order.h"
@@ -28,7 +28,7 @@ class Nesting : public ::testing::Test {
   Func forward(const Func& f, const AdjointInput& by) {
     return propagate_tangents(f, {{by, one}})(f);
   }
-  // One derivative a letter: r by an adjoint, f by a tangent.
+  // Takes one derivative for each letter of `modes`: r by an adjoint, f by a tangent.
   Func derivative(Func f, const AdjointInput& by, const std::string& modes) {
     for (char mode : modes) f = mode == 'r' ? reverse(f, by) : forward(f, by);
     return f;
@@ -60,7 +60,7 @@ TEST_F(Nesting, HigherDerivativesInEveryOrderOfModes) {
   EXPECT_NEAR(compiled(), closed_form(0.5, 0.75, 3), 1e-5);
 }
 
-// A factor that is exactly 0 cuts an infinite adjoint off; its own derivative goes on.
+// A factor that is exactly 0 blocks an infinite adjoint, but the factor itself still has a derivative.
 TEST_F(Nesting, FactorsThatAreZeroHaveDerivatives) {
   Expr a = u - 0.75f;
   for (const Expr& e : {pow(a * a + 1.0f, 0.5625f), sqrt(a * a + 0.25f), fast_pow(a * a + 1, w)}) {
@@ -113,7 +113,7 @@ TEST_F(Nesting, ThroughARecurrence) {
   EXPECT_NEAR(evaluate_scalar(derivative(f, u, "rff")), 120 * std::pow(u0, 3), 1e-12);
 }
 
-// cube(x) = u^3 by a rule whose slope is a Func with a rule, whose slope is a Func with a rule.
+// cube(x) = u^3 by a rule whose slope is a Func with a rule, whose slope again is a Func with a rule.
 Func with_rules(const Param<float>& u, int power, float factor) {
   Func f("monomial");
   Expr value = factor;
@@ -144,8 +144,7 @@ TEST_F(Nesting, ThroughCustomRulesOfCustomRules) {
   EXPECT_NEAR(evaluate_scalar(derivative(f, u, "rfrf")), 24, 1e-12);
 }
 
-// The Jacobian of a Hessian's diagonal: third derivatives d3 / da_i^2 da_j, with seeds inside of
-// seeds.
+// The Jacobian of a Hessian's diagonal: third derivatives d3 / da_i^2 da_j, with nested seeds.
 TEST_F(Nesting, JacobiansOfHessians) {
   Var x("x"), y("y");
   Buffer<float> a = random_image({5}, 0.25, 1.5, 1);

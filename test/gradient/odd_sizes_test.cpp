@@ -1,5 +1,5 @@
-// Programs of the pieces that people write images with, at sizes that no vector divides: no schedule
-// that the compiler chose reads more than the program and its gradient need.
+// Tests typical image programs at sizes that no vector length divides: no schedule that the compiler chooses may read
+// more than the program and its gradient need.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -19,7 +19,7 @@ constexpr uint64_t first_program = 0, programs = 200;
 constexpr uint64_t first_program = 0, programs = 8;
 #endif
 
-// As far as the budget of interpreter operations allows.
+// The budget of interpreter operations for one program.
 constexpr uint64_t operations = 20'000'000;
 
 // The largest difference, relative to the largest element.
@@ -37,8 +37,8 @@ double difference(const Func& gradient, const Buffer<float>& found) {
   return worst / scale;
 }
 
-// The value, then the gradients by image and scale under the schedule that the compiler chooses,
-// against the interpreter in double. Empty: they run, and are right.
+// Checks the value, then the gradients by image and scale under the compiler's schedule, against the interpreter in
+// double. Returns an error, or an empty string if all run and are right.
 std::string check(const fuzz::RandomProgram& program) {
   const std::vector<int>& size = program.region().extents;
   const RDom all(0, size[0], 0, size[1]);
@@ -77,8 +77,7 @@ TEST(OddSizes, ValuesAndGradientsRunAndAreRight) {
   }
 }
 
-// The window that an element of a filter sees moves with the element: the end of the one and the place of the other
-// add up to the image's end.
+// The window of a filter element moves with the element. Its end and its offset add up to the image's end.
 TEST(OddSizes, WindowsOverImagesWithBoundariesReadNothingOutside) {
   using Bounded = Func (*)(const ImageParam&);
   const std::map<std::string, Bounded> boundaries = {
@@ -115,8 +114,8 @@ TEST(OddSizes, WindowsOverImagesWithBoundariesReadNothingOutside) {
   }
 }
 
-// The gain's gradient is summed in lanes of 16, of which 30 leave two over, by private parts that
-// compute the place of the smallest again.
+// The gain's gradient is summed in vectors of 16 lanes, which leave a tail of two out of 30. Its privatised copies
+// recompute the position of the minimum.
 TEST(OddSizes, PrivatePartsComputeAgainNoMoreThanTheirDomainHas) {
   constexpr int n = 30, taps = 5;
   Buffer<float> image(n + taps - 1, n);
@@ -134,7 +133,7 @@ TEST(OddSizes, PrivatePartsComputeAgainNoMoreThanTheirDomainHas) {
   EXPECT_NEAR(by_gain(), 2 * 0.75f * 0.25f * n * n, 1e-3);
 }
 
-// Places are clamped into domains; an empty one has none at its end.
+// Indices are clamped into domains, but an empty domain has no last element.
 TEST(OddSizes, AReductionOfRunTimeExtentZeroHasAGradientOfZero) {
   Buffer<float> image(24);
   image.fill(0.5f);
@@ -164,8 +163,8 @@ TEST(OddSizes, AReductionOfRunTimeExtentZeroHasAGradientOfZero) {
   }
 }
 
-// One compiled gradient for seeds of every size. It reads the seed where it is: not a row more, as the ends of rows and
-// taps apart would have it.
+// One compiled gradient serves seeds of every size. It must not read a row more than the seed has, although bounds of
+// rows and taps taken separately would allow it.
 TEST(OddSizes, AConvolutionsGradientReadsASeedOfRunTimeSizeWhereItIs) {
   constexpr int taps = 3;
   ImageParam image(Float(32), 3, "image"), filter(Float(32), 4, "filter"),

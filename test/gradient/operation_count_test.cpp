@@ -1,4 +1,4 @@
-// Operations and bytes of small pipelines, against counts done by hand from their definitions.
+// Tests the counts of operations and bytes of small pipelines against counts by hand from their definitions.
 #include "autodiff/report/operation_count.h"
 
 #include <gtest/gtest.h>
@@ -100,14 +100,14 @@ TEST(OperationCount, TheGradientOfASquaredErrorCostsASmallMultiple) {
   ASSERT_TRUE(operations.ratio());
   EXPECT_GT(*operations.ratio(), 1);
   EXPECT_LT(*operations.ratio(), 5);
-  // Funcs that were not requested cost nothing.
+  // Funcs of adjoints that were not requested cost nothing.
   Derivative only = propagate_adjoints(loss, {.wrt = {a}});
   EXPECT_LT(value(only.operations().gradient.operations()),
             value(operations.gradient.operations()));
 }
 
-// Of a tape's steps each iteration runs one: a sine to bring back the value, a cosine for the
-// adjoint; a third for the gradient by the factors.
+// Each iteration runs one step of a tape: a sine to restore the value, a cosine for the adjoint, and a third function
+// for the gradient by the factors.
 TEST(OperationCount, OneStepOfATapeRunsAtATime) {
   Buffer<float> a = line(6);
   Func f("f");

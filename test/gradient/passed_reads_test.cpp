@@ -1,5 +1,5 @@
-// Adjoints of stencils over boundary conditions: stencils again, with the values that they should
-// have; and where a boundary condition keeps an adjoint of its own between.
+// Tests adjoints of stencils over boundary conditions: they are stencils again, with the right values. Also tests the
+// cases in which a boundary condition keeps an adjoint of its own in between.
 #include "autodiff/sweeps/passed_reads.h"
 
 #include <gtest/gtest.h>
@@ -14,12 +14,12 @@ Var x("x"), y("y"), z("z");
 
 using Bound = Func (*)(const Func&, const Region&);
 
-// The gradient by `image` of steps of a stencil over bounded states.
+// The gradient by `image` of repeated stencil steps over states with boundary conditions.
 struct Stencil {
   Buffer<float> image;
   Func state{"state"}, bounded, next{"next"}, loss;
 
-  // Taps at these places beside the element, in two dimensions.
+  // A stencil with taps at these offsets beside the element itself, in two dimensions.
   Stencil(Bound bound, const std::vector<std::pair<int, int>>& taps)
       : image(random_image({12, 10}, -1.0, 1.0, 7)) {
     state(x, y) = image(x, y) * image(x, y);

@@ -1,4 +1,4 @@
-// tools/plot_report draws the reports of both checks, with NaN and infinities in them, and refuses
+// Tests that tools/plot_report draws the reports of both checks, even with NaN and infinities in them, and refuses
 // other files.
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ class PlotReport : public ::testing::Test {
   int draw(const std::string& json) {
     const auto report = folder_.path() / "report.json";
     std::ofstream(report) << json;
-    // Debian's Python has Debian's matplotlib.
+    // Debian's Python is the one that has Debian's matplotlib.
     const char* python =
         std::filesystem::exists("/usr/bin/python3") ? "/usr/bin/python3" : "python3";
     return std::system((std::string(python) + " " RETROGRADE_TEST_DIR "/../tools/plot_report " +

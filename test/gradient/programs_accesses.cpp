@@ -1,4 +1,4 @@
-// Programs about where things are read: the structure of accesses, boundary conditions, resampling.
+// Suite programs about access patterns: structured indices, boundary conditions, resampling.
 #include "gradient/programs_suite.h"
 
 namespace retrograde::gradient {
@@ -6,7 +6,7 @@ namespace {
 
 Var x("x"), y("y"), c("c");
 
-// Nonlinear, so that the place at which a partial is evaluated shows, too.
+// A nonlinear loss, so that the point at which a partial is evaluated shows, too.
 Program squared(const Func& f, const std::vector<int>& sizes, const Buffer<float>& input) {
   return {weighted_sum(f, sizes), {input}};
 }
@@ -74,7 +74,7 @@ PROGRAM(diagonal_of_a_matrix_of_funcs) {
   return squared(f, {6}, a);
 }
 
-// x is known from the second index only: the first says x = e0 - (a truth value of x).
+// Only the second index determines x: the first one says x = e0 - (a truth value of x).
 PROGRAM_OF(diagonal_that_a_condition_bends, plane(7, 6)) {
   f(x) = a(x + cast<int>(x == 0), x);
   return squared(f, {6}, a);

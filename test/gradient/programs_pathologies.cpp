@@ -1,4 +1,5 @@
-// Programs on which published systems for differentiation are wrong, silent or not finite.
+// Suite programs on which published systems for automatic differentiation give wrong values, silent failures, or values
+// that are not finite.
 #include "gradient/programs_suite.h"
 
 namespace retrograde::gradient {
@@ -6,7 +7,7 @@ namespace {
 
 Var x("x"), y("y");
 
-// 0 * infinity in the branch that was not taken.
+// The branch that is not taken would give 0 * infinity.
 PROGRAM_OF(select_whose_other_branch_has_an_infinite_partial, line()) {
   a(3) = 0.0f;
   f(x) = select(a(x) > 0.125f, sqrt(a(x)), 2.0f * a(x));
@@ -110,7 +111,7 @@ PROGRAM_OF(many_writers_of_one_element, line()) {
   return {weighted_sum(f, {9}), {a}};
 }
 
-// Nothing reads row 0, where a tape runs the update backward.
+// Nothing reads row 0, although a tape runs the update there backward.
 PROGRAM(infinite_factor_where_nothing_is_read) {
   Buffer<float> a = line(), scale = line(1);
   Buffer<int> row = places(2, 1);

@@ -1,4 +1,4 @@
-// Programs of one point: operators, selections, conversions, Tuples, parameters, approximations.
+// Suite programs of a single point: operators, selections, conversions, Tuples, parameters, approximations.
 #include "gradient/programs_suite.h"
 
 namespace retrograde::gradient {

@@ -1,5 +1,5 @@
-// The gradient suite: small programs by name. A file of programs is a list of PROGRAM(name) { ...
-// } and PROGRAM_OF(name, image) { ... }; the driver (programs_suite_test.cpp) checks each one.
+// The gradient suite: small programs by name. A file of programs is a list of PROGRAM(name) { ... } and
+// PROGRAM_OF(name, image) { ... }; the driver (programs_suite_test.cpp) checks each one.
 #pragma once
 
 #include <string>
@@ -49,7 +49,7 @@ inline Buffer<float> line(int n = 9, unsigned seed = 1) { return random_image({n
 inline Buffer<float> plane(int w = 7, int h = 6, unsigned seed = 2) {
   return random_image({w, h}, 0.25, 2, seed);
 }
-// Integers 0, 1, ..., bound - 1, scrambled: places that data decide.
+// Integers 0, 1, ..., bound - 1, scrambled: data-dependent indices.
 inline Buffer<int> places(int n, int bound, unsigned seed = 3) {
   Buffer<int> result(n);
   std::mt19937 random(seed);
@@ -58,7 +58,7 @@ inline Buffer<int> places(int n, int bound, unsigned seed = 3) {
   return result;
 }
 
-// In bytes, as the profiler sees it.
+// The peak memory in bytes, as the profiler reports it.
 inline int64_t peak_memory(const Derivative& d, const Buffer<float>& input) {
   Func gradient = d(input);
   std::string report;

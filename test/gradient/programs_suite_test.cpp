@@ -1,9 +1,9 @@
-// Every program of the suite, each input's gradient element by element against central differences
-// in double, which only the interpreter of the algorithm evaluates; then as machine code. A program
-// that overwrites what its partials need is refused where the compiler may not keep the values.
+// Runs every program of the gradient suite. Each input's gradient is compared, element by element, with central
+// differences in double, which the interpreter evaluates; then the gradient is checked as machine code. Programs that
+// overwrite values needed by their partials must be refused if the compiler may not keep the values.
 //
-// Then every third program, or every one in the fuzz preset, by check_gradients: adjoint, tangent
-// and complex step, in machine code, of which no two share their derivatives.
+// Every third program (every one in the fuzz preset) also runs through check_gradients, which compares adjoint, tangent
+// and complex step in machine code. No two of these share their derivatives.
 #include "gradient/programs_suite.h"
 #include "checks/check_gradients.h"
 #include "graph/give_directive.h"
@@ -45,7 +45,7 @@ TEST_P(Suite, GraphsAreTheirText) {
   }
 }
 
-// What is given to a gradient is given to its text alike.
+// The schedule of a gradient also applies to a copy built from its text.
 TEST_P(Suite, SchedulesAreReplayed) {
   std::vector<graph::FuncPtr> outputs{program.loss.function()};
   Derivative d = propagate_adjoints(program.loss);

@@ -13,7 +13,7 @@ class Programs : public ::testing::Test {
   Buffer<float> a = random_image({9}, 0.25, 2, 1);
   Buffer<float> image = random_image({7, 6}, 0.25, 2, 2);
 
-  // The gradient by what the image is, of its size.
+  // Checks the gradient by the image's present contents, over the image's size.
   void expect_right(const Func& loss, const Func& gradient) {
     const oracle::Region region = oracle::region_of(*image.raw_buffer());
     const oracle::Array found = evaluate(gradient, region);
@@ -25,7 +25,7 @@ class Programs : public ::testing::Test {
   }
 };
 
-// Cells are found from float coordinates, as those of an image are when it is scaled.
+// Cells are found from float coordinates, as when an image is scaled.
 TEST_F(Programs, BilateralSliceOfCellsByFloatCoordinates) {
   Buffer<float> grid = random_image({4, 3, 3}, -1, 1, 9);
   const Expr gx = cast<float>(x) * (3 / 7.0f), gy = cast<float>(y) * (2 / 6.0f);
@@ -112,7 +112,7 @@ TEST_F(Programs, DataDependentGatherScatters) {
   expect_mentions(d.explain(Detail::All), {"scattered"});
 }
 
-// Numbers of these types are taken modulo 2^8, 2^16 and 2^32, or are beyond int32.
+// Numbers of these types wrap around at 2^8, 2^16 or 2^32, or exceed int32.
 template <class T>
 void expect_place_chosen_by_data_of_the_row(Buffer<float>& image) {
   Buffer<T> row(6);
@@ -168,7 +168,7 @@ TEST_F(Programs, BilateralSlice) {
 
 // ---- updates ----
 
-// Sizes are known when the pipeline is called only.
+// Sizes are known only when the pipeline is called.
 TEST_F(Programs, ParametricSizes) {
   ImageParam in(Float(32), 2, "in");
   in.set(image);
@@ -185,8 +185,8 @@ TEST_F(Programs, ParametricSizes) {
   expect_right(loss, d(in));
 }
 
-// Of a recurrence whose steps are counted at run time, those that read the end of the clamp may be
-// none: the others still count.
+// The steps of this recurrence are counted at run time. There may be no step that reads the end of the clamp; the other
+// steps still count.
 TEST_F(Programs, ARecurrenceThatMayNotReachTheEndOfAClamp) {
   Param<int> steps("steps");
   Func f("f");
@@ -202,7 +202,7 @@ TEST_F(Programs, ARecurrenceThatMayNotReachTheEndOfAClamp) {
   }
 }
 
-// The adjoint of clamp(x, 0, p) adds to element p, which the image has only where it is read.
+// The adjoint of clamp(x, 0, p) adds to element p, which exists in the image only if it is read.
 TEST_F(Programs, AClampWiderThanTheImageIsNotReachedAndAddsNowhere) {
   Param<int> p("p");
   p.set(50);
@@ -221,7 +221,7 @@ TEST_F(Programs, AClampToSizesOfAnImageAddsInsideOfIt) {
   expect_machine_code_agrees(gradient, {{0, 0}, {7, 6}});
 }
 
-// Room up to element p would be 8 GB.
+// A buffer up to element p would take 8 GB.
 TEST_F(Programs, AClampWiderThanAFuncTakesNoRoom) {
   Param<int> p("p");
   p.set(2000000000);
@@ -376,7 +376,7 @@ TEST(Gradients, TheAdjointAfterAScanIsThatOfItsConsumersOnly) {
   }
 }
 
-// The output is updated beyond the bounds that were given, and its updates read that.
+// The output is updated beyond the bounds that were specified, and its updates read those elements.
 TEST(Gradients, ASeedIsReadInsideOfItsBoundsOnly) {
   Buffer<float> a = random_image({5}, 0.25, 2, 1), seed = random_image({4}, -1, 1, 2);
   Func f("f");

@@ -1,6 +1,6 @@
-// Losses over large images, whose parts, sums of gradients and gradients by the image read the same
-// pixels: they run in one loop over rows, with the results of each computed apart, and the same bits
-// on any number of threads.
+// Tests the fusion of loops over large images: partial sums of a loss, of gradients by parameters, and gradients by the
+// image read the same pixels. They run in one loop over rows, with the results that each has on its own, and the same
+// bits on any number of threads.
 #include <gtest/gtest.h>
 
 #include "autodiff/derivative.h"
@@ -15,7 +15,7 @@ namespace {
 
 constexpr int width = 1501, height = 1009, channels = 3;  // no multiples of vectors and parts
 
-// A loss and what it is differentiated by.
+// A loss and the inputs by which it is differentiated.
 struct Fit {
   Func loss;
   std::vector<Buffer<float>> inputs;
@@ -39,7 +39,7 @@ Func mean(const Func& error) {
   return loss;
 }
 
-// gain * picture^gamma + lift, by the picture too, against a picture that is given.
+// gain * picture^gamma + lift against a reference picture, differentiated by the picture too.
 Fit tone_curve() {
   Var x("x"), y("y"), c("c");
   const Buffer<float> picture = pixels(0.05, 1, 1), wanted = pixels(0, 1, 2);
@@ -50,7 +50,7 @@ Fit tone_curve() {
   return {mean(error), {picture, gain, gamma, lift}};
 }
 
-// A mask of pixels, by a scale and a shift of each channel.
+// A pixel mask, by a scale and a shift of each channel.
 Fit logistic() {
   Var x("x"), y("y"), c("c");
   const Buffer<float> picture = pixels(-1, 1, 3), marks = pixels(0, 1, 4);
@@ -62,7 +62,7 @@ Fit logistic() {
   return {mean(error), {picture, scale, shift}};
 }
 
-// Exposure in stops and a gain of each channel; outliers count little.
+// Exposure in stops and a gain of each channel, with a loss that is robust to outliers.
 Fit exposure() {
   Var x("x"), y("y"), c("c");
   const Buffer<float> picture = pixels(0, 1, 5), wanted = pixels(0, 1, 6);
@@ -74,7 +74,7 @@ Fit exposure() {
   return {mean(error), {stops, gains}};
 }
 
-// Counts that grow with what is measured, by a softplus of a weighted sum.
+// Counts whose rate is a softplus of a weighted sum of the measurements.
 Fit softplus() {
   Var x("x"), y("y"), c("c");
   const Buffer<float> measured = pixels(-1, 1, 7), counts = pixels(0, 2, 8);

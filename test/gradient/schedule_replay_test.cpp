@@ -1,5 +1,5 @@
-// The default schedule of a gradient is a log of directives: as text and back, on a fresh build of
-// the same program, it gives the same loop nests.
+// Tests that the default schedule of a gradient can be replayed: its log of directives, written as text, parsed and
+// applied to a fresh build of the same program, gives the same loop nests.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -89,7 +89,7 @@ class ScheduleReplay : public ::testing::TestWithParam<Case> {};
 
 TEST_P(ScheduleReplay, GivesTheSameLoopNests) {
   const Program program = GetParam().build(), again = GetParam().build();
-  // That of the machine, for which the loop nests are.
+  // The vector unit of the machine for which the loop nests are compiled.
   const auto unit = autoschedule::vector_unit_of(get_jit_target_from_environment());
   const auto scheduled = autoschedule::schedule_unscheduled(functions(program), unit);
   const ScheduleLog log = graph::schedule_log(scheduled);
@@ -109,7 +109,7 @@ TEST_P(ScheduleReplay, GivesTheSameLoopNests) {
   EXPECT_EQ(same_numbers(pipeline.loop_nest()), same_numbers(Pipeline(program).loop_nest()));
 }
 
-// What it prints as C++ is compiled here, for names that the process numbers otherwise.
+// The schedule, printed as C++ and compiled here, must apply to names that this process numbers differently.
 TEST(ScheduleOfAGradient, IsStatements) {
   const std::string file = std::string(RETROGRADE_TEST_DIR) + "/golden/schedule_log/gradient.inc";
   const Program first = conv_layer(), program = conv_layer();

@@ -1,4 +1,4 @@
-// The search over what the autoscheduler decides, by made-up costs whose least is known.
+// Tests the autoscheduler's search with artificial costs whose minimum is known.
 #include "autoschedule/schedule_search.h"
 
 #include <gtest/gtest.h>
@@ -117,7 +117,7 @@ TEST_F(SearchOfSchedules, KeepsWhatAUserDecided) {
   EXPECT_TRUE(found.best.request.options.without.contains(Decision::Strips));
 }
 
-// 500 stages and their gradient. What one schedule of it takes is a matter of chain_growth_test.
+// 500 stages and their gradient. chain_growth_test measures the time for one schedule.
 TEST(SearchOfLongChains, TriesFewAndEnds) {
   EXPECT_EQ(autoschedule::candidates_for(10), 96u);
   EXPECT_EQ(autoschedule::candidates_for(1000), 12u);

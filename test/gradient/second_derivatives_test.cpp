@@ -1,8 +1,9 @@
-// Second derivatives of every operator, in all four orders of the modes: reverse over forward,
-// forward over reverse, twice reverse, twice forward. At regular points they are those of the
-// function, by differences in double. At exceptional points (kinks, ties, poles, ends of the
-// domain, infinities) the orders agree, and the Hessian is symmetric, but where `exceptions` says
-// why not. An arm that a select does not choose contributes exactly 0.
+// Tests second derivatives of every operator, in all four orders of the modes: reverse over forward, forward over
+// reverse, twice reverse, twice forward.
+//
+// At regular points they agree with differences in double. At exceptional points (kinks, ties, poles, ends of the
+// domain, infinities) the orders agree with each other and the Hessian is symmetric; `exceptions` lists the cases in
+// which they do not, with the reason. An arm that a select does not choose contributes exactly 0.
 #include <array>
 #include <functional>
 #include <map>
@@ -121,7 +122,7 @@ TEST(SecondDerivatives, EveryOperatorWithPartialsIsListed) {
   }
 }
 
-// Why orders of the modes, or of the operands, differ at exceptional points.
+// The reason why orders of the modes, or of the operands, differ at exceptional points.
 struct Exception {
   std::string operation;
   std::function<bool(const Point&)> holds;
@@ -178,7 +179,7 @@ struct Operands {
   }
   std::vector<Expr> at(const Var& i) const { return {values[0](i), values[1](i), values[2](i)}; }
 
-  // The derivative of a pointwise Func, by an adjoint or a tangent of ones.
+  // The derivative of a pointwise Func, by an adjoint with a seed of ones or a tangent along ones.
   Func derivative(const Func& f, char mode, size_t by) const {
     const Buffer<T>& image = values[by];
     if (mode == 'f') return propagate_tangents(f, {{image, Direction::as_func(ones)}})(f);
@@ -198,7 +199,7 @@ struct Second {
   std::vector<double> values;  // one a point
 };
 
-// All of the Hessian in all orders, as the interpreter or machine code has it.
+// The complete Hessian in all orders, by the interpreter or as machine code.
 template <typename T>
 std::vector<Second> all_seconds(const Operands<T>& operands, const Func& f, int arity,
                                 bool is_compiled) {
@@ -243,7 +244,7 @@ std::string text_of(const Operation& o, const Point& p, const Second& s) {
   return result + ") by " + "xyw"[s.first] + " then " + "xyw"[s.then] + " in order " + s.modes;
 }
 
-// d2 f / da db by differences of values, with an error of fourth order in the step.
+// d2 f / da db by differences of values; the error is of fourth order in the step.
 double difference(const Operands<double>&, const Operation& o, const Point& p, size_t a, size_t b) {
   const auto value = [&](double step_a, double step_b) {
     Point moved = p;
@@ -279,7 +280,7 @@ TEST(SecondDerivatives, AtRegularPointsAreThoseOfTheFunction) {
   }
 }
 
-// With the first of all as the measure.
+// Compares with the first order of the modes as the reference.
 template <typename T>
 void expect_orders_agree(bool is_compiled, std::set<size_t>& needed) {
   const double tolerance = sizeof(T) == 8 ? 1e-9 : 1e-4;
@@ -330,7 +331,7 @@ double chosen_hessian(size_t a, size_t b) {
   return hessian[a][b];
 }
 
-// How an arm that is not chosen meets the select: in its expression, or by Funcs.
+// How the unselected arm reaches the select: within its expression, or through Funcs.
 enum class Path { Inline, Func, Product, Chain };
 template <typename T>
 Func guarded(const Operation& o, const Operands<T>& operands, Path path) {
@@ -382,7 +383,7 @@ TEST(SecondDerivatives, AnUnchosenArmContributesNothingInMachineCode) {
   expect_unchosen_arms_contribute_nothing<float>(Path::Inline, true);
 }
 
-// Through the public functions.
+// Hessians through the public functions.
 class HessiansAtExceptionalPoints : public ::testing::Test {
  protected:
   Buffer<float> a = Buffer<float>(2), one = Buffer<float>(2);

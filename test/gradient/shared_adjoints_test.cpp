@@ -1,5 +1,5 @@
-// Inner adjoints of a step that several inputs have a part in: kept where that pays, and nowhere
-// else. That gradients stay right is for the suite (programs_suite_test.cpp).
+// Tests which inner adjoints of a step are kept because several inputs need them: those that pay, and no others. The
+// suite (programs_suite_test.cpp) checks that the gradients stay right.
 #include "autodiff/sweeps/shared_adjoints.h"
 
 #include <gtest/gtest.h>
@@ -93,7 +93,7 @@ TEST(SharedAdjoints, AnAccumulationKeepsNothingForEachOfItsTerms) {
   EXPECT_FALSE(inner_of(propagate_adjoints(loss)).defined());
 }
 
-// a(i - 3) stands under a condition: the primal reads it from 0 on.
+// a(i - 3) is read under a condition: the primal reads it from 0 on.
 struct Guarded : ::testing::Test {
   Guarded() {
     using namespace autodiff;

@@ -1,5 +1,5 @@
-// Strong zeros across Funcs: where the true derivative is finite, infinite or NaN values that the
-// output does not use leave no trace in the gradient. The expected values are worked out by hand.
+// Tests strong zeros across Funcs: if the true derivative is finite, infinite or NaN values that the output does not
+// use leave no trace in the gradient. The expected values are worked out by hand.
 #include <limits>
 
 #include "autodiff/tangents.h"
@@ -72,7 +72,7 @@ TEST_F(StrongZeros, InfiniteAndNaNInputsOfAnUnselectedFunc) {
   for (int i = 0; i < 4; ++i) EXPECT_EQ(found(i), i == 2 ? 4.0f : 0.0f) << i;
 }
 
-// They cost a comparison and a mask each, so they stand only where a factor may be infinite or NaN.
+// Strong products cost a comparison and a mask each, so they are used only where a factor may be infinite or NaN.
 TEST_F(StrongZeros, StandOnlyWhereAFactorMayBeInfinite) {
   set(a, {1, 2, 3, -4});
   set(b, {1, 2, 3, 4});
@@ -98,7 +98,7 @@ TEST_F(StrongZeros, StandOnlyWhereAFactorMayBeInfinite) {
   EXPECT_TRUE(has_strong_zeros(select(b(x) > 1, b(x), 3.0f))) << "a choice of what memory holds";
 }
 
-// Which lets products fuse with the sums that they are added to.
+// With this promise, products fuse with the sums that they are added to.
 TEST_F(StrongZeros, StandNotWhereAUserPromisesThatFactorsAreFinite) {
   ImageParam plain(Float(32), 1, "plain"), promised(Float(32), 1, "promised");
   promised.promise_finite();
@@ -174,9 +174,8 @@ TEST_F(StrongZeros, OverflowOfAProductUnderAnExponential) {
   expect(g, b, {0, 1.0f / 81, 0, 1 / 1.75f / 1.75f});
 }
 
-// Squares of squares: value and tangent overflow in the Func that the exponential reads. (Adjoints
-// know of it under a seed that is given; else a product that overflows in another Func counts as
-// finite.)
+// Squares of squares: value and tangent overflow in the Func that the exponential reads. (Adjoints detect this only
+// under a user-specified seed; otherwise a product that overflows in another Func counts as finite.)
 TEST_F(StrongZeros, OverflowOfAnUpdateUnderAnExponential) {
   set(a, {3, 4, 0.99f, 0.5f});
   Func power("power"), f("f");
@@ -230,7 +229,7 @@ TEST_F(StrongZeros, SeedsOfZero) {
   for (int i = 0; i < 4; ++i) EXPECT_NEAR(found(i), i % 2 ? 0.0f : 1.0f, 1e-6) << i;
 }
 
-// The exponential of -inf is 0, and so is its slope, which then meets the infinity.
+// The exponential of -inf is 0, and so is its slope, which is then multiplied by infinity.
 TEST_F(StrongZeros, AnInfiniteFactorThatAnotherFuncHolds) {
   set(a, {0, 0, 0, 0});
   set(b, {1, 2, 0.5f, 3});
@@ -276,8 +275,8 @@ TEST_F(StrongZeros, AFactorOfZeroAfterAPole) {
   expect(g, a, {0, 1.5f, 3, 0.75f});
 }
 
-// f <- b(t) sqrt(f) for t = 0, 1 with b(0) = 0: what is infinite behind the pole at t = 1 meets a
-// factor of 0 at t = 0. The last value is 0 whatever f was.
+// f <- b(t) sqrt(f) for t = 0, 1 with b(0) = 0: the infinite adjoint of the pole at t = 1 is multiplied by a factor of
+// 0 at t = 0. The last value is 0 for any initial f.
 TEST_F(StrongZeros, AFactorOfZeroInAnEarlierStepThanThePole) {
   set(a, {4, 1, 9, 16});
   set(b, {0, 1, 0, 1});
@@ -313,7 +312,7 @@ TEST_F(StrongZeros, AFactorOfZeroAfterAQuotient) {
   expect(shrunk, a, {0, 1, 1, 0});
 }
 
-// Term by term, the infinite adjoint reaches f with both signs.
+// Taken term by term, infinite adjoints of both signs reach f.
 TEST_F(StrongZeros, ATermThatCancelsBehindAPole) {
   set(a, {1, 0, -3, 2});
   set(b, {1, 2, 4, 9});
@@ -333,8 +332,8 @@ TEST_F(StrongZeros, AnInfiniteFactorOfAMaximumThatIsConstant) {
   expect(f, a, {0, 3, 0, 5});
 }
 
-// Sums in registers try plain products first. Rows of seeds that are 0 meet infinities and NaNs;
-// sizes that tiles divide, and sizes that they do not.
+// Sums in registers try plain products first. Rows of seeds that are 0 are multiplied by infinities and NaNs, at sizes
+// that tiles divide and sizes that they do not.
 TEST_F(StrongZeros, SumsOfProductsInRegisters) {
   for (const int size : {64, 45}) {
     Buffer<float> weight(size, size), image(size, size), seed(size, size);

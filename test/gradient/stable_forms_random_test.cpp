@@ -1,4 +1,4 @@
-// A fixed set of random expressions; fuzz_forms goes on without end.
+// Checks the gradients of a fixed set of random expressions; fuzz_forms continues without end.
 #include <gtest/gtest.h>
 
 #include "frontend/language/expr_ops.h"
@@ -9,7 +9,7 @@
 namespace retrograde::gradient {
 namespace {
 
-// In float32 and in double by turns; one in forty as machine code too.
+// Alternates between float32 and double; one expression in forty is also checked as machine code.
 TEST(StableFormsRandom, GradientsOfFormsAndNearMissesAreThoseOfDualNumbers) {
   FormResult total;
   for (uint64_t seed = 0; seed < 1000; ++seed) {
@@ -23,8 +23,8 @@ TEST(StableFormsRandom, GradientsOfFormsAndNearMissesAreThoseOfDualNumbers) {
   EXPECT_GT(total.checked, 20'000);
 }
 
-// A smooth maximum that is none (the distance is that of one operand to itself), an entropy and a
-// norm of one component twice, below one ratio.
+// Below one ratio: an expression that only looks like a smooth maximum (its distance is that of one operand to itself),
+// an entropy, and a norm that has one component twice.
 TEST(StableFormsRandom, FormsThatShareNodesUnderARatioTakeNothingFromEachOther) {
   for (const Type type : {Float(32), Float(64)}) {
     const auto num = [&](double value) { return ir::make_const(type, value); };

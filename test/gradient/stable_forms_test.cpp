@@ -1,6 +1,6 @@
-// Functions as users write them, whose derivative taken operator by operator would cancel, overflow
-// or underflow: wherever value and true derivative are finite in float32, the gradient is right to
-// a few ULP. Oracle: the derivative in long double, in closed form.
+// Tests functions as users write them, whose derivative would cancel, overflow or underflow if taken operator by
+// operator. If value and true derivative are finite in float32, the gradient is right to a few ULP. The expected values
+// are closed forms in long double.
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -26,7 +26,7 @@ Real logistic_slope(Real x) {
 }
 Real logistic(Real x) { return x > 0 ? 1 / (1 + std::exp(-x)) : std::exp(x) / (1 + std::exp(x)); }
 
-// The derivative of (exp(x) - 1) / x, at the numbers below.
+// The derivative of (exp(x) - 1) / x, for the points used below.
 Real growth_slope(Real x) {
   const Real series = 0.5L + x / 3 + x * x / 8 + x * x * x / 30;
   return std::fabs(x) < 0.002L ? series : (std::exp(x) - std::expm1(x) / x) / x;
@@ -37,7 +37,7 @@ Real logarithm_slope(Real x) {
   return std::fabs(x) < 0.002L ? series : (1 / (1 + x) - std::log1p(x) / x) / x;
 }
 
-// An exponential is denormal or overflows: so few digits are left as the value has.
+// An exponential is denormal or overflows: the derivative has only as many digits left as the value.
 bool is_wide(Real x, Real y) { return std::min(x, y) < -87 || std::max(x, y) > 87; }
 
 const std::vector<Shape>& shapes() {
@@ -60,7 +60,7 @@ const std::vector<Shape>& shapes() {
        [](Real x, Real) { return logistic(-x); }, 6},
       {"log(1 + exp(x))", [](Expr x, Expr) { return log(1.0f + exp(x)); },
        [](Real x, Real) { return logistic(x); }, 6},
-      // Where exp(x) is denormal, so few digits of it are left as the value has.
+      // If exp(x) is denormal, the derivative has only as many digits left as the value.
       {"log(exp(x) + exp(y))", [](Expr x, Expr y) { return log(exp(x) + exp(y)); },
        [](Real x, Real y) { return x < -87 ? std::nanl("") : logistic(x - y); }, 6},
       {"softmax", [](Expr x, Expr y) { return exp(x) / (exp(x) + exp(y)); },
@@ -117,7 +117,7 @@ const std::vector<Shape>& shapes() {
        },
        6},
       {"(1 - x*x) / (1 + x*x)", [](Expr x, Expr) { return (1.0f - x * x) / (1.0f + x * x); },
-       [](Real x, Real) {  // by x*x it is denormal from 1e9 on
+       [](Real x, Real) {  // as a quotient by x*x it is denormal from 1e9 on
          return std::fabs(x) > 1e9L ? std::nanl("") : -4 * x / (1 + x * x) / (1 + x * x);
        },
        8},
@@ -261,7 +261,7 @@ TEST(StableForms, AreRightToAFewUlpWhereverTheyAreFinite) {
   }
 }
 
-// The parts have kinks at 0; the sum, and its derivative, do not.
+// The parts have kinks at 0, but the sum and its derivative do not.
 TEST(StableForms, HaveDerivativesOfTheirOwn) {
   Buffer<float> x(3), one(3);
   x(0) = 0, x(1) = -2, x(2) = 1.5f;
@@ -278,8 +278,8 @@ TEST(StableForms, HaveDerivativesOfTheirOwn) {
   EXPECT_NEAR(of_sine(0), -1.0 / 3, 1e-6);
 }
 
-// Over Funcs, shifted by the largest as usual. The adjoint that passes the maximum is exactly 0:
-// summed, it would be what rounding left, and the largest element would get that.
+// Softmax over Funcs, shifted by the largest value as usual. The adjoint that passes through the maximum is exactly 0.
+// If it were summed, only rounding errors would remain, and the largest element would receive them.
 class OverFuncs : public ::testing::Test {
  protected:
   static constexpr int n = 300;
@@ -306,7 +306,7 @@ class OverFuncs : public ::testing::Test {
     for (Real& v : p) v /= sum;
     return p;
   }
-  // `magnitude`: of the terms that each element is a sum of.
+  // `magnitude`: the magnitude of the terms that each element sums.
   void expect(const std::vector<Real>& expected, const std::vector<Real>& magnitude) {
     Derivative d = propagate_adjoints(loss);
     Buffer<float> found = d(x).realize({n});

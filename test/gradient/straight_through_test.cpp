@@ -1,5 +1,5 @@
-// Straight-through forms: the value is bit for bit the first operand's, as machine code too, and
-// the derivative the second's, in both modes.
+// Tests straight-through forms: the value is bit for bit the first operand's, also as machine code, and the derivative
+// is the second operand's, in both modes.
 #include "autodiff/straight_through.h"
 
 #include "autodiff/tangents.h"

@@ -1,6 +1,5 @@
-// Forward mode: tangents of whole programs, element by element, against central differences in
-// double along the direction; as machine code too. Every kind of update; inputs of every kind;
-// errors.
+// Tests forward mode: tangents of complete programs, element by element, against central differences in double along
+// the direction, and as machine code. Covers every kind of update, inputs of every kind, and errors.
 #include "autodiff/tangents.h"
 #include "frontend/data/param.h"
 #include "gradient/gradient_check.h"

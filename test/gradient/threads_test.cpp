@@ -60,7 +60,7 @@ TEST_P(LargeGradients, HaveTheSameBitsOnAnyNumberOfThreads) {
   }
 }
 
-// And on the threads of the runtime.
+// The same, on the threads of the runtime.
 TEST_P(LargeGradients, AgreeWithForwardMode) {
   const Derivative d = derivative();
   Pipeline p = pipeline(d);

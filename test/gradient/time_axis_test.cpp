@@ -1,6 +1,6 @@
-// Loops over time that keep every step along an axis of their own, of which the last are read, run
-// backward from a few kept states. Oracles: central differences; the gradient without a budget, bit
-// by bit; the memory that the profiler sees.
+// Tests checkpointing of loops over time that store every step along an axis of its own, if only the last steps are
+// read. Such loops run backward from a few kept states. Oracles: central differences; the gradient without a budget,
+// bit by bit; the memory that the profiler reports.
 #include "gradient/programs_suite.h"
 #include "support/errors.h"
 
@@ -41,7 +41,7 @@ Program two_steps_back(int n) {
   return {weighted_sum(last, {6}), {start, speed}};
 }
 
-// Elements at the border are 0 at every step but the first.
+// Elements at the border are 0 at every step except the first.
 Program stencil_with_a_border(int n) {
   Buffer<float> start = line(9), k = line(9, 3);
   Func u("u"), last("last");
@@ -55,7 +55,7 @@ Program stencil_with_a_border(int n) {
   return {weighted_sum(last, {9}), {start, k}};
 }
 
-// The last two steps, of a Tuple, through other Funcs.
+// The last two steps of a Tuple are read through other Funcs.
 Program tuple_and_its_last_difference(int n) {
   Buffer<float> angle = line(5), gravity = line(5, 9);
   Func u("u"), energy("energy"), end("end");
@@ -104,7 +104,7 @@ Program one_loop_after_another(int n) {
   return {weighted_sum(last, {5}), {start, gain}};
 }
 
-// A matrix applied again and again: several iterations add up an element.
+// Repeated multiplication by a matrix: several iterations accumulate into one element.
 Program power_of_a_matrix(int n) {
   Buffer<float> m = random_image({3, 3}, -1, 1, 12), start = line(3);
   Func v("v"), last("last");
@@ -146,8 +146,8 @@ std::vector<float> gradient_of(const Derivative& d, const Buffer<float>& input) 
   return result;
 }
 
-// In float32, operation by operation, as the gradient that keeps all steps; what every step reads
-// is summed in another order.
+// In float32, bits agree operation by operation with the gradient that keeps all steps. Gradients by inputs that every
+// step reads are summed in another order.
 TEST(TimeAxis, GradientsAreThoseOfAllStepsKept) {
   for (const NamedLoop& c : cases) {
     for (int n : {1, 2, 3, 12}) {
@@ -166,8 +166,8 @@ TEST(TimeAxis, GradientsAreThoseOfAllStepsKept) {
   }
 }
 
-// A loop of random shape: where it reads, which elements it writes, what was there before, in which
-// direction time runs, which steps are read at the end.
+// A loop of random shape: its reads, the elements that it writes, their initial values, the direction of time, and the
+// steps that are read at the end are all random.
 Program random_loop(unsigned seed) {
   std::mt19937 random(seed);
   auto pick = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
@@ -176,7 +176,7 @@ Program random_loop(unsigned seed) {
   Buffer<float> start = plane(width, n + 4, seed), k = random_image({3}, 0.25, 0.5, seed + 1);
   Func u("u"), last("last");
   RDom r(margin, width - 2 * margin, 0, n);
-  // Times lags to lags + n - 1 are written, or n - 1 to 0.
+  // Time steps lags to lags + n - 1 are written, or n - 1 to 0.
   Expr time = forward ? r.y + lags : n - 1 - r.y, place = in_rows ? Expr(r.x) : Expr(x);
   auto back = [&](int steps) { return forward ? time - steps : time + steps; };
   const int before = forward ? lags - 1 : n, end = forward ? lags + n - 1 : 0;
@@ -227,7 +227,8 @@ TEST(TimeAxis, RandomLoopsAgreeWithThoseThatKeepAllSteps) {
   EXPECT_GT(folded, 30);
 }
 
-// One slice a state, however many steps: the loss, which is not linear, reads the last step too.
+// Memory is one slice for each kept state, regardless of the number of steps: the loss, which is not linear, reads the
+// last step too.
 TEST(TimeAxis, MemoryIsThatOfTheKeptSlices) {
   Buffer<float> start = line(100);
   auto peak = [&](int n, int states) {
@@ -278,7 +279,7 @@ TEST(TimeAxis, TheGradientCanBeDifferentiatedAgain) {
   expect_gradient(weighted_sum(d(start), {2}), start, {.overwritten = Overwritten::Store});
 }
 
-// Adjoints of Funcs between the loop and the output are found by the user's Funcs.
+// Adjoints of Funcs between the loop and the output are found under the user's Funcs.
 TEST(TimeAxis, FuncsBehindTheLoopHaveTheirAdjoints) {
   Func u("u"), last("last");
   Buffer<float> start = line(7);
@@ -298,7 +299,7 @@ TEST(TimeAxis, FuncsBehindTheLoopHaveTheirAdjoints) {
   EXPECT_TRUE(asked(u).defined());
 }
 
-// Whether a step writes, data decide: which slot holds what is not known.
+// Data decide whether a step writes, so the compiler cannot know which slot holds which step.
 TEST(TimeAxis, WithStepsThatDataSkipIsLeftAsItIs) {
   Buffer<float> start = line(5), gate = line(6, 4);
   Func u("u"), last("last");

@@ -1,5 +1,5 @@
-// Programs with loops over time as users write them: recursive filters, simulations, sweeps in
-// place, state machines. Every output is read by the loss, so a lost one shows.
+// Suite programs with loops over time as users write them: recursive filters, simulations, in-place sweeps, state
+// machines. The loss reads every output, so that a lost one shows.
 #include "gradient/programs_suite.h"
 
 namespace retrograde::gradient {
@@ -7,7 +7,7 @@ namespace {
 
 Var x("x"), y("y"), t("t");
 
-// Second order, forward and backward along both axes, as image filters do (I. Young, L. van Vliet,
+// A second-order filter, forward and backward along both axes, as in image processing (I. Young, L. van Vliet,
 // Recursive implementation of the Gaussian filter, Signal Processing 44, 1995).
 PROGRAM_OF(recursive_filter_of_second_order_along_both_axes, plane(6, 5)) {
   Buffer<float> c = random_image({2}, 0.25, 0.5, 8);
@@ -34,8 +34,8 @@ PROGRAM(recursive_filter_of_third_order_into_another_func) {
   return {weighted_sum(both, {12}), {a, c}};
 }
 
-// The weight of the previous pixel falls with the step of a guide (E. Gastal, M. Oliveira, Domain
-// transform for edge-aware image and video processing, SIGGRAPH 2011).
+// The weight of the previous pixel decreases with the step of a guide image (E. Gastal, M. Oliveira, Domain transform
+// for edge-aware image and video processing, SIGGRAPH 2011).
 PROGRAM(recursive_bilateral_filter) {
   Buffer<float> image = plane(6, 4), guide = plane(6, 4, 5), sigma = line(1, 6);
   Func weight("weight"), f("f");
@@ -47,7 +47,7 @@ PROGRAM(recursive_bilateral_filter) {
   return {weighted_sum(f, {6, 4}), {image, guide, sigma}, true};
 }
 
-// Numerator and denominator of a weighted mean, decayed by what the data say.
+// Numerator and denominator of a weighted mean, with a data-dependent decay.
 PROGRAM_OF(normalised_recursive_mean_in_a_tuple, line()) {
   Buffer<float> w = line(9, 4);
   Func g("g");
@@ -100,7 +100,7 @@ PROGRAM(kalman_filter) {
   return {weighted_sum(g, {10}), {measured, noise}};
 }
 
-// Cells that live or die by their neighbours, and an energy that flows where they live.
+// A cellular automaton, and an energy that flows between living cells.
 PROGRAM(cells_that_live_by_their_neighbours) {
   Buffer<float> start = line(9);
   Func u("u"), g("g");
@@ -154,8 +154,8 @@ PROGRAM(cumulative_maximum_and_its_place) {
   return {weighted_sum(g, {9}), {a, b}, true};
 }
 
-// Maximum, sum of exponentials and weighted sum, one key at a time, as attention over long inputs
-// does (M. Milakov, N. Gimelshein, Online normalizer calculation for softmax, 2018).
+// Maximum, sum of exponentials and weighted sum, one key at a time, as in attention over long inputs (M. Milakov, N.
+// Gimelshein, Online normalizer calculation for softmax, 2018).
 PROGRAM(streaming_softmax) {
   Buffer<float> q = line(3), k = line(7, 4), v = line(7, 5);
   Func s("s"), out("out");
@@ -179,7 +179,7 @@ PROGRAM(horner_along_a_time_axis) {
   return {weighted_sum(last, {5}), {a, c}};
 }
 
-// Backward in time: a value function from the end, choosing the better of two moves.
+// Value iteration backward in time, from the last step, choosing the better of two moves.
 PROGRAM(value_iteration_backward_in_time) {
   Buffer<float> reward = plane(6, 5), end = line(6, 4);
   Func v("v");

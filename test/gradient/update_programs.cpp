@@ -1,4 +1,5 @@
-// Programs whose updates overwrite, read what they overwrite, or write where data say.
+// Suite programs whose updates overwrite values, read the values that they overwrite, or write at data-dependent
+// indices.
 #include "gradient/programs_suite.h"
 
 namespace retrograde::gradient {
@@ -6,7 +7,7 @@ namespace {
 
 Var x("x"), y("y"), t("t");
 
-// ---- places that data decide ----
+// ---- data-dependent indices ----
 
 PROGRAM(histogram) {
   Buffer<float> a = line(12);

@@ -1,6 +1,6 @@
-// Random updates of small Funcs that read and overwrite themselves at random places, affine or
-// decided by data: an accepted program has a right gradient, whether values may be kept or not, by
-// the oracle of adversary/check.h.
+// Tests random updates of small Funcs that read and overwrite themselves at random indices, affine or data-dependent.
+// An accepted program must have a right gradient, whether values may be kept or not, according to the oracle of
+// adversary/check.h.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,7 +23,7 @@ AdversaryProgram program_of(unsigned seed, const AdjointOptions& options) {
   return {fuzz::make_program(choices, fuzz::Style::updates()), options, true, {}};
 }
 
-// How many are judged alike.
+// The number of programs with each judgement.
 std::map<Judgement, unsigned> judge_all(unsigned count, const AdjointOptions& options) {
   std::map<Judgement, unsigned> judged;
   for (unsigned seed = 0; seed < count && !::testing::Test::HasFailure(); ++seed) {
@@ -50,14 +50,14 @@ TEST(RandomUpdates, AreRightWhenValuesMayBeKept) {
   EXPECT_GT(2 * judged[Judgement::Right], programs);
 }
 
-// Most overwrite what a partial needs, which Overwritten::Refuse is there to refuse.
+// Most of the programs overwrite values that a partial needs, so Overwritten::Refuse must refuse them.
 TEST(RandomUpdates, AreRightOrRefusedWhenValuesMayNotBeKept) {
   auto judged = judge_all(programs, {.overwritten = Overwritten::Refuse});
   EXPECT_LE(10 * judged[Judgement::Refused], 6 * programs);
   EXPECT_GT(judged[Judgement::Refused], 0u);
 }
 
-// The same products, added in another order.
+// The same products are added in another order.
 TEST(RandomUpdates, AreTheSameWithABudgetForStates) {
   constexpr unsigned count = programs / 2;
   unsigned compared = 0;

@@ -1,4 +1,4 @@
-// Programs that reduce: sums in every shape, and associative operators that are not sums.
+// Suite programs that reduce: sums of every shape, and associative operators other than sums.
 #include "gradient/programs_suite.h"
 
 namespace retrograde::gradient {

@@ -1,5 +1,5 @@
-// Programs with recurrences: scans forward and backward, in one and in several dimensions, of
-// several taps and of coupled Tuples. Every step is read by the loss, so a lost one shows.
+// Suite programs with recurrences: scans forward and backward, in one and several dimensions, with several taps and
+// coupled Tuples. The loss reads every step, so that a lost one shows.
 #include "gradient/programs_suite.h"
 
 namespace retrograde::gradient {
@@ -21,7 +21,7 @@ PROGRAM_OF(cumulative_sum_from_the_right, line()) {
   return {weighted_sum(f, {9}), {a}};
 }
 
-// The iteration that reads a(0) is the first: there is none.
+// Only a first iteration could read a(0), but there is no iteration.
 PROGRAM_OF(shift_of_no_elements, line()) {
   Param<int> n("n");
   n.set(0);
@@ -144,7 +144,7 @@ PROGRAM(symplectic_euler_in_two_updates) {
   return {weighted_sum(g, {7}), {a}};
 }
 
-// u(x, t + 1) = step(u(x - 1, t), u(x, t), u(x + 1, t)), with the ends of the line as they are.
+// u(x, t + 1) = step(u(x - 1, t), u(x, t), u(x + 1, t)); the ends of the line stay unchanged.
 template <class Step>
 Program steps_over_a_stencil(int steps, const Step& step) {
   Buffer<float> a = line();

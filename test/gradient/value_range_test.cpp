@@ -1,4 +1,4 @@
-// ValueRanges: which values may be infinite, and which bounds prove that they are not.
+// Tests ValueRanges: the analysis of which values may be infinite, and which bounds prove that they are not.
 #include "autodiff/rules/value_range.h"
 
 #include <cmath>
@@ -20,7 +20,7 @@ class ValueRanges : public ::testing::Test {
     const autodiff::ValueRanges ranges(graph::topological_order({f.function()}));
     return ranges.of(f(std::vector<Expr>(static_cast<size_t>(f.dimensions()), Expr(0))));
   }
-  // Through another Func.
+  // The range of an expression that is read through another Func.
   ValueRange range_of(const Expr& e) const {
     Func inner("inner"), f("f");
     inner(x) = e;

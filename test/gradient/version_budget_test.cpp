@@ -1,5 +1,5 @@
-// Updates that overwrite what their partials need, written as users do: under the defaults their
-// gradients are right, explain() says what is kept, and beyond the budget they are refused.
+// Tests the budget for overwritten values that partials need. In programs as users write them, the gradients are right
+// under the defaults, explain() lists the values that are kept, and updates beyond the budget are refused.
 #include "autodiff/updates/version_budget.h"
 
 #include "frontend/data/param.h"
@@ -15,7 +15,7 @@ struct VersionBudget : ::testing::Test {
   static Buffer<float> positive(const std::vector<int>& sizes) {
     return random_image(sizes, 0.5, 1.5, 3);
   }
-  // No two of them close to each other: at ties a maximum has no difference.
+  // Values that are well separated, because a maximum has no derivative at ties.
   static Buffer<float> separated(int n) {
     Buffer<float> values(n);
     for (int i = 0; i < n; ++i) values(i) = 0.5f + static_cast<float>(i * 7 % n) / 16.0f;
@@ -68,7 +68,7 @@ TEST_F(VersionBudget, MaximaInLogStepsInOneRow) {
   expect_gradient(weighted_sum(f, {5}), a);
 }
 
-// Logistic growth: each value is multiplied with what came before it.
+// Logistic growth: each value is multiplied by the previous one.
 TEST_F(VersionBudget, CompoundScans) {
   Buffer<float> a = positive({8});
   RDom r(1, 7);
@@ -129,7 +129,7 @@ TEST_F(VersionBudget, WhatAllUpdatesKeepCountsTogether) {
   expect_mentions(error_of(loss, {.version_bytes = 239}), {"they are 240 bytes"});
 }
 
-// Kept or not is decided by the call: its sizes are known then.
+// The call decides whether values are kept, because only then are the sizes known.
 TEST_F(VersionBudget, SizesKnownAtRunTimeOnlyAreCheckedByTheCall) {
   ImageParam a(Float(32), 2, "a");
   Param<int> columns("columns");

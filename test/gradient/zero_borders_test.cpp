@@ -1,4 +1,4 @@
-// Gathers of a stencil over an adjoint that is zero outside of its box have no conditions for that.
+// Tests gathers of a stencil over an adjoint that is zero outside of its box: they need no conditions for that.
 #include <gtest/gtest.h>
 
 #include <retrograde/retrograde.h>
@@ -27,7 +27,7 @@ struct Stencil {
     out(x) += image(x + r.x, r.y) * weights(r.x, r.y);
   }
   Func gradient() { return propagate_adjoints(out, Func(seed), {{0, width}})(image); }
-  // The gradient by the image, term by term.
+  // The expected gradient by the image, summed term by term.
   float expected(int i, int k) const {
     float sum = 0;
     for (int tap = 0; tap < taps; tap++) {
@@ -77,7 +77,7 @@ TEST(ZeroBorders, LeaveTheGradientAsItIs) {
   }
 }
 
-// The first element is not read by the second tap, whose weight is infinite.
+// The second tap, whose weight is infinite, does not read the first element.
 TEST(ZeroBorders, StayZeroBesideInfinity) {
   Stencil stencil;
   for (int k = 0; k < Stencil::channels; k++)
@@ -93,7 +93,7 @@ TEST(ZeroBorders, StayZeroBesideInfinity) {
   }
 }
 
-// A factor at a place of its own stays where the domain is: its image ends there.
+// A factor with an index of its own is read only inside of the domain, because its image ends there.
 TEST(ZeroBorders, ReadOtherFactorsInsideOfTheirImages) {
   Stencil stencil;
   Buffer<float> gains(Stencil::width);

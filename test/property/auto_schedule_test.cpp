@@ -15,14 +15,14 @@ namespace {
 constexpr uint64_t first_seed = 7000;
 constexpr int programs_per_shard = 40;
 constexpr int shards = 4;
-// Programs with nothing scheduled and with a part.
+// Programs without a schedule, and partly scheduled ones.
 #ifdef RETROGRADE_MANY_PROGRAMS
 constexpr int step = 1;  // 160
 #else
 constexpr int step = 2;  // 80: every second shard
 #endif
 
-// Directives for half of the Funcs, and for the Funcs generated from these.
+// The directives for half of the Funcs, and for the Funcs generated from these.
 ScheduleLog part_of(const ScheduleLog& log, Choices& choices) {
   ScheduleLog part;
   std::set<std::string> seen, kept;
@@ -40,7 +40,7 @@ ScheduleLog part_of(const ScheduleLog& log, Choices& choices) {
 
 struct Built {
   RandomProgram program;
-  ScheduleLog schedule;  // of a part, or none
+  ScheduleLog schedule;  // a partial schedule, or none
 };
 Built build(uint64_t seed, bool has_schedule) {
   Choices choices(seed);
@@ -49,8 +49,8 @@ Built build(uint64_t seed, bool has_schedule) {
   return built;
 }
 
-// How many values were compared. Unscheduled, a program may compute what it reads again and again, so it
-// runs so only where auto_schedule's is not right.
+// Returns the number of compared values. An unscheduled program may recompute its producers many times, so it runs only
+// if the result under auto_schedule is wrong.
 uint64_t check(uint64_t seed, bool has_schedule) {
   const Target target = get_jit_target_from_environment();
   const Built built = build(seed, has_schedule);

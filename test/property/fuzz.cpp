@@ -1,11 +1,11 @@
-// fuzz_pipelines -- looks for random programs whose machine code disagrees with the interpreter. Its
-// arguments are those of support/fuzz.h, and
+// fuzz_pipelines -- searches for random programs whose machine code disagrees with the interpreter. Its arguments are
+// those of support/fuzz.h, and
 //
 //   --without DIRECTIVE    leaves it out of all schedules
 //   --style STYLE          only chains, or only pipelines (testing/programs/program.h)
 //   --only DIRECTIVE       seeds whose schedules do not use it are passed over and not counted
 //
-// A random schedule may well ask for a thousand times the work: a few may compute for too long.
+// A random schedule may multiply the work by a thousand, so a few programs may exceed the time limit.
 #include <algorithm>
 
 #include "graph/directive.h"
@@ -27,9 +27,9 @@ constexpr int watched_by_pages = 25;  // percent
 
 std::vector<std::string> without;
 std::string only;
-std::string style;  // of the programs; empty: one or the other
+std::string style;  // the style of the programs; empty: either one
 
-// Takes every use of it out of the schedule, with what hangs on it.
+// Removes every use of the directive from the schedule, with the directives that depend on it.
 ScheduleLog leave_out(ScheduleLog log, const std::string& directive) {
   for (size_t i = log.size(); i-- > 0;) {
     if (i < log.size() && name_of(log.entries[i].directive) == directive) log = log.without(i);

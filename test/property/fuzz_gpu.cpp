@@ -1,6 +1,6 @@
-// fuzz_gpu -- looks for random programs under random GPU schedules whose kernels, on the simulated
-// device, disagree with the interpreter, race, or touch what is not theirs: each program runs under every
-// order of threads. Arguments: support/fuzz.h.
+// fuzz_gpu -- searches for random programs under random GPU schedules whose kernels, on the simulated device, disagree
+// with the interpreter, race, or access memory that they do not own. Each program runs under every order of threads.
+// support/fuzz.h describes the arguments.
 #include <cstdlib>
 
 #include "simt/simt_driver.h"

@@ -1,7 +1,7 @@
-// fuzz_ptx -- looks for random programs under random GPU schedules whose kernels LLVM's back end for NVPTX
-// does not translate: it ends the process, which is a finding here. Each is compiled for one of four chips;
-// of the share that --compile says (5), ptxas assembles the code, where it is installed. Arguments:
-// support/fuzz.h.
+// fuzz_ptx -- searches for random programs under random GPU schedules whose kernels LLVM's NVPTX back end cannot
+// translate. Such a kernel aborts the process, which counts as a finding here. Each program is compiled for one of four
+// chips. A share of them (--compile, 5 % by default) is also assembled by ptxas, if it is installed. support/fuzz.h
+// describes the arguments.
 #include <cstdio>
 
 #include "codegen/kernel_code.h"

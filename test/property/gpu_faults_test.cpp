@@ -1,9 +1,9 @@
 // The simulated device finds faults in kernels that a lowering with a bug would generate.
 //
-// Each test breaks a kernel: a barrier is removed, or narrowed from the block to a warp, arrays of shared memory
-// overlap, or a condition is dropped. Some faults are harmless, as a barrier between accesses that do not conflict. A
-// fault is real if some order of threads gives a different result; each real one is found in the first run that checks
-// for races, whatever its order is.
+// Each test breaks a kernel: it removes a barrier, narrows it from the block to a warp, overlaps arrays of shared
+// memory, or drops a condition. Some faults are harmless, such as a missing barrier between accesses that do not
+// conflict. A fault is real if some order of threads gives a different result. Each real fault must be found in the
+// first run that checks for races, in any order.
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
@@ -19,7 +19,7 @@
 namespace retrograde {
 namespace {
 
-// Before anything asks for a device.
+// Must be set before any code requests a device.
 [[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
 
 constexpr int width = 37, height = 21;
@@ -35,7 +35,7 @@ struct Made {
   Func out{"out"};
   Var x{"x"}, y{"y"}, xi{"xi"}, yi{"yi"}, u{"u"};
 
-  // Sizes of tiles come from the seed.
+  // The seed determines the tile sizes.
   explicit Made(int seed) {
     const int tile_x = 4 + seed * 3 % 13, tile_y = 2 + seed * 5 % 7;
     if (seed % 4 == 0) two_stages(tile_x, tile_y);
@@ -78,7 +78,7 @@ struct Made {
     line.compute_at(out, x).split(x, x, u, 3, TailStrategy::GuardWithIf).gpu_threads(u);
   }
 
-  // Each warp turns its own row around, then all of them the column.
+  // Each warp mirrors its own row; then all of them read the mirrored column.
   void in_warps(int tile_y) {
     constexpr int warp = 32;
     Func line("line"), turned("turned");
@@ -100,7 +100,7 @@ bool is_barrier(const Stmt& s, ir::Op op) {
   return call && ir::as_op(call->value, op);
 }
 
-// A condition on which iteration or thread it is.
+// Whether the statement tests the iteration or the thread.
 bool is_guard(const Stmt& s) {
   const auto* choice = s.as<ir::IfThenElse>();
   return choice && !choice->when_false.defined() &&
@@ -115,7 +115,7 @@ bool is_shared(const Stmt& s) {
   return n && n->memory == MemoryType::GPUShared && ir::as_const_int(n->offset).value_or(0) > 0;
 }
 
-// Puts the fault of this number in, counted over the function.
+// Inserts the fault with this number, counted over the function.
 class FaultMaker : public ir::Rewriter {
  public:
   explicit FaultMaker(int wanted) : wanted_(wanted) {}
@@ -198,7 +198,7 @@ Result run(const ir::LoweredFunction& function, int order, bool find_races = tru
   }
   in.device_deallocate();
   out.device_deallocate();
-  // A device that has failed is used again.
+  // A device remains usable after a failure.
   const auto* device = get_device_interface_for_device_api(DeviceAPI::CUDA);
   if (result.code != 0) device->device_release(nullptr, device);
   return result;

@@ -1,5 +1,5 @@
-// Random pipelines under random GPU schedules: kernels on the simulated device agree with the
-// interpreter in every order of threads, and race nowhere. test/property/fuzz_gpu.cpp goes on from here.
+// Tests random pipelines under random GPU schedules. Kernels on the simulated device must agree with the interpreter in
+// every order of threads, without races. test/property/fuzz_gpu.cpp runs further seeds.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

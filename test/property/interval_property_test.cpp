@@ -1,5 +1,5 @@
-// Random integer expressions over small boxes: every value that occurs lies in bounds_of, and a
-// condition holds wherever solve_for says so. The seed is printed with a failure.
+// Tests interval analysis on random integer expressions over small boxes: every value that occurs lies in bounds_of,
+// and a condition holds wherever solve_for claims it. A failure prints its seed.
 #include <gtest/gtest.h>
 
 #include <random>

@@ -1,5 +1,5 @@
-// Random loop nests, run before and after the passes over loops and memory: the same buffers, the
-// same prints. The seed of a failure is in its message.
+// Tests the passes over loops and memory on random loop nests: run before and after a pass, the nest must leave the
+// same buffers and print the same. A failure prints its seed.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ namespace {
 constexpr int width = 24, height = 6,
               margin = 40;  // of the image; the buffers have a margin on both sides
 
-// Programs whose iterations are independent, but for reductions.
+// Generates programs whose iterations are independent, except for reductions.
 class RandomProgram {
  public:
   explicit RandomProgram(unsigned seed) : random_(seed) {}
@@ -51,7 +51,7 @@ class RandomProgram {
     return types[number(0, 3)];
   }
 
-  // y outside; x inside, perhaps split into blocks with a guard or shifted inwards.
+  // Loops over y outside and x inside, the latter possibly split into blocks with a guard or shifted inwards.
   Stmt nest() {
     coordinates_.clear();
     Expr y = variable(name("y")), x = variable(name("x"));
@@ -84,7 +84,7 @@ class RandomProgram {
     return make_for(y_name, 0, number(1, height), y_type, loop);
   }
 
-  // Rows in storage of their own, updated by vectors whose last one is guarded, then copied out.
+  // Rows in a buffer of their own, updated by vectors with a guarded tail, then copied to the output.
   Stmt row_of_storage() {
     coordinates_.clear();
     const std::string row = name("row");
@@ -181,7 +181,7 @@ class RandomProgram {
     }
   }
 
-  // A reduction over blocks of lanes, whose sums may go through several loops.
+  // A reduction over blocks of lanes, whose sums may pass through several loops.
   Stmt summed_blocks(const Expr& y) {
     const Expr block = variable(name("block")), lane = variable(name("lane"));
     coordinates_.push_back(block);
@@ -199,7 +199,7 @@ class RandomProgram {
     return make_for(block.as<Variable>()->name, 0, extent, ForType::Serial, sum);
   }
 
-  // Storage of one iteration.
+  // A buffer that lives for one iteration.
   Stmt scratch(const Expr& x, const Expr& y) {
     std::string buffer = name("scratch");
     Expr k = variable(name("k"));
@@ -330,12 +330,12 @@ const std::vector<std::string> free_names = {"w", "x_min"};
 
 constexpr std::pair<int, int> inputs[] = {{17, 1}, {6, -2}, {width, 0}};  // w, x_min
 
-// A program and what passes make of it: often the same statement as before, which runs once.
+// A program and its versions after each pass. Often a version equals the previous statement, which then runs only once.
 class Comparison {
  public:
   Comparison(unsigned seed, const Stmt& program) : seed_(seed), program_(program) {}
 
-  // To be called first.
+  // Must be called first.
   void run_program() {
     for (const auto& [w, x_min] : inputs) {
       expected_.push_back(run(program_, w, x_min));
@@ -373,7 +373,7 @@ class Comparison {
   std::vector<Stmt> same_;         // computes the same
 };
 
-// Each buffer is stored to once, and not loaded from.
+// Whether each buffer is stored to once, and not loaded from.
 bool is_surely_independent(const For& loop) {
   std::map<std::string, int> stores;
   std::set<std::string> loads;

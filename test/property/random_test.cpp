@@ -1,10 +1,11 @@
 // Random pipelines under random schedules: machine code agrees with the interpreter.
 //
-// Bit for bit, except floats whose value depends on roundings that a compiler may move (contraction
-// to FMA, ULP of math functions): those within twice the error bound that the interpreter derives
-// for each element (testing/tracked_value.h). Seeds are fixed; test/property/fuzz.cpp goes on from
-// here with any others, and shrinks what fails. Three of four check their accesses; the fourth is as
-// users get it, in memory where an access beyond a block is a crash.
+// Results agree bit for bit, except floats that depend on roundings that a compiler may change (contraction to FMA, ULP
+// of math functions). These must be within twice the error bound that the interpreter derives for each element
+// (testing/tracked_value.h).
+//
+// Seeds are fixed; test/property/fuzz.cpp runs any others, and shrinks failing programs. Three of four programs check
+// their accesses. The fourth is compiled as for users, with buffers where an access beyond a block is a crash.
 #include <gtest/gtest.h>
 
 #include "ir/target.h"
@@ -22,10 +23,10 @@ constexpr int step = 1;  // 200 programs
 #else
 constexpr int step = 2;  // 100 programs: every second shard
 #endif
-constexpr double max_refused_fraction = 0.15;  // of one shard
+constexpr double max_refused_fraction = 0.15;  // the share of one shard's programs
 constexpr double max_unstable_fraction = 0.1;
 
-// The styles that are drawn, under the names that the fuzzer uses.
+// The random styles, under the names that the fuzzer uses.
 struct Kind {
   const char* name;
   Style style;

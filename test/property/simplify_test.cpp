@@ -1,5 +1,4 @@
-// Random expressions mean the same before and after simplification, for ordinary and for extreme
-// inputs.
+// Tests that random expressions keep their value under simplification, for ordinary and for extreme inputs.
 #include <gtest/gtest.h>
 
 #include "ir/print.h"
@@ -44,7 +43,7 @@ std::string shown(const std::map<std::string, Scalar>& values) {
   return result;
 }
 
-// Compares the two at random points; gives how many were compared (not skipped for overflow).
+// Compares the two at random points. Returns the number of comparisons, without those skipped for overflow.
 int compare_at_points(RandomIr& random, const Expr& before, const Expr& after, Inputs inputs,
                       int points) {
   int compared = 0;
@@ -54,8 +53,8 @@ int compare_at_points(RandomIr& random, const Expr& before, const Expr& after, I
     const test::Lanes expected = old_values(before);
     if (old_values.overflowed()) continue;
     const test::Lanes actual = new_values(after);
-    // Sums may be regrouped: only where a part is extreme may that overflow when the original does
-    // not.
+    // Simplification may regroup sums. A regrouped sum may overflow although the original does not, but only if a part
+    // is extreme.
     if (new_values.overflowed() && old_values.met_extreme()) continue;
     ++compared;
     EXPECT_EQ(expected.size(), actual.size());
@@ -117,7 +116,7 @@ TEST(SimplifyRandom, KeepsVectors) {
   check_random(UInt(8, 4), 4, 1300001, 1500, Inputs::Extreme);
 }
 
-// Both orders of minimum and maximum, moved, one-sided and empty ones.
+// Both orders of minimum and maximum, with offsets, one-sided, and with empty ranges.
 TEST(Simplify, DifferencesOfClampsKeepTheirValues) {
   std::vector<Expr> clamps;
   const Expr x = ir::variable("x");
@@ -143,7 +142,7 @@ TEST(Simplify, DifferencesOfClampsKeepTheirValues) {
   }
 }
 
-// Variables within given bounds, some of them symbolic: y in [x, x + 9].
+// Variables within specified bounds, some of them symbolic: y in [x, x + 9].
 TEST(SimplifyRandom, KeepsExpressionsWithinGivenBounds) {
   const Expr x = ir::variable("x");
   const simplification::BoundsMap bounds = {

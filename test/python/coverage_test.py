@@ -20,7 +20,7 @@ OPERATORS = {"+": "__add__", "-": "__sub__", "*": "__mul__", "/": "__truediv__",
              "!": "__invert__", "&&": "__and__", "||": "__or__", "()": "__call__", "[]": "__getitem__",
              "+=": "__add__", "-=": "__sub__", "*=": "__mul__", "/=": "__truediv__", "=": "__setitem__", "<=>": "__lt__"}
 WORDS = {"in": "in_", "lambda": "lambda_", "async": "async_", "pass": "pass_"}
-# Bases that Python does not show: where their members are.
+# Base classes that Python does not expose: the classes that have their members instead.
 BASES = {"LoopDirectives": ["Func", "Stage"], "Runnable": ["Func", "Pipeline"], "OutputImageParam": ["OutputImageParam"]}
 FREE = ["", "BoundaryConditions"]  # where functions may be
 

@@ -27,7 +27,7 @@ def free_port():
 
 def train(processes, *options):
     with tempfile.TemporaryDirectory() as folder:
-        # torchrun of PyTorch 1.13 does not start with Python 3.11 unless it is told where output goes.
+        # torchrun of PyTorch 1.13 needs an explicit destination for output to start under Python 3.11.
         subprocess.run([sys.executable, "-B", "-m", "torch.distributed.run", "--nproc_per_node", str(processes),
                         "--master_addr", "127.0.0.1", "--master_port", str(free_port()), "--redirects", "1", "--tee", "1",
                         PROGRAM, "--steps", "2", "--size", "64", "--batch", "4", "--output", folder, *options],

@@ -141,7 +141,7 @@ class Modules(unittest.TestCase):
         image, f, xo, xi = rg.ImageParam("float32", 1, "image"), rg.Func("f"), rg.Var("xo"), rg.Var("xi")
         f[x] = image[x] + 1
         f.gpu_tile(x, xo, xi, 16)
-        # Kernels for the simulated device, which the module finds at run time.
+        # Kernels for the simulated device, whose library the module finds at run time.
         library = os.path.join(os.environ["RETROGRADE_BUILD_DIR"], "libretrograde_simt.so")
         os.environ.update(RETROGRADE_GPU="simulated", RETROGRADE_SIMT_LIBRARY=library)
         module = built("kernels", write(f, [image], "on_device", rg.Target.Feature.CUDA),

@@ -13,8 +13,8 @@ def off_grid(t, cells):
     return (at.floor() + (at - at.floor()) * 0.8 + 0.1) / cells
 
 
-# The sizes of the operators' tensors, names where they are free; and those of which an element is read in any case: by
-# what looks up a place, and at the edge of an image, so that they are not 0.
+# SHAPES: the sizes of the operators' tensors, with names for free sizes. READ: the names of sizes that cannot be 0,
+# because an element is read in any case: by a gather, or at the edge of an image.
 SHAPES = {
     "bilateral_slice": [(3, "H", "W"), ("H", "W"), (3, 4, "levels", "cells", "columns")],
     "flow_warp": [("C", "H", "W"), (2, "H", "W")],

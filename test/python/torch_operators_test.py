@@ -76,7 +76,7 @@ class Sizes(unittest.TestCase):
 
     def cases(self):
         for sizes in sizes_of(NAME):
-            # Code for all sizes has reduction domains of one element at least, which begin at 1.
+            # Code for all sizes has reduction domains of at least one element, which begin at 1.
             has_domains = NAME != "recursive_filter" or 1 not in sizes.values()
             if has_domains:
                 yield OF_ANY_SIZES, sizes

@@ -83,7 +83,7 @@ std::vector<std::vector<float>> cases(int n) {
   }
   std::mt19937 random(7);
   auto pick = [&](const std::vector<float>& from) { return from[random() % from.size()]; };
-  // All of them anything; one of them anything and the others ordinary; all the same.
+  // Three kinds of cases: all numbers extreme; one extreme and the others ordinary; all numbers equal.
   for (int c = 0; c < 1500; ++c) {
     std::vector<float> x;
     const float same = pick(all);

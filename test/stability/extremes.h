@@ -1,4 +1,4 @@
-// The inputs of the suite: every pair, or many random sets, of ordinary and of extreme numbers.
+// Generates the inputs of the stability suite: every pair, or many random sets, of ordinary and extreme numbers.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Measures the adjoint of a problem, in float32 and as machine code, against its true gradient.
+// Measures the error of a problem's adjoint, in float32 and as machine code, against its true gradient.
 #pragma once
 
 #include <array>
@@ -9,15 +9,16 @@
 
 namespace retrograde::stability {
 
-// Cases whose true gradient is finite in float32.
+// A cell of the result table: the cases whose true gradient is finite in float32.
 struct Cell {
   int cases = 0;
-  int lost = 0;            // came out infinite or NaN
-  double worst_error = 0;  // of the others, relative to the case's largest derivative
+  int lost = 0;  // came out infinite or NaN
+  double worst_error =
+      0;  // the worst error of the other cases, relative to their largest derivative
   std::string lost_at, worst_at;
 };
 struct Row {
-  std::array<Cell, extreme_count> cells;  // by the case's most extreme number
+  std::array<Cell, extreme_count> cells;  // indexed by the most extreme number of a case
   Cell left;  // the program's values or adjoints leave float32 (traced.h), whatever the numbers
 };
 

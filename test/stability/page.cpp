@@ -28,7 +28,7 @@ Bounds are powers of ten, at least twice the measured error. `test/stability/sta
 
 constexpr double smallest_bound = 1e-6, no_digit = 1;
 
-// The power of ten that is at least twice the error.
+// The smallest power of ten that is at least twice the error.
 double bound_of(double error) {
   if (2 * error <= smallest_bound) return smallest_bound;
   return std::pow(10.0, std::ceil(std::log10(2 * error) - 1e-9));
@@ -76,7 +76,7 @@ std::vector<std::string> split(const std::string& text, const std::string& by) {
   return result;
 }
 
-// A figure of the page, and one measured: the bound holds, and is not a thousand times too large.
+// Compares a number of the page with a measured one: the bound must hold, and must not be a thousand times too large.
 bool agree(const std::string& stated, double error) {
   const double bound = bound_of_text(stated);
   if (!(error <= bound)) return false;

@@ -1,4 +1,4 @@
-// docs/stability.md: the suite's errors as bounds that hold on every machine.
+// Writes and checks docs/stability.md, which states the suite's errors as bounds that hold on every machine.
 #pragma once
 
 #include <functional>
@@ -9,9 +9,9 @@
 namespace retrograde::stability {
 
 std::string render(const std::function<Row(const Problem&)>& measured);
-// The page with the figures of its rows left out.
+// The page without the numbers in its rows.
 std::string without_figures(const std::string& page);
-// Empty when the page's row for the program says what was measured: bounds hold and are not slack.
+// Returns an empty string if the page's row for the program agrees with the measurement: bounds hold and are not slack.
 std::string disagreement_with(const std::string& page, const std::string& program, const Row& row);
 
 }  // namespace retrograde::stability

@@ -1,11 +1,10 @@
 // The stability suite: small programs on extreme inputs, with their true gradients.
 //
-// A problem is a function of n numbers to one, over a batch: inputs(i, c) is the i-th number of
-// case c, and the program's output is f(c). One adjoint, seeded with ones, is therefore the
-// gradients of all cases, and one compiled program sees hundreds of combinations of extremes.
+// A problem is a function of n numbers to one, over a batch: inputs(i, c) is the i-th number of case c, and the
+// program's output is f(c). One adjoint, seeded with ones, therefore contains the gradients of all cases, and one
+// compiled program covers hundreds of combinations of extremes.
 //
-// The true gradient comes from Traced numbers or, where these overflow or cancel too, from a
-// formula.
+// The true gradient comes from Traced numbers, or from a formula if these overflow or cancel too.
 #pragma once
 
 #include <functional>
@@ -53,7 +52,8 @@ inline Real logistic(Real x) {
   return x >= 0 ? 1 / (1 + std::exp(-x)) : std::exp(x) / (1 + std::exp(x));
 }
 
-// f is generic: of a vector of Exprs it makes the program, of Traced numbers the oracle.
+// A pointwise problem of a generic f: called with a vector of Exprs, f makes the program; called with Traced numbers,
+// the oracle.
 template <class F>
 Problem pointwise(const std::string& name, int n, F f, const ExactGradient& exact = {}) {
   auto build = [f, n](const Buffer<float>& inputs) {

@@ -1,5 +1,5 @@
-// Activations and losses as people write them, by exponentials and roots, where the true derivative
-// is finite nearly everywhere.
+// Problems of the stability suite: activations and losses as users write them, with exponentials and roots. The true
+// derivative is finite nearly everywhere.
 #include "stability/problems.h"
 
 namespace retrograde::stability {

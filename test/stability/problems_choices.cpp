@@ -1,4 +1,4 @@
-// Selections whose other branch is NaN or infinite, saturated clamps, interpolation.
+// Problems of the stability suite: selections whose other branch is NaN or infinite, saturated clamps, interpolation.
 #include "stability/problems.h"
 
 namespace retrograde::stability {

@@ -1,5 +1,5 @@
-// Reductions and recurrences: what happens to extremes on their way through sums, products,
-// histograms and scans, stiff and chaotic ones too.
+// Problems of the stability suite: reductions and recurrences that carry extremes through sums, products, histograms
+// and scans, including stiff and chaotic ones.
 #include "frontend/language/inline_reductions.h"
 #include "stability/problems.h"
 
@@ -91,7 +91,7 @@ Func product(const Buffer<float>& in) {
   f(c) *= in(r, c);
   return f;
 }
-// Products of the others: no quotient by a zero.
+// Takes products of the other numbers, to avoid a quotient by zero.
 Reals product_gradient(const Reals& x) {
   Reals result(x.size(), 1);
   for (size_t i = 0; i < x.size(); ++i) {
@@ -129,7 +129,7 @@ Func variance_in_two_passes(const Buffer<float>& in) {
   f(c) += (in(q, c) - mean(c)) * (in(q, c) - mean(c)) * (1.0f / n);
   return f;
 }
-// 2 (x_i - mean) / n: what both are the derivative of.
+// 2 (x_i - mean) / n: the derivative of both formulas.
 Reals variance_gradient(const Reals& x) {
   Real mean = 0;
   for (Real v : x) mean += v / static_cast<Real>(x.size());
@@ -139,7 +139,7 @@ Reals variance_gradient(const Reals& x) {
 }
 
 Expr bin_of(const Expr& v) { return cast<int>(clamp(v, 0.0f, 3.0f)); }
-// Weights |v| collected in four bins by v; the root of each bin, summed. An empty bin is at a pole.
+// Weights |v| are collected in four bins by v, and the roots of the bins are summed. An empty bin is at a pole.
 Func roots_of_histogram(const Buffer<float>& in) {
   Var c("c"), b("b");
   RDom r(0, n), q(0, 4);
@@ -161,7 +161,7 @@ Traced roots_of_histogram_of(const Numbers& x) {
   return sum;
 }
 
-// y = step(y, a), `steps` times from the first number; a is the last number.
+// Iterates y = step(y, a) `steps` times from the first number; a is the last number.
 template <class F>
 Problem iterated(const std::string& name, int numbers, int steps, F step) {
   auto build = [steps, step, numbers](const Buffer<float>& in) {
@@ -181,7 +181,7 @@ Problem iterated(const std::string& name, int numbers, int steps, F step) {
   return {name, numbers, build, value, {}};
 }
 
-// A recursive filter with a pole near 1, over the numbers of a case in turn.
+// A recursive filter with a pole near 1, over the numbers of a case in order.
 Func leaky_sum(const Buffer<float>& in) {
   Var c("c"), t("t");
   RDom r(1, n - 1);

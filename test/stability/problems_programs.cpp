@@ -1,4 +1,5 @@
-// Programs as people write them: losses, normalisations, colour, means.
+// Problems of the stability suite: complete formulas as users write them, such as losses, normalisations, colour,
+// means.
 #include <algorithm>
 
 #include "stability/problems.h"

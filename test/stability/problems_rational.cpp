@@ -1,5 +1,5 @@
-// Quotients and powers, angles, ill-conditioned systems: poles, cancellation, overflow of
-// intermediate values.
+// Problems of the stability suite: quotients, powers, angles and ill-conditioned systems, with poles, cancellation and
+// overflow of intermediate values.
 #include "stability/problems.h"
 
 namespace retrograde::stability {

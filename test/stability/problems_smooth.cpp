@@ -1,4 +1,5 @@
-// Norms, exponentials and their kin: where naive partials overflow, underflow or cancel.
+// Problems of the stability suite: norms, exponentials and similar functions, whose naive partials overflow, underflow
+// or cancel.
 #include <algorithm>
 
 #include "stability/problems.h"

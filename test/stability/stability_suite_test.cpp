@@ -1,10 +1,9 @@
-// Every program of the suite on every input: the gradient that comes out of the compiler in float32
-// is finite where the true one is, and its errors are those that docs/stability.md states. The
-// oracle is described in problems.h and traced.h.
+// Runs every program of the stability suite on every input. The compiler's float32 gradient must be finite wherever the
+// true one is, and its errors must be those that docs/stability.md states. problems.h and traced.h describe the oracle.
 //
-// The page is written here: RETROGRADE_UPDATE_GOLDEN=1 measures and writes it; read the difference
-// before you commit it. Its bounds are powers of ten, so that they hold on every machine; a bound
-// that is far from what is measured fails like one that does not hold.
+// This test also writes the page: run it with RETROGRADE_UPDATE_GOLDEN=1, and read the difference before you commit it.
+// Its bounds are powers of ten, so that they hold on every machine. A bound that is far from the measured error fails
+// like one that does not hold.
 #include <gtest/gtest.h>
 
 #include <cctype>
@@ -24,9 +23,8 @@ std::string on_disk() {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// Where a = 1e-30: 1 - b * second is what rounding left of a cancellation, and it is divided by a
-// twice, beyond float32. The exact value of the difference is small, not lost, so these cases do
-// not count as outside.
+// For a = 1e-30, 1 - b * second is only the rounding error of a cancellation. The program divides it by a twice, beyond
+// float32. The exact difference is small, not lost, so these cases do not count as outside.
 const std::string rounding_noise = "2 x 2 system by elimination";
 
 class Suite : public ::testing::TestWithParam<size_t> {};
@@ -60,7 +58,7 @@ TEST(StabilityPage, HasTheProgramsOfTheSuite) {
   if (std::getenv("RETROGRADE_UPDATE_GOLDEN")) {
     std::ofstream(path) << render([](const Problem& p) { return measure(p); });
   }
-  // Everything but what was measured: a row's cells after the program.
+  // Compares the pages without the measured numbers, which are the cells of a row after the program.
   EXPECT_EQ(without_figures(on_disk()),
             without_figures(render([](const Problem&) { return Row(); })));
 }

@@ -1,15 +1,13 @@
-// Numbers that remember how they were made: the oracle for gradients of small programs, which
-// shares nothing with the compiler.
+// Numbers that record their computation: an oracle for gradients of small programs that shares no code with the
+// compiler.
 //
-// A Traced number has two values: `exact`, with 64 bits of precision and exponents up to 4932, and
-// `own`, what float32 makes of it, which decides branches. Operations write themselves with their
-// exact partials on the Tape of their inputs; Tape::differentiate walks it backwards. An adjoint of
-// exactly 0 stays 0 whatever it meets.
+// A Traced number has two values: `exact`, with 64 bits of precision and exponents up to 4932, and `own`, the value in
+// float32, which decides branches. Operations record themselves with their exact partials on the Tape of their inputs;
+// Tape::differentiate walks it backwards. An adjoint of exactly 0 stays 0, whatever it is multiplied by.
 //
-// A number `has_left` float32 where its own value is not finite, or has no digit of the exact one;
-// a gradient, where a number on its path has, or where the exact adjoint of one, or a contribution
-// to it, is beyond float32's largest number or below its smallest. What runs in float32 and goes
-// through these numbers cannot be expected to be right there.
+// A number `has_left` float32 if its own value is not finite, or has no digit of the exact one. A gradient has left
+// float32 if a number on its path has, or if the exact adjoint of such a number, or a contribution to it, is beyond
+// float32's largest number or below its smallest. A float32 program cannot be expected to be right in these cases.
 #pragma once
 
 #include <cmath>
@@ -52,7 +50,7 @@ class Tape {
   }
 
   struct Gradient {
-    Reals adjoints;  // of the inputs
+    Reals adjoints;  // the adjoints of the inputs
     bool has_left = false;
   };
   Gradient differentiate(const Traced& output, size_t inputs) const {
@@ -132,7 +130,7 @@ inline bool operator==(const Traced& a, const Traced& b) { return a.own == b.own
 inline bool operator!=(const Traced& a, const Traced& b) { return a.own != b.own; }
 
 inline Traced select(bool c, const Traced& a, const Traced& b) { return c ? a : b; }
-// As the language: the second operand at a tie and where one is NaN.
+// As in the language, max returns the second operand at a tie or if one is NaN.
 inline Traced max(const Traced& a, const Traced& b) { return a > b ? a : b; }
 inline Traced min(const Traced& a, const Traced& b) { return a < b ? a : b; }
 inline Traced clamp(const Traced& a, const Traced& low, const Traced& high) {
@@ -140,7 +138,7 @@ inline Traced clamp(const Traced& a, const Traced& low, const Traced& high) {
 }
 inline bool is_finite(const Traced& a) { return std::isfinite(a.own); }
 
-// One operand x and the exact value v.
+// Defines a function of one operand x, with the exact value v.
 #define RETROGRADE_TRACED(name, partial)                    \
   inline Traced name(const Traced& a) {                     \
     const Real x = a.exact;                                 \
@@ -175,7 +173,7 @@ inline Traced atan2(const Traced& y, const Traced& x) {
   return tracing::binary(y, x, std::atan2(y.exact, x.exact), std::atan2(y.own, x.own),
                          r == 0 ? 0 : x.exact / r, r == 0 ? 0 : -y.exact / r);
 }
-// The partial by the exponent: 0 at a base of 0, where the value stays 0 nearby.
+// The partial by the exponent is 0 at a base of 0, because the value stays 0 nearby.
 inline Traced pow(const Traced& a, const Traced& p) {
   const Real v = std::pow(a.exact, p.exact);
   return tracing::binary(a, p, v, std::pow(a.own, p.own),

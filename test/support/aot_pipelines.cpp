@@ -94,7 +94,7 @@ void write_tuple() {
   write(out, {in}, "aot_tuple", target);
 }
 
-// A table in the code, and the same table from the caller.
+// The same table twice: embedded in the code, and passed by the caller.
 void write_table() {
   Buffer<float> table({4, 3}, "table");
   for (int y = 0; y < 3; y++) {
@@ -108,7 +108,7 @@ void write_table() {
   write(out, {table}, "aot_table_given", target);
 }
 
-// Vector math: a library's, or lane by lane.
+// Vector math, by a vector library or lane by lane.
 void write_math() {
   ImageParam in(Float(32), 1, "in");
   Var x("x");
@@ -118,7 +118,7 @@ void write_math() {
   write(out, {in}, "aot_math", target);
 }
 
-// Which variant ran can be seen in the result.
+// The result shows which variant ran.
 void write_variants() {
   std::vector<Target> targets = {target};
   if (target.arch == Target::X86) {
@@ -140,7 +140,7 @@ void write_variants() {
                       targets, {}, make);
 }
 
-// Reports what its caller can hear of: prints and requirements.
+// Uses everything that reports to the caller: prints and requirements.
 void write_talker() {
   Param<int> limit("limit");
   Var x("x");
@@ -149,7 +149,7 @@ void write_talker() {
   write(out, {limit}, "aot_talker", target);
 }
 
-// What the runtime does besides: traces, remembered results, two stages at once.
+// Uses other services of the runtime: traces, memoised results, two stages at once.
 void write_services() {
   Param<int> start("start");
   Var x("x");

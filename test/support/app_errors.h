@@ -1,5 +1,5 @@
-// app_errors.h -- an app run on bad input: it says one line in four parts, ends with status 1, and leaves
-// no result behind.
+// app_errors.h -- runs an app on bad input. It must print an error of one line in four parts, exit with status 1, and
+// leave no result behind.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ class AppErrors : public testing::Test {
     message_ = contents(folder_ / "stderr");
   }
 
-  // The last line of standard error is the message; before it there may be lines of progress.
+  // The last line of standard error is the message; lines of progress may precede it.
   void expect_refused(const std::vector<std::string>& parts, bool after_progress = false) {
     EXPECT_EQ(status_, 1) << message_;
     ASSERT_FALSE(message_.empty());
@@ -62,7 +62,7 @@ class AppErrors : public testing::Test {
     }
   }
 
-  // Runs it with these words: it refuses them so, and leaves no results.
+  // Runs the app with these arguments: it must refuse them with this message, and leave no results.
   void refused(const std::vector<std::string>& words, const std::vector<std::string>& parts) {
     std::string line;
     for (const std::string& word : words) line += " '" + word + "'";
@@ -78,7 +78,7 @@ class AppErrors : public testing::Test {
     refused(words, parts);
   }
 
-  // A picture of noise, which no compression makes small.
+  // A picture of noise, which compresses badly.
   std::filesystem::path write_noise(const std::string& name, int width, int height,
                                     int channels = 3) {
     apps::Image image{width, height, 8, {}, channels};
@@ -92,7 +92,7 @@ class AppErrors : public testing::Test {
     return folder_ / name;
   }
 
-  // What every app says to files that are no whole pictures.
+  // Checks the error of every app for files that are damaged pictures.
   void expect_refuses_damaged_pictures() {
     refused_input(folder_ / "nowhere.png", {"nowhere.png", "must be an image file"});
     std::ofstream(folder_ / "text.png") << "this is no picture";

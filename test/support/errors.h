@@ -11,8 +11,8 @@
 
 namespace retrograde {
 
-// The message of the Kind that `action` throws, which has all four parts when it is about a program;
-// what else it throws goes on.
+// Returns the message of the Kind that `action` throws; errors about a program must have all four parts. Other
+// exceptions propagate.
 template <class Kind = CompileError, class Action>
 std::string error_of(Action&& action) {
   try {

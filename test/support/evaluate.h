@@ -27,7 +27,7 @@ class LaneEvaluator {
 
  protected:
   virtual Lanes load(const ir::Load& n) = 0;
-  // The value of one lane of a call to anything but an operator.
+  // The value of one lane of a call to a function that is not an operator.
   virtual ir::Scalar other_call(const ir::Call& n, const Lanes& args) = 0;
   virtual ir::Scalar operate(ir::Kind kind, const ir::Scalar& a, const ir::Scalar& b) {
     return ir::eval_binary(kind, a, b);
@@ -155,7 +155,7 @@ class LaneEvaluator {
   }
 };
 
-// The value of a pure expression. Loads and calls return made-up values that depend on their indices alone.
+// The value of a pure expression. Loads and calls return arbitrary values that depend on their indices alone.
 class Evaluator : public LaneEvaluator {
  public:
   explicit Evaluator(const std::map<std::string, ir::Scalar>& variables) {
@@ -173,8 +173,7 @@ class Evaluator : public LaneEvaluator {
     }
     return found->second.second;
   }
-  // Whether an operation on int32 or int64 left its type's range: then the language promises
-  // nothing.
+  // Whether an operation on int32 or int64 overflowed, in which case the language defines no result.
   bool overflowed() const { return overflowed_; }
   // Whether an int32 or int64 beyond half of its type's range occurred.
   bool met_extreme() const { return met_extreme_; }
@@ -221,7 +220,7 @@ class Evaluator : public LaneEvaluator {
   bool overflowed_ = false, met_extreme_ = false;
 };
 
-// Bit for bit, except that one NaN is as good as another.
+// Compares bit by bit, except that all NaNs are equal.
 inline bool same_value(const ir::Scalar& a, const ir::Scalar& b) {
   if (a.type != b.type) return false;
   if (!a.type.is_float()) return a.u == b.u;

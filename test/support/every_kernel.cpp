@@ -34,10 +34,10 @@ const Kind all_kinds[] = {
 #include "ir/kinds.def"
 };
 
-// How kernels have it.
+// Whether kernels support a kind or operator.
 enum class In { Kernels, HostsAlone, NoCode };
 
-// The body of one kernel: stores at places of their own.
+// The body of one kernel, which stores each value at an index of its own.
 class Kernel {
  public:
   Kernel(std::string name, int lanes, const std::vector<Type>& types)
@@ -45,12 +45,12 @@ class Kernel {
 
   In add(Kind kind);
   In add(Op op);
-  // Undefined: nothing is stored.
+  // Undefined: the kernel stores nothing.
   Stmt launch() const {
     if (stores_.empty()) return {};
     return make_launch(name_, {1, 1, 1}, {32, 1, 1}, most_shared_bytes, make_block(stores_));
   }
-  // Only a host may have it.
+  // Adds a kind that only a host supports.
   void add_of_host(Kind kind);
   void add_of_host(Op op);
 
@@ -65,7 +65,7 @@ class Kernel {
   }
 
   Expr thread() const { return variable(thread_index(name_, 0)); }
-  // Elements of this thread's own, the nth of them.
+  // The index of the n-th element that belongs to this thread.
   Expr place(int n, int lanes) const {
     const Expr base = (thread() + 32 * n) * lanes;
     return lanes == 1 ? base : make_ramp(base, 1, lanes);
@@ -105,7 +105,7 @@ Type unsigned_form(Type type) { return type.is_int() ? type.with_code(TypeCode::
 // ---- kinds of nodes ----
 
 void Kernel::add_loads() {
-  store_all(types(), [&](Type t) {  // of places that data say
+  store_all(types(), [&](Type t) {  // data-dependent indices
     return make_load(wide(t), memory("in", t), operand(Int(32)));
   });
   store_all(types(), [&](Type t) {  // strided
@@ -218,7 +218,7 @@ void Kernel::statement(Kind kind) {
 }
 
 In Kernel::add(Kind kind) {
-  // No default: a kind that is added is one that a compiler warns of here.
+  // There is no default case, so that a compiler warns about a kind that is added.
   switch (kind) {
     case Kind::IntImm:
     case Kind::UIntImm:
@@ -326,8 +326,8 @@ In Kernel::add(Kind kind) {
     case Kind::Assert:
       return In::HostsAlone;
     case Kind::StringImm:  // parts of what is printed
-    case Kind::Call:       // by their operators
-    case Kind::Free:       // of what a host allocated
+    case Kind::Call:       // covered by their operators
+    case Kind::Free:       // frees memory that a host allocated
     case Kind::Provide:    // before storage is flat
     case Kind::Realize:
     case Kind::Prefetch:
@@ -348,7 +348,7 @@ void Kernel::functions_of_floats(Op op) {
   });
 }
 
-// An operator that is not named here is a function of floats.
+// Operators without a case of their own are functions of floats.
 In Kernel::add(Op op) {
   const std::vector<Type> with_bool = joined(integer_types, {Bool()});
   const Expr buffer = variable("in_float32.buffer", Handle());
@@ -476,7 +476,7 @@ In Kernel::add(Op op) {
   }
 }
 
-// ---- what only a host can do ----
+// ---- operations that only a host supports ----
 
 void Kernel::add_of_host(Op op) {
   const Expr value = make_load(Float(32), "in_float32", thread()), condition = thread() < 3;
@@ -524,7 +524,7 @@ LoweredFunction with_arguments(const std::string& name, Stmt body) {
   return function;
 }
 
-// Calls `visit` with the name of each kind and operator and how kernels have it.
+// Calls `visit` with the name of each kind and operator, and whether kernels support it.
 template <typename Visit>
 void for_each_one(int lanes, const std::vector<Type>& types, const Visit& visit) {
   const auto add = [&](const char* name, auto one) {

@@ -9,18 +9,18 @@
 
 namespace retrograde::every_kernel {
 
-// Numbers and truth values.
+// All number types and bool.
 const std::vector<Type>& types();
 
-// A function with a kernel for each kind of node and each operator that devices have, named after it, which
-// stores its values in every type that it takes, in vectors of `lanes` lanes. `types`: those that may occur.
+// A function with one kernel, named after it, for each kind of node and each operator that devices have. The kernel
+// stores its values in every type that it takes, in vectors of `lanes` lanes. `types`: the types that may occur.
 ir::LoweredFunction of_everything(int lanes, const std::vector<Type>& types);
 
 // Operations that only a host supports: a function with a kernel that uses it, named after the operator or the node
 // kind.
 std::vector<ir::LoweredFunction> of_hosts_alone();
 
-// Kinds and operators of the lists that are in neither.
+// The kinds and operators that are in neither list.
 std::vector<std::string> left_out();
 
 }  // namespace retrograde::every_kernel

@@ -1,4 +1,4 @@
-// Expects that ptxas, where it is installed, accepts PTX.
+// Expects that ptxas, if it is installed, accepts PTX.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 
 namespace retrograde {
 
-// Says what it skips where there is no ptxas.
+// Prints a note about the skipped check if there is no ptxas.
 inline void expect_ptxas_takes(const std::string& ptx, const std::string& chip) {
   static int skipped = 0;
   if (!has_ptxas()) {

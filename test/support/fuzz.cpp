@@ -16,14 +16,14 @@ namespace {
 constexpr size_t most_reasons = 12;
 constexpr double seconds_between_lines = 30;
 
-// All of the text, from its first digit on.
+// Parses all of the text as a number, without leading spaces.
 template <typename T>
 bool is_number(const std::string& text, T& value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   return error == std::errc() && end == text.data() + text.size();
 }
 
-// Between quotes and of digits nothing is left.
+// Removes names in quotes and digits, so that messages about different programs are equal.
 std::string without_names(const std::string& message) {
   std::string result;
   bool quoted = false;
@@ -34,7 +34,7 @@ std::string without_names(const std::string& message) {
   return result;
 }
 
-// "cannot do A: the rule B; the evidence C. Do D": what stands between ": " and "; ".
+// Messages have the form "cannot do A: the rule B; the evidence C. Do D"; this returns the text between ": " and "; ".
 std::string reason_of(const std::string& message) {
   const std::string plain = without_names(message);
   const bool is_compiled = plain.find("no machine code") != std::string::npos;
@@ -55,7 +55,7 @@ class Fuzzing {
  public:
   explicit Fuzzing(Fuzzer fuzzer) : fuzzer_(std::move(fuzzer)) {}
 
-  // Its index; 0: all are good.
+  // Returns the index of the first bad argument; 0: all are good.
   int read(int argc, char** argv) {
     for (int i = 1; i < argc; ++i) {
       const std::string name = argv[i];
@@ -83,7 +83,7 @@ class Fuzzing {
     const bool is_many = tried_ >= 50;
     const bool refuses = is_many && judgements_[Judgement::Refused] > fuzzer_.most_refused * legal;
     const bool is_slow = is_many && slow_ > fuzzer_.most_slow * tried_;
-    // Nobody takes a run of nothing for a clean one.
+    // A run that tried nothing must not look like a clean one.
     if (tried_ == 0) std::puts("no program was tried: nothing is known");
     if (refuses) std::puts("too many are refused: the generator or a check is wrong");
     if (is_slow) std::puts("too many are slow: the generator or the compiler is wrong");
@@ -133,7 +133,7 @@ class Fuzzing {
     }
   }
 
-  // Counts come back as words before the detail.
+  // The process sends the counts as words before the detail.
   Outcome judge(Choices choices, bool machine_code) const {
     Outcome result;
     result.apart = run_apart(fuzzer_.limits, [&](std::string& detail) {
@@ -166,14 +166,14 @@ class Fuzzing {
     if (result.apart.is_crash()) return result.apart.crash();
     return text("is ", name_of(result.judged.judgement), ": ", result.judged.detail);
   }
-  // Findings of one kind: how their messages begin.
+  // The kind of a finding: the beginning of its message.
   std::string kind_of(const Outcome& result) const {
     if (is_wanted(result)) return want_;
     return text(result.apart.is_slow() ? -1 : result.apart.signal, " ", result.apart.code, " ",
                 without_names(result.judged.detail).substr(0, 18));
   }
 
-  // Those that making the program takes.
+  // The choices that generating the program consumes.
   std::vector<uint32_t> taken_by(Choices choices) const {
     text_of(choices);
     return choices.taken();
@@ -233,7 +233,7 @@ class Fuzzing {
     std::fflush(stdout);
   }
 
-  // One line of counts, then one for each reason of refusals, the most frequent first.
+  // Prints one line of counts, then one for each reason of refusals, the most frequent first.
   void print_summary(double seconds) const {
     std::string line = text(tried_, " programs, ", found_, " findings");
     for (const auto& [judgement, n] : judgements_) line += text(", ", n, " ", name_of(judgement));

@@ -26,12 +26,13 @@ struct Fuzzer {
   std::function<Judged(Choices& choices, bool machine_code)> judge;
   std::function<std::string(Choices& choices)> text;
   ApartLimits limits = {};
-  double most_refused = 0.1;  // of the legal ones; then little is tested
-  double most_slow = 0;       // of all; up to that, one that takes too long is no finding
+  double most_refused =
+      0.1;  // largest share of legal programs that may be refused; beyond it, too little is tested
+  double most_slow = 0;  // largest share of programs that may time out without being a finding
   unsigned compile = 100;
-  // Takes another argument and its value.
+  // Handles an additional argument and its value.
   std::function<bool(const std::string& name, const std::string& value)> take = {};
-  // A program that is not meant: it is not counted.
+  // Programs that the options exclude are not counted.
   std::function<bool(Choices& choices)> passes_over = {};
 };
 

@@ -1,4 +1,4 @@
-// The reference for the function of gpu_generator.cpp, in plain C++; sums of integers, which are exact.
+// The reference for the function of gpu_generator.cpp, in plain C++. It sums integers, so results are exact.
 #pragma once
 
 #include <HalideBuffer.h>
@@ -25,7 +25,7 @@ inline float expected(const Buffer<float, 2>& in, float gain, int x, int y) {
   return result;
 }
 
-// Of elements that are on the host.
+// Checks elements that are on the host.
 inline void expect_filtered(const Buffer<float, 2>& in, float gain, const Buffer<float, 2>& out) {
   for (int y = 0; y < out.height(); y++) {
     for (int x = 0; x < out.width(); x++)

@@ -12,7 +12,7 @@ namespace gpu_kernels {
 
 using Thread = retrograde_simt_thread;
 
-// ---- what a kernel does ----
+// ---- operations inside of kernels ----
 
 template <typename T>
 T load(Thread* t, const T* from, int32_t site, int32_t space = retrograde_simt_global) {
@@ -120,7 +120,7 @@ class Image {
   Image(const Image&) = delete;
   const char* source() const { return reinterpret_cast<const char*>(&image_); }
   static constexpr int bytes = sizeof(retrograde_gpu_image);
-  // For devices; the text lives as long as the image.
+  // The kernel's text for devices; it lives as long as the image.
   void set_ptx(const char* text) {
     image_.ptx = text;
     image_.ptx_bytes = std::char_traits<char>::length(text);

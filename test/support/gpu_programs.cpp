@@ -24,8 +24,8 @@ Func tiled(Func f, bool on_gpu, int width = 16, int height = 8) {
 
 // ---- from linear algebra ----
 
-// A block's part of both in shared memory, 16 products at a time; each thread has a square of sums in
-// registers, 16 apart, so that threads beside each other read words beside each other.
+// Each block stages its tile of both matrices in shared memory, 16 products at a time. Each thread keeps a square of
+// sums in registers, 16 apart, so that neighbouring threads read neighbouring words.
 Func matrix_product(bool on_gpu, int scale) {
   const int n = 64 * scale, threads = 16, each = scale == 1 ? 4 : 8, steps = 16;
   const Buffer<float> a = picture(n, n), b = picture(n, n);
@@ -193,13 +193,13 @@ Func bilateral_grid(bool on_gpu, int scale) {
            zf * along_y(x / cell, y / cell, zi + 1, channel);
   };
   out(x, y) = sliced(0) / max(sliced(1), 1e-3f);
-  grid.compute_root();  // which each of its readers would make anew
+  grid.compute_root();  // otherwise each of its consumers would recompute it
   for (const Func& f : {grid, along_z, along_x, along_y, out}) tiled(f, on_gpu, 8, 8);
   if (on_gpu) grid.update().gpu_tile(x, y, xi, yi, 4, 4, TailStrategy::GuardWithIf);
   return out;
 }
 
-// A raw picture to colours: faulty points, the colours between, a matrix, a curve.
+// From a raw sensor image to colours: hot pixels, demosaicing, a colour matrix, a tone curve.
 Func camera_pipe(bool on_gpu, int scale) {
   Buffer<uint16_t> raw(72 * scale, 52 * scale);
   raw.for_each_element([&](int i, int j) {
@@ -245,7 +245,7 @@ Func camera_pipe(bool on_gpu, int scale) {
   return out;
 }
 
-// A step of learning a filter: its weights, less a part of the gradient of the loss.
+// A training step of a filter: its weights minus a fraction of the gradient of the loss.
 Func training_step(bool on_gpu, int scale) {
   const int width = 64 * scale, height = 32 * scale;
   const Buffer<float> in = picture(width + 2, height + 2), wanted = picture(width, height),
@@ -261,7 +261,7 @@ Func training_step(bool on_gpu, int scale) {
   const Derivative d = propagate_adjoints(loss);
   const Func gradient = d(weights);
   step(x, y) = weights(x, y) - 0.1f * gradient(x, y);
-  // Stages that were derived have no names to schedule them by.
+  // Stages of the gradient have no names by which a user could schedule them.
   step.set_estimates({{0, 3}, {0, 3}});
   if (on_gpu) Pipeline(step).auto_schedule(get_host_target().with_feature(Target::CUDA));
   return step;
@@ -283,8 +283,8 @@ Program reduction(int values) {
     total(x) = sum();
     if (on_gpu) {
       sum.compute_root();
-      // Neighbouring threads read neighbours; then fewer threads add up their sums, 64 each, until there is
-      // one.
+      // Neighbouring threads read neighbouring elements; then fewer and fewer threads add up these sums, 64 each, until
+      // there is one.
       RVar left = r;
       for (int parts = threads; parts > 1; parts = parts > 64 ? parts / 64 : 1) {
         const std::string number = std::to_string(parts);
@@ -304,7 +304,7 @@ Program reduction(int values) {
 std::vector<Program> all(int scale) {
   using Builder = Func(bool on_gpu, int scale);
   std::vector<Program> programs;
-  // Bytes and operations of an element of the output's first two dimensions.
+  // Bytes and operations for an element of the output's first two dimensions.
   const auto add = [&](const char* name, Builder* build, std::vector<int> sizes, double bytes,
                        double operations, int timing_scale) {
     for (size_t d = 0; d < std::min<size_t>(sizes.size(), 2); ++d) sizes[d] *= scale;

@@ -30,20 +30,20 @@ inline Buffer<float> ramp(int width, int height = 1) {
   return b;
 }
 
-// The host's element: writable access would set host_dirty.
+// Reads an element on the host through a const Buffer, because writable access would set host_dirty.
 template <typename T>
 T at(const Buffer<T>& b, int x, int y) {
   return b(x, y);
 }
 
-// Other elements on the host, which do not count as newer.
+// Changes elements on the host without marking them as newer than the device's.
 template <typename T>
 void spoil_host(Buffer<T>& b) {
   b.fill(static_cast<T>(-1));
   b.set_host_dirty(false);
 }
 
-// The kernels of one pipeline, as generated code has them.
+// The kernels of one pipeline, as generated code registers them.
 struct Saxpy {
   Image image{gpu_kernels::saxpy_kernel()};
   void* state = nullptr;
@@ -72,7 +72,7 @@ struct Saxpy {
   }
 };
 
-// Everything that a handler was told, and nothing left behind.
+// A fixture that records all messages to handlers, and checks that nothing is left allocated.
 class GpuRuntime : public testing::Test {
  protected:
   GpuRuntime() {
@@ -107,7 +107,7 @@ inline void expect_saxpy(const Buffer<float>& y, float a) {
     ASSERT_EQ(y(i, 0), a * static_cast<float>(i) + static_cast<float>(i)) << i;
 }
 
-// One stream, created in the context that a call asks for.
+// Handlers that give the runtime the program's own context and the stream in it.
 inline cuda::Context user_context_made = nullptr;
 inline cuda::Stream user_stream = nullptr;
 inline int acquire_users(void*, void** context, bool) {
@@ -120,7 +120,7 @@ inline int get_users_stream(void*, void* context, void** stream) {
   return 0;
 }
 
-// A context and a stream of the program's, which it hands to the runtime.
+// A context and a stream that the program owns and passes to the runtime.
 class GivenStream {
  public:
   GivenStream() {

@@ -1,4 +1,4 @@
-// A buffer between protected pages.
+// A buffer between protected pages, which turns an out-of-bounds access into a crash.
 #pragma once
 
 #include <HalideRuntime.h>
@@ -14,8 +14,8 @@ namespace retrograde::testing_codegen {
 
 using namespace ir;
 
-// A one-dimensional buffer that lies directly before a page that cannot be touched, or directly
-// behind one: an access outside of it is a crash.
+// A one-dimensional buffer that lies directly before or directly after a protected page: an access outside of it is a
+// crash.
 class Array {
  public:
   enum class Guard { Above, Below };

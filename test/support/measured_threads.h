@@ -15,10 +15,11 @@ class MeasuredThreads : public OwnThreads {
     handlers.custom_free = release;
   }
   int64_t peak_bytes() const { return peak_; }
-  int64_t bytes() const { return now_; }  // that are still there
+  int64_t bytes() const { return now_; }  // bytes still allocated
 
  private:
-  static constexpr size_t alignment = 128;  // of the runtime's own; the size stands before it
+  static constexpr size_t alignment =
+      128;  // the runtime's own alignment; the size is stored before the block
 
   static void* allocate(JITUserContext* context, size_t size) {
     auto& self = static_cast<MeasuredThreads&>(*context);

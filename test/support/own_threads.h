@@ -1,5 +1,5 @@
-// Parallel loops on a number of threads that does not depend on the machine: a context for
-// realize(). Threads take iterations as they come, last ones first on request.
+// Runs parallel loops on a number of threads that does not depend on the machine, as a context for realize(). Threads
+// take iterations in order, or in reverse order on request.
 #pragma once
 
 #include <atomic>
@@ -15,12 +15,12 @@ class OwnThreads : public JITUserContext {
   explicit OwnThreads(int threads, bool backward = false) : threads_(threads), backward_(backward) {
     handlers.custom_do_par_for = run;
   }
-  // Parallel loops of more than one iteration that ran so far, and the longest.
+  // The number of parallel loops with more than one iteration that have run, and the largest number of iterations.
   int loops() const { return loops_; }
   int longest() const { return longest_; }
 
  private:
-  // Loops inside of loops stay on the thread that they are on.
+  // Nested loops run on the thread that reaches them.
   static int run(JITUserContext* context, JITTask task, int min, int extent, uint8_t* closure) {
     auto& self = static_cast<OwnThreads&>(*context);
     static thread_local int depth = 0;

@@ -1,7 +1,6 @@
-// Tables of pages in docs/ that tests write from the code itself, so that no page states what the code does
-// not have. The prose around them lives in the page: a table stands between the lines
-// "<!-- table: NAME -->" and "<!-- end of table -->". RETROGRADE_UPDATE_GOLDEN=1 writes the tables; read
-// the difference before you commit it.
+// Checks tables of pages in docs/ that tests generate from the code itself, so that the pages cannot disagree with the
+// code. The prose around them lives in the page: a table stands between the lines "<!-- table: NAME -->" and "<!-- end
+// of table -->". RETROGRADE_UPDATE_GOLDEN=1 writes the tables; read the difference before you commit it.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -13,7 +12,7 @@
 
 namespace retrograde {
 
-// Whether the table of this name in the page is this one.
+// Expects that the page contains this table under this name.
 inline void expect_table_in_page(const std::string& path, const std::string& name,
                                  const std::string& table) {
   std::ifstream file(path);

@@ -1,4 +1,4 @@
-// ptxas.h -- NVIDIA's assembler of PTX, where it is installed: whether it takes what we generate.
+// ptxas.h -- checks generated PTX with NVIDIA's assembler, if it is installed.
 #pragma once
 
 #include <cstdio>
@@ -16,8 +16,8 @@ inline bool has_ptxas() {
   return has;
 }
 
-// What ptxas says against the code, for the chip ("sm_80") it was made for; empty: nothing. "-O0" of
-// `options` looks at the same things in less time.
+// The errors of ptxas for the code and its chip (such as "sm_80"); empty: none. "-O0" in `options` runs the same checks
+// in less time.
 inline std::string ptxas_problem(const std::string& ptx, const std::string& chip,
                                  const std::string& options = "") {
   const TemporaryFolder folder;

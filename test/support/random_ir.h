@@ -29,7 +29,7 @@ class RandomIr {
                        BFloat(16)});
   }
 
-  // Small constants mostly, now and then an extreme one.
+  // Mostly small constants, sometimes an extreme one.
   Expr constant(Type type) {
     if (type.is_bool()) return ir::make_const(type, int64_t{below(2)});
     if (type.is_float()) {
@@ -65,7 +65,7 @@ class RandomIr {
     return ir::make_broadcast(std::move(scalar), type.lanes());
   }
 
-  // A node made before: expressions are DAGs.
+  // A node that was generated before, because expressions are DAGs.
   Expr shared(Type type, int depth) {
     for (int tries = 0; tries < 5 && !recent_.empty(); ++tries) {
       Expr candidate = pick(recent_);

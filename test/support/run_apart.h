@@ -16,8 +16,8 @@
 namespace retrograde::fuzz {
 
 struct ApartResult {
-  int code = 0;             // what the function returned
-  int signal = 0;           // what ended it instead; SIGXCPU and SIGKILL: it took too long
+  int code = 0;             // the function's return value
+  int signal = 0;           // the signal that ended it instead; SIGXCPU and SIGKILL: a time limit
   bool has_exited = false;  // before the function returned, as sanitizers do
   std::string detail;
 
@@ -31,14 +31,14 @@ struct ApartResult {
 
 struct ApartLimits {
   unsigned cpu_seconds = 60;
-  unsigned seconds = 240;   // it may stand still for so long, on a machine however busy
-  size_t memory_bytes = 0;  // of address space; 0: no limit
+  unsigned seconds = 240;   // limit of elapsed time, which also holds on a busy machine
+  size_t memory_bytes = 0;  // limit of address space; 0: none
 };
 
-// Ends what a process sends whose function returned.
+// The byte that a process sends last if its function has returned.
 constexpr char has_returned = '\n';
 
-// Whether the other end was closed in time.
+// Returns whether the other end was closed in time.
 inline bool read_all(int from, std::chrono::steady_clock::time_point end, std::string& text) {
   char chunk[4096];
   while (true) {
@@ -66,7 +66,7 @@ inline ApartResult run_apart(const ApartLimits& limits, const std::function<int(
       const rlimit memory = {limits.memory_bytes, limits.memory_bytes};
       setrlimit(RLIMIT_AS, &memory);
     }
-    alarm(limits.seconds + 10);  // should the harness be gone
+    alarm(limits.seconds + 10);  // in case the harness has ended
     std::string detail;
     const int code = f(detail);
     detail += has_returned;

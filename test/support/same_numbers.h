@@ -1,4 +1,4 @@
-// Renumbers names, so that texts which differ only in the process's unique numbers are equal.
+// Renumbers names, so that texts are equal if they differ only in numbers unique to the process.
 #pragma once
 
 #include <map>
@@ -9,13 +9,14 @@
 
 namespace retrograde {
 
-// In the order in which they appear: the first v$31 or v is v, the next other one is v$1. Of
-// reduction variables the domain counts, r$7.x and r$7.y are r.x and r.y; behind it, what has a
-// number: rho$8.r$7.x is rho.r.x.
+// Numbers names in the order in which they appear: the first v$31 or v becomes v, the next different one v$1. In names
+// of reduction variables the domain is numbered: r$7.x and r$7.y become r.x and r.y. After a domain, any numbered name
+// is renumbered: rho$8.r$7.x becomes rho.r.x.
 inline std::string same_numbers(const std::string& text) {
   static const std::regex name(
       "(^|[^A-Za-z_0-9$.]|\\.(?=[A-Za-z_0-9]+\\$))([A-Za-z_][A-Za-z_0-9$]*)");
-  std::map<std::string, std::map<std::string, size_t>> numbers;  // of each name without: those seen
+  std::map<std::string, std::map<std::string, size_t>>
+      numbers;  // for each name without its number: the numbers seen
   std::string result;
   auto at = text.begin();
   for (std::sregex_iterator it(text.begin(), text.end(), name), end; it != end; ++it) {

@@ -17,7 +17,7 @@ using namespace gpu_kernels;
 constexpr int32_t orders[] = {retrograde_simt_forward, retrograde_simt_reverse,
                               retrograde_simt_random, retrograde_simt_warp_ahead};
 
-// A context with a stream, and arrays in its memory.
+// A fixture with a context, a stream, and arrays in device memory.
 class Simt : public testing::Test {
  protected:
   void SetUp() override {
@@ -67,7 +67,7 @@ class Simt : public testing::Test {
                           stream, args.data(), nullptr);
   }
 
-  // Runs a kernel over an array of zeros until it is over; what it leaves there.
+  // Runs a kernel over an array of zeros and waits for its end; then `left` has the contents of the array.
   template <void (*body)(Thread*, int32_t*, int32_t)>
   Result run(bool waits, Shape shape, int32_t n) {
     const Image image{array_kernel<body>("kernel", waits)};
@@ -78,7 +78,7 @@ class Simt : public testing::Test {
     if (result == success) left = download<int32_t>(data, static_cast<size_t>(n));
     return result;
   }
-  // The same, with an error whose text has all these parts.
+  // Runs a kernel that must fail with an error that contains all these parts.
   template <void (*body)(Thread*, int32_t*, int32_t)>
   void expect_finding(bool waits, Shape shape, int32_t n, Result result,
                       const std::vector<std::string>& parts) {

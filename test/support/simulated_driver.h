@@ -1,4 +1,4 @@
-// The simulated driver's functions, for tests that link it: those that the runtime calls, and a few that
+// Declares the simulated driver's functions for tests that link it: those that the runtime calls, and a few that
 // programs call.
 #pragma once
 

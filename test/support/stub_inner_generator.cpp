@@ -15,7 +15,7 @@ class Inner : public Halide::Generator<Inner> {
       "shape", Shape::Ramp, {{"square", Shape::Square}, {"ramp", Shape::Ramp}}};
   GeneratorParam<Halide::Type> type{"type", Halide::Int(32)};
   GeneratorParam<LoopLevel> level{"level", LoopLevel::root()};
-  // The stub's name for the open type of "scaled", too.
+  // The stub also calls the open type of "scaled" by this name.
   GeneratorParam<Halide::Type> scaled_type{"scaled_type", Halide::Int(32)};
 
   Input<Func> source{"source", Int(32), 1};

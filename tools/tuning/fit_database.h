@@ -8,9 +8,10 @@
 
 namespace retrograde::tune {
 
-// Starts from the figures in use (machine_for). Prints to `out` the prediction error before and after, and by two-fold
-// cross-validation: for programs that the fit did not use.
-// Requires: the database has measurements of this machine with so many threads.
+// Fits the parameters of the machine model to the measurements of this machine, starting from the parameters in use
+// (machine_for). Prints to `out` the prediction error before and after, and the error by two-fold cross-validation,
+// that is, for programs that the fit did not use.
+// Requires: the database has measurements of this machine with that number of threads.
 tuning::Machine fit_database(Database& database, int threads, std::ostream& out);
 
 }  // namespace retrograde::tune

@@ -40,8 +40,8 @@ struct LoopNests {
   std::map<std::string, Box> outputs;  // what is written or read of each output Func
   std::map<std::string, std::vector<Expr>>
       folds;  // of Funcs: after how many coordinates each dimension wraps around, or undefined
-  // Of async Funcs stored outside of where they are computed: how many iterations the producer may
-  // be ahead of its consumer; 0: any number.
+  // For async Funcs stored outside of the loop that computes them: how many iterations the producer may be ahead of its
+  // consumer; 0: any number.
   std::map<std::string, int> async_room;
 };
 

@@ -1,5 +1,4 @@
-// What bilateral_slice says to bad input: one line in four parts, status 1, and no file left
-// behind.
+// Tests the errors of bilateral_slice for bad input: one line in four parts, status 1, and no file left behind.
 #include <gtest/gtest.h>
 #include <sys/mount.h>
 #include <unistd.h>
@@ -129,7 +128,7 @@ TEST_F(BilateralSliceErrors, AGuideMovesOnlyWithAGridThatHasLayers) {
   expect_no_results();
 }
 
-// States and looks are left by a run of one step; what follows leaves them as they are.
+// A run of one step writes a state and a look; the refused runs after it must not change them.
 TEST_F(BilateralSliceErrors, OtherGroupsAndChannelsDoNotGoOn) {
   const fs::path gray = write_noise("gray.png", 12, 10, 1);
   run_on(gray, "--steps 1 --grid 4 --optimize grid");
@@ -184,7 +183,7 @@ TEST_F(BilateralSliceErrors, TheOutputMustBeAFolder) {
 }
 
 TEST_F(BilateralSliceErrors, AnUnwritableFolderIsFoundBeforeTheRun) {
-  // Root may write anywhere but where no file can be made.
+  // Root may write anywhere except where no file can be created.
   const fs::path folder = getuid() == 0 ? fs::path("/proc") : out();
   if (getuid() != 0) {
     fs::create_directories(folder);
@@ -197,7 +196,7 @@ TEST_F(BilateralSliceErrors, AnUnwritableFolderIsFoundBeforeTheRun) {
 
 TEST_F(BilateralSliceErrors, AFileThatMayNotGrowIsNotLeftHalfWritten) {
   const fs::path large = write_noise("large.png", 100, 100);
-  // The limit is in blocks of 512 bytes: enough for the trial file, not for an image.
+  // The limit is in blocks of 512 bytes: enough for the trial file, too little for an image.
   run("--halide-seconds 0 --steps 1 --input " + large.string() + " --output " + out().string(),
       "ulimit -f 8;");
   expect_refused({"input.png", "stored whole or not at all", "File too large", "Free some space"},

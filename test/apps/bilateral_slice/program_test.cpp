@@ -1,5 +1,4 @@
-// bilateral_slice on small images of awkward shapes: it ends well, and its report keeps its
-// promises.
+// Runs bilateral_slice on small images of awkward shapes: it succeeds, and its report agrees with its results.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -34,7 +33,7 @@ class BilateralSlice : public testing::Test {
     return folder_ / name;
   }
 
-  // What it prints.
+  // Runs the program, and returns its output.
   std::string output_of(const std::vector<std::string>& more) {
     std::vector<std::string> command{BILATERAL_SLICE_PROGRAM, "--output",
                                      (folder_ / "out").string()};
@@ -49,7 +48,7 @@ class BilateralSlice : public testing::Test {
     return nlohmann::json::parse(file);
   }
 
-  // Where no plot is looked at.
+  // Runs the program without plots, for tests that do not look at them.
   std::string without_plots(const std::vector<std::string>& words) {
     setenv("RETROGRADE_PYTHON", "/bin/true", 1);
     const std::string text = output_of(words);
@@ -57,7 +56,7 @@ class BilateralSlice : public testing::Test {
     return text;
   }
 
-  // Whose layers and coefficients all differ, and are what float32 holds.
+  // Writes a look whose layers and coefficients all differ and are exact in float32.
   fs::path write_uneven_look(const std::string& name, int nodes) const {
     const auto held = [](double value) { return static_cast<double>(static_cast<float>(value)); };
     apps::State look{.program = "bilateral_slice look"};
@@ -71,7 +70,7 @@ class BilateralSlice : public testing::Test {
     return folder_ / name;
   }
 
-  // A look that the last run learned, kept from the next.
+  // Copies the look that the last run learned, because the next run overwrites it.
   fs::path kept_look(const std::string& name) const {
     fs::copy_file(folder_ / "out" / "look.bin", folder_ / name);
     return folder_ / name;
@@ -115,7 +114,7 @@ TEST_F(BilateralSlice, HalideTakesTheSameSteps) {
   const auto photo = write_photo("photo.png", 120, 70);
   const auto report = run({"--input", photo, "--steps", "12", "--threads", "2", "--grid", "16"});
   ASSERT_EQ(report["halide"]["psnr_db"].size(), 12);
-  // The same function and the same steps: only rounding differs.
+  // Both run the same function for the same steps: only rounding differs.
   for (int step = 0; step < 12; ++step) {
     EXPECT_NEAR(report["halide"]["psnr_db"][step].get<double>(),
                 report["retrograde"]["psnr_db"][step].get<double>(), 0.02)
@@ -124,7 +123,7 @@ TEST_F(BilateralSlice, HalideTakesTheSameSteps) {
   EXPECT_GT(report["ratio_to_halide"], 0);
 }
 
-// What does not move is not computed: less of the gradient, no step, and no Halide beside it.
+// Groups that are not learned cost nothing: a smaller gradient, no step, and no comparison with Halide.
 TEST_F(BilateralSlice, MovesOnlyWhatItIsTold) {
   const auto photo = write_photo("photo.png", 64, 48),
              target = write_photo("target.png", 64, 48, 0.5f);
@@ -145,7 +144,7 @@ TEST_F(BilateralSlice, MovesOnlyWhatItIsTold) {
   EXPECT_EQ(grid["left_out"].size(), 1u);
   EXPECT_LE(grid["gradient_check_derivatives"], all["gradient_check_derivatives"].get<int>() / 2);
   EXPECT_GT(grid["psnr_final_db"], grid["psnr_initial_db"].get<double>() + 5);
-  // The first loss is that of the same identity, the last is not.
+  // The first loss is that of the same identity, the last one differs.
   EXPECT_EQ(grid["retrograde"]["psnr_db"][0], all["retrograde"]["psnr_db"][0]);
   EXPECT_NE(grid["retrograde"]["psnr_db"][14], all["retrograde"]["psnr_db"][14]);
   const fs::path look = kept_look("grid.look");
@@ -165,7 +164,7 @@ TEST_F(BilateralSlice, MovesOnlyWhatItIsTold) {
   EXPECT_NE(part_of(moved, "curve"), part_of(look, "curve"));
 }
 
-// From one place, a step moves a group alike whether others move or not.
+// From the same point, a step moves a group equally, whether other groups move or not.
 TEST_F(BilateralSlice, AGroupMovesAlikeBesideOthers) {
   const auto photo = write_photo("photo.png", 30, 24);
   const fs::path start = write_uneven_look("start.look", 4);
@@ -201,7 +200,7 @@ TEST_F(BilateralSlice, GrayStaysGray) {
   EXPECT_EQ(apps::read_channels(folder_ / "out" / "result.png").channels, 1);
 }
 
-// A target with colours makes all of it so, and a look with colours is given to gray photographs.
+// One target in colour makes the whole run a colour run, and a look in colour also applies to gray photographs.
 TEST_F(BilateralSlice, GrayBesideColourIsColour) {
   const auto photo = write_photo("photo.png", 60, 44, 1, 1);
   const auto target = write_photo("target.png", 60, 44, 0.5f);
@@ -213,7 +212,7 @@ TEST_F(BilateralSlice, GrayBesideColourIsColour) {
   EXPECT_EQ(apps::read_channels(folder_ / "out" / "result.png").channels, 3);
 }
 
-// Three equal channels through the colour model become what one becomes through the gray one.
+// Three equal channels through the colour model give the result of one channel through the gray model.
 TEST_F(BilateralSlice, TheGrayEditIsThatOfEqualColours) {
   const auto gray = write_photo("gray.png", 50, 40, 1, 1);
   apps::write_png(folder_ / "spread.png", apps::read_image(gray));
@@ -280,7 +279,7 @@ TEST_F(BilateralSlice, GoesOnWhereItWasToTheSameResult) {
     return report();
   };
   const auto whole = with({"--steps", "20"});
-  // A tenth of a microsecond is over after the first block of five steps.
+  // A limit of a tenth of a microsecond has passed after the first block of five steps.
   EXPECT_EQ(with({"--steps", "20", "--seconds", "1e-7"})["steps"], 5);
   const auto rest = with({"--steps", "20", "--resume"});
   EXPECT_EQ(rest["steps"], 15);
@@ -298,7 +297,7 @@ TEST_F(BilateralSlice, StopsInGoodOrder) {
   EXPECT_EQ(nlohmann::json::parse(file)["stopped"], true);
 }
 
-// One curve for all photos: what was learned from four of them suits the two held out, and a seventh.
+// One curve for all photographs: learned from four of them, it suits the two held out, and a seventh.
 TEST_F(BilateralSlice, LearnsOneLookFromAFolderAndAppliesIt) {
   const fs::path pairs = folder_ / "pairs";
   fs::create_directories(pairs / "target");
@@ -332,7 +331,7 @@ TEST_F(BilateralSlice, LearnsOneLookFromAFolderAndAppliesIt) {
   EXPECT_LT(sum / static_cast<double>(target.pixels.size()), 2e-3);  // 27 dB
 }
 
-// Gray ones are learned from in colour beside one with colours, and stay gray among themselves.
+// Gray photographs beside one in colour are learned in colour; among themselves they stay gray.
 TEST_F(BilateralSlice, AFolderIsGrayWhereAllAre) {
   const fs::path pairs = folder_ / "pairs";
   fs::create_directories(pairs);
@@ -347,7 +346,7 @@ TEST_F(BilateralSlice, AFolderIsGrayWhereAllAre) {
   EXPECT_EQ(report()["bilateral_slice"]["channels"], 1);
   EXPECT_EQ(report()["bilateral_slice"]["left_out"].size(), 2u);
   EXPECT_EQ(apps::read_channels(folder_ / "out" / "result.png").channels, 1);
-  // It stops after one step, goes on, and comes to the same look.
+  // A run that stops after one step and resumes must arrive at the same look.
   const fs::path whole = kept_look("whole.look");
   with({"--optimize", "grid", "--seconds", "1e-9"});
   EXPECT_EQ(report()["steps"], 1);

@@ -1,4 +1,4 @@
-// What burst_superresolution says to inputs that it cannot use: one line in four parts, status 1, no results.
+// Tests the errors of burst_superresolution for unusable inputs: one line in four parts, status 1, no results.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -39,7 +39,7 @@ TEST_F(BurstErrors, NoNumbers) {
 }
 
 TEST_F(BurstErrors, HugePhotographs) {
-  // 30000 x 30000 pixels in the head of a file that has none.
+  // The header promises 30000 x 30000 pixels, but the file has none.
   std::ofstream(folder_ / "huge.ppm") << "P6\n30000 30000\n255\n";
   refused(folder_ / "huge.ppm", {"huge.ppm", "50000000 pixels"});
 }

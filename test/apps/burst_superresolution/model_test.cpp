@@ -1,5 +1,5 @@
-// burst_superresolution, its parts: homographies, simulated bursts, noise, registration, the average; and the
-// objective and its gradient against plain C++.
+// Tests the parts of burst_superresolution: homographies, simulated bursts, noise, registration, the average. The
+// objective and its gradient are compared with plain C++.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -91,7 +91,7 @@ TEST(Homography, ShakenCamerasDoNotMirrorOrZoomFar) {
   EXPECT_FALSE(is_small_motion({0, 0, 0, 0, 0, 0, std::nan(""), 0}, frame_size));
 }
 
-// Keys' interpolation is exact for polynomials of degree two (his section IV), away from the borders.
+// Keys' interpolation is exact for polynomials of degree two (his section IV), except near the borders.
 TEST(Bicubic, ReproducesParabolas) {
   constexpr int width = 12, height = 10;
   const auto value = [](double x, double y) {
@@ -148,7 +148,7 @@ TEST(Simulation, IsThatOfItsSeed) {
   EXPECT_NE(one.samples, simulate(photograph, {.frames = 2, .seed = 6}).samples);
 }
 
-// A sensor that begins with another colour: the frame begins at its first red sample.
+// If a sensor does not begin with red, the frame begins at its first red sample.
 TEST(Frames, BeginWithRed) {
   const TemporaryFolder folder;
   const auto picture = scene(61, 51);
@@ -187,7 +187,7 @@ TEST(Noise, IsFoundWhereThePictureIsPlain) {
   EXPECT_EQ(estimate_noise(black), 0);
 }
 
-// 0.1 from each pixel to the next along x, in gray.
+// A gray ramp that rises by 0.1 from each pixel to the next along x.
 std::vector<float> gray_ramp(const FrameSize& size) {
   std::vector<float> planes(3 * size.pixels());
   for (size_t n = 0; n < planes.size(); ++n)
@@ -195,7 +195,8 @@ std::vector<float> gray_ramp(const FrameSize& size) {
   return planes;
 }
 
-// The truth explains all but the noise, of which it follows nothing: the correction for that is taken back.
+// The true picture explains everything but the noise, and does not fit any of the noise. The estimate corrects for that
+// fit, so the test undoes the correction.
 TEST(Noise, IsWhatAPictureLeavesUnexplained) {
   for (const double noise : {0.01, 0.03}) {
     const Burst burst =
@@ -241,7 +242,7 @@ TEST(Noise, AsksForSmoothness) {
   EXPECT_EQ(weight(0.02, 0.5), 0.5);
   EXPECT_TRUE(smoothness_for(0.02, ramp, size, Colours::Rgb, 0.0).empty());
   const auto opponent = smoothness_for(0.02, ramp, size, Colours::Opponent, {});
-  EXPECT_TRUE(std::isfinite(opponent[1].weight));  // of differences that are 0
+  EXPECT_TRUE(std::isfinite(opponent[1].weight));  // although all differences are 0
   EXPECT_GT(opponent[1].weight, opponent[0].weight);
   const auto given = smoothness_for(0.02, ramp, size, Colours::Opponent, 0.5);
   EXPECT_NEAR(given[1].weight / given[0].weight, opponent[1].weight / opponent[0].weight, 1e-6);
@@ -329,7 +330,7 @@ TEST(Average, UndoesWholeShifts) {
   for (size_t n = 0; n < mean.size(); ++n) EXPECT_NEAR(mean[n], first[n], 1e-5);
 }
 
-// A point and frames, all random: places beyond the picture included.
+// A random point of the objective and random frames, including positions beyond the picture.
 struct Point {
   Shape shape;
   std::vector<double> x;
@@ -358,7 +359,7 @@ std::vector<double> gradient_at(Evaluator<T>& evaluator, const Point& point, dou
   return {gradient.begin(), gradient.end()};
 }
 
-// The reference has a gradient by the first homography, too; the evaluator keeps it where it is.
+// The reference also has a gradient by the first homography, which the evaluator keeps fixed.
 std::vector<double> without_first(const Shape& shape, std::vector<double> gradient) {
   std::fill_n(gradient.begin() + static_cast<long>(shape.image_elems()), homography_params, 0.0);
   return gradient;
@@ -368,7 +369,7 @@ void expect_near(std::span<const double> own, std::span<const double> exact, dou
   EXPECT_LE(apps::relative_error(own, exact), limit);
 }
 
-// All three colours, each in another way.
+// Smooths along all three opponent colours and green, with different weights.
 Smoothness smoothness(double weight) {
   Smoothness all;
   for (const auto& axis : axes_of(Colours::Opponent)) all.push_back({axis, weight *= 1.5});
@@ -397,7 +398,7 @@ TEST_P(ObjectiveTest, IsThatOfTheReference) {
   expect_near(std::span(own).subspan(image), std::span(expected).subspan(image), 1e-3);
 }
 
-// From shifts of a pixel to horizons within the frames.
+// Motions from shifts of a pixel to horizons within the frames.
 INSTANTIATE_TEST_SUITE_P(Motions, ObjectiveTest, testing::Values(0.05, 0.3, 1.5));
 
 TEST(Objective, WithoutMotionOrSmoothnessIsThatOfTheReference) {

@@ -1,5 +1,5 @@
-// burst_superresolution, the program: from a photograph or a folder of mosaics to pictures and a report; what the
-// optimization gains; what stops it and goes on.
+// Runs burst_superresolution from a photograph or a folder of mosaics to pictures and a report. Also tests the gain by
+// the optimization, and stopping and resuming.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,7 +28,7 @@ class BurstRun : public testing::Test {
  protected:
   BurstRun() { options_.common.output = folder_.path(); }
 
-  // 110 x 90 pixels of a scene.
+  // Simulates a burst from 110 x 90 pixels of a scene.
   void simulate_burst(int frames, double noise) {
     options_.simulation = {.frames = frames, .shake = 4, .noise = noise, .seed = 3};
     burst_ = simulate(scene(140, 120), options_.simulation);
@@ -64,13 +64,13 @@ TEST_F(BurstRun, GainsTwoDecibelsAndFindsTheMotion) {
   simulate_burst(9, 0.005);
   choose_smoothness(options_, burst_, prepared_, *evaluator_);
   EXPECT_NEAR(prepared_.noise, 0.005, 0.003);
-  // A fourth of a pixel beside where SIFT found them.
+  // Moves the frames by a fourth of a pixel from the positions that SIFT found.
   for (size_t n = 1; n < 9; ++n) prepared_.homographies[n][2] += 0.25 / burst_.size.scale();
   const Fit found = fit_for(100);
   const double best = std::max(db(prepared_.first), db(prepared_.average));
   EXPECT_GE(db(found.picture(shape())), best + 2);
   EXPECT_LT(found.loss, found.series.front().loss);
-  // A hundred steps of at most 1e-4, which fall to a tenth, go a fifth of a pixel here at the most.
+  // A hundred steps of at most 1e-4, decreasing to a tenth, move at most a fifth of a pixel here.
   EXPECT_LT(error_of(found.homographies(shape())), 0.8 * error_of(prepared_.homographies));
   EXPECT_EQ(found.refused, 0);
 }
@@ -113,7 +113,7 @@ TEST_F(BurstRun, GoesOnAsIfItHadNotStopped) {
 
 class BurstProgram : public testing::Test {
  protected:
-  // Writes a scene as a picture and gives its name.
+  // Writes a scene as a picture, and returns its name.
   fs::path photograph(int width, int height) {
     const auto picture = scene(width, height);
     apps::write_image(folder_.path() / "scene.png",
@@ -153,7 +153,7 @@ TEST_F(BurstProgram, MakesAPictureAndAReport) {
   EXPECT_EQ(result.height, own["height"]);
 }
 
-// What was written as mosaics is read again, and gives the same picture but for 16 bits.
+// Mosaics that a run wrote can be read again, and give the same picture up to rounding to 16 bits.
 TEST_F(BurstProgram, ReadsAFolderOfMosaics) {
   const fs::path one = folder_.path() / "one", two = folder_.path() / "two";
   run(photograph(110, 100), one, {"--frames", "3", "--shake", "3", "--write-frames"});

@@ -1,4 +1,4 @@
-// scenes.h -- pictures with something to see everywhere, at several scales, for tests of bursts.
+// scenes.h -- test pictures for bursts, with structure everywhere at several scales.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace burst_test {
 
-// Overlapping discs of many sizes and colours, with soft edges: corners and blobs that features are found at.
+// Overlapping discs of many sizes and colours with soft edges, which give feature detectors corners and blobs.
 inline demosaic::Photograph scene(int width, int height, unsigned seed = 1) {
   unsigned state = seed * 2654435761u + 12345;
   const auto unit = [&] {

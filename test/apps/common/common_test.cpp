@@ -1,4 +1,4 @@
-// What apps share beside optimizers: options, states, stopping, reports and the page of them.
+// Tests the code that apps share, except optimizers: options, states, stopping, reports and their pages.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -29,7 +29,7 @@ std::string contents_of(const fs::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// The message of what `body` throws.
+// The message of the exception that `body` throws.
 template <typename Body>
 std::string refusal(Body&& body) {
   try {
@@ -91,7 +91,7 @@ TEST(AppOptions, RefuseWhatTheyDoNotKnowInOneLine) {
   expect_words(refused({"--seconds", "nan"}), {"--seconds"});
   expect_words(refused({"--threads", "9999"}), {"--threads", "too large"});
   expect_words(refused({"--seed", "blue"}), {"understand the command line", "blue"});
-  // Not of this app:
+  // An option that this app does not have.
   expect_words(refused({"--memory", "100"}), {"understand the command line", "--memory"});
   expect_words(refusal([] { parse({}, defaults); }), {"--output is required"});
   expect_words(refusal([] { parse({"--output", "o"}, {}); }), {"--input is required"});
@@ -170,7 +170,7 @@ TEST(AppStop, ASignalSetsTheFlag) {
   apps::request_stop(false);
 }
 
-// As timeout(1) sends it, to a program and to the program's group.
+// timeout(1) sends the signal twice: to a program and to the program's group.
 TEST(AppStop, ASignalSentTwiceAtOnceIsOne) {
   apps::catch_stop_signals();
   ::raise(SIGINT);
@@ -206,7 +206,7 @@ TEST(AppRun, ErrorsBecomeOneLineAndAStatus) {
 
 class AppReport : public testing::Test {
  protected:
-  // A report with two pictures, a plot of two series, a table.
+  // Writes a report with two pictures, a plot of two series, and a table.
   void write_report(const std::string& name, bool all_pictures = true) {
     apps::CommonOptions options;
     options.output = folder_.path() / name;
@@ -299,7 +299,7 @@ TEST_F(AppReport, AMissingPictureIsNamed) {
   expect_words(contents_of(folder_.path() / "index.html"), {"after.png is missing"});
 }
 
-// The page as a browser shows it: nothing of it comes from elsewhere, and every picture is one.
+// A browser shows the page completely: it loads nothing from elsewhere, and every picture is valid.
 TEST_F(AppReport, ThePageShowsEverythingInABrowser) {
   write_report("one");
   write_report("two");
@@ -309,7 +309,8 @@ TEST_F(AppReport, ThePageShowsEverythingInABrowser) {
   expect_words(page,
                {"before &lt;it&gt;", "<td class=\"number\">31.25</td>", "at least 30", "speeds"});
   EXPECT_EQ(page.find("src=\"http"), std::string::npos);
-  // Alone in a folder, so that it can only show what is in it, with the sizes of its pictures noted.
+  // The page lies alone in a folder, so that it can only show files of that folder; the test notes the sizes of its
+  // pictures.
   const fs::path alone = folder_.path() / "alone";
   fs::create_directories(alone);
   const std::string note =

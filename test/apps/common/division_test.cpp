@@ -1,4 +1,4 @@
-// Which photographs are learned from: as a list says, else by name.
+// Tests how photographs are divided into those for learning and the others: by a list, or by name.
 #include "common/division.h"
 
 #include <gtest/gtest.h>

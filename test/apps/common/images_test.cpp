@@ -1,4 +1,4 @@
-// Images of every kind come in as RGB floats, and go out as PNG.
+// Tests reading images of every kind as RGB floats, and writing PNG.
 #include <OpenImageIO/imageio.h>
 #include <gtest/gtest.h>
 
@@ -17,8 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A RAW file as small as one can be: Adobe's DNG (Digital Negative Specification 1.4, chapter 4), which is
-// TIFF with the tags of a colour filter array. The samples are those of a sensor "RGGB".
+// A minimal RAW file: Adobe's DNG (Digital Negative Specification 1.4, chapter 4), which is TIFF with the tags of a
+// colour filter array. The samples are those of a sensor with the pattern "RGGB".
 class SmallDng {
  public:
   SmallDng(int width, int height, const std::vector<uint16_t>& samples, uint32_t orientation = 1) {
@@ -73,7 +73,7 @@ class SmallDng {
   void append(T value) {
     bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
   }
-  // Head, directory, what does not fit into its entries, samples.
+  // Writes the header, the directory, the values that are too large for its entries, and the samples.
   void finish(size_t place, const std::vector<uint16_t>& samples) {
     const uint32_t behind = 8 + 2 + 12 * static_cast<uint32_t>(entries_.size()) + 4;
     std::string rest;
@@ -114,7 +114,7 @@ void expect_pixels(const apps::Image& image, const std::vector<float>& expected)
 
 class AppImages : public testing::Test {
  protected:
-  // Sample n of the file is values[n].
+  // Stores a file in which sample n is values[n].
   fs::path store(const std::string& name, int width, int height, int channels, OIIO::TypeDesc type,
                  const std::vector<float>& values) {
     const fs::path path = folder_ / name;
@@ -189,7 +189,7 @@ TEST_F(AppImages, TheSuffixSaysHowAnImageIsStored) {
     EXPECT_NEAR(back.pixels[n], image.pixels[n], 0.1);  // eight bits, shared exponent
   apps::write_image(folder_ / "a.jpg", image);
   EXPECT_EQ(apps::read_image(folder_ / "a.jpg").bits, 8);
-  // Nothing else is left in the folder.
+  // No other file is left in the folder.
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 5);
 }
 
@@ -256,7 +256,7 @@ TEST_F(AppImages, ResizingKeepsMeansAndRamps) {
   for (int x = 2; x < 22; ++x) EXPECT_NEAR(twice.pixels[2 * (24 * 5 + x)], (x - 0.5f) / 24, 1e-6);
 }
 
-// A JPEG whose rows are ramps along x, with colours that no mirror image has.
+// A JPEG whose rows are ramps along x, with colours that no mirrored image has.
 class AppPhotographs : public AppImages {
  protected:
   fs::path store_ramp(const std::string& name, int width, int height, int orientation) {
@@ -279,8 +279,8 @@ class AppPhotographs : public AppImages {
   }
 };
 
-// Where the stored pixel (x, y) of w x h is shown, by the definition of the tag: which side of the picture the
-// first row is, and which the first column.
+// The position at which the stored pixel (x, y) of w x h is shown, by the definition of the tag: it names the side of
+// the picture of the first row, and that of the first column.
 std::pair<int, int> place_shown(int orientation, int x, int y, int w, int h) {
   switch (orientation) {
     case 2:  // top, right
@@ -317,7 +317,7 @@ TEST_F(AppPhotographs, ComeUprightAndGoOutUpright) {
         EXPECT_NEAR(image.pixels[at], x / 64.0f, 0.04) << orientation;
         EXPECT_NEAR(image.pixels[at + 1], y / 64.0f, 0.04) << orientation;
       }
-      // What is written looks the same to who turns pictures and to who does not.
+      // The written file looks the same in viewers that apply the orientation and in those that ignore it.
       apps::write_image(folder_ / ("b" + suffix), image);
       EXPECT_EQ(OIIO::ImageInput::open((folder_ / ("b" + suffix)).string())
                     ->spec()
@@ -328,7 +328,8 @@ TEST_F(AppPhotographs, ComeUprightAndGoOutUpright) {
   }
 }
 
-// The sensor's samples stay as they are, for its pattern's sake; who makes a picture of them turns it.
+// A sensor's samples are not rotated, because their pattern depends on the position; code that makes a picture of them
+// rotates it.
 TEST_F(AppPhotographs, AMosaicIsNotTurnedButSaysHow) {
   std::vector<uint16_t> samples;
   for (int n = 0; n < 64 * 48; ++n) samples.push_back(static_cast<uint16_t>(10000 + 10 * n));
@@ -345,7 +346,7 @@ TEST_F(AppPhotographs, AMosaicIsNotTurnedButSaysHow) {
     EXPECT_EQ(photograph.width, orientation < 5 ? 64 : 48);
     EXPECT_EQ(photograph.height, orientation < 5 ? 48 : 64);
   }
-  // A gray image says it by itself.
+  // A gray image that is read as a mosaic has an orientation, too.
   apps::write_image(folder_ / "a.tif", {1, 1, 8, {0.5f}, 1});
   EXPECT_EQ(apps::read_mosaic(folder_ / "a.tif").orientation, 1);
 }
@@ -366,7 +367,7 @@ TEST_F(AppPhotographs, ThatAreNotWholeAreRefused) {
   for (const size_t kept : {whole.size() / 2, whole.size() - 100, whole.size() - 2})
     EXPECT_NE(error_of(whole.substr(0, kept)).find("must be a whole image"), std::string::npos)
         << error_of(whole.substr(0, kept));
-  // A piece out of the middle.
+  // A file with a piece missing in the middle.
   EXPECT_NE(error_of(whole.substr(0, whole.size() - 300) + whole.substr(whole.size() - 2))
                 .find("must be a whole image"),
             std::string::npos);

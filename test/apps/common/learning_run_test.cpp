@@ -1,4 +1,5 @@
-// A learning run counts its steps, looks and saves now and then, stops when it shall, and goes on from its state.
+// Tests the learning run, which counts steps, measures and saves at intervals, stops on request, and resumes from its
+// state.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -82,7 +83,7 @@ TEST_F(LearningRun, GoesOnFromItsState) {
   EXPECT_EQ(rest.steps(), 5);
   EXPECT_EQ(second.value, std::ldexp(1.0, -5));
   EXPECT_EQ(second.looks.front(), 3);
-  // The smoothed loss of what is resumed begins at its first step.
+  // The smoothed loss of a resumed run begins at its first step.
   apps::Report report("halving", options_);
   rest.enter(report, {});
   const auto json = report.to_json(5, false);

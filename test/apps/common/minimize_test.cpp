@@ -1,5 +1,5 @@
-// Optimizers of the apps: they find minima, obey their limits, keep the best point, and survive places
-// where the loss is no number.
+// Tests the optimizers of the apps: they find minima, obey their limits, keep the best point, and survive points at
+// which the loss is NaN.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +17,8 @@ using Numbers = std::span<const double>;
 
 const std::vector<double> rosenbrock_start{-1.2, 1, -1.2, 1};
 
-// H. Rosenbrock, Computer Journal 3 (1960), in pairs of variables: a bent valley, its minimum at ones.
+// The function of H. Rosenbrock, Computer Journal 3 (1960), in pairs of variables: a bent valley with its minimum at
+// ones.
 apps::Problem rosenbrock() {
   apps::Problem problem{.size = 4};
   problem.evaluate = [](Numbers x, std::span<double> gradient) {
@@ -40,7 +41,7 @@ apps::Problem rosenbrock() {
   return problem;
 }
 
-// x - log x, no number for x <= 0, its minimum at 1.
+// x - log x, which is NaN for x <= 0 and has its minimum at 1.
 apps::Problem with_a_wall() {
   apps::Problem problem{.size = 1};
   problem.evaluate = [](Numbers x, std::span<double> gradient) {
@@ -100,7 +101,7 @@ TEST_P(EveryMethod, EndsWhenItIsStopped) {
 }
 
 TEST_P(EveryMethod, EndsWhenItsTimeIsOver) {
-  // One nanosecond is over after the first step.
+  // A limit of one nanosecond has passed after the first step.
   const auto found = apps::minimize(rosenbrock(), rosenbrock_start,
                                     {.method = GetParam(), .steps = 100, .seconds = 1e-9});
   EXPECT_EQ(found.steps, 1);
@@ -108,7 +109,7 @@ TEST_P(EveryMethod, EndsWhenItsTimeIsOver) {
 }
 
 TEST_P(EveryMethod, ComesBackFromWhereTheLossIsNoNumber) {
-  // The first step of Adam at this rate, and of any line search from so steep a place, jumps the wall.
+  // At this rate, the first step of Adam jumps over the wall, as does that of any line search from such a steep point.
   const std::vector<double> start{3};
   const auto found =
       apps::minimize(with_a_wall(), start, {.method = GetParam(), .steps = 400, .rate = 8});
@@ -150,7 +151,7 @@ TEST(AppMinimize, MethodsHaveNames) {
 }
 
 TEST(AppAdam, TakesThePapersFirstStep) {
-  // Whatever the gradient, the first step is rate * g / (|g| + epsilon): algorithm 1 with t = 1.
+  // For any gradient, the first step is rate * g / (|g| + epsilon): algorithm 1 with t = 1.
   apps::Adam adam({{1, 0.1}, {1, 0.01}});
   std::vector<double> x{1, 1};
   EXPECT_TRUE(adam.step(x, 1.0, std::vector<double>{123, -5}));
@@ -189,7 +190,7 @@ TEST(AppAdam, ALossThatExplodesIsRefusedWhereThatIsAskedFor) {
   EXPECT_EQ(adam.refused(), 1);
 }
 
-// A logarithm, or a negative of what is to grow.
+// Negative losses arise from a logarithm, or from a negated quantity to be maximised.
 TEST(AppAdam, LossesBelowZeroAreLossesLikeOthers) {
   for (const double explosion : {100.0, static_cast<double>(INFINITY)}) {
     apps::Adam adam({{1, 1.0}}, {.explosion = explosion});

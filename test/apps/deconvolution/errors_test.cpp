@@ -1,4 +1,4 @@
-// What deconvolution says to bad input: one line in four parts, status 1, and no file left behind.
+// Tests the errors of deconvolution for bad input: one line in four parts, status 1, and no file left behind.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -29,7 +29,7 @@ TEST_F(DeconvolutionErrors, PicturesThatAreTooSmallOrNoNumbers) {
   refused_input(folder_ / "nan.exr", {"nan.exr", "every sample must be a finite number"});
 }
 
-// A header that promises more pixels than there may be, and none behind it.
+// A header that promises more pixels than are allowed, without any pixels after it.
 TEST_F(DeconvolutionErrors, HugePictures) {
   std::ofstream(folder_ / "huge.ppm") << "P6\n100000 100000\n255\n";
   refused_input(folder_ / "huge.ppm", {"huge.ppm"});

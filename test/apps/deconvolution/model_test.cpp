@@ -1,5 +1,5 @@
-// deconvolution, its parts: point-spread functions, simulated problems; a stage's energy, its gradient and its minimum
-// against plain C++; what is learned, and by which gradient.
+// Tests the parts of deconvolution: point-spread functions and simulated problems. A stage's energy, its gradient and
+// its minimum are compared with plain C++. Also tests what is learned, and by which gradient.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -85,12 +85,12 @@ TEST(Simulation, BlursWithoutABorder) {
   one.add(luma, shift, 0, random);
   EXPECT_EQ(one.problem.extent.width, 22);
   EXPECT_EQ(one.problem.extent.height, 18);
-  // k * x at (1, 1) of the photograph is x there less (1, -1).
+  // k * x at (1, 1) of the photograph is x at that point minus (1, -1).
   EXPECT_FLOAT_EQ(one.problem.blurred[0], luma.at(0, 2));
   EXPECT_FLOAT_EQ(one.truth[0], luma.at(1, 1));
 }
 
-// A problem of two images with functions and noise of their own.
+// A problem of two images, each with its own point-spread function and noise.
 Simulated small_problem(int width, int height, int psf) {
   Simulated problem;
   Random random(7);

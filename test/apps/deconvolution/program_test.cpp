@@ -1,5 +1,5 @@
-// deconvolution, the program: from a photograph or a folder of them to pictures, weights and a report; what stops it
-// and goes on.
+// Runs deconvolution from a photograph or a folder of photographs to pictures, weights and a report. Also tests
+// stopping and resuming.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -37,7 +37,7 @@ class DeconvolutionProgram : public testing::Test {
       photograph("set/" + std::to_string(k) + ".png", 100 + 2 * k, 102, k);
     return folder_.path() / "set";
   }
-  // Of a run in this process on a small picture; the folder is there.
+  // Options for a run in this process on a small picture; the output folder exists.
   Options of_a_picture() {
     Options options;
     options.common.input = photograph("a.png", 60, 50);
@@ -72,7 +72,7 @@ TEST_F(DeconvolutionProgram, BlursAPhotographAndMakesItSharp) {
   const json own = report();
   EXPECT_GT(own["picture"]["original"], own["picture"]["blurred"]);
   EXPECT_GT(own["picture"]["learned"], own["picture"]["original"]);
-  // A disc of this radius has five samples a side, and two pixels of each border are not seen.
+  // A disc of this radius has five samples on each side, so two pixels at each border are not observed.
   EXPECT_EQ(own["width"], 86);
   EXPECT_EQ(own["height"], 66);
   EXPECT_EQ(apps::read_image(out() / "result.png").width, 86);
@@ -167,7 +167,8 @@ TEST_F(DeconvolutionProgram, StopsBeforeTheNextIterationWithTheBestOfEachChannel
       if (now == method && channel == c && count == iterations) apps::request_stop();
     };
   };
-  // Green of the second method: red is its own, the others are the first one's.
+  // Stops at green of the second method: red is the second method's result, the other channels are still the first
+  // one's.
   const long half = deconvolve_input(options, methods, second, stop_at("other", 1, 3));
   apps::request_stop(false);
   EXPECT_EQ(heard, 0);
@@ -179,7 +180,7 @@ TEST_F(DeconvolutionProgram, StopsBeforeTheNextIterationWithTheBestOfEachChannel
   EXPECT_EQ(second.own["picture"]["original"], whole.own["picture"]["original"]);
   EXPECT_GT(second.own["picture"]["best so far"], second.own["picture"]["blurred"]);
 
-  // Green of the first method: as far as it came, and blue is blurred.
+  // Stops at green of the first method: green is a partial result, and blue is still blurred.
   fs::remove(out() / "original.png");
   deconvolve_input(options, methods, first, stop_at("original", 1, 3));
   apps::request_stop(false);
@@ -192,7 +193,7 @@ TEST_F(DeconvolutionProgram, StopsBeforeTheNextIterationWithTheBestOfEachChannel
 }
 
 TEST_F(DeconvolutionProgram, ChecksItself) {
-  // Few numbers for the table of inexact solutions, of which nothing is required.
+  // The table of inexact solutions gets few numbers, because the test does not depend on them.
   const fs::path weights = folder_.path() / "weights.json";
   write_weights(weights, learning_start({.filters = 6, .size = 3, .bumps = 4}, 2), "a test");
   run({"--input", photograph("a.png", 60, 50), "--check-gradients", "--weights", weights});
@@ -200,7 +201,7 @@ TEST_F(DeconvolutionProgram, ChecksItself) {
 }
 
 TEST_F(DeconvolutionProgram, SurvivesExtremes) {
-  // Where there is hardly any noise, float32 is too short for what is hardly seen.
+  // With hardly any noise, float32 is too short for components that the blur almost removes.
   for (const apps::StabilityRow& row : stability_rows(1, 2, 2)) {
     EXPECT_LT(row.primal_error, 0.1) << row.name;
     EXPECT_FALSE(std::isnan(row.gradient_error)) << row.name;

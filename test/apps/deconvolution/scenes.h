@@ -1,4 +1,4 @@
-// scenes.h -- pictures with edges and texture for the tests of deconvolution.
+// scenes.h -- test pictures for deconvolution, with edges and texture.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// What demosaic says to bad input: one line in four parts, status 1, and no file left behind.
+// Tests the errors of demosaic for bad input: one line in four parts, status 1, and no file left behind.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

@@ -1,4 +1,4 @@
-// demosaic: its pipelines against plain C++, what learning does, and the program on small pictures.
+// Tests demosaic: its pipelines against plain C++, the effect of learning, and the program on small pictures.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace demosaic;
 
-// Stripes and edges in several directions and colours, with a little noise.
+// A picture with stripes and edges in several directions and colours, and a little noise.
 Photograph picture(int width, int height, unsigned seed = 1) {
   std::mt19937 random(seed);
   Photograph result{"picture", width, height, 8, {}};
@@ -50,7 +50,7 @@ Weights shaken(const Shape& shape, unsigned seed) {
   return weights;
 }
 
-// How many samples differ by more than `tolerance`.
+// The number of samples that differ by more than `tolerance`.
 size_t differing(const std::vector<float>& got, const std::vector<double>& wanted,
                  double tolerance) {
   EXPECT_EQ(got.size(), wanted.size());
@@ -75,8 +75,8 @@ TEST(DemosaicPipelines, BilinearIsThatOfPlainLoops) {
   }
 }
 
-// Whether a count of homogeneity is one more or less hangs on rounding: a few pixels may differ, and in
-// 2 x 2 pixels, which mirrors make a texture of ties, all may.
+// Rounding may change a homogeneity count by one, so a few pixels may differ. In 2 x 2 pixels all may differ, because
+// mirroring makes a texture of ties.
 TEST(DemosaicPipelines, AhdIsThatOfPlainLoops) {
   Demosaicker method = Demosaicker::ahd(2);
   for (const Sized& size : sizes) {
@@ -132,7 +132,7 @@ TEST(DemosaicPipelines, AFlatGrayFrameStaysItself) {
   }
 }
 
-// Rows alternate in gray: a method that interpolates along them makes no error, one across them does.
+// Rows alternate in gray: interpolation along them makes no error, interpolation across them does.
 TEST(DemosaicPipelines, AhdFollowsStripesWhereBilinearBlursThem) {
   Photograph stripes{"stripes", 40, 40, 8, {}};
   for (int n = 0; n < 3 * 1600; ++n) {
@@ -164,7 +164,7 @@ TEST(DemosaicWeights, AreKeptInAFile) {
   }
 }
 
-// Whole arrays of finite numbers, as read_weights() holds files to, under the name of their shape.
+// All weights are finite, and arrays are complete, as read_weights() requires, under the name of their shape.
 TEST(DemosaicWeights, EveryShippedFileLoads) {
   size_t files = 0;
   for (const auto& entry : fs::directory_iterator(DEMOSAIC_WEIGHTS)) {
@@ -227,7 +227,7 @@ TEST_F(DemosaicLearning, MovesOnlyTheGroupsThatItIsTold) {
   }
 }
 
-// The gradient of what is not learned is not part of the program.
+// Gradients by groups that are not learned are not part of the program.
 TEST_F(DemosaicLearning, ComputesOnlyWhatItsGroupsNeed) {
   const auto chosen = options();
   const TrainingPipeline all({2, 5}, chosen.batch, group_names);
@@ -243,14 +243,15 @@ class DemosaicProgram : public testing::Test {
     return folder_ / name;
   }
 
-  // What a sensor sees of it, in one channel: the program runs the relaxed method alone.
+  // Writes a sensor's view of the photograph in one channel. Given such a file, the program runs the relaxed method
+  // alone.
   fs::path write_mosaic(const std::string& name, const Photograph& photograph) {
     apps::write_image(folder_ / name,
                       {photograph.width, photograph.height, 8, mosaic_of(photograph), 1});
     return folder_ / name;
   }
 
-  // Weights as they are before anything is learned.
+  // Writes the initial weights, before any learning.
   fs::path start() {
     Weights weights({2, 5});
     write_weights(folder_ / "start.json", weights, "the start");
@@ -299,7 +300,7 @@ TEST_P(DemosaicShapes, TakeTheirShippedWeights) {
 INSTANTIATE_TEST_SUITE_P(Shipped, DemosaicShapes,
                          testing::Values(std::pair{"2", "7"}, std::pair{"15", "5"}));
 
-// The same scene behind each of the four mosaics: colours must come out alike, also in odd sizes.
+// The same scene behind each of the four mosaics must give the same colours, also in odd sizes.
 TEST_F(DemosaicProgram, KnowsTheFourMosaics) {
   const int width = 33, height = 27;
   for (const std::string pattern : {"RGGB", "GRBG", "GBRG", "BGGR"}) {

@@ -1,4 +1,4 @@
-// What fluid says to bad input: one line in four parts, status 1, and no result left behind.
+// Tests the errors of fluid for bad input: one line in four parts, status 1, and no result left behind.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -146,7 +146,7 @@ TEST_F(FluidErrors, TheOutputMustBeAFolder) {
 }
 
 TEST_F(FluidErrors, AnUnwritableFolderIsFoundBeforeTheRun) {
-  // Root may write anywhere but where no file can be made.
+  // Root may write anywhere except where no file can be created.
   const fs::path folder = getuid() == 0 ? fs::path("/proc") : out();
   if (getuid() != 0) {
     fs::create_directories(folder);
@@ -158,7 +158,7 @@ TEST_F(FluidErrors, AnUnwritableFolderIsFoundBeforeTheRun) {
 }
 
 TEST_F(FluidErrors, FilesThatMayNotGrowAreNotLeftHalfWritten) {
-  // In blocks of 512 bytes: enough for the trial file, not for a state.
+  // The limit is in blocks of 512 bytes: enough for the trial file, too little for a state.
   run("--frames 4 --force-nodes 0 --steps 1 --input " + picture_.string() + " --output " +
           out().string(),
       "ulimit -f 8;");

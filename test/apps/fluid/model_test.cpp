@@ -1,5 +1,5 @@
-// The fluid's frame keeps what Stam's method promises, its adjoint is right, and going back in time
-// gives the same bits from any number of kept states.
+// Tests the model of fluid: a frame has the properties of Stam's method, its adjoint is right, and the reverse sweep
+// gives the same bits for any number of kept states.
 #include <OpenImageIO/imageio.h>
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ namespace {
 
 using namespace fluid;
 
-// A blob on the left that shall be one on the right.
+// A blob on the left that is to become one on the right.
 Scene scene_of(int width, int height, int frames, int nodes) {
   Scene scene;
   scene.shape = {.width = width, .height = height, .force_width = nodes, .force_height = nodes};
@@ -111,7 +111,7 @@ TEST(FluidCheckpoints, RunEveryFrameBackwardInOrderFromAStateThatIsThere) {
   }
 }
 
-// By trying every cut of every length: the least number of frames.
+// The smallest number of frames, by trying every split of every length.
 TEST(FluidCheckpoints, AdvanceAsFewFramesAsPossible) {
   constexpr int most_frames = 60, most_slots = 12;
   std::vector<std::vector<int64_t>> least(most_frames + 1, std::vector<int64_t>(most_slots + 1, 0));

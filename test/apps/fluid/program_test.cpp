@@ -1,5 +1,4 @@
-// fluid on small pictures: it ends well, its report keeps its promises, and it goes on where it was
-// stopped.
+// Runs fluid on small pictures: it succeeds, its report agrees with its results, and it resumes after a stop.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -25,7 +24,7 @@ class Fluid : public testing::Test {
  protected:
   void SetUp() override { picture_ = write_bar("bar.png", 20, 16); }
 
-  // A bright bar on the right half.
+  // Writes a picture with a bright bar on the right half.
   fs::path write_bar(const std::string& name, int width, int height) {
     apps::Image image{width, height, 8, {}};
     for (int y = 0; y < height; ++y) {
@@ -116,7 +115,7 @@ TEST_F(Fluid, MovesOnlyWhatItIsAskedTo) {
 }
 
 TEST_F(Fluid, GoesOnAsIfItHadNotStopped) {
-  // The rate falls with the total number of steps, so that is given to all runs.
+  // The rate decreases over the total number of steps, so all runs get the same total.
   const auto whole = run(with(force_only, {"--steps", "12"}), "whole");
   const Words limited = with(force_only, {"--steps", "12", "--seconds", "0.000001"});
   run(limited, "parts");  // stops after a step: its time is over
@@ -133,7 +132,7 @@ TEST_F(Fluid, TakesItsForceFromAnotherRun) {
                            "time_step", "--viscosity", "0", "--diffusion", "0", "--steps", "5"},
                           "second");
   EXPECT_EQ(second["fluid"]["variables"], 1);
-  // The force is no longer paid for, but the smoke is where it was.
+  // The loss no longer includes the cost of the force, but the smoke is where it was.
   EXPECT_NEAR(second["fluid"]["psnr_initial_db"].get<double>(),
               report("first")["fluid"]["psnr_final_db"].get<double>(), 0.01);
 }

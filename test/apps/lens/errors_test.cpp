@@ -1,5 +1,5 @@
-// What lens says to prescriptions that cannot be made and to bad options: one line in four parts, status 1,
-// and no results.
+// Tests the errors of lens for impossible prescriptions and bad options: one line in four parts, status 1, and no
+// results.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -40,7 +40,7 @@ class AppLensErrors : public AppErrors {
 TEST_F(AppLensErrors, OtherFilesAreNoPrescriptions) {
   refuse_text("", {"a prescription is JSON"});
   refuse_text("{\"surfaces\": [", {"a prescription is JSON"});
-  // What they are is said, and nothing of them that no terminal shows.
+  // The message says that the file is binary, without printing bytes that a terminal cannot show.
   for (const std::string binary :
        {"\x89PNG\r\n\x1a\n", "{\"name\": \"\xc3\x28\"}", "{\"\x1b[31m\": 1}",
         "{\"\xc2\x9b"

@@ -1,5 +1,5 @@
-// lens: paraxial numbers of the patent, the pipeline against the reference, exact images of conics, features
-// that vanish, and the program itself.
+// Tests lens: paraxial numbers of the patent, the pipeline against the reference, exact images of conics, vanishing
+// features, and the program itself.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,8 +23,8 @@ using lens::Surface;
 
 const char* const tessar_file = LENS_PRESCRIPTIONS "/tessar_1903.json";
 
-// A plano-convex glass whose back turns light from the axis into one point exactly: a hyperboloid with
-// k = -n^2 (R. Descartes, La Geometrie, 1637, book 2).
+// A plano-convex lens whose rear surface focuses light from the axis into exactly one point: a hyperboloid with k =
+// -n^2 (R. Descartes, La Geometrie, 1637, book 2).
 Lens perfect_on_axis() {
   Lens lens;
   lens.name = "hyperboloid";
@@ -45,7 +45,7 @@ double largest(const std::vector<double>& values) {
 TEST(AppLens, TheTessarHasThePatentsFocalLengthAndAperture) {
   const Lens tessar = lens::read_lens(tessar_file);
   const lens::Paraxial p = lens::paraxial(tessar);
-  // Printed: 1; with its three digits, 0.9925 (the scale is 100).
+  // The patent prints 1; its three digits give 0.9925 (the scale is 100).
   EXPECT_NEAR(p.focal_length(), 99.25, 0.02);
   EXPECT_NEAR(p.back_focus, 90.7, 0.05);
   EXPECT_EQ(tessar.f_number, 5.5);
@@ -56,7 +56,7 @@ TEST(AppLens, TheTessarHasThePatentsFocalLengthAndAperture) {
 }
 
 TEST(AppLens, AFastAxialRayOfTheTessarLeavesWithItsFNumber) {
-  // The sine of the angle at the image is 1 / (2 N), but for what aberrations there are.
+  // The sine of the angle at the image is 1 / (2 N), apart from aberrations.
   const Lens tessar = lens::read_lens(tessar_file);
   const double radius = lens::paraxial(tessar).focal_length() / tessar.f_number / 2;
   const auto ray = lens::trace_ray(tessar, 0, 0, 1, radius, lens::line_d);
@@ -74,7 +74,7 @@ TEST(AppLens, AHyperboloidImagesTheAxisInOnePoint) {
     ASSERT_EQ(ray.fate, lens::Fate::Arrived);
     EXPECT_NEAR(std::hypot(ray.x(), ray.y()), 0, 1e-9);
   }
-  // A sphere does not.
+  // A spherical surface does not focus into one point.
   lens.surfaces[2].conic = 0;
   EXPECT_GT(std::abs(lens::trace_ray(lens, 0, 0, 1, 25, lens::line_d).y()), 0.5);
 }
@@ -91,7 +91,7 @@ TEST(AppLens, RaysMissAndAreTotallyReflected) {
 }
 
 TEST(AppLens, ThePupilsRuleIntegratesPolynomials) {
-  // Over the unit disc, of radius^2: 1/2; of x^2 y^2: 1/24.
+  // Mean values over the unit disc: 1/2 for radius^2, 1/24 for x^2 y^2.
   double weight = 0, square = 0, product = 0;
   for (const auto& p : lens::pupil_points(3, 6)) {
     weight += p.weight;
@@ -103,7 +103,7 @@ TEST(AppLens, ThePupilsRuleIntegratesPolynomials) {
   EXPECT_NEAR(product, 1.0 / 24, 1e-14);
 }
 
-// Every ray of the pipeline, against the reference: the lens with all features, moved off its start.
+// Compares every ray of the pipeline with the reference, on the lens with all features, moved away from its start.
 TEST(AppLens, ThePipelineTracesAsTheReferenceDoes) {
   const Lens tessar = lens::read_lens(tessar_file);
   const lens::Scene scene = lens::make_scene(tessar, {.optimize = lens::groups, .fields = 3});
@@ -139,7 +139,7 @@ TEST(AppLens, ThePipelineTracesAsTheReferenceDoes) {
   EXPECT_GT(lost, 20);
 }
 
-// What is between the whole pipeline and a test of its derivatives: a scene off the kinks of its hinges.
+// A scene for derivatives of the complete pipeline, away from the kinks of its hinge functions.
 class AppLensDerivatives : public testing::Test {
  protected:
   AppLensDerivatives() {
@@ -169,7 +169,7 @@ TEST_F(AppLensDerivatives, AgreeWithDifferences) {
   EXPECT_LT(worst, 1e-6 * largest(gradient));
 }
 
-// Of a small lens: the product of a Tessar takes seconds to compile.
+// Uses a small lens, because the Hessian-vector product of a Tessar takes seconds to compile.
 TEST(AppLensHessian, ProductsAgreeWithDifferencesOfGradients) {
   Lens singlet = perfect_on_axis();
   singlet.half_field_degrees = 8;
@@ -261,7 +261,7 @@ TEST_F(AppLensProgram, ShortensDrawsAndReports) {
   for (const char* picture :
        {"lens_before.png", "lens_after.png", "spots.png", "error_vs_time.png"})
     EXPECT_GT(apps::read_image(out() / picture).width, 400) << picture;
-  // What came out is a prescription again.
+  // The result is a valid prescription again.
   EXPECT_NEAR(lens::read_lens(out() / "result.json").length(), report()["numbers"][0]["value"],
               1e-3);
 }
@@ -276,7 +276,7 @@ TEST_F(AppLensProgram, GoesOnWhereItWas) {
       << other.output;
 }
 
-// The signal comes while it optimizes: what was found until then is written, and the status is 0.
+// The signal arrives during the optimization: the program writes the best result so far, and its status is 0.
 TEST_F(AppLensProgram, StopsInGoodOrder) {
   const apps::Outcome outcome = apps::run_program(
       {"timeout", "--preserve-status", "-s", "INT", "3", LENS_PROGRAM, "--input", tessar_file,

@@ -1,5 +1,5 @@
-// What both sides of the table do, in the language that is visible where this is included. The side
-// gives `adjoint_of`, `depends_on_reduction` and `iterations_of`.
+// Code that both sides of the table share, in the language (Halide or Retrograde) that is visible where this file is
+// included. The including side defines `adjoint_of`, `depends_on_reduction` and `iterations_of`.
 
 static Region region_of(const std::vector<int>& extents) {
   Region region;
@@ -7,7 +7,7 @@ static Region region_of(const std::vector<int>& extents) {
   return region;
 }
 
-// in(...) is the image; what lies outside of it is never read.
+// in(...) is the image; elements outside of it are never read.
 static Func wrapped(const Buffer<float>& image) {
   Func in("in");
   std::vector<Var> args(static_cast<size_t>(image.dimensions()));
@@ -24,7 +24,7 @@ static Func seed_of(const std::vector<int>& extents) {
     number = number + args[d] * stride;
     stride *= extents[d];
   }
-  // Zero outside of the output: Halide 14 reads the seed there.
+  // Zero outside of the output, because Halide 14 reads the seed there.
   Expr inside = cast<bool>(1);
   for (size_t d = 0; d < extents.size(); ++d)
     inside = inside && args[d] >= 0 && args[d] < extents[d];
@@ -32,7 +32,7 @@ static Func seed_of(const std::vector<int>& extents) {
   return seed;
 }
 
-// On a ring around the input too: Halide 14's scatters write there.
+// Also computed on a ring around the input, because Halide 14's scatters write there.
 static std::vector<float> realized_on(Func adjoint, const std::vector<int>& extents) {
   const int ring = 16;
   std::vector<int> mins, wide;

@@ -1,4 +1,4 @@
-// The access patterns in Halide 14.
+// Differentiates the access patterns of the table with Halide 14.
 #include <Halide.h>
 
 #include "gradient/access_table/side.h"
@@ -7,8 +7,7 @@ namespace access_table {
 namespace in_halide {
 using namespace Halide;
 
-// Halide 14 takes any AVX512-BF16 machine for a Sapphire Rapids, and emits instructions that others
-// lack.
+// Halide 14 takes any machine with AVX512-BF16 for a Sapphire Rapids, and emits instructions that other machines lack.
 static Target jit_target() {
   return get_jit_target_from_environment().without_feature(Target::AVX512_SapphireRapids);
 }
@@ -39,7 +38,7 @@ static long iterations_of(const RVar& r) {
 }
 
 #include "gradient/access_table/patterns.h"
-// Needs the patterns.
+// Must follow the inclusion of the patterns.
 #include "gradient/access_table/common.h"
 }  // namespace in_halide
 

@@ -1,5 +1,5 @@
-// The access patterns. Included inside a namespace of its own, after the language (Halide or
-// Retrograde) has been made visible there: nothing here names it.
+// The access patterns of the table, written in the subset that Halide and Retrograde share. This file is included
+// inside a namespace in which the names of one of the two languages are visible.
 
 struct Pattern {
   Description description;
@@ -19,7 +19,7 @@ static Func summed(const Expr& term, const std::vector<Var>& args) {
   out(args) += term;
   return out;
 }
-// Integers that no analysis can know: 0, 1, 2, ... scrambled, below `bound`.
+// Integers that no analysis can know: a permutation of 0, 1, 2, ... below `bound`.
 static Expr data(const Expr& i, int bound) {
   static Func table("table");
   static Var t("t");

@@ -1,4 +1,5 @@
-// The access patterns in Retrograde, and their oracle in its interpreter.
+// Differentiates the access patterns of the table with Retrograde, and computes the expected gradients in its
+// interpreter.
 #include <retrograde/retrograde.h>
 
 #include "gradient/access_table/side.h"
@@ -31,7 +32,7 @@ static long iterations_of(const RVar& r) {
 }
 
 #include "gradient/access_table/patterns.h"
-// Needs the patterns.
+// Must follow the inclusion of the patterns.
 #include "gradient/access_table/common.h"
 
 static std::vector<double> realized(const Func& f, const std::vector<int>& extents) {

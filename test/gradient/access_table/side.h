@@ -1,4 +1,4 @@
-// The list of access patterns seen from the test: how each of two languages differentiates them.
+// The interface between the test of access patterns and the two languages that differentiate them.
 #pragma once
 
 #include <string>
@@ -6,17 +6,17 @@
 
 namespace access_table {
 
-// How one update of an adjoint gets its sums.
+// How one update of an adjoint accumulates its sums.
 struct UpdateShape {
   bool is_gather =
       true;             // no index on its left-hand side runs over its reduction or depends on data
-  long iterations = 1;  // of its reduction domain, for each element; -1: parametric
+  long iterations = 1;  // iterations of its reduction domain for each element; -1: parametric
 };
 
 struct Outcome {
   std::string error;  // empty: there is a gradient
   std::vector<UpdateShape> updates;
-  std::vector<float> gradient;  // of the input, dimension 0 innermost
+  std::vector<float> gradient;  // the adjoint of the input, dimension 0 innermost
 
   bool is_gather() const {
     for (const UpdateShape& u : updates) {
@@ -26,11 +26,11 @@ struct Outcome {
   }
 };
 
-// The class of an access for an analysis of integer sets.
+// The class of an access in the terms of integer set analysis.
 enum class Nature {
   QuasiAffine,   // piecewise affine with floors of constants: a gather exists
   Determined,    // data, but only of variables that the other indices determine: a gather exists
-  DataDependent  // data decide the place: a scatter, inside the determined dimensions
+  DataDependent  // data-dependent indices: a scatter, inside the determined dimensions
 };
 
 struct Description {
@@ -40,12 +40,12 @@ struct Description {
 };
 std::vector<Description> descriptions();
 
-// The adjoint of the input for the seed (37 i + 11) % 17 - 8 at the i-th element of the output.
+// The adjoint of the input. The seed at the i-th element of the output is (37 i + 11) % 17 - 8.
 Outcome differentiate_in_halide(size_t pattern);
 Outcome differentiate_in_retrograde(size_t pattern);
 
-// The same gradient without differentiating anything: every pattern is linear in its input, so one
-// evaluation of the pipeline on each unit vector gives a column of its matrix.
+// The same gradient without differentiation. Every pattern is linear in its input, so one evaluation of the pipeline on
+// each unit vector gives a column of its matrix.
 std::vector<float> gradient_by_columns(size_t pattern);
 
 }  // namespace access_table

@@ -1,7 +1,9 @@
-// Programs made to break propagate_adjoints: a fixed set of them has right gradients or is refused,
-// by the oracle of adversary/check.h (differences in double, forward against reverse mode, machine
-// code against the interpreter). And the oracle itself: it finds a gradient that is wrong, knows a
-// kink, and a failing list of choices shrinks to the smallest one. fuzz_adjoints runs many more.
+// Tests propagate_adjoints on random programs that are designed to break it. Each gradient in a fixed set is right or
+// refused, according to the oracle of adversary/check.h (differences in double, forward against reverse mode, machine
+// code against the interpreter).
+//
+// The oracle itself is tested as well: it finds a wrong gradient, recognises a kink, and shrinks a failing list of
+// choices to the smallest one. fuzz_adjoints runs many more programs.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -33,15 +35,15 @@ TEST_P(Adversary, IsRightOrRefused) {
     const Judged judged = judge(choices, i % one_compiled_of == 0);
     EXPECT_LT(judged.judgement, Judgement::Wrong)
         << "fuzz_adjoints --seed " << seed << ": " << judged.detail;
-    checked += judged.judgement <= Judgement::Kink;  // forward agrees with reverse
+    checked += judged.judgement <= Judgement::Kink;  // forward mode agrees with reverse mode
   }
   EXPECT_GT(checked, programs_per_shard / 2);
 }
 
 INSTANTIATE_TEST_SUITE_P(Shard, Adversary, ::testing::Range(0u, shards, step));
 
-// Under random schedules: what two threads computed in memory of both (4402864), read before it was
-// there (4300969), and never computed (4400916).
+// Regressions found under random schedules, by seed: two threads computed into shared memory (4402864), a value was
+// read before it was written (4300969), and a value was never computed (4400916).
 TEST(AdversaryFindings, ProgramsWhoseMachineCodeWasWrongAreRight) {
   for (const unsigned seed : {4300969u, 4400916u, 4402864u}) {
     for (int run = 0; run < 3; ++run) {
@@ -91,7 +93,7 @@ TEST(AdversaryOracle, KnowsAKinkAndAJump) {
   EXPECT_EQ(judge_pointwise(jump, 0.5f).judgement, Judgement::Kink);
 }
 
-// Along any direction the median of equal elements has the same slope on both sides.
+// Along any direction, the median of equal elements has the same slope on both sides.
 TEST(AdversaryOracle, KnowsTheKinkOfAMedian) {
   const auto median = [](const Buffer<float>& image) {
     const Expr a = image(x), b = image((x + 1) % natural_size), c = image((x + 2) % natural_size);
@@ -124,7 +126,7 @@ TEST(AdversaryChoices, ShrinkToTheSmallestListThatFails) {
   EXPECT_EQ(fuzz::shrink_choices(list, has_large_pair), (std::vector<uint32_t>{5, 7}));
 }
 
-// A sanitizer ends a process by an exit code, which is no result.
+// A sanitizer ends a process with an exit code, which must not be taken for a result.
 TEST(RunApart, AProcessThatExitsOnItsOwnIsACrash) {
   for (int code : {0, 1}) {
     const fuzz::ApartResult exited = fuzz::run_apart({}, [&](std::string&) -> int { _exit(code); });
@@ -139,7 +141,7 @@ TEST(RunApart, AProcessThatExitsOnItsOwnIsACrash) {
   EXPECT_EQ(returned.detail, "seen");
 }
 
-// Nothing that the process blocks or waits for keeps it beyond its time.
+// A process that blocks or waits is ended when its time is up.
 TEST(RunApart, AProcessThatStandsStillIsEnded) {
   const fuzz::ApartResult still = fuzz::run_apart({.seconds = 1}, [](std::string&) -> int {
     sigset_t all;
@@ -150,7 +152,7 @@ TEST(RunApart, AProcessThatStandsStillIsEnded) {
   EXPECT_TRUE(still.is_slow());
 }
 
-// Gradients as the compiler schedules them; fuzz_schedules runs many more.
+// Gradients under the compiler's own schedules; fuzz_schedules runs many more.
 class AutoScheduled : public ::testing::TestWithParam<unsigned> {};
 
 TEST_P(AutoScheduled, IsLegalRightAndTheSameForAnyThreads) {

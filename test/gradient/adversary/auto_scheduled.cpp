@@ -18,10 +18,10 @@ namespace {
 
 int memory_limit_percent = 0;
 
-// Beside which what threads have for themselves counts little.
+// Threads' private memory is negligible compared with this size.
 constexpr int64_t small_memory = 4 << 20;
 
-// Of two schedules that add in other orders, relative to the element and to all of its image. The
+// Tolerances for two schedules that add in different orders, relative to the element and to its whole image. The
 // gradient by a parameter is one sum of millions of terms, which may cancel each other.
 constexpr double other_rounding = 5e-3, of_few_sums = 5e-2;
 constexpr size_t few_sums = 64;
@@ -65,7 +65,7 @@ class AutoScheduled {
     if (!error.empty()) explain_refused(error);
     if (compiles_all_) expect_right(run(all_.own(), 2), " by default");
   }
-  // The bytes that are allocated for intermediate results.
+  // Returns the number of bytes that are allocated for intermediate results.
   int64_t compare_with_serial_loops() {
     const Pipeline scheduled = all_.copy();
     int64_t bytes = 0;
@@ -112,7 +112,7 @@ class AutoScheduled {
 
   // ---- schedules ----
 
-  // Scheduled now, or, by default, when it is compiled.
+  // Schedules now, or, by default, when the pipeline is compiled.
   void schedule(const Pipeline& pipeline) {
     if (!is_whole_) return Pipeline(pipeline).set_autoschedule(told_);
     source_ = pipeline.auto_schedule(get_jit_target_from_environment(), told_).schedule_source;
@@ -121,7 +121,7 @@ class AutoScheduled {
     for (const std::string& rule : rules_seen_in(outputs)) rules_.insert(rule);
   }
 
-  // A fresh copy with the text of the log.
+  // A fresh copy, scheduled from the text of the log.
   Pipeline replay_of(const Pipeline& scheduled) const {
     const ScheduleLog log = scheduled.schedule_log();
     if (source_.empty() && log.size() > 0)
@@ -142,8 +142,8 @@ class AutoScheduled {
       decide(Judgement::Wrong, "replayed, it has other loops: " + replayed.loop_nest());
   }
 
-  // What has no machine code must have none under the default schedule either. (Without any, it may
-  // take forever to compile.)
+  // A pipeline that is refused here must also be refused under the default schedule. (Without any schedule, it may take
+  // forever to compile.)
   [[noreturn]] void explain_refused(const std::string& why) const {
     const std::string also = error_of(
         [&] { extents_ == Extents::Huge ? all_.own().compile_jit() : (void)run(all_.own(), 1); });
@@ -198,7 +198,7 @@ class AutoScheduled {
     return measured.peak_bytes();
   }
 
-  // Values are floats.
+  // Compares float values.
   void expect_near(const Buffers& found, const Buffers& serial) const {
     for (size_t i = 0; i < found.size(); ++i) {
       const auto* a = reinterpret_cast<const float*>(found[i].data());

@@ -1,23 +1,24 @@
-// Random programs and all of their gradients as one pipeline, which the compiler schedules.
+// Checks the autoscheduler on random programs: one pipeline holds the program and all of its gradients.
 #pragma once
 
 #include "gradient/adversary/check.h"
 
 namespace retrograde::gradient {
 
-// The schedule that Pipeline::auto_schedule gives, or that a gradient gets when nobody asks, is legal
-// wherever the pipeline runs at all; as text and back it gives a fresh copy the same loops; results
-// agree with the interpreter, and have the same bits on 1, 2, 3 and 7 threads and when run again.
-// Extents are constant, one, parameters with and without estimates, or so large that the pipeline is
-// compiled only; decisions may be switched off. Large programs are checked at a small size so, and at
-// their own against serial loops. compiles_all: the replayed schedule is run too, and the one that a
-// gradient gets when nobody asks.
-// Counts: what was done, which rules were seen (schedule_rules.h), what used more memory than inputs,
-// outputs and twice the largest Func of the program.
+// Judges a schedule by Pipeline::auto_schedule, or the default schedule of a gradient. It must be legal wherever the
+// pipeline runs at all, and a fresh copy must get the same loops from its text. Results must agree with the
+// interpreter, and have the same bits on 1, 2, 3 and 7 threads and in repeated runs.
+//
+// Extents are constant, one, parameters with and without estimates, or so large that the pipeline is only compiled;
+// decisions may be switched off. Large programs are checked against the interpreter at a small size, and against serial
+// loops at their own size. With compiles_all, the replayed schedule and the default schedule of the gradient run too.
+//
+// The counts in the result say which checks ran, which rules were seen (schedule_rules.h), and which programs used more
+// memory than inputs, outputs and twice the largest Func of the program.
 Judged judge_auto_scheduled(Choices& choices, bool compiles_all);
 std::string auto_scheduled_text(Choices& choices);
 
-// A large program that uses more memory than so many percent of that is judged wrong; 0: none is.
+// Large programs that use more than `percent` of that memory are judged wrong; 0: no limit.
 void limit_memory(int percent);
 
 }  // namespace retrograde::gradient

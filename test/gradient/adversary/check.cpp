@@ -80,13 +80,13 @@ class Judge {
     const std::vector<AdjointInput> inputs = v_->inputs();
     for (size_t i = 0; i < inputs.size(); ++i) {
       const Func gradient = derivative_->of(inputs[i]);
-      // undefined: the output does not read it
+      // Undefined: the output does not read the input.
       if (gradient.defined()) check_around(gradient, v_->region(i));
       gradients_.push_back({gradient, v_->region(i)});
     }
   }
 
-  // The gradient is 0 in a ring around the region.
+  // The gradient must be 0 in a ring around the region.
   void check_around(const Func& gradient, const oracle::Region& region) {
     oracle::Region around = region;
     for (size_t d = 0; d < region.mins.size(); ++d) --around.mins[d], around.extents[d] += 2;
@@ -114,7 +114,7 @@ class Judge {
            text("forward and reverse mode differ ", where, ": ", jv, " and ", jtw.sum));
   }
 
-  // The adjoint of a Func against the tangent of what comes after it.
+  // Compares the adjoint of a Func with the tangent of the stages after it.
   void compare_along_func() {
     if (p_.funcs.size() < 2) return;
     const std::vector<graph::FuncPtr> order = graph::topological_order({p_.output().function()});
@@ -133,7 +133,7 @@ class Judge {
     compare(forward({{f, reading_inside(directions, *region, 0.0f)}}), product,
             "along " + f.name());
   }
-  // What is read of f; none when it has no constant bounds or is never read.
+  // The region of f that is read; none if it has no constant bounds or is never read.
   std::optional<oracle::Region> region_of(const Func& f,
                                           const std::vector<graph::FuncPtr>& order) const {
     analysis::Box box;
@@ -155,9 +155,9 @@ class Judge {
 
   // ---- differences ----
 
-  // False: it cannot be told here. A wrong gradient is wrong along any direction, and slopes add
-  // up, while kinks that cancel along one do not along another. Slopes at the median of three equal
-  // elements say the same on both sides along every direction, but they do not add up.
+  // Returns false if differences cannot decide. A wrong gradient is wrong along any direction, and slopes are additive,
+  // while kinks that cancel along one direction do not along another. At the median of three equal elements, both
+  // one-sided slopes agree along every direction, but slopes are not additive.
   bool compare_with_differences() {
     const Differences first = differences_along(*v_, reverse_);
     if (first.is_right() || !first.slope.is_smooth) return first.slope.is_smooth;
@@ -213,7 +213,7 @@ Judged guard(const F& f) {
   } catch (const Verdict& verdict) {
     return verdict.judged;
   } catch (const UserError& error) {
-    // An error in something that the compiler wrote itself is not the author's.
+    // An error in code that the compiler generated is not the author's fault.
     const bool of_synthesis = std::string(error.what()).find("_adj") != std::string::npos;
     const bool is_compilers = of_synthesis || fuzz::is_access_outside(error);
     return {is_compilers ? Judgement::Broken : Judgement::Refused, error.what()};

@@ -1,5 +1,5 @@
-// Whole matrices against one product for each column: a Jacobian of the output by an image, by
-// columns and by rows, and the Hessian of the weighted output, whose diagonal is also had alone.
+// Checks complete derivative matrices against one product for each column: the Jacobian of the output by an image, by
+// columns and by rows, and the Hessian of the weighted output, whose diagonal is also computed alone.
 #include <cmath>
 #include <ctime>
 
@@ -12,9 +12,9 @@ namespace retrograde::gradient {
 
 namespace {
 
-constexpr std::clock_t longest = 3 * CLOCKS_PER_SEC;  // of the columns of one matrix
+constexpr std::clock_t longest = 3 * CLOCKS_PER_SEC;  // time limit for the columns of one matrix
 
-// Both regions one after the other.
+// The product of two regions: the dimensions of `a`, then those of `b`.
 oracle::Region joined(const oracle::Region& a, const oracle::Region& b) {
   oracle::Region result = a;
   result.mins.insert(result.mins.end(), b.mins.begin(), b.mins.end());
@@ -70,7 +70,7 @@ class Dense {
   }
 
  private:
-  // matrix(y, x) against column(y) with 1 at x of the direction.
+  // Compares matrix(y, x) with column(y), which has 1 at x as its direction.
   void compare(const char* what, const Func& matrix, const Func& column,
                const oracle::Region& rows) {
     if (!matrix.defined() || !column.defined()) return;

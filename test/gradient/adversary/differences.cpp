@@ -1,4 +1,4 @@
-// Central differences with a bound on what they can tell.
+// Central differences with a bound on their accuracy.
 #include <cmath>
 
 #include "gradient/adversary/probe.h"
@@ -24,7 +24,7 @@ void for_each_node(const Func& output, ir::FunctionRef<void(const Expr&)> visit)
 }
 
 int narrowest_float(const Func& output) {
-  int bits = 64;  // of the mantissa, about
+  int bits = 64;  // the width of the type, a rough measure of its mantissa
   for_each_node(output, [&](const Expr& e) {
     if (e.type().is_float()) bits = std::min(bits, e.type().is_bfloat() ? 8 : e.type().bits());
   });

@@ -1,10 +1,10 @@
-// fuzz_adjoints -- looks for programs that propagate_adjoints gets wrong; its arguments:
-// support/fuzz.h.
+// fuzz_adjoints -- searches for programs that propagate_adjoints differentiates wrongly. support/fuzz.h describes its
+// arguments.
 #include "support/fuzz.h"
 #include "gradient/adversary/check.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr size_t memory_bytes = 0;  // their shadow takes address space
+constexpr size_t memory_bytes = 0;  // no limit: the sanitizers' shadow memory takes address space
 #else
 constexpr size_t memory_bytes = size_t{6} << 30;
 #endif

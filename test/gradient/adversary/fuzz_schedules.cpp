@@ -1,7 +1,7 @@
-// fuzz_schedules -- looks for programs whose gradients the compiler schedules wrongly; its
-// arguments: support/fuzz.h, and
+// fuzz_schedules -- searches for programs whose gradients the compiler schedules wrongly. support/fuzz.h describes its
+// arguments; this program adds
 //
-//   --memory PERCENT    a large program that uses more than so much of its memory is a finding
+//   --memory PERCENT    report a large program that uses more than this share of its memory limit
 #include <cstdlib>
 
 #include "gradient/adversary/auto_scheduled.h"

@@ -46,7 +46,7 @@ GradientPipeline::GradientPipeline(const AdversaryProgram& program, Extents exte
   }
 }
 
-// From -1 to 1, of no pattern that a program has.
+// Values from -1 to 1, in a pattern that no program contains.
 Buffer<float> GradientPipeline::seed(int k) const {
   Buffer<float> result(p_.region().extents, "w" + std::to_string(k));
   result.set_min(p_.region().mins);

@@ -1,4 +1,4 @@
-// A random program and all of its gradients as one pipeline.
+// Builds one pipeline from a random program and all of its gradients.
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,11 @@ namespace retrograde::gradient {
 
 using Buffers = std::vector<Buffer<>>;
 
-// How the region of the program's output is said.
+// How the region of the program's output is specified.
 enum class Extents : uint8_t {
   Constant,
-  One,         // element in each dimension
-  Parameters,  // known when it runs
+  One,         // one element in each dimension
+  Parameters,  // known when the pipeline runs
   Huge,        // too many elements along the last dimension to run: compiled only
   Estimated    // parameters, with estimates that are wrong
 };
@@ -28,15 +28,15 @@ class GradientPipeline {
 
   // A new copy of all Funcs, without directives.
   Pipeline copy() const;
-  // Of a copy that is scheduled: the same at root in serial loops, but for what is inlined there.
+  // The scheduled copy again, with its Funcs at root in serial loops, except those that it inlines.
   Pipeline in_serial_loops_like(const std::vector<graph::FuncPtr>& scheduled) const;
   Pipeline own() const { return Pipeline(outputs_); }
 
   const std::vector<Func>& outputs() const { return outputs_; }
   const std::vector<oracle::Region>& regions() const { return regions_; }
-  // Into memory that holds something else before.
+  // Runs the pipeline into buffers filled with garbage.
   Buffers realize(Pipeline pipeline, JITUserContext* context) const;
-  // Of the largest Func of the program whose size is known; of inputs and outputs.
+  // The size of the largest Func of the program whose size is known; below, the size of inputs and outputs.
   int64_t largest_bytes() const;
   int64_t callers_bytes() const;
 

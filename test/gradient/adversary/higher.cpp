@@ -1,5 +1,5 @@
-// Derivatives of derivatives along two directions u and v: by every order of the two modes, which
-// must agree, and against differences of <v, gradient> along u. Third ones along u, v and u.
+// Checks derivatives of derivatives along two directions u and v. Every order of the two modes must agree, with each
+// other and with differences of <v, gradient> along u. Third derivatives are taken along u, v and u.
 #include <cmath>
 
 #include "diagnostics/error.h"
@@ -47,7 +47,7 @@ class Higher {
     const Derivative d = propagate_adjoints(tangent(), s_.seed, s_.bounds(), s_.options());
     return u_.along([&](const AdjointInput& x) { return d.of(x); });
   }
-  // The derivative of the sum over inputs of <v, gradient>, one input at a time.
+  // The adjoint of an adjoint: the derivative of the sum over inputs of <v, gradient>, one input at a time.
   Product adjoint_of_adjoint() const {
     Product result;
     const std::vector<Direction> directions = v_.directions();
@@ -67,7 +67,7 @@ class Higher {
     return result;
   }
 
-  // A value that is not finite may be a pole of the second derivative; differences decide.
+  // A value that is not finite may be a pole of the second derivative; then differences decide.
   void compare(const char* what, const Product& a, const Product& b) const {
     if (!a.is_finite() || !b.is_finite()) return;
     const double slack = 1e-9 * (a.magnitude + b.magnitude + first_.magnitude + 1 + s_.largest);

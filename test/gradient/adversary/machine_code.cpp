@@ -1,5 +1,5 @@
-// Gradients as machine code: within the rounding that the interpreter allows for, and the same bits
-// on any number of threads; as they are, and under a random schedule.
+// Checks gradients as machine code: within the rounding that the interpreter allows for, and with the same bits on any
+// number of threads, both unscheduled and under a random schedule.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -23,7 +23,7 @@ class Compiled {
   Compiled(Subject& s, const Gradients& gradients)
       : s_(s), gradients_(gradients), has_fast_(uses_fast_functions(s.program.output())) {}
 
-  // False: nothing of the program runs as machine code.
+  // Returns false if no part of the program runs as machine code.
   bool compare_unscheduled() {
     for (const auto& [gradient, region] : gradients_) {
       oracle::InterpreterOptions options;
@@ -36,7 +36,7 @@ class Compiled {
         compare(expected_.size() - 1, "");
       } catch (const UserError& error) {
         decide_by_access(error);
-        // Machine code bounds what is read before it runs.
+        // Machine code computes the bounds of all reads before it runs.
         if (!primal_runs()) return false;
         decide(Judgement::Refused,
                std::string("its gradient has no machine code: ") + error.what());
@@ -45,7 +45,7 @@ class Compiled {
     return true;
   }
 
-  // How many of them have machine code under a schedule of their own.
+  // Returns the number of gradients that have machine code under a random schedule.
   int compare_scheduled(const Derivative& derivative) {
     std::vector<Func> funcs = derivative.funcs();
     if (s_.program.checks.primal)
@@ -57,7 +57,7 @@ class Compiled {
       try {
         compare(i, scheduled(gradients_[i], funcs, choices), ", scheduled");
         ++compared;
-      } catch (const UserError& error) {  // of the schedule
+      } catch (const UserError& error) {  // the schedule is refused
         decide_by_access(error);
       } catch (const Unsupported&) {
       }
@@ -65,7 +65,7 @@ class Compiled {
     return compared;
   }
 
-  // The same gradients of the same program with an extern stage in it.
+  // Compares the gradients with those of the same program with an extern stage.
   void compare_twin(const AdversaryProgram& twin) {
     AdjointOptions options = s_.program.options;
     for (size_t i = 0; i < twin.images.size(); ++i) options.wrt.push_back(twin.image(i));
@@ -92,7 +92,7 @@ class Compiled {
     }
   }
 
-  // A copy of the gradient, with a schedule for those of the Funcs that it is made of.
+  // A copy of the gradient, with a random schedule for the Funcs that it consists of.
   static Func scheduled(const std::pair<Func, oracle::Region>& gradient,
                         const std::vector<Func>& funcs, Choices& choices) {
     const graph::GraphCopy copy = graph::copy_graph({gradient.first.function()});
@@ -113,7 +113,7 @@ class Compiled {
 
   void compare(size_t i, const std::string& how) { compare(i, gradients_[i].first, how); }
   void compare(size_t i, const Func& gradient, const std::string& how) {
-    // Approximations are finite where the functions that they stand for have long overflowed.
+    // Fast approximations stay finite where the exact functions have long overflowed.
     if (has_fast_ && !is_finite(expected_[i])) return;
     const oracle::Region& region = gradients_[i].second;
     const int threads = 1 << s_.weights.below(4);
@@ -157,7 +157,7 @@ int compare_machine_code(Subject& s, const Derivative& derivative, const Gradien
   if (!code.compare_unscheduled()) return 0;
   try {
     if (twin) code.compare_twin(*twin);
-  } catch (const UserError& error) {  // what a C function reads must have bounds, and no versions
+  } catch (const UserError& error) {  // operands of a C function must have bounds, and no versions
     decide_by_access(error);
   } catch (const Unsupported&) {
   }

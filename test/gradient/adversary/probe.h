@@ -14,23 +14,23 @@ namespace retrograde::gradient {
 constexpr size_t max_points = size_t{1} << 17;
 constexpr uint64_t max_operations = 20'000'000;
 
-// Ends the judgement.
+// An exception that ends the judgement.
 struct Verdict {
   Judged judged;
 };
 [[noreturn]] void decide(Judgement judgement, const std::string& detail);
-// Breaks the compiler where the error is that of an access outside of its memory (Target::CheckedAccesses).
+// Judges the compiler as broken if the error reports an access outside of its own memory (Target::CheckedAccesses).
 void decide_by_access(const UserError& error);
 
-// sum a * b, and of the magnitudes.
+// The sum of a * b, and the sum of its magnitudes.
 struct Product {
   double sum = 0, magnitude = 0;
   void add(double a, double b);
   bool is_finite() const;
 };
 
-// Weights of all values of a box, from 1/4 to 7/4 and of either sign. No two are alike, so that
-// kinks of two elements do not cancel.
+// Weights of all values of a box, from 1/4 to 7/4 and of either sign. No two are equal, so that the kinks of two
+// elements do not cancel.
 class Weights {
  public:
   explicit Weights(uint64_t seed) : random_(seed) {}
@@ -47,12 +47,12 @@ class Weights {
 double as_double(const oracle::Value& v);
 double element(const Buffer<float>& buffer, const std::vector<int>& at);
 
-// In double. `evaluate` is for what was synthesized: when the program can be evaluated, its
-// derivative can, or it is wrong.
+// Both evaluate in double. `evaluate` is for generated Funcs: if the program can be evaluated, its derivative must be,
+// or it is judged wrong.
 std::vector<oracle::Array> interpret(const Func& f, const oracle::Region& region);
 std::vector<oracle::Array> evaluate(const Func& f, const oracle::Region& region);
 
-// sum weights * values of a Func over a region; integers count as 0.
+// The sum of weights * values of a Func over a region; integers count as 0.
 Product weighted(const std::vector<oracle::Array>& arrays, const oracle::Region& region,
                  const std::vector<Buffer<float>>& weights);
 
@@ -61,14 +61,15 @@ Func reading(const std::vector<Buffer<float>>& buffers, const std::string& name)
 Func reading_inside(const std::vector<Buffer<float>>& buffers, const oracle::Region& region,
                     float outside);
 
-// All inputs of a program, and by how much each element of them moves: by +1 or -1.
+// All inputs of a program, and the step of each of their elements: +1 or -1.
 class Motion {
  public:
   Motion(const AdversaryProgram& program, Weights& weights, const std::string& name);
   Motion operator+(const Motion& other) const;
   std::vector<AdjointInput> inputs() const;
   std::vector<Direction> directions() const;
-  oracle::Region region(size_t input) const;  // of input i; none of `scale`, the last
+  oracle::Region region(
+      size_t input) const;  // the region of input i; empty for `scale`, the last one
   void move(double by) const;
   // <gradients, directions>; `of` gives the gradient by an input, undefined where there is none.
   Product along(const std::function<Func(const AdjointInput&)>& of) const;
@@ -83,37 +84,38 @@ class Motion {
 struct Subject {
   const AdversaryProgram& program;
   Weights weights;
-  std::vector<Buffer<float>> w = {};  // of each value of the output
+  std::vector<Buffer<float>> w = {};  // one for each value of the output
   Func seed = {};
-  double largest = 0;  // of the magnitudes summed up in the primal
+  double largest = 0;  // the largest sum of magnitudes in the primal
   std::clock_t begun = std::clock();
   Region bounds() const;
-  AdjointOptions options() const;  // by inputs only
-  // The interpreter took long already: dear checks that are not begun are left out.
+  AdjointOptions options() const;  // options that request gradients by inputs only
+  // The interpreter has already taken long: expensive checks that have not begun are skipped.
   bool is_late() const;
 };
 
 // ---- differences ----
 
-// Whether a sine may turn within one step of differences, where slopes along the direction add up to
-// so much: to them it is noise, whatever its derivative is. sin(9^8 x) was found so.
+// Whether a sine may turn within one step of the differences, given the sum of slopes along the direction. Differences
+// see such a sine as noise, whatever its derivative is. (Found with sin(9^8 x).)
 bool turns_within_a_step(const Func& output, double slope);
 
-// The slope of f at 0, by sixth-order central differences; smooth: one-sided slopes say the same.
+// The slope of f at 0, by sixth-order central differences. is_smooth: one-sided slopes agree.
 struct Slope {
   double value, doubt;
   bool is_smooth;
 };
-// `scale`: of the errors of rounding relative to 1e-6. f gives its value at a place.
+// `scale`: of rounding errors, relative to 1e-6. f gives its value at a point.
 Slope slope_of(const std::function<double(double)>& f, double at_rest, double scale, double largest,
                double precision);
-// Of the narrowest floats of a program: partials have their digits, in double too.
+// The precision of the narrowest floats of a program. Partials have that precision, even if they are computed in
+// double.
 double precision_of(const Func& output);
 
 // ---- machine code ----
 
 Buffer<> room_for(const Type& type, const oracle::Region& region);
-// They approximate, and are finite where the functions that they stand for have long overflowed.
+// Fast functions are approximations, which stay finite where the exact functions have long overflowed.
 bool uses_fast_functions(const Func& output);
 bool is_finite(const oracle::Array& values);
 
@@ -123,8 +125,8 @@ void compare_higher(Subject& s, const Motion& v, const Derivative& derivative);
 void compare_dense(Subject& s);
 // The gradient by each input; undefined if the input is not read.
 using Gradients = std::vector<std::pair<Func, oracle::Region>>;
-// twin: null, or the same program with a stage that a C function computes.
-// How many gradients have machine code under a random schedule too.
+// Returns the number of gradients that also have machine code under a random schedule. twin: null, or the same program
+// with an extern stage.
 int compare_machine_code(Subject& s, const Derivative& derivative, const Gradients& gradients,
                          const AdversaryProgram* twin);
 

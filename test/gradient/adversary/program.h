@@ -1,4 +1,4 @@
-// Random programs that stress propagate_adjoints, and the checks that each gets.
+// Generates random programs that stress propagate_adjoints, and chooses the checks to run on each.
 #pragma once
 
 #include "testing/programs/program.h"
@@ -8,7 +8,7 @@ namespace retrograde::gradient {
 using fuzz::Choices;
 using fuzz::natural_size;
 
-// The checks of a program beside that of its gradient.
+// The checks of a program beyond the check of its gradient.
 struct AdversaryChecks {
   int order = 1;        // derivatives of derivatives, up to this one
   bool dense = false;   // Jacobian and Hessian by one image
@@ -23,8 +23,8 @@ struct AdversaryProgram : fuzz::RandomProgram {
   AdversaryChecks checks;
 };
 
-// UserError: the program is no legal one. as_extern: a C function computes the Func that may be a
-// stage.
+// Throws UserError if the choices describe no legal program. as_extern: a C function computes the Func that may be an
+// extern stage.
 AdversaryProgram make_adversary(Choices& choices, bool as_extern = false);
 AdversaryProgram make_adversary(Choices& choices, const fuzz::Style& style);
 

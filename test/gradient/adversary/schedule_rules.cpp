@@ -120,7 +120,7 @@ class RulesSeen {
     if (splits.size() == 1 && s > 0 && !f.args.empty() && runs_inside(loops, f.args[0]))
       seen_.insert("sums along rows");
   }
-  // The loop over the variable inside of one of a reduction.
+  // Whether the loop over the variable is inside of a reduction loop.
   static bool runs_inside(const std::vector<graph::Dim>& loops, const std::string& var) {
     bool is_inside = false;
     for (const graph::Dim& loop : loops) {

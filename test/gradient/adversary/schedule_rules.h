@@ -9,7 +9,7 @@
 
 namespace retrograde::gradient {
 
-// In words, by the traces that each leaves in directives and loops.
+// Descriptions of the rules, detected by the traces that each leaves in directives and loops.
 std::set<std::string> rules_seen_in(const std::vector<graph::FuncPtr>& outputs);
 
 }  // namespace retrograde::gradient

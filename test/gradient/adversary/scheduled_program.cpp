@@ -28,7 +28,7 @@ AutoscheduleOptions choose_options(Choices& choices) {
   return options;
 }
 
-// A few hundred states are no large program: its options are the default ones.
+// A program with a few hundred states does not count as large: it keeps the default options.
 AdversaryProgram large(Choices& choices, fuzz::LargeSizes sizes) {
   return {fuzz::make_large_program(choices, sizes), {}, false, {}};
 }
@@ -47,8 +47,9 @@ ScheduledProgram make_scheduled(Choices& choices) {
     result.small = large(again, fuzz::LargeSizes::Small);
     result.program = large(choices, fuzz::LargeSizes::Full);
   } else {
-    result.program = make_adversary(
-        choices, kind < 8 ? fuzz::Style::gradients() : fuzz::Style::pieces());  // of any size
+    result.program =
+        make_adversary(choices, kind < 8 ? fuzz::Style::gradients()
+                                         : fuzz::Style::pieces());  // programs of any size
   }
   std::vector<int>& sides = result.program.runs.front().front().extents;
   if (result.extents == Extents::One) std::fill(sides.begin(), sides.end(), 1);

@@ -1,4 +1,4 @@
-// Programs for the autoscheduler, with their options.
+// Generates random programs for the autoscheduler, with their options.
 #pragma once
 
 #include <optional>
@@ -12,12 +12,13 @@ struct ScheduledProgram {
   AdversaryProgram program;
   Extents extents = Extents::Constant;
   AutoscheduleOptions told = {};
-  bool is_whole = true;  // by Pipeline::auto_schedule(), not what a gradient gets by default
+  bool is_whole =
+      true;  // scheduled by Pipeline::auto_schedule() instead of the default schedule of gradients
   // For a large program: the same structure at a size that the interpreter can handle.
   std::optional<AdversaryProgram> small = {};
 };
 
-// UserError: the program is no legal one.
+// Throws UserError if the choices describe no legal program.
 ScheduledProgram make_scheduled(Choices& choices);
 std::string to_text(const ScheduledProgram& scheduled);
 

@@ -26,7 +26,7 @@ namespace {
 constexpr int places = 6;
 const char* const leaf_names[leaf_count] = {"x", "y", "z"};
 
-// Numbers of all magnitudes from 1e-3 to 4 and of either sign, rounded to the type.
+// Random numbers of all magnitudes from 1e-3 to 4 and of either sign, rounded to the type.
 Place place_of(std::mt19937_64& random, Type type) {
   Place at;
   std::uniform_real_distribution<double> exponent(-7, 1.4), sign(-1, 1);
@@ -37,7 +37,7 @@ Place place_of(std::mt19937_64& random, Type type) {
   return at;
 }
 
-// In the declared types.
+// The value of an expression, computed in its declared types.
 double evaluate_at(const Expr& root, const Place& at) {
   std::map<std::string, ir::Scalar> leaves;
   for (size_t k = 0; k < leaf_count; ++k)

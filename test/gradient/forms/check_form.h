@@ -1,5 +1,5 @@
-// One random expression: its gradient by the reverse sweep, the forward sweep, and as machine code,
-// against dual numbers.
+// Checks the gradient of one random expression against dual numbers: by the reverse sweep, by the forward sweep, and as
+// machine code.
 #pragma once
 
 #include <string>
@@ -19,7 +19,7 @@ struct FormResult {
   FormResult& operator+=(const FormResult& other);
 };
 
-// compile: as machine code too.
+// compile: also check machine code.
 FormResult check_form(const Expr& e, uint64_t seed, bool compile);
 
 }  // namespace retrograde::gradient

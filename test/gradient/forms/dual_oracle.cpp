@@ -34,19 +34,19 @@ struct Dual {
   std::array<Wide, leaf_count> d{};
 };
 
-// Units in the last place by which an operation may be off.
+// The error bound of one operation, in units in the last place.
 constexpr double units = 4;
 constexpr int trials = 8;
 
-// For each node: a bound on the error of its value.
+// A bound on the error of each node's value.
 using Spread = std::unordered_map<const ir::ExprNode*, Wide>;
 
 class Evaluation {
  public:
-  // epsilon: 0 for the true gradient.
+  // epsilon: the rounding error to simulate; 0 for the true gradient.
   Evaluation(const std::vector<Expr>& order, const Place& at, double epsilon, uint64_t seed)
       : order_(order), at_(at), epsilon_(epsilon), random_(seed) {}
-  // Values as `exact` has them, which partials see anywhere in `spread`.
+  // Takes values from `exact`; partials see them anywhere within `spread`.
   Evaluation(const Evaluation& exact, const Spread& spread, double epsilon, uint64_t seed)
       : order_(exact.order_),
         at_(exact.at_),
@@ -55,7 +55,7 @@ class Evaluation {
         exact_(&exact),
         spread_(&spread) {}
 
-  // False: a value is not finite, or leaves the normal range of its type.
+  // Returns false if a value is not finite, or leaves the normal range of its type.
   bool run() {
     for (const Expr& e : order_) {
       Dual result = value_of(e);
@@ -86,14 +86,14 @@ class Evaluation {
 
   double uniform() { return static_cast<double>(random_() >> 11) * 0x1p-52 - 1; }
   Wide nudge() { return epsilon_ == 0 ? 1 : 1 + static_cast<Wide>(epsilon_ * uniform()); }
-  // As an operation sees it.
+  // A value as an operation reads it.
   Dual operand(const Expr& e) {
     Dual result = of(e);
     if (spread_) result.v += spread_->at(e.get()) * static_cast<Wide>(uniform());
     return result;
   }
 
-  // phi(a, ...) with the partials by the operands.
+  // Applies an operation with the value v and the given partials by its operands.
   Dual combine(Wide v, const std::vector<std::pair<const Dual*, Wide>>& partials, bool is_exact) {
     Dual result;
     result.v = is_exact ? v : v * nudge();
@@ -180,7 +180,7 @@ class Evaluation {
         const Wide v = RETROGRADE_WIDE(hypot)(x, b.v);
         return combine(v, {{&a, x / v}, {&b, b.v / v}}, false);
       }
-      case Op::pow: {  // by a constant
+      case Op::pow: {  // the exponent is a constant
         const Wide p = operand(call.args[1]).v, v = RETROGRADE_WIDE(pow)(x, p);
         return combine(v, {{&a, p * RETROGRADE_WIDE(pow)(x, p - 1)}}, false);
       }

@@ -1,11 +1,10 @@
-// Gradients of one expression by dual numbers in more digits than the expression's own, and how far
-// rounding in its type may take them.
+// The gradient of one expression by dual numbers, in higher precision than the expression's own, and a bound on the
+// effect of rounding in its type.
 //
-// What rounding may do is found by doing it. First each operation's value is moved at random by a
-// few units in the last place of the type: how far the values of the nodes spread is how far the
-// program's own values are from the true ones. Then partials are taken at operands anywhere in
-// that spread, and their products with tangents moved likewise. A gradient that spreads is one that
-// cannot be told from the rounded values; a kink within reach spreads by what it changes.
+// The bound comes from simulated rounding. First, each operation's value is moved at random by a few units in the last
+// place of its type; the spread of the node values bounds how far the program's values are from the true ones. Then
+// partials are taken at operands anywhere in that spread, and their products with tangents are moved likewise. A
+// gradient with a large spread cannot be determined from the rounded values; a kink within reach adds the jump at it.
 #pragma once
 
 #include <array>
@@ -28,7 +27,7 @@ using Place = std::array<double, leaf_count>;  // x, y, z
 struct TrueGradient {
   bool is_usable = false;  // finite, and no value leaves the normal range of the type
   std::array<double, leaf_count> slope{};  // rounded to double
-  std::array<double, leaf_count> reach{};  // of rounding
+  std::array<double, leaf_count> reach{};  // the effect of rounding
 };
 
 TrueGradient true_gradient(const Expr& e, const Place& at, uint64_t seed);

@@ -1,5 +1,5 @@
-// Sub-expressions are drawn from a pool that holds every one made so far, so that forms overlap on
-// nodes; or an equal one is built anew, so that they overlap on equal nodes.
+// Sub-expressions are drawn from a pool of all those made so far, so that forms share nodes, or an equal one is built
+// anew, so that they share structure.
 #include "gradient/forms/expressions.h"
 
 #include <string>
@@ -30,14 +30,14 @@ class FormMaker {
     pool_.push_back(e);
     return e;
   }
-  // The last ones are the likelier, so that expressions grow.
+  // Later entries are likelier, so that expressions grow.
   Expr any() {
     const int n = static_cast<int>(pool_.size());
     if (c_.chance(55)) return pool_[static_cast<size_t>(c_.below(3))];
     return pool_[static_cast<size_t>(n - 1 - c_.below(std::min(n, 4)))];
   }
   double constant() { return (1 + c_.below(19)) * 0.0987654321; }
-  // Something to put into a form.
+  // A simple operand for a form.
   Expr simple() {
     switch (c_.below(8)) {
       case 1:
@@ -56,10 +56,10 @@ class FormMaker {
         return any();
     }
   }
-  // Not negative, or above 0.
+  // An expression that is not negative, or above 0.
   Expr size() { return keep(c_.chance(50) ? abs(any()) : abs(simple())); }
   Expr positive() { return keep(size() + num(constant())); }
-  // Moderate: exp of it neither overflows nor is denormal in float32.
+  // Moderate values: their exp neither overflows nor is denormal in float32.
   Expr exponent() {
     switch (c_.below(4)) {
       case 1:
@@ -113,7 +113,7 @@ class FormMaker {
         [&] { return b / (b + size()); },
         [&] { return a / (b + abs(a)); },
         [&] { return b / (b + b + size()); },
-        // near: another magnitude, the other sign, a multiple
+        // Near misses: another magnitude, the other sign, a multiple.
         [&] { return a / (b + abs(any())); },
         [&] { return a / (abs(-a) + b); },
         [&] { return b / (num(2) * b + size()); },
@@ -130,12 +130,12 @@ class FormMaker {
         [&] { return a / (b + c); },
         [&] { return (a + b) / (a + b + c); },
         [&] { return a / (a + positive()); },
-        // nested
+        // Nested forms.
         [&] { return a / (b + keep(a / (a + c))); },
     });
   }
 
-  // Sums of the same terms, with either sign.
+  // A ratio of sums of the same terms, with either sign.
   Expr ratio() {
     std::vector<Expr> terms;
     for (int n = c_.between(2, 3); n > 0; --n)
@@ -168,7 +168,7 @@ class FormMaker {
     });
   }
 
-  // max(a, b) + log(1 + exp(-|a - b|)) and what looks like it.
+  // max(a, b) + log(1 + exp(-|a - b|)), and expressions that resemble it.
   Expr smooth_maximum() {
     const Expr a = any(), b = c_.chance(20) ? ir::make_zero(type_) : simple();
     const Expr c = c_.chance(70) ? a : any(), d = c_.chance(70) ? b : any();

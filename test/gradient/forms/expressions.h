@@ -1,5 +1,5 @@
-// Random pointwise expressions of the shapes that stable_forms.h looks for, of near misses of them,
-// and of both around sub-expressions that they share.
+// Generates random pointwise expressions: the forms that stable_forms.h recognises, near misses of these forms, and
+// both around shared sub-expressions.
 #pragma once
 
 #include "ir/expr.h"
@@ -9,7 +9,7 @@ namespace retrograde::gradient {
 
 using fuzz::Choices;
 
-// Over the variables x, y and z of `type`. The same choices make the same expression.
+// An expression over the variables x, y and z of `type`. The same choices generate the same expression.
 Expr make_form(Choices& choices, Type type);
 
 }  // namespace retrograde::gradient

@@ -1,5 +1,5 @@
-// fuzz_forms -- looks for pointwise expressions whose gradient is wrong, in float32 and in double;
-// its arguments: support/fuzz.h.
+// fuzz_forms -- searches for pointwise expressions whose gradient is wrong, in float32 and in double. support/fuzz.h
+// describes its arguments.
 #include "support/fuzz.h"
 #include "gradient/forms/check_form.h"
 #include "gradient/forms/expressions.h"
@@ -11,7 +11,7 @@ using namespace retrograde;
 using namespace retrograde::gradient;
 using namespace retrograde::fuzz;
 
-// A draw decides the places at which it is checked.
+// One draw seeds the points at which the expression is checked.
 Judged judge(Choices& choices, bool compile) {
   FormResult total;
   const auto seed = static_cast<uint64_t>(choices.below(1 << 30));

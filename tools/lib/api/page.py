@@ -58,8 +58,8 @@ class Page:
         return out
 
     def table_of_requirements(self):
-        out = ["## Requirements", "", "What callers must keep to, in the words of the messages of those who do not, "
-               "and the test that breaks it.", ""]
+        out = ["## Requirements", "", "The requirements on callers, worded as in the error message for a violation, "
+               "each with the test that violates it.", ""]
         for header, requirements in by_header(self.requirements):
             out += [f"### {header}", "", "| of | requires | raises | test |", "|---|---|---|---|"]
             out += [f"| `{r.of}` | {cell(r.text)} | {r.kind} | {self.breaker(r)} |" for r in requirements]

@@ -22,7 +22,7 @@ from pages.python_package import write_python_package  # noqa: E402
 from pages.python_pages import write_python_pages  # noqa: E402
 from pages.tutorials import write_tutorials  # noqa: E402
 
-# What pages link to: all of it is in the folder of sources, as in the repository.
+# Folders and files that pages link to: the folder of sources has all of them, as the repository has.
 LINKED = ["apps", "bench", "cmake", "compiler", "docs", "python_bindings", "runtime", "test", "tools",
           "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "README.md"]
 

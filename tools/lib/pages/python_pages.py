@@ -9,7 +9,7 @@ The names of the C++ library, as Python calls them; :doc:`/python_bindings/READM
 ``TypeLike`` and their like in signatures are what an argument takes beyond its class: numbers, texts, arrays of NumPy.
 """
 PACKAGE = "Generators, errors and files in Python"
-# What is written in Python: the module, how its page introduces it, and where its __all__ is.
+# The modules written in Python: the name, and the file with its __all__.
 MODULES = [
     ("retrograde.runtime", "runtime.py"),
     ("retrograde.torch", "torch/__init__.py"),
