@@ -118,7 +118,7 @@ Machine fit_database(Database& database, int threads, std::ostream& out) {
       database.measured(database.machine(tuning::processor_name()), threads);
   if (all.empty()) {
     user_error("fit the model of " + retrograde::quoted(tuning::processor_name()),
-               "the database has measurements of this machine with so many threads",
+               "the database has measurements of this machine with that number of threads",
                text("there are none with ", threads), "Measure some programs first: tune FILE");
   }
   const Target target = get_jit_target_from_environment();
