@@ -246,7 +246,7 @@ class Texts(unittest.TestCase):
     def test_repr_shows_what_it_is(self):
         self.assertEqual(repr(x), "Var('x')")
         self.assertEqual(repr(x + 1), "<retrograde.Expr int32 x + 1>")
-        self.assertEqual(str(rg.f32(x) * 2), "(float32(x) * 2f)")
+        self.assertEqual(str(rg.f32(x) * 2), "float32(x) * 2f")
         self.assertEqual(repr(rg.Expr()), "<retrograde.Expr undefined>")
         self.assertEqual(repr(rg.Tuple(x, 1)), "<retrograde.Tuple (x, 1)>")
         self.assertIn("r.x", repr(rg.RDom([(0, 3), (0, 4)], "r")))
