@@ -206,10 +206,7 @@ class LoopNestPrinter {
 std::string loop_nest_text(const Program& program) {
   std::string result;
   run_on_large_stack([&] {
-    const LoopNests nests = build_loop_nests(program, {.slide = true});
-    LoopNestPrinter printer(program);
-    for (const auto& [name, value] : nests.bounds) printer.bind(name, value);
-    result = printer.print(nests.body);
+    result = LoopNestPrinter(program).print(build_loop_nests(program));
   });
   return result;
 }
