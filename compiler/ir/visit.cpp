@@ -60,7 +60,8 @@ struct ChildMap {
   }
   StorageLayout operator()(const StorageLayout& l) {
     std::vector<Expr> folds = (*this)(l.folds);
-    return {l.order, std::move(folds), l.place.empty() ? l.place : (*this)(l.place), (*this)(l.first), l.lead};
+    return {l.order, std::move(folds), l.place.empty() ? l.place : (*this)(l.place),
+            (*this)(l.first), l.lead};
   }
   const std::string& operator()(const std::string& name) {
     if (!names) return name;
@@ -180,8 +181,10 @@ Stmt map_children(const Stmt& s, ChildMap mapped) {
         return mapped.of(s, make_provide, n.name, n.values, n.args, n.predicate);
       },
       [&](const Realize& n) {
-        const auto make = [](auto name, auto types, MemoryType memory, auto bounds, auto layout, Stmt body) {
-          return make_realize(name, std::move(types), memory, std::move(bounds), std::move(body), std::move(layout));
+        const auto make = [](auto name, auto types, MemoryType memory, auto bounds, auto layout,
+                             Stmt body) {
+          return make_realize(name, std::move(types), memory, std::move(bounds), std::move(body),
+                              std::move(layout));
         };
         return mapped.of(s, make, n.name, n.types, n.memory, n.bounds, n.layout, n.body);
       },

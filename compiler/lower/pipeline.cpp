@@ -39,7 +39,7 @@
 namespace retrograde::lower {
 namespace {
 
-// What passes know besides the statement. Only program passes change it.
+// The data that passes have besides the statement. Only program passes change it.
 struct Lowering {
   const std::string& name;  // of the function
   const std::vector<FuncPtr>& outputs;
@@ -98,9 +98,9 @@ GivenBuffers given_buffers(const Lowering& lowering) {
 
 Stmt run_vectorize_inner_loops(const Lowering& lowering, const Stmt& s) {
   if (lowering.target.has_feature(Target::DisableLLVMLoopOpt)) return s;
-  return vectorize_inner_loops(
-      s, {ir::vector_bytes(lowering.target),
-          [&](const For& loop) { return is_pure_loop(lowering.program, loop.name); }});
+  return vectorize_inner_loops(s, {ir::vector_bytes(lowering.target), [&](const For& loop) {
+                                     return is_pure_loop(lowering.program, loop.name);
+                                   }});
 }
 
 Stmt run_skip_stages(const Lowering& lowering, const Stmt& s) {
@@ -140,8 +140,7 @@ Stmt with_program(const Lowering& lowering, const Stmt& s) {
 constexpr ProgramPass program_passes[] = {
     {"inline_functions",
      [](Lowering& lowering) { lowering.program = inline_functions(lowering.outputs); }},
-    {"check_devices",
-     [](Lowering& lowering) { check_devices(lowering.program, lowering.target); }},
+    {"check_devices", [](Lowering& lowering) { check_devices(lowering.program, lowering.target); }},
     {"share_parameters", [](Lowering& lowering) { share_parameters(lowering.program); }},
 };
 
@@ -238,9 +237,8 @@ Stmt timed(const char* pass, const Lowering& lowering, const LowerOptions& optio
   const Stmt after = run();
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   if (options.observe) options.observe(pass, seconds.count(), after);
-  tell_pass_observers({lowering.name, pass, seconds.count(), [&] {
-                         return after.defined() ? print(after) : to_text(lowering.program);
-                       }});
+  tell_pass_observers({lowering.name, pass, seconds.count(),
+                       [&] { return after.defined() ? print(after) : to_text(lowering.program); }});
   return after;
 }
 

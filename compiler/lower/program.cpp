@@ -38,7 +38,6 @@ std::string original_name(const std::string& name) {
   return is_copy ? name.substr(0, mark) : name;
 }
 
-
 std::string to_text(const Program& program) {
   std::vector<FuncPtr> funcs, outputs;
   for (const LoopedFunc& f : program.funcs) {

@@ -8,8 +8,8 @@
 #include <fstream>
 #include <iterator>
 
-#include "ir/print.h"
 #include "diagnostics/error.h"
+#include "ir/print.h"
 #include "lower/lower.h"
 #include "lower/statement_passes.h"
 #include "program_text.h"

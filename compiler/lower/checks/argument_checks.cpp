@@ -27,8 +27,8 @@ constexpr const char *check_shape = "retrograde_check_shape",
 
 class Checks {
  public:
-  Checks(const RootStatement& root, const std::vector<LoweredArgument>& args, const Program& program,
-         bool has_device)
+  Checks(const RootStatement& root, const std::vector<LoweredArgument>& args,
+         const Program& program, bool has_device)
       : root_(root),
         args_(args),
         program_(program),

@@ -205,9 +205,7 @@ class LoopNestPrinter {
 
 std::string loop_nest_text(const Program& program) {
   std::string result;
-  run_on_large_stack([&] {
-    result = LoopNestPrinter(program).print(build_loop_nests(program));
-  });
+  run_on_large_stack([&] { result = LoopNestPrinter(program).print(build_loop_nests(program)); });
   return result;
 }
 

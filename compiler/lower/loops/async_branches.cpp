@@ -243,8 +243,8 @@ class BranchSplitter {
                  "async Func, or computed outside of the loops that they share",
                  text(quoted(original_name(other)),
                       " is computed in these loops and stored around ", name),
-                 text("Compute ", quoted(original_name(other)), " at root, store it where ",
-                      name, " is stored, or call async() on it"));
+                 text("Compute ", quoted(original_name(other)), " at root, store it where ", name,
+                      " is stored, or call async() on it"));
     }
   }
 

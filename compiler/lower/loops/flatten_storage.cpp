@@ -209,8 +209,6 @@ class Flattener : public Rewriter {
 
 }  // namespace
 
-Stmt flatten_storage(const Stmt& s) {
-  return Flattener(s)(s);
-}
+Stmt flatten_storage(const Stmt& s) { return Flattener(s)(s); }
 
 }  // namespace retrograde::lower

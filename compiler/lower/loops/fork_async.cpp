@@ -208,10 +208,10 @@ class AsyncForker : public StatementRewriter {
           if (!around || !may_be_skipped(*around) || fused_funcs_of(*around).count(n.name) ||
               !produces(around->body, n.name))
             return true;
-          refuse_async_loops(
-              original_name(n.name),
-              text("they are those of ", quoted(original_name(around->name)), ", which is memoized"),
-              "Store the Func inside of that loop, or do not memoize the other");
+          refuse_async_loops(original_name(n.name),
+                             text("they are those of ", quoted(original_name(around->name)),
+                                  ", which is memoized"),
+                             "Store the Func inside of that loop, or do not memoize the other");
         });
   }
 

@@ -15,7 +15,8 @@
 
 namespace retrograde::lower {
 
-using Requirements = std::map<std::string, Footprint>;  // the box that is read of each Func and image
+using Requirements =
+    std::map<std::string, Footprint>;  // the box that is read of each Func and image
 
 struct Loop {
   std::string var;   // as the user names it: "xo"

@@ -111,7 +111,8 @@ bool NestStorage::is_site(const LoopedFunc& f, const Loop& loop) const {
 Stmt NestStorage::with_layouts(const Stmt& s) const {
   std::map<std::string, std::vector<Expr>> factors;
   for (const auto& [name, folds] : folds_) {
-    if (std::ranges::none_of(folds, [](const Fold& fold) { return fold.factor.defined(); })) continue;
+    if (std::ranges::none_of(folds, [](const Fold& fold) { return fold.factor.defined(); }))
+      continue;
     factors[name] = factors[place_name(name)] = mapped(folds, &Fold::factor);
   }
   if (factors.empty() && leads_.empty()) return s;
@@ -153,7 +154,7 @@ Stmt NestStorage::fold(const LoopedFunc& f, const Box& touched, const std::vecto
 // iteration of the outer ones and overwrites elements that the consumer may still read. This is harmless only if
 // nothing is folded and the same value is written; an update definition writes other values in between.
 void NestStorage::note_lead(const LoopedFunc& f, const std::vector<Loop>& loops,
-                                  const std::vector<Slide>& slides, const Box& touched) {
+                            const std::vector<Slide>& slides, const Box& touched) {
   const std::vector<Fold>& folds = folds_.at(f.name());
   const bool is_folded =
       std::ranges::any_of(folds, [](const Fold& fold) { return fold.factor.defined(); });

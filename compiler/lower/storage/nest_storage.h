@@ -26,7 +26,7 @@ class NestStorage {
             const std::vector<Slide>& slides, bool is_vectorized, ComputePlace& site, Stmt stmt);
   // Decides how far an async producer may run ahead. `loops`: between f's computation and its storage.
   void note_lead(const LoopedFunc& f, const std::vector<Loop>& loops,
-                       const std::vector<Slide>& slides, const Box& touched);
+                 const std::vector<Slide>& slides, const Box& touched);
 
   Stmt realize(const LoopedFunc& f, const Box& box, Stmt stmt);
   // Hoisted storage of f: needs room for the largest region stored at any time.
