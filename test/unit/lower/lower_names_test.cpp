@@ -4,6 +4,7 @@
 #include "ir/parse.h"
 #include "ir/print.h"
 #include "lower/nests/make_names_unique.h"
+#include "lower/program.h"
 #include "retrograde/retrograde.h"
 #include "support/errors.h"
 
@@ -16,17 +17,20 @@ TEST(MakeNamesUnique, RenamesAllButTheFirstBinding) {
       "realize f(int32) auto [0, 4] { for (x, 0, 4) { f(x) = {x} } "
       "realize f(int32) auto [0, 2] { f(1) = {3} out(0) = {f(1).0:int32} } out(1) = {f(2).0:int32} "
       "}");
-  lower::UniqueNames unique = lower::make_names_unique(s);
-  std::string text = ir::print(unique.stmt);
+  const std::string text = ir::print(lower::make_names_unique(s));
   expect_mentions(text, {"for (x.$1, 0, 4)", "f(x.$1) = {x.$1}", "f.$1(1) = {3}",
                          "out(0) = {f.$1(1)", "out(1) = {f(2)"});
-  ASSERT_EQ(unique.original.size(), 1u);
-  EXPECT_EQ(unique.original.at("f.$1"), "f");
+}
+
+TEST(MakeNamesUnique, TheOriginalNameFollowsFromTheNewOne) {
+  EXPECT_EQ(lower::original_name("f.$12"), "f");
+  for (const char* name : {"f", "f$3", "f.0", "f.$", "f.$1.min.0"})
+    EXPECT_EQ(lower::original_name(name), name);
 }
 
 TEST(MakeNamesUnique, LeavesNamesOfArgumentsToThem) {
   Stmt s = ir::parse_stmt("{ let code = 3 assert((code == 0), code) } out(0) = {code:int32}");
-  const std::string text = ir::print(lower::make_names_unique(s, {"code"}).stmt);
+  const std::string text = ir::print(lower::make_names_unique(s, {"code"}));
   expect_mentions(text, {"let code.$1 = 3", "assert(code.$1 == 0, code.$1)", "out(0) = {code}"});
 }
 
