@@ -1,5 +1,5 @@
 # The mathematical functions of kernels, embedded in the library: extracted from libclc's bitcode for NVPTX are the
-# functions that codegen/math_table.h names, with their callees.
+# functions that codegen/math/math_table.h names, with their callees.
 #
 # retrograde_device_math(<target>)
 find_program(RETROGRADE_LLVM_EXTRACT NAMES llvm-extract PATHS /usr/lib/llvm-19/bin NO_DEFAULT_PATH

@@ -256,7 +256,7 @@ Interval BoundsEngine::cast_bounds(Type type, const Expr& value) {
     return interval_cast(type, value.type(), v);
   if (v.max.defined()) return interval_cast(type, value.type(), {make_zero(value.type()), v.max});
   // Where it may be NaN too, the integer is kept from being negative
-  // (lower/nests/strict_indices.h).
+  // (lower/definitions/strict_indices.h).
   Interval result = type_range(type);
   if (has_linear_form(type)) result.min = make_zero(type);
   return result;

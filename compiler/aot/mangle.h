@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "codegen/exports.h"
+#include "codegen/cpu/exports.h"
 
 namespace retrograde::aot {
 

@@ -9,8 +9,8 @@
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
-#include "graph/give_directive.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
+#include "graph/directives/give_directive.h"
 #include "ir/build.h"
 
 namespace retrograde::autoschedule {

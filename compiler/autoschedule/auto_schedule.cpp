@@ -8,8 +8,8 @@
 #include "frontend/run/pipeline.h"
 #include "frontend/schedule/autoscheduler.h"
 #include "graph/copy_graph.h"
-#include "graph/schedule_log.h"
-#include "graph/wrappers.h"
+#include "graph/directives/schedule_log.h"
+#include "graph/directives/wrappers.h"
 
 namespace retrograde::autoschedule {
 

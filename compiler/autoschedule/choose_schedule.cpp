@@ -11,9 +11,9 @@
 #include "autoschedule/task_sizes.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
-#include "graph/give_directive.h"
-#include "graph/parameter_contents.h"
-#include "graph/wrappers.h"
+#include "graph/definitions/parameter_contents.h"
+#include "graph/directives/give_directive.h"
+#include "graph/directives/wrappers.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
 

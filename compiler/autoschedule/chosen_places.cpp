@@ -4,7 +4,7 @@
 #include <string>
 
 #include "diagnostics/error.h"
-#include "graph/give_directive.h"
+#include "graph/directives/give_directive.h"
 
 namespace retrograde::autoschedule {
 

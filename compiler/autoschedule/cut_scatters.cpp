@@ -7,8 +7,8 @@
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
-#include "graph/associative_update.h"
-#include "graph/give_directive.h"
+#include "graph/definitions/associative_update.h"
+#include "graph/directives/give_directive.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
 

@@ -34,9 +34,9 @@
 #include "diagnostics/large_stack.h"
 #include "frontend/language/func.h"
 #include "graph/copy_graph.h"
-#include "graph/give_directive.h"
-#include "graph/own_reads.h"
-#include "graph/wrappers.h"
+#include "graph/definitions/own_reads.h"
+#include "graph/directives/give_directive.h"
+#include "graph/directives/wrappers.h"
 
 namespace retrograde::autoschedule {
 

@@ -1,5 +1,5 @@
 // default_schedule.h -- a sane schedule for Funcs that nobody scheduled: directives such as a user
-// would give, each in its Func's log (graph/schedule_log.h). Pipelines that contain adjoints get it
+// would give, each in its Func's log (graph/directives/schedule_log.h). Pipelines that contain adjoints get it
 // whenever they are compiled, others when they ask for it (Pipeline::auto_schedule).
 //
 // Sums to one element are cut into lanes and rows (cut_reductions.h). What is stored

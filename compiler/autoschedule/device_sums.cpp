@@ -10,9 +10,9 @@
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
-#include "graph/associative_update.h"
-#include "graph/own_reads.h"
-#include "graph/race_checks.h"
+#include "graph/definitions/associative_update.h"
+#include "graph/definitions/own_reads.h"
+#include "graph/definitions/race_checks.h"
 #include "ir/build.h"
 
 namespace retrograde::autoschedule {

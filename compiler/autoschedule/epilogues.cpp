@@ -13,9 +13,9 @@
 #include "frontend/language/func.h"
 #include "frontend/schedule/loop_level.h"
 #include "frontend/schedule/stage.h"
-#include "graph/give_directive.h"
-#include "graph/own_reads.h"
-#include "graph/wrappers.h"
+#include "graph/definitions/own_reads.h"
+#include "graph/directives/give_directive.h"
+#include "graph/directives/wrappers.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 

@@ -4,7 +4,7 @@
 
 #include "autoschedule/only_reader.h"
 #include "autoschedule/size_estimate.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 

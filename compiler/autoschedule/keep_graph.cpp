@@ -13,9 +13,9 @@
 #include "autoschedule/stored_funcs.h"
 #include "diagnostics/error.h"
 #include "diagnostics/text_hash.h"
-#include "graph/give_directive.h"
+#include "graph/definitions/parameter_contents.h"
+#include "graph/directives/give_directive.h"
 #include "graph/graph.h"
-#include "graph/parameter_contents.h"
 #include "ir/text.h"
 
 namespace retrograde::autoschedule {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <unordered_set>
 
-#include "graph/give_directive.h"
-#include "graph/own_reads.h"
-#include "graph/parameter_contents.h"
+#include "graph/definitions/own_reads.h"
+#include "graph/definitions/parameter_contents.h"
+#include "graph/directives/give_directive.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 

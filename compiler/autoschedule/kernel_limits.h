@@ -14,7 +14,7 @@ namespace retrograde::autoschedule {
 // `stored`: those that are, or will be, computed at root. What else is read the stage computes itself.
 bool can_be_kernel(const FuncPtr& f, int stage, const std::vector<FuncPtr>& stored);
 
-// The block of partial sums that a stage adds up for itself (graph/provenance.h); null: none.
+// The block of partial sums that a stage adds up for itself (graph/definitions/provenance.h); null: none.
 FuncPtr block_read_by(const Definition& stage, const std::vector<FuncPtr>& stored);
 
 }  // namespace retrograde::autoschedule

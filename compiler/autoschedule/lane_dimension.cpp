@@ -4,8 +4,8 @@
 #include <optional>
 
 #include "autoschedule/stored_reads.h"
-#include "graph/give_directive.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
+#include "graph/directives/give_directive.h"
 #include "ir/build.h"
 
 namespace retrograde::autoschedule {

@@ -5,8 +5,8 @@
 #include <unordered_set>
 
 #include "autoschedule/placement_limits.h"
-#include "graph/give_directive.h"
-#include "graph/inlined_size.h"
+#include "graph/definitions/inlined_size.h"
+#include "graph/directives/give_directive.h"
 
 namespace retrograde::autoschedule {
 

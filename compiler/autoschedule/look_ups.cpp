@@ -7,7 +7,7 @@
 
 #include "autoschedule/new_loop.h"
 #include "frontend/language/rdom.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 #include "ir/memory_reads.h"

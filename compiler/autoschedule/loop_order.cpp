@@ -4,8 +4,8 @@
 #include <functional>
 #include <unordered_map>
 
-#include "graph/associative_update.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/associative_update.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/visit.h"
 
 namespace retrograde::autoschedule {

@@ -14,8 +14,8 @@
 #include "autoschedule/stored_funcs.h"
 #include "autoschedule/task_sizes.h"
 #include "graph/copy_graph.h"
-#include "graph/give_directive.h"
-#include "graph/parameter_contents.h"
+#include "graph/definitions/parameter_contents.h"
+#include "graph/directives/give_directive.h"
 #include "ir/build.h"
 
 namespace retrograde::autoschedule {

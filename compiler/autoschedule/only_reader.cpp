@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/visit.h"
 
 namespace retrograde::autoschedule {

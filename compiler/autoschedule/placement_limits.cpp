@@ -7,7 +7,7 @@
 #include <unordered_map>
 
 #include "analysis/interval.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 

@@ -7,7 +7,7 @@
 
 #include "analysis/linear.h"
 #include "autoschedule/read_estimate.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 #include "ir/visit.h"

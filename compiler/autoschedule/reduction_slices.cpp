@@ -14,7 +14,7 @@
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/loop_level.h"
 #include "frontend/schedule/stage.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/lets.h"

@@ -4,7 +4,7 @@
 #include <unordered_set>
 
 #include "autoschedule/cost_estimate.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/vector_bytes.h"
 #include "ir/visit.h"

@@ -17,7 +17,7 @@
 //
 // A read that stays inside of where the border begins gets no copy, as a seed's over its own box.
 //
-// The same is done for blocks of a long sum (autodiff/sweeps/blocked_sums.h), as of a convolution's gradient
+// The same is done for blocks of a long sum (autodiff/sums/blocked_sums.h), as of a convolution's gradient
 // by its weights, whose tiles run over chunks of it (reduction_chunks.h): a copy is of a chunk then.
 #pragma once
 

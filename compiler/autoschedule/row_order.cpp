@@ -8,7 +8,7 @@
 #include "autoschedule/only_reader.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 #include "simplify/simplify.h"

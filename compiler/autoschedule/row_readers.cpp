@@ -5,7 +5,7 @@
 
 #include "autoschedule/cut_reductions.h"
 #include "autoschedule/inlined_reads.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"

@@ -11,7 +11,7 @@
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
-#include "graph/give_directive.h"
+#include "graph/directives/give_directive.h"
 
 namespace retrograde::autoschedule {
 

@@ -1,4 +1,4 @@
-// running_sums.h -- sums of many adjoints by few of them (autodiff/sweeps/running_sums.h).
+// running_sums.h -- sums of many adjoints by few of them (autodiff/sums/running_sums.h).
 //
 //   s1 = a1_adj + ... + a4_adj;  s2 = s1 + a5_adj + ... + a8_adj;  b_adj = s2 + ...
 //

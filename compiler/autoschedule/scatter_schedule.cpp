@@ -7,7 +7,7 @@
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/equal.h"
 #include "ir/memory_reads.h"
 #include "ir/visit.h"

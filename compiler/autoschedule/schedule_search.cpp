@@ -15,7 +15,7 @@
 #include "autoschedule/stored_funcs.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
-#include "graph/give_directive.h"
+#include "graph/directives/give_directive.h"
 
 namespace retrograde::autoschedule {
 

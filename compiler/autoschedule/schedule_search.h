@@ -23,7 +23,7 @@
 
 #include "autoschedule/default_schedule.h"
 #include "autoschedule/memory_budget.h"
-#include "graph/schedule_log.h"
+#include "graph/directives/schedule_log.h"
 
 namespace retrograde::autoschedule {
 

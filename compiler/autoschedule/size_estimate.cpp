@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "graph/own_reads.h"
-#include "graph/parameter_contents.h"
+#include "graph/definitions/own_reads.h"
+#include "graph/definitions/parameter_contents.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 #include "simplify/simplify.h"

@@ -10,7 +10,7 @@
 #include "autoschedule/running_sums.h"
 #include "frontend/language/func.h"
 #include "frontend/schedule/loop_level.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "graph/own_reads.h"
-#include "graph/race_checks.h"
-#include "graph/reduction_leaves.h"
+#include "graph/definitions/own_reads.h"
+#include "graph/definitions/race_checks.h"
+#include "graph/definitions/reduction_leaves.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
 

@@ -8,7 +8,7 @@
 
 #include "autoschedule/new_loop.h"
 #include "frontend/schedule/stage.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 
 namespace retrograde::autoschedule {

@@ -9,8 +9,8 @@
 #include "autoschedule/large_bodies.h"
 #include "autoschedule/read_estimate.h"
 #include "autoschedule/running_sums.h"
-#include "graph/give_directive.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
+#include "graph/directives/give_directive.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 

@@ -12,7 +12,7 @@
 #include "frontend/language/func.h"
 #include "frontend/schedule/loop_level.h"
 #include "frontend/schedule/stage.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 
 namespace retrograde::autoschedule {

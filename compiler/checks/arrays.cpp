@@ -7,7 +7,7 @@
 #include "frontend/data/image_param.h"
 #include "frontend/data/param.h"
 #include "graph/copy_graph.h"
-#include "graph/give_directive.h"
+#include "graph/directives/give_directive.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
 

@@ -2,11 +2,11 @@
 
 #include <unordered_map>
 
-#include "autodiff/sweeps/generated_definitions.h"
+#include "autodiff/sums/generated_definitions.h"
 #include "autodiff/sweeps/local_derivative.h"
 #include "frontend/data/image_param.h"
 #include "frontend/data/param.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "ir/build.h"
 #include "ir/print.h"
 

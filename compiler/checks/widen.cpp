@@ -1,11 +1,11 @@
 #include "checks/widen.h"
 
-#include "autodiff/sweeps/generated_definitions.h"
+#include "autodiff/sums/generated_definitions.h"
 #include "autodiff/sweeps/local_derivative.h"
 #include "diagnostics/error.h"
 #include "frontend/data/image_param.h"
 #include "frontend/data/param.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
 

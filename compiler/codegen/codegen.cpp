@@ -13,14 +13,14 @@
 #include <thread>
 #include <utility>
 
-#include "codegen/archive.h"
-#include "codegen/cut_loops.h"
+#include "codegen/cpu/make_exports.h"
+#include "codegen/device/kernels.h"
 #include "codegen/function_generator.h"
-#include "codegen/kernels.h"
-#include "codegen/make_exports.h"
-#include "codegen/split_module.h"
-#include "codegen/stopwatch.h"
-#include "codegen/unit.h"
+#include "codegen/llvm/archive.h"
+#include "codegen/llvm/cut_loops.h"
+#include "codegen/llvm/split_module.h"
+#include "codegen/llvm/stopwatch.h"
+#include "codegen/llvm/unit.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "codegen/exports.h"
+#include "codegen/cpu/exports.h"
 #include "ir/lowered_function.h"
 #include "ir/target.h"
 

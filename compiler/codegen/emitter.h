@@ -12,7 +12,7 @@
 #include <functional>
 #include <vector>
 
-#include "codegen/machine.h"
+#include "codegen/llvm/machine.h"
 #include "ir/expr.h"
 
 namespace retrograde::codegen {

@@ -9,8 +9,8 @@
 
 #include <string>
 
-#include "codegen/kernels.h"
-#include "codegen/values.h"
+#include "codegen/device/kernels.h"
+#include "codegen/values/values.h"
 #include "ir/lowered_function.h"
 
 namespace retrograde::codegen {

@@ -1,8 +1,8 @@
 // Code for functions, loops, branches, allocations and assertions.
-#include "codegen/access.h"
-#include "codegen/calls.h"
+#include "codegen/cpu/long_functions.h"
 #include "codegen/function_generator.h"
-#include "codegen/long_functions.h"
+#include "codegen/memory/access.h"
+#include "codegen/values/calls.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/print.h"

@@ -5,9 +5,9 @@
 #include <unordered_set>
 
 #include "diagnostics/error.h"
+#include "graph/definitions/own_reads.h"
+#include "graph/directives/wrappers.h"
 #include "graph/names.h"
-#include "graph/own_reads.h"
-#include "graph/wrappers.h"
 #include "ir/build.h"
 #include "ir/print.h"
 
@@ -107,7 +107,7 @@ const char* role_name(Role role) {
 #define RETROGRADE_ROLE(Name, text) \
   case Role::Name:                  \
     return text;
-#include "graph/roles.def"
+#include "graph/definitions/roles.def"
   }
   return "";
 }

@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "graph/directive.h"
-#include "graph/parameter_contents.h"
-#include "graph/provenance.h"
-#include "graph/reduction_domain.h"
+#include "graph/definitions/parameter_contents.h"
+#include "graph/definitions/provenance.h"
+#include "graph/definitions/reduction_domain.h"
+#include "graph/directives/directive.h"
 #include "graph/schedule.h"
 #include "ir/visit.h"
 

@@ -1,6 +1,6 @@
 #include "diagnostics/error.h"
 #include "graph/graph.h"
-#include "graph/graph_lines.h"
+#include "graph/text/graph_lines.h"
 
 namespace retrograde::graph {
 

@@ -3,7 +3,7 @@
 #include <unordered_set>
 
 #include "diagnostics/error.h"
-#include "graph/directive.h"
+#include "graph/directives/directive.h"
 #include "graph/graph.h"
 #include "ir/build.h"
 #include "ir/print.h"

@@ -415,7 +415,7 @@ Expr make_vector_reduce(Kind op, Expr value, int result_lanes) {
 namespace {
 
 // Generated code implements these functions itself, and may differ in the last bit. Code generation
-// folds them (codegen/constant_math.h).
+// folds them (codegen/math/constant_math.h).
 bool is_rounded_otherwise(Op op) { return op_info(op).real.error.kind == OpError::Kind::Library; }
 
 bool is_zero_or_one(const Scalar& s) { return s.f == 0 || s.f == 1; }

@@ -73,7 +73,7 @@ struct OpError {
   enum class Kind : uint8_t {
     Exact = 1,     // correctly rounded, once
     Arithmetic,    // sums, products and quotients, each of which is rounded
-    Library,       // a function of codegen/math_table.h, with a maximum error in ULP
+    Library,       // a function of codegen/math/math_table.h, with a maximum error in ULP
     Approximates,  // a fast approximation, whose domain and error are in codegen's table
   };
   Kind kind = {};

@@ -16,7 +16,7 @@
 #include <mutex>
 #include <tuple>
 
-#include "codegen/machine.h"
+#include "codegen/llvm/machine.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
 #include "frontend/run/compile_cache.h"

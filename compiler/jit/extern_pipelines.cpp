@@ -6,7 +6,7 @@
 
 #include "autoschedule/choose_schedule.h"
 #include "diagnostics/error.h"
-#include "graph/parameter_contents.h"
+#include "graph/definitions/parameter_contents.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"

@@ -7,7 +7,7 @@
 #include <unordered_map>
 
 #include "codegen/codegen.h"
-#include "codegen/kernel_code.h"
+#include "codegen/device/kernel_code.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
 #include "diagnostics/pass_observer.h"

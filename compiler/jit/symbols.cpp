@@ -6,7 +6,7 @@
 #include <cstring>
 #include <map>
 
-#include "codegen/sleef_library.h"
+#include "codegen/math/sleef_library.h"
 #include "gpu/gpu_calls.h"
 #include "gpu/kernel_storage.h"
 #include "inquiries.h"
@@ -95,22 +95,23 @@ void add_libm(Table& table) {
   RETROGRADE_UNARY(atanh)
   RETROGRADE_UNARY(cbrt)
   RETROGRADE_UNARY(ceil)
-  RETROGRADE_UNARY(cos) RETROGRADE_UNARY(cosh) RETROGRADE_UNARY(erf) RETROGRADE_UNARY(erfc)
-      RETROGRADE_UNARY(exp) RETROGRADE_UNARY(exp2) RETROGRADE_UNARY(expm1) RETROGRADE_UNARY(
-          fabs) RETROGRADE_UNARY(floor) RETROGRADE_UNARY(lgamma) RETROGRADE_UNARY(log)
-          RETROGRADE_UNARY(log10) RETROGRADE_UNARY(log1p) RETROGRADE_UNARY(log2) RETROGRADE_UNARY(
-              nearbyint) RETROGRADE_UNARY(rint) RETROGRADE_UNARY(round) RETROGRADE_UNARY(roundeven)
-              RETROGRADE_UNARY(sin) RETROGRADE_UNARY(sinh) RETROGRADE_UNARY(sqrt)
-                  RETROGRADE_UNARY(tan) RETROGRADE_UNARY(tanh) RETROGRADE_UNARY(tgamma)
-                      RETROGRADE_UNARY(trunc) RETROGRADE_BINARY(atan2) RETROGRADE_BINARY(copysign)
-                          RETROGRADE_BINARY(fdim) RETROGRADE_BINARY(fmax) RETROGRADE_BINARY(fmin)
-                              RETROGRADE_BINARY(fmod) RETROGRADE_BINARY(hypot)
-                                  RETROGRADE_BINARY(nextafter) RETROGRADE_BINARY(pow)
-                                      RETROGRADE_BINARY(remainder)
+  RETROGRADE_UNARY(cos)
+  RETROGRADE_UNARY(cosh) RETROGRADE_UNARY(erf) RETROGRADE_UNARY(erfc) RETROGRADE_UNARY(exp)
+      RETROGRADE_UNARY(exp2) RETROGRADE_UNARY(expm1) RETROGRADE_UNARY(fabs) RETROGRADE_UNARY(floor)
+          RETROGRADE_UNARY(lgamma) RETROGRADE_UNARY(log) RETROGRADE_UNARY(log10) RETROGRADE_UNARY(
+              log1p) RETROGRADE_UNARY(log2) RETROGRADE_UNARY(nearbyint) RETROGRADE_UNARY(rint)
+              RETROGRADE_UNARY(round) RETROGRADE_UNARY(roundeven) RETROGRADE_UNARY(sin)
+                  RETROGRADE_UNARY(sinh) RETROGRADE_UNARY(sqrt) RETROGRADE_UNARY(tan)
+                      RETROGRADE_UNARY(tanh) RETROGRADE_UNARY(tgamma) RETROGRADE_UNARY(trunc)
+                          RETROGRADE_BINARY(atan2) RETROGRADE_BINARY(copysign)
+                              RETROGRADE_BINARY(fdim) RETROGRADE_BINARY(fmax)
+                                  RETROGRADE_BINARY(fmin) RETROGRADE_BINARY(fmod)
+                                      RETROGRADE_BINARY(hypot) RETROGRADE_BINARY(nextafter)
+                                          RETROGRADE_BINARY(pow) RETROGRADE_BINARY(remainder)
 #undef RETROGRADE_UNARY
 #undef RETROGRADE_BINARY
-                                          table["fma"] =
-                                              pointer<double(double, double, double)>(::fma);
+                                              table["fma"] =
+                                                  pointer<double(double, double, double)>(::fma);
   table["fmaf"] = pointer<float(float, float, float)>(::fmaf);
 }
 

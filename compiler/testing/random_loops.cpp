@@ -9,9 +9,9 @@
 #include <functional>
 #include <map>
 
-#include "graph/associative_update.h"
+#include "graph/definitions/associative_update.h"
+#include "graph/definitions/race_checks.h"
 #include "graph/names.h"
-#include "graph/race_checks.h"
 #include "ir/build.h"
 
 namespace retrograde::fuzz {

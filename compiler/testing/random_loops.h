@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "graph/schedule_log.h"
+#include "graph/directives/schedule_log.h"
 #include "testing/choices.h"
 
 namespace retrograde::fuzz {

@@ -13,9 +13,9 @@
 
 #include "diagnostics/error.h"
 #include "frontend/data/param.h"
-#include "graph/directive.h"
+#include "graph/directives/directive.h"
+#include "graph/directives/wrappers.h"
 #include "graph/names.h"
-#include "graph/wrappers.h"
 #include "ir/visit.h"
 #include "testing/random_loops.h"
 

@@ -4,7 +4,7 @@
 // loops of each of its stages.
 #pragma once
 
-#include "graph/schedule_log.h"
+#include "graph/directives/schedule_log.h"
 #include "testing/programs/program.h"
 
 namespace retrograde::fuzz {

@@ -9,7 +9,7 @@
 #include "autoschedule/choose_schedule.h"
 #include "frontend/data/buffer.h"
 #include "frontend/run/compiler_interface.h"
-#include "graph/schedule_log.h"
+#include "graph/directives/schedule_log.h"
 #include "tuning/kernels_taken.h"
 #include "tuning/machine.h"
 #include "tuning/measure_stages.h"

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "codegen/kernel_code.h"
+#include "codegen/device/kernel_code.h"
 #include "diagnostics/error.h"
 #include "ir/lists.h"
 #include "jit/ptxas.h"

@@ -8,7 +8,7 @@
 #include <random>
 
 #include "frontend/run/call.h"
-#include "graph/parameter_contents.h"
+#include "graph/definitions/parameter_contents.h"
 #include "jit/jit.h"
 #include "lower/lower.h"
 #include "tuning/compiled_once.h"

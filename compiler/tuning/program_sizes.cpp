@@ -6,7 +6,7 @@
 
 #include "autoschedule/size_estimate.h"
 #include "diagnostics/error.h"
-#include "graph/parameter_contents.h"
+#include "graph/definitions/parameter_contents.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
 

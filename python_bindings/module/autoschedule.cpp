@@ -4,7 +4,7 @@
 #include "callback.h"
 #include "func_class.h"
 #include "graph/copy_graph.h"
-#include "graph/wrappers.h"
+#include "graph/directives/wrappers.h"
 #include "runnable.h"
 
 namespace retrograde::python {

@@ -2,7 +2,7 @@
 #include "bind_all.h"
 #include "binding.h"
 #include "frontend/run/module.h"
-#include "graph/directive_choices.h"
+#include "graph/directives/directive_choices.h"
 
 namespace retrograde::python {
 

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "support/errors.h"
 
 namespace retrograde {

@@ -11,12 +11,12 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "autodiff/graph_passes.h"
+#include "graph/directives/schedule_log.h"
 #include "graph/graph.h"
-#include "graph/schedule_log.h"
+#include "graph_passes.h"
 #include "support/same_numbers.h"
 
-namespace retrograde::autodiff {
+namespace retrograde::opt {
 namespace {
 
 namespace fs = std::filesystem;
@@ -75,4 +75,4 @@ TEST(GraphPasses, AreAllTested) {
 }
 
 }  // namespace
-}  // namespace retrograde::autodiff
+}  // namespace retrograde::opt

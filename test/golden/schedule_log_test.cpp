@@ -13,7 +13,7 @@
 #include <set>
 #include <sstream>
 
-#include "graph/directive_text.h"
+#include "graph/directives/directive_text.h"
 #include "graph/graph.h"
 #include "support/errors.h"
 #include "support/same_numbers.h"

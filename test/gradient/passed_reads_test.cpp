@@ -1,6 +1,6 @@
 // Tests adjoints of stencils over boundary conditions: they are stencils again, with the right values. Also tests the
 // cases in which a boundary condition keeps an adjoint of its own in between.
-#include "autodiff/sweeps/passed_reads.h"
+#include "autodiff/borders/passed_reads.h"
 
 #include <gtest/gtest.h>
 

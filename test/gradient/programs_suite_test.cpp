@@ -6,9 +6,9 @@
 // and complex step in machine code. No two of these share their derivatives.
 #include "gradient/programs_suite.h"
 #include "checks/check_gradients.h"
-#include "graph/give_directive.h"
+#include "graph/directives/give_directive.h"
+#include "graph/directives/schedule_log.h"
 #include "graph/graph.h"
-#include "graph/schedule_log.h"
 
 namespace retrograde::gradient {
 namespace {

@@ -1,13 +1,13 @@
 // Tests which inner adjoints of a step are kept because several inputs need them: those that pay, and no others. The
 // suite (programs_suite_test.cpp) checks that the gradients stay right.
-#include "autodiff/sweeps/shared_adjoints.h"
+#include "autodiff/sums/shared_adjoints.h"
 
 #include <gtest/gtest.h>
 
 #include "autodiff/derivative.h"
-#include "autodiff/sweeps/generated_definitions.h"
+#include "autodiff/sums/generated_definitions.h"
 #include "gradient/gradient_check.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
 #include "support/errors.h"

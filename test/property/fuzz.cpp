@@ -8,7 +8,7 @@
 // A random schedule may multiply the work by a thousand, so a few programs may exceed the time limit.
 #include <algorithm>
 
-#include "graph/directive.h"
+#include "graph/directives/directive.h"
 #include "support/fuzz.h"
 #include "testing/check_program.h"
 

@@ -4,7 +4,7 @@
 // describes the arguments.
 #include <cstdio>
 
-#include "codegen/kernel_code.h"
+#include "codegen/device/kernel_code.h"
 #include "lower/lower.h"
 #include "support/fuzz.h"
 #include "support/ptxas.h"

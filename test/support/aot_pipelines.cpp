@@ -1,4 +1,4 @@
-// Writes the objects and headers that test/unit/aot_call_test.cpp and its neighbours call.
+// Writes the objects and headers that test/unit/aot/aot_call_test.cpp and its neighbours call.
 //
 //   aot_pipelines <folder> [target]
 #include <retrograde/retrograde.h>

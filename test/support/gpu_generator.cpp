@@ -1,5 +1,5 @@
 // A generator whose function has kernels, with producers and consumers alternating between device and host.
-// test/unit/aot_gpu_test.cpp calls it.
+// test/unit/aot/aot_gpu_test.cpp calls it.
 #include <retrograde/retrograde.h>
 
 using namespace retrograde;

@@ -1,4 +1,4 @@
-// The generator that test/unit/generator_stub_test.cpp uses through its stub.
+// The generator that test/unit/generator/generator_stub_test.cpp uses through its stub.
 #include "Halide.h"
 
 namespace {

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "codegen/kernel_code.h"
+#include "codegen/device/kernel_code.h"
 #include "diagnostics/error.h"
 #include "gpu/gpu_calls.h"
 #include "gpu/gpu_image.h"

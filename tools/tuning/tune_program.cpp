@@ -14,8 +14,8 @@
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
 #include "frontend/run/compiler_interface.h"
+#include "graph/directives/wrappers.h"
 #include "graph/graph.h"
-#include "graph/wrappers.h"
 #include "tuning/machine.h"
 #include "tuning/measure_schedule.h"
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <unordered_map>
 
-#include "autodiff/sweeps/generated_definitions.h"
+#include "autodiff/sums/generated_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
-#include "graph/define.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/define.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 

@@ -3,10 +3,10 @@
 #include <algorithm>
 
 #include "autodiff/matrices/colour_dimension.h"
-#include "autodiff/sweeps/generated_definitions.h"
+#include "autodiff/sums/generated_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"

@@ -6,7 +6,7 @@
 
 #include "autodiff/inversion/isl_maps.h"
 #include "diagnostics/error.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 #include "ir/memory_reads.h"

@@ -5,7 +5,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
-#include "autodiff/sweeps/distinct_nodes.h"
+#include "autodiff/sums/distinct_nodes.h"
 #include "autodiff/sweeps/local_derivative.h"
 #include "autodiff/sweeps/regions.h"
 #include "autoschedule/cost_estimate.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "autodiff/report/explain.h"
-#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sums/accumulation.h"
 
 namespace retrograde::autodiff {
 

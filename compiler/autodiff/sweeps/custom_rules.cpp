@@ -4,11 +4,11 @@
 #include <unordered_set>
 
 #include "autodiff/rules/derivative_rules.h"
-#include "autodiff/sweeps/generated_definitions.h"
+#include "autodiff/sums/generated_definitions.h"
 #include "autodiff/sweeps/input_shape.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "graph/function.h"
 #include "graph/names.h"
 #include "ir/build.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "autodiff/sweeps/custom_rules.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 #include "simplify/simplify.h"

@@ -3,7 +3,7 @@
 #include <unordered_map>
 
 #include "autodiff/rules/derivative_rules.h"
-#include "autodiff/sweeps/distinct_nodes.h"
+#include "autodiff/sums/distinct_nodes.h"
 #include "ir/build.h"
 
 namespace retrograde::autodiff {

@@ -3,12 +3,12 @@
 #include <algorithm>
 
 #include "autodiff/report/absent_gradients.h"
-#include "autodiff/sweeps/contributions.h"
+#include "autodiff/sums/contributions.h"
+#include "autodiff/sums/distinct_nodes.h"
+#include "autodiff/sums/kept_values.h"
+#include "autodiff/sums/shared_adjoints.h"
 #include "autodiff/sweeps/custom_rules.h"
-#include "autodiff/sweeps/distinct_nodes.h"
 #include "autodiff/sweeps/input_shape.h"
-#include "autodiff/sweeps/kept_values.h"
-#include "autodiff/sweeps/shared_adjoints.h"
 #include "autodiff/updates/update_context.h"
 #include "autodiff/updates/versions.h"
 #include "diagnostics/error.h"

@@ -19,7 +19,7 @@
 
 #include "autodiff/report/explain.h"
 #include "autodiff/report/operation_count.h"
-#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sums/accumulation.h"
 #include "autodiff/sweeps/regions.h"
 #include "autodiff/updates/update.h"
 #include "autodiff/updates/version_budget.h"

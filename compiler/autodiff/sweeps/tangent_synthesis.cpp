@@ -3,12 +3,12 @@
 #include <algorithm>
 
 #include "autodiff/rules/value_range.h"
+#include "autodiff/sums/generated_definitions.h"
 #include "autodiff/sweeps/custom_rules.h"
 #include "autodiff/sweeps/forward_sweep.h"
-#include "autodiff/sweeps/generated_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "ir/build.h"
 #include "ir/memory_reads.h"
 

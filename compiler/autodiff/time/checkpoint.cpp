@@ -7,7 +7,7 @@
 #include "autodiff/time/checkpoint_step.h"
 #include "autodiff/updates/versions.h"
 #include "frontend/language/var.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"

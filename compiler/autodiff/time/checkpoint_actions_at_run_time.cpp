@@ -1,12 +1,12 @@
 // Computes the table of checkpoint_actions.h at run time, by a Func.
 #include <algorithm>
 
-#include "autodiff/sweeps/generated_definitions.h"
+#include "autodiff/sums/generated_definitions.h"
 #include "autodiff/time/checkpoint_actions.h"
 #include "autodiff/time/revolve.h"
 #include "diagnostics/error.h"
 #include "frontend/data/buffer.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
 

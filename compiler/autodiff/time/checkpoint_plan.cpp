@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sums/accumulation.h"
 #include "autodiff/time/checkpoint_actions.h"
 #include "autodiff/time/revolve.h"
 #include "autodiff/updates/versions.h"

@@ -5,7 +5,7 @@
 #include "autodiff/updates/numbering.h"
 #include "autodiff/updates/versions.h"
 #include "frontend/language/var.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
 #include "ir/visit.h"

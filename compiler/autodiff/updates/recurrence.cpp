@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <set>
 
-#include "autodiff/sweeps/carried_sums.h"
+#include "autodiff/sums/carried_sums.h"
 #include "autodiff/time/checkpoint.h"
 #include "autodiff/updates/versions.h"
 #include "frontend/language/var.h"

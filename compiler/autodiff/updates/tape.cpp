@@ -6,7 +6,7 @@
 #include "autodiff/updates/versions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
 

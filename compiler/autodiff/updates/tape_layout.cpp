@@ -2,7 +2,7 @@
 
 #include "diagnostics/error.h"
 #include "frontend/language/var.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"

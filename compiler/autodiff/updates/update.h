@@ -29,7 +29,7 @@
 
 #include "autodiff/report/explain.h"
 #include "autodiff/rules/value_range.h"
-#include "autodiff/sweeps/accumulation.h"
+#include "autodiff/sums/accumulation.h"
 #include "autodiff/sweeps/regions.h"
 #include "autodiff/sweeps/reverse_sweep.h"
 #include "autodiff/updates/version_budget.h"

@@ -4,7 +4,7 @@
 #include <set>
 
 #include "diagnostics/error.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "autodiff/sweeps/generated_definitions.h"
+#include "autodiff/sums/generated_definitions.h"
 #include "autodiff/sweeps/reverse_sweep.h"
 #include "autodiff/updates/update.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/memory_reads.h"
 
 namespace retrograde::autodiff {

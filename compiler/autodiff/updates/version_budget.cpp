@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
-#include "autodiff/sweeps/generated_definitions.h"
+#include "autodiff/sums/generated_definitions.h"
 #include "diagnostics/error.h"
 #include "frontend/language/expr_ops.h"
 #include "frontend/language/var.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
 

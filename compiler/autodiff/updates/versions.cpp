@@ -1,9 +1,9 @@
 #include "autodiff/updates/versions.h"
 
-#include "autodiff/sweeps/generated_definitions.h"
+#include "autodiff/sums/generated_definitions.h"
 #include "frontend/language/var.h"
-#include "graph/define.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/define.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "simplify/simplify.h"

@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "frontend/language/func.h"
-#include "graph/define.h"
-#include "graph/wrappers.h"
+#include "graph/definitions/define.h"
+#include "graph/directives/wrappers.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"

@@ -1,7 +1,7 @@
 // param.cpp -- values and limits of scalar parameters.
 #include "frontend/data/param.h"
 
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"

@@ -1,7 +1,7 @@
 // expr_ops.cpp -- type rules and checks of the operators and functions on Exprs.
 #include "frontend/language/expr_ops.h"
 
-#include "graph/random_sequence.h"
+#include "graph/definitions/random_sequence.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 

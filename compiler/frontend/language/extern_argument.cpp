@@ -2,7 +2,7 @@
 #include "frontend/language/extern_argument.h"
 
 #include "frontend/language/func.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "ir/build.h"
 #include "ir/print.h"
 

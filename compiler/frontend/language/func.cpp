@@ -1,7 +1,7 @@
 // func.cpp -- construction and accessors of Func, and its directives about compute and storage levels.
 #include "frontend/language/func.h"
 
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 

@@ -6,7 +6,7 @@
 #include "frontend/language/several_points.h"
 #include "frontend/language/var.h"
 #include "frontend/run/warnings.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 
 namespace retrograde {
 

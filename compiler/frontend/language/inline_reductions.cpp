@@ -4,7 +4,7 @@
 #include <unordered_set>
 
 #include "frontend/language/integer_ops.h"
-#include "graph/define.h"
+#include "graph/definitions/define.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 

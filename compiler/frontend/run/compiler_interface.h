@@ -13,8 +13,8 @@
 #include "frontend/run/jit_handlers.h"
 #include "frontend/run/schedule_report.h"
 #include "frontend/schedule/autoschedule_options.h"
+#include "graph/directives/schedule_log.h"
 #include "graph/function.h"
-#include "graph/schedule_log.h"
 #include "ir/lowered_function.h"
 #include "ir/target.h"
 

@@ -5,7 +5,7 @@
 
 #include "diagnostics/error.h"
 #include "frontend/run/compiler_interface.h"
-#include "graph/random_sequence.h"
+#include "graph/definitions/random_sequence.h"
 
 namespace retrograde {
 

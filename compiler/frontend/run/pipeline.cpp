@@ -10,8 +10,8 @@
 #include "frontend/language/func.h"
 #include "frontend/run/call.h"
 #include "frontend/run/warnings.h"
-#include "graph/give_directive.h"
-#include "graph/wrappers.h"
+#include "graph/directives/give_directive.h"
+#include "graph/directives/wrappers.h"
 
 namespace retrograde {
 

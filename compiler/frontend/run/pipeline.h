@@ -15,7 +15,7 @@
 #include "frontend/run/schedule_report.h"
 #include "frontend/schedule/autoschedule_options.h"
 #include "frontend/schedule/autoscheduler.h"
-#include "graph/schedule_log.h"
+#include "graph/directives/schedule_log.h"
 
 namespace retrograde {
 

@@ -17,8 +17,8 @@
 #include <utility>
 
 #include "diagnostics/error.h"
-#include "graph/give_directive.h"
-#include "graph/wrappers.h"
+#include "graph/directives/give_directive.h"
+#include "graph/directives/wrappers.h"
 #include "ir/build.h"
 #include "ir/memory_reads.h"
 #include "ir/print.h"

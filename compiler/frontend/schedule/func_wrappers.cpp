@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "frontend/language/func.h"
-#include "graph/wrappers.h"
+#include "graph/directives/wrappers.h"
 #include "ir/equal.h"
 
 namespace retrograde {

@@ -16,8 +16,8 @@
 
 #include "frontend/language/var_or_rvar.h"
 #include "frontend/schedule/loop_level.h"
-#include "graph/give_directive.h"
-#include "graph/inline_calls.h"
+#include "graph/definitions/inline_calls.h"
+#include "graph/directives/give_directive.h"
 #include "ir/target.h"
 
 namespace retrograde {

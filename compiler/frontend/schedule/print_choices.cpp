@@ -2,7 +2,7 @@
 
 #include <ostream>
 
-#include "graph/directive_choices.h"
+#include "graph/directives/directive_choices.h"
 
 namespace retrograde {
 

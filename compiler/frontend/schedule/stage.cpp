@@ -1,11 +1,11 @@
-// stage.cpp -- helpers of the loop directives; graph/give_directive.h has their rules.
+// stage.cpp -- helpers of the loop directives; graph/directives/give_directive.h has their rules.
 #include "frontend/schedule/stage.h"
 
 #include <algorithm>
 
 #include "frontend/language/func.h"
-#include "graph/define.h"
-#include "graph/rfactor.h"
+#include "graph/definitions/define.h"
+#include "graph/definitions/rfactor.h"
 
 namespace retrograde {
 

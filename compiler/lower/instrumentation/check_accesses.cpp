@@ -15,7 +15,7 @@
 //         before it. A promise is checked where it is a scalar outside of conditions and predicates. The promise of a
 //         let is checked where its name is used, inside the choices and loops between the two.
 // Not done: kernels, whose accesses the simulated device checks; accesses of extern stages.
-// Tests: test/golden/lower/check_accesses/, test/unit/checked_accesses_test.cpp.
+// Tests: test/golden/lower/check_accesses/, test/unit/codegen/checked_accesses_test.cpp.
 #include "lower/instrumentation/check_accesses.h"
 
 #include <memory>
@@ -24,8 +24,8 @@
 
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/checks/run_time_check.h"
 #include "lower/nests/copy_statement.h"
-#include "lower/nests/run_time_check.h"
 #include "retrograde_runtime.h"
 
 namespace retrograde::lower {

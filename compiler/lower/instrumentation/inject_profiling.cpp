@@ -17,7 +17,7 @@
 //         when the function returns early. Allocations that fit on the stack are not counted as memory: reporting
 //         one in an innermost tile would take longer than filling it.
 // Source: the sampling profiler that Halide's documentation describes. Tests:
-//         test/golden/pipeline/inject_profiling/, test/unit/profiler_test.cpp.
+//         test/golden/pipeline/inject_profiling/, test/unit/lower/profiler_test.cpp.
 #include "lower/instrumentation/inject_profiling.h"
 
 #include <algorithm>

@@ -15,7 +15,7 @@
 //         where, when and as often as the access, in vectors and branches, too. Realizations, productions and
 //         consumptions are reported by calls around statements. The parent of an event is the innermost
 //         enclosing event of its Func, or the beginning of the pipeline if there is none.
-// Source: HalideRuntime.h on halide_trace. Tests: test/unit/tracing_test.cpp.
+// Source: HalideRuntime.h on halide_trace. Tests: test/unit/lower/tracing_test.cpp.
 #include "lower/instrumentation/inject_tracing.h"
 
 #include <HalideRuntime.h>

@@ -10,9 +10,9 @@
 #include "ir/print.h"
 #include "ir/text.h"
 #include "ir/visit.h"
+#include "lower/definitions/inline_functions.h"
 #include "lower/lower.h"
 #include "lower/nests/build_loop_nests.h"
-#include "lower/nests/inline_functions.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::lower {

@@ -6,7 +6,7 @@
 //
 // Errors: Tuples; file names without a known format; types that the format does not support.
 // Source: Halide's documentation of debug_to_file. Tests:
-//         test/golden/pipeline/write_debug_files/, test/unit/debug_file_test.cpp.
+//         test/golden/pipeline/write_debug_files/, test/unit/lower/debug_file_test.cpp.
 #include "lower/instrumentation/write_debug_files.h"
 
 #include <algorithm>

@@ -11,7 +11,7 @@
 //
 // Method: constant upper bounds of sizes, as for loops (bounded_extents.h), for sizes that mention few names.
 // Not done: storage that is scheduled on the heap or a device; kernels, whose storage is already placed.
-// Source: folklore. Tests: test/golden/lower/bound_allocations/, test/unit/loop_schedules_test.cpp.
+// Source: folklore. Tests: test/golden/lower/bound_allocations/, test/unit/lower/loop_schedules_test.cpp.
 #include <algorithm>
 
 #include "ir/build.h"

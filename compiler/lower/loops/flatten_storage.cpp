@@ -25,8 +25,8 @@
 #include "ir/build.h"
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
+#include "lower/definitions/resolve_undef.h"
 #include "lower/nests/copy_statement.h"
-#include "lower/nests/resolve_undef.h"
 
 namespace retrograde::lower {
 

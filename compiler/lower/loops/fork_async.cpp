@@ -25,7 +25,7 @@
 // Errors: a Func that both branches compute, if its storage level is outside of theirs; loops between storage and
 //         compute level that are not serial, or that belong to a memoized Func.
 // Source: Halide's documentation of async; the handshake is a bounded buffer's (Dijkstra 1965).
-// Tests: test/golden/pipeline/fork_async/, test/unit/async_test.cpp.
+// Tests: test/golden/pipeline/fork_async/, test/unit/lower/async_test.cpp.
 #include "lower/loops/fork_async.h"
 
 #include <algorithm>

@@ -18,7 +18,7 @@
 //         conditions and by the loops running at least once. Equal calls at one place are merged.
 // Not done: calls in arms of a select; loops with checks, which must run before the calls after them; arguments and
 //           conditions that read memory.
-// Source: folklore. Tests: test/golden/lower/hoist_calls/, test/unit/extern_stage_test.cpp.
+// Source: folklore. Tests: test/golden/lower/hoist_calls/, test/unit/lower/extern_stage_test.cpp.
 #include "lower/statement_passes.h"
 
 #include <algorithm>

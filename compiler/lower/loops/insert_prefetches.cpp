@@ -12,7 +12,7 @@
 //         faults.
 // Not done: limiting the size; boxes larger than a cache are fetched completely.
 // Source: Halide's documentation of prefetch. Tests: test/golden/pipeline/insert_prefetches/,
-//         test/golden/pipeline/lower_prefetches/, test/unit/prefetch_test.cpp.
+//         test/golden/pipeline/lower_prefetches/, test/unit/lower/prefetch_test.cpp.
 #include "lower/loops/insert_prefetches.h"
 
 #include "ir/build.h"

@@ -14,7 +14,7 @@
 //
 // Method: one walk that counts the parallel loops around; each allocation remembers the count.
 // Errors: a require() that reads an element of a Tuple: it would return while holding the lock.
-// Source: folklore. Tests: test/golden/lower/lower_atomics/, test/unit/atomic_test.cpp.
+// Source: folklore. Tests: test/golden/lower/lower_atomics/, test/unit/lower/atomic_test.cpp.
 #include "lower/statement_passes.h"
 
 #include <unordered_map>

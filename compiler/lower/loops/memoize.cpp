@@ -15,7 +15,7 @@
 // Errors: a memoized Func that reads an ImageParam without memoize_tag; one that is stored outside of its compute
 //         level; a tag or eviction key that depends on Vars.
 // Source: Halide's documentation of memoize and memoize_tag. Tests: test/golden/pipeline/memoize/,
-//         test/unit/memoize_test.cpp.
+//         test/unit/lower/memoize_test.cpp.
 #include "lower/loops/memoize.h"
 
 #include <algorithm>

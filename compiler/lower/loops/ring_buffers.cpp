@@ -11,7 +11,7 @@
 //         number of copies. Producer and consumer of an async Func count separately.
 // Errors: loops that are not serial; Funcs whose storage is not hoisted; inner loops of an async Func with varying
 //         extents, for which two consecutive iterations could use the same copy.
-// Source: folklore. Tests: test/golden/pipeline/ring_buffers/, test/unit/ring_buffer_test.cpp.
+// Source: folklore. Tests: test/golden/pipeline/ring_buffers/, test/unit/lower/ring_buffer_test.cpp.
 #include "lower/loops/ring_buffers.h"
 
 #include <map>

@@ -29,7 +29,7 @@
 // Side effects of a Func are part of its values: traced stores, calls of C functions and lookups of memoized Funcs are
 // skipped with it. A traced load, or memory that debug_to_file writes, is a read.
 // Source: Halide's tests and documentation describe the behaviour that users see. Tests:
-//         test/golden/lower/skip_stages/, test/unit/skip_stages_test.cpp, test/property.
+//         test/golden/lower/skip_stages/, test/unit/lower/skip_stages_test.cpp, test/property.
 #include "lower/loops/skip_stages.h"
 
 #include <algorithm>

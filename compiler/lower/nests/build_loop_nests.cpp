@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "ir/build.h"
-#include "lower/nests/nest_checks.h"
+#include "lower/checks/nest_checks.h"
 #include "lower/nests/nest_emitter.h"
 #include "lower/nests/own_joining.h"
 #include "lower/nests/shared_loops.h"

@@ -18,7 +18,7 @@
 // each box is bound to a name at its site, so time and code grow linearly with the pipeline. A Func
 // stored further out than it is computed slides (sliding_window.h) and folds (storage_folding.h).
 // Source: the scheduling model of Ragan-Kelley et al., PLDI 2013, section 4.2; the single bottom-up
-// walk is ours. Tests: test/unit/loop_nest_test.cpp, sliding_window_test.cpp, test/property.
+// walk is ours. Tests: test/unit/lower/loop_nest_test.cpp, sliding_window_test.cpp, test/property.
 #pragma once
 
 #include <string>

@@ -12,7 +12,7 @@
 #include "analysis/interval.h"
 #include "ir/build.h"
 #include "ir/visit.h"
-#include "lower/nests/sliding_window.h"
+#include "lower/storage/sliding_window.h"
 
 namespace retrograde::lower {
 

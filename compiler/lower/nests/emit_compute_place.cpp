@@ -3,11 +3,11 @@
 
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/checks/nest_checks.h"
 #include "lower/loops/memoize.h"
 #include "lower/nests/emit_definition.h"
-#include "lower/nests/nest_checks.h"
 #include "lower/nests/nest_emitter.h"
-#include "lower/nests/promised_bounds.h"
+#include "lower/storage/promised_bounds.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::lower {

@@ -9,7 +9,7 @@
 #include "ir/memory_reads.h"
 #include "ir/text.h"
 #include "ir/visit.h"
-#include "lower/nests/resolve_undef.h"
+#include "lower/definitions/resolve_undef.h"
 #include "simplify/cse.h"
 #include "simplify/simplify.h"
 

@@ -5,8 +5,8 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/checks/run_time_check.h"
 #include "lower/nests/emitted.h"
-#include "lower/nests/run_time_check.h"
 #include "lower/runtime_call.h"
 #include "retrograde_runtime.h"
 

@@ -20,7 +20,7 @@
 // Method: buffer descriptors are packed values (Op::pack) in the layout of halide_buffer_t. The answer to a query is an
 //         expression that contains the call, so that it can be used wherever a bound can.
 // Errors: arguments that are inlined or folded; functions with C++ names.
-// Source: Halide's documentation of define_extern. Tests: test/unit/extern_stage_test.cpp.
+// Source: Halide's documentation of define_extern. Tests: test/unit/lower/extern_stage_test.cpp.
 #pragma once
 
 #include "ir/build.h"

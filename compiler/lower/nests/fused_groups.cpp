@@ -4,7 +4,7 @@
 #include <map>
 
 #include "diagnostics/error.h"
-#include "lower/nests/fusing_checks.h"
+#include "lower/checks/fusing_checks.h"
 #include "lower/nests/own_joining.h"
 
 namespace retrograde::lower {

@@ -7,7 +7,7 @@
 // of loops that it shares. The trees of a group run one after another, in an order that keeps the stages of every Func
 // in order. A group is then sorted like a single Func. Linear in the number of Funcs and their calls.
 // Errors: the conditions that docs/scheduling.md and Stage::compute_with state.
-// Tests: test/unit/compute_with_test.cpp, test/error/compute_with_errors_test.cpp.
+// Tests: test/unit/lower/compute_with_test.cpp, test/error/compute_with_errors_test.cpp.
 #pragma once
 
 #include <vector>

@@ -8,7 +8,7 @@
 //   produce g: realize f: ...                produce g: realize f: ...
 //   produce h: realize f: ...       =>       produce h: realize f.$1: ...
 //
-// Method: one walk with a stack of renamings. Tests: test/unit/lower_names_test.cpp.
+// Method: one walk with a stack of renamings. Tests: test/unit/lower/lower_names_test.cpp.
 #pragma once
 
 #include <map>

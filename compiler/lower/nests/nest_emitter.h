@@ -10,14 +10,14 @@
 #include <utility>
 #include <vector>
 
+#include "lower/definitions/value_bounds.h"
 #include "lower/nests/build_loop_nests.h"
 #include "lower/nests/compute_place.h"
 #include "lower/nests/emitted.h"
 #include "lower/nests/extern_stage.h"
 #include "lower/nests/fused_groups.h"
-#include "lower/nests/nest_storage.h"
 #include "lower/nests/stage_nest.h"
-#include "lower/nests/value_bounds.h"
+#include "lower/storage/nest_storage.h"
 
 namespace retrograde::lower {
 

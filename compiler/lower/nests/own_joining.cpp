@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "diagnostics/error.h"
-#include "graph/define.h"
-#include "graph/own_reads.h"
+#include "graph/definitions/define.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/equal.h"
 #include "ir/print.h"
 #include "ir/text.h"

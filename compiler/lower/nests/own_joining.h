@@ -6,12 +6,12 @@
 // A tile of sums is then initialised while it is in the cache. In every iteration of the shared loops, the update must
 // access exactly the elements that the stage before has computed in that iteration: the loops are the same parts of the
 // same dimensions, the stage before computes no element twice, and the update of each element reads no other element.
-// Tests: test/unit/compute_with_test.cpp, test/error/compute_with_errors_test.cpp.
+// Tests: test/unit/lower/compute_with_test.cpp, test/error/compute_with_errors_test.cpp.
 #pragma once
 
 #include <string>
 
-#include "lower/nests/fusing_checks.h"
+#include "lower/checks/fusing_checks.h"
 
 namespace retrograde::lower {
 

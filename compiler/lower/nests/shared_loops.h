@@ -11,7 +11,7 @@
 // The needs of each stage stay separate: further out a stage needs the same as alone, without the iterations that
 // belong only to the other stage. Only a Func that is computed inside of the shared loops must know the needs of all
 // stages in one iteration: the conditions that choose which stage runs also choose the box.
-// Tests: test/unit/compute_with_test.cpp.
+// Tests: test/unit/lower/compute_with_test.cpp.
 #pragma once
 
 #include <functional>

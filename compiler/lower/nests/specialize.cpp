@@ -4,7 +4,7 @@
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/visit.h"
-#include "lower/nests/run_time_check.h"
+#include "lower/checks/run_time_check.h"
 #include "retrograde_runtime.h"
 #include "simplify/simplify.h"
 

@@ -5,7 +5,7 @@
 //
 // Method: the definition is simplified under the condition of each branch before regions are inferred, so that a branch
 // does not compute regions that it does not read. Consequences of a comparison are found later, when the statement is
-// simplified. Not done: conditions that depend on data. Tests: test/unit/specialize_test.cpp.
+// simplified. Not done: conditions that depend on data. Tests: test/unit/lower/specialize_test.cpp.
 #pragma once
 
 #include <string>

@@ -19,7 +19,7 @@
 #include "frontend/data/image_param.h"
 #include "frontend/data/param.h"
 #include "frontend/language/func.h"
-#include "graph/schedule_log.h"
+#include "graph/directives/schedule_log.h"
 #include "testing/array.h"
 #include "testing/choices.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <variant>
 
-#include "graph/own_reads.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/memory_reads.h"
 
 namespace retrograde::gradient {

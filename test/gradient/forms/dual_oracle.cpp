@@ -9,7 +9,7 @@
 #include <quadmath.h>
 #endif
 
-#include "autodiff/sweeps/distinct_nodes.h"
+#include "autodiff/sums/distinct_nodes.h"
 #include "autodiff/sweeps/local_derivative.h"
 #include "diagnostics/error.h"
 #include "ir/build.h"

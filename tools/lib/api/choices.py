@@ -5,16 +5,16 @@ HEADER_FOLDERS = ["frontend", "generator", "checks"]
 MORE_HEADERS = [
     "autodiff/custom_derivative.h", "autodiff/derivative.h", "autodiff/jacobian.h", "autodiff/matrices/compressed.h",
     "autodiff/second_order.h", "autodiff/straight_through.h", "autodiff/tangents.h", "diagnostics/error.h", "diagnostics/pass_observer.h",
-    "graph/schedule_log.h", "ir/build.h", "ir/expr.h", "ir/target.h", "ir/type.h"]
+    "graph/directives/schedule_log.h", "ir/build.h", "ir/expr.h", "ir/target.h", "ir/type.h"]
 INTERNAL_HEADERS = {
     "checks/arrays.h", "checks/complex_step.h", "checks/culprit.h", "checks/json_number.h",
     "checks/widen.h", "frontend/data/argument.h", "frontend/run/call.h", "frontend/run/compiler_interface.h",
     "generator/command_line.h", "generator/cpp_stub.h", "generator/members.h",
-    "graph/associative_update.h", "graph/binder.h", "graph/copy_graph.h", "graph/define.h",
-    "graph/directive.h", "graph/directive_choices.h", "graph/directive_fields.h", "graph/directive_text.h",
-    "graph/function.h", "graph/give_directive.h", "graph/graph.h", "graph/graph_lines.h", "graph/names.h", "graph/parameter_contents.h", "graph/provenance.h",
-    "graph/race_checks.h", "graph/reduction_domain.h", "graph/reduction_leaves.h", "graph/rfactor.h", "graph/schedule.h",
-    "graph/wrappers.h", "lower/lower.h"}
+    "graph/definitions/associative_update.h", "graph/text/binder.h", "graph/copy_graph.h", "graph/definitions/define.h",
+    "graph/directives/directive.h", "graph/directives/directive_choices.h", "graph/directives/directive_fields.h", "graph/directives/directive_text.h",
+    "graph/function.h", "graph/directives/give_directive.h", "graph/graph.h", "graph/text/graph_lines.h", "graph/names.h", "graph/definitions/parameter_contents.h", "graph/definitions/provenance.h",
+    "graph/definitions/race_checks.h", "graph/definitions/reduction_domain.h", "graph/definitions/reduction_leaves.h", "graph/definitions/rfactor.h", "graph/schedule.h",
+    "graph/directives/wrappers.h", "lower/lower.h"}
 # Parts of templates that users never name by themselves.
 INTERNAL_SCOPES = {"Declared", "ArrayTraits", "ElementTraits", "InputValue", "InputElements", "ScalarElements",
                    "OutputElements", "GeneratorParamBase::InCpp", "RegisterGenerator", "tell_pass_observers",

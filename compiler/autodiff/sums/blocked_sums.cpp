@@ -1,0 +1,146 @@
+#include "autodiff/sums/blocked_sums.h"
+
+#include <algorithm>
+
+#include "autodiff/sums/generated_definitions.h"
+#include "graph/definitions/define.h"
+#include "graph/names.h"
+#include "ir/build.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::autodiff {
+
+namespace {
+
+// The number of terms of a block. Each lane has blocks of its own.
+constexpr int64_t short_block = 16, long_block = 32;
+// Sums of at least this many long blocks use long blocks.
+constexpr int64_t enough_blocks = 16;
+// A block with fewer terms does not pay.
+constexpr int64_t least_terms = 8;
+// For loops of at least this many blocks, rounding up to whole blocks costs little.
+constexpr int64_t least_to_round = 8;
+
+// The size of a block in a sum of `terms` terms; INT64_MAX means unknown.
+int64_t terms_of_block(int64_t terms) {
+  return terms / long_block >= enough_blocks ? long_block : short_block;
+}
+
+int64_t number_of_terms(const std::vector<ReductionVariable>& rvars) {
+  int64_t terms = 1;
+  for (const ReductionVariable& r : rvars) {
+    const auto extent = as_const_int(simplify(r.extent));
+    if (!extent || __builtin_mul_overflow(terms, *extent, &terms)) return INT64_MAX;
+  }
+  return terms;
+}
+
+// The number of consecutive iterations of a loop that form a block, at most `most`; a divisor of the extent if there is
+// one above most / 2.
+int64_t cut_of(int64_t extent, int64_t most) {
+  for (int64_t size = most; size * 2 > most; --size) {
+    if (extent % size == 0) return size;
+  }
+  return most;
+}
+
+class Cutter {
+ public:
+  Cutter(const std::vector<ReductionVariable>& rvars) {
+    int64_t room = terms_of_block(number_of_terms(rvars));
+    for (const ReductionVariable& r : rvars) {
+      const auto extent = as_const_int(simplify(r.extent));
+      if (extent && *extent <= room) {
+        keep_inside(r, *extent);
+        room /= std::max<int64_t>(*extent, 1);
+      } else if (extent && room >= 2) {
+        cut(r, *extent, cut_of(*extent, room));
+        room = 1;
+      } else {  // a loop of unknown extent may be shorter than a block
+        keep_outside(r);
+      }
+    }
+  }
+
+  bool is_worth_while() const { return !outer().empty() && terms_ >= least_terms; }
+  const std::vector<ReductionVariable>& inner() const { return inside_->vars; }
+  const std::vector<ReductionVariable>& outer() const { return outside_->vars; }
+  const std::vector<Expr>& conditions() const { return conditions_; }
+  const std::vector<Expr>& numbers() const {
+    return numbers_;
+  }  // block numbers: Vars of the block's Func
+  const Substitution& place() const { return place_; }
+  std::vector<Expr> places_outside() const {
+    return mapped(outer(), [&](const auto& r) { return loop_variable(outside_, r.var); });
+  }
+
+ private:
+  Expr add_outside(const std::string& name, const Expr& min, const Expr& extent) {
+    add_loop(outside_, name, min, extent);
+    const std::string loop = without_numbers(name);
+    numbers_.push_back(variable(unique_name(loop.substr(loop.rfind('.') + 1) + "_block")));
+    return numbers_.back();
+  }
+
+  void keep_inside(const ReductionVariable& r, int64_t extent) {
+    place_[r.var] = add_loop(inside_, r.var, r.min, r.extent);
+    terms_ *= extent;
+  }
+  void keep_outside(const ReductionVariable& r) {
+    place_[r.var] = add_outside(r.var, r.min, r.extent);
+  }
+  // Splits the loop into blocks. Indices beyond the end are clamped, because the elements that are read must exist.
+  void cut(const ReductionVariable& r, int64_t extent, int64_t size) {
+    const Expr all = make_const(Int(32), extent), each = make_const(Int(32), size);
+    const Expr number =
+        add_outside(r.var, make_zero(Int(32)), make_const(Int(32), (extent + size - 1) / size));
+    Expr at = number * each + add_loop(inside_, r.var, make_zero(Int(32)), each);
+    if (extent % size != 0) {
+      conditions_.push_back(likely(at < all));
+      at = binary(Kind::Min, likely(at), all - 1);
+    }
+    place_[r.var] = r.min + at;
+    terms_ *= size;
+  }
+
+  const DomainPtr inside_ = make_domain(), outside_ = make_domain();
+  std::vector<Expr> numbers_, conditions_;
+  Substitution place_;
+  int64_t terms_ = 1;
+};
+
+}  // namespace
+
+Expr in_whole_blocks(const Expr& extent) {
+  const auto known = as_const_int(extent);
+  if (!known) return extent;
+  const int64_t block = terms_of_block(*known), blocks = (*known + block - 1) / block;
+  return *known < least_to_round * block ? extent : make_const(Int(32), blocks * block);
+}
+
+std::optional<SumOfBlocks> sum_in_blocks(const std::string& name, const std::string& of,
+                                         const std::vector<Expr>& point,
+                                         const std::vector<ReductionVariable>& rvars,
+                                         const std::vector<Expr>& terms, const Expr& predicate) {
+  const Cutter cut(rvars);
+  if (!cut.is_worth_while()) return {};
+  const FuncPtr block = make_func(Role::Accumulator, name + "_block", of);
+  block->made->blocks = static_cast<int>(cut.numbers().size());
+  std::vector<Expr> args = point, place = point;
+  append(args, cut.numbers());
+  append(place, cut.places_outside());
+  define_pure(block, args, mapped(terms, [](const Expr& term) {
+                return make_zero(term.defined() ? term.type() : Float(32));
+              }));
+  const auto here = [&](const Expr& e) { return e.defined() ? substitute(e, cut.place()) : e; };
+  std::vector<Expr> conditions = cut.conditions();
+  if (predicate.defined()) conditions.push_back(here(predicate));
+  append_sums(block, args, mapped(terms, here), cut.inner(), conjunction(conditions));
+  SumOfBlocks result{block, cut.outer(), values_of(block, place)};
+  for (size_t k = 0; k < terms.size(); ++k) {
+    if (!terms[k].defined()) result.values[k] = Expr();
+  }
+  return result;
+}
+
+}  // namespace retrograde::autodiff

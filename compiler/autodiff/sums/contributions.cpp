@@ -1,0 +1,69 @@
+#include "autodiff/sums/contributions.h"
+
+#include <utility>
+
+#include "autodiff/sweeps/input_shape.h"
+#include "diagnostics/error.h"
+#include "ir/build.h"
+
+namespace retrograde::autodiff {
+
+void Contributions::add_pointwise(const Symbol* symbol, const std::vector<std::string>& args,
+                                  const Box& box, const std::vector<LoopVariable>& read,
+                                  const std::vector<Expr>& values) {
+  passed_.close(symbol);
+  AccessQuery query{{}, {}, args, read};
+  for (size_t d = 0; d < args.size(); ++d)
+    query.domain.vars.push_back({args[d], box[d].min, box[d].max});
+  query.indices = variables_of(args);
+  Inversion inversion = invert_access(query);
+  for (size_t k = 0; k < values.size(); ++k) {
+    if (!values[k].defined()) continue;
+    for (const Gather& g : inversion.gathers)
+      pending_[symbol].push_back({static_cast<int>(k), g, substitute(values[k], g.iteration)});
+  }
+}
+
+void Contributions::add(const FuncPtr& f, const LeafAdjoint& leaf, const Expr& adjoint,
+                        const IterationDomain& domain) {
+  const Symbol* symbol = symbol_of(leaf.leaf);
+  const auto* call = leaf.leaf.as<Call>();
+  const Inversion& inversion = inversion_of(*f, leaf, domain);
+  const auto* read = dynamic_cast<const FuncContents*>(symbol);
+  if (read && is_look_up(*read) && !primal_.is_named(symbol))
+    passed_.note(symbol, {f, {leaf.leaf, adjoint}, domain});
+  if (!inversion.note.empty())
+    account_.add(Explanation::Kind::Scattered, shape_of(symbol).name,
+                 text("read by ", quoted(f->name), ": ", inversion.note));
+  for (const Gather& g : inversion.gathers)
+    pending_[symbol].push_back({call ? call->component : 0, g, substitute(adjoint, g.iteration)});
+}
+
+bool Contributions::pass_on(const FuncContents& f) {
+  std::vector<PassedRead> further;
+  for (const PassedRead& read : passed_.of(&f)) {
+    const SweepResult sweep =
+        primal_.sweep({looked_up(f, *read.read.leaf.as<Call>())}, {read.read.adjoint});
+    for (const LeafAdjoint& leaf : sweep.leaves) {
+      if (!is_short(inversion_of(*read.reader, leaf, read.domain))) return false;
+      further.push_back({read.reader, leaf, read.domain});
+    }
+  }
+  for (const PassedRead& read : further) add(read.reader, read.read, read.domain);
+  return !further.empty();
+}
+
+std::vector<Contribution> Contributions::take(const Symbol* symbol) {
+  return std::exchange(pending_[symbol], {});
+}
+
+const Inversion& Contributions::inversion_of(const FuncContents& reader, const LeafAdjoint& leaf,
+                                             const IterationDomain& domain) {
+  const Symbol* symbol = symbol_of(leaf.leaf);
+  const auto* call = leaf.leaf.as<Call>();
+  const AdjointTarget target = primal_.target_of(symbol);
+  AccessQuery query{domain, call ? call->args : std::vector<Expr>{}, target.args, target.region};
+  return inversions_.of(reader, *symbol, query, leaf.adjoint);
+}
+
+}  // namespace retrograde::autodiff

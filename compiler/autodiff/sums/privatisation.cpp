@@ -1,0 +1,250 @@
+#include "autodiff/sums/privatisation.h"
+
+#include <algorithm>
+
+#include "autodiff/sums/blocked_sums.h"
+#include "autoschedule/size_estimate.h"
+#include "ir/build.h"
+#include "ir/print.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::autodiff {
+
+namespace {
+
+// The number of parts of a privatised accumulation: enough for the threads of today's machines, few enough to sum and
+// store.
+constexpr int part_count = 32;
+// Zeroing and summing parts may cost as much as this many elements an iteration. With fewer than least_parts, a scatter
+// is not privatised.
+constexpr double elements_an_iteration = 4;
+constexpr int least_parts = 4;
+// The number of elements of one part of a scatter, lanes included, that fit a near cache.
+constexpr double near_elements = 1 << 14;
+// Memory budget in bytes for all parts of one adjoint. A larger target is accumulated in place, in parallel over its
+// pure dimensions only.
+constexpr double private_bytes = 64 << 20;
+// With at most few_elements elements, each of many_iterations iterations, the pure dimensions alone do not occupy a
+// machine. Up to one_tile elements fit one register tile; up to few_elements fit a few tiles.
+constexpr double one_tile = 64, few_elements = 1024, many_iterations = 4096;
+// The least number of terms that a lane of a part adds if there are several tiles, so that zeroing and summing the
+// parts cost little beside them.
+constexpr double terms_a_lane = 8;
+// Sums of at least this many iterations repay zeroing and summing the lanes.
+constexpr double lanes_pay = 16 * lane_count;
+
+class PartSizes {
+ public:
+  PartSizes(const AdjointTarget& target, const std::vector<Type>& types)
+      : target_(target), types_(types) {}
+
+  bool sums_many_terms(const Gather& g) const {
+    return g.rdom && (is_few_elements(g) || iterations_of(g, many_terms) >= many_terms);
+  }
+  // Whether the elements alone offer too little parallelism, and each sums over many iterations.
+  bool is_worth_splitting(const Iterations& update) const {
+    const Gather& g = update.over;
+    return g.rdom && (leaves_lanes_idle(update) || is_few_elements(g));
+  }
+  bool is_few_elements(const Gather& g) const {
+    if (elements_of(g) > few_elements) return false;
+    if (parts_of(g) < least_parts) return false;
+    const double iterations = iterations_of(g, many_iterations);
+    const bool has_pure_dimension = std::ranges::find(g.pure, true) != g.pure.end();
+    return iterations >= (has_pure_dimension ? many_iterations : part_count * lane_count);
+  }
+  // Whether vectors of elements are worse than vectors of terms, while each element sums over long rows. Rows of
+  // elements may be shorter than a vector, as in a small kernel with many channels, or strided in what they read, as in
+  // a layer that mixes channels.
+  bool leaves_lanes_idle(const Iterations& update) const {
+    const Gather& g = update.over;
+    if (g.scatters || g.pure.empty() || target_.region.size() != g.pure.size()) return false;
+    const auto row = as_const_int(g.rdom->vars[0].extent);
+    const bool is_short = extent_of(target_.region[0]) * 2 <= lane_count;
+    return g.pure[0] && (is_short || reads_across(update)) && (!row || *row >= lane_count) &&
+           elements_of(g) <= near_elements && iterations_of(g, many_iterations) >= lanes_pay;
+  }
+  // Whether the reads are strided for neighbouring elements and contiguous for neighbouring terms.
+  bool reads_across(const Iterations& update) const {
+    const std::string &row = target_.args[0], &term = update.rvars[0].var;
+    bool along = false, across = false;
+    const auto note = [&](const Expr& e) {
+      const auto* call = e.as<Call>();
+      if (!call || call->call_type == CallType::Operator || call->args.empty()) return true;
+      along |= uses_variable(call->args[0], row);
+      across |= uses_variable(call->args[0], term) &&
+                std::any_of(call->args.begin() + 1, call->args.end(),
+                            [&](const Expr& arg) { return uses_variable(arg, row); });
+      return true;
+    };
+    for (const Expr& sum : update.all.sums) {
+      if (sum.defined()) walk(sum, note);
+    }
+    return across && !along;
+  }
+  // The number of parts, a power of two; 1 means only lanes. Each part of a scatter holds every element that the
+  // scatter may reach, so there are fewer parts if there are many elements for the iterations. If sizes are known at
+  // run time only, this is the maximum.
+  int parts_of(const Gather& g) const {
+    if (!g.scatters && elements_of(g) > few_elements) return 1;
+    if (!g.scatters && elements_of(g) > one_tile) return parts_of_a_tile(g);
+    if (!g.scatters || target_.region.size() != g.pure.size()) return part_count;
+    const double elements = elements_of_target();
+    if (elements >= unknown_elements) return part_count;
+    const double most = iterations_of(g, many_iterations) * elements_of(g) * elements_an_iteration /
+                        std::max(elements, 1.0);
+    int parts = part_count;
+    while ((parts > most || parts * elements * bytes_an_element() > private_bytes) && parts > 1)
+      parts /= 2;
+    return parts;
+  }
+  // The number of parts for elements that fill a few register tiles. Each part has lanes for every element, which must
+  // be zeroed and summed.
+  int parts_of_a_tile(const Gather& g) const {
+    int parts = part_count;
+    while (parts > 1 && iterations_of(g, many_iterations) < parts * lane_count * terms_a_lane)
+      parts /= 2;
+    return parts;
+  }
+  double bytes_an_element() const { return total_bytes(types_); }
+  // `parts_of`, or at run time the number of parts that fit if that is smaller.
+  Expr part_count_of(const Gather& g) const {
+    const Expr most = make_const(Int(32), parts_of(g));
+    if (!g.scatters || target_.region.size() != g.pure.size() ||
+        elements_of_target() < unknown_elements)
+      return most;
+    Expr fit = make_const(Int(64), static_cast<int64_t>(private_bytes / bytes_an_element()));
+    for (const LoopVariable& v : target_.region) {
+      if (!v.range().is_bounded()) return most;
+      fit = fit / max(cast_to(Int(64), v.max - v.min + 1), make_one(Int(64)));
+    }
+    return simplify(cast_to(Int(32), min(max(fit, make_one(Int(64))), cast_to(Int(64), most))));
+  }
+  // Lanes let a gather add in vectors. In a scatter, neighbouring iterations often meet in one element and would wait
+  // for each other, so lanes get elements of their own if there are few.
+  bool has_lanes(const Gather& g) const {
+    if (!g.scatters) return true;
+    if (target_.region.size() != g.pure.size()) return false;
+    const double elements = elements_of_target() * lane_count;
+    const double iterations = iterations_of(g, many_iterations) * elements_of(g);
+    return elements <= near_elements && elements * parts_of(g) <= iterations;
+  }
+  std::string note(const Gather& g, const Expr& count) const {
+    const double bytes = elements_of_target() * bytes_an_element();
+    if (!g.scatters || as_const_int(count) == 1) return "";
+    const std::string number = is_const(count) ? ir::print(count) : text("at most ", parts_of(g));
+    const std::string each =
+        bytes >= unknown_elements ? "" : text(" of ", static_cast<int64_t>(bytes), " bytes each");
+    return text("accumulated in ", number, " privatised copies", each, ", as many as fit ",
+                static_cast<int64_t>(private_bytes), " bytes");
+  }
+
+ private:
+  double elements_of_target() const {
+    double elements = 1;
+    for (const LoopVariable& v : target_.region) elements *= extent_of(v);
+    return elements;
+  }
+  // The number of iterations; a loop of unknown extent counts as `unknown`.
+  static double iterations_of(const Gather& g, double unknown) {
+    double iterations = 1;
+    for (const ReductionVariable& r : g.rdom->vars) {
+      auto extent = as_const_int(r.extent);
+      iterations *= extent ? static_cast<double>(*extent) : unknown;
+    }
+    return iterations;
+  }
+  // The number of elements that the pure dimensions of the update run over; very large if unknown.
+  double elements_of(const Gather& g) const {
+    double elements = 1;
+    for (size_t d = 0; d < g.pure.size(); ++d) {
+      if (!g.pure[d]) continue;
+      if (target_.region.size() != g.pure.size()) return unknown_elements;
+      elements *= extent_of(target_.region[d]);
+    }
+    return elements;
+  }
+  static double extent_of(const LoopVariable& v) {
+    auto extent = constant_extent(v.range());
+    return extent ? static_cast<double>(*extent) : unknown_elements;
+  }
+
+  const AdjointTarget& target_;
+  const std::vector<Type>& types_;
+};
+
+}  // namespace
+
+bool sums_many_terms(const Gather& g, const AdjointTarget& target, const std::vector<Type>& types) {
+  return PartSizes(target, types).sums_many_terms(g);
+}
+
+std::optional<PartPlan> plan_parts(const Iterations& update, const AdjointTarget& target,
+                                   const std::vector<Type>& types) {
+  const PartSizes sizes(target, types);
+  if (!sizes.is_worth_splitting(update)) return std::nullopt;
+  const Gather& g = update.over;
+  const Expr count = sizes.part_count_of(g);
+  return PartPlan{sizes.parts_of(g) > 1, count, sizes.has_lanes(g), sizes.note(g, count)};
+}
+
+// The loop that is split into parts: the outermost with enough iterations to run in parallel, so that a part reads
+// contiguous memory; else the longest loop.
+static size_t loop_in_parts(const Iterations& update) {
+  const size_t count = update.rvars.size() - (update.has_taps ? 1 : 0);
+  const auto extent = [&](size_t i) {
+    return as_const_int(update.rvars[i].extent).value_or(INT64_MAX);
+  };
+  size_t longest = count - 1;
+  for (size_t i = count; i-- > 0;) {
+    if (extent(i) >= MachineLimits().enough_tasks) return i;
+    if (extent(i) > extent(longest)) longest = i;
+  }
+  return longest;
+}
+
+// If the variable in parts is also the innermost, x = (part * chunk + rho) * lanes + lane; else lanes split the
+// innermost variable. Indices beyond the end are clamped, because the elements that are read must exist even where the
+// condition is false. Loop partitioning removes clamp and condition from the steady state, whose accumulators stay in
+// registers.
+Slice slice_of(const Iterations& update, const Expr& lane, const Expr& part, const Expr& parts,
+               bool in_blocks) {
+  Slice slice;
+  slice.rvars = update.rvars;
+  const DomainPtr rdom = make_domain();
+  const size_t cut = loop_in_parts(update);
+  for (size_t i = 0; i < slice.rvars.size(); ++i) {
+    ReductionVariable& r = slice.rvars[i];
+    std::string old = r.var;
+    Expr all = r.extent, min = r.min;
+    r = {unique_name(old), make_zero(Int(32)), all};
+    const bool in_parts = i == cut && part.defined(), in_lanes = i == 0 && lane.defined();
+    if (in_lanes) r.extent = simplify((r.extent + (lane_count - 1)) / lane_count);
+    if (in_parts) r.extent = simplify((r.extent + (parts - 1)) / parts);
+    if ((in_parts || in_lanes) && in_blocks) r.extent = in_whole_blocks(r.extent);
+    Expr at = loop_variable(rdom, r.var);
+    if (in_parts) at = part * r.extent + at;
+    if (in_lanes) at = at * lane_count + lane;
+    if (in_parts || in_lanes) {
+      slice.conditions.push_back(likely(at < all));
+      at = binary(Kind::Min, likely(at), all - 1);
+      if (!as_const_int(all)) at = max(at, make_zero(Int(32)));  // the extent may be 0
+    }
+    slice.place[old] = min + at;
+  }
+  rdom->vars = slice.rvars;
+  return slice;
+}
+
+std::vector<Expr> parts_point(const Gather& g, const std::vector<Expr>& element, const Expr& lane,
+                              const Expr& part) {
+  std::vector<Expr> point;
+  if (lane.defined()) point.push_back(lane);
+  for (size_t d = 0; d < element.size(); ++d) {
+    if (g.scatters || g.pure[d]) point.push_back(element[d]);
+  }
+  if (part.defined()) point.push_back(part);
+  return point;
+}
+
+}  // namespace retrograde::autodiff

@@ -1,0 +1,130 @@
+#include "graph/directives/give_directive.h"
+
+#include <atomic>
+
+namespace retrograde::graph {
+
+namespace {
+
+// The schedule that a directive changes; it and every schedule around it count as scheduled.
+StageLoops& mutable_schedule(const SchedulePlace& place) {
+  StageLoops* result = &place.f->stage(place.stage).schedule;
+  result->is_given = true;
+  for (const int step : place.special) {
+    result = &result->specializations[static_cast<size_t>(step)];
+    result->is_given = true;
+  }
+  return *result;
+}
+
+// ---- levels of LoopLevel objects, which may be set later ----
+
+using LevelSource = std::shared_ptr<LoopLevelContents> FuncPlacement::*;
+
+// The member of the schedule that holds the object behind a level.
+LevelSource source_of(const ComputeAt&) { return &FuncPlacement::compute_from; }
+LevelSource source_of(const StoreAt&) { return &FuncPlacement::store_from; }
+LevelSource source_of(const HoistStorage&) { return &FuncPlacement::hoist_from; }
+
+// Setting the object later updates the schedule, unless it has another level by then.
+template <typename D>
+void give_level(D at, const FuncPtr& f) {
+  const LevelSource source = source_of(at);
+  f->schedule.is_given = true;
+  f->schedule.*source = at.from;
+  if (at.from->defined) apply_directive(at, *f);
+  const LoopLevelContents* raw = at.from.get();
+  at.from->followers.push_back([=, weak = f->weak_from_this()](const LoopLevel& now) {
+    const auto func = weak.lock();
+    if (!func || (func->schedule.*source).get() != raw) return;
+    apply_directive(D{{now}}, *func);
+    func->version++;
+  });
+}
+
+// Until the object is set, the stage is not fused with any loop.
+void give_level(ComputeWith with, const SchedulePlace& place) {
+  if (!with.from->defined) {
+    const auto object = reinterpret_cast<uintptr_t>(with.from.get());
+    with.level = {LoopLevel::Kind::At, "", std::to_string(object), -1};
+  }
+  apply_directive(with, mutable_schedule(place));
+  with.from->followers.push_back([weak = place.f->weak_from_this(), index = place.stage,
+                                  align = with.align,
+                                  last = with.level](const LoopLevel& now) mutable {
+    const auto func = weak.lock();
+    if (!func || !(func->stage(index).schedule.fuse_level == last)) return;
+    Directive joined = ComputeWith{{now}, align};
+    check_directive({func, index}, joined);
+    last = func->stage(index).schedule.fuse_level = now;
+    func->version++;
+  });
+}
+
+void settle(AtLevel& at) {
+  if (!at.from) {
+    at.from = std::make_shared<LoopLevelContents>();
+    at.from->level = at.level;
+    at.from->defined = true;
+  }
+  if (at.from->defined) at.level = at.from->level;
+}
+
+}  // namespace
+
+void check_directive(const SchedulePlace& place, Directive& directive) {
+  is_of_stage(directive) ? check_stage_directive(place, directive)
+                         : check_func_directive(place, directive);
+}
+
+void log_directive(const SchedulePlace& place, Directive directive) {
+  static std::atomic<uint64_t> order = 0;
+  place.f->version++;
+  place.f->log.push_back({place.stage, place.special, std::move(directive), ++order});
+}
+
+void give_directive(const SchedulePlace& place, Directive directive) {
+  std::visit(
+      []<typename D>(D& d) {
+        if constexpr (std::is_base_of_v<AtLevel, D>) settle(d);
+      },
+      directive);
+  check_directive(place, directive);
+  if (const auto* special = std::get_if<Specialize>(&directive);
+      special && specialization_for(place.schedule(), special->condition) >= 0)
+    return;
+  std::visit(
+      [&]<typename D>(const D& d) {
+        if constexpr (std::is_same_v<D, ComputeWith>) {
+          give_level(d, place);
+        } else if constexpr (std::is_base_of_v<AtLevel, D>) {
+          give_level(d, place.f);
+        } else if (is_of_stage(directive)) {
+          apply_directive(directive, mutable_schedule(place));
+        } else {
+          apply_directive(directive, *place.f);
+        }
+      },
+      directive);
+  log_directive(place, std::move(directive));
+}
+
+void reset_loops(FuncContents& f) {
+  std::erase_if(f.log, [](const LoggedDirective& logged) { return logged.stage >= 0; });
+  for (int s = 0; s < f.stage_count(); ++s) {
+    Definition& stage = f.stage(s);
+    stage.schedule = StageLoops();
+    stage.schedule.dims = first_loops(f, stage);
+  }
+  f.version++;
+}
+
+bool has_directives(const FuncContents& f) {
+  if (f.schedule.is_given) return true;
+  for (int s = 0; s < f.stage_count(); ++s) {
+    if (f.stage(s).schedule.is_given) return true;
+  }
+  return false;
+}
+
+}  // namespace retrograde::graph

@@ -1,0 +1,149 @@
+#include "lower/definitions/inline_functions.h"
+
+#include <algorithm>
+#include <functional>
+#include <unordered_set>
+
+#include "diagnostics/error.h"
+#include "graph/definitions/inlined_size.h"
+#include "graph/directives/wrappers.h"
+#include "ir/visit.h"
+#include "lower/checks/refuse_unsupported.h"
+#include "lower/definitions/likely_clamps.h"
+#include "lower/definitions/resolve_undef.h"
+#include "lower/definitions/strict_indices.h"
+#include "lower/nests/fused_groups.h"
+#include "lower/storage/memory_order.h"
+
+namespace retrograde::lower {
+
+std::string value_buffer_name(const FuncContents& f, int index) {
+  return f.types.size() == 1 ? f.name : f.name + "." + std::to_string(index);
+}
+
+static bool is_given(const LoopLevel& level) { return level.kind != LoopLevel::Kind::Inlined; }
+static bool is_same_loop(const LoopLevel& a, const LoopLevel& b) {
+  return a.kind == b.kind && a.func == b.func && a.var == b.var;
+}
+
+bool is_stored_where_computed(const LoopedFunc& f) {
+  const LoopLevel& store = f.schedule.store_level;
+  return !is_given(store) || is_same_loop(store, f.schedule.compute_level);
+}
+
+bool is_hoisted(const LoopedFunc& f) {
+  const FuncPlacement& at = f.schedule;
+  return !f.is_output && is_given(at.hoist_level) &&
+         !is_same_loop(at.hoist_level,
+                       is_given(at.store_level) ? at.store_level : at.compute_level);
+}
+
+constexpr const char* place_suffix = ".place";
+std::string place_name(const std::string& func) { return func + place_suffix; }
+bool is_place_name(const std::string& name) { return name.ends_with(place_suffix); }
+
+std::string stage_prefix(const std::string& func, int stage) {
+  return func + ".s" + std::to_string(stage) + ".";
+}
+
+namespace {
+
+struct InlinedFunc {
+  std::vector<std::string> args;
+  std::vector<Expr> values;
+};
+using InlinedFuncs = std::unordered_map<const Symbol*, InlinedFunc>;
+
+Expr value_at(const InlinedFunc& f, const std::vector<Expr>& args, int component) {
+  RETROGRADE_ASSERT(args.size() == f.args.size(), "call with a wrong number of arguments");
+  Substitution at_point;
+  for (size_t i = 0; i < f.args.size(); i++) at_point[f.args[i]] = args[i];
+  return substitute(f.values[component], at_point);
+}
+
+bool is_inlined(const FuncContents& f, const FuncPlacement& schedule, bool is_output) {
+  return !is_output && f.is_pure() && schedule.compute_level.kind == LoopLevel::Kind::Inlined;
+}
+
+// The number of nodes of an expression above which code generation would take more than minutes.
+constexpr double most_nodes = 200000;
+
+double distinct_nodes(const std::vector<Expr>& values) {
+  std::unordered_set<const ExprNode*> seen;
+  for (const Expr& value : values)
+    walk(value, [&](const Expr& e) { return seen.insert(e.get()).second; });
+  return static_cast<double>(seen.size());
+}
+
+void check_size(const FuncContents& f, const InlinedSizes& sizes) {
+  const double nodes = sizes.nodes(f);
+  const FuncPtr part = nodes > most_nodes ? sizes.largest_part(f) : nullptr;
+  if (!part) return;
+  user_error(
+      text("inline ", quoted(part->name), " into ", quoted(f.name)),
+      "what is inlined makes an expression that a code generator finishes",
+      text("it is called ", func_calls(f).at(part.get()), " times, and the expression would have ",
+           static_cast<int64_t>(nodes), " nodes, more than ", static_cast<int64_t>(most_nodes)),
+      text("Compute ", quoted(part->name),
+           ", or a Func that it reads, at root or at a loop of its consumer"));
+}
+
+// A C function gets each of its buffers as one box. The storage of a Func is one box only at its compute level, so the
+// store level of such Funcs is set to it; the values are the same.
+void store_with_extern_stages(Program& program) {
+  std::unordered_set<const FuncContents*> boxes;
+  for (const LoopedFunc& f : program.funcs) {
+    if (!f.func->is_extern()) continue;
+    boxes.insert(f.func.get());
+    for (const ExternArgument& arg : f.func->extern_definition->args) {
+      if (arg.kind == ExternArgument::Kind::Func) boxes.insert(arg.func.get());
+    }
+  }
+  for (LoopedFunc& f : program.funcs) {
+    if (!boxes.contains(f.func.get()) || f.is_output) continue;
+    f.schedule.store_level = f.schedule.compute_level;
+    f.schedule.hoist_level = f.schedule.compute_level;
+  }
+}
+
+}  // namespace
+
+Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
+  const std::vector<FuncPtr> outputs = apply_wrappers(unwrapped);
+  Program program;
+  InlinedFuncs inlined;
+  StepRewriter inliner([&](const Expr& e, const auto& recurse) -> Expr {
+    const Call* call = e.as<Call>();
+    if (!call || call->call_type != CallType::Func) return {};
+    const Expr mapped = map_children(e, recurse);
+    const auto it = inlined.find(call->symbol.raw());
+    return it == inlined.end() ? mapped
+                               : value_at(it->second, mapped.as<Call>()->args, call->component);
+  });
+  InlinedSizes sizes;
+  for (const FuncPtr& f : topological_order(outputs)) {
+    bool is_output = std::find(outputs.begin(), outputs.end(), f) != outputs.end();
+    check_size(*f, sizes);
+    std::vector<Definition> stages = numbered(
+        f->stage_count(), [&](int i) { return map_exprs(f->stage(i), std::ref(inliner)); });
+    if (is_inlined(*f, f->schedule, is_output)) {
+      check_inlined(*f, f->schedule);
+      inlined[f.get()] = {f->args, stages[0].values};
+      sizes.inline_calls_of(*f, distinct_nodes(stages[0].values));
+      continue;
+    }
+    program.index_of[f->name] = static_cast<int>(program.funcs.size());
+    program.funcs.push_back({f, f->schedule, std::move(stages), is_output});
+  }
+  store_with_extern_stages(program);
+  resolve_outermost_levels(program);
+  refuse_unsupported(program);
+  order_for_memory(program);
+  order_fused_groups(program);
+  resolve_undef(program);
+  make_indices_strict(program);
+  mark_likely_clamps(program);
+  return program;
+}
+
+}  // namespace retrograde::lower

@@ -1,0 +1,51 @@
+#include "graph_passes.h"
+
+#include <algorithm>
+
+#include "autodiff/derivative.h"
+#include "autoschedule/cut_reductions.h"
+#include "autoschedule/default_schedule.h"
+#include "graph/copy_graph.h"
+#include "graph/directives/wrappers.h"
+
+namespace retrograde::opt {
+
+namespace {
+
+// Adds the adjoints of all images and parameters that the first output depends on to the outputs.
+std::vector<FuncPtr> with_adjoints(const std::vector<FuncPtr>& outputs) {
+  const Derivative d = retrograde::propagate_adjoints(Func(outputs[0]));
+  std::vector<FuncPtr> result = outputs;
+  for (const auto& parameter : parameters_of(outputs)) {
+    const AdjointInput input(parameter);
+    if (d.has(input)) result.push_back(d.of(input).function());
+  }
+  return result;
+}
+
+std::vector<FuncPtr> with_cut_reductions(const std::vector<FuncPtr>& outputs) {
+  const std::vector<FuncPtr> copy = copy_graph(outputs).outputs;
+  cut_reductions(copy, SizeEstimate(copy));
+  return copy;
+}
+
+}  // namespace
+
+const std::vector<GraphPass>& graph_passes() {
+  static const std::vector<GraphPass> passes{
+      {"propagate_adjoints", with_adjoints},
+      {"apply_wrappers", apply_wrappers},
+      {"cut_reductions", with_cut_reductions},
+      {"schedule_unscheduled",
+       [](const std::vector<FuncPtr>& outputs) { return schedule_unscheduled(outputs); }}};
+  return passes;
+}
+
+const GraphPass* find_graph_pass(const std::string& name) {
+  const auto& all = graph_passes();
+  const auto found =
+      std::ranges::find_if(all, [&](const GraphPass& pass) { return pass.name == name; });
+  return found == all.end() ? nullptr : &*found;
+}
+
+}  // namespace retrograde::opt
