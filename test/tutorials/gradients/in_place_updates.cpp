@@ -65,7 +65,8 @@ int main(int argc, char** argv) {
   const std::string budget = refusal({.version_bytes = 16});  // 8 steps of 4 bytes need more
   std::printf("\n%s\n\n%s\n\n", never.c_str(), budget.c_str());
   claim(never.find("forbidden") != std::string::npos, "Overwritten::Refuse names the Func");
-  claim(budget.find("16") != std::string::npos, "a budget that is too small is an error that states its bytes");
+  claim(budget.find("16") != std::string::npos,
+        "a budget that is too small is an error that states its bytes");
 
   // ---- If a dimension of your own holds the versions, nothing is overwritten. ----
   Var i("i");

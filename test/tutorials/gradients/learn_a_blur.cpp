@@ -13,7 +13,8 @@ using namespace retrograde;
 int main(int argc, char** argv) {
   // ---- The input: a sharp picture, and the same picture blurred. ----
   const int size = 48;
-  const float truth[3][3] = {{1, 2, 1}, {2, 4, 2}, {1, 2, 1}};  // in sixteenths; the program does not use it to learn
+  const float truth[3][3] = {
+      {1, 2, 1}, {2, 4, 2}, {1, 2, 1}};  // in sixteenths; the program does not use it to learn
   Buffer<float> sharp(size + 2, size + 2), given(size, size);
   for (int y = 0; y < size + 2; ++y)
     for (int x = 0; x < size + 2; ++x)

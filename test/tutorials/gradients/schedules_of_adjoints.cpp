@@ -71,8 +71,10 @@ int main(int argc, char** argv) {
   claim(gradient.args().size() == 2, "the gradient by an image has the image's dimensions");
   Var gx = gradient.args()[0], gy = gradient.args()[1], rows("rows");
   Var ex = edges_adj.args()[0];
-  gradient.compute_root().split(gy, rows, gy, 32, TailStrategy::GuardWithIf).parallel(rows).vectorize(
-      gx, 8, TailStrategy::GuardWithIf);
+  gradient.compute_root()
+      .split(gy, rows, gy, 32, TailStrategy::GuardWithIf)
+      .parallel(rows)
+      .vectorize(gx, 8, TailStrategy::GuardWithIf);
   edges_adj.compute_at(gradient, rows).vectorize(ex, 8, TailStrategy::GuardWithIf);
   const double by_hand_ms = milliseconds(gradient, by_hand);
   claim(largest_difference(plain, by_hand) < 1e-5, "a schedule by hand changes no value either");
