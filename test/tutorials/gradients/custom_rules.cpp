@@ -95,7 +95,7 @@ int main(int argc, char** argv) {
   claim(refusal.find("mixed") != std::string::npos,
         "a requested input that the rule does not cover is an error");
 
-  Picture picture("User-defined derivatives: the loss, learned through rounding");
+  Picture picture("The loss over steps that learn through rounding");
   picture.curve("", losses, 0, losses.front());
   picture.write(argc, argv, "custom_rules");
 }

@@ -80,7 +80,7 @@ int main(int argc, char** argv) {
   for (int k = 0; k < n; ++k) worst = std::max<double>(worst, std::abs(same(k) - slopes(k)));
   claim(worst < 1e-6, "a Func with its steps along a dimension has the same gradient");
 
-  Picture picture("In-place updates: gradient of a product by its 8 factors; the fourth is 0");
+  Picture picture("Gradient of a product by its 8 factors; the fourth is 0");
   for (int k = 0; k < n; ++k) {
     picture.cells(40 + 50 * k, 60, 40, {{all[k]}}, 0, 1.5);
     picture.text(40 + 50 * k, 130, std::to_string(all[k]).substr(0, 5));

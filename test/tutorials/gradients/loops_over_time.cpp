@@ -76,8 +76,7 @@ int main(int argc, char** argv) {
   claim(losses.back() < 0.01 * losses.front(),
         "forty steps of descent bring the loss below a hundredth");
 
-  Picture picture(
-      "Loops over time: operations of the gradient, with 1, 2, 4 ... 32 stored states of 200");
+  Picture picture("Cost of a gradient over 200 steps, by number of stored states");
   std::vector<double> logs;
   for (double w : works) logs.push_back(std::log10(w));
   picture.curve("log10 of operations", logs, std::log10(works.back()) - 0.2,

@@ -46,7 +46,9 @@ class Picture {
       }
     }
   }
+  // Ends the program if the words would leave the picture on the right; letters are at most 7 wide on average.
   void text(double x, double y, const std::string& words, const std::string& colour = "#222") {
+    if (x + 7.0 * words.size() > 480) claim(false, "the picture has room for \"" + words + "\"");
     body_ += "<text x='" + number(x) + "' y='" + number(y) +
              "' font-family='sans-serif' font-size='13' fill='" + colour + "'>" + words +
              "</text>\n";
