@@ -12,6 +12,8 @@
 // Source: folklore (reassociation by loop depth), restricted to addresses. LLVM's own pass reorders all integer
 // arithmetic and so breaks sums and products that match machine instructions.
 
+#pragma once
+
 #include <llvm/IR/PassManager.h>
 
 namespace retrograde::codegen {
