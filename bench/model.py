@@ -7,7 +7,7 @@ order the measurements.
     model.py PROGRAMS [--program NAME]... [--threads N] [--seconds S] [--output FILE] [--plot FILE]
 
 PROGRAMS is the folder of bench_operators_retrograde and bench_kernels_retrograde. The parameters of the machine are
-those that RETROGRADE_MACHINE names or that were measured before (tools/tune --machine); they never depend on
+those that RETROGRADE_MACHINE names or that were measured before (`tune --machine`); they never depend on
 a program. Stages that take less than 5 us are left out, because the profiler samples every millisecond.
 """
 import argparse

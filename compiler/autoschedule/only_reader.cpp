@@ -12,7 +12,7 @@ Readers::Readers(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>
   for (const FuncPtr& f : stored) stored_.insert(f.get());
   for (const FuncPtr& f : topological_order(outputs)) {
     for (const FuncPtr& callee : direct_callees(*f)) readers_[callee.get()].push_back(f);
-    const bool is_block = f->made && f->made->blocks > 0;  // see default_schedule.cpp
+    const bool is_block = f->made && f->made->blocks > 0;  // see root_loops.cpp
     for (const graph::LoopLevel& level : {f->schedule.compute_level, f->schedule.store_level}) {
       if (level.kind == graph::LoopLevel::Kind::At && !is_block) hosts_.insert(level.func);
     }

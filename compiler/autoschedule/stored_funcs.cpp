@@ -111,7 +111,7 @@ class StorageChooser {
            }) >= static_cast<std::ptrdiff_t>(least_summed);
   }
 
-  // A block of a sum is computed where it is added up: see default_schedule.cpp.
+  // A block of a sum is computed where it is added up: see root_loops.cpp.
   bool is_block_of_one(const FuncPtr& f) const {
     if (!f->made || f->made->blocks == 0 || is_output(*f)) return false;
     const auto found = readers_.find(f.get());

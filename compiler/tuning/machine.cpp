@@ -128,7 +128,7 @@ Machine Machine::from_json(const std::string& text, const std::string& where) {
   } catch (const std::exception& error) {
     user_error("read the machine in " + retrograde::quoted(where),
                "a description of a machine is JSON with a number for each figure", error.what(),
-               "Make it again: tools/tune --machine");
+               "Make it again: out/build/release/tools/tune --machine");
   }
 }
 
@@ -188,7 +188,8 @@ Machine machine_for(const Target& target) {
     if (!text) {
       user_error("read the machine in " + retrograde::quoted(path),
                  "RETROGRADE_MACHINE names a file with the description of a machine",
-                 "it cannot be read", "Make it: tools/tune --machine --output FILE");
+                 "it cannot be read",
+                 "Make it: out/build/release/tools/tune --machine --output FILE");
     }
     return Machine::from_json(*text, path);
   }
@@ -209,8 +210,9 @@ Machine machine_for(const Target& target) {
 std::string keep_machine(const Machine& machine) {
   const std::string folder = cache_folder(), asked = "keep the figures of the machine";
   if (folder.empty()) {
-    user_error(asked, "the cache folder can be written", "neither XDG_CACHE_HOME nor HOME is set",
-               "Set one, or write them to a file: tools/tune --machine --output FILE");
+    user_error(
+        asked, "the cache folder can be written", "neither XDG_CACHE_HOME nor HOME is set",
+        "Set one, or write them to a file: out/build/release/tools/tune --machine --output FILE");
   }
   mkdir(folder.substr(0, folder.rfind('/')).c_str(), 0700);  // where it fails the next step says so
   const jit::PrivateFolder files(folder, asked);

@@ -1,7 +1,7 @@
 // machine.h -- the machine as the cost model sees it: what an operation, a byte and a launch cost.
 //
 // The figures are of one kind of machine, never of a program. They are measured when somebody asks for
-// it (calibrate.h, `tools/tune --machine`), which takes a few seconds, and kept in the user's cache
+// it (calibrate.h, `tune --machine`), which takes a few seconds, and kept in the user's cache
 // folder. Where nothing was measured, constants stand for the target's vector width: compiling a
 // program never starts to measure.
 #pragma once

@@ -41,13 +41,14 @@ const char* const smooth_head =
     "|---|---|---|---|---|---|---|\n";
 
 Tables tables() {
-  Tables result{smooth_head, "| operators | rule |\n|---|---|\n"};
+  Tables result{smooth_head, "| operators | derivative |\n|---|---|\n"};
   std::map<std::string, std::string> by_reason;  // operators without partials, together
   auto add = [&](const std::string& name, const DerivativeRule& rule) {
     if (rule.cls == RuleClass::Smooth) {
       result.smooth += row(name, rule);
     } else if (rule.cls != RuleClass::NoRule) {
-      std::string& names = by_reason[rule.convention];
+      const bool is_zero = rule.cls == RuleClass::Constant || rule.cls == RuleClass::Blocked;
+      std::string& names = by_reason[(is_zero ? "0: " : "") + std::string(rule.convention)];
       names += (names.empty() ? "`" : ", `") + name + "`";
     }
   };

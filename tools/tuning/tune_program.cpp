@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <iomanip>
 #include <mutex>
 #include <ostream>
 #include <set>
+#include <system_error>
 #include <thread>
 #include <tuple>
 
@@ -88,7 +90,10 @@ Measurement measure(const Candidate& candidate, const Target& target, const Opti
   return result;
 }
 
+// Makes the folder where there is none.
 void write_file(const std::string& path, const std::string& contents) {
+  std::error_code ignored;  // the file says so if the folder cannot be made
+  std::filesystem::create_directories(std::filesystem::path(path).parent_path(), ignored);
   std::ofstream file(path);
   file << contents;
   if (file.flush()) return;

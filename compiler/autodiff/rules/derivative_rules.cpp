@@ -188,7 +188,8 @@ DerivativeRule constant_rule(const char* convention) {
   return {RuleClass::Constant,           nullptr,    -1,
           "everywhere but at the steps", convention, "definition"};
 }
-DerivativeRule transparent(int arg, const char* convention = "the value is the argument's") {
+DerivativeRule transparent(int arg,
+                           const char* convention = "1: the value is the argument unchanged") {
   return {RuleClass::Transparent, nullptr, arg, "everywhere", convention, "definition"};
 }
 DerivativeRule no_rule(const char* reason) {
@@ -196,67 +197,64 @@ DerivativeRule no_rule(const char* reason) {
 }
 
 using OpTable = std::map<Op, DerivativeRule>;
-constexpr const char* approximated = "that of the function it approximates";
+constexpr const char* approximated = "as for the exact function";
 
 OpTable smooth_operators() {
   return {
-      {Op::abs, smooth(abs_partials, "x != 0", "0 at 0", "sign(x)", "-1 and 1", 0)},
-      {Op::absd, smooth(absd_partials, "a != b", "0 where a == b", "sign(x - y), -sign(x - y)",
-                        "-1 and 1; 0 for equal infinities", 0)},
-      {Op::lerp,
-       smooth(lerp_partials, "everywhere", "floating weights; integer weights are constants",
-              "1 - w, w, y - x", "infinite or NaN, as the value", 1, "definition")},
-      {Op::fma, smooth(fma_partials, "everywhere", "as a product and a sum", "y, x, 1",
-                       "as a product and a sum", 0)},
+      {Op::abs, smooth(abs_partials, "x != 0", "0 at 0", "sign(x)", "-1 at -inf, 1 at +inf", 0)},
+      {Op::absd, smooth(absd_partials, "x != y", "0 where x = y", "sign(x - y), -sign(x - y)",
+                        "-1 or 1; 0 for equal infinities", 0)},
+      {Op::lerp, smooth(lerp_partials, "everywhere", "no kinks; integer weights are constants",
+                        "1 - w, w, y - x", "infinite or NaN, like the value", 1, "definition")},
+      {Op::fma,
+       smooth(fma_partials, "everywhere", "as for x * y + w", "y, x, 1", "as for x * y + w", 0)},
       {Op::sqrt,
-       smooth(sqrt_partials, "x > 0", "+inf at 0 (-inf at -0), times a strong zero; NaN below 0",
+       smooth(sqrt_partials, "x > 0", "+inf at +0, -inf at -0, with strong zeros; NaN for x < 0",
               "1 / (2 v)", "0 at +inf", 2)},
-      {Op::exp, smooth(exp_partials, "everywhere", "inf where exp overflows", "v",
+      {Op::exp, smooth(exp_partials, "everywhere", "no kinks; inf where exp overflows", "v",
                        "0 at -inf, inf at +inf", 1)},
-      {Op::log,
-       smooth(log_partials, "x > 0", "inf at 0 (-inf at -0), 1/x below 0 where the primal is NaN",
-              "1 / x", "0 at +inf", 1)},
+      {Op::log, smooth(log_partials, "x > 0",
+                       "+inf at +0, -inf at -0; 1 / x for x < 0, where the value is NaN", "1 / x",
+                       "0 at +inf", 1)},
       {Op::pow,
-       smooth(pow_partials, "x > 0, or integer p",
-              "dx is 0 where p == 0; dp is 0 where x == 0 and NaN where x < 0",
+       smooth(pow_partials, "x > 0, or integer y",
+              "dx = 0 where y = 0; dy = 0 where x = 0; dy is NaN for x < 0",
               "y x^(y-1), or y v / x, v log x",
-              "as x^(y-1) and v log x; a pole may have either sign where y - 1 is rounded", 3)},
+              "as for x^(y-1) and v log x; a pole may have either sign if y - 1 is inexact", 3)},
       {Op::hypot,
-       smooth(hypot_partials, "(x, y) != (0, 0)", "0 at the origin: the smallest subgradient",
+       smooth(hypot_partials, "(x, y) != (0, 0)", "0 at the origin, the smallest subgradient",
               "x / v, y / v, scaled by max(|x|, |y|)", "NaN", 2)},
-      {Op::sin,
-       smooth(sin_partials, "everywhere", "NaN at infinities", "cos x", "NaN, as the value", 1)},
-      {Op::cos,
-       smooth(cos_partials, "everywhere", "NaN at infinities", "-sin x", "NaN, as the value", 1)},
-      {Op::tan, smooth(tan_partials, "x != pi/2 + k pi", "1 + tan^2, huge near the poles",
-                       "1 + v^2", "NaN, as the value", 4)},
-      {Op::asin, smooth(asin_partials, "|x| < 1", "inf at -1 and 1, NaN outside",
-                        "1 / sqrt((1 - x)(1 + x))", "NaN, as the value", 3)},
-      {Op::acos, smooth(acos_partials, "|x| < 1", "-inf at -1 and 1, NaN outside",
-                        "-1 / sqrt((1 - x)(1 + x))", "NaN, as the value", 3)},
-      {Op::atan, smooth(atan_partials, "everywhere", "0 at infinities", "1 / (1 + x^2)", "0", 3)},
-      {Op::atan2, smooth(atan2_partials, "(y, x) != (0, 0)", "0 at the origin",
+      {Op::sin, smooth(sin_partials, "everywhere", "no kinks", "cos x", "NaN, like the value", 1)},
+      {Op::cos, smooth(cos_partials, "everywhere", "no kinks", "-sin x", "NaN, like the value", 1)},
+      {Op::tan, smooth(tan_partials, "x != pi/2 + k pi", "large near the poles", "1 + v^2",
+                       "NaN, like the value", 4)},
+      {Op::asin, smooth(asin_partials, "|x| < 1", "inf at -1 and 1; NaN for |x| > 1",
+                        "1 / sqrt((1 - x)(1 + x))", "NaN, like the value", 3)},
+      {Op::acos, smooth(acos_partials, "|x| < 1", "-inf at -1 and 1; NaN for |x| > 1",
+                        "-1 / sqrt((1 - x)(1 + x))", "NaN, like the value", 3)},
+      {Op::atan, smooth(atan_partials, "everywhere", "no kinks", "1 / (1 + x^2)", "0", 3)},
+      {Op::atan2, smooth(atan2_partials, "(x, y) != (0, 0)", "0 at the origin",
                          "y / r / r, -x / r / r with r = hypot(x, y), scaled",
-                         "0 where an operand is infinite", 4, "[DLMF] 4.24")},
-      {Op::sinh,
-       smooth(sinh_partials, "everywhere", "inf where cosh overflows", "cosh x", "inf", 2)},
-      {Op::cosh, smooth(cosh_partials, "everywhere", "inf where sinh overflows", "sinh x",
-                        "-inf and inf", 2)},
-      {Op::tanh, smooth(tanh_partials, "everywhere", "0 at infinities",
+                         "0 if an operand is infinite", 4, "[DLMF] 4.24")},
+      {Op::sinh, smooth(sinh_partials, "everywhere", "no kinks; inf where cosh overflows", "cosh x",
+                        "inf", 2)},
+      {Op::cosh, smooth(cosh_partials, "everywhere", "no kinks; inf where sinh overflows", "sinh x",
+                        "-inf at -inf, inf at +inf", 2)},
+      {Op::tanh, smooth(tanh_partials, "everywhere", "no kinks",
                         "4 e / (1 + e)^2 with e = exp(-2 |x|)", "0", 6)},
-      {Op::asinh, smooth(asinh_partials, "everywhere", "0 at infinities", "1 / hypot(x, 1)", "0", 2,
-                         "[DLMF] 4.40")},
-      {Op::acosh, smooth(acosh_partials, "x > 1", "inf at 1, NaN below",
+      {Op::asinh,
+       smooth(asinh_partials, "everywhere", "no kinks", "1 / hypot(x, 1)", "0", 2, "[DLMF] 4.40")},
+      {Op::acosh, smooth(acosh_partials, "x > 1", "inf at 1; NaN for x < 1",
                          "1 / (sqrt(x - 1) sqrt(x + 1))", "0 at +inf", 4, "[DLMF] 4.40")},
       {Op::atanh, smooth(atanh_partials, "|x| < 1",
-                         "inf at -1 and 1; the formula outside, where the value is NaN",
-                         "1 / ((1 - x)(1 + x))", "0, where the value is NaN", 3, "[DLMF] 4.40")},
-      {Op::erf, smooth(erf_partials, "everywhere", "0 at infinities", "2 / sqrt(pi) exp(-x^2)", "0",
-                       4, "[DLMF] 7.2")},
-      {Op::fast_exp, smooth(exp_partials, "as exp", approximated, "exp's, with v", "as exp", -1)},
-      {Op::fast_log, smooth(fast_log_partials, "x > 0", approximated, "log's", "as log", 1)},
-      {Op::fast_pow, smooth(fast_pow_partials, "as pow", approximated,
-                            "pow's, by fast_pow and fast_log", "as pow", -1)},
+                         "inf at -1 and 1; the formula for |x| > 1, where the value is NaN",
+                         "1 / ((1 - x)(1 + x))", "0, although the value is NaN", 3, "[DLMF] 4.40")},
+      {Op::erf, smooth(erf_partials, "everywhere", "no kinks", "2 / sqrt(pi) exp(-x^2)", "0", 4,
+                       "[DLMF] 7.2")},
+      {Op::fast_exp, smooth(exp_partials, "everywhere", approximated, "v", "as for exp", -1)},
+      {Op::fast_log, smooth(fast_log_partials, "x > 0", approximated, "1 / x", "as for log", 1)},
+      {Op::fast_pow, smooth(fast_pow_partials, "as for pow", approximated,
+                            "as for pow, with fast_pow and fast_log", "as for pow", -1)},
       {Op::fast_sin,
        smooth(fast_sin_partials, "everywhere", approximated, "fast_cos x", "NaN", -1)},
       {Op::fast_cos,
@@ -265,22 +263,22 @@ OpTable smooth_operators() {
       {Op::fast_inverse_sqrt,
        smooth(fast_inverse_sqrt_partials, "x > 0", approximated, "-v^3 / 2", "0 at +inf", -1)},
       {Op::saturating_cast, smooth(saturating_cast_partials, "inside the type's range",
-                                   "0 where the value saturates; to integers: 0", "1 or 0",
-                                   "0: the value saturates", 0, "definition")},
-      {Op::strong_div,
-       smooth(strong_div_partials, "b != 0", "as a quotient, with strong zeros", "1 / y, -v / y",
-              "as a quotient, with strong zeros", 2, "definition")},
-      {Op::strong_mul, smooth(strong_mul_partials, "everywhere", "as a product, with strong zeros",
-                              "y, x", "as a product, with strong zeros", 0, "definition")},
+                                   "0 where the value saturates; casts to integers: 0", "1 or 0",
+                                   "0, because the value saturates", 0, "definition")},
+      {Op::strong_div, smooth(strong_div_partials, "y != 0", "as for Div, always with strong zeros",
+                              "1 / y, -v / y", "as for Div, with strong zeros", 2, "definition")},
+      {Op::strong_mul,
+       smooth(strong_mul_partials, "everywhere", "as for Mul, always with strong zeros", "y, x",
+              "as for Mul, with strong zeros", 0, "definition")},
   };
 }
 
 // Operators whose derivative is 0, and operators that return an argument under a promise.
 OpTable other_operators() {
-  const char* bits = "integers only: derivative 0";
-  const char* test = "a truth value: derivative 0";
-  const char* steps = "0 everywhere, at the steps too";
-  const char* promise = "the bounds are promises, not values";
+  const char* bits = "defined on integers only";
+  const char* test = "its value is true or false";
+  const char* steps = "constant between steps; 0 at the steps by convention";
+  const char* promise = "1 for the first argument; the bounds are only promises";
   return {
       {Op::bitwise_and, constant_rule(bits)},
       {Op::bitwise_or, constant_rule(bits)},
@@ -298,12 +296,12 @@ OpTable other_operators() {
       {Op::ceil, constant_rule(steps)},
       {Op::round, constant_rule(steps)},
       {Op::trunc, constant_rule(steps)},
-      {Op::undef, constant_rule("any value: derivative 0")},
-      {Op::random, constant_rule("depends on its seeds only")},
+      {Op::undef, constant_rule("may be any value")},
+      {Op::random, constant_rule("depends only on its seeds")},
       {Op::promise_clamped, transparent(0, promise)},
       {Op::unsafe_promise_clamped, transparent(0, promise)},
       {Op::stop_gradient,
-       {RuleClass::Blocked, nullptr, -1, "everywhere", "0: the program says so", "definition"}},
+       {RuleClass::Blocked, nullptr, -1, "everywhere", "the program requests it", "definition"}},
   };
 }
 
@@ -334,32 +332,34 @@ Partials max_partials(Args a, const Expr&) { return taken_partials(a, a[0] > a[1
 using KindTable = std::map<Kind, DerivativeRule>;
 KindTable make_kind_table() {
   KindTable t = {
-      {Kind::Add, smooth(add_partials, "everywhere", "none needed", "1, 1", "1", 0)},
-      {Kind::Sub, smooth(sub_partials, "everywhere", "none needed", "1, -1", "1 and -1", 0)},
-      {Kind::Mul,
-       smooth(mul_partials, "everywhere", "strong zero where a factor may be infinite or NaN",
-              "y, x", "infinite, but for strong zeros", 0)},
+      {Kind::Add, smooth(add_partials, "everywhere", "no kinks", "1, 1", "1, 1", 0)},
+      {Kind::Sub, smooth(sub_partials, "everywhere", "no kinks", "1, -1", "1, -1", 0)},
+      {Kind::Mul, smooth(mul_partials, "everywhere",
+                         "no kinks; strong zeros where a factor may be infinite or NaN", "y, x",
+                         "infinite, except for strong zeros", 0)},
       {Kind::Div,
-       smooth(div_partials, "b != 0", "infinite at b == 0, times a strong zero; integers: 0",
-              "1 / y, -v / y", "0 where y is infinite", 2)},
-      {Kind::Mod, smooth(mod_partials, "a / b not an integer",
-                         "da is 1 and db -floor(a / b) at the steps too; integers: 0",
-                         "1, -floor(x / y)", "NaN, as the value", 0, "definition")},
-      {Kind::Min, smooth(min_partials, "a != b", "the operand taken gets 1; at a tie that is b",
+       smooth(div_partials, "y != 0", "infinite at y = 0, with strong zeros; integers: 0",
+              "1 / y, -v / y", "0 for infinite y", 2)},
+      {Kind::Mod, smooth(mod_partials, "x / y is not an integer",
+                         "the same partials at the steps; integers: 0", "1, -floor(x / y)",
+                         "NaN, like the value", 0, "definition")},
+      {Kind::Min, smooth(min_partials, "x != y", "1 for the selected operand; at a tie that is y",
                          "1, 0 or 0, 1", "as for finite operands", 0, "definition")},
-      {Kind::Max, smooth(max_partials, "a != b", "the operand taken gets 1; at a tie that is b",
+      {Kind::Max, smooth(max_partials, "x != y", "1 for the selected operand; at a tie that is y",
                          "1, 0 or 0, 1", "as for finite operands", 0, "definition")},
       {Kind::Select,
        {RuleClass::Smooth, nullptr, -1, "where the condition does not change",
-        "the chosen arm gets all, the other exactly 0", "definition", "1 or 0",
+        "1 for the chosen arm, exactly 0 for the other", "definition", "1 or 0",
         "as for finite operands", 0}},
       {Kind::Cast,
-       transparent(0, "between floats: the adjoint is converted; to or from integers: 0")},
+       transparent(
+           0,
+           "between floats, the adjoint is converted; to or from integers, the derivative is 0")},
       {Kind::Reinterpret, no_rule("the bits of a value are no differentiable function of it")},
   };
   for (Kind k : {Kind::EQ, Kind::NE, Kind::LT, Kind::LE, Kind::GT, Kind::GE, Kind::And, Kind::Or,
                  Kind::Not}) {
-    t.emplace(k, constant_rule("a truth value: derivative 0"));
+    t.emplace(k, constant_rule("its value is true or false"));
   }
   return t;
 }

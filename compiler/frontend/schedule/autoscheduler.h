@@ -37,7 +37,7 @@ std::string scheduler_for(const AutoschedulerParams& params);
 struct MachineParams {
   int parallelism = 16;                               // number of threads
   uint64_t last_level_cache_size = 16 * 1024 * 1024;  // in bytes
-  float balance = 40;  // cost of a load from the last-level cache, in operations
+  float balance = 40;  // operations per load from that cache; unused by the built-in autoscheduler
 
   MachineParams() = default;  // the generic machine
   MachineParams(int parallelism, uint64_t last_level_cache_size, float balance)

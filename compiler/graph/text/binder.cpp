@@ -1,10 +1,13 @@
 #include "graph/text/binder.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "diagnostics/error.h"
 #include "graph/directives/directive_fields.h"
 #include "ir/build.h"
+#include "ir/lexer.h"
+#include "ir/parse.h"
 #include "ir/visit.h"
 
 namespace retrograde::graph {
@@ -17,7 +20,33 @@ namespace {
              "Add its lines, or correct the name");
 }
 
+// Blames the first call in the text of a Func or an image that does not exist.
+void check_names(const std::string& text, const NamedEntities& names) {
+  ir::Lexer lexer(text);
+  ir::Token before, token = lexer.next();
+  while (token.kind != ir::Token::Kind::End) {
+    const ir::Token after = lexer.next();
+    const bool is_name =
+        token.kind == ir::Token::Kind::Name && (token.quoted || !is_reserved(token.text));
+    if (is_name && after.text == "(" && before.text != "extern") {
+      const bool is_image = before.text == "image";
+      if (is_image && !names.parameters.contains(token.text)) unknown("image", token.text);
+      if (!is_image && !names.funcs.contains(token.text)) unknown("Func", token.text);
+    }
+    before = std::exchange(token, after);
+  }
+}
+
 }  // namespace
+
+Expr parse_with_names(const std::string& text, const NameTypes& types, const NamedEntities& names) {
+  try {
+    return ir::parse_expr(text, types);
+  } catch (const UserError&) {
+    check_names(text, names);
+    throw;
+  }
+}
 
 ParameterPtr NamedEntities::buffer_of_fact(const std::string& name) const {
   for (const char* fact : {".min.", ".extent.", ".stride."}) {

@@ -25,6 +25,10 @@ struct NamedEntities {
 void declare(const FuncContents& f, NameTypes& types);
 void declare(const ParameterContents& parameter, NameTypes& types);
 
+// Parses an expression in which these names may be read. If it cannot be parsed, a Func or an image that does not exist
+// is blamed first: its type was a guess.
+Expr parse_with_names(const std::string& text, const NameTypes& types, const NamedEntities& names);
+
 // Attaches symbols to the calls and variables in expressions of `f` (null: outside of Funcs):
 // Funcs, images, parameters, buffer metadata, and the variables of `domain` (may be null).
 class Binder {

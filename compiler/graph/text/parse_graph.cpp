@@ -302,11 +302,11 @@ class GraphReader {
 
   bool reads_definition(const Line& line) {
     if (line.word == "place") {
-      definition_->args.push_back(parse_expr(line.rest, types_));
+      definition_->args.push_back(parse_with_names(line.rest, types_, names_));
     } else if (line.word == "value") {
-      definition_->values.push_back(parse_expr(line.rest, types_));
+      definition_->values.push_back(parse_with_names(line.rest, types_, names_));
     } else if (line.word == "where") {
-      definition_->predicate = parse_expr(line.rest, types_);
+      definition_->predicate = parse_with_names(line.rest, types_, names_);
     } else if (line.word == "loop" || line.word == "points") {
       const std::vector<Expr> args = parse_arguments(line.rest, types_);
       const Variable* v = args.size() == 3 && args[0].defined() ? args[0].as<Variable>() : nullptr;
@@ -402,7 +402,7 @@ class GraphReader {
     return found->second;
   }
   Expr expr(const Line& line) const {
-    return Binder(names_, f_, nullptr)(parse_expr(line.rest, types_));
+    return Binder(names_, f_, nullptr)(parse_with_names(line.rest, types_, names_));
   }
   std::vector<Expr> bound(std::vector<Expr> args) const {
     for (Expr& arg : args) {

@@ -124,7 +124,7 @@ int main(int argc, char** argv) {
           "2,048 threads in a block are rejected, and the error states the maximum");
   }
 
-  Picture picture("32-byte sectors of device memory that a blur accesses, for three schedules");
+  Picture picture("32-byte sectors that a blur accesses, for three schedules");
   const double most = by_points;
   picture.cells(40, 60, 60, {{by_points / most}}, 0, 1);
   picture.cells(180, 60, 60, {{by_rows / most}}, 0, 1);

@@ -90,7 +90,7 @@ int main(int argc, char** argv) {
     central.push_back(std::log10(std::max(step.central_error, 1e-16)));
     richardson.push_back(std::log10(std::max(step.richardson_error, 1e-16)));
   }
-  Picture picture("Checking: log10 of the error of finite differences, for decreasing steps");
+  Picture picture("log10 of the error of finite differences, for smaller steps");
   picture.curve("central differences", central, -16, 0);
   picture.curve("extrapolated", richardson, -16, 0);
   picture.write(argc, argv, "checking_and_explaining");

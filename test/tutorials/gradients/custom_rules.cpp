@@ -38,7 +38,8 @@ int main(int argc, char** argv) {
         "rounding has derivative 0, and so do its inputs");
   bool told = false;
   for (const Explanation& fact : flat.explanations())
-    told = told || (fact.kind == Explanation::Kind::Zero && fact.detail.find("round") != std::string::npos);
+    told = told ||
+           (fact.kind == Explanation::Kind::Zero && fact.detail.find("round") != std::string::npos);
   claim(told, "explanations() names round as the reason");
 
   // ---- A rule: the adjoint of `stored` passes on to `scaled` unchanged, as if nothing had been rounded. A
@@ -58,9 +59,10 @@ int main(int argc, char** argv) {
     gain.set(gain.get() - down_gain);
     offset.set(offset.get() - down_offset);
   }
-  std::printf("gain %.3f, offset %.3f, loss %.4f (%.4f before)\n", gain.get(), offset.get(), losses.back(),
-              losses.front());
-  claim(losses.back() < 0.1 * losses.front(), "with the rule, gain and offset are learned through the rounding");
+  std::printf("gain %.3f, offset %.3f, loss %.4f (%.4f before)\n", gain.get(), offset.get(),
+              losses.back(), losses.front());
+  claim(losses.back() < 0.1 * losses.front(),
+        "with the rule, gain and offset are learned through the rounding");
 
   // ---- The same without a separate Func: one expression's value with another's derivative. ----
   Func inside("inside"), other("other");
@@ -90,9 +92,10 @@ int main(int argc, char** argv) {
     refusal = error.what();
   }
   std::printf("\n%s\n\n", refusal.c_str());
-  claim(refusal.find("mixed") != std::string::npos, "a requested input that the rule does not cover is an error");
+  claim(refusal.find("mixed") != std::string::npos,
+        "a requested input that the rule does not cover is an error");
 
-  Picture picture("User-defined derivatives: the loss, learned through rounding");
+  Picture picture("The loss over steps that learn through rounding");
   picture.curve("", losses, 0, losses.front());
   picture.write(argc, argv, "custom_rules");
 }

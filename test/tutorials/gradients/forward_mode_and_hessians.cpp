@@ -108,7 +108,7 @@ int main(int argc, char** argv) {
   claim(newton[6] < -4, "six Newton steps bring the gradient below 1e-4");
   claim(downhill[11] > -2, "twelve steps of gradient descent do not bring it below 1e-2");
 
-  Picture picture("Forward mode and Hessians: log10 of the gradient's size over 12 steps");
+  Picture picture("log10 of the gradient's size over 12 steps");
   picture.curve("gradient descent", downhill, -6, 1);
   picture.curve("Newton", newton, -6, 1);
   picture.write(argc, argv, "forward_mode_and_hessians");

@@ -65,7 +65,8 @@ int main(int argc, char** argv) {
   const std::string budget = refusal({.version_bytes = 16});  // 8 steps of 4 bytes need more
   std::printf("\n%s\n\n%s\n\n", never.c_str(), budget.c_str());
   claim(never.find("forbidden") != std::string::npos, "Overwritten::Refuse names the Func");
-  claim(budget.find("16") != std::string::npos, "a budget that is too small is an error that states its bytes");
+  claim(budget.find("16") != std::string::npos,
+        "a budget that is too small is an error that states its bytes");
 
   // ---- If a dimension of your own holds the versions, nothing is overwritten. ----
   Var i("i");
@@ -79,7 +80,7 @@ int main(int argc, char** argv) {
   for (int k = 0; k < n; ++k) worst = std::max<double>(worst, std::abs(same(k) - slopes(k)));
   claim(worst < 1e-6, "a Func with its steps along a dimension has the same gradient");
 
-  Picture picture("In-place updates: gradient of a product by its 8 factors; the fourth is 0");
+  Picture picture("Gradient of a product by its 8 factors; the fourth is 0");
   for (int k = 0; k < n; ++k) {
     picture.cells(40 + 50 * k, 60, 40, {{all[k]}}, 0, 1.5);
     picture.text(40 + 50 * k, 130, std::to_string(all[k]).substr(0, 5));

@@ -13,7 +13,8 @@ using namespace retrograde;
 int main(int argc, char** argv) {
   // ---- The input: a sharp picture, and the same picture blurred. ----
   const int size = 48;
-  const float truth[3][3] = {{1, 2, 1}, {2, 4, 2}, {1, 2, 1}};  // in sixteenths; the program does not use it to learn
+  const float truth[3][3] = {
+      {1, 2, 1}, {2, 4, 2}, {1, 2, 1}};  // in sixteenths; the program does not use it to learn
   Buffer<float> sharp(size + 2, size + 2), given(size, size);
   for (int y = 0; y < size + 2; ++y)
     for (int x = 0; x < size + 2; ++x)
@@ -68,7 +69,7 @@ int main(int argc, char** argv) {
   claim(losses.back() < losses.front() - 6, "the loss fell below a millionth of its start");
   claim(worst < 1e-3f, "all nine taps are correct to 1e-3");
 
-  Picture picture("Learn a blur: log10 of the loss over 60 steps; the kernel that was learned");
+  Picture picture("log10 of the loss over 60 steps; the learned kernel");
   picture.curve("", losses, -14, 0);
   std::vector<std::vector<double>> rows(3, std::vector<double>(3));
   for (int j = 0; j < 3; ++j)

@@ -37,7 +37,8 @@ int main(int argc, char** argv) {
   };
 
   // ---- All states or a few: the gradient has the same bits. ----
-  Buffer<float> all = gradient_with({.overwritten = Overwritten::Store})(start).realize({pendulums});
+  Buffer<float> all =
+      gradient_with({.overwritten = Overwritten::Store})(start).realize({pendulums});
   std::vector<double> works, memories;
   bool same = true;
   for (int states : {1, 2, 4, 8, 16, 32}) {
@@ -46,14 +47,16 @@ int main(int argc, char** argv) {
     for (int i = 0; i < pendulums; ++i) same = same && few(i) == all(i);
     works.push_back(*d.operations().gradient.operations().value());
     memories.push_back(*d.operations().gradient.bytes().value());
-    std::printf("%2d states: %9.0f operations, %7.0f bytes\n", states, works.back(), memories.back());
+    std::printf("%2d states: %9.0f operations, %7.0f bytes\n", states, works.back(),
+                memories.back());
   }
   claim(same, "1 to 32 stored states of 200 give the same bits as storing all");
 
   // ---- The cost: s states need r n - C(s + r, r - 1) recomputed steps (docs/derivatives.md). ----
   claim(works[5] < works[2] && works[2] < works[0], "more states, fewer recomputed steps");
   claim(memories[0] < memories[2] && memories[2] < memories[5], "and more memory");
-  claim(works[3] < works[0] / 8, "eight states already save seven eighths of the operations of one state");
+  claim(works[3] < works[0] / 8,
+        "eight states already save seven eighths of the operations of one state");
 
   // ---- A budget in bytes works the same way: it holds as many states as fit. ----
   Derivative within = gradient_with({.checkpoint_bytes = 4096});
@@ -70,12 +73,14 @@ int main(int argc, char** argv) {
     Buffer<float> g = gradient.realize({pendulums});
     for (int i = 0; i < pendulums; ++i) start(i) -= 0.4f * g(i);
   }
-  claim(losses.back() < 0.01 * losses.front(), "forty steps of descent bring the loss below a hundredth");
+  claim(losses.back() < 0.01 * losses.front(),
+        "forty steps of descent bring the loss below a hundredth");
 
-  Picture picture("Loops over time: operations of the gradient, with 1, 2, 4 ... 32 stored states of 200");
+  Picture picture("Cost of a gradient over 200 steps, by number of stored states");
   std::vector<double> logs;
   for (double w : works) logs.push_back(std::log10(w));
-  picture.curve("log10 of operations", logs, std::log10(works.back()) - 0.2, std::log10(works[0]) + 0.2);
+  picture.curve("log10 of operations", logs, std::log10(works.back()) - 0.2,
+                std::log10(works[0]) + 0.2);
   logs.clear();
   for (double m : memories) logs.push_back(std::log10(m));
   picture.curve("log10 of bytes", logs, logs.front() - 0.2, logs.back() + 0.2);

@@ -29,25 +29,29 @@ class Picture {
       const double share = (std::clamp(ys[i], low, high) - low) / (high - low);
       points += number(x) + "," + number(240 - 200 * share) + " ";
     }
-    body_ += "<polyline fill='none' stroke-width='2' stroke='" + colour + "' points='" + points + "'/>\n";
+    body_ += "<polyline fill='none' stroke-width='2' stroke='" + colour + "' points='" + points +
+             "'/>\n";
     text(330, 40.0 + 18 * curves_++, name, colour);
   }
   // Rows of cells; the top left corner is at (x, y). `low` is white and `high` is black.
-  void cells(double x, double y, double side, const std::vector<std::vector<double>>& rows, double low,
-             double high) {
+  void cells(double x, double y, double side, const std::vector<std::vector<double>>& rows,
+             double low, double high) {
     for (size_t r = 0; r < rows.size(); ++r) {
       for (size_t c = 0; c < rows[r].size(); ++c) {
         const double share = (std::clamp(rows[r][c], low, high) - low) / (high - low);
         const std::string gray = std::to_string(static_cast<int>(255 - 255 * share));
         body_ += "<rect x='" + number(x + side * c) + "' y='" + number(y + side * r) + "' width='" +
-                 number(side) + "' height='" + number(side) + "' fill='rgb(" + gray + "," + gray + "," +
-                 gray + ")' stroke='#ccc' stroke-width='0.5'/>\n";
+                 number(side) + "' height='" + number(side) + "' fill='rgb(" + gray + "," + gray +
+                 "," + gray + ")' stroke='#ccc' stroke-width='0.5'/>\n";
       }
     }
   }
+  // Ends the program if the words would leave the picture on the right; letters are at most 7 wide on average.
   void text(double x, double y, const std::string& words, const std::string& colour = "#222") {
+    if (x + 7.0 * words.size() > 480) claim(false, "the picture has room for \"" + words + "\"");
     body_ += "<text x='" + number(x) + "' y='" + number(y) +
-             "' font-family='sans-serif' font-size='13' fill='" + colour + "'>" + words + "</text>\n";
+             "' font-family='sans-serif' font-size='13' fill='" + colour + "'>" + words +
+             "</text>\n";
   }
 
   // Writes the file into the folder that the command line names; does nothing if it names none.

@@ -69,9 +69,9 @@ int main(int argc, char** argv) {
   claim(first(0) == a(1) && first(3) == a(2) && first(4) == 0.0f,
         "outputs outside the bounds contribute nothing");
 
-  Picture picture("What is a seed: the Jacobian of f(x) = a(x) a(x + 1), one row per seed");
+  Picture picture("The Jacobian of f(x) = a(x) a(x + 1), one row per seed");
   picture.cells(60, 40, 18, matrix, 0, 2.5);
-  picture.text(300, 60, "row k: the seed is 1 at k");
-  picture.text(300, 80, "column i: derivatives by a(i)");
+  picture.text(270, 60, "row k: the seed is 1 at k");
+  picture.text(270, 80, "column i: derivatives by a(i)");
   picture.write(argc, argv, "what_is_a_seed");
 }

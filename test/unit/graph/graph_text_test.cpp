@@ -178,6 +178,19 @@ TEST(GraphText, WhatIsReadIsThere) {
                [] { parse_graph(with("in32(x + r.x, y)", "other(x, y):float32")); });
 }
 
+// A name without a declaration has type int32, which rarely fits.
+TEST(GraphText, UnknownNamesAreBlamedBeforeTheirTypes) {
+  const char* const rule = "every Func and image that is read belongs to the graph";
+  expect_error({rule, "no Func of it is called \"other\""},
+               [] { parse_graph(with("in32(x + r.x, y)", "other(x, y)")); });
+  expect_error({rule, "no Func of it is called \"an other\""},
+               [] { parse_graph(with("where r.x < y", "where `an other`(x) < 1f")); });
+  expect_error({rule, "no image of it is called \"other\""},
+               [] { parse_graph(with("in32(x + r.x, y)", "image other(x, y)")); });
+  expect_error({"operands must fit each other"},
+               [] { parse_graph(with("in32(x + r.x, y)", "image input(x, y)")); });
+}
+
 TEST(GraphText, BrokenGraphsAreBlamedOnThePass) {
   const auto expect_broken = [](const std::string& text, const char* rule) {
     const Graph graph = parse_graph(text);
