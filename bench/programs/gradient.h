@@ -113,7 +113,7 @@ class Variable {
 // The base of a gradient's generator, whose members are the inputs of the pipeline (a Variable each, if it has a
 // gradient), then the Seed. `generate` defines the pipeline and ends with `differentiate`.
 template <typename T>
-class GradientGenerator : public Halide::Generator<T> {
+class GradientGenerator : public PictureGenerator<T> {
  public:
   using Seed = programs::Seed;
   using Variable = programs::Variable;
@@ -136,8 +136,6 @@ class GradientGenerator : public Halide::Generator<T> {
     estimate(seed.values, seed.extents);
     estimate(sum, {});
   }
-
-  Halide::Var x{"x"}, y{"y"}, c{"c"};
 };
 
 // The one case of a gradient: the inputs of its pipeline, of which the arrays have gradients.
