@@ -1,12 +1,12 @@
 // command.cpp -- see command.h.
 #include "command.h"
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <exception>
 
+#include "common/options.h"
 #include "diagnostics/error.h"
 
 namespace bench {
@@ -14,16 +14,7 @@ namespace bench {
 using retrograde::text;
 
 bool parse_command_line(CLI::App& app, int argc, char** argv) {
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::CallForHelp&) {
-    std::fputs(app.help().c_str(), stdout);
-    return false;
-  } catch (const CLI::ParseError& error) {
-    retrograde::call_error("understand the command line", "each option takes one value",
-                           error.what(), "Run with --help for the options");
-  }
-  return true;
+  return apps::parse_words(app, argc, argv, "each option takes one value");
 }
 
 void require_known(const std::string& kind, const std::vector<std::string>& asked,
