@@ -9,15 +9,6 @@
 
 namespace {
 
-void compile_stencil_chain(benchmark::State& state) {
-  const int stages = static_cast<int>(state.range(0));
-  for (auto _ : state) {
-    retrograde::Func last = stencil_chain(stages);
-    last.compile_jit();
-    benchmark::DoNotOptimize(last);
-  }
-  state.SetComplexityN(stages);
-}
 BENCHMARK(compile_stencil_chain)
     ->Arg(16)
     ->Arg(32)

@@ -5,14 +5,13 @@
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
-#include <csignal>
 #include <cstdio>
-#include <exception>
 #include <string>
 #include <vector>
 
 #include "common/files.h"
 #include "common/process.h"
+#include "pairs/command.h"
 #include "pairs/machine.h"
 #include "pairs/options.h"
 #include "pairs/pair.h"
@@ -95,13 +94,9 @@ int run(const Options& options) {
 }  // namespace bench
 
 int main(int argc, char** argv) {
-  std::signal(SIGPIPE, SIG_IGN);  // a crashed worker is an error of its kernel only
-  try {
+  return bench::run_benchmark("bench_kernels", [&] {
     benchmark::Initialize(&argc, argv);
     const auto options = bench::read_options(argc, argv);
     return options ? bench::run(*options) : 0;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bench_kernels: %s\n", error.what());
-    return 1;
-  }
+  });
 }

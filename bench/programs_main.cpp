@@ -2,14 +2,12 @@
 // and run in turns: see README.md.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <csignal>
 #include <cstdio>
-#include <exception>
 #include <thread>
 
 #include "common/files.h"
 #include "common/process.h"
-#include "diagnostics/error.h"
+#include "pairs/command.h"
 #include "programs/compare.h"
 
 namespace programs {
@@ -37,18 +35,11 @@ struct Options {
   std::filesystem::path output = "programs.json";
 };
 
-void check_names(const std::vector<std::string>& asked) {
+std::vector<std::string> all_names() {
   std::vector<std::string> names = program_names;
   for (const auto& more : {second_names, gradient_names})
     names.insert(names.end(), more.begin(), more.end());
-  std::string known;
-  for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
-  for (const std::string& name : asked) {
-    if (std::count(names.begin(), names.end(), name)) continue;
-    retrograde::call_error("run the program " + retrograde::quoted(name),
-                           "it must be one of the benchmark's", "they are " + known,
-                           "Give --program one of these names");
-  }
+  return names;
 }
 
 void add_options(CLI::App& app, Options& options) {
@@ -72,16 +63,8 @@ void add_options(CLI::App& app, Options& options) {
 bool read(int argc, char** argv, Options& options) {
   CLI::App app("Programs as users write them, compiled ahead of time by Halide 14 and Retrograde.");
   add_options(app, options);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::CallForHelp&) {
-    std::fputs(app.help().c_str(), stdout);
-    return false;
-  } catch (const CLI::ParseError& error) {
-    retrograde::call_error("understand the command line", "each option takes one value",
-                           error.what(), "Run with --help for the options");
-  }
-  check_names(options.programs);
+  if (!bench::parse_command_line(app, argc, argv)) return false;
+  bench::require_known("program", options.programs, all_names());
   if (options.programs.empty())
     options.programs = options.gradients ? gradient_names
                        : options.second  ? second_names
@@ -126,12 +109,8 @@ int run(const Options& options) {
 }  // namespace programs
 
 int main(int argc, char** argv) {
-  std::signal(SIGPIPE, SIG_IGN);  // a crashed worker is an error of its program only
-  try {
+  return bench::run_benchmark("bench_programs", [&] {
     programs::Options options;
     return programs::read(argc, argv, options) ? programs::run(options) : 0;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bench_programs: %s\n", error.what());
-    return 1;
-  }
+  });
 }

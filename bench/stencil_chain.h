@@ -1,6 +1,8 @@
-// stencil_chain.h -- a chain of stencils, every stage at root, vectorized and parallel; the same source for both
-// languages. Define BENCH_LANGUAGE as the namespace before including it.
+// stencil_chain.h -- the benchmark of a chain of stencils, every stage at root, vectorized and parallel; the same source
+// for both languages. Define BENCH_LANGUAGE as the namespace before including it.
 #pragma once
+
+#include <benchmark/benchmark.h>
 
 #include <string>
 
@@ -19,4 +21,14 @@ static BENCH_LANGUAGE::Func stencil_chain(int stages) {
     previous = next;
   }
   return previous;
+}
+
+static void compile_stencil_chain(benchmark::State& state) {
+  const int stages = static_cast<int>(state.range(0));
+  for (auto _ : state) {
+    BENCH_LANGUAGE::Func last = stencil_chain(stages);
+    last.compile_jit();
+    benchmark::DoNotOptimize(last);
+  }
+  state.SetComplexityN(stages);
 }

@@ -155,8 +155,7 @@ std::optional<Look> read_start(const Options& options) {
 }
 
 void run(const Options& options) {
-  apps::require_writable_folder(options.output);
-  const apps::ThreadLimit threads(options.threads);
+  const apps::RunScope scope(options);
   const auto begun = std::chrono::steady_clock::now();
   if (!options.apply.empty()) return apply_look(options);
   const std::optional<Look> start = read_start(options);

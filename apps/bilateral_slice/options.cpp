@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "common/number_options.h"
 #include "diagnostics/error.h"
 
 namespace bilateral_slice {
@@ -14,9 +15,9 @@ void check_work(const Options& options) {
   if (options.pairs.empty() != options.input.empty() &&
       (options.apply.empty() || options.pairs.empty()))
     return;
-  retrograde::call_error("understand the command line", "either --input or --pairs is required",
-                         options.input.empty() ? "neither is given" : "both are given",
-                         "Run with --help for the options");
+  apps::refuse_command_line("either --input or --pairs is required",
+                            options.input.empty() ? "neither is given" : "both are given",
+                            "Run with --help for the options");
 }
 
 }  // namespace
@@ -24,9 +25,8 @@ void check_work(const Options& options) {
 // If the grid stays the identity, all its layers are equal, and then the guide has no effect.
 void check_groups(const Options& options) {
   if (options.resume && !options.start.empty()) {
-    retrograde::call_error("understand the command line",
-                           "a run either resumes from a state or starts from a look",
-                           "both --resume and --start are given", "Leave out one of them");
+    apps::refuse_command_line("a run either resumes from a state or starts from a look",
+                              "both --resume and --start are given", "Leave out one of them");
   }
   const bool learns = options.apply.empty() && !options.check_gradients &&
                       !options.check_stability && !options.time_steps;
@@ -59,14 +59,13 @@ std::optional<Options> read_options(int argc, char** argv) {
   app.add_option(
       "--start", options.start,
       "the initial look, a look.bin, which also sets the grid's size; default: the identity");
-  app.add_option("--grid", options.grid, "nodes along each side; 0: 64, or 3 with --pairs")
-      ->capture_default_str();
-  app.add_option("--halide-seconds", options.halide_seconds,
-                 "time limit for the comparison with Halide 14; 0: no comparison")
-      ->capture_default_str();
-  app.add_option("--check-side", options.check_side,
-                 "pixels along each side of the crop for --check-gradients; 0: 96 x 80")
-      ->capture_default_str();
+  apps::NumberOptions numbers(app);
+  numbers.add("--grid", options.grid, {3, 256, true},
+              "nodes along each side; 0: 64, or 3 with --pairs");
+  numbers.add("--halide-seconds", options.halide_seconds, {0, 1e6},
+              "time limit for the comparison with Halide 14; 0: no comparison");
+  numbers.add("--check-side", options.check_side, {4, 96, true},
+              "pixels along each side of the crop for --check-gradients; 0: 96 x 80");
   app.add_flag(
       "--time-steps", options.time_steps,
       "instead of learning: the time of a step, by optimized groups, and for a gray photo");
@@ -75,9 +74,7 @@ std::optional<Options> read_options(int argc, char** argv) {
   options.moves = {apps::optimizes(options, "grid"), apps::optimizes(options, "mix"),
                    apps::optimizes(options, "curve")};
   check_groups(options);
-  apps::require_in_range("--halide-seconds", options.halide_seconds, 0, 1e6);
-  if (options.check_side != 0) apps::require_in_range("--check-side", options.check_side, 4, 96);
-  if (options.grid != 0) apps::require_in_range("--grid", options.grid, 3, 256);
+  numbers.check();
   return options;
 }
 

@@ -3,10 +3,7 @@
 
 usage: plot_error_against_time.py report.json plot.png
 """
-import json
-import sys
-
-from figures import plt, save
+from figures import draw_report, plt, save
 
 
 def add_curve(axes, name, curve, ms_per_step):
@@ -30,13 +27,5 @@ def draw(report, path):
     save(figure, path)
 
 
-def main():
-    if len(sys.argv) != 3:
-        sys.exit(__doc__.strip())
-    with open(sys.argv[1], encoding="utf-8") as file:
-        report = json.load(file)
-    draw(report, sys.argv[2])
-
-
 if __name__ == "__main__":
-    main()
+    draw_report(__doc__, draw)

@@ -101,10 +101,8 @@ std::vector<apps::StabilityRow> check_stability() {
   FlatModel<float> own;
   FlatModel<double> exact;
   const std::vector<double> x = identity();
-  apps::Problem problem{.size = x.size()};
-  problem.evaluate = [&](std::span<const double> at, std::span<double> gradient) {
-    return own.loss(at, gradient);
-  };
+  const apps::Problem problem{
+      .size = x.size(), .evaluate = [&](auto at, auto gradient) { return own.loss(at, gradient); }};
   std::vector<apps::StabilityRow> rows;
   for (const PhotoCase& one : photo_cases()) {
     const long pixels = stability_shape.pixels();
@@ -120,14 +118,9 @@ std::vector<apps::StabilityRow> check_stability() {
     exact.set_images(photo, target);
     std::vector<double> g(x.size()), g_exact(x.size());
     const double loss = own.loss(x, g), loss_exact = exact.loss(x, g_exact);
-    apps::StabilityRow row;
-    row.name = one.name;
-    row.primal_error = apps::relative_error({&loss, 1}, {&loss_exact, 1});
-    row.gradient_error = apps::relative_error(g, g_exact);
-    apps::MinimizeOptions fast{
-        .method = apps::Method::Adam, .steps = stability_steps, .rate = large_rate};
-    fast.adam.explosion = 100;
-    apps::measure_divergence(row, problem, x, fast);
+    apps::StabilityRow row{one.name, apps::relative_error({&loss, 1}, {&loss_exact, 1}),
+                           apps::relative_error(g, g_exact)};
+    apps::measure_divergence(row, problem, x, apps::large_steps(stability_steps, large_rate, 100));
     rows.push_back(row);
   }
   return rows;

@@ -219,14 +219,11 @@ std::vector<apps::StabilityRow> check_stability(const Burst& burst, uint64_t see
     std::vector<double> wide_gradient(x.size());
     in_float.evaluate(x, gradient);
     in_double.evaluate(wide_x, wide_gradient);
-    apps::StabilityRow row;
-    row.name = name;
-    row.primal_error =
-        apps::relative_error(residuals<float>(own, shape, at), residuals<double>(exact, shape, at));
-    row.gradient_error = gradient_error(shape, gradient, wide_gradient);
-    apps::MinimizeOptions fast{.method = apps::Method::Adam, .steps = 60, .rate = 0.3};
-    fast.adam.explosion = 10;
-    apps::measure_divergence(row, problem, wide_x, fast);
+    apps::StabilityRow row{
+        name,
+        apps::relative_error(residuals<float>(own, shape, at), residuals<double>(exact, shape, at)),
+        gradient_error(shape, gradient, wide_gradient)};
+    apps::measure_divergence(row, problem, wide_x, apps::large_steps(60, 0.3, 10));
     rows.push_back(row);
   }
   return rows;

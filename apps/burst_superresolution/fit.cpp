@@ -14,7 +14,6 @@
 
 namespace burst {
 
-using retrograde::quoted;
 using retrograde::text;
 
 namespace {
@@ -22,7 +21,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr const char* program = "burst_superresolution";
-constexpr double save_every_seconds = 20;
 constexpr long looks = 60;  // comparisons with the truth, over the whole run
 constexpr double explosion = 10;
 
@@ -55,12 +53,10 @@ class Optimization {
   }
 
   Fit run(const std::function<void(const Sample&)>& shown) {
-    auto saved = Clock::now();
+    apps::SaveTimer timer;
     while (step()) {
       shown(fit_.series.back());
-      if (apps::seconds_since(saved) < save_every_seconds) continue;
-      save();
-      saved = Clock::now();
+      if (timer.is_due()) save();
     }
     shown(fit_.series.back());
     save();
@@ -142,14 +138,7 @@ class Optimization {
 
   void resume() {
     const apps::State state = apps::read_state(file(), program);
-    const auto before = state.words.find("problem");
-    if (before == state.words.end() || before->second != problem_) {
-      retrograde::call_error(
-          text("go on with ", quoted(file().string())), "a run goes on with what it began with",
-          text("it began with ", before == state.words.end() ? "nothing" : before->second,
-               "; this is ", problem_),
-          "Give the same options, or leave --resume out");
-    }
+    apps::require_same_problem(file(), state, problem_, "what");
     state.get("x", std::span<float>(x_));
     fit_.x.resize(x_.size());
     state.get("best", std::span<float>(fit_.x));

@@ -2,7 +2,6 @@
 #include <cstdio>
 
 #include "checks.h"
-#include "common/files.h"
 #include "common/progress.h"
 #include "common/run_app.h"
 #include "options.h"
@@ -19,14 +18,6 @@ Burst burst_of(const Options& options) {
   if (std::filesystem::is_directory(options.common.input))
     return read_burst(options.common.input, options.pattern);
   return simulate(demosaic::read_photograph(options.common.input), options.simulation);
-}
-
-// For the checks: reports a table instead of a result.
-void write_table(const Options& options, const apps::Table& table) {
-  apps::Report report(name, options.common);
-  report.add_table(table);
-  report.write(0, false);
-  std::fputs(table.to_markdown().c_str(), stdout);
 }
 
 void print_explanation(const Options& options, const Prepared& prepared,
@@ -56,17 +47,16 @@ Fit fit_with_progress(const Options& options, const Burst& burst, const Prepared
 }
 
 void run(const Options& options) {
-  apps::require_writable_folder(options.common.output);
-  const apps::ThreadLimit threads(options.common.threads);
+  const apps::RunScope scope(options.common);
   Burst burst = burst_of(options);
   if (options.common.check_gradients) {
     const auto rows = check_gradients(burst, options.common.seed);
-    write_table(options, apps::gradient_table(rows));
+    apps::report_tables(name, options.common, {apps::gradient_table(rows)});
     return apps::require_gradients(rows);
   }
   if (options.common.check_stability) {
     const auto rows = check_stability(burst, options.common.seed, options.common.threads);
-    return write_table(options, apps::stability_table(rows));
+    return apps::report_tables(name, options.common, {apps::stability_table(rows)});
   }
   apps::Report report(name, options.common);
   Prepared prepared = prepare(burst, options.colours, options.lambda, options.common.threads);

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "common/number_options.h"
 #include "diagnostics/error.h"
 
 namespace burst {
@@ -14,28 +15,15 @@ constexpr const char* image_group = "image";
 constexpr const char* motion_group = "homographies";
 constexpr const char* both_groups = "both";
 
-void add_simulation_options(CLI::App& cli, Simulation& s) {
-  cli.add_option("--frames", s.frames, "number of frames that are simulated from a photograph")
-      ->capture_default_str();
-  cli.add_option("--shake", s.shake, "movement of the camera between frames, in pixels")
-      ->capture_default_str();
-  cli.add_option("--rotation", s.rotation, "rotation of the camera between frames, in degrees")
-      ->capture_default_str();
-  cli.add_option("--noise", s.noise, "standard deviation of each sample; 1 is white")
-      ->capture_default_str();
-  cli.add_option("--frame-size", s.frame_size,
-                 "largest number of pixels along each side of a frame; 0: as the photograph allows")
-      ->capture_default_str();
-}
-
-void check(const Options& options) {
-  const Simulation& s = options.simulation;
-  apps::require_in_range("--frames", s.frames, 1, 1000);
-  apps::require_in_range("--shake", s.shake, 0, 1000);
-  apps::require_in_range("--rotation", s.rotation, 0, 20);
-  apps::require_in_range("--noise", s.noise, 0, 1);
-  if (s.frame_size != 0) apps::require_in_range("--frame-size", s.frame_size, least_side, 100'000);
-  if (options.lambda) apps::require_in_range("--lambda", *options.lambda, 0, 1e6);
+void add_simulation_options(apps::NumberOptions& numbers, Simulation& s) {
+  numbers.add("--frames", s.frames, {1, 1000},
+              "number of frames that are simulated from a photograph");
+  numbers.add("--shake", s.shake, {0, 1000}, "movement of the camera between frames, in pixels");
+  numbers.add("--rotation", s.rotation, {0, 20},
+              "rotation of the camera between frames, in degrees");
+  numbers.add("--noise", s.noise, {0, 1}, "standard deviation of each sample; 1 is white");
+  numbers.add("--frame-size", s.frame_size, {least_side, 100'000, true},
+              "largest number of pixels along each side of a frame; 0: as the photograph allows");
 }
 
 Colours colours_named(const std::string& name) {
@@ -65,7 +53,8 @@ std::optional<Options> read_options(int argc, char** argv) {
        .steps = usual_steps,
        .optimize = {image_group, motion_group, both_groups}});
   options.common.optimize = {both_groups};
-  add_simulation_options(cli, options.simulation);
+  apps::NumberOptions numbers(cli);
+  add_simulation_options(numbers, options.simulation);
   cli.add_option(
       "--mosaic", options.pattern,
       "the colours of the first two rows of the frames, as RGGB; RAW files contain them");
@@ -82,7 +71,8 @@ std::optional<Options> read_options(int argc, char** argv) {
   options.moves = moves_of(options.common);
   options.colours = colours_named(colours);
   options.simulation.seed = options.common.seed;
-  check(options);
+  numbers.check();
+  if (options.lambda) apps::require_in_range("--lambda", *options.lambda, 0, 1e6);
   return options;
 }
 

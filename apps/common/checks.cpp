@@ -69,6 +69,18 @@ double relative_error(std::span<const double> own, std::span<const double> exact
   return worst == 0 ? 0 : worst / largest;
 }
 
+double difference_along(const std::function<double(const std::vector<double>&)>& loss,
+                        const std::vector<double>& at, const std::vector<double>& direction,
+                        double step) {
+  const auto loss_at = [&](double move) {
+    std::vector<double> moved = at;
+    for (size_t n = 0; n < at.size(); ++n) moved[n] += move * direction[n];
+    return loss(moved);
+  };
+  const auto central = [&](double h) { return (loss_at(h) - loss_at(-h)) / (2 * h); };
+  return (4 * central(step / 2) - central(step)) / 3;
+}
+
 Table stability_table(const std::vector<StabilityRow>& rows) {
   Table table{"stability",
               {"case", "primal, float32 against double", "gradient, float32 against double",
@@ -91,6 +103,12 @@ std::optional<long> diverging_step(std::span<const LossSample> series, double fa
     if (bad && !first) first = sample.step;
   }
   return first;
+}
+
+MinimizeOptions large_steps(long steps, double rate, double explosion) {
+  MinimizeOptions options{.method = Method::Adam, .steps = steps, .rate = rate};
+  options.adam.explosion = explosion;
+  return options;
 }
 
 void measure_divergence(StabilityRow& row, const Problem& problem, std::span<const double> start,

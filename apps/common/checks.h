@@ -6,6 +6,7 @@
 
 #include <retrograde/retrograde.h>
 
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <span>
@@ -38,6 +39,12 @@ void require_gradients(const std::vector<GradientRow>& rows);
 // example gradients that consist of rounding errors.
 double relative_error(std::span<const double> own, std::span<const double> exact, double least = 0);
 
+// The derivative of `loss` at a point along a direction: central differences with `step` and half of it, extrapolated
+// (Richardson), so that the remaining error is of fourth order.
+double difference_along(const std::function<double(const std::vector<double>&)>& loss,
+                        const std::vector<double>& at, const std::vector<double>& direction,
+                        double step);
+
 struct StabilityRow {
   std::string name;
   double primal_error = 0, gradient_error = 0;                     // float32 against double, worst
@@ -49,6 +56,9 @@ Table stability_table(const std::vector<StabilityRow>& rows);
 // The first step whose loss is not finite, or exceeds `factor` times the first loss and never falls below that again;
 // nothing if there is none.
 std::optional<long> diverging_step(std::span<const LossSample> series, double factor = 10);
+
+// Adam at a rate far above the one that the app uses. A loss of `explosion` times the lowest one counts as diverged.
+MinimizeOptions large_steps(long steps, double rate, double explosion = INFINITY);
 
 // Runs the optimizer twice from `start`, without and with safeguards, and records the steps at which it diverges.
 void measure_divergence(StabilityRow& row, const Problem& problem, std::span<const double> start,

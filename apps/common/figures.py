@@ -1,5 +1,7 @@
 """Helpers for scripts that draw: matplotlib without a display, and figures that are written atomically."""
+import json
 import os
+import sys
 
 import matplotlib
 
@@ -17,3 +19,12 @@ def save(figure, path):
         plt.close(figure)
         if os.path.exists(temporary):
             os.remove(temporary)
+
+
+def draw_report(usage, draw):
+    """Runs a script whose arguments are a report and where to draw: `draw(report, path)`."""
+    if len(sys.argv) != 3:
+        sys.exit(usage.strip())
+    with open(sys.argv[1], encoding="utf-8") as file:
+        report = json.load(file)
+    draw(report, sys.argv[2])

@@ -31,13 +31,6 @@ void add_optimize_option(CLI::App& cli, CommonOptions& options,
       });
 }
 
-[[noreturn]] void refuse_command_line(std::string evidence) {
-  std::replace(evidence.begin(), evidence.end(), '\n', ' ');
-  retrograde::call_error("understand the command line",
-                         "options must be as --help describes, and required ones present", evidence,
-                         "Run with --help for the options");
-}
-
 void check_ranges(const CLI::App& cli, const CommonOptions& options) {
   require_in_range("--steps", static_cast<double>(options.steps), 1, 1'000'000);
   require_in_range("--seconds", options.seconds, 0, 1e6);
@@ -74,17 +67,31 @@ void add_common_options(CLI::App& cli, CommonOptions& options, const CommonDefau
   if (!defaults.optimize.empty()) add_optimize_option(cli, options, defaults.optimize);
 }
 
-bool parse_command_line(CLI::App& cli, int argc, char** argv, CommonOptions& options) {
+bool parse_words(CLI::App& cli, int argc, char** argv, const std::string& rule) {
   try {
     cli.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
     std::fputs(cli.help().c_str(), stdout);
     return false;
   } catch (const CLI::ParseError& error) {
-    refuse_command_line(error.what());
+    std::string evidence = error.what();
+    std::replace(evidence.begin(), evidence.end(), '\n', ' ');
+    refuse_command_line(rule, evidence, "Run with --help for the options");
   }
+  return true;
+}
+
+bool parse_command_line(CLI::App& cli, int argc, char** argv, CommonOptions& options) {
+  if (!parse_words(cli, argc, argv,
+                   "options must be as --help describes, and required ones present"))
+    return false;
   check_ranges(cli, options);
   return true;
+}
+
+void refuse_command_line(const std::string& rule, const std::string& evidence,
+                         const std::string& instead) {
+  retrograde::call_error("understand the command line", rule, evidence, instead);
 }
 
 void require_in_range(const std::string& option, double value, double low, double high) {
@@ -98,6 +105,13 @@ void require_in_range(const std::string& option, double value, double low, doubl
 bool optimizes(const CommonOptions& options, const std::string& group) {
   return std::find(options.optimize.begin(), options.optimize.end(), group) !=
          options.optimize.end();
+}
+
+void print_left_out_groups(const CommonOptions& options, const std::vector<std::string>& groups) {
+  for (const std::string& group : groups) {
+    if (optimizes(options, group)) continue;
+    std::printf("left out: the gradient by %s, which --optimize does not name\n", group.c_str());
+  }
 }
 
 nlohmann::json to_json(const CommonOptions& options) {

@@ -29,6 +29,8 @@ struct CommonOptions {
   std::vector<std::string> optimize;  // the groups of parameters to optimize
   bool check_gradients = false, check_stability = false, explain = false;
   bool resume = false;
+
+  bool is_check() const { return check_gradients || check_stability; }
 };
 
 // Which of these options an app has, and their defaults.
@@ -44,15 +46,26 @@ struct CommonDefaults {
 
 void add_common_options(CLI::App& cli, CommonOptions& options, const CommonDefaults& defaults);
 
+// Parses a command line, also one without common options. Returns false after printing the help for --help. Throws
+// retrograde::UserError, which states `rule`.
+bool parse_words(CLI::App& cli, int argc, char** argv, const std::string& rule);
+
 // Parses the command line and checks ranges and names. Returns false after printing the help for --help. Throws
 // retrograde::UserError with a one-line message.
 bool parse_command_line(CLI::App& cli, int argc, char** argv, CommonOptions& options);
+
+// Rejects the command line. Throws retrograde::UserError.
+[[noreturn]] void refuse_command_line(const std::string& rule, const std::string& evidence,
+                                      const std::string& instead);
 
 // The check of all numeric options. Throws retrograde::UserError unless low <= value <= high.
 void require_in_range(const std::string& option, double value, double low, double high);
 
 // Whether --optimize names the group.
 bool optimizes(const CommonOptions& options, const std::string& group);
+
+// Prints a line for each group whose gradient is left out because --optimize does not name it.
+void print_left_out_groups(const CommonOptions& options, const std::vector<std::string>& groups);
 
 // For report.json.
 nlohmann::json to_json(const CommonOptions& options);

@@ -3,11 +3,9 @@
 
 usage: plot_series.py report.json FOLDER
 """
-import json
 import os
-import sys
 
-from figures import plt, save
+from figures import draw_report, plt, save
 
 
 def drawable(series, plot):
@@ -73,14 +71,10 @@ def draw(plot, path):
     save(figure, path)
 
 
-def main():
-    if len(sys.argv) != 3:
-        sys.exit(__doc__.strip())
-    with open(sys.argv[1], encoding="utf-8") as file:
-        report = json.load(file)
+def draw_all(report, folder):
     for plot in report["plots"]:
-        draw(plot, os.path.join(sys.argv[2], plot["file"]))
+        draw(plot, os.path.join(folder, plot["file"]))
 
 
 if __name__ == "__main__":
-    main()
+    draw_report(__doc__, draw_all)

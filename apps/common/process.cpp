@@ -72,6 +72,19 @@ int exit_status(pid_t id) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
+// Calls read() or write() until all bytes are transferred; returns false if that fails or the pipe's end is closed.
+template <typename Call, typename Byte>
+bool transfer(const Call& call, int descriptor, Byte* at, size_t bytes) {
+  while (bytes > 0) {
+    const ssize_t done = call(descriptor, at, bytes);
+    if (done < 0 && errno == EINTR) continue;
+    if (done <= 0) return false;
+    at += done;
+    bytes -= static_cast<size_t>(done);
+  }
+  return true;
+}
+
 }  // namespace
 
 Child::Child(const std::filesystem::path& program, const std::vector<std::string>& arguments,
@@ -113,27 +126,11 @@ Child::~Child() {
 }
 
 bool Child::send(const void* data, size_t bytes) {
-  auto* at = static_cast<const char*>(data);
-  while (bytes > 0) {
-    const ssize_t sent = ::write(to_, at, bytes);
-    if (sent < 0 && errno == EINTR) continue;
-    if (sent <= 0) return false;
-    at += sent;
-    bytes -= static_cast<size_t>(sent);
-  }
-  return true;
+  return transfer(::write, to_, static_cast<const char*>(data), bytes);
 }
 
 bool Child::receive(void* data, size_t bytes) {
-  auto* at = static_cast<char*>(data);
-  while (bytes > 0) {
-    const ssize_t received = ::read(from_, at, bytes);
-    if (received < 0 && errno == EINTR) continue;
-    if (received <= 0) return false;
-    at += received;
-    bytes -= static_cast<size_t>(received);
-  }
-  return true;
+  return transfer(::read, from_, static_cast<char*>(data), bytes);
 }
 
 Outcome run_program(const std::vector<std::string>& command) {

@@ -116,4 +116,12 @@ void Report::write(long steps, bool stopped) const {
   if (!plots_.empty()) draw_plots(path);
 }
 
+void report_tables(const std::string& program, const CommonOptions& options,
+                   const std::vector<Table>& tables) {
+  Report report(program, options);
+  for (const Table& table : tables) report.add_table(table);
+  report.write(0, false);
+  for (const Table& table : tables) std::fputs(table.to_markdown().c_str(), stdout);
+}
+
 }  // namespace apps

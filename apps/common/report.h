@@ -76,4 +76,8 @@ class Report {
   std::vector<std::string> notes_;
 };
 
+// Writes a report that has only these tables, as checks do, and prints them. Throws retrograde::UserError.
+void report_tables(const std::string& program, const CommonOptions& options,
+                   const std::vector<Table>& tables);
+
 }  // namespace apps

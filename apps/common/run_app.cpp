@@ -9,6 +9,7 @@
 #include <exception>
 #include <new>
 
+#include "common/files.h"
 #include "common/stop.h"
 #include "diagnostics/error.h"
 
@@ -57,5 +58,9 @@ ThreadLimit::ThreadLimit(int threads)
                                            static_cast<size_t>(std::max(threads, 1)))}) {}
 
 ThreadLimit::~ThreadLimit() = default;
+
+RunScope::RunScope(const CommonOptions& options) : threads_(options.threads) {
+  require_writable_folder(options.output);
+}
 
 }  // namespace apps

@@ -13,6 +13,8 @@
 #include <memory>
 #include <string>
 
+#include "common/options.h"
+
 namespace apps {
 
 int run_app(const std::string& name, int argc, char** argv,
@@ -29,6 +31,15 @@ class ThreadLimit {
  private:
   struct Limit;
   std::unique_ptr<Limit> limit_;
+};
+
+// The preparation of every run: requires a writable output folder, and limits the threads during its lifetime.
+class RunScope {
+ public:
+  explicit RunScope(const CommonOptions& options);
+
+ private:
+  ThreadLimit threads_;
 };
 
 }  // namespace apps

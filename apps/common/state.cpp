@@ -210,4 +210,16 @@ State read_state(const std::filesystem::path& path, const std::string& program) 
   return state;
 }
 
+void require_same_problem(const std::filesystem::path& path, const State& state,
+                          const std::string& problem, const std::string& kind) {
+  const auto before = state.words.find("problem");
+  if (before != state.words.end() && before->second == problem) return;
+  retrograde::call_error(
+      text("go on with ", quoted(path.string())),
+      text("a run goes on with ", kind, " it began with"),
+      text("it began with ", before == state.words.end() ? "nothing" : before->second, "; this is ",
+           problem),
+      "Give the same options, or leave --resume out");
+}
+
 }  // namespace apps

@@ -36,6 +36,11 @@ struct State {
   void get(const std::string& name, std::mt19937_64& random) const;
 };
 
+// Throws retrograde::UserError unless the state is that of a run on this problem: `problem` is a description, which
+// words["problem"] has, of what must be the same, and `kind` names it in the message.
+void require_same_problem(const std::filesystem::path& path, const State& state,
+                          const std::string& problem, const std::string& kind);
+
 void write_state(const std::filesystem::path& path, const State& state);
 
 // Throws retrograde::UserError unless the file is a complete state of this program.

@@ -82,20 +82,10 @@ std::vector<size_t> places_of(Array array) {
   return places;
 }
 
-// Central differences with two steps, extrapolated (Richardson). Steps are small, because the cleaning has kinks where
-// a pixel's brightness crosses a bin.
+// Steps are small, because the cleaning has kinks where a pixel's brightness crosses a bin.
 double difference_along(Evaluator<double>& exact, const std::vector<double>& at,
                         const std::vector<double>& direction) {
-  constexpr double step = 2e-6;
-  const auto central = [&](double h) {
-    const auto loss_at = [&](double move) {
-      std::vector<double> moved = at;
-      for (size_t k = 0; k < at.size(); ++k) moved[k] += move * direction[k];
-      return exact.loss(moved);
-    };
-    return (loss_at(h) - loss_at(-h)) / (2 * h);
-  };
-  return (4 * central(step / 2) - central(step)) / 3;
+  return apps::difference_along([&](const auto& x) { return exact.loss(x); }, at, direction, 2e-6);
 }
 
 std::vector<double> part(const std::vector<double>& all, const std::vector<size_t>& places) {
@@ -245,18 +235,12 @@ apps::StabilityRow stability_of(const Frame& frame, uint64_t seed, long steps,
                                   std::copy(gradient.begin(), gradient.end(), g.begin());
                                 return loss;
                               }};
-  apps::measure_divergence(row, problem, at,
-                           {.method = apps::Method::Adam, .steps = steps, .rate = large_rate});
+  apps::measure_divergence(row, problem, at, apps::large_steps(steps, large_rate));
   return row;
 }
 
 void finish(const Options& options, const std::vector<apps::Table>& tables) {
-  apps::Report report("deconvolution", options.common);
-  for (const apps::Table& table : tables) {
-    report.add_table(table);
-    std::printf("%s", table.to_markdown().c_str());
-  }
-  report.write(0, false);
+  apps::report_tables("deconvolution", options.common, tables);
   std::printf("report in %s\n", (options.common.output / "report.json").c_str());
 }
 
@@ -275,6 +259,8 @@ std::vector<apps::StabilityRow> stability_rows(uint64_t seed, int threads, long 
   for (const Frame& frame : frames()) rows.push_back(stability_of(frame, seed, steps, own, exact));
   return rows;
 }
+
+namespace {
 
 void check_gradients(const Options& options) {
   const auto photographs = photographs_of(options);
@@ -296,16 +282,19 @@ void check_stability(const Options& options) {
       {apps::stability_table(stability_rows(options.common.seed, options.common.threads, steps))});
 }
 
+}  // namespace
+
+void check(const Options& options) {
+  options.common.check_gradients ? check_gradients(options) : check_stability(options);
+}
+
 void explain(const Options& options) {
   const Extent extent = BatchShape{}.extent();
   const Objective<float> all(options.shape, extent, options.common.threads);
   const Objective<float> chosen(options.shape, extent, options.common.threads,
                                 arrays_of(options.common.optimize));
   std::printf("%s\n", chosen.explain().c_str());
-  for (const std::string& group : group_names) {
-    if (apps::optimizes(options.common, group)) continue;
-    std::printf("left out: the gradient by %s, which --optimize does not name\n", group.c_str());
-  }
+  apps::print_left_out_groups(options.common, group_names);
   std::printf("the gradient of a stage has %zu Funcs; that by every group would have %zu\n",
               chosen.stages(), all.stages());
   std::printf("left out where a picture is deconvolved: the loss, and all of this\n");

@@ -23,9 +23,9 @@ std::vector<apps::GradientRow> loss_gradients(const std::vector<demosaic::Photog
 // diverge.
 std::vector<apps::StabilityRow> stability_rows(uint64_t seed, int threads, long steps);
 
-// Throws retrograde::UserError if an error exceeds the limits of apps/common/checks.h.
-void check_gradients(const Options& options);
-void check_stability(const Options& options);
+// Runs --check-gradients or --check-stability. Throws retrograde::UserError if an error exceeds the limits of
+// apps/common/checks.h.
+void check(const Options& options);
 // Explains what learning computes, and what it leaves out.
 void explain(const Options& options);
 

@@ -19,11 +19,7 @@ Weights start_of(const Options& options) {
 
 // Learned weights use mixtures; those of the original method use thresholds, which have a gradient too.
 Trainer::Options trainer_options(const Options& options) {
-  return {.steps = options.common.steps,
-          .threads = options.common.threads,
-          .seed = options.common.seed,
-          .groups = options.common.optimize,
-          .from_weights = !options.weights.empty()};
+  return {.common = options.common, .from_weights = !options.weights.empty()};
 }
 
 // The stages, and their results on the held-out photographs.

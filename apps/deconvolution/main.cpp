@@ -4,7 +4,6 @@
 #include <optional>
 
 #include "checks.h"
-#include "common/files.h"
 #include "common/run_app.h"
 #include "common/stop.h"
 #include "learn.h"
@@ -71,10 +70,8 @@ long use_dataset(const Options& options, std::vector<Method>& methods, apps::Rep
 }
 
 void run(const Options& options) {
-  apps::require_writable_folder(options.common.output);
-  const apps::ThreadLimit threads(options.common.threads);
-  if (options.common.check_gradients) return check_gradients(options);
-  if (options.common.check_stability) return check_stability(options);
+  const apps::RunScope scope(options.common);
+  if (options.common.is_check()) return check(options);
   if (options.common.explain) explain(options);
 
   apps::Report report("deconvolution", options.common);

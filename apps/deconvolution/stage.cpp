@@ -2,9 +2,9 @@
 #include "stage.h"
 
 #include <cmath>
-#include <numeric>
 
 #include "cleaning.h"
+#include "demosaic/relaxed.h"
 
 namespace deconvolution {
 
@@ -46,8 +46,7 @@ std::vector<int> sizes_of(const Shape& shape, Array array) {
 }
 
 size_t elements_of(const Shape& shape, Array array) {
-  const auto sizes = sizes_of(shape, array);
-  return std::accumulate(sizes.begin(), sizes.end(), size_t{1}, std::multiplies<>());
+  return demosaic::elements_of(sizes_of(shape, array));
 }
 
 size_t elements_of(const Shape& shape) {

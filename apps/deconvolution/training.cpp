@@ -2,6 +2,7 @@
 #include "training.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "diagnostics/error.h"
@@ -19,20 +20,9 @@ constexpr double least_noise = 0.005, most_noise = 0.02;
 constexpr double motion_share = 0.65, least_radius = 1.5;
 constexpr int least_path = 9;
 
-// Adam's rates: weights are exponents, filters have a norm of about one.
-double rate_of(Array array) {
-  switch (array) {
-    case Array::Filters:
-      return 5e-3;
-    case Array::LogWeights:
-      return 2e-2;
-    case Array::Shrinkage:
-      return 1e-2;
-    case Array::Smoothing:
-      return 3e-3;
-  }
-  return 0;
-}
+// Adam's rates of filters, logarithms of weights, shrinkage and smoothing: weights are exponents, filters have a norm of
+// about one.
+constexpr std::array<double, all_arrays.size()> rates{5e-3, 2e-2, 1e-2, 3e-3};
 
 std::vector<apps::AdamGroup> adam_groups(const Weights& weights,
                                          const std::vector<std::string>& groups) {
@@ -41,7 +31,8 @@ std::vector<apps::AdamGroup> adam_groups(const Weights& weights,
   for (int stage = 0; stage < weights.stages; ++stage) {
     for (const Array array : all_arrays) {
       const bool moves = std::find(moving.begin(), moving.end(), array) != moving.end();
-      result.push_back({elements_of(weights.shape, array), moves ? rate_of(array) : 0.0});
+      result.push_back(
+          {elements_of(weights.shape, array), moves ? rates[static_cast<size_t>(array)] : 0.0});
     }
   }
   return result;
@@ -122,15 +113,17 @@ Range learned_at(long step, long apart, int stages) {
 Trainer::Trainer(const Weights& start, const std::vector<demosaic::Photograph>& photographs,
                  const Options& options)
     : options_(options),
-      apart_(options.from_weights ? 0 : steps_apart(options.steps, start.stages)),
+      apart_(options.from_weights ? 0 : steps_apart(options.common.steps, start.stages)),
       weights_(start),
       gradient_(start.values.size()),
-      sampler_(photographs, options.seed),
+      sampler_(photographs, options.common.seed),
       objective_(std::make_unique<Objective<float>>(start.shape, options.batch.extent(),
-                                                    options.threads, arrays_of(options.groups))),
+                                                    options.common.threads,
+                                                    arrays_of(options.common.optimize))),
       adam_(std::make_unique<apps::Adam>(
-          adam_groups(start, options.groups),
-          apps::AdamOptions{.schedule = rate_schedule(options.steps, apart_ * start.stages)})) {
+          adam_groups(start, options.common.optimize),
+          apps::AdamOptions{.schedule =
+                                rate_schedule(options.common.steps, apart_ * start.stages)})) {
   objective_->set(options.accuracy);
 }
 

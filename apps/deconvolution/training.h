@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/adam.h"
+#include "common/options.h"
 #include "objective.h"
 
 namespace deconvolution {
@@ -48,10 +49,7 @@ Range learned_at(long step, long steps_apart, int stages);
 class Trainer {
  public:
   struct Options {
-    long steps = 1000;
-    int threads = 1;
-    uint64_t seed = 1;
-    std::vector<std::string> groups = group_names;
+    apps::CommonOptions common;  // steps, threads, seed, and the groups to optimize
     bool from_weights =
         false;  // starting from learned weights: all stages are learned from the first step on
     BatchShape batch = {};

@@ -8,12 +8,9 @@
 
 #include "cleaning.h"
 #include "common/files.h"
-#include "common/json_files.h"
-#include "common/process.h"
+#include "common/weight_files.h"
 
 namespace deconvolution {
-
-using retrograde::text;
 
 namespace {
 
@@ -96,39 +93,17 @@ void set_mixture(Weights& weights, int stage, int f, double threshold) {
   at(1 + nearest) = -1;
 }
 
-std::filesystem::path shipped_path(const char* name) {
-  const auto here = apps::program_folder();
-  const auto installed = here / ".." / "share" / "retrograde" / "deconvolution" / name;
-  return std::filesystem::exists(installed) ? installed : here / "weights" / name;
-}
-
-[[noreturn]] void refuse_file(const std::filesystem::path& path, const std::string& evidence) {
-  retrograde::call_error(
-      text("read the weights ", retrograde::quoted(path.string())),
-      "a file of weights is JSON as this program writes it, with every array whole", evidence,
-      "Give a file that deconvolution wrote, or leave --weights out");
-}
-
-void require_shape(const std::filesystem::path& path, const Shape& s, int stages) {
+void require_shape(const apps::WeightFile& file, const Shape& s, int stages) {
   if (s.filters >= 1 && s.filters <= most_filters && s.size >= 1 && s.size <= most_size &&
       s.size % 2 == 1 && s.bumps >= 0 && s.bumps <= most_bumps && stages >= 1 &&
       stages <= most_stages)
     return;
-  refuse_file(path, text("it has ", stages, " stages of ", s.filters, " filters of size ", s.size,
-                         " and ", s.bumps, " bumps"));
+  file.refuse(retrograde::text("it has ", stages, " stages of ", s.filters, " filters of size ",
+                               s.size, " and ", s.bumps, " bumps"));
 }
 
-void read_array(const std::filesystem::path& path, const nlohmann::json& stage, Array array,
-                std::span<float> to) {
-  const std::string name = name_of(array);
-  const auto list = stage.at(name).get<std::vector<float>>();
-  if (list.size() != to.size()) {
-    refuse_file(path, text(name, " has ", list.size(), " numbers and not ", to.size()));
-  }
-  for (const float value : list) {
-    if (!std::isfinite(value)) refuse_file(path, text(name, " holds a number that is not finite"));
-  }
-  std::copy(list.begin(), list.end(), to.begin());
+Weights shipped(const char* name) {
+  return read_weights(apps::shipped_weights_path("deconvolution", name));
 }
 
 }  // namespace
@@ -216,39 +191,33 @@ void write_weights(const std::filesystem::path& path, const Weights& weights,
                       {"stages", nlohmann::json::array()}};
   for (int stage = 0; stage < of.stages; ++stage) {
     nlohmann::json arrays;
-    for (const Array array : all_arrays) {
-      auto& list = arrays[name_of(array)] = nlohmann::json::array();
-      // Six digits; the values are used as the file stores them, so no further precision is lost.
-      for (const float value : of.of(stage, array)) list.push_back(std::stod(text(value)));
-    }
+    for (const Array array : all_arrays)
+      arrays[name_of(array)] = apps::array_of_weights(of.of(stage, array));
     json["stages"].push_back(arrays);
   }
   apps::write_file(path, json.dump() + "\n");
 }
 
 Weights read_weights(const std::filesystem::path& path) {
-  nlohmann::json json;
-  if (const std::string wrong = apps::read_json(path, json); !wrong.empty())
-    refuse_file(path, wrong);
-  try {
+  const apps::WeightFile file("deconvolution", path);
+  return file.parse([&](const nlohmann::json& json) {
     const Shape shape{json.at("filters").get<int>(), json.at("size").get<int>(),
                       json.at("bumps").get<int>()};
-    const auto stages = static_cast<int>(json.at("stages").size());
-    require_shape(path, shape, stages);
-    Weights weights(shape, stages);
-    for (int stage = 0; stage < stages; ++stage) {
+    const nlohmann::json& stages = json.at("stages");
+    const auto count = static_cast<int>(stages.size());
+    require_shape(file, shape, count);
+    Weights weights(shape, count);
+    for (int stage = 0; stage < count; ++stage) {
       for (const Array array : all_arrays) {
-        read_array(path, json["stages"][static_cast<size_t>(stage)], array,
-                   weights.of(stage, array));
+        file.read_array(stages[static_cast<size_t>(stage)], name_of(array),
+                        weights.of(stage, array));
       }
     }
     return weights;
-  } catch (const nlohmann::json::exception& error) {
-    refuse_file(path, error.what());
-  }
+  });
 }
 
-Weights learned_weights() { return read_weights(shipped_path(learned_name)); }
-Weights tuned_weights() { return read_weights(shipped_path(tuned_name)); }
+Weights learned_weights() { return shipped(learned_name); }
+Weights tuned_weights() { return shipped(tuned_name); }
 
 }  // namespace deconvolution

@@ -146,25 +146,15 @@ apps::StabilityRow stability_of(const Shape& shape, const Frame& frame, Evaluato
                                   std::copy(gradient.begin(), gradient.end(), g.begin());
                                 return loss;
                               }};
-  apps::measure_divergence(row, problem, at,
-                           {.method = apps::Method::Adam, .steps = steps, .rate = large_rate});
+  apps::measure_divergence(row, problem, at, apps::large_steps(steps, large_rate));
   return row;
 }
 
-// The derivative of the loss along a direction, by central differences with two steps, extrapolated (Richardson). The
-// loss is smooth everywhere, so the remaining error is of fourth order.
+// The loss is smooth everywhere.
 double difference_along(const Shape& shape, Evaluator<double>& exact, const std::vector<double>& at,
                         const std::vector<double>& direction) {
-  constexpr double step = 1e-4;
-  const auto central = [&](double h) {
-    const auto loss_at = [&](double move) {
-      std::vector<double> moved = at;
-      for (size_t n = 0; n < at.size(); ++n) moved[n] += move * direction[n];
-      return exact.evaluate(shape, moved);
-    };
-    return (loss_at(h) - loss_at(-h)) / (2 * h);
-  };
-  return (4 * central(step / 2) - central(step)) / 3;
+  return apps::difference_along([&](const auto& x) { return exact.evaluate(shape, x); }, at,
+                                direction, 1e-4);
 }
 
 // For each array: the worst error of the adjoint in double against differences along random directions, and the adjoint
@@ -205,14 +195,9 @@ std::vector<apps::GradientRow> gradient_rows(const Shape& shape, Evaluator<float
 }
 
 void finish(const Options& options, const apps::Table& table) {
-  apps::Report report("demosaic", options.common);
-  report.add_table(table);
-  report.write(0, false);
-  std::printf("%sreport in %s\n", table.to_markdown().c_str(),
-              (options.common.output / "report.json").c_str());
+  apps::report_tables("demosaic", options.common, {table});
+  std::printf("report in %s\n", (options.common.output / "report.json").c_str());
 }
-
-}  // namespace
 
 void check_gradients(const Options& options) {
   const std::vector<Photograph> photographs{photograph_of(options)};
@@ -236,14 +221,17 @@ void check_stability(const Options& options) {
   finish(options, apps::stability_table(rows));
 }
 
+}  // namespace
+
+void check(const Options& options) {
+  options.common.check_gradients ? check_gradients(options) : check_stability(options);
+}
+
 void explain(const Options& options) {
   const TrainingPipeline all(options.shape, {}, group_names);
   const TrainingPipeline chosen(options.shape, {}, options.common.optimize);
   std::printf("%s\n", chosen.adjoints.explain().c_str());
-  for (const std::string& group : group_names) {
-    if (apps::optimizes(options.common, group)) continue;
-    std::printf("left out: the gradient by %s, which --optimize does not name\n", group.c_str());
-  }
+  apps::print_left_out_groups(options.common, group_names);
   std::printf("the gradient has %zu stages; that by every group would have %zu\n", chosen.stages(),
               all.stages());
   std::printf("left out where a picture is demosaicked: the batch's dimension, and all of this\n");

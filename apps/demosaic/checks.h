@@ -5,13 +5,11 @@
 
 namespace demosaic {
 
-// Checks a piece of the input, or of the dataset's first photograph. Throws retrograde::UserError if an error exceeds
-// the limits of apps/common/checks.h.
-void check_gradients(const Options& options);
-
-// Black, saturated, clipped and nearly empty frames: image and gradient in float32 against double, and whether Adam
-// diverges.
-void check_stability(const Options& options);
+// --check-gradients: a piece of the input, or of the dataset's first photograph. Throws retrograde::UserError if an error
+// exceeds the limits of apps/common/checks.h.
+// --check-stability: black, saturated, clipped and nearly empty frames: image and gradient in float32 against double, and
+// whether Adam diverges.
+void check(const Options& options);
 
 // Explains what learning computes for the groups of --optimize, and what it leaves out.
 void explain(const Options& options);

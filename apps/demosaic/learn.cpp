@@ -17,11 +17,7 @@ class FilterLearner : public apps::Learner {
   FilterLearner(const Options& options, const Dataset& dataset, Gallery& held_out)
       : options_(options),
         held_out_(held_out),
-        trainer_(Weights(options.shape), dataset.train,
-                 {.steps = options.common.steps,
-                  .threads = options.common.threads,
-                  .seed = options.common.seed,
-                  .groups = options.common.optimize}),
+        trainer_(Weights(options.shape), dataset.train, {.common = options.common}),
         method_(Demosaicker::relaxed(trainer_.weights(), options.common.threads)) {}
 
   double step() override { return trainer_.step(); }
@@ -72,9 +68,11 @@ apps::Table time_steps(const Options& options, const Dataset& dataset) {
   apps::Table table{"a step of learning", {"groups", "stages of the gradient", "ms"}, {}};
   std::vector<std::vector<std::string>> choices{group_names};
   for (const std::string& group : group_names) choices.push_back({group});
+  apps::CommonOptions common = options.common;
+  common.steps = 1000;
   for (const auto& groups : choices) {
-    Trainer trainer(Weights(options.shape), dataset.train,
-                    {.threads = options.common.threads, .groups = groups});
+    common.optimize = groups;
+    Trainer trainer(Weights(options.shape), dataset.train, {.common = common});
     std::vector<double> seconds;
     for (int step = 0; step < timed; ++step) {
       const auto start = std::chrono::steady_clock::now();

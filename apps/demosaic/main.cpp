@@ -3,7 +3,6 @@
 #include <cstdio>
 
 #include "checks.h"
-#include "common/files.h"
 #include "common/run_app.h"
 #include "learn.h"
 #include "measure.h"
@@ -51,10 +50,8 @@ void enter_gain(const std::vector<Measured>& methods, apps::Report& report) {
 }
 
 void run(const Options& options) {
-  apps::require_writable_folder(options.common.output);
-  const apps::ThreadLimit threads(options.common.threads);
-  if (options.common.check_gradients) return check_gradients(options);
-  if (options.common.check_stability) return check_stability(options);
+  const apps::RunScope scope(options.common);
+  if (options.common.is_check()) return check(options);
   if (options.common.explain) explain(options);
 
   apps::Report report("demosaic", options.common);

@@ -11,29 +11,27 @@ namespace {
 
 constexpr long usual_steps = 4000;
 
-[[noreturn]] void refuse(const std::string& rule, const std::string& evidence,
-                         const std::string& instead) {
-  retrograde::call_error("understand the command line", rule, evidence, instead);
-}
-
 void check(const Options& options) {
   if (options.common.input.empty() && options.dataset.empty()) {
-    refuse("there must be a picture to demosaic or photographs to learn from",
-           "neither --input nor --dataset was given", "Give one of them, or both");
+    apps::refuse_command_line("there must be a picture to demosaic or photographs to learn from",
+                              "neither --input nor --dataset was given",
+                              "Give one of them, or both");
   }
   if (options.shape.filters != 2 && options.shape.filters != 9 && options.shape.filters != 15) {
-    refuse("the relaxed method comes with 2, 9 or 15 filters",
-           retrograde::text("--filters is ", options.shape.filters), "Give one of these");
+    apps::refuse_command_line("the relaxed method comes with 2, 9 or 15 filters",
+                              retrograde::text("--filters is ", options.shape.filters),
+                              "Give one of these");
   }
   if (options.shape.size != 5 && options.shape.size != 7) {
-    refuse("filters have 5 x 5 or 7 x 7 samples",
-           retrograde::text("--size is ", options.shape.size), "Give 5 or 7");
+    apps::refuse_command_line("filters have 5 x 5 or 7 x 7 samples",
+                              retrograde::text("--size is ", options.shape.size), "Give 5 or 7");
   }
   const std::string& p = options.pattern;
   if (!p.empty() && p != "RGGB" && p != "GRBG" && p != "GBRG" && p != "BGGR") {
-    refuse("a mosaic begins with RGGB, GRBG, GBRG or BGGR",
-           retrograde::text("--mosaic is ", retrograde::quoted(p)),
-           "Give one of these: the colours of its first row, then of its second");
+    apps::refuse_command_line(
+        "a mosaic begins with RGGB, GRBG, GBRG or BGGR",
+        retrograde::text("--mosaic is ", retrograde::quoted(p)),
+        "Give one of these: the colours of its first row, then of its second");
   }
 }
 

@@ -40,10 +40,11 @@ std::vector<int> sizes_of(const Shape& shape, Array array) {
   return {};
 }
 
-size_t elements_of(const Shape& shape, Array array) {
-  const auto sizes = sizes_of(shape, array);
+size_t elements_of(const std::vector<int>& sizes) {
   return std::accumulate(sizes.begin(), sizes.end(), size_t{1}, std::multiplies<>());
 }
+
+size_t elements_of(const Shape& shape, Array array) { return elements_of(sizes_of(shape, array)); }
 
 Parameters::Parameters(const Shape& shape, lang::Type scalar) {
   constexpr std::array<const char*, all_arrays.size()> names{

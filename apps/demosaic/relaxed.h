@@ -63,6 +63,7 @@ inline constexpr std::array<Array, 8> all_arrays{Array::Green, Array::Closeness,
 //   Near       [8 (t), 3, 3]: roots of the weights in the step towards the median
 //   Steepness  [8 (t)]: how fast these weights fall
 std::vector<int> sizes_of(const Shape& shape, Array array);
+size_t elements_of(const std::vector<int>& sizes);
 size_t elements_of(const Shape& shape, Array array);
 
 struct Parameters {

@@ -2,16 +2,14 @@
 
 #include <filesystem>
 
-#include "common/process.h"
+#include "common/weight_files.h"
 
 namespace demosaic {
 
 namespace {
 
 std::filesystem::path place_of(const Shape& shape) {
-  const auto here = apps::program_folder();
-  const auto installed = here / ".." / "share" / "retrograde" / "demosaic" / weights_file(shape);
-  return std::filesystem::exists(installed) ? installed : here / "weights" / weights_file(shape);
+  return apps::shipped_weights_path("demosaic", weights_file(shape));
 }
 
 }  // namespace

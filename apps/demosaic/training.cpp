@@ -219,12 +219,12 @@ Trainer::Trainer(const Weights& start, const std::vector<Photograph>& photograph
     : weights_(start),
       gradient_(start.shape),
       batch_(options.batch),
-      training_(start.shape, options.batch, options.groups),
-      sampler_(photographs, options.seed),
-      adam_(adam_groups(start.shape, options.groups),
-            {.schedule = apps::exponential_schedule(options.steps, last_rate_factor)}),
+      training_(start.shape, options.batch, options.common.optimize),
+      sampler_(photographs, options.common.seed),
+      adam_(adam_groups(start.shape, options.common.optimize),
+            {.schedule = apps::exponential_schedule(options.common.steps, last_rate_factor)}),
       loss_(lang::Buffer<float>::make_scalar()) {
-  training_.compile(options.threads);
+  training_.compile(options.common.threads);
   std::fill(gradient_.values.begin(), gradient_.values.end(), 0.0f);
   weights_.bind(training_.objective.model.parameters);
 }

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "common/adam.h"
+#include "common/options.h"
 #include "photographs.h"
 #include "weights.h"
 
@@ -88,10 +89,7 @@ class Sampler {
 class Trainer {
  public:
   struct Options {
-    long steps = 1000;
-    int threads = 1;
-    uint64_t seed = 1;
-    std::vector<std::string> groups = group_names;
+    apps::CommonOptions common;  // steps, threads, seed, and the groups to optimize
     BatchShape batch = {};
   };
   // The photographs must outlive it.

@@ -1,16 +1,13 @@
 #include "weights.h"
 
 #include <array>
-#include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
-#include "common/json_files.h"
+#include "common/weight_files.h"
 
 namespace demosaic {
-
-using retrograde::text;
 
 namespace {
 
@@ -59,13 +56,6 @@ const std::vector<Start>& starts() {
                                        {{left, right, up, down}, false},
                                        {{left, right, up}}};
   return list;
-}
-
-[[noreturn]] void refuse_file(const std::filesystem::path& path, const std::string& evidence) {
-  retrograde::call_error(
-      text("read the weights ", retrograde::quoted(path.string())),
-      "a file of weights is JSON as this program writes it, with every array whole", evidence,
-      "Give a file that demosaic wrote, or leave --weights out");
 }
 
 }  // namespace
@@ -150,42 +140,21 @@ void write_weights(const std::filesystem::path& path, Weights& weights, const st
   json["filters"] = weights.shape.filters;
   json["size"] = weights.shape.size;
   json["origin"] = origin;
-  for (Array array : all_arrays) {
-    const auto values = weights.of(array);
-    auto& list = json[name_of(array)] = nlohmann::json::array();
-    // Six digits; the values are used as the file stores them, so no further precision is lost.
-    for (float value : values) list.push_back(std::stod(text(value)));
-  }
+  for (Array array : all_arrays) json[name_of(array)] = apps::array_of_weights(weights.of(array));
   apps::write_file(path, json.dump() + "\n");
 }
 
 Weights read_weights(const std::filesystem::path& path) {
-  nlohmann::json json;
-  if (const std::string wrong = apps::read_json(path, json); !wrong.empty())
-    refuse_file(path, wrong);
-  try {
+  const apps::WeightFile file("demosaic", path);
+  return file.parse([&](const nlohmann::json& json) {
     const Shape shape{json.at("filters").get<int>(), json.at("size").get<int>()};
     if (shape.filters < 1 || shape.filters > 64 || (shape.size != 5 && shape.size != 7)) {
-      refuse_file(path, text("it has ", shape.filters, " filters of size ", shape.size));
+      file.refuse(retrograde::text("it has ", shape.filters, " filters of size ", shape.size));
     }
     Weights weights(shape);
-    for (Array array : all_arrays) {
-      const std::string name = name_of(array);
-      const auto list = json.at(name).get<std::vector<float>>();
-      const auto to = weights.of(array);
-      if (list.size() != to.size()) {
-        refuse_file(path, text(name, " has ", list.size(), " numbers and not ", to.size()));
-      }
-      for (size_t n = 0; n < list.size(); ++n) {
-        if (!std::isfinite(list[n]))
-          refuse_file(path, text(name, " holds a number that is not finite"));
-        to[n] = list[n];
-      }
-    }
+    for (Array array : all_arrays) file.read_array(json, name_of(array), weights.of(array));
     return weights;
-  } catch (const nlohmann::json::exception& error) {
-    refuse_file(path, error.what());
-  }
+  });
 }
 
 }  // namespace demosaic

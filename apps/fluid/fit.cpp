@@ -12,19 +12,11 @@
 
 namespace fluid {
 
-using retrograde::quoted;
 using retrograde::text;
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr const char* program = "fluid";
-constexpr double save_every_seconds = 20;
-
-double seconds_between(Clock::time_point from, Clock::time_point to) {
-  return std::chrono::duration<double>(to - from).count();
-}
 
 // A description of what must be the same to resume a run.
 std::string problem_of(const Scene& s, const Options& o) {
@@ -73,13 +65,8 @@ class Optimization {
       : options_(options), control_(control), start_(start), shown_(shown) {
     if (!options.common.resume) return;
     earlier_ = apps::read_state(file(), program);
-    const std::string now = problem_of(control.scene(), options);
-    const std::string before = earlier_->words["problem"];
-    if (now == before) return;
-    retrograde::call_error(text("go on with ", quoted(file().string())),
-                           "a run goes on with the scene that it began with",
-                           text("it began with ", before, "; this is ", now),
-                           "Give the same options, or leave --resume out");
+    apps::require_same_problem(file(), *earlier_, problem_of(control.scene(), options),
+                               "the scene that");
   }
 
   Fit run() {
@@ -144,7 +131,7 @@ class Optimization {
           const double loss = s.loss / scale;
           now.series.push_back({s.step + steps_before, s.seconds + seconds_before, loss});
           shown_(apps::name_of(now.method), now.steps(), loss);
-          save_now_and_then();
+          if (timer_.is_due()) save();
           return true;
         });
     now.refused += found.refused;
@@ -162,9 +149,9 @@ class Optimization {
   }
 
   double evaluate(MethodRun& now, std::span<const double> x, std::span<double> gradient) {
-    const auto start = Clock::now();
+    const auto start = std::chrono::steady_clock::now();
     const double loss = control_.loss(x, gradient);
-    if (!gradient.empty()) fit_.gradient_seconds.push_back(seconds_between(start, Clock::now()));
+    if (!gradient.empty()) fit_.gradient_seconds.push_back(apps::seconds_since(start));
     if (now.series.empty()) now.series.push_back({0, 0, loss});
     now.x.assign(x.begin(), x.end());
     if (loss < now.best_loss) {
@@ -172,13 +159,6 @@ class Optimization {
       now.best = now.x;
     }
     return loss;
-  }
-
-  void save_now_and_then() {
-    const auto now = Clock::now();
-    if (seconds_between(saved_, now) < save_every_seconds) return;
-    save();
-    saved_ = now;
   }
 
   void save() const {
@@ -203,7 +183,7 @@ class Optimization {
   const std::function<void(const std::string&, long, double)>& shown_;
   std::optional<apps::State> earlier_;
   std::optional<apps::Adam> adam_;
-  Clock::time_point saved_ = Clock::now();
+  apps::SaveTimer timer_;
   Fit fit_;
 };
 

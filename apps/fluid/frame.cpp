@@ -43,18 +43,7 @@ Expr hat(const Expr& i, const Expr& place, int nodes, Type scalar) {
 
 }  // namespace
 
-Frame::Frame(const FrameShape& shape, Type scalar)
-    : shape(shape),
-      scalar(scalar),
-      velocity_x(scalar, 2, "velocity_x"),
-      velocity_y(scalar, 2, "velocity_y"),
-      density(scalar, 2, "density"),
-      force(scalar, 3, "force"),
-      time_step(scalar, "time_step"),
-      viscosity(scalar, "viscosity"),
-      diffusion(scalar, "diffusion"),
-      now_x_("driven_x"),
-      now_y_("driven_y") {
+Frame::Frame(const FrameShape& shape, Type scalar) : shape(shape), scalar(scalar) {
   add_force();
   advect_velocity();
   if (shape.has_viscosity) diffuse_velocity();

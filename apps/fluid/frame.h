@@ -29,12 +29,13 @@ class Frame {
   FrameShape shape;
   retrograde::Type scalar;
 
-  // The state before the frame.
-  retrograde::ImageParam velocity_x;  // [height, width + 1], width innermost
-  retrograde::ImageParam velocity_y;  // [height + 1, width]
-  retrograde::ImageParam density;     // [height, width]
-  retrograde::ImageParam force;       // [2, force_height, force_width]
-  retrograde::Param<> time_step, viscosity, diffusion;
+  // The state before the frame, with the width innermost.
+  retrograde::ImageParam velocity_x{scalar, 2, "velocity_x"};  // [height, width + 1]
+  retrograde::ImageParam velocity_y{scalar, 2, "velocity_y"};  // [height + 1, width]
+  retrograde::ImageParam density{scalar, 2, "density"};        // [height, width]
+  retrograde::ImageParam force{scalar, 3, "force"};            // [2, force_height, force_width]
+  retrograde::Param<> time_step{scalar, "time_step"}, viscosity{scalar, "viscosity"},
+      diffusion{scalar, "diffusion"};
 
   // The state after the frame.
   retrograde::Func next_x{"next_x"}, next_y{"next_y"}, next_density{"next_density"};
@@ -55,7 +56,7 @@ class Frame {
   void move_density();
 
   const retrograde::Var x_{"x"}, y_{"y"};
-  Func now_x_, now_y_;  // the velocity after the stages so far
+  Func now_x_{"driven_x"}, now_y_{"driven_y"};  // the velocity after the stages so far
 };
 
 // The gradient of  seed . (next_x, next_y, next_density)  by the frame's inputs.

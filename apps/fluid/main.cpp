@@ -5,7 +5,6 @@
 #include <string>
 
 #include "common/checks.h"
-#include "common/files.h"
 #include "common/process.h"
 #include "common/progress.h"
 #include "common/report.h"
@@ -88,16 +87,9 @@ std::vector<double> start_of(const Scene& scene, const Variables& variables) {
   return x;
 }
 
-void report_table(const Options& options, const apps::Table& table) {
-  apps::Report report("fluid", options.common);
-  report.add_table(table);
-  report.write(0, false);
-  std::printf("%s", table.to_markdown().c_str());
-}
-
 void run_gradient_check(const Options& options, const Scene& scene) {
   const auto rows = check_gradients(scene, options.common.seed);
-  report_table(options, apps::gradient_table(rows));
+  apps::report_tables("fluid", options.common, {apps::gradient_table(rows)});
   apps::require_gradients(rows);
 }
 
@@ -106,7 +98,7 @@ void run_stability_check(const Options& options, const Scene& scene) {
   const auto rows =
       check_stability(scene, options.common.seed,
                       [&](int done, int, const std::string& name) { progress.show(done, name); });
-  report_table(options, apps::stability_table(rows));
+  apps::report_tables("fluid", options.common, {apps::stability_table(rows)});
 }
 
 void explain(Control<float>& control, const std::vector<std::string>& left_out) {
@@ -141,8 +133,7 @@ void print_summary(const Options& options, const Setup& setup, const Fit& fit, c
 void run(const Options& options) {
   Scene scene = make_scene(options);
   read_force_of_scene(options, scene);
-  apps::require_writable_folder(options.common.output);
-  const apps::ThreadLimit threads(options.common.threads);
+  const apps::RunScope scope(options.common);
   if (options.common.check_gradients) return run_gradient_check(options, scene);
   if (options.common.check_stability) return run_stability_check(options, scene);
 

@@ -100,10 +100,9 @@ std::vector<apps::GradientRow> check_gradients(const Lens& lens, const SceneOpti
 
 std::vector<apps::StabilityRow> check_stability(const Scene& scene) {
   Evaluator in_double(scene, retrograde::Float(64)), in_float(scene, retrograde::Float(32));
-  apps::Problem problem{.size = scene.variables.size()};
-  problem.evaluate = [&](std::span<const double> x, std::span<double> gradient) {
-    return in_float.loss(x, gradient);
-  };
+  const apps::Problem problem{
+      .size = scene.variables.size(),
+      .evaluate = [&](auto x, auto gradient) { return in_float.loss(x, gradient); }};
   std::vector<apps::StabilityRow> rows;
   for (const HardCase& hard : hard_cases()) {
     Lens lens = scene.lens;
@@ -113,13 +112,9 @@ std::vector<apps::StabilityRow> check_stability(const Scene& scene) {
     for (double& v : x) v = static_cast<float>(v);
     std::vector<double> exact(x.size()), own(x.size());
     const double loss = in_double.loss(x, exact), own_loss = in_float.loss(x, own);
-    apps::StabilityRow row;
-    row.name = hard.name;
-    row.primal_error = apps::relative_error({&own_loss, 1}, {&loss, 1});
-    row.gradient_error = apps::relative_error(own, exact);
-    apps::MinimizeOptions fast{.method = apps::Method::Adam, .steps = 60, .rate = 10};
-    fast.adam.explosion = 100;
-    apps::measure_divergence(row, problem, x, fast);
+    apps::StabilityRow row{hard.name, apps::relative_error({&own_loss, 1}, {&loss, 1}),
+                           apps::relative_error(own, exact)};
+    apps::measure_divergence(row, problem, x, apps::large_steps(60, 10, 100));
     rows.push_back(row);
   }
   return rows;

@@ -3,11 +3,9 @@
 
 usage: draw_lens.py report.json FOLDER      writes lens_before.png, lens_after.png, spots.png
 """
-import json
 import os
-import sys
 
-from figures import plt, save
+from figures import draw_report, plt, save
 
 WAVELENGTH_COLOURS = ["#2255cc", "#229944", "#cc3322"]
 FIELD_COLOURS = ["#1f77b4", "#2ca02c", "#ff7f0e", "#d62728"]
@@ -74,16 +72,13 @@ def limits_of(drawings):
     return (min(z) - 2, max(z) + 3), (min(y) - 2, max(y) + 2)
 
 
-def main():
-    if len(sys.argv) != 3:
-        sys.exit(__doc__.strip())
-    with open(sys.argv[1], encoding="utf-8") as file:
-        drawings = json.load(file)["lens"]["drawings"]
+def draw(report, folder):
+    drawings = report["lens"]["drawings"]
     limits = limits_of(drawings)
     for drawing in drawings:
-        draw_system(drawing, limits, os.path.join(sys.argv[2], f"lens_{drawing['name']}.png"))
-    draw_spots(drawings, os.path.join(sys.argv[2], "spots.png"))
+        draw_system(drawing, limits, os.path.join(folder, f"lens_{drawing['name']}.png"))
+    draw_spots(drawings, os.path.join(folder, "spots.png"))
 
 
 if __name__ == "__main__":
-    main()
+    draw_report(__doc__, draw)

@@ -250,27 +250,19 @@ void print_explanation(const Scene& scene, const Evaluator& evaluator) {
   std::printf("%s\n", evaluator.explain().c_str());
 }
 
-// For the checks: reports a table instead of a result.
-void write_table(const Options& options, const apps::Table& table) {
-  apps::Report report("lens", options.common);
-  report.add_table(table);
-  report.write(0, false);
-  std::fputs(table.to_markdown().c_str(), stdout);
-}
-
 void run(const Options& options) {
-  apps::require_writable_folder(options.common.output);
-  const apps::ThreadLimit threads(options.common.threads);
+  const apps::RunScope scope(options.common);
   const Lens lens = read_lens(options.common.input);
   if (options.common.check_gradients) {
     const auto rows = check_gradients(lens, scene_options(options));
-    write_table(options, apps::gradient_table(rows));
+    apps::report_tables("lens", options.common, {apps::gradient_table(rows)});
     return apps::require_gradients(rows);
   }
   apps::Report report("lens", options.common);
   const Scene scene = make_scene(lens, scene_options(options));
   if (options.common.check_stability)
-    return write_table(options, apps::stability_table(check_stability(scene)));
+    return apps::report_tables("lens", options.common,
+                               {apps::stability_table(check_stability(scene))});
   Evaluator evaluator(scene, retrograde::Float(64));
   if (options.common.explain) print_explanation(scene, evaluator);
   std::vector<Result> results;

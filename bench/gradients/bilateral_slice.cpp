@@ -4,8 +4,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel bilateral_slice(const Setup& setup) {
   const int width = setup.size(512, 21), height = setup.size(384, 17);
   const int cells = 16, levels = 8;

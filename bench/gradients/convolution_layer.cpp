@@ -3,8 +3,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel convolution_layer(const Setup& setup) {
   const int width = setup.size(128, 13), height = setup.size(128, 11);
   const int channels = setup.size(16, 3);

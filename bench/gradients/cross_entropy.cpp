@@ -3,8 +3,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel cross_entropy(const Setup& setup) {
   const int samples = setup.size(16384, 37), classes = setup.size(32, 5);
   const Buffer<float> logits = make_values({samples, classes}, -3, 3);

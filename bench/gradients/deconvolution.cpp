@@ -3,8 +3,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel deconvolution(const Setup& setup) {
   const int width = setup.size(512, 25), height = setup.size(384, 19), side = 7;
   const Buffer<float> image = make_values({width, height}, 0, 1);

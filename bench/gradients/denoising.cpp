@@ -4,8 +4,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel denoising(const Setup& setup) {
   const int width = setup.size(1024, 27), height = setup.size(768, 22);
   const Buffer<float> image = make_values({width, height}, 0, 1);

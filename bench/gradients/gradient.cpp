@@ -3,8 +3,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 namespace {
 
 std::vector<int> sizes_of(const Buffer<real>& values) {

@@ -4,8 +4,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 namespace {
 
 Var x("x"), y("y");

@@ -4,8 +4,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel normalisation(const Setup& setup) {
   const int width = setup.size(256, 21), height = setup.size(192, 13);
   const int channels = setup.size(16, 3);

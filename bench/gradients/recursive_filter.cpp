@@ -3,8 +3,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel recursive_filter(const Setup& setup) {
   const int width = setup.size(1024, 27), height = setup.size(768, 22);
   const Buffer<float> image = make_values({width, height}, 0, 1);

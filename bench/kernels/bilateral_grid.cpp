@@ -10,8 +10,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 namespace {
 
 // The sum of brightness over all pixels of a cell and bin, and their number: the paper's homogeneous value, whose

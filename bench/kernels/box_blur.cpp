@@ -5,8 +5,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel box_blur(const Setup& setup) {
   const int width = setup.size(2048, 213), height = setup.size(1536, 97), planes = 3;
   ImageParam input(UInt(16), 3, "input");

@@ -7,8 +7,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 namespace {
 
 Expr average(Expr a, Expr b) { return (a + b + cast<int16_t>(1)) >> 1; }

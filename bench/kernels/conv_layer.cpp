@@ -7,8 +7,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel conv_layer(const Setup& setup) {
   const int width = setup.size(128, 21), height = setup.size(96, 11), batch = setup.size(4, 2);
   const int features = 32, reach = 1, taps = 2 * reach + 1;

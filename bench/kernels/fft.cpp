@@ -7,8 +7,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 namespace {
 
 struct Complex {

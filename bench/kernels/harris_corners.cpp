@@ -6,8 +6,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel harris_corners(const Setup& setup) {
   const int width = setup.size(2304, 331), height = setup.size(1536, 119);
   ImageParam input(Float(32), 3, "input");

@@ -6,8 +6,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel histogram_equalisation(const Setup& setup) {
   const int width = setup.size(2304, 223), height = setup.size(1536, 230), rows = 32;
   ImageParam input(UInt(8), 3, "input");

@@ -6,8 +6,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 namespace {
 
 // Filters the columns of f, which has `height` rows; the result is transposed.

@@ -16,6 +16,8 @@
 
 namespace kernels {
 
+using namespace Halide;
+
 // The type of values in gradients. It is double for checks that need more precision than float; the inputs are the same
 // numbers.
 #ifdef BENCH_FLOAT64

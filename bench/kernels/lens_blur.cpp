@@ -6,8 +6,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel lens_blur(const Setup& setup) {
   const int width = setup.size(1280, 173), height = setup.size(960, 89);
   const int reach = 5;

@@ -7,8 +7,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 namespace {
 
 constexpr int levels = 8, brightnesses = 8;

@@ -6,8 +6,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel matrix_multiply(const Setup& setup) {
   const int n = setup.size(1024, 128);
   const int lanes = setup.lanes<float>(), panel = 4 * lanes, rows = 6;

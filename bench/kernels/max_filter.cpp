@@ -6,8 +6,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel max_filter(const Setup& setup) {
   const int width = setup.size(1920, 233), height = setup.size(1280, 127), planes = 3;
   const int radius = 15;

@@ -8,8 +8,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel non_local_means(const Setup& setup) {
   const int width = setup.size(960, 137), height = setup.size(640, 75);
   const int reach = 3, patch_reach = 2;  // on either side

@@ -10,8 +10,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 namespace {
 
 // A pixel: three colours, each multiplied by the trust, and the trust.

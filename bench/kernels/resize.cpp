@@ -7,8 +7,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 namespace {
 
 // Pixel p of the result is at position ((2p + 1) * 2 / 3 - 1) / 2 = (4p - 1) / 6 of the source.

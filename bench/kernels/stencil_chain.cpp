@@ -6,8 +6,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel stencil_chain(const Setup& setup) {
   const int width = setup.size(1536, 211), height = setup.size(1280, 149);
   const int stages = 40, group = 8;

@@ -7,8 +7,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel unsharp_mask(const Setup& setup) {
   const int width = setup.size(1920, 187), height = setup.size(1280, 113);
   const int radius = 3;

@@ -7,8 +7,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 namespace {
 
 const float coefficient[] = {0.48296291f, 0.83651630f, 0.22414387f, -0.12940952f};

@@ -4,8 +4,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel attention(const Setup& setup) {
   const int features = setup.size(64, 8), rows = setup.size(512, 21), heads = setup.size(8, 2);
   const Buffer<real> query = make_noise({features, rows, heads}, 1);

@@ -5,8 +5,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 namespace {
 
 // The two cells next to a position, and the weight of the far one.

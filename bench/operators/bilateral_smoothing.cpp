@@ -5,8 +5,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel bilateral_smoothing(const Setup& setup) {
   const int side = setup.size(128, 11), depth = setup.size(32, 5), iterations = 30;
   const Buffer<real> values = make_noise({side, side, depth}, 1);

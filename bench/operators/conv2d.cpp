@@ -3,8 +3,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel conv2d(const Setup& setup) {
   const int width = setup.size(256, 13), height = setup.size(256, 11);
   const int channels = setup.size(16, 3), images = setup.size(4, 2);

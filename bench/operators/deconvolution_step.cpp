@@ -5,8 +5,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel deconvolution_step(const Setup& setup) {
   const int width = setup.size(1024, 37), height = setup.size(1024, 29), side = 11, filters = 5;
   const Buffer<real> image = make_values({width, height}, 0, 1);

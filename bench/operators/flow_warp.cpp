@@ -3,8 +3,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel flow_warp(const Setup& setup) {
   const int width = setup.size(512, 25), height = setup.size(512, 19);
   const int channels = setup.size(64, 3);

@@ -4,8 +4,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 namespace {
 
 constexpr int iterations = 20;

@@ -3,8 +3,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel gamma_mse(const Setup& setup) {
   const int width = setup.size(2560, 27), height = setup.size(1600, 22), channels = 3;
   const Buffer<real> image = make_values({width, height, channels}, 0.05f, 1);

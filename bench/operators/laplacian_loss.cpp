@@ -5,8 +5,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 namespace {
 
 constexpr int levels = 8;

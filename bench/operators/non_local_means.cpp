@@ -5,8 +5,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel non_local_means(const Setup& setup) {
   const int width = setup.size(1024, 25), height = setup.size(1024, 19);
   const int patch = 7, search = 11;

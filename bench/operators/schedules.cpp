@@ -5,8 +5,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 #ifdef BENCH_RETROGRADE
 
 // A search runs here, so that it is timed, and again during compilation, with the same result.

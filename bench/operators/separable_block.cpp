@@ -5,8 +5,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 Kernel separable_block(const Setup& setup) {
   const int width = setup.size(128, 13), height = setup.size(128, 11);
   const int channels = setup.size(64, 5), images = setup.size(8, 2);

@@ -4,8 +4,6 @@
 
 namespace kernels {
 
-using namespace Halide;
-
 namespace {
 
 Buffer<real> make_transforms(int images) {

@@ -3,30 +3,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
 
-#include "diagnostics/error.h"
+#include "command.h"
 
 namespace bench {
-
-using retrograde::text;
-
-namespace {
-
-void check_kernels(const std::vector<std::string>& asked) {
-  std::vector<std::string> all = kernel_names();
-  all.insert(all.end(), gradient_names().begin(), gradient_names().end());
-  std::string known;
-  for (const std::string& name : all) known += (known.empty() ? "" : ", ") + name;
-  for (const std::string& name : asked) {
-    if (std::count(all.begin(), all.end(), name)) continue;
-    retrograde::call_error(text("run the kernel ", retrograde::quoted(name)),
-                           "it must be one of the benchmark's", text("they are ", known),
-                           "Give --kernel one of these names");
-  }
-}
-
-}  // namespace
 
 const std::vector<std::string>& kernel_names() {
   static const std::vector<std::string> names{
@@ -60,17 +40,11 @@ std::optional<Options> read_options(int argc, char** argv) {
                      ->check(CLI::Range(1, 100000))
                      ->capture_default_str();
   app.add_option("--output", options.output, "the report, as JSON")->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::CallForHelp&) {
-    std::fputs(app.help().c_str(), stdout);
-    return std::nullopt;
-  } catch (const CLI::ParseError& error) {
-    retrograde::call_error("understand the command line", "each option takes one value",
-                           error.what(), "Run with --help for the options");
-  }
+  if (!parse_command_line(app, argc, argv)) return std::nullopt;
   if (options.quick && rounds->count() == 0) options.rounds = 7;
-  check_kernels(options.kernels);
+  std::vector<std::string> known = kernel_names();
+  known.insert(known.end(), gradient_names().begin(), gradient_names().end());
+  require_known("kernel", options.kernels, known);
   if (options.kernels.empty()) options.kernels = gradients ? gradient_names() : kernel_names();
   return options;
 }

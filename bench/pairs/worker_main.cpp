@@ -14,6 +14,7 @@
 #include "../gradients/gradient.h"
 #include "../gradients/slope.h"
 #include "process_memory.h"
+#include "worker_orders.h"
 #include "worker_protocol.h"
 
 namespace {
@@ -168,22 +169,15 @@ class Worker {
   double start_seconds_ = 0, compile_peak_mb_ = 0, resident_mb_ = 0;
 };
 
-void serve(Worker& worker) {
-  for (std::string line; std::getline(std::cin, line);) {
-    std::istringstream words(line);
-    std::string order, path;
-    words >> order >> path;
-    if (order == "run") worker.run();
-    if (order == "threads") worker.set_threads(std::stoi(path));
-    if (order == "save") worker.save(path);
-    if (order == "inputs") worker.save_inputs(path);
+void obey(Worker& worker, const std::string& order, const std::string& word,
+          [[maybe_unused]] std::istream& words) {
+  if (order == "threads") worker.set_threads(std::stoi(word));
+  if (order == "inputs") worker.save_inputs(word);
 #ifdef BENCH_RETROGRADE
-    double seconds = 0;
-    if (order == "explain" && words >> seconds) worker.explain(path, seconds);
+  double seconds = 0;
+  if (order == "explain" && words >> seconds) worker.explain(word, seconds);
 #endif
-    if (order == "slope") worker.tell_slope();
-    if (order == "memory") worker.tell_memory();
-  }
+  if (order == "slope") worker.tell_slope();
 }
 
 std::string one_line(std::string text) {
@@ -209,7 +203,9 @@ int main(int argc, char** argv) {
     Worker worker(argv[1], argv[2] == std::string("small"), std::stoi(argv[3]),
                   argc > 4 ? argv[4] : "");
     worker.compile();
-    serve(worker);
+    bench::serve(worker, [&](const auto& order, const auto& word, auto& words) {
+      obey(worker, order, word, words);
+    });
   } catch (const Halide::Error& error) {  // a std::exception in some versions of Halide only
     return tell_failure(error.what());
   } catch (const std::exception& error) {

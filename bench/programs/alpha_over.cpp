@@ -4,10 +4,8 @@
 
 namespace {
 
-class AlphaOver : public Halide::Generator<AlphaOver> {
- public:
-  Input<Buffer<uint8_t>> top{"top", 3};
-  Input<Buffer<uint8_t>> bottom{"bottom", 3};
+struct AlphaOver : programs::PictureGenerator<AlphaOver> {
+  Input<Buffer<uint8_t>> top{"top", 3}, bottom{"bottom", 3};
   Output<Buffer<uint8_t>> output{"output", 3};
 
   void generate() {
@@ -27,9 +25,6 @@ class AlphaOver : public Halide::Generator<AlphaOver> {
     output.dim(2).set_stride(1).set_bounds(0, 4);
     output.reorder(c, x, y).unroll(c).vectorize(x, lanes).parallel(y, 16);
   }
-
- private:
-  Var x{"x"}, y{"y"}, c{"c"};
 };
 
 }  // namespace

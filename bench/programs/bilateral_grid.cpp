@@ -4,12 +4,9 @@
 
 namespace {
 
-class BilateralGrid : public Halide::Generator<BilateralGrid> {
- public:
+struct BilateralGrid : programs::Filter<BilateralGrid, float, 2> {
   GeneratorParam<int> cell{"cell", 8};  // pixels per side
-  Input<Buffer<float>> input{"input", 2};
-  Input<float> range{"range"};  // brightness of a cell
-  Output<Buffer<float>> output{"output", 2};
+  Input<float> range{"range"};          // brightness of a cell
 
   void generate() {
     Func pixel = Halide::BoundaryConditions::repeat_edge(input);
@@ -54,7 +51,7 @@ class BilateralGrid : public Halide::Generator<BilateralGrid> {
     return at(-2) + 4 * at(-1) + 6 * at(0) + 4 * at(1) + at(2);
   }
 
-  Var x{"x"}, y{"y"}, z{"z"}, c{"c"};
+  Var z{"z"};
   RDom r;
   Func grid{"grid"}, blur_z{"blur_z"}, blur_x{"blur_x"}, blur_y{"blur_y"}, slice{"slice"};
 };

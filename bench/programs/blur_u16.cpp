@@ -3,11 +3,7 @@
 
 namespace {
 
-class Blur : public Halide::Generator<Blur> {
- public:
-  Input<Buffer<uint16_t>> input{"input", 2};
-  Output<Buffer<uint16_t>> output{"output", 2};
-
+struct Blur : programs::Filter<Blur, uint16_t, 2> {
   void generate() {
     rows(x, y) = (input(x, y) + input(x + 1, y) + input(x + 2, y)) / 3;
     output(x, y) = (rows(x, y) + rows(x, y + 1) + rows(x, y + 2)) / 3;
@@ -22,7 +18,6 @@ class Blur : public Halide::Generator<Blur> {
   }
 
  private:
-  Var x{"x"}, y{"y"};
   Func rows{"rows"};
 };
 

@@ -4,11 +4,8 @@
 
 namespace {
 
-class BoxRunning : public Halide::Generator<BoxRunning> {
- public:
-  Input<Buffer<float>> input{"input", 2};
+struct BoxRunning : programs::Filter<BoxRunning, float, 2> {
   Input<int> radius{"radius"};
-  Output<Buffer<float>> output{"output", 2};
 
   void generate() {
     Func pixel = Halide::BoundaryConditions::constant_exterior(input, 0.0f);
@@ -42,7 +39,6 @@ class BoxRunning : public Halide::Generator<BoxRunning> {
   }
 
  private:
-  Var x{"x"}, y{"y"};
   RDom rx, ry;
   Func down{"down"}, across{"across"};
 };

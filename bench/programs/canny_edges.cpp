@@ -4,11 +4,8 @@
 
 namespace {
 
-class CannyEdges : public Halide::Generator<CannyEdges> {
- public:
-  Input<Buffer<uint8_t>> input{"input", 2};
+struct CannyEdges : programs::Filter<CannyEdges, uint8_t, 2> {
   Input<int> weak{"weak"}, strong{"strong"};
-  Output<Buffer<uint8_t>> output{"output", 2};
 
   void generate() {
     Func pixel = Halide::BoundaryConditions::repeat_edge(input);
@@ -51,7 +48,6 @@ class CannyEdges : public Halide::Generator<CannyEdges> {
  private:
   static int abs(int v) { return v < 0 ? -v : v; }
 
-  Var x{"x"}, y{"y"};
   Func smooth{"smooth"}, gx{"gx"}, gy{"gy"}, strength{"strength"}, grade{"grade"};
 };
 

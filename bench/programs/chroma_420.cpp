@@ -4,12 +4,9 @@
 
 namespace {
 
-class Chroma420 : public Halide::Generator<Chroma420> {
- public:
+struct Chroma420 : programs::PictureGenerator<Chroma420> {
   Input<Buffer<uint8_t>> rgb{"rgb", 3};
-  Output<Buffer<uint8_t>> luma{"luma", 2};
-  Output<Buffer<uint8_t>> blue{"blue", 2};
-  Output<Buffer<uint8_t>> red{"red", 2};
+  Output<Buffer<uint8_t>> luma{"luma", 2}, blue{"blue", 2}, red{"red", 2};
 
   void generate() {
     auto at = [&](Expr i, Expr j, int c) { return cast<int>(rgb(i, j, c)); };
@@ -36,7 +33,6 @@ class Chroma420 : public Halide::Generator<Chroma420> {
   }
 
  private:
-  Var x{"x"}, y{"y"}, c{"c"};
   Func mean{"mean"};
 };
 

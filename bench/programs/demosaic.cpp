@@ -4,8 +4,7 @@
 
 namespace {
 
-class Demosaic : public Halide::Generator<Demosaic> {
- public:
+struct Demosaic : programs::PictureGenerator<Demosaic> {
   Input<Buffer<uint16_t>> raw{"raw", 2};
   Input<float> red_gain{"red_gain"}, blue_gain{"blue_gain"};
   Output<Buffer<uint8_t>> output{"output", 3};
@@ -47,7 +46,6 @@ class Demosaic : public Halide::Generator<Demosaic> {
   }
 
  private:
-  Var x{"x"}, y{"y"}, c{"c"};
   Func wide{"wide"};
 };
 

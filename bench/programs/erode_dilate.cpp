@@ -3,11 +3,7 @@
 
 namespace {
 
-class ErodeDilate : public Halide::Generator<ErodeDilate> {
- public:
-  Input<Buffer<uint8_t>> input{"input", 2};
-  Output<Buffer<uint8_t>> output{"output", 2};
-
+struct ErodeDilate : programs::Filter<ErodeDilate, uint8_t, 2> {
   void generate() {
     Func pixel = Halide::BoundaryConditions::constant_exterior(input, cast<uint8_t>(0));
     Func opened = filtered(filtered(pixel, true), false);
@@ -38,7 +34,6 @@ class ErodeDilate : public Halide::Generator<ErodeDilate> {
     return square;
   }
 
-  Var x{"x"}, y{"y"};
   std::vector<Func> stages;
 };
 

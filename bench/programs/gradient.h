@@ -4,21 +4,11 @@
 // differences can check them.
 #pragma once
 
+#include <optional>
+
 #include "program.h"
 
 namespace programs {
-
-// The values of an input, as a Func with respect to which gradients are taken.
-template <typename Image>
-Halide::Func values_of(Image& image, const std::string& name, const std::vector<int>& extents) {
-  std::vector<Halide::Var> vars;
-  std::vector<Halide::Expr> at;
-  for (size_t d = 0; d < extents.size(); d++) vars.emplace_back("v" + std::to_string(d));
-  for (const Halide::Var& v : vars) at.push_back(v);
-  Halide::Func f(name);
-  f(vars) = image(at);
-  return f;
-}
 
 // f at a position, clamped to its extents.
 inline Halide::Expr nearest(const Halide::Func& f, const std::vector<int>& extents,
@@ -68,11 +58,98 @@ void estimate(Image& image, const std::vector<int>& extents) {
   image.set_estimates(region);
 }
 
-// Without a schedule a program would be inlined into its output. Only the primal, which is for checks, is stored.
-inline void store(std::vector<Halide::Func> stages, bool is_primal) {
-  for (Halide::Func& f : stages) {
-    if (is_primal) f.compute_root();
+// The adjoint of a pipeline's output: an input.
+struct Seed {
+  explicit Seed(const std::vector<int>& output_extents)
+      : extents(output_extents), values("seed", static_cast<int>(extents.size())) {}
+
+  std::vector<int> extents;
+  Halide::GeneratorInput<Halide::Buffer<float>> values;
+};
+
+// An input of a pipeline, and its gradient: an output. The pipeline reads it like a Func.
+class Variable {
+ public:
+  // The names of the input and of the Func of its values.
+  Variable(const std::string& input_name, const std::string& func_name,
+           const std::vector<int>& extents)
+      : func_name_(func_name),
+        extents_(extents),
+        values_(input_name, static_cast<int>(extents.size())),
+        gradient_("d_" + input_name, static_cast<int>(extents.size())) {}
+
+  operator const Halide::Func&() { return func(); }
+  template <typename... Indices>
+  Halide::FuncRef operator()(const Indices&... indices) {
+    return func()(indices...);
   }
+  // Defines the gradient with respect to the Func.
+  void set_gradient(const Weighed& weighed) {
+    gradient_ = weighed.by(func());
+    estimate(values_, extents_);
+    estimate(gradient_, extents_);
+  }
+
+ private:
+  // Defined when the pipeline first reads it: a generator's inputs have no values before.
+  const Halide::Func& func() {
+    if (func_) return *func_;
+    std::vector<Halide::Var> vars;
+    std::vector<Halide::Expr> at;
+    for (size_t d = 0; d < extents_.size(); d++) vars.emplace_back("v" + std::to_string(d));
+    for (const Halide::Var& v : vars) at.push_back(v);
+    func_.emplace(func_name_);
+    (*func_)(vars) = values_(at);
+    return *func_;
+  }
+
+  std::string func_name_;
+  std::vector<int> extents_;
+  Halide::GeneratorInput<Halide::Buffer<float>> values_;
+  Halide::GeneratorOutput<Halide::Buffer<float>> gradient_;
+  std::optional<Halide::Func> func_;
+};
+
+// The base of a gradient's generator, whose members are the inputs of the pipeline (a Variable each, if it has a
+// gradient), then the Seed. `generate` defines the pipeline and ends with `differentiate`.
+template <typename T>
+class GradientGenerator : public PictureGenerator<T> {
+ public:
+  using Seed = programs::Seed;
+  using Variable = programs::Variable;
+  Halide::GeneratorParam<bool> primal{"primal", false};
+  Halide::GeneratorOutput<Halide::Buffer<double>> sum{"sum", 0};
+
+ protected:
+  // Without a schedule a program would be inlined into its output. Only the primal, which is for checks, is stored.
+  void store(std::vector<Halide::Func> stages) {
+    for (Halide::Func& f : stages) {
+      if (primal) f.compute_root();
+    }
+  }
+  // Defines all outputs, from the pipeline's output and the variables that it depends on.
+  void differentiate(const Halide::Func& output, Seed& seed,
+                     const std::vector<Variable*>& variables) {
+    const Weighed weighed(output, seed.values, seed.extents, primal);
+    sum() = weighed.sum();
+    for (Variable* variable : variables) variable->set_gradient(weighed);
+    estimate(seed.values, seed.extents);
+    estimate(sum, {});
+  }
+};
+
+// The one case of a gradient: the inputs of its pipeline, of which the arrays have gradients.
+inline Registered gradients_of(const std::vector<Argument>& inputs,
+                               const std::vector<int>& output_extents) {
+  std::vector<Argument> arguments = inputs, gradients;
+  for (const Argument& input : inputs) {
+    if (input.role == Role::Input) gradients.push_back(out<float>(input.extents));
+  }
+  arguments.push_back(in<float>(output_extents, -1, 1).noise());
+  arguments.push_back(out<double>({}));
+  arguments.insert(arguments.end(), gradients.begin(), gradients.end());
+  return at_sizes({{}}, [&](const Sizes&) { return arguments; })
+      .gradients(static_cast<int>(gradients.size()));
 }
 
 }  // namespace programs

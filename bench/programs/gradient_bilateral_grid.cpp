@@ -4,20 +4,11 @@
 
 namespace {
 
-class GradientBilateralGrid : public Halide::Generator<GradientBilateralGrid> {
- public:
-  GeneratorParam<bool> primal{"primal", false};
-  Input<Buffer<float>> image{"image", 2};
-  Input<Buffer<float>> guide{"guide", 2};
-  Input<Buffer<float>> seed{"seed", 2};
-  Output<Buffer<double>> sum{"sum", 0};
-  Output<Buffer<float>> d_image{"d_image", 2};
-  Output<Buffer<float>> d_guide{"d_guide", 2};
+struct GradientBilateralGrid : programs::GradientGenerator<GradientBilateralGrid> {
+  Variable picture{"image", "picture", {512, 384}}, brightness{"guide", "brightness", {512, 384}};
+  Seed seed{{512, 384}};
 
   void generate() {
-    Func picture = programs::values_of(image, "picture", {512, 384});
-    Func brightness = programs::values_of(guide, "brightness", {512, 384});
-
     const int cell = 8, depth = 12;
     Func grid("grid"), blur_z("blur_z"), blur_x("blur_x"), blur_y("blur_y"), slice("slice");
     Var z("z");
@@ -50,31 +41,12 @@ class GradientBilateralGrid : public Halide::Generator<GradientBilateralGrid> {
     slice(x, y, c) = lerp(plane(0), plane(1), place - cast<float>(zi));
     Func result("result");
     result(x, y) = slice(x, y, 0) / (slice(x, y, 1) + 0.01f);
-    programs::store({grid, blur_z, blur_x, blur_y}, primal);
-    programs::Weighed weighed(result, seed, {512, 384}, primal);
-    sum() = weighed.sum();
-    d_image = weighed.by(picture);
-    programs::estimate(image, {512, 384});
-    programs::estimate(d_image, {512, 384});
-    d_guide = weighed.by(brightness);
-    programs::estimate(guide, {512, 384});
-    programs::estimate(d_guide, {512, 384});
-    programs::estimate(seed, {512, 384});
-    programs::estimate(sum, {});
+    store({grid, blur_z, blur_x, blur_y});
+    differentiate(result, seed, {&picture, &brightness});
   }
-
- private:
-  Var x{"x"}, y{"y"}, c{"c"};
 };
 
 }  // namespace
 
-PROGRAM(gradient_bilateral_grid, GradientBilateralGrid, at_sizes({{}}, [](const Sizes&) {
-                                                          return std::vector{
-                                                              in<float>({512, 384}),
-                                                              in<float>({512, 384}, 0.02, 0.97),
-                                                              in<float>({512, 384}, -1, 1).noise(),
-                                                              out<double>({}),
-                                                              out<float>({512, 384}),
-                                                              out<float>({512, 384})};
-                                                        }).gradients(2))
+PROGRAM(gradient_bilateral_grid, GradientBilateralGrid,
+        gradients_of({in<float>({512, 384}), in<float>({512, 384}, 0.02, 0.97)}, {512, 384}))

@@ -4,17 +4,11 @@
 
 namespace {
 
-class GradientInterpolation : public Halide::Generator<GradientInterpolation> {
- public:
-  GeneratorParam<bool> primal{"primal", false};
-  Input<Buffer<float>> image{"image", 3};
-  Input<Buffer<float>> seed{"seed", 3};
-  Output<Buffer<double>> sum{"sum", 0};
-  Output<Buffer<float>> d_image{"d_image", 3};
+struct GradientInterpolation : programs::GradientGenerator<GradientInterpolation> {
+  Variable picture{"image", "picture", {512, 512, 4}};
+  Seed seed{{512, 512, 3}};
 
   void generate() {
-    Func picture = programs::values_of(image, "picture", {512, 512, 4});
-
     programs::Pyramid pyramid;
     const int levels = 10;
     std::vector<Func> down(levels);
@@ -36,25 +30,12 @@ class GradientInterpolation : public Halide::Generator<GradientInterpolation> {
     }
     Func colour("colour");
     colour(x, y, c) = result(x, y, c) / (result(x, y, 3) + 0.01f);
-    programs::store(pyramid.stages, primal);
-    programs::Weighed weighed(colour, seed, {512, 512, 3}, primal);
-    sum() = weighed.sum();
-    d_image = weighed.by(picture);
-    programs::estimate(image, {512, 512, 4});
-    programs::estimate(d_image, {512, 512, 4});
-    programs::estimate(seed, {512, 512, 3});
-    programs::estimate(sum, {});
+    store(pyramid.stages);
+    differentiate(colour, seed, {&picture});
   }
-
- private:
-  Var x{"x"}, y{"y"}, c{"c"};
 };
 
 }  // namespace
 
 PROGRAM(gradient_interpolation, GradientInterpolation,
-        at_sizes({{}}, [](const Sizes&) {
-          return std::vector{in<float>({512, 512, 4}, 0.05, 1),
-                             in<float>({512, 512, 3}, -1, 1).noise(), out<double>({}),
-                             out<float>({512, 512, 4})};
-        }).gradients(1))
+        gradients_of({in<float>({512, 512, 4}, 0.05, 1)}, {512, 512, 3}))

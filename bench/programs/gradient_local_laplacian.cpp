@@ -4,20 +4,11 @@
 
 namespace {
 
-class GradientLocalLaplacian : public Halide::Generator<GradientLocalLaplacian> {
- public:
-  GeneratorParam<bool> primal{"primal", false};
-  Input<Buffer<float>> image{"image", 2};
-  Input<Buffer<float>> detail{"detail", 1};
-  Input<Buffer<float>> seed{"seed", 2};
-  Output<Buffer<double>> sum{"sum", 0};
-  Output<Buffer<float>> d_image{"d_image", 2};
-  Output<Buffer<float>> d_detail{"d_detail", 1};
+struct GradientLocalLaplacian : programs::GradientGenerator<GradientLocalLaplacian> {
+  Variable picture{"image", "picture", {512, 384}}, gain{"detail", "gain", {8}};
+  Seed seed{{512, 384}};
 
   void generate() {
-    Func picture = programs::values_of(image, "picture", {512, 384});
-    Func gain = programs::values_of(detail, "gain", {8});
-
     programs::Pyramid pyramid;
     const int levels = 8, greys = 4;
     std::vector<Func> remapped(levels), own(levels);
@@ -52,31 +43,12 @@ class GradientLocalLaplacian : public Halide::Generator<GradientLocalLaplacian> 
     }
     Func grey("grey");
     grey(x, y) = result(x, y, 0);
-    programs::store(pyramid.stages, primal);
-    programs::Weighed weighed(grey, seed, {512, 384}, primal);
-    sum() = weighed.sum();
-    d_image = weighed.by(picture);
-    programs::estimate(image, {512, 384});
-    programs::estimate(d_image, {512, 384});
-    d_detail = weighed.by(gain);
-    programs::estimate(detail, {8});
-    programs::estimate(d_detail, {8});
-    programs::estimate(seed, {512, 384});
-    programs::estimate(sum, {});
+    store(pyramid.stages);
+    differentiate(grey, seed, {&picture, &gain});
   }
-
- private:
-  Var x{"x"}, y{"y"}, c{"c"};
 };
 
 }  // namespace
 
 PROGRAM(gradient_local_laplacian, GradientLocalLaplacian,
-        at_sizes({{}}, [](const Sizes&) {
-          return std::vector{in<float>({512, 384}),
-                             in<float>({8}, 0.5, 1.5).noise(),
-                             in<float>({512, 384}, -1, 1).noise(),
-                             out<double>({}),
-                             out<float>({512, 384}),
-                             out<float>({8})};
-        }).gradients(2))
+        gradients_of({in<float>({512, 384}), in<float>({8}, 0.5, 1.5).noise()}, {512, 384}))

@@ -4,20 +4,11 @@
 
 namespace {
 
-class GradientNonLocalMeans : public Halide::Generator<GradientNonLocalMeans> {
- public:
-  GeneratorParam<bool> primal{"primal", false};
-  Input<Buffer<float>> image{"image", 2};
-  Input<Buffer<float>> strength{"strength", 1};
-  Input<Buffer<float>> seed{"seed", 2};
-  Output<Buffer<double>> sum{"sum", 0};
-  Output<Buffer<float>> d_image{"d_image", 2};
-  Output<Buffer<float>> d_strength{"d_strength", 1};
+struct GradientNonLocalMeans : programs::GradientGenerator<GradientNonLocalMeans> {
+  Variable picture{"image", "picture", {192, 144}}, decay{"strength", "decay", {1}};
+  Seed seed{{192, 144}};
 
   void generate() {
-    Func picture = programs::values_of(image, "picture", {192, 144});
-    Func decay = programs::values_of(strength, "decay", {1});
-
     const std::vector<int> size = {192, 144};
     Var dx("dx"), dy("dy");
     Func padded("padded"), distance("distance"), across("across"), patches("patches");
@@ -32,28 +23,12 @@ class GradientNonLocalMeans : public Halide::Generator<GradientNonLocalMeans> {
     total(x, y, c) +=
         weight(x, y, window.x, window.y) * select(c == 0, padded(x + window.x, y + window.y), 1.0f);
     result(x, y) = total(x, y, 0) / total(x, y, 1);
-    programs::store({padded, distance, across, patches, weight, total}, primal);
-    programs::Weighed weighed(result, seed, {192, 144}, primal);
-    sum() = weighed.sum();
-    d_image = weighed.by(picture);
-    programs::estimate(image, {192, 144});
-    programs::estimate(d_image, {192, 144});
-    d_strength = weighed.by(decay);
-    programs::estimate(strength, {1});
-    programs::estimate(d_strength, {1});
-    programs::estimate(seed, {192, 144});
-    programs::estimate(sum, {});
+    store({padded, distance, across, patches, weight, total});
+    differentiate(result, seed, {&picture, &decay});
   }
-
- private:
-  Var x{"x"}, y{"y"}, c{"c"};
 };
 
 }  // namespace
 
 PROGRAM(gradient_non_local_means, GradientNonLocalMeans,
-        at_sizes({{}}, [](const Sizes&) {
-          return std::vector{
-              in<float>({192, 144}), in<float>({1}, 2, 2.5), in<float>({192, 144}, -1, 1).noise(),
-              out<double>({}),       out<float>({192, 144}), out<float>({1})};
-        }).gradients(2))
+        gradients_of({in<float>({192, 144}), in<float>({1}, 2, 2.5)}, {192, 144}))

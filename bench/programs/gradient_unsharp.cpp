@@ -4,20 +4,11 @@
 
 namespace {
 
-class GradientUnsharp : public Halide::Generator<GradientUnsharp> {
- public:
-  GeneratorParam<bool> primal{"primal", false};
-  Input<Buffer<float>> image{"image", 3};
-  Input<Buffer<float>> amount{"amount", 1};
-  Input<Buffer<float>> seed{"seed", 3};
-  Output<Buffer<double>> sum{"sum", 0};
-  Output<Buffer<float>> d_image{"d_image", 3};
-  Output<Buffer<float>> d_amount{"d_amount", 1};
+struct GradientUnsharp : programs::GradientGenerator<GradientUnsharp> {
+  Variable picture{"image", "picture", {512, 384, 3}}, gain{"amount", "gain", {1}};
+  Seed seed{{512, 384, 3}};
 
   void generate() {
-    Func picture = programs::values_of(image, "picture", {512, 384, 3});
-    Func gain = programs::values_of(amount, "gain", {1});
-
     const std::vector<int> size = {512, 384};
     Func grey("grey"), down("down"), across("across"), ratio("ratio"), result("result");
     grey(x, y) = 0.299f * picture(x, y, 0) + 0.587f * picture(x, y, 1) + 0.114f * picture(x, y, 2);
@@ -31,31 +22,13 @@ class GradientUnsharp : public Halide::Generator<GradientUnsharp> {
     across(x, y) = blurred([&](int d) { return programs::nearest(down, size, {x + d, y}); });
     ratio(x, y) = (grey(x, y) + gain(0) * (grey(x, y) - across(x, y))) / grey(x, y);
     result(x, y, c) = ratio(x, y) * picture(x, y, c);
-    programs::store({grey, down, across, ratio}, primal);
-    programs::Weighed weighed(result, seed, {512, 384, 3}, primal);
-    sum() = weighed.sum();
-    d_image = weighed.by(picture);
-    programs::estimate(image, {512, 384, 3});
-    programs::estimate(d_image, {512, 384, 3});
-    d_amount = weighed.by(gain);
-    programs::estimate(amount, {1});
-    programs::estimate(d_amount, {1});
-    programs::estimate(seed, {512, 384, 3});
-    programs::estimate(sum, {});
+    store({grey, down, across, ratio});
+    differentiate(result, seed, {&picture, &gain});
   }
-
- private:
-  Var x{"x"}, y{"y"}, c{"c"};
 };
 
 }  // namespace
 
-PROGRAM(gradient_unsharp, GradientUnsharp, at_sizes({{}}, [](const Sizes&) {
-                                             return std::vector{
-                                                 in<float>({512, 384, 3}, 0.1, 1),
-                                                 in<float>({1}, 0.5, 1).noise(),
-                                                 in<float>({512, 384, 3}, -1, 1).noise(),
-                                                 out<double>({}),
-                                                 out<float>({512, 384, 3}),
-                                                 out<float>({1})};
-                                           }).gradients(2))
+PROGRAM(gradient_unsharp, GradientUnsharp,
+        gradients_of({in<float>({512, 384, 3}, 0.1, 1), in<float>({1}, 0.5, 1).noise()},
+                     {512, 384, 3}))

@@ -4,20 +4,11 @@
 
 namespace {
 
-class GradientWavelet : public Halide::Generator<GradientWavelet> {
- public:
-  GeneratorParam<bool> primal{"primal", false};
-  Input<Buffer<float>> image{"image", 2};
-  Input<Buffer<float>> threshold{"threshold", 1};
-  Input<Buffer<float>> seed{"seed", 2};
-  Output<Buffer<double>> sum{"sum", 0};
-  Output<Buffer<float>> d_image{"d_image", 2};
-  Output<Buffer<float>> d_threshold{"d_threshold", 1};
+struct GradientWavelet : programs::GradientGenerator<GradientWavelet> {
+  Variable picture{"image", "picture", {512, 384}}, limit{"threshold", "limit", {1}};
+  Seed seed{{512, 384}};
 
   void generate() {
-    Func picture = programs::values_of(image, "picture", {512, 384});
-    Func limit = programs::values_of(threshold, "limit", {1});
-
     const float h[4] = {0.48296291f, 0.83651630f, 0.22414387f, -0.12940952f};
     Func bands("bands"), shrunk("shrunk"), result("result");
     auto tap = [&](int i) { return programs::nearest(picture, {512, 384}, {2 * x + i, y}); };
@@ -33,31 +24,12 @@ class GradientWavelet : public Halide::Generator<GradientWavelet> {
       return a0 * at(x / 2 - 1, 0) + d0 * at(x / 2 - 1, 1) + a1 * at(x / 2, 0) + d1 * at(x / 2, 1);
     };
     result(x, y) = select(x % 2 == 0, mix(h[2], h[1], h[0], h[3]), mix(h[3], -h[0], h[1], -h[2]));
-    programs::store({bands, shrunk}, primal);
-    programs::Weighed weighed(result, seed, {512, 384}, primal);
-    sum() = weighed.sum();
-    d_image = weighed.by(picture);
-    programs::estimate(image, {512, 384});
-    programs::estimate(d_image, {512, 384});
-    d_threshold = weighed.by(limit);
-    programs::estimate(threshold, {1});
-    programs::estimate(d_threshold, {1});
-    programs::estimate(seed, {512, 384});
-    programs::estimate(sum, {});
+    store({bands, shrunk});
+    differentiate(result, seed, {&picture, &limit});
   }
-
- private:
-  Var x{"x"}, y{"y"}, c{"c"};
 };
 
 }  // namespace
 
-PROGRAM(gradient_wavelet, GradientWavelet, at_sizes({{}}, [](const Sizes&) {
-                                             return std::vector{
-                                                 in<float>({512, 384}),
-                                                 in<float>({1}, 0.04, 0.05),
-                                                 in<float>({512, 384}, -1, 1).noise(),
-                                                 out<double>({}),
-                                                 out<float>({512, 384}),
-                                                 out<float>({1})};
-                                           }).gradients(2))
+PROGRAM(gradient_wavelet, GradientWavelet,
+        gradients_of({in<float>({512, 384}), in<float>({1}, 0.04, 0.05)}, {512, 384}))

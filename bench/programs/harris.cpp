@@ -3,11 +3,7 @@
 
 namespace {
 
-class Harris : public Halide::Generator<Harris> {
- public:
-  Input<Buffer<float>> input{"input", 3};
-  Output<Buffer<float>> output{"output", 2};
-
+struct Harris : programs::Filter<Harris, float, 3, float, 2> {
   void generate() {
     grey(x, y) = 0.299f * input(x, y, 0) + 0.587f * input(x, y, 1) + 0.114f * input(x, y, 2);
     auto across = [&](int dy) { return grey(x + 1, y + dy) - grey(x - 1, y + dy); };
@@ -25,9 +21,8 @@ class Harris : public Halide::Generator<Harris> {
     Var yi("yi");
     const int lanes = natural_vector_size<float>();
     output.split(y, y, yi, 32).parallel(y).vectorize(x, lanes);
-    grey.store_at(output, y).compute_at(output, yi).vectorize(x, lanes);
-    dx.store_at(output, y).compute_at(output, yi).vectorize(x, lanes);
-    dy.store_at(output, y).compute_at(output, yi).vectorize(x, lanes);
+    for (Func* f : {&grey, &dx, &dy})
+      f->store_at(output, y).compute_at(output, yi).vectorize(x, lanes);
     dx.compute_with(dy, x);
   }
 
@@ -40,7 +35,6 @@ class Harris : public Halide::Generator<Harris> {
     return sum;
   }
 
-  Var x{"x"}, y{"y"};
   Func grey{"grey"}, dx{"dx"}, dy{"dy"}, xx{"xx"}, yy{"yy"}, xy{"xy"};
 };
 

@@ -4,10 +4,8 @@
 
 namespace {
 
-class HeatSteps : public Halide::Generator<HeatSteps> {
- public:
-  Input<Buffer<float>> heat{"heat", 2};
-  Input<Buffer<float>> conductivity{"conductivity", 2};
+struct HeatSteps : programs::PictureGenerator<HeatSteps> {
+  Input<Buffer<float>> heat{"heat", 2}, conductivity{"conductivity", 2};
   Input<float> rate{"rate"};
   Output<Buffer<float>> output{"output", 2};
 
@@ -35,7 +33,6 @@ class HeatSteps : public Halide::Generator<HeatSteps> {
   }
 
  private:
-  Var x{"x"}, y{"y"};
   std::vector<Func> steps;
 };
 

@@ -4,11 +4,7 @@
 
 namespace {
 
-class HistogramEqualise : public Halide::Generator<HistogramEqualise> {
- public:
-  Input<Buffer<uint8_t>> input{"input", 3};
-  Output<Buffer<uint8_t>> output{"output", 3};
-
+struct HistogramEqualise : programs::Filter<HistogramEqualise, uint8_t, 3> {
   void generate() {
     Expr r = input(x, y, 0), g = input(x, y, 1), b = input(x, y, 2);
     auto wide = [](Expr e) { return cast<uint16_t>(e); };
@@ -40,8 +36,8 @@ class HistogramEqualise : public Halide::Generator<HistogramEqualise> {
   }
 
  private:
-  Var x{"x"}, y{"y"}, c{"c"}, v{"v"};
   RDom px;
+  Var v{"v"};
   Func luma{"luma"}, histogram{"histogram"}, running{"running"}, curve{"curve"};
 };
 

@@ -3,11 +3,8 @@
 
 namespace {
 
-class IirBlur : public Halide::Generator<IirBlur> {
- public:
-  Input<Buffer<float>> input{"input", 3};
+struct IirBlur : programs::Filter<IirBlur, float, 3> {
   Input<float> share{"share"};  // weight of the new value
-  Output<Buffer<float>> output{"output", 3};
 
   void generate() {
     Expr width = input.width(), height = input.height();
@@ -48,7 +45,6 @@ class IirBlur : public Halide::Generator<IirBlur> {
     return scan;
   }
 
-  Var x{"x"}, y{"y"}, c{"c"};
   Func first, turned{"turned"}, second;
   std::vector<Func> scans;
   std::vector<std::vector<RDom>> rows;

@@ -4,13 +4,8 @@
 
 namespace {
 
-class IntegralImage : public Halide::Generator<IntegralImage> {
- public:
-  Input<Buffer<uint8_t>> input{"input", 2};
-  Output<Buffer<uint8_t>> output{"output", 2};
-
+struct IntegralImage : programs::Filter<IntegralImage, uint8_t, 2> {
   void generate() {
-    const int radius = 7;
     Expr width = input.width(), height = input.height();
     along = RDom(1, width - 1, "along");
     down = RDom(1, height - 1, "down");
@@ -44,7 +39,7 @@ class IntegralImage : public Halide::Generator<IntegralImage> {
   }
 
  private:
-  Var x{"x"}, y{"y"};
+  static constexpr int radius = 7;
   RDom along, down;
   Func rows{"rows"}, sums{"sums"};
 };

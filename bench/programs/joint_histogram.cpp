@@ -7,8 +7,7 @@ namespace {
 class JointHistogram : public Halide::Generator<JointHistogram> {
  public:
   Input<Buffer<uint8_t>> first{"first", 2}, second{"second", 2};
-  Output<Buffer<int32_t>> table{"table", 2};
-  Output<Buffer<int32_t>> sums{"sums", 2};
+  Output<Buffer<int32_t>> table{"table", 2}, sums{"sums", 2};
 
   void generate() {
     r = RDom(0, first.width(), 0, first.height(), "r");

@@ -4,8 +4,7 @@
 
 namespace {
 
-class KmeansAssign : public Halide::Generator<KmeansAssign> {
- public:
+struct KmeansAssign : programs::PictureGenerator<KmeansAssign> {
   Input<Buffer<float>> pixels{"pixels", 3};    // (x, y, c)
   Input<Buffer<float>> centres{"centres", 2};  // (c, k)
   Output<Buffer<int32_t>> label{"label", 2};
@@ -37,7 +36,6 @@ class KmeansAssign : public Halide::Generator<KmeansAssign> {
   }
 
  private:
-  Var x{"x"}, y{"y"};
   RDom r;
   Func best{"best"};
 };

@@ -4,12 +4,9 @@
 
 namespace {
 
-class LensBlur : public Halide::Generator<LensBlur> {
- public:
-  Input<Buffer<float>> input{"input", 3};
+struct LensBlur : programs::Filter<LensBlur, float, 3> {
   Input<Buffer<float>> depth{"depth", 2};
   Input<float> focus{"focus"};
-  Output<Buffer<float>> output{"output", 3};
 
   void generate() {
     Func pixel = Halide::BoundaryConditions::repeat_edge(input);
@@ -28,9 +25,7 @@ class LensBlur : public Halide::Generator<LensBlur> {
 
   void schedule() {
     const int lanes = natural_vector_size<float>();
-    Var xi("xi"), yi("yi");
-    output.bound(c, 0, 3).tile(x, y, xi, yi, 64, 16).reorder(xi, yi, c, x, y).parallel(y);
-    output.vectorize(xi, lanes);
+    tile_colours(16);
     circle.compute_at(output, x).vectorize(x, lanes);
     weighted.compute_at(output, x).reorder(c, x, y).bound(c, 0, 4).unroll(c).vectorize(x, lanes);
     total.compute_at(output, x).reorder(c, x, y).bound(c, 0, 4).unroll(c).vectorize(x, lanes);
@@ -39,7 +34,6 @@ class LensBlur : public Halide::Generator<LensBlur> {
 
  private:
   static constexpr int radius = 6;
-  Var x{"x"}, y{"y"}, c{"c"};
   RDom r;
   Func circle{"circle"}, weighted{"weighted"}, total{"total"};
 };

@@ -4,12 +4,9 @@
 
 namespace {
 
-class LocalLaplacian : public Halide::Generator<LocalLaplacian> {
- public:
+struct LocalLaplacian : programs::Filter<LocalLaplacian, uint16_t, 3> {
   GeneratorParam<int> levels{"levels", 5};
-  Input<Buffer<uint16_t>> input{"input", 3};
   Input<float> detail{"detail"};
-  Output<Buffer<uint16_t>> output{"output", 3};
 
   void generate() {
     Func pixel = Halide::BoundaryConditions::repeat_edge(input);
@@ -79,7 +76,7 @@ class LocalLaplacian : public Halide::Generator<LocalLaplacian> {
     return large;
   }
 
-  Var x{"x"}, y{"y"}, c{"c"}, k{"k"}, i{"i"};
+  Var k{"k"}, i{"i"};
   Func colour{"colour"}, grey{"grey"}, remap{"remap"};
   std::vector<Func> whole;
 };

@@ -4,11 +4,8 @@
 
 namespace {
 
-class MaxFilter : public Halide::Generator<MaxFilter> {
- public:
+struct MaxFilter : programs::Filter<MaxFilter, float, 3> {
   GeneratorParam<int> radius{"radius", 12};
-  Input<Buffer<float>> input{"input", 3};
-  Output<Buffer<float>> output{"output", 3};
 
   void generate() {
     Func pixel = Halide::BoundaryConditions::repeat_edge(input);
@@ -42,7 +39,6 @@ class MaxFilter : public Halide::Generator<MaxFilter> {
   }
 
  private:
-  Var x{"x"}, y{"y"}, c{"c"};
   Func column{"column"};
   std::vector<Func> downs, acrosses;
 };

@@ -4,11 +4,7 @@
 
 namespace {
 
-class Median : public Halide::Generator<Median> {
- public:
-  Input<Buffer<uint8_t>> input{"input", 2};
-  Output<Buffer<uint8_t>> output{"output", 2};
-
+struct Median : programs::Filter<Median, uint8_t, 2> {
   void generate() {
     Func pixel = Halide::BoundaryConditions::repeat_edge(input);
     Expr a = pixel(x, y - 1), b = pixel(x, y), c = pixel(x, y + 1);
@@ -30,7 +26,6 @@ class Median : public Halide::Generator<Median> {
  private:
   static Expr middle(Expr a, Expr b, Expr c) { return max(min(a, b), min(max(a, b), c)); }
 
-  Var x{"x"}, y{"y"};
   Func sorted{"sorted"};
 };
 

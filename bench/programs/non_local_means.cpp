@@ -5,11 +5,8 @@
 
 namespace {
 
-class NonLocalMeans : public Halide::Generator<NonLocalMeans> {
- public:
-  Input<Buffer<float>> input{"input", 3};
+struct NonLocalMeans : programs::Filter<NonLocalMeans, float, 3> {
   Input<float> strength{"strength"};
-  Output<Buffer<float>> output{"output", 3};
 
   void generate() {
     Func pixel = Halide::BoundaryConditions::repeat_edge(input);
@@ -28,9 +25,7 @@ class NonLocalMeans : public Halide::Generator<NonLocalMeans> {
 
   void schedule() {
     const int lanes = natural_vector_size<float>();
-    Var xi("xi"), yi("yi");
-    output.bound(c, 0, 3).tile(x, y, xi, yi, 64, 32).reorder(xi, yi, c, x, y).parallel(y);
-    output.vectorize(xi, lanes);
+    tile_colours(32);
     total.compute_at(output, x).bound(c, 0, 4).vectorize(x, lanes);
     total.update().reorder(x, c, y, window.x, window.y).unroll(c).vectorize(x, lanes);
     weight.compute_at(total, y).vectorize(x, lanes);
@@ -39,7 +34,7 @@ class NonLocalMeans : public Halide::Generator<NonLocalMeans> {
   }
 
  private:
-  Var x{"x"}, y{"y"}, c{"c"}, dx{"dx"}, dy{"dy"};
+  Var dx{"dx"}, dy{"dy"};
   RDom window;
   Func distance{"distance"}, across{"across"}, patches{"patches"}, weight{"weight"};
   Func with_one{"with_one"}, total{"total"};

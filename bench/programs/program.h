@@ -13,6 +13,30 @@
 
 namespace programs {
 
+// The base of a generator whose pictures have the coordinates x, y and c.
+template <typename T>
+struct PictureGenerator : Halide::Generator<T> {
+ protected:
+  Halide::Var x{"x"}, y{"y"}, c{"c"};
+};
+
+// The base of a generator that makes a picture from a picture, and from the inputs that it adds.
+template <typename T, typename Pixel, int in_dims, typename OutPixel = Pixel,
+          int out_dims = in_dims>
+struct Filter : PictureGenerator<T> {
+  Halide::GeneratorInput<Halide::Buffer<Pixel>> input{"input", in_dims};
+  Halide::GeneratorOutput<Halide::Buffer<OutPixel>> output{"output", out_dims};
+
+ protected:
+  // Computes the three channels of the output in tiles of 64 columns; rows of tiles run in parallel.
+  void tile_colours(int rows) {
+    Halide::Var xi("xi"), yi("yi");
+    output.bound(this->c, 0, 3).tile(this->x, this->y, xi, yi, 64, rows);
+    output.reorder(xi, yi, this->c, this->x, this->y).parallel(this->y);
+    output.vectorize(xi, this->template natural_vector_size<float>());
+  }
+};
+
 // A program with its generator parameters.
 struct Registered {
   Program program;

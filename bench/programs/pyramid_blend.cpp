@@ -4,8 +4,7 @@
 
 namespace {
 
-class PyramidBlend : public Halide::Generator<PyramidBlend> {
- public:
+struct PyramidBlend : programs::PictureGenerator<PyramidBlend> {
   Input<Buffer<float>> first{"first", 3}, second{"second", 3};
   Input<Buffer<float>> mask{"mask", 2};
   Output<Buffer<float>> output{"output", 3};
@@ -72,7 +71,6 @@ class PyramidBlend : public Halide::Generator<PyramidBlend> {
     return all;
   }
 
-  Var x{"x"}, y{"y"}, c{"c"};
   std::vector<Func> whole;
   std::vector<std::pair<Func, Func>> row_passes;
 };

@@ -4,12 +4,9 @@
 
 namespace {
 
-class RgbGain : public Halide::Generator<RgbGain> {
- public:
-  Input<Buffer<uint8_t>> input{"input", 3};  // (x, y, c)
+struct RgbGain : programs::Filter<RgbGain, uint8_t, 3> {
   Input<Buffer<uint8_t>> other{"other", 3};
   Input<float> gain{"gain"};
-  Output<Buffer<uint8_t>> output{"output", 3};
 
   void generate() {
     Expr fixed = cast<uint16_t>(gain * 256);
@@ -29,9 +26,6 @@ class RgbGain : public Halide::Generator<RgbGain> {
     output.reorder(c, x, y).fuse(c, x, cx).vectorize(cx, natural_vector_size<uint8_t>());
     output.parallel(y, 8);
   }
-
- private:
-  Var x{"x"}, y{"y"}, c{"c"};
 };
 
 }  // namespace

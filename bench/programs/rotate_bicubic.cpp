@@ -3,11 +3,8 @@
 
 namespace {
 
-class RotateBicubic : public Halide::Generator<RotateBicubic> {
- public:
-  Input<Buffer<uint8_t>> input{"input", 3};
+struct RotateBicubic : programs::Filter<RotateBicubic, uint8_t, 3> {
   Input<float> angle{"angle"};
-  Output<Buffer<uint8_t>> output{"output", 3};
 
   void generate() {
     Expr width = input.width(), height = input.height();
@@ -47,7 +44,6 @@ class RotateBicubic : public Halide::Generator<RotateBicubic> {
     return 0.5f * t * t * (t - 1.0f);
   }
 
-  Var x{"x"}, y{"y"}, c{"c"};
   Func place{"place"};
 };
 

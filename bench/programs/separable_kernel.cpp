@@ -3,11 +3,8 @@
 
 namespace {
 
-class SeparableKernel : public Halide::Generator<SeparableKernel> {
- public:
-  Input<Buffer<float>> input{"input", 2};
+struct SeparableKernel : programs::Filter<SeparableKernel, float, 2> {
   Input<Buffer<float>> kernel{"kernel", 1};
-  Output<Buffer<float>> output{"output", 2};
 
   void generate() {
     Func pixel = Halide::BoundaryConditions::mirror_image(input);
@@ -30,7 +27,6 @@ class SeparableKernel : public Halide::Generator<SeparableKernel> {
   }
 
  private:
-  Var x{"x"}, y{"y"};
   RDom r;
   Func columns{"columns"}, rows{"rows"};
 };

@@ -3,11 +3,7 @@
 
 namespace {
 
-class SobelU8 : public Halide::Generator<SobelU8> {
- public:
-  Input<Buffer<uint8_t>> input{"input", 2};
-  Output<Buffer<uint8_t>> output{"output", 2};
-
+struct SobelU8 : programs::Filter<SobelU8, uint8_t, 2> {
   void generate() {
     Func pixel = Halide::BoundaryConditions::repeat_edge(input);
     wide(x, y) = cast<int16_t>(pixel(x, y));
@@ -27,7 +23,6 @@ class SobelU8 : public Halide::Generator<SobelU8> {
   }
 
  private:
-  Var x{"x"}, y{"y"};
   Func wide{"wide"}, across{"across"}, down{"down"};
 };
 

@@ -4,11 +4,7 @@
 
 namespace {
 
-class StencilChain : public Halide::Generator<StencilChain> {
- public:
-  Input<Buffer<uint16_t>> input{"input", 2};
-  Output<Buffer<uint16_t>> output{"output", 2};
-
+struct StencilChain : programs::Filter<StencilChain, uint16_t, 2> {
   void generate() {
     stages.push_back(Halide::BoundaryConditions::repeat_edge(input));
     for (int n = 1; n < 12; n++) {
@@ -47,7 +43,7 @@ class StencilChain : public Halide::Generator<StencilChain> {
     f.vectorize(xi, lanes);
   }
 
-  Var x{"x"}, y{"y"}, xi{"xi"}, yi{"yi"};
+  Var xi{"xi"}, yi{"yi"};
   std::vector<Func> stages;
 };
 

@@ -4,8 +4,7 @@
 
 namespace {
 
-class StereoMatch : public Halide::Generator<StereoMatch> {
- public:
+struct StereoMatch : programs::PictureGenerator<StereoMatch> {
   GeneratorParam<int> shifts{"shifts", 32};
   Input<Buffer<uint8_t>> left{"left", 2}, right{"right", 2};
   Output<Buffer<uint8_t>> output{"output", 2};
@@ -36,7 +35,7 @@ class StereoMatch : public Halide::Generator<StereoMatch> {
   }
 
  private:
-  Var x{"x"}, y{"y"}, d{"d"};
+  Var d{"d"};
   RDom s;
   Func cost{"cost"}, down{"down"}, square{"square"}, best{"best"};
 };

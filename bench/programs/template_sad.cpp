@@ -4,10 +4,8 @@
 
 namespace {
 
-class TemplateSad : public Halide::Generator<TemplateSad> {
- public:
-  Input<Buffer<uint8_t>> scene{"scene", 2};
-  Input<Buffer<uint8_t>> pattern{"pattern", 2};
+struct TemplateSad : programs::PictureGenerator<TemplateSad> {
+  Input<Buffer<uint8_t>> scene{"scene", 2}, pattern{"pattern", 2};
   Output<Buffer<uint32_t>> output{"output", 2};
 
   void generate() {
@@ -28,7 +26,6 @@ class TemplateSad : public Halide::Generator<TemplateSad> {
   }
 
  private:
-  Var x{"x"}, y{"y"};
   RDom r;
   Func sum{"sum"};
 };

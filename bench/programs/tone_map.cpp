@@ -3,11 +3,8 @@
 
 namespace {
 
-class ToneMap : public Halide::Generator<ToneMap> {
- public:
-  Input<Buffer<float>> input{"input", 3};
+struct ToneMap : programs::Filter<ToneMap, float, 3, uint8_t, 3> {
   Input<float> exposure{"exposure"}, gamma{"gamma"};
-  Output<Buffer<uint8_t>> output{"output", 3};
 
   void generate() {
     auto curve = [](Expr v) {
@@ -27,7 +24,6 @@ class ToneMap : public Halide::Generator<ToneMap> {
   }
 
  private:
-  Var x{"x"}, y{"y"}, c{"c"};
   Func luma{"luma"}, scale{"scale"};
 };
 

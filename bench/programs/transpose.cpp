@@ -3,11 +3,7 @@
 
 namespace {
 
-class Transpose : public Halide::Generator<Transpose> {
- public:
-  Input<Buffer<float>> input{"input", 2};
-  Output<Buffer<float>> output{"output", 2};
-
+struct Transpose : programs::Filter<Transpose, float, 2> {
   void generate() {
     block(x, y) = input(y, x);
     output(x, y) = block(x, y);
@@ -21,7 +17,6 @@ class Transpose : public Halide::Generator<Transpose> {
   }
 
  private:
-  Var x{"x"}, y{"y"};
   Func block{"block"};
 };
 

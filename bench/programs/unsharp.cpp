@@ -3,11 +3,8 @@
 
 namespace {
 
-class Unsharp : public Halide::Generator<Unsharp> {
- public:
-  Input<Buffer<float>> input{"input", 3};
+struct Unsharp : programs::Filter<Unsharp, float, 3> {
   Input<float> amount{"amount"};
-  Output<Buffer<float>> output{"output", 3};
 
   void generate() {
     Func pixel = Halide::BoundaryConditions::mirror_interior(input);
@@ -38,7 +35,6 @@ class Unsharp : public Halide::Generator<Unsharp> {
   }
 
  private:
-  Var x{"x"}, y{"y"}, c{"c"};
   Func grey{"grey"}, down{"down"}, across{"across"}, ratio{"ratio"};
 };
 

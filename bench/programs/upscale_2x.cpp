@@ -4,11 +4,7 @@
 
 namespace {
 
-class Upscale2x : public Halide::Generator<Upscale2x> {
- public:
-  Input<Buffer<uint8_t>> input{"input", 2};
-  Output<Buffer<uint8_t>> output{"output", 2};
-
+struct Upscale2x : programs::Filter<Upscale2x, uint8_t, 2> {
   void generate() {
     Func pixel = Halide::BoundaryConditions::repeat_edge(input);
     auto between = [](Expr a, Expr b, Expr c, Expr d) {
@@ -34,7 +30,6 @@ class Upscale2x : public Halide::Generator<Upscale2x> {
   }
 
  private:
-  Var x{"x"}, y{"y"};
   Func rows{"rows"};
 };
 

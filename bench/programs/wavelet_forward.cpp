@@ -4,27 +4,20 @@
 
 namespace {
 
-class WaveletForward : public Halide::Generator<WaveletForward> {
- public:
-  Input<Buffer<float>> input{"input", 2};
-  Output<Buffer<float>> bands{"bands", 3};
-
+struct WaveletForward : programs::Filter<WaveletForward, float, 2, float, 3> {
   void generate() {
     const float* h = programs::daubechies;
     Func at = Halide::BoundaryConditions::repeat_edge(input);
     auto tap = [&](int i) -> Expr { return at(2 * x + i, y); };
     Expr average = h[0] * tap(0) + h[1] * tap(1) + h[2] * tap(2) + h[3] * tap(3);
     Expr detail = h[3] * tap(0) - h[2] * tap(1) + h[1] * tap(2) - h[0] * tap(3);
-    bands(x, y, b) = select(b == 0, average, detail);
+    output(x, y, c) = select(c == 0, average, detail);
   }
 
   void schedule() {
-    bands.bound(b, 0, 2).reorder(b, x, y).unroll(b);
-    bands.vectorize(x, natural_vector_size<float>()).parallel(y, 8);
+    output.bound(c, 0, 2).reorder(c, x, y).unroll(c);
+    output.vectorize(x, natural_vector_size<float>()).parallel(y, 8);
   }
-
- private:
-  Var x{"x"}, y{"y"}, b{"b"};
 };
 
 }  // namespace

@@ -4,14 +4,10 @@
 
 namespace {
 
-class WaveletInverse : public Halide::Generator<WaveletInverse> {
- public:
-  Input<Buffer<float>> bands{"bands", 3};
-  Output<Buffer<float>> output{"output", 2};
-
+struct WaveletInverse : programs::Filter<WaveletInverse, float, 3, float, 2> {
   void generate() {
     const float* h = programs::daubechies;
-    Func at = Halide::BoundaryConditions::repeat_edge(bands);
+    Func at = Halide::BoundaryConditions::repeat_edge(input);
     auto sum = [&](float a0, float d0, float a1, float d1) {
       return a0 * at(x / 2 - 1, y, 0) + d0 * at(x / 2 - 1, y, 1) + a1 * at(x / 2, y, 0) +
              d1 * at(x / 2, y, 1);
@@ -26,9 +22,6 @@ class WaveletInverse : public Halide::Generator<WaveletInverse> {
     output.split(x, x, xi, 2, Halide::TailStrategy::RoundUp).reorder(xi, x, y).unroll(xi);
     output.vectorize(x, lanes).parallel(y, 8);
   }
-
- private:
-  Var x{"x"}, y{"y"};
 };
 
 }  // namespace

@@ -23,6 +23,7 @@
 
 #include "../kernels/picture.h"
 #include "../pairs/process_memory.h"
+#include "../pairs/worker_orders.h"
 #include "../pairs/worker_protocol.h"
 #include "cases.h"
 
@@ -281,18 +282,6 @@ class Worker {
   double compile_peak_mb_ = 0, resident_mb_ = 0;
 };
 
-void serve(Worker& worker) {
-  for (std::string line; std::getline(std::cin, line);) {
-    std::istringstream words(line);
-    std::string order, path;
-    words >> order >> path;
-    if (order == "run") worker.run();
-    if (order == "save") worker.save(path);
-    if (order == "slope") worker.tell_slope(path);
-    if (order == "memory") worker.tell_memory();
-  }
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -304,7 +293,9 @@ int main(int argc, char** argv) {
   std::cout.precision(9);
   try {
     Worker worker(argv[1], argv[2], std::stoi(argv[3]));
-    serve(worker);
+    bench::serve(worker, [&](const auto& order, const auto& word, auto&) {
+      if (order == "slope") worker.tell_slope(word);
+    });
   } catch (const std::exception& error) {
     std::cout << "failed " << error.what() << std::endl;
     return 1;

@@ -4,8 +4,7 @@
 
 namespace {
 
-class YuvFromRgb : public Halide::Generator<YuvFromRgb> {
- public:
+struct YuvFromRgb : programs::PictureGenerator<YuvFromRgb> {
   Input<Buffer<uint8_t>> rgb{"rgb", 3};
   Output<Buffer<uint8_t>> luma{"luma", 2};
   Output<Buffer<uint8_t>> chroma{"chroma", 3};  // (x, y, c), interleaved
@@ -33,9 +32,6 @@ class YuvFromRgb : public Halide::Generator<YuvFromRgb> {
     luma.vectorize(x, lanes).parallel(y, 16);
     chroma.reorder(c, x, y).unroll(c).vectorize(x, lanes / 2).parallel(y, 8);
   }
-
- private:
-  Var x{"x"}, y{"y"}, c{"c"};
 };
 
 }  // namespace

@@ -4,11 +4,13 @@
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -105,6 +107,35 @@ class AppErrors : public testing::Test {
     std::filesystem::resize_file(folder_ / "half.jpg",
                                  std::filesystem::file_size(folder_ / "half.jpg") / 2);
     refused_input(folder_ / "half.jpg", {"half.jpg", "must be a whole image", "end of"});
+  }
+
+  // Checks that the output folder is tried before the run.
+  void expect_refuses_unwritable_folder(const std::filesystem::path& input) {
+    using std::filesystem::perms;
+    // Root may write anywhere except where no file can be created.
+    const std::filesystem::path folder = getuid() == 0 ? "/proc" : out();
+    if (getuid() != 0) {
+      std::filesystem::create_directories(folder);
+      std::filesystem::permissions(folder, perms::owner_read | perms::owner_exec);
+    }
+    run("--input " + input.string() + " --output " + folder.string());
+    if (getuid() != 0) std::filesystem::permissions(folder, perms::owner_all);
+    expect_refused({"write", "stored whole or not at all", "Give a folder that you may write to"});
+  }
+
+  // Checks that the output is neither a file nor, for root, a folder in which no file can be created.
+  void expect_refuses_outputs(const std::filesystem::path& input) {
+    refused({"--input", input, "--output", input}, {input.filename(), "must be a folder"});
+    if (getuid() == 0)
+      refused({"--input", input, "--output", "/proc"}, {"Give a folder that you may write to"});
+  }
+
+  // Checks that a picture without finite samples is refused.
+  void expect_refuses_nan(int side) {
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    apps::Image image{side, side, 32, std::vector<float>(3 * side * side, nan)};
+    apps::write_image(folder_ / "nan.exr", image);
+    refused_input(folder_ / "nan.exr", {"nan.exr", "every sample must be a finite number"});
   }
 
   std::filesystem::path out() const { return folder_ / "out"; }

@@ -126,17 +126,27 @@ class AppImages : public testing::Test {
     return path;
   }
 
+  // Samples that are multiples of `step`, wrapped around at white.
+  static apps::Image ramp(int width, int height, int bits, int step) {
+    apps::Image image{width, height, bits, {}};
+    const long values = 1L << bits;
+    for (long n = 0; n < image.elems(); ++n)
+      image.pixels.push_back(static_cast<float>(n * step % values) /
+                             static_cast<float>(values - 1));
+    return image;
+  }
+
+  apps::Image stored_and_read(const apps::Image& image) const {
+    apps::write_png(folder_ / "a.png", image);
+    return apps::read_image(folder_ / "a.png");
+  }
+
   const TemporaryFolder temporary_;
   const fs::path& folder_ = temporary_.path();
 };
 
 TEST_F(AppImages, EightBitsSurviveARoundTrip) {
-  apps::Image image{5, 3, 8, {}};
-  for (long n = 0; n < image.elems(); ++n) {
-    image.pixels.push_back(static_cast<float>(n * 11 % 256) / 255.0f);
-  }
-  apps::write_png(folder_ / "a.png", image);
-  const apps::Image back = apps::read_image(folder_ / "a.png");
+  const apps::Image image = ramp(5, 3, 8, 11), back = stored_and_read(image);
   EXPECT_EQ(back.width, 5);
   EXPECT_EQ(back.height, 3);
   EXPECT_EQ(back.bits, 8);
@@ -144,12 +154,7 @@ TEST_F(AppImages, EightBitsSurviveARoundTrip) {
 }
 
 TEST_F(AppImages, SixteenBitsSurviveARoundTrip) {
-  apps::Image image{4, 2, 16, {}};
-  for (long n = 0; n < image.elems(); ++n) {
-    image.pixels.push_back(static_cast<float>(n * 2711 % 65536) / 65535.0f);
-  }
-  apps::write_png(folder_ / "a.png", image);
-  const apps::Image back = apps::read_image(folder_ / "a.png");
+  const apps::Image image = ramp(4, 2, 16, 2711), back = stored_and_read(image);
   EXPECT_EQ(back.bits, 16);
   for (long n = 0; n < image.elems(); ++n) EXPECT_NEAR(back.pixels[n], image.pixels[n], 1e-6);
 }

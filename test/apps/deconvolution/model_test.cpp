@@ -263,11 +263,11 @@ TEST(Learning, StagesAreLearnedByThemselvesAndThenTogether) {
 }
 
 Trainer::Options few_steps(std::vector<std::string> groups = group_names) {
-  return {.steps = 30,
-          .threads = 2,
-          .groups = std::move(groups),
-          .from_weights = true,
-          .batch = {.side = 24, .pieces = 4, .psf = 5}};
+  apps::CommonOptions common;
+  common.steps = 30;
+  common.threads = 2;
+  common.optimize = std::move(groups);
+  return {.common = common, .from_weights = true, .batch = {.side = 24, .pieces = 4, .psf = 5}};
 }
 
 TEST(Learning, LossesFallAndOnlyWhatIsNamedMoves) {

@@ -178,7 +178,12 @@ TEST(DemosaicWeights, EveryShippedFileLoads) {
 class DemosaicLearning : public testing::Test {
  protected:
   Trainer::Options options(int threads = 2) const {
-    return {.steps = 40, .threads = threads, .seed = 5, .batch = {.cells = 8, .pieces = 2}};
+    apps::CommonOptions common;
+    common.steps = 40;
+    common.threads = threads;
+    common.seed = 5;
+    common.optimize = group_names;
+    return {.common = common, .batch = {.cells = 8, .pieces = 2}};
   }
   std::vector<float> after(int steps, const Trainer::Options& options) const {
     Trainer trainer(Weights({2, 5}), photographs_, options);
@@ -217,7 +222,7 @@ TEST_F(DemosaicLearning, GoesOnFromAStateAsIfItHadNotStopped) {
 
 TEST_F(DemosaicLearning, MovesOnlyTheGroupsThatItIsTold) {
   auto chosen = options();
-  chosen.groups = {"chroma"};
+  chosen.common.optimize = {"chroma"};
   Weights moved({2, 5}), start({2, 5});
   moved.values = after(3, chosen);
   for (Array array : all_arrays) {

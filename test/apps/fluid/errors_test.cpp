@@ -1,6 +1,5 @@
 // Tests the errors of fluid for bad input: one line in four parts, status 1, and no result left behind.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -15,8 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class FluidErrors : public AppErrors {
- protected:
+struct FluidErrors : AppErrors {
   FluidErrors() : AppErrors("fluid", FLUID_PROGRAM) {}
 
   void SetUp() override { picture_ = write_picture("picture.png", 12, 10); }
@@ -94,7 +92,8 @@ TEST_F(FluidErrors, TheStartHasTheShapeOfTheEnd) {
 
 TEST_F(FluidErrors, NothingIsOptimizedByFactorsFromZero) {
   run_on(picture_, "--viscosity 0");
-  expect_refused({"optimize the viscosity", "as a logarithm", "--viscosity a small positive number"});
+  expect_refused(
+      {"optimize the viscosity", "as a logarithm", "--viscosity a small positive number"});
   run_on(picture_, "--diffusion 0 --optimize diffusion");
   expect_refused({"optimize the diffusion", "as a logarithm"});
   expect_no_results();
@@ -146,15 +145,7 @@ TEST_F(FluidErrors, TheOutputMustBeAFolder) {
 }
 
 TEST_F(FluidErrors, AnUnwritableFolderIsFoundBeforeTheRun) {
-  // Root may write anywhere except where no file can be created.
-  const fs::path folder = getuid() == 0 ? fs::path("/proc") : out();
-  if (getuid() != 0) {
-    fs::create_directories(folder);
-    fs::permissions(folder, fs::perms::owner_read | fs::perms::owner_exec);
-  }
-  run("--input " + picture_.string() + " --output " + folder.string());
-  if (getuid() != 0) fs::permissions(folder, fs::perms::owner_all);
-  expect_refused({"write", "stored whole or not at all", "Give a folder that you may write to"});
+  expect_refuses_unwritable_folder(picture_);
 }
 
 TEST_F(FluidErrors, FilesThatMayNotGrowAreNotLeftHalfWritten) {
