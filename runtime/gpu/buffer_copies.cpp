@@ -3,7 +3,6 @@
 
 #include "gpu/buffers.h"
 #include "gpu/device_memory.h"
-#include "gpu/layout.h"
 
 namespace retrograde::runtime {
 namespace {

@@ -8,7 +8,6 @@
 
 #include "gpu/copies.h"
 #include "gpu/device_memory.h"
-#include "gpu/layout.h"
 
 namespace retrograde::runtime {
 namespace {
@@ -118,11 +117,11 @@ int32_t update_host(const BufferRequest& request, halide_buffer_t& buffer) {
 
 // ---- calls ----
 
-int64_t bytes_of(const halide_buffer_t* buffer) { return buffer ? span_bytes(*buffer) : 0; }
-
-// Runs one of the functions above under the buffer's lock.
+// Runs one of the functions above under the buffer's lock. `asked` may name the buffer's size.
 template <typename Work>
-int32_t run_locked(const BufferRequest& request, halide_buffer_t* buffer, Work work) {
+int32_t run_locked(const BufferCaller& caller, halide_buffer_t* buffer, int32_t code,
+                   const char* asked, Work work) {
+  const BufferRequest request(caller, code, asked, buffer ? span_bytes(*buffer) : 0);
   if (!buffer) return request.refuse_null_buffer();
   return guarded(request, [&] {
     const std::lock_guard lock(lock_of(buffer));
@@ -133,27 +132,21 @@ int32_t run_locked(const BufferRequest& request, halide_buffer_t* buffer, Work w
 }  // namespace
 
 int32_t allocate_device_memory(const BufferCaller& caller, halide_buffer_t* buffer) {
-  const BufferRequest request(caller, retrograde_error_device_malloc_failed,
-                              "allocate device memory for a buffer of %i bytes", bytes_of(buffer));
-  return run_locked(request, buffer, allocate);
+  return run_locked(caller, buffer, retrograde_error_device_malloc_failed,
+                    "allocate device memory for a buffer of %i bytes", allocate);
 }
 
 int32_t free_device_memory(const BufferCaller& caller, halide_buffer_t* buffer) {
-  const BufferRequest request(caller, retrograde_error_device_free_failed,
-                              "free the device memory of a buffer");
-  return run_locked(request, buffer, free_memory);
+  return run_locked(caller, buffer, retrograde_error_device_free_failed,
+                    "free the device memory of a buffer", free_memory);
 }
 
-int32_t copy_to_device(const BufferCaller& caller, halide_buffer_t* buffer) {
-  const BufferRequest request(caller, retrograde_error_copy_to_device_failed,
-                              "copy a buffer of %i bytes to a device", bytes_of(buffer));
-  return run_locked(request, buffer, update_device);
-}
-
-int32_t copy_to_host(const BufferCaller& caller, halide_buffer_t* buffer) {
-  const BufferRequest request(caller, retrograde_error_copy_to_host_failed,
-                              "copy a buffer of %i bytes to the host", bytes_of(buffer));
-  return run_locked(request, buffer, update_host);
+int32_t copy_newest(const BufferCaller& caller, halide_buffer_t* buffer, Place to) {
+  if (to == Place::device)
+    return run_locked(caller, buffer, retrograde_error_copy_to_device_failed,
+                      "copy a buffer of %i bytes to a device", update_device);
+  return run_locked(caller, buffer, retrograde_error_copy_to_host_failed,
+                    "copy a buffer of %i bytes to the host", update_host);
 }
 
 int32_t wait_for_stream(retrograde_context* caller, const halide_buffer_t* buffer) {

@@ -6,8 +6,6 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "gpu/layout.h"
-
 namespace retrograde::runtime {
 namespace {
 

@@ -3,11 +3,10 @@
 
 #include <HalideRuntime.h>
 
+#include "gpu/layout.h"
 #include "gpu/session.h"
 
 namespace retrograde::runtime {
-
-enum class Place { host, device };
 
 // A copy over a box of elements: the first element of each side, and the strides.
 struct Copy {

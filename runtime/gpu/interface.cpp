@@ -6,7 +6,6 @@
 #include "gpu/buffers.h"
 #include "gpu/gpu_calls.h"
 #include "gpu/host.h"
-#include "gpu/layout.h"
 #include "gpu/views.h"
 
 namespace retrograde::runtime {
@@ -43,12 +42,12 @@ void device_release(void* user_context, const halide_device_interface_t*) {
   retrograde_gpu_release(caller);
 }
 
-int device_to_host(void* user_context, halide_buffer_t* buffer) {
+int copy_to_host(void* user_context, halide_buffer_t* buffer) {
   CallerOf caller(user_context);
   return retrograde_gpu_copy_to_host(caller, buffer);
 }
 
-int host_to_device(void* user_context, halide_buffer_t* buffer, const halide_device_interface_t*) {
+int copy_to_device(void* user_context, halide_buffer_t* buffer, const halide_device_interface_t*) {
   CallerOf caller(user_context);
   return retrograde_gpu_copy_to_device(caller, buffer);
 }
@@ -149,8 +148,8 @@ const halide_device_interface_t* retrograde_gpu_interface(void) {
                                                           device_free,
                                                           device_sync,
                                                           device_release,
-                                                          device_to_host,
-                                                          host_to_device,
+                                                          copy_to_host,
+                                                          copy_to_device,
                                                           device_and_host_malloc,
                                                           device_and_host_free,
                                                           buffer_copy,
@@ -173,11 +172,11 @@ int32_t retrograde_gpu_free(retrograde_context* caller, halide_buffer_t* buffer)
 }
 
 int32_t retrograde_gpu_copy_to_device(retrograde_context* caller, halide_buffer_t* buffer) {
-  return rt::copy_to_device(rt::for_buffers(caller), buffer);
+  return rt::copy_newest(rt::for_buffers(caller), buffer, rt::Place::device);
 }
 
 int32_t retrograde_gpu_copy_to_host(retrograde_context* caller, halide_buffer_t* buffer) {
-  return rt::copy_to_host(rt::for_buffers(caller), buffer);
+  return rt::copy_newest(rt::for_buffers(caller), buffer, rt::Place::host);
 }
 
 int32_t retrograde_gpu_sync(retrograde_context* caller, halide_buffer_t* buffer) {

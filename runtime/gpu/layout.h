@@ -5,6 +5,9 @@
 
 namespace retrograde::runtime {
 
+// The memory that a buffer has on the host, or that on its device.
+enum class Place { host, device };
+
 // Bytes from the first element in memory to the end of the last one.
 int64_t span_bytes(const halide_buffer_t&);
 // Offset of the element with the smallest coordinates from the first element in memory, in bytes.
