@@ -1,4 +1,4 @@
-// What the profiler records.
+// The records of the profiler.
 #include "profile.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What the profiler records: the runs of pipelines, and the totals of each pipeline over its runs.
+// The records of the profiler: the runs of pipelines, and the totals of each pipeline over its runs.
 #pragma once
 
 #include <HalideRuntime.h>

@@ -1,5 +1,6 @@
-// What devices ask of the program that they serve. The compiler's library uses the defaults of host.cpp. The static
-// runtime sets functions that a program can replace through HalideRuntime.h (halide/host.cpp).
+// The functions through which devices ask the program for settings, libraries and contexts. The compiler's library uses
+// the defaults of host.cpp. The static runtime sets functions that a program can replace through HalideRuntime.h
+// (halide/host.cpp).
 #pragma once
 
 #include "retrograde_runtime.h"
