@@ -3,18 +3,12 @@
 #include <retrograde/retrograde.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <functional>
+
+#include "support/simulated_device.h"
 
 namespace retrograde {
 namespace {
-
-// Must be set before the first use of a device.
-[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
-
-Target with_gpu() {
-  return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
-}
 
 Buffer<float> ramp(int width, int height) {
   Buffer<float> image(width, height);
