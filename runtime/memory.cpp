@@ -3,7 +3,6 @@
 // A pipeline allocates the same few large blocks on every call. The system would map and zero their pages each time,
 // which costs more than computing most stages. So released blocks stay in a list, oldest first, and are reused for
 // requests that fit without much waste. The oldest are freed when the list exceeds its limit.
-#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,6 +13,7 @@
 #include <new>
 #include <vector>
 
+#include "huge_pages.h"
 #include "report.h"
 
 namespace retrograde::runtime {
@@ -22,7 +22,6 @@ namespace {
 constexpr size_t alignment = retrograde_allocation_alignment;
 constexpr size_t small_bytes = size_t{64}
                                << 10;  // below this size the system's free lists are fast
-constexpr size_t huge_page_bytes = size_t{2} << 20;  // x86-64 and AArch64 Linux
 constexpr size_t page_bytes = 4096;
 constexpr size_t max_blocks = 256;
 
@@ -78,9 +77,7 @@ void* system_malloc(size_t capacity) {
   const bool huge = bytes >= 4 * huge_page_bytes;
   void* allocation = nullptr;
   if (posix_memalign(&allocation, huge ? huge_page_bytes : alignment, bytes) != 0) return nullptr;
-#ifdef MADV_HUGEPAGE
-  if (huge) madvise(allocation, bytes, MADV_HUGEPAGE);  // only a hint: failure changes nothing
-#endif
+  if (huge) advise_huge_pages(allocation, bytes);
   return with_header(allocation, static_cast<char*>(allocation) + alignment, capacity);
 }
 

@@ -87,6 +87,53 @@ size_t format_message(char* out, size_t size, const char* format, va_list& args)
 
 thread_local Failure* current_failure = nullptr;
 
+struct ErrorName {
+  int32_t code;
+  const char* text;
+};
+constexpr ErrorName error_names[] = {
+    {retrograde_error_success, "success"},
+    {retrograde_error_generic, "generic error"},
+    {retrograde_error_explicit_bounds_too_small, "explicit bounds too small"},
+    {retrograde_error_bad_type, "bad element type"},
+    {retrograde_error_access_out_of_bounds, "access out of bounds"},
+    {retrograde_error_allocation_too_large, "allocation too large"},
+    {retrograde_error_extents_too_large, "extents too large"},
+    {retrograde_error_constraints_make_required_region_smaller,
+     "constraints make the required region smaller"},
+    {retrograde_error_constraint_violated, "constraint violated"},
+    {retrograde_error_param_too_small, "parameter too small"},
+    {retrograde_error_param_too_large, "parameter too large"},
+    {retrograde_error_out_of_memory, "out of memory"},
+    {retrograde_error_buffer_argument_is_null, "buffer argument is null"},
+    {retrograde_error_debug_to_file_failed, "a file cannot be written"},
+    {retrograde_error_copy_to_host_failed, "copy to the host failed"},
+    {retrograde_error_copy_to_device_failed, "copy to the device failed"},
+    {retrograde_error_device_malloc_failed, "no memory on the device"},
+    {retrograde_error_device_sync_failed, "waiting for the device failed"},
+    {retrograde_error_device_free_failed, "freeing device memory failed"},
+    {retrograde_error_no_device_interface, "no device interface"},
+    {retrograde_error_device_run_failed, "a kernel cannot run"},
+    {retrograde_error_device_wrap_native_failed, "wrapping device memory failed"},
+    {retrograde_error_device_detach_native_failed, "detaching device memory failed"},
+    {retrograde_error_device_interface_no_device, "a device interface without device memory"},
+    {retrograde_error_host_and_device_dirty, "newer on the host and on the device"},
+    {retrograde_error_buffer_is_null, "buffer is null"},
+    {retrograde_error_device_buffer_copy_failed, "copying a buffer failed"},
+    {retrograde_error_device_crop_failed, "cropping device memory failed"},
+    {retrograde_error_incompatible_device_interface, "another device interface"},
+    {retrograde_error_internal, "internal error"},
+    {retrograde_error_unaligned_host_ptr, "unaligned host pointer"},
+    {retrograde_error_bad_fold, "bad fold"},
+    {retrograde_error_fold_factor_too_small, "fold factor too small"},
+    {retrograde_error_requirement_failed, "requirement failed"},
+    {retrograde_error_extents_negative, "negative extent"},
+    {retrograde_error_specialize_fail, "no specialization fits"},
+    {retrograde_error_host_is_null, "host pointer is null"},
+    {retrograde_error_bad_dimensions, "wrong number of dimensions"},
+    {retrograde_error_device_dirty_with_no_device_support, "data on a device"},
+};
+
 }  // namespace
 
 FailureScope::FailureScope(Failure* failure) : outer_(current_failure) {
@@ -149,86 +196,8 @@ void* retrograde_user_context(retrograde_context* context) {
 }
 
 const char* retrograde_error_name(int32_t code) {
-  switch (code) {
-    case retrograde_error_success:
-      return "success";
-    case retrograde_error_generic:
-      return "generic error";
-    case retrograde_error_explicit_bounds_too_small:
-      return "explicit bounds too small";
-    case retrograde_error_bad_type:
-      return "bad element type";
-    case retrograde_error_access_out_of_bounds:
-      return "access out of bounds";
-    case retrograde_error_allocation_too_large:
-      return "allocation too large";
-    case retrograde_error_extents_too_large:
-      return "extents too large";
-    case retrograde_error_constraints_make_required_region_smaller:
-      return "constraints make the required region smaller";
-    case retrograde_error_constraint_violated:
-      return "constraint violated";
-    case retrograde_error_param_too_small:
-      return "parameter too small";
-    case retrograde_error_param_too_large:
-      return "parameter too large";
-    case retrograde_error_out_of_memory:
-      return "out of memory";
-    case retrograde_error_buffer_argument_is_null:
-      return "buffer argument is null";
-    case retrograde_error_debug_to_file_failed:
-      return "a file cannot be written";
-    case retrograde_error_copy_to_host_failed:
-      return "copy to the host failed";
-    case retrograde_error_copy_to_device_failed:
-      return "copy to the device failed";
-    case retrograde_error_device_malloc_failed:
-      return "no memory on the device";
-    case retrograde_error_device_sync_failed:
-      return "waiting for the device failed";
-    case retrograde_error_device_free_failed:
-      return "freeing device memory failed";
-    case retrograde_error_no_device_interface:
-      return "no device interface";
-    case retrograde_error_device_run_failed:
-      return "a kernel cannot run";
-    case retrograde_error_device_wrap_native_failed:
-      return "wrapping device memory failed";
-    case retrograde_error_device_detach_native_failed:
-      return "detaching device memory failed";
-    case retrograde_error_device_interface_no_device:
-      return "a device interface without device memory";
-    case retrograde_error_host_and_device_dirty:
-      return "newer on the host and on the device";
-    case retrograde_error_buffer_is_null:
-      return "buffer is null";
-    case retrograde_error_device_buffer_copy_failed:
-      return "copying a buffer failed";
-    case retrograde_error_device_crop_failed:
-      return "cropping device memory failed";
-    case retrograde_error_incompatible_device_interface:
-      return "another device interface";
-    case retrograde_error_internal:
-      return "internal error";
-    case retrograde_error_unaligned_host_ptr:
-      return "unaligned host pointer";
-    case retrograde_error_bad_fold:
-      return "bad fold";
-    case retrograde_error_fold_factor_too_small:
-      return "fold factor too small";
-    case retrograde_error_requirement_failed:
-      return "requirement failed";
-    case retrograde_error_extents_negative:
-      return "negative extent";
-    case retrograde_error_specialize_fail:
-      return "no specialization fits";
-    case retrograde_error_host_is_null:
-      return "host pointer is null";
-    case retrograde_error_bad_dimensions:
-      return "wrong number of dimensions";
-    case retrograde_error_device_dirty_with_no_device_support:
-      return "data on a device";
-    default:
-      return "unknown error";
+  for (const retrograde::runtime::ErrorName& name : retrograde::runtime::error_names) {
+    if (name.code == code) return name.text;
   }
+  return "unknown error";
 }

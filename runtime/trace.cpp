@@ -7,7 +7,6 @@
 #include <unistd.h>
 
 #include <atomic>
-#include <cerrno>
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
@@ -17,6 +16,7 @@
 #include <vector>
 
 #include "report.h"
+#include "write_all.h"
 
 namespace retrograde::runtime {
 namespace {
@@ -173,14 +173,7 @@ std::vector<char> packet_of(const halide_trace_event_t& e, int32_t id) {
 bool write_packet(int file, const std::vector<char>& packet) {
   static std::mutex mutex;
   const std::lock_guard lock(mutex);
-  size_t done = 0;
-  while (done < packet.size()) {
-    const ssize_t written = write(file, packet.data() + done, packet.size() - done);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    done += static_cast<size_t>(written);
-  }
-  return true;
+  return write_all(file, packet.data(), packet.size());
 }
 
 std::atomic<bool> has_complained{false};

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "autoschedule/cost_estimate.h"
+#include "autoschedule/hosted_funcs.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/read_estimate.h"
 #include "autoschedule/start_in_tiles.h"
@@ -189,42 +190,23 @@ LoopNames give_passed_loops(const FuncPtr& reader, const PassedLoops& passed, in
   return names;
 }
 
-// What is computed in loops of the sum.
-class Hosted {
- public:
-  Hosted(const std::vector<FuncPtr>& outputs, const FuncContents& sum) {
-    for (const FuncPtr& f : graph::functions_of(outputs)) {
-      const graph::LoopLevel& level = f->schedule.compute_level;
-      const bool is_here = is_in(level, sum);
-      if (is_here) all_.push_back(f);
-      is_plain_ &= is_here || !is_in(f->schedule.store_level, sum);
-    }
-  }
-  // In loops that the reader takes over.
-  bool may_move(const PassedLoops& passed) const {
-    return is_plain_ && std::ranges::all_of(all_, [&](const FuncPtr& f) {
-             const bool is_stored_apart =
-                 f->schedule.store_level.kind == graph::LoopLevel::Kind::At &&
-                 f->schedule.store_level.var != f->schedule.compute_level.var;
-             return !is_stored_apart &&
-                    std::ranges::any_of(passed.loops, [&](const PassedLoop& loop) {
-                      return loop.var == f->schedule.compute_level.var;
-                    });
-           });
-  }
-  void move(const FuncPtr& reader, const LoopNames& names) const {
-    for (const FuncPtr& f : all_)
-      Func(f).compute_at(Func(reader), Var(names.at(f->schedule.compute_level.var)));
-  }
+// Whether all that is computed in loops of the sum is computed in loops that the reader takes over.
+bool may_move(const HostedFuncs& hosted, const FuncContents& sum, const PassedLoops& passed) {
+  if (!hosted.are_computed_where_stored(sum)) return false;
+  return std::ranges::all_of(hosted.computed_in(sum), [&](const FuncPtr& f) {
+    const graph::LoopLevel& store = f->schedule.store_level;
+    const std::string& loop = f->schedule.compute_level.var;
+    const bool is_stored_apart = store.kind == graph::LoopLevel::Kind::At && store.var != loop;
+    return !is_stored_apart && std::ranges::any_of(passed.loops, [&](const PassedLoop& each) {
+      return each.var == loop;
+    });
+  });
+}
 
- private:
-  static bool is_in(const graph::LoopLevel& level, const FuncContents& sum) {
-    return level.kind == graph::LoopLevel::Kind::At && level.func == sum.name;
-  }
-
-  std::vector<FuncPtr> all_;
-  bool is_plain_ = true;
-};
+void move(const std::vector<FuncPtr>& funcs, const FuncPtr& reader, const LoopNames& names) {
+  for (const FuncPtr& f : funcs)
+    Func(f).compute_at(Func(reader), Var(names.at(f->schedule.compute_level.var)));
+}
 
 }  // namespace
 
@@ -248,10 +230,10 @@ std::vector<FuncPtr> compute_epilogues(const std::vector<FuncPtr>& outputs, cons
         is_for_strips(*sum, reader->func, reads))
       continue;
     const auto passed = passed_loops(*sum, lanes);
-    const Hosted hosted(outputs, *sum);
-    if (!passed || !hosted.may_move(*passed)) continue;
+    const HostedFuncs hosted(outputs);
+    if (!passed || !may_move(hosted, *sum, *passed)) continue;
     const LoopNames names = give_passed_loops(reader->func, *passed, lanes);
-    hosted.move(reader->func, names);
+    move(hosted.computed_in(*sum), reader->func, names);
     give_loops(sum, passed->tile);
     Func(sum).compute_at(Func(reader->func), Var(names.at(passed->loops.back().var)));
     result.insert(result.end(), {sum, reader->func});

@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <optional>
-#include <set>
 #include <string>
-#include <utility>
 
+#include "autoschedule/hosted_funcs.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/slices.h"
 #include "autoschedule/start_in_tiles.h"
@@ -38,39 +37,17 @@ bool is_sum_in_tiles(const FuncContents& f) {
   });
 }
 
-// In which loops something is computed, such as the rows that tiles read copied.
-class Hosts {
- public:
-  explicit Hosts(const std::vector<FuncPtr>& outputs) {
-    for (const FuncPtr& f : graph::functions_of(outputs)) {
-      for (const graph::LoopLevel& level : {f->schedule.compute_level, f->schedule.store_level}) {
-        if (level.kind == graph::LoopLevel::Kind::At) loops_.insert({level.func, level.var});
-      }
-    }
-  }
-  void add(const FuncContents& f, const std::string& loop) { loops_.insert({f.name, loop}); }
-  bool contain(const FuncContents& f, const std::string& loop) const {
-    return loops_.contains({f.name, loop});
-  }
-  bool contain(const FuncContents& f) const {
-    const auto first = loops_.lower_bound({f.name, ""});
-    return first != loops_.end() && first->first == f.name;
-  }
-
- private:
-  std::set<std::pair<std::string, std::string>> loops_;  // of a Func
-};
-
 // Slices of something else are computed in the loops of its reduction: it runs in strips of its own.
-bool has_slices(const FuncContents& f, const Hosts& hosts) {
+bool has_slices(const FuncContents& f, const HostedFuncs& hosted) {
   const std::vector<Dim>& loops = f.updates[0].schedule.dims;
   return std::ranges::any_of(
-      loops, [&](const Dim& loop) { return loop.is_reduction && hosts.contain(f, loop.var); });
+      loops, [&](const Dim& loop) { return loop.is_reduction && hosted.are_in(f, loop.var); });
 }
 
 // The loops of the sum whose iterations make blocks small enough, and are enough tasks.
 std::optional<std::vector<BlockLoop>> block_loops(const FuncContents& f, const Reader& reader,
-                                                  const Hosts& hosts, const SizeEstimate& sizes) {
+                                                  const HostedFuncs& hosted,
+                                                  const SizeEstimate& sizes) {
   const FuncContents& by = *reader.func;
   int64_t block_bytes = sizes.bytes(f), tasks = 1;
   if (block_bytes < sizes.machine().passes_caches) return std::nullopt;
@@ -95,7 +72,7 @@ std::optional<std::vector<BlockLoop>> block_loops(const FuncContents& f, const R
     result.push_back(block);
     if (block_bytes <= sizes.machine().block_bytes && tasks >= sizes.machine().enough_tasks)
       return result;
-    if (hosts.contain(f, block.var)) return std::nullopt;
+    if (hosted.are_in(f, block.var)) return std::nullopt;
   }
   return std::nullopt;
 }
@@ -134,19 +111,19 @@ void compute_sums_in_blocks(const std::vector<FuncPtr>& outputs, const Readers& 
   const auto may_share = [&](const FuncPtr& f) {
     return std::ranges::count(given, f) > 0 && is_at_root(*f) && !but.contains(f.get());
   };
-  Hosts hosts(outputs);
+  HostedFuncs hosted(outputs);
   for (const FuncPtr& sum : given) {
     if (!may_share(sum) || !readers.is_inside(sum) || readers.is_output(sum) ||
-        !is_sum_in_tiles(*sum) || has_slices(*sum, hosts))
+        !is_sum_in_tiles(*sum) || has_slices(*sum, hosted))
       continue;
     const auto reader = readers.only_reader(sum);
     if (!reader || !may_share(reader->func) || !has_plain_rows(*reader->func) ||
-        hosts.contain(*reader->func))
+        hosted.are_in(*reader->func))
       continue;
-    const auto blocks = block_loops(*sum, *reader, hosts, sizes);
+    const auto blocks = block_loops(*sum, *reader, hosted, sizes);
     if (!blocks) continue;
     move(sum, reader->func, *blocks);
-    hosts.add(*reader->func, sum->schedule.compute_level.var);
+    hosted.add(*reader->func, sum->schedule.compute_level.var);
   }
 }
 

@@ -11,23 +11,13 @@
 #include <memory>
 
 #include "diagnostics/error.h"
+#include "write_all.h"
 
 namespace retrograde::jit {
 namespace {
 
 bool is_private(const struct stat& status) {
   return status.st_uid == geteuid() && (status.st_mode & 077) == 0;
-}
-
-bool write_all(int fd, const std::string& data) {
-  size_t done = 0;
-  while (done < data.size()) {
-    const ssize_t written = write(fd, data.data() + done, data.size() - done);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    done += static_cast<size_t>(written);
-  }
-  return true;
 }
 
 std::optional<std::string> read_all(int fd, size_t size) {
@@ -99,7 +89,7 @@ bool PrivateFolder::write(const std::string& name, const std::string& data, bool
   {
     const Descriptor file(openat(fd_.get(), temporary.c_str(), flags, 0600));
     if (!file.valid()) return false;
-    written = write_all(file.get(), data);
+    written = runtime::write_all(file.get(), data.data(), data.size());
   }
   if (written && replaces)
     written = renameat(fd_.get(), temporary.c_str(), fd_.get(), name.c_str()) == 0;

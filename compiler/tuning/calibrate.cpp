@@ -19,6 +19,7 @@
 #include "frontend/language/func.h"
 #include "frontend/language/inline_reductions.h"
 #include "frontend/language/rdom.h"
+#include "huge_pages.h"
 
 namespace retrograde::tuning {
 
@@ -279,9 +280,7 @@ double page_ns() {
   constexpr size_t bytes = size_t{64} << 20, page = 4096;
   void* memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) return Machine().page_ns;
-#ifdef MADV_HUGEPAGE
-  madvise(memory, bytes, MADV_HUGEPAGE);  // as the runtime asks for its blocks
-#endif
+  runtime::advise_huge_pages(memory, bytes);  // as for the runtime's blocks
   const auto begin = Clock::now();
   for (size_t at = 0; at < bytes; at += page) static_cast<volatile char*>(memory)[at] = 1;
   const std::chrono::duration<double, std::nano> taken = Clock::now() - begin;

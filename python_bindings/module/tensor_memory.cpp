@@ -1,13 +1,12 @@
 // tensor_memory.cpp -- reads the memory of tensors through PyTorch's Python methods.
 #include "tensor_memory.h"
 
-#include <sys/mman.h>
-
 #include <climits>
 #include <cstring>
 
 #include "casters.h"
 #include "diagnostics/error.h"
+#include "huge_pages.h"
 #include "numbers.h"
 
 namespace retrograde::python {
@@ -80,14 +79,7 @@ Runtime::Buffer<> buffer_of_tensor(py::handle tensor, Type type) {
 }
 
 void use_huge_pages(uintptr_t first, size_t bytes) {
-#ifdef MADV_HUGEPAGE
-  constexpr uintptr_t page = 2 << 20;
-  const uintptr_t begin = (first + page - 1) / page * page, end = (first + bytes) / page * page;
-  // Failure is harmless, since this is only advice.
-  if (begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
-#else
-  (void)first, (void)bytes;
-#endif
+  runtime::advise_huge_pages(reinterpret_cast<void*>(first), bytes);
 }
 
 ir::Scalar scalar_of_tensor(py::handle tensor, Type type) {

@@ -120,32 +120,6 @@ uint8_t* first_of(const halide_buffer_t& buffer, Place place) {
 
 }  // namespace
 
-int64_t offset_bytes(const halide_buffer_t& whole, const halide_buffer_t& part) {
-  int64_t offset = 0;
-  for (int d = 0; d < part.dimensions; d++)
-    offset += (int64_t{part.dim[d].min} - whole.dim[d].min) * whole.dim[d].stride;
-  return offset * whole.type.bytes();
-}
-
-int64_t origin_bytes(const halide_buffer_t& buffer) {
-  int64_t origin = 0;
-  for (int d = 0; d < buffer.dimensions; d++) {
-    const halide_dimension_t& dim = buffer.dim[d];
-    if (dim.stride < 0 && dim.extent > 0) origin -= (int64_t{dim.extent} - 1) * dim.stride;
-  }
-  return origin * buffer.type.bytes();
-}
-
-int64_t span_bytes(const halide_buffer_t& buffer) {
-  int64_t elements = 1;
-  for (int d = 0; d < buffer.dimensions; d++) {
-    const halide_dimension_t& dim = buffer.dim[d];
-    if (dim.extent <= 0) return 0;
-    elements += (int64_t{dim.extent} - 1) * std::llabs(dim.stride);
-  }
-  return elements * buffer.type.bytes();
-}
-
 bool plan_copy(const halide_buffer_t& from, Place from_place, const halide_buffer_t& to,
                Place to_place, Copy& copy) {
   const int64_t element = to.type.bytes();
@@ -169,6 +143,14 @@ bool plan_copy(const halide_buffer_t& from, Place from_place, const halide_buffe
 
 int32_t start_copy(const Session& session, const Copy& copy) {
   return copy_dimensions(session, copy, copy.dims.size());
+}
+
+int32_t refuse_in_capture(const Session& session, const char* advice) {
+  uint64_t capture = 0;
+  if (const int32_t code = session.capture(capture)) return code;
+  if (capture == 0) return 0;
+  return session.request.refuse("nothing is copied from or to the host while a graph is captured",
+                                "the stream of this call is being captured", advice);
 }
 
 void copy_on_host(const Copy& copy) { copy_on_host(copy, copy.from, copy.to, copy.dims.size()); }

@@ -3,11 +3,10 @@
 
 #include <HalideRuntime.h>
 
+#include "gpu/layout.h"
 #include "gpu/session.h"
 
 namespace retrograde::runtime {
-
-enum class Place { host, device };
 
 // A copy over a box of elements: the first element of each side, and the strides.
 struct Copy {
@@ -30,13 +29,9 @@ bool plan_copy(const halide_buffer_t& from, Place from_place, const halide_buffe
 // Issues the copy on the session's stream. A copy from the host has read the host's memory when this returns. A copy to
 // the host is complete once the stream has been waited for.
 int32_t start_copy(const Session&, const Copy&);
+// For copies from or to the host: reports an error if the stream is being captured into a graph.
+int32_t refuse_in_capture(const Session&, const char* advice);
 // A copy within the host.
 void copy_on_host(const Copy&);
-// Bytes from the first element in memory to the end of the last one.
-int64_t span_bytes(const halide_buffer_t&);
-// Offset of the element with the smallest coordinates from the first element in memory, in bytes.
-int64_t origin_bytes(const halide_buffer_t&);
-// Offset of the first element of `part` from the first element of `whole`, each the one with the smallest coordinates.
-int64_t offset_bytes(const halide_buffer_t& whole, const halide_buffer_t& part);
 
 }  // namespace retrograde::runtime

@@ -205,7 +205,8 @@ int32_t allocate_of_driver(const Session& session, size_t bytes, Address& base) 
   if (const int32_t code = reuse_block(session, bytes, capture, base)) return code;
   if (base != 0) return 0;
   if (capture == 0) {
-    const size_t most = may_reuse(session.request.caller) ? session.device().memory_bytes / 4 : 0;
+    const size_t most =
+        host().may_reuse(session.request.caller) ? session.device().memory_bytes / 4 : 0;
     if (const int32_t code = shrink_unused(session, most, Which::not_of_graphs)) return code;
   }
   if (const int32_t code = new_block(session, bytes, capture, base)) return code;
@@ -282,7 +283,7 @@ int32_t wait_for_device(const Session& session) {
 int32_t release_block(const Request& request, Address base) {
   Devices& known = devices();
   Block block;
-  const bool reuse = may_reuse(request.caller);
+  const bool reuse = host().may_reuse(request.caller);
   {
     const std::lock_guard lock(known.mutex);
     const auto found = known.live.find(base);

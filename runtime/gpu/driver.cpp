@@ -18,7 +18,7 @@ struct Library {
   void* handle = nullptr;
   bool is_simulated = false;
   void* symbol(const char* name) const {
-    return is_simulated ? dlsym(handle, name) : library_symbol(handle, name);
+    return is_simulated ? dlsym(handle, name) : host().library_symbol(handle, name);
   }
 };
 
@@ -43,7 +43,7 @@ void* load_simulated() {
 bool load(const Request& request, Library& library) {
   const char* chosen = std::getenv("RETROGRADE_GPU");
   if (!chosen || !*chosen || std::strcmp(chosen, "cuda") == 0) {
-    library = {load_library("libcuda.so.1"), false};
+    library = {host().load_library("libcuda.so.1"), false};
     if (library.handle) return true;
     request.refuse(
         "CUDA's driver must be installed",

@@ -1,8 +1,9 @@
-// The device interface of CUDA: buffers point to it, and the functions of HalideRuntime.h call it.
+// The device interface of CUDA: buffers point to it, and the functions of HalideRuntime.h call it. The functions for
+// buffers that generated code calls are the same with another context.
 #include <HalideRuntime.h>
 
-#include "gpu/copies.h"
-#include "gpu/device_memory.h"
+#include "gpu/buffer_copies.h"
+#include "gpu/buffers.h"
 #include "gpu/gpu_calls.h"
 #include "gpu/host.h"
 #include "gpu/views.h"
@@ -10,16 +11,15 @@
 namespace retrograde::runtime {
 namespace {
 
-// Makes the context of a call from its user context.
+// The context of a call that has only a user context.
 struct CallerOf {
-  explicit CallerOf(void* user_context) { begin_device_call(&context, user_context); }
+  explicit CallerOf(void* user_context) { host().begin_call(&context, user_context); }
   operator retrograde_context*() { return &context; }
   retrograde_context context;
 };
 
-int refuse_null(const Request& request) {
-  return request.refuse(retrograde_error_buffer_is_null, "there must be a buffer",
-                        "the pointer is null", "Pass a halide_buffer_t");
+BufferCaller for_buffers(retrograde_context* context) {
+  return {context, retrograde_gpu_interface()};
 }
 
 int device_malloc(void* user_context, halide_buffer_t* buffer, const halide_device_interface_t*) {
@@ -86,16 +86,18 @@ int buffer_copy(void* user_context, halide_buffer_t* from,
 
 int device_crop(void* user_context, const halide_buffer_t* whole, halide_buffer_t* view) {
   CallerOf caller(user_context);
-  const Request request(caller, retrograde_error_device_crop_failed, "crop device memory");
-  return whole && view ? crop_device(request, *whole, *view) : refuse_null(request);
+  const BufferRequest request(for_buffers(caller), retrograde_error_device_crop_failed,
+                              "crop device memory");
+  return whole && view ? crop_device(request, *whole, *view) : request.refuse_null_buffer();
 }
 
 int device_slice(void* user_context, const halide_buffer_t* whole, int dimension, int position,
                  halide_buffer_t* view) {
   CallerOf caller(user_context);
-  const Request request(caller, retrograde_error_device_crop_failed, "slice device memory");
+  const BufferRequest request(for_buffers(caller), retrograde_error_device_crop_failed,
+                              "slice device memory");
   return whole && view ? slice_device(request, *whole, dimension, position, *view)
-                       : refuse_null(request);
+                       : request.refuse_null_buffer();
 }
 
 int device_release_crop(void*, halide_buffer_t* buffer) {
@@ -106,9 +108,10 @@ int device_release_crop(void*, halide_buffer_t* buffer) {
 int wrap_native(void* user_context, halide_buffer_t* buffer, uint64_t address,
                 const halide_device_interface_t*) {
   CallerOf caller(user_context);
-  const Request request(caller, retrograde_error_device_wrap_native_failed, "wrap device memory");
+  const BufferRequest request(for_buffers(caller), retrograde_error_device_wrap_native_failed,
+                              "wrap device memory");
   return buffer ? guarded(request, [&] { return wrap_memory(request, *buffer, address); })
-                : refuse_null(request);
+                : request.refuse_null_buffer();
 }
 
 int detach_native(void* user_context, halide_buffer_t* buffer) {
@@ -116,7 +119,7 @@ int detach_native(void* user_context, halide_buffer_t* buffer) {
   const Request request(caller, retrograde_error_device_detach_native_failed,
                         "detach device memory");
   return buffer ? guarded(request, [&] { return detach_memory(request, *buffer); })
-                : refuse_null(request);
+                : request.refuse_null_buffer();
 }
 
 int compute_capability(void* user_context, int* major, int* minor) {
@@ -137,6 +140,8 @@ int compute_capability(void* user_context, int* major, int* minor) {
 }  // namespace
 }  // namespace retrograde::runtime
 
+namespace rt = retrograde::runtime;
+
 const halide_device_interface_t* retrograde_gpu_interface(void) {
   using namespace retrograde::runtime;
   static constexpr halide_device_interface_t interface = {device_malloc,
@@ -156,4 +161,30 @@ const halide_device_interface_t* retrograde_gpu_interface(void) {
                                                           compute_capability,
                                                           nullptr};
   return &interface;
+}
+
+int32_t retrograde_gpu_malloc(retrograde_context* caller, halide_buffer_t* buffer) {
+  return rt::allocate_device_memory(rt::for_buffers(caller), buffer);
+}
+
+int32_t retrograde_gpu_free(retrograde_context* caller, halide_buffer_t* buffer) {
+  return rt::free_device_memory(rt::for_buffers(caller), buffer);
+}
+
+int32_t retrograde_gpu_copy_to_device(retrograde_context* caller, halide_buffer_t* buffer) {
+  return rt::copy_newest(rt::for_buffers(caller), buffer, rt::Place::device);
+}
+
+int32_t retrograde_gpu_copy_to_host(retrograde_context* caller, halide_buffer_t* buffer) {
+  return rt::copy_newest(rt::for_buffers(caller), buffer, rt::Place::host);
+}
+
+int32_t retrograde_gpu_sync(retrograde_context* caller, halide_buffer_t* buffer) {
+  return rt::wait_for_stream(caller, buffer);
+}
+
+int32_t retrograde_gpu_buffer_copy(retrograde_context* caller, halide_buffer_t* from,
+                                   int32_t to_device, halide_buffer_t* to) {
+  const rt::Place place = to_device ? rt::Place::device : rt::Place::host;
+  return rt::copy_buffer(rt::for_buffers(caller), from, to, place);
 }

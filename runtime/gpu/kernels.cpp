@@ -6,7 +6,6 @@
 #include "gpu/device_memory.h"
 #include "gpu/gpu_calls.h"
 #include "gpu/programs.h"
-#include "gpu/views.h"
 
 namespace retrograde::runtime {
 namespace {

@@ -58,5 +58,7 @@ std::shared_ptr<Program> find_program(const void* source);
 // Returns the existing program, or makes one.
 std::shared_ptr<Program> make_program(const void* source, int64_t bytes);
 std::shared_ptr<Program> forget_program(const void* source);
+// kernels.cpp: unloads all programs.
+int32_t unload_all(const Request&);
 
 }  // namespace retrograde::runtime

@@ -1,7 +1,7 @@
 // Releases everything that is kept: unused memory, kernels, primary contexts.
 #include "gpu/device_memory.h"
 #include "gpu/gpu_calls.h"
-#include "gpu/views.h"
+#include "gpu/programs.h"
 
 namespace retrograde::runtime {
 namespace {

@@ -49,6 +49,11 @@ int32_t Request::refuse(int32_t other_code, const char* rule, const char* eviden
                                  static_cast<const char*>(asked_), rule, evidence, advice);
 }
 
+int32_t Request::refuse_null_buffer() const {
+  return refuse(retrograde_error_buffer_is_null, "there must be a buffer", "the pointer is null",
+                "Pass a halide_buffer_t");
+}
+
 int32_t Request::driver_failed(const Driver& driver, const char* function, int result,
                                const char* evidence) const {
   const char* separator = *evidence ? ", " : "";

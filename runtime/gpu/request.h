@@ -36,6 +36,7 @@ class Request {
   }
   int32_t refuse(int32_t other_code, const char* rule, const char* evidence,
                  const char* advice) const;
+  int32_t refuse_null_buffer() const;
   // Reports that a driver function returned `result`; `evidence` may be empty.
   int32_t driver_failed(const Driver&, const char* function, int result,
                         const char* evidence = "") const;

@@ -22,7 +22,7 @@ int32_t handler_failed(const Request& request, const char* handler, int32_t code
 
 int32_t default_context(const Request& request, const Driver& driver, Context current,
                         Context& context) {
-  const int number = wanted_device(request.caller);
+  const int number = host().selected_device(request.caller);
   context = current;
   return number == -1 && current ? 0 : primary_context(request, driver, number, context);
 }
@@ -108,6 +108,11 @@ int32_t Session::capture(uint64_t& id) const {
   if (result != success) return failed("cuStreamGetCaptureInfo_v2", result);
   if (status != capture_none) id = given;
   return 0;
+}
+
+int32_t Session::wait() const {
+  const Result result = driver_->cuStreamSynchronize(stream_);
+  return result == success ? 0 : failed("cuStreamSynchronize", result);
 }
 
 }  // namespace retrograde::runtime

@@ -25,6 +25,8 @@ class Session {
   Stream stream() const { return stream_; }
   // The number of the graph that the stream is being captured into; 0: none.
   int32_t capture(uint64_t& id) const;
+  // Waits for all work on the stream.
+  int32_t wait() const;
   int32_t failed(const char* function, Result result, const char* evidence = "") const {
     return request.driver_failed(*driver_, function, result, evidence);
   }

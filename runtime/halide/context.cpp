@@ -3,19 +3,12 @@
 #include <cstdint>
 #include <cstring>
 
-#include "halide/gpu_handlers.h"
+#include "halide/cuda_context.h"
+#include "halide/handlers.h"
 #include "halide/weak.h"
 #include "retrograde_runtime.h"
 
 namespace {
-
-void tell_error(retrograde_context* context, int, const char* message) {
-  halide_error(context->user_data, message);
-}
-
-void print(retrograde_context* context, const char* text) {
-  halide_print(context->user_data, text);
-}
 
 // A program's own halide_malloc may align less than generated code needs. So blocks are aligned here, and the pointer
 // to free is stored in front of them.
@@ -63,13 +56,10 @@ int32_t run_parallel(retrograde_context* context, retrograde_task task, int32_t 
 }  // namespace
 
 void retrograde_begin_call(retrograde_context* context, void* user_context) {
-  *context = {};
-  context->error_handler = tell_error;
-  context->print_handler = print;
+  *context = retrograde::runtime::reporting_context(user_context);
   context->malloc_handler = allocate;
   context->free_handler = release;
   context->parallel_handler = run_parallel;
   context->trace_handler = trace;
   context->gpu_handlers = retrograde::runtime::halide_gpu_handlers();
-  context->user_data = user_context;
 }

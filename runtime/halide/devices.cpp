@@ -3,29 +3,23 @@
 #include "gpu/gpu_calls.h"
 #include "gpu/host.h"
 #include "gpu/request.h"
+#include "halide/call_context.h"
 #include "halide/weak.h"
 
 namespace {
 
 namespace rt = retrograde::runtime;
 
-struct CallerOf {
-  explicit CallerOf(void* user_context) { retrograde_begin_call(&context, user_context); }
-  operator retrograde_context*() { return &context; }
-  retrograde_context context;
-};
-
 int no_interface(void* user_context, const char* asked) {
-  CallerOf caller(user_context);
+  rt::CallContext caller(user_context);
   return rt::Request(caller, halide_error_code_no_device_interface, asked)
       .refuse("a device interface must be named", "it is null, and the buffer has none",
               "Pass halide_cuda_device_interface()");
 }
 
 int null_buffer(void* user_context, const char* asked) {
-  CallerOf caller(user_context);
-  return rt::Request(caller, halide_error_code_buffer_is_null, asked)
-      .refuse("there must be a buffer", "the pointer is null", "Pass a halide_buffer_t");
+  rt::CallContext caller(user_context);
+  return rt::Request(caller, halide_error_code_buffer_is_null, asked).refuse_null_buffer();
 }
 
 // The interface of a buffer that is on a device. Null if there is nothing to do or on an error; `code` tells which.
@@ -41,7 +35,7 @@ const halide_device_interface_t* interface_of(void* user_context, const halide_b
 halide_device_allocation_pool* pools = nullptr;
 
 int release_pools(void* user_context) {
-  CallerOf caller(user_context);
+  rt::CallContext caller(user_context);
   int first = retrograde_gpu_release_unused(caller);
   for (auto* pool = __atomic_load_n(&pools, __ATOMIC_ACQUIRE); pool; pool = pool->next) {
     const int code = pool->release_unused(user_context);

@@ -1,6 +1,7 @@
 // Tracing and profiling functions of HalideRuntime.h.
 #include <cstdint>
 
+#include "halide/handlers.h"
 #include "halide/weak.h"
 #include "inquiries.h"
 #include "retrograde_runtime.h"
@@ -8,19 +9,13 @@
 
 namespace {
 
-retrograde_context context_of(void* user_context) {
-  retrograde_context context;
-  retrograde_begin_call(&context, user_context);
-  return context;
-}
-
 halide_trace_t custom_trace = nullptr;
 
 }  // namespace
 
 RETROGRADE_WEAK int32_t halide_default_trace(void* user_context,
                                              const halide_trace_event_t* event) {
-  retrograde_context context = context_of(user_context);
+  retrograde_context context = retrograde::runtime::reporting_context(user_context);
   return retrograde::runtime::trace_to(halide_get_trace_file(user_context), &context, event);
 }
 
@@ -57,7 +52,7 @@ RETROGRADE_WEAK void halide_start_timer_chain() {}
 RETROGRADE_WEAK void halide_disable_timer_interrupt() {}
 RETROGRADE_WEAK void halide_enable_timer_interrupt() {}
 RETROGRADE_WEAK void halide_profiler_report(void* user_context) {
-  retrograde_context context = context_of(user_context);
+  retrograde_context context = retrograde::runtime::reporting_context(user_context);
   retrograde_profiler_report(&context);
 }
 RETROGRADE_WEAK void halide_profiler_reset() { retrograde_profiler_reset(); }

@@ -1,9 +1,10 @@
 // Printing, errors and memory by HalideRuntime.h: a handler that the program sets, or the default.
 //
-// An error that no handler takes ends the process, as it does in Halide: a program that does not look
-// at the code that a function returns must not go on with what was never computed. With a handler of
-// its own the program gets the code. One difference to Halide's defaults: memory comes from the pool
-// of memory.cpp.
+// Without a handler, an error ends the process, as in Halide: a program that ignores error codes must not continue with
+// results that were never computed. With a handler, functions return the code. Unlike Halide's default, memory comes
+// from the pool of memory.cpp.
+#include "halide/handlers.h"
+
 #include <unistd.h>
 
 #include <atomic>
@@ -11,7 +12,6 @@
 #include <cstring>
 
 #include "halide/weak.h"
-#include "retrograde_runtime.h"
 
 namespace {
 
@@ -26,7 +26,23 @@ Handler exchange(std::atomic<Handler>& current, Handler wanted, Handler fallback
   return current.exchange(wanted ? wanted : fallback);
 }
 
+void tell_error(retrograde_context* context, int, const char* message) {
+  halide_error(context->user_data, message);
+}
+
+void print(retrograde_context* context, const char* text) {
+  halide_print(context->user_data, text);
+}
+
 }  // namespace
+
+retrograde_context retrograde::runtime::reporting_context(void* user_context) {
+  retrograde_context context = {};
+  context.error_handler = tell_error;
+  context.print_handler = print;
+  context.user_data = user_context;
+  return context;
+}
 
 RETROGRADE_WEAK void halide_default_print(void*, const char* text) {
   size_t length = std::strlen(text);

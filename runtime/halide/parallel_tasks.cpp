@@ -8,7 +8,7 @@
 #include <new>
 #include <vector>
 
-#include "halide/parallel_tasks.h"
+#include "halide/semaphores.h"
 #include "halide/weak.h"
 #include "parallel.h"
 #include "report.h"
@@ -20,9 +20,6 @@ namespace rt = retrograde::runtime;
 
 std::atomic<halide_do_loop_task_t> loop_task_handler{halide_default_do_loop_task};
 std::atomic<halide_do_parallel_tasks_t> tasks_handler{halide_default_do_parallel_tasks};
-
-// Counts events that may end a wait: signals and failures.
-std::atomic<uint32_t> news{0};
 
 struct TaskRun {
   void* user_context;
@@ -38,10 +35,10 @@ struct TaskRun {
 
   bool acquire(const halide_semaphore_acquire_t& wanted) const {
     for (;;) {
-      const uint32_t seen = news.load();
+      const uint32_t seen = rt::wake_count();
       if (any_failed->load()) return false;
       if (halide_semaphore_try_acquire(wanted.semaphore, wanted.count)) return true;
-      news.wait(seen);
+      rt::wait_for_wake(seen);
     }
   }
   bool acquire_all() const {
@@ -83,7 +80,7 @@ struct TaskRun {
   void fail(int with) {
     code = with;
     any_failed->store(true);
-    rt::note_semaphore_release();
+    rt::wake_waiting_tasks();
   }
 };
 
@@ -96,11 +93,6 @@ void start(TaskRun& run) {
 }
 
 }  // namespace
-
-void rt::note_semaphore_release() {
-  news.fetch_add(1);
-  news.notify_all();
-}
 
 RETROGRADE_WEAK int halide_default_do_loop_task(void* user_context, halide_loop_task_t task,
                                                 int min, int extent, uint8_t* closure,

@@ -1,8 +1,7 @@
-// Mutexes, condition variables and semaphores by HalideRuntime.h; all are zero-initialised words.
+// Mutexes and condition variables by HalideRuntime.h; both are zero-initialised words.
 #include <atomic>
 #include <new>
 
-#include "halide/parallel_tasks.h"
 #include "halide/weak.h"
 
 namespace {
@@ -13,14 +12,6 @@ constexpr uintptr_t is_free = 0, is_held = 1, is_awaited = 2;
 
 Word word(halide_mutex* mutex) { return Word(mutex->_private[0]); }
 Word word(halide_cond* cond) { return Word(cond->_private[0]); }
-std::atomic_ref<uint64_t> word(halide_semaphore_t* semaphore) {
-  return std::atomic_ref<uint64_t>(semaphore->_private[0]);
-}
-
-std::atomic<halide_semaphore_init_t> init_handler{halide_default_semaphore_init};
-std::atomic<halide_semaphore_try_acquire_t> try_acquire_handler{
-    halide_default_semaphore_try_acquire};
-std::atomic<halide_semaphore_release_t> release_handler{halide_default_semaphore_release};
 
 }  // namespace
 
@@ -76,41 +67,4 @@ RETROGRADE_WEAK int halide_mutex_array_lock(halide_mutex_array* array, int entry
 RETROGRADE_WEAK int halide_mutex_array_unlock(halide_mutex_array* array, int entry) {
   halide_mutex_unlock(&array->mutexes[entry]);
   return 0;
-}
-
-RETROGRADE_WEAK int halide_default_semaphore_init(halide_semaphore_t* semaphore, int count) {
-  word(semaphore).store(static_cast<uint64_t>(count));
-  return count;
-}
-RETROGRADE_WEAK int halide_default_semaphore_release(halide_semaphore_t* semaphore, int count) {
-  const int before = static_cast<int>(word(semaphore).fetch_add(static_cast<uint64_t>(count)));
-  retrograde::runtime::note_semaphore_release();
-  return before + count;
-}
-RETROGRADE_WEAK bool halide_default_semaphore_try_acquire(halide_semaphore_t* semaphore,
-                                                          int count) {
-  uint64_t has = word(semaphore).load();
-  do {
-    if (has < static_cast<uint64_t>(count)) return false;
-  } while (!word(semaphore).compare_exchange_weak(has, has - static_cast<uint64_t>(count)));
-  return true;
-}
-RETROGRADE_WEAK int halide_semaphore_init(halide_semaphore_t* semaphore, int count) {
-  return init_handler.load()(semaphore, count);
-}
-RETROGRADE_WEAK int halide_semaphore_release(halide_semaphore_t* semaphore, int count) {
-  const int now = release_handler.load()(semaphore, count);
-  retrograde::runtime::note_semaphore_release();
-  return now;
-}
-RETROGRADE_WEAK bool halide_semaphore_try_acquire(halide_semaphore_t* semaphore, int count) {
-  return try_acquire_handler.load()(semaphore, count);
-}
-
-void retrograde::runtime::set_semaphore_handlers(halide_semaphore_init_t init,
-                                                 halide_semaphore_try_acquire_t try_acquire,
-                                                 halide_semaphore_release_t release) {
-  init_handler = init ? init : halide_default_semaphore_init;
-  try_acquire_handler = try_acquire ? try_acquire : halide_default_semaphore_try_acquire;
-  release_handler = release ? release : halide_default_semaphore_release;
 }

@@ -17,34 +17,33 @@ namespace {
 
 constexpr int quality = 98;  // high enough for comparing pictures
 
-struct Errors {
-  jpeg_error_mgr manager;
-  std::jmp_buf back;
-  char message[JMSG_LENGTH_MAX] = "";  // the first message
-};
-
 // Warnings after which the decoder invents samples, as for a truncated file.
 bool is_damage(int warning) {
   return warning == JWRN_JPEG_EOF || warning == JWRN_HIT_MARKER || warning == JWRN_HUFF_BAD_CODE ||
          warning == JWRN_ARITH_BAD_CODE || warning == JWRN_MUST_RESYNC;
 }
 
-void note(j_common_ptr codec) {
-  auto* errors = static_cast<Errors*>(codec->client_data);
-  if (!*errors->message) codec->err->format_message(codec, errors->message);
-}
+struct Errors {
+  jpeg_error_mgr manager;
+  std::jmp_buf back;
+  char message[JMSG_LENGTH_MAX] = "";  // the first message
 
-[[noreturn]] void give_up(j_common_ptr codec) {
-  note(codec);
-  std::longjmp(static_cast<Errors*>(codec->client_data)->back, 1);
-}
+  void note(j_common_ptr codec) {
+    if (!*message) codec->err->format_message(codec, message);
+  }
+};
+
+Errors& errors_of(j_common_ptr codec) { return *static_cast<Errors*>(codec->client_data); }
 
 template <typename Codec>
 void report_to(Errors& errors, Codec& codec) {
   codec.err = jpeg_std_error(&errors.manager);
-  errors.manager.error_exit = give_up;
+  errors.manager.error_exit = [](j_common_ptr from) {
+    errors_of(from).note(from);
+    std::longjmp(errors_of(from).back, 1);
+  };
   errors.manager.emit_message = [](j_common_ptr from, int level) {
-    if (level < 0 && is_damage(from->err->msg_code)) note(from);
+    if (level < 0 && is_damage(from->err->msg_code)) errors_of(from).note(from);
   };
   codec.client_data = &errors;
 }

@@ -13,18 +13,10 @@ std::string triple(const int32_t (&v)[3]) {
 }
 
 const char* waiting_for(Wait wait) {
-  switch (wait) {
-    case Wait::barrier:
-      return "waits at a barrier";
-    case Wait::warp_barrier:
-      return "waits at a barrier of its warp";
-    case Wait::shuffle:
-      return "waits at a shuffle";
-    case Wait::ended:
-      return "has ended";
-    default:
-      return "runs";
-  }
+  if (wait == Wait::barrier) return "waits at a barrier";
+  if (wait == Wait::warp_barrier) return "waits at a barrier of its warp";
+  if (wait == Wait::shuffle) return "waits at a shuffle";
+  return wait == Wait::ended ? "has ended" : "runs";
 }
 
 const char* verb_of(Access access) {

@@ -6,6 +6,7 @@
 
 #include "frontend/run/pipeline.h"
 #include "ir/target.h"
+#include "support/program_counts.h"
 #include "testing/check_program.h"
 #include "testing/random_schedule.h"
 
@@ -16,11 +17,7 @@ constexpr uint64_t first_seed = 7000;
 constexpr int programs_per_shard = 40;
 constexpr int shards = 4;
 // Programs without a schedule, and partly scheduled ones.
-#ifdef RETROGRADE_MANY_PROGRAMS
-constexpr int step = 1;  // 160
-#else
-constexpr int step = 2;  // 80: every second shard
-#endif
+constexpr int step = many_or_few(1, 2);  // 160, or 80: every second shard
 
 // The directives for half of the Funcs, and for the Funcs generated from these.
 ScheduleLog part_of(const ScheduleLog& log, Choices& choices) {

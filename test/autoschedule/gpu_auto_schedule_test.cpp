@@ -13,16 +13,10 @@
 #include "graph/graph.h"
 #include "simt/simt_driver.h"
 #include "support/gpu_programs.h"
+#include "support/simulated_device.h"
 
 namespace retrograde {
 namespace {
-
-// Must be set before the first use of a device.
-[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
-
-Target with_gpu() {
-  return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
-}
 
 void set_order(int order) {
   retrograde_simt_options options;

@@ -2,26 +2,20 @@
 // device. A program that is refused is also refused without a schedule.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-
 #include "frontend/run/pipeline.h"
 #include "ir/target.h"
 #include "simt/simt_driver.h"
+#include "support/program_counts.h"
+#include "support/simulated_device.h"
 #include "testing/check_program.h"
 
 namespace retrograde::fuzz {
 namespace {
 
-[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
-
 constexpr uint64_t first_seed = 8000;
 constexpr int orders = 4;
 constexpr int programs_per_shard = 4;
-#ifdef RETROGRADE_MANY_PROGRAMS
-constexpr int shards = 150;
-#else
-constexpr int shards = 15;  // 60 programs
-#endif
+constexpr int shards = many_or_few(150, 15);  // 600 programs, or 60
 
 RandomProgram program_of(uint64_t seed) {
   Choices choices(seed);
@@ -35,8 +29,7 @@ TEST_P(GpuAutoSchedules, AreLegalAndRight) {
   retrograde_simt_get_options(&options);
   options.order = GetParam() % orders;
   retrograde_simt_set_options(&options);
-  const Target target =
-      get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
+  const Target target = with_gpu();
   uint64_t compared = 0;
   int on_gpu = 0;
   for (int i = 0; i < programs_per_shard; ++i) {

@@ -16,19 +16,12 @@
 #include "ir/visit.h"
 #include "lower/lower.h"
 #include "simt/simt_driver.h"
+#include "support/simulated_device.h"
 
 namespace retrograde {
 namespace {
 
-// Selects the simulated device before any code asks for a device.
-[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
-
 constexpr int width = 256, height = 128;
-
-// A fixed capability, not this machine's: the page must be the same everywhere.
-Target with_gpu() {
-  return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
-}
 
 struct Convolution {
   Var x{"x"}, y{"y"}, xi{"xi"}, yi{"yi"};

@@ -8,15 +8,11 @@
 #include "frontend/run/kernel_report.h"
 #include "frontend/run/pipeline.h"
 #include "gradient/programs_suite.h"
+#include "support/program_counts.h"
+#include "support/simulated_device.h"
 
 namespace retrograde::gradient {
 namespace {
-
-[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
-
-Target with_gpu() {
-  return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
-}
 
 // Buffers for the loss and its gradients by all inputs.
 struct Outputs {
@@ -72,11 +68,7 @@ TEST_P(GpuGradients, AreWhatTheCpuGives) {
   }
 }
 
-#ifdef RETROGRADE_MANY_PROGRAMS
-constexpr size_t step = 1;
-#else
-constexpr size_t step = 4;
-#endif
+constexpr size_t step = many_or_few(1, 4);
 
 INSTANTIATE_TEST_SUITE_P(Programs, GpuGradients,
                          ::testing::Range<size_t>(0, programs().size(), step),

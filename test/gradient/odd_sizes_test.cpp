@@ -7,17 +7,14 @@
 
 #include "frontend/language/inline_reductions.h"
 #include "support/checked_accesses.h"
+#include "support/program_counts.h"
 #include "testing/interpreter.h"
 #include "testing/programs/program.h"
 
 namespace retrograde::gradient {
 namespace {
 
-#ifdef RETROGRADE_MANY_PROGRAMS
-constexpr uint64_t first_program = 0, programs = 200;
-#else
-constexpr uint64_t first_program = 0, programs = 8;
-#endif
+constexpr uint64_t first_program = 0, programs = many_or_few(200, 8);
 
 // The budget of interpreter operations for one program.
 constexpr uint64_t operations = 20'000'000;

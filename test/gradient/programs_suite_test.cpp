@@ -9,6 +9,7 @@
 #include "graph/directives/give_directive.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/graph.h"
+#include "support/program_counts.h"
 
 namespace retrograde::gradient {
 namespace {
@@ -81,11 +82,7 @@ TEST_P(CheckedSuite, AdjointTangentAndComplexStepAgree) {
   }
 }
 
-#ifdef RETROGRADE_MANY_PROGRAMS
-constexpr size_t step_of_checked = 1;
-#else
-constexpr size_t step_of_checked = 3;
-#endif
+constexpr size_t step_of_checked = many_or_few(1, 3);
 
 std::string name_of(const ::testing::TestParamInfo<size_t>& info) {
   return programs()[info.param].name;

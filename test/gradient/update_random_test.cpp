@@ -8,15 +8,12 @@
 #include "diagnostics/error.h"
 #include "gradient/adversary/check.h"
 #include "gradient/adversary/probe.h"
+#include "support/program_counts.h"
 
 namespace retrograde::gradient {
 namespace {
 
-#ifdef RETROGRADE_MANY_PROGRAMS
-constexpr unsigned programs = 300;
-#else
-constexpr unsigned programs = 150;
-#endif
+constexpr unsigned programs = many_or_few(300, 150);
 
 AdversaryProgram program_of(unsigned seed, const AdjointOptions& options) {
   Choices choices(seed);

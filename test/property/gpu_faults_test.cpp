@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
-#include <cstdlib>
 #include <map>
 
 #include "ir/build.h"
@@ -15,18 +14,12 @@
 #include "ir/visit.h"
 #include "jit/jit.h"
 #include "simt/simt_driver.h"
+#include "support/simulated_device.h"
 
 namespace retrograde {
 namespace {
 
-// Must be set before any code requests a device.
-[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
-
 constexpr int width = 37, height = 21;
-
-Target with_gpu() {
-  return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
-}
 
 // ---- programs ----
 

@@ -2,17 +2,14 @@
 // every order of threads, without races. test/property/fuzz_gpu.cpp runs further seeds.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-
 #include "ir/target.h"
 #include "simt/simt_driver.h"
+#include "support/simulated_device.h"
 #include "testing/check_program.h"
 #include "testing/random_gpu_schedule.h"
 
 namespace retrograde::fuzz {
 namespace {
-
-[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
 
 constexpr uint64_t first_seed = 5000;
 constexpr int programs_per_order = 40;
@@ -25,8 +22,7 @@ TEST_P(GpuSchedules, KernelsAgreeWithTheInterpreter) {
   retrograde_simt_get_options(&options);
   options.order = GetParam();
   retrograde_simt_set_options(&options);
-  const Target target =
-      get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
+  const Target target = with_gpu();
   uint64_t compared = 0;
   int refused = 0;
   GpuScheduleCounts used;

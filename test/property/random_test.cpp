@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "ir/target.h"
+#include "support/program_counts.h"
 #include "testing/check_program.h"
 #include "testing/random_schedule.h"
 
@@ -18,11 +19,7 @@ namespace {
 constexpr uint64_t first_seed = 1000;
 constexpr int programs_per_shard = 50;
 constexpr int shards = 4;
-#ifdef RETROGRADE_MANY_PROGRAMS
-constexpr int step = 1;  // 200 programs
-#else
-constexpr int step = 2;  // 100 programs: every second shard
-#endif
+constexpr int step = many_or_few(1, 2);        // 200 programs, or 100: every second shard
 constexpr double max_refused_fraction = 0.15;  // the share of one shard's programs
 constexpr double max_unstable_fraction = 0.1;
 

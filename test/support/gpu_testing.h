@@ -1,27 +1,22 @@
-// Helpers for tests of the GPU runtime: a pipeline of one kernel as generated code would run it, and a test fixture
-// that checks for leaks on the simulated device.
+// Helpers for tests of the GPU runtime: a pipeline of one kernel as generated code would run it, a test fixture, and
+// streams and graphs that belong to the program.
 #pragma once
 
 #include <HalideBuffer.h>
 #include <HalideRuntimeCuda.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <string>
 
 #include "gpu/gpu_calls.h"
 #include "support/gpu_kernels.h"
-#include "support/simulated_driver.h"
+#include "support/simulated_fixture.h"
 
 namespace gpu_testing {
 
 namespace cuda = retrograde::cuda;
 using gpu_kernels::Image;
 using Halide::Runtime::Buffer;
-
-inline thread_local std::string errors;
-
-inline const halide_device_interface_t* device() { return halide_cuda_device_interface(); }
 
 inline Buffer<float> ramp(int width, int height = 1) {
   Buffer<float> b(width, height);
@@ -72,26 +67,14 @@ struct Saxpy {
   }
 };
 
-// A fixture that records all messages to handlers, and checks that nothing is left allocated.
-class GpuRuntime : public testing::Test {
+// Restores the handlers and settings that a test may change.
+class GpuRuntime : public SimulatedDevice {
  protected:
-  GpuRuntime() {
-    setenv("RETROGRADE_GPU", "simulated", 1);
-    errors.clear();
-    halide_set_error_handler([](void*, const char* text) { errors += text; });
-  }
   ~GpuRuntime() override {
-    retrograde_simt_call_off();
     halide_set_gpu_device(0);
     halide_set_cuda_acquire_context(nullptr);
     halide_set_cuda_get_stream(nullptr);
     retrograde_set_device_allocator(nullptr, nullptr);
-    halide_reuse_device_allocations(nullptr, true);
-    halide_device_release(nullptr, device());
-    EXPECT_EQ(live_objects().allocations, 0);
-    EXPECT_EQ(live_objects().modules, 0);
-    EXPECT_EQ(live_objects().contexts, 0);
-    halide_set_error_handler(nullptr);
   }
   void expect_error(int code, int expected, std::initializer_list<const char*> parts) {
     EXPECT_EQ(code, expected) << errors;
@@ -99,7 +82,6 @@ class GpuRuntime : public testing::Test {
       EXPECT_NE(errors.find(part), std::string::npos) << part << "\nin: " << errors;
     errors.clear();
   }
-  SimulatedOptions options;
 };
 
 inline void expect_saxpy(const Buffer<float>& y, float a) {
@@ -136,6 +118,39 @@ class GivenStream {
     halide_set_cuda_get_stream(nullptr);
     EXPECT_EQ(cuda::cuCtxDestroy_v2(user_context_made), cuda::success);
   }
+};
+
+// During its lifetime, calls use the default stream instead of the program's.
+class OnDefaultStream {
+ public:
+  OnDefaultStream() { halide_set_cuda_get_stream(nullptr); }
+  OnDefaultStream(const OnDefaultStream&) = delete;
+  ~OnDefaultStream() { halide_set_cuda_get_stream(get_users_stream); }
+};
+
+// A graph of the work that is issued on the program's stream between begin and end.
+class CapturedGraph {
+ public:
+  CapturedGraph() = default;
+  CapturedGraph(const CapturedGraph&) = delete;
+  ~CapturedGraph() {
+    EXPECT_EQ(cuda::cuGraphExecDestroy(exec_), cuda::success);
+    EXPECT_EQ(cuda::cuGraphDestroy(graph_), cuda::success);
+  }
+
+  void begin() { ASSERT_EQ(cuda::cuStreamBeginCapture_v2(user_stream, 0), cuda::success); }
+  void end() {
+    ASSERT_EQ(cuda::cuStreamEndCapture(user_stream, &graph_), cuda::success);
+    ASSERT_EQ(cuda::cuGraphInstantiateWithFlags(&exec_, graph_, 0), cuda::success);
+  }
+  void launch(int times) {
+    for (int i = 0; i < times; i++)
+      ASSERT_EQ(cuda::cuGraphLaunch(exec_, user_stream), cuda::success);
+  }
+
+ private:
+  cuda::Graph graph_ = nullptr;
+  cuda::GraphExec exec_ = nullptr;
 };
 
 }  // namespace gpu_testing

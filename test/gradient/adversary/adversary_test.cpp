@@ -12,6 +12,7 @@
 #include "gradient/adversary/auto_scheduled.h"
 #include "gradient/adversary/check.h"
 #include "support/checked_accesses.h"
+#include "support/program_counts.h"
 #include "support/run_apart.h"
 
 namespace retrograde::gradient {
@@ -19,11 +20,8 @@ namespace {
 
 constexpr unsigned programs_per_shard = 15, shards = 16, one_compiled_of = 8;
 constexpr unsigned scheduled_per_shard = 5, shards_scheduled = 6;
-#ifdef RETROGRADE_MANY_PROGRAMS
-constexpr unsigned step = 1;  // 240 programs, and 30 that the compiler schedules
-#else
-constexpr unsigned step = 2;  // half of them: every second shard
-#endif
+// 240 programs, and 30 that the compiler schedules; or half of them: every second shard.
+constexpr unsigned step = many_or_few(1, 2);
 
 class Adversary : public ::testing::TestWithParam<unsigned> {};
 

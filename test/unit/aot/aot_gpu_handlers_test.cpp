@@ -11,7 +11,7 @@
 #include "gpu/driver_types.h"
 #include "gpu_filter_alone.h"
 #include "support/gpu_filter_testing.h"
-#include "support/simulated_driver.h"
+#include "support/simulated_fixture.h"
 
 namespace cuda = retrograde::cuda;
 
@@ -59,12 +59,7 @@ TEST(AotGpuHandlers, ContextAndStreamAreTheProgramsOwn) {
     EXPECT_EQ(contexts_held, 0) << "what was acquired was released";
     EXPECT_EQ(std::count(users.begin(), users.end(), &user), static_cast<int64_t>(users.size()));
     EXPECT_EQ(live_objects().contexts, 1) << "no other was made";
-    cuda::Context current = &current;
-    ASSERT_EQ(cuda::cuCtxGetCurrent(&current), cuda::success);
-    EXPECT_EQ(current, nullptr) << "what was current is so again";
-    ASSERT_EQ(cuda::cuCtxSetCurrent(context_made), cuda::success);
-    EXPECT_EQ(cuda::cuStreamQuery(stream_made), cuda::not_ready) << "the work is on this stream";
-    EXPECT_EQ(cuda::cuStreamQuery(nullptr), cuda::success);
+    expect_work_on(context_made, stream_made);
     ASSERT_EQ(out.copy_to_host(), 0);
     expect_filtered(in, 2.0f, out);
   }

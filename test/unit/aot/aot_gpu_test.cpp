@@ -11,34 +11,13 @@
 #include "gpu_filter_devices_only.h"
 #include "space_gpu_filter.h"
 #include "support/gpu_filter_testing.h"
-#include "support/simulated_driver.h"
+#include "support/simulated_fixture.h"
 
 namespace {
 
 using namespace gpu_filter_testing;
 
-std::string errors;
-
-const halide_device_interface_t* device() { return halide_cuda_device_interface(); }
-
-class AotGpu : public testing::Test {
- protected:
-  AotGpu() {
-    setenv("RETROGRADE_GPU", "simulated", 1);
-    errors.clear();
-    halide_set_error_handler([](void*, const char* text) { errors += text; });
-  }
-  ~AotGpu() override {
-    retrograde_simt_call_off();
-    halide_reuse_device_allocations(nullptr, true);
-    halide_device_release(nullptr, device());
-    EXPECT_EQ(live_objects().allocations, 0);
-    EXPECT_EQ(live_objects().modules, 0);
-    EXPECT_EQ(live_objects().contexts, 0);
-    halide_set_error_handler(nullptr);
-  }
-  SimulatedOptions options;
-};
+class AotGpu : public SimulatedDevice {};
 
 TEST_F(AotGpu, KernelsAndTheHostTakeTurns) {
   Buffer<float, 2> in = input(100, 60), out(100, 60);

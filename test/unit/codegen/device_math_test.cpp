@@ -14,7 +14,9 @@
 #include "ir/operators.h"
 #include "simt/simt_driver.h"
 #include "support/page_table.h"
+#include "support/program_counts.h"
 #include "support/reference_functions.h"
+#include "support/simulated_device.h"
 
 namespace retrograde {
 
@@ -24,16 +26,9 @@ void PrintTo(const MathFunction& function, std::ostream* out) { *out << function
 
 namespace {
 
-// Must be set before the first use of a device.
-[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
-
 using ir::Op;
 
-#ifdef RETROGRADE_MANY_PROGRAMS
-constexpr int samples = 1 << 20;
-#else
-constexpr int samples = 1 << 14;
-#endif
+constexpr int samples = many_or_few(1 << 20, 1 << 14);
 
 // ---- operands ----
 
@@ -91,9 +86,7 @@ Worst worst_error(Op op) {
   if (is_binary) operands.push_back(y(i));
   values(i) = ir::call_op(op, operands);
   values.gpu_tile(i, thread, 256);
-  const Buffer<T> got = values.realize(
-      {samples},
-      get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80));
+  const Buffer<T> got = values.realize({samples}, with_gpu());
   Worst worst;
   for (int k = 0; k < samples; ++k) {
     const double ulp = error_in_ulp(got(k), reference_value(op, x(k), y(k)));
@@ -121,9 +114,9 @@ class DeviceMath : public testing::TestWithParam<codegen::MathFunction> {
     std::printf("%-6s %-8s %.3f ULP, stated %.2f\n", ir::op_info(GetParam().op).name,
                 to_string(type_of<T>()).c_str(), worst.ulp, stated);
     EXPECT_LE(worst.ulp, stated) << worst.where;
-#ifdef RETROGRADE_MANY_PROGRAMS
-    EXPECT_LE(stated, 1.3 * worst.ulp + 0.1) << "more is stated than need be";
-#endif
+    if (takes_many) {
+      EXPECT_LE(stated, 1.3 * worst.ulp + 0.1) << "more is stated than need be";
+    }
   }
 };
 

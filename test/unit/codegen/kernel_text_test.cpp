@@ -3,23 +3,16 @@
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
-#include <cstdlib>
 #include <regex>
 
 #include "codegen/device/kernel_code.h"
 #include "lower/lower.h"
 #include "simt/simt_driver.h"
 #include "support/gpu_programs.h"
+#include "support/simulated_device.h"
 
 namespace retrograde {
 namespace {
-
-// Must be set before the first use of a device.
-[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
-
-Target with_gpu() {
-  return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
-}
 
 codegen::KernelCode code_of(const Func& f) {
   const std::vector<graph::FuncPtr> outputs = Pipeline(f).spec().outputs;

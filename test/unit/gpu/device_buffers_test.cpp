@@ -3,21 +3,14 @@
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
-#include <cstdlib>
-
 #include "simt/simt_driver.h"
 #include "support/errors.h"
+#include "support/simulated_device.h"
 
 namespace retrograde {
 namespace {
 
-// Must be set before the first use of a device.
-[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
-
 int64_t uploads() { return retrograde_simt_call_count("cuMemcpyHtoDAsync_v2"); }
-
-const Target with_gpu =
-    get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
 
 Buffer<int> ramp(int width, int height) {
   Buffer<int> b(width, height, "b");
@@ -41,7 +34,7 @@ TEST(DeviceBuffers, CopiesWhereTheFlagsAsk) {
   EXPECT_TRUE(b.has_device_allocation());
   EXPECT_FALSE(b.host_dirty());
   const int64_t before = uploads();
-  b.copy_to_device(with_gpu);
+  b.copy_to_device(with_gpu());
   b.copy_to_device(DeviceAPI::CUDA);
   EXPECT_EQ(uploads(), before);
   b(3, 2) = 5;
@@ -78,7 +71,7 @@ TEST(DeviceBuffers, ErrorsGoToTheHandlerOfTheContext) {
     std::string text;
   } context;
   Buffer<int> b = ramp(20, 10);
-  EXPECT_EQ(b.copy_to_device(with_gpu, &context), 0);
+  EXPECT_EQ(b.copy_to_device(with_gpu(), &context), 0);
   EXPECT_EQ(b.copy_to_host(&context), 0);
   EXPECT_EQ(b.device_sync(&context), 0);
   Buffer<int> part = b.cropped(0, 4, 3);
@@ -156,10 +149,10 @@ TEST(DeviceBuffers, PipelinesOfBothSidesFollowEachOther) {
   in.set(first);
   more.realize(second);
   in.set(second);
-  twice.realize(third, with_gpu);
+  twice.realize(third, with_gpu());
   EXPECT_TRUE(third.device_dirty());
   in.set(third);
-  twice.realize(second, with_gpu);
+  twice.realize(second, with_gpu());
   third.copy_to_host();
   second.copy_to_host();
   EXPECT_EQ(third(3, 2), 2 * 204);
@@ -167,7 +160,7 @@ TEST(DeviceBuffers, PipelinesOfBothSidesFollowEachOther) {
   in.set(second);
   more.realize(third);
   in.set(third);
-  twice.realize(second, with_gpu);
+  twice.realize(second, with_gpu());
   second.copy_to_host();
   EXPECT_EQ(second(3, 2), 2 * (4 * 204 + 1)) << "what the CPU wrote counts as newer";
 }

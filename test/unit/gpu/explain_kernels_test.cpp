@@ -6,13 +6,10 @@
 #include <nlohmann/json.hpp>
 
 #include "jit/ptxas.h"
+#include "support/simulated_device.h"
 
 namespace retrograde {
 namespace {
-
-Target with_gpu() {
-  return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
-}
 
 class ExplainKernels : public testing::Test {
  protected:

@@ -3,22 +3,15 @@
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
-#include <cstdlib>
 #include <functional>
 
 #include "simt/simt_driver.h"
+#include "support/simulated_device.h"
 
 namespace retrograde {
 namespace {
 
-// Must be set before the first use of a device.
-[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
-
 constexpr int width = 128, height = 8;
-
-Target with_gpu() {
-  return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
-}
 
 class GpuBarriers : public testing::Test {
  protected:

@@ -5,22 +5,14 @@
 #include <gtest/gtest.h>
 #include <retrograde/retrograde.h>
 
-#include <cstdlib>
-
 #include "simt/simt_driver.h"
+#include "support/simulated_device.h"
 
 namespace retrograde {
 namespace {
 
-// Must be set before the first use of a device.
-[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
-
 constexpr int width = 64, height = 8;
 constexpr int64_t picture_bytes = width * height * 4;
-
-Target with_gpu() {
-  return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
-}
 
 int64_t copied_to_device() {
   retrograde_simt_copied copied;

@@ -8,19 +8,14 @@
 
 #include "simt/simt_driver.h"
 #include "support/gpu_programs.h"
+#include "support/program_counts.h"
+#include "support/simulated_device.h"
 
 namespace {
 
 using namespace retrograde;
 
-// Must be set before the first use of a device.
-[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
-
 constexpr int invalid_value = 1, out_of_memory = 2;  // CUresult
-
-Target with_gpu() {
-  return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
-}
 
 void set(int order, bool profile) {
   retrograde_simt_options options;
@@ -118,11 +113,7 @@ TEST_P(GpuPrograms, SurviveEachFailureOfTheDriver) {
 
 // Summing this many values serially in float is inaccurate, so the exact sum is the reference.
 TEST(GpuReduction, OfManyValuesIsTheirSum) {
-#ifdef RETROGRADE_MANY_PROGRAMS
-  constexpr int values = 1 << 24;
-#else
-  constexpr int values = 1 << 20;
-#endif
+  constexpr int values = many_or_few(1 << 24, 1 << 20);
   double expected = 0;
   for (int i = 0; i < values; ++i) expected += static_cast<double>(gpu_programs::reduced_value(i));
   Func f = gpu_programs::reduction(values).build(true);

@@ -3,18 +3,12 @@
 #include <retrograde/retrograde.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <functional>
+
+#include "support/simulated_device.h"
 
 namespace retrograde {
 namespace {
-
-// Must be set before the first use of a device.
-[[maybe_unused]] const int simulated = setenv("RETROGRADE_GPU", "simulated", 1);
-
-Target with_gpu() {
-  return get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80);
-}
 
 Buffer<float> ramp(int width, int height) {
   Buffer<float> image(width, height);
@@ -22,11 +16,14 @@ Buffer<float> ramp(int width, int height) {
   return image;
 }
 
-// Builds a pipeline twice, once scheduled for the GPU.
-using Build = std::function<Func(bool on_gpu)>;
-void agrees(const Build& build, const std::vector<int>& sizes) {
-  Buffer<float> expected = build(false).realize(sizes, get_host_target());
-  Buffer<float> got = build(true).realize(sizes, with_gpu());
+// Defines a pipeline twice, once scheduled for the GPU.
+using Define = std::function<void(Func& out, bool on_gpu)>;
+void agrees(const std::vector<int>& sizes, const Define& define) {
+  Func on_host("on_host"), out("out");
+  define(on_host, false);
+  define(out, true);
+  Buffer<float> expected = on_host.realize(sizes, get_host_target());
+  Buffer<float> got = out.realize(sizes, with_gpu());
   ASSERT_EQ(got.number_of_elements(), expected.number_of_elements());
   for (size_t i = 0; i < got.number_of_elements(); ++i)
     ASSERT_EQ(got.data()[i], expected.data()[i]) << "element " << i;
@@ -39,145 +36,113 @@ class GpuRun : public testing::Test {
 
 TEST_F(GpuRun, PointsOfTiles) {
   const Buffer<float> in = ramp(100, 60);
-  agrees(
-      [&](bool on_gpu) {
-        Func out("out");
-        out(x, y) = in(x, y) * 2.0f + 1.0f;
-        if (on_gpu) out.gpu_tile(x, y, xi, yi, 16, 8);
-        return out;
-      },
-      {100, 60});
+  agrees({100, 60}, [&](Func& out, bool on_gpu) {
+    out(x, y) = in(x, y) * 2.0f + 1.0f;
+    if (on_gpu) out.gpu_tile(x, y, xi, yi, 16, 8);
+  });
 }
 
 TEST_F(GpuRun, TailsOfEveryKind) {
   const Buffer<float> in = ramp(101, 61);
   for (const TailStrategy tail : {TailStrategy::GuardWithIf, TailStrategy::ShiftInwards}) {
-    agrees(
-        [&](bool on_gpu) {
-          Func out("out");
-          out(x, y) = in(x, y) * 2.0f + 1.0f;
-          if (on_gpu) out.gpu_tile(x, y, xi, yi, 16, 8, tail);
-          return out;
-        },
-        {101, 61});
+    agrees({101, 61}, [&](Func& out, bool on_gpu) {
+      out(x, y) = in(x, y) * 2.0f + 1.0f;
+      if (on_gpu) out.gpu_tile(x, y, xi, yi, 16, 8, tail);
+    });
   }
 }
 
 TEST_F(GpuRun, ATileInSharedMemory) {
   const Buffer<float> in = ramp(130, 70);
-  agrees(
-      [&](bool on_gpu) {
-        Func rows("rows"), out("out");
-        rows(x, y) = in(x, y) + in(x + 1, y) + in(x + 2, y);
-        out(x, y) = rows(x, y) + rows(x, y + 1) + rows(x, y + 2);
-        if (on_gpu) {
-          out.gpu_tile(x, y, xi, yi, 16, 8);
-          rows.compute_at(out, x).gpu_threads(x, y);
-        }
-        return out;
-      },
-      {128, 68});
+  agrees({128, 68}, [&](Func& out, bool on_gpu) {
+    Func rows("rows");
+    rows(x, y) = in(x, y) + in(x + 1, y) + in(x + 2, y);
+    out(x, y) = rows(x, y) + rows(x, y + 1) + rows(x, y + 2);
+    if (on_gpu) {
+      out.gpu_tile(x, y, xi, yi, 16, 8);
+      rows.compute_at(out, x).gpu_threads(x, y);
+    }
+  });
 }
 
 TEST_F(GpuRun, TheHostComputesBetweenKernels) {
   const Buffer<float> in = ramp(100, 1);
-  agrees(
-      [&](bool on_gpu) {
-        Func first("first"), second("second"), out("out");
-        first(x) = in(x, 0) * 3.0f;
-        second(x) = first(x) + 1.0f;
-        out(x) = second(x) * first(x);
-        first.compute_root();
-        second.compute_root();
-        if (on_gpu) {
-          first.gpu_tile(x, xi, 32);
-          out.gpu_tile(x, xi, 32);
-        }
-        return out;
-      },
-      {100});
+  agrees({100}, [&](Func& out, bool on_gpu) {
+    Func first("first"), second("second");
+    first(x) = in(x, 0) * 3.0f;
+    second(x) = first(x) + 1.0f;
+    out(x) = second(x) * first(x);
+    first.compute_root();
+    second.compute_root();
+    if (on_gpu) {
+      first.gpu_tile(x, xi, 32);
+      out.gpu_tile(x, xi, 32);
+    }
+  });
 }
 
 TEST_F(GpuRun, UpdatesAreKernelsOfTheirOwn) {
   const Buffer<float> in = ramp(64, 40);
-  agrees(
-      [&](bool on_gpu) {
-        RDom r(0, 40, "r");
-        Func out("out");
-        out(x) = 1.0f;
-        out(x) += in(x, r);
-        if (on_gpu) {
-          out.gpu_tile(x, xi, 16);
-          out.update().gpu_tile(x, xi, 16);
-        }
-        return out;
-      },
-      {64});
+  agrees({64}, [&](Func& out, bool on_gpu) {
+    RDom r(0, 40, "r");
+    out(x) = 1.0f;
+    out(x) += in(x, r);
+    if (on_gpu) {
+      out.gpu_tile(x, xi, 16);
+      out.update().gpu_tile(x, xi, 16);
+    }
+  });
 }
 
 TEST_F(GpuRun, VectorsInsideOfThreads) {
   const Buffer<float> in = ramp(128, 32);
-  agrees(
-      [&](bool on_gpu) {
-        Func out("out");
-        out(x, y) = in(x, y) + in(x, y) * in(x, y);
-        if (on_gpu) out.vectorize(x, 4).gpu_tile(x, y, xi, yi, 8, 4);
-        return out;
-      },
-      {128, 32});
+  agrees({128, 32}, [&](Func& out, bool on_gpu) {
+    out(x, y) = in(x, y) + in(x, y) * in(x, y);
+    if (on_gpu) out.vectorize(x, 4).gpu_tile(x, y, xi, yi, 8, 4);
+  });
 }
 
 TEST_F(GpuRun, FewerThreadsThanIterationsTakeTurns) {
   const Buffer<float> in = ramp(200, 1);
-  agrees(
-      [&](bool on_gpu) {
-        Func sums("sums"), out("out");
-        sums(x) = in(x, 0) + 1.0f;
-        out(x) = sums(x) + sums(x + 9) + sums(x + 50);
-        if (on_gpu) {
-          out.gpu_tile(x, xi, 32, TailStrategy::RoundUp);
-          sums.compute_at(out, x).split(x, x, u, 16).gpu_threads(u);
-        }
-        return out;
-      },
-      {128});
+  agrees({128}, [&](Func& out, bool on_gpu) {
+    Func sums("sums");
+    sums(x) = in(x, 0) + 1.0f;
+    out(x) = sums(x) + sums(x + 9) + sums(x + 50);
+    if (on_gpu) {
+      out.gpu_tile(x, xi, 32, TailStrategy::RoundUp);
+      sums.compute_at(out, x).split(x, x, u, 16).gpu_threads(u);
+    }
+  });
 }
 
 TEST_F(GpuRun, AHistogramByAtomicUpdates) {
   const Buffer<float> in = ramp(256, 16);
-  agrees(
-      [&](bool on_gpu) {
-        RDom r(0, 256, 0, 16, "r");
-        Func counts("counts"), out("out");
-        counts(x) = 0;
-        counts(clamp(cast<int>(in(r.x, r.y)), 0, 15)) += 1;
-        out(x) = cast<float>(counts(x));
-        counts.compute_root();
-        if (on_gpu) {
-          RVar ro("ro"), ri("ri");
-          counts.gpu_tile(x, xi, 16);
-          counts.update().atomic().split(r.x, ro, ri, 32).gpu_blocks(r.y, ro).gpu_threads(ri);
-        }
-        return out;
-      },
-      {16});
+  agrees({16}, [&](Func& out, bool on_gpu) {
+    RDom r(0, 256, 0, 16, "r");
+    Func counts("counts");
+    counts(x) = 0;
+    counts(clamp(cast<int>(in(r.x, r.y)), 0, 15)) += 1;
+    out(x) = cast<float>(counts(x));
+    counts.compute_root();
+    if (on_gpu) {
+      RVar ro("ro"), ri("ri");
+      counts.gpu_tile(x, xi, 16);
+      counts.update().atomic().split(r.x, ro, ri, 32).gpu_blocks(r.y, ro).gpu_threads(ri);
+    }
+  });
 }
 
 TEST_F(GpuRun, OneThreadDoesAll) {
   const Buffer<float> in = ramp(40, 1);
-  agrees(
-      [&](bool on_gpu) {
-        RDom r(1, 39, "r");
-        Func out("out");
-        out(x) = in(x, 0);
-        out(r) += out(r - 1);
-        if (on_gpu) {
-          out.gpu_tile(x, xi, 8);
-          out.update().gpu_single_thread();
-        }
-        return out;
-      },
-      {40});
+  agrees({40}, [&](Func& out, bool on_gpu) {
+    RDom r(1, 39, "r");
+    out(x) = in(x, 0);
+    out(r) += out(r - 1);
+    if (on_gpu) {
+      out.gpu_tile(x, xi, 8);
+      out.update().gpu_single_thread();
+    }
+  });
 }
 
 // A call's context that selects the device, and counts the queries.
@@ -238,21 +203,19 @@ TEST_F(GpuRun, ACallHasItsOwnContextAndStream) {
 
 TEST_F(GpuRun, GradientsRunOnGpus) {
   const Buffer<float> in = ramp(66, 34);
-  agrees(
-      [&](bool on_gpu) {
-        Func image("image"), blurred("blurred"), loss("loss");
-        RDom r(0, 64, 0, 32, "r");
-        image(x, y) = in(x, y);
-        blurred(x, y) = image(x, y) + image(x + 1, y) + image(x, y + 2);
-        loss() = 0.0f;
-        loss() += blurred(r.x, r.y) * blurred(r.x, r.y);
-        Derivative d = propagate_adjoints(loss);
-        Func gradient = d(image);
-        image.compute_root();
-        if (on_gpu) gradient.gpu_tile(x, y, xi, yi, 16, 8);
-        return gradient;
-      },
-      {66, 34});
+  agrees({66, 34}, [&](Func& out, bool on_gpu) {
+    Func image("image"), blurred("blurred"), loss("loss");
+    RDom r(0, 64, 0, 32, "r");
+    image(x, y) = in(x, y);
+    blurred(x, y) = image(x, y) + image(x + 1, y) + image(x, y + 2);
+    loss() = 0.0f;
+    loss() += blurred(r.x, r.y) * blurred(r.x, r.y);
+    Derivative d = propagate_adjoints(loss);
+    Func gradient = d(image);
+    image.compute_root();
+    if (on_gpu) gradient.gpu_tile(x, y, xi, yi, 16, 8);
+    out = gradient;
+  });
 }
 
 // The profiler measures the host's time, in the host's memory.

@@ -45,12 +45,7 @@ TEST_F(GpuRuntime, WorksInTheContextAndOnTheStreamThatItIsGiven) {
     Buffer<float> x = ramp(300), y = ramp(300);
     ASSERT_EQ(saxpy.run(x, y, 3.0f), 0) << errors;
     EXPECT_EQ(live_objects().contexts, 1) << "no other was made";
-    cuda::Context current = &current;
-    ASSERT_EQ(cuda::cuCtxGetCurrent(&current), cuda::success);
-    EXPECT_EQ(current, nullptr) << "what was current is so again";
-    ASSERT_EQ(cuda::cuCtxSetCurrent(user_context_made), cuda::success);
-    EXPECT_EQ(cuda::cuStreamQuery(user_stream), cuda::not_ready) << "the work is on this stream";
-    EXPECT_EQ(cuda::cuStreamQuery(nullptr), cuda::success);
+    expect_work_on(user_context_made, user_stream);
     ASSERT_EQ(y.copy_to_host(), 0);
     expect_saxpy(y, 3.0f);
   }
@@ -73,10 +68,9 @@ TEST_F(GpuRuntime, CopiesToTheHostWaitForTheStreamThatWrote) {
   for (int i = 0; i < 10; i++) {
     Buffer<float> x = ramp(300), y = ramp(300);
     ASSERT_EQ(saxpy.run(x, y, 3.0f), 0) << errors;
-    halide_set_cuda_get_stream(nullptr);
+    const OnDefaultStream reading;
     ASSERT_EQ(y.copy_to_host(), 0) << errors;
     expect_saxpy(y, 3.0f);
-    halide_set_cuda_get_stream(get_users_stream);
   }
 }
 
@@ -129,12 +123,13 @@ TEST_F(GpuRuntime, MemoryThatAStreamUsesIsNotGivenToAnother) {
     ASSERT_EQ(saxpy.run(x, y, 1.0f), 0) << errors;
     x.set_host_dirty(false);
     ASSERT_EQ(x.device_free(), 0);
-    halide_set_cuda_get_stream(nullptr);
     Buffer<float> other(5000, 1);
     other.fill(-1.0f);
     other.set_host_dirty();
-    ASSERT_EQ(other.copy_to_device(device()), 0) << errors;
-    halide_set_cuda_get_stream(get_users_stream);
+    {
+      const OnDefaultStream writing;
+      ASSERT_EQ(other.copy_to_device(device()), 0) << errors;
+    }
     ASSERT_EQ(y.copy_to_host(), 0);
     expect_saxpy(y, 1.0f);
   }
@@ -189,12 +184,10 @@ TEST_F(GpuRuntime, ARunIsCapturedOnceItHasRun) {
   ASSERT_EQ(saxpy.run(x, y, 0.0f), 0) << errors;
   x.set_device_dirty();  // the run must read the device's elements
   ASSERT_EQ(run_with_temporary(), 0) << errors;
-  cuda::Graph graph = nullptr;
-  cuda::GraphExec exec = nullptr;
-  ASSERT_EQ(cuda::cuStreamBeginCapture_v2(user_stream, 0), cuda::success);
+  CapturedGraph graph;
+  graph.begin();
   EXPECT_EQ(run_with_temporary(), 0) << errors;
-  ASSERT_EQ(cuda::cuStreamEndCapture(user_stream, &graph), cuda::success);
-  ASSERT_EQ(cuda::cuGraphInstantiateWithFlags(&exec, graph, 0), cuda::success);
+  graph.end();
   // The graph's memory is exclusive: other buffers of this size do not disturb it.
   Buffer<float> others[3];
   for (Buffer<float>& other : others) {
@@ -203,7 +196,7 @@ TEST_F(GpuRuntime, ARunIsCapturedOnceItHasRun) {
     other.set_host_dirty();
     ASSERT_EQ(other.copy_to_device(device()), 0) << errors;
   }
-  for (int i = 0; i < 4; i++) ASSERT_EQ(cuda::cuGraphLaunch(exec, user_stream), cuda::success);
+  graph.launch(4);
   y.set_device_dirty();
   ASSERT_EQ(y.copy_to_host(), 0) << errors;
   for (int i = 0; i < 300; i++) ASSERT_EQ(at(y, i, 0), static_cast<float>(i) * (1 + 5 * 9)) << i;
@@ -212,8 +205,6 @@ TEST_F(GpuRuntime, ARunIsCapturedOnceItHasRun) {
     ASSERT_EQ(other.copy_to_host(), 0);
     EXPECT_TRUE(other.all_equal(-5.0f));
   }
-  EXPECT_EQ(cuda::cuGraphExecDestroy(exec), cuda::success);
-  EXPECT_EQ(cuda::cuGraphDestroy(graph), cuda::success);
 }
 
 // As PyTorch captures: on another stream than the one that ran before.
@@ -223,10 +214,9 @@ TEST_F(GpuRuntime, MemoryThatACaptureLacksIsAllocatedForItsGraph) {
   Buffer<float> x = ramp(300), y = ramp(300);
   ASSERT_EQ(saxpy.run(x, y, 0.0f), 0) << errors;
   x.set_device_dirty();
-  cuda::Graph graph = nullptr;
-  cuda::GraphExec exec = nullptr;
+  CapturedGraph graph;
   Buffer<float> t(nullptr, 300, 1), other(300, 1);
-  ASSERT_EQ(cuda::cuStreamBeginCapture_v2(user_stream, 0), cuda::success);
+  graph.begin();
   EXPECT_EQ(halide_device_malloc(nullptr, t, device()), 0) << errors;
   EXPECT_EQ(halide_buffer_copy(nullptr, x, device(), t), 0) << errors;
   EXPECT_EQ(saxpy.launch(t, y, 2.0f, 300), 0) << errors;
@@ -235,20 +225,17 @@ TEST_F(GpuRuntime, MemoryThatACaptureLacksIsAllocatedForItsGraph) {
   int mode = cuda::capture_mode_global;
   EXPECT_EQ(cuda::cuThreadExchangeStreamCaptureMode(&mode), cuda::success);
   EXPECT_EQ(mode, cuda::capture_mode_global) << "the thread's mode is as it was";
-  ASSERT_EQ(cuda::cuStreamEndCapture(user_stream, &graph), cuda::success);
-  ASSERT_EQ(cuda::cuGraphInstantiateWithFlags(&exec, graph, 0), cuda::success);
+  graph.end();
   other.fill(-5.0f);
   other.set_host_dirty();
   ASSERT_EQ(other.copy_to_device(device()), 0) << errors;  // gets other memory than the graph's
-  for (int i = 0; i < 3; i++) ASSERT_EQ(cuda::cuGraphLaunch(exec, user_stream), cuda::success);
+  graph.launch(3);
   y.set_device_dirty();
   ASSERT_EQ(y.copy_to_host(), 0) << errors;
   for (int i = 0; i < 300; i++) ASSERT_EQ(at(y, i, 0), static_cast<float>(i) * (1 + 3 * 2)) << i;
   other.set_device_dirty();
   ASSERT_EQ(other.copy_to_host(), 0) << errors;
   EXPECT_TRUE(other.all_equal(-5.0f));
-  EXPECT_EQ(cuda::cuGraphExecDestroy(exec), cuda::success);
-  EXPECT_EQ(cuda::cuGraphDestroy(graph), cuda::success);
 }
 
 TEST_F(GpuRuntime, WhatACaptureCannotHoldIsAnErrorThatSaysSo) {

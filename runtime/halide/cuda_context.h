@@ -1,4 +1,4 @@
-// Devices by the functions of HalideRuntimeCuda.h.
+// Selection of CUDA contexts and streams by the functions of HalideRuntimeCuda.h.
 #pragma once
 
 #include "retrograde_runtime.h"
