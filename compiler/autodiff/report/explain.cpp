@@ -11,22 +11,23 @@ namespace retrograde {
 
 namespace {
 
-using Kind = Explanation::Kind;
+using ExplanationKind = Explanation::Kind;
 
 constexpr size_t most_names = 8;  // listed for each kind in a summary
 
 // The order of a summary: what users ask first comes first.
-constexpr Kind told_first[] = {Kind::Cost,    Kind::Stored,       Kind::Recomputed,
-                               Kind::Version, Kind::Scattered,    Kind::Privatised,
-                               Kind::Zero,    Kind::NotRequested, Kind::LeftOut,
-                               Kind::Custom,  Kind::Built,        Kind::Performance};
+constexpr ExplanationKind told_first[] = {
+    ExplanationKind::Cost,    ExplanationKind::Stored,       ExplanationKind::Recomputed,
+    ExplanationKind::Version, ExplanationKind::Scattered,    ExplanationKind::Privatised,
+    ExplanationKind::Zero,    ExplanationKind::NotRequested, ExplanationKind::LeftOut,
+    ExplanationKind::Custom,  ExplanationKind::Built,        ExplanationKind::Performance};
 
 std::string line_of(const Explanation& e) {
   return text(to_string(e.kind), " ", quoted(e.subject), ": ", e.detail, "\n");
 }
 
 // The facts of one kind, the largest first, each subject once.
-std::vector<Explanation> of_kind(const std::vector<Explanation>& all, Kind kind) {
+std::vector<Explanation> of_kind(const std::vector<Explanation>& all, ExplanationKind kind) {
   std::vector<Explanation> found;
   std::set<std::string> seen;
   for (const Explanation& e : all) {
@@ -54,27 +55,27 @@ std::string line_of(const char* what, const std::vector<Explanation>& facts) {
 // An adjoint that is built may still have contributions that are zero; it is listed as zero in part.
 std::string zeros_of(const std::vector<Explanation>& all) {
   std::set<std::string> built;
-  for (const Explanation& e : of_kind(all, Kind::Built)) built.insert(e.subject);
+  for (const Explanation& e : of_kind(all, ExplanationKind::Built)) built.insert(e.subject);
   std::vector<Explanation> entirely, in_part;
-  for (const Explanation& e : of_kind(all, Kind::Zero))
+  for (const Explanation& e : of_kind(all, ExplanationKind::Zero))
     (built.count(e.subject) ? in_part : entirely).push_back(e);
   return line_of("zero", entirely) + line_of("zero in part", in_part);
 }
 
-std::string summary_of(const std::vector<Explanation>& all, Kind kind) {
-  if (kind == Kind::Zero) return zeros_of(all);
+std::string summary_of(const std::vector<Explanation>& all, ExplanationKind kind) {
+  if (kind == ExplanationKind::Zero) return zeros_of(all);
   const std::vector<Explanation> facts = of_kind(all, kind);
-  if (kind == Kind::Cost && !facts.empty()) return line_of(facts.front());
+  if (kind == ExplanationKind::Cost && !facts.empty()) return line_of(facts.front());
   return line_of(to_string(kind), facts);
 }
 
 std::string summary_of(const std::vector<Explanation>& all) {
   std::string result;
-  for (Kind kind : told_first) result += summary_of(all, kind);
+  for (ExplanationKind kind : told_first) result += summary_of(all, kind);
   return result + "explain(Detail::All) lists every fact with its reason.\n";
 }
 
-std::string without_numbers(const std::string& name) {
+std::string without_suffix_numbers(const std::string& name) {
   static const std::regex number("[$][0-9]+");
   return std::regex_replace(name, number, "");
 }
@@ -85,12 +86,12 @@ std::string with_short_names(const std::string& words) {
   std::map<std::string, std::set<std::string>> alike;
   for (auto i = std::sregex_iterator(words.begin(), words.end(), name); i != std::sregex_iterator();
        ++i)
-    alike[without_numbers(i->str())].insert(i->str());
+    alike[without_suffix_numbers(i->str())].insert(i->str());
   std::string result;
   auto copied = words.cbegin();
   for (auto i = std::sregex_iterator(words.begin(), words.end(), name); i != std::sregex_iterator();
        ++i) {
-    const std::string shorter = without_numbers(i->str());
+    const std::string shorter = without_suffix_numbers(i->str());
     result.append(copied, words.cbegin() + i->position());
     result += alike[shorter].size() == 1 ? shorter : i->str();
     copied = words.cbegin() + i->position() + i->length();
