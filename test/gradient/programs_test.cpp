@@ -286,15 +286,18 @@ TEST_F(Programs, PrivatisedScatterIsTheSameForEveryNumberOfThreads) {
   expect_machine_code_agrees(d(table), {{0}, {16}});
 }
 
+void expect_stored_versions(const Func& loss, Buffer<float>& a) {
+  EXPECT_THROW(propagate_adjoints(loss, {.overwritten = Overwritten::Refuse}), UserError);
+  expect_gradient(loss, a, {.overwritten = Overwritten::Store});
+  expect_gradient(loss, a);
+}
+
 TEST_F(Programs, ProductNeedsStoredVersions) {
   Func f("f");
   RDom r(0, 4);
   f(x) = 1.0f;
   f(x) *= a(x + r);
-  Func loss = weighted_sum(f, {6});
-  EXPECT_THROW(propagate_adjoints(loss, {.overwritten = Overwritten::Refuse}), UserError);
-  expect_gradient(loss, a, {.overwritten = Overwritten::Store});
-  expect_gradient(loss, a);
+  expect_stored_versions(weighted_sum(f, {6}), a);
 }
 
 TEST_F(Programs, InPlaceSquareNeedsStoredVersions) {
@@ -302,10 +305,7 @@ TEST_F(Programs, InPlaceSquareNeedsStoredVersions) {
   f(x) = a(x) + 1.0f;
   f(x) = f(x) * f(x) * a(x);
   f(x) += f(x) * f(x);
-  Func loss = weighted_sum(f, {9});
-  EXPECT_THROW(propagate_adjoints(loss, {.overwritten = Overwritten::Refuse}), UserError);
-  expect_gradient(loss, a, {.overwritten = Overwritten::Store});
-  expect_gradient(loss, a);
+  expect_stored_versions(weighted_sum(f, {9}), a);
 }
 
 TEST_F(Programs, ReductionWithPredicate) {
