@@ -561,9 +561,16 @@ Stmt make_provide(const std::string& name, std::vector<Expr> values, std::vector
 }
 
 Stmt make_realize(const std::string& name, std::vector<Type> types, MemoryType memory,
-                  std::vector<Range> bounds, Stmt body) {
+                  std::vector<Range> bounds, Stmt body, StorageLayout layout) {
   if (!body.defined()) return {};
-  return make_node<Realize>(name, std::move(types), memory, std::move(bounds), std::move(body));
+  return make_node<Realize>(name, std::move(types), memory, std::move(bounds), std::move(layout),
+                            std::move(body));
+}
+
+Stmt with_body(const Realize& n, Stmt body) { return with_bounds(n, n.bounds, std::move(body)); }
+
+Stmt with_bounds(const Realize& n, std::vector<Range> bounds, Stmt body) {
+  return make_realize(n.name, n.types, n.memory, std::move(bounds), std::move(body), n.layout);
 }
 
 Stmt make_allocate(const std::string& name, Type type, MemoryType memory, Expr elements, Stmt body,

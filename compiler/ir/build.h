@@ -93,7 +93,10 @@ Stmt make_store(const std::string& name, Expr value, Expr index, Expr predicate 
 Stmt make_provide(const std::string& name, std::vector<Expr> values, std::vector<Expr> args,
                   Expr predicate = {});
 Stmt make_realize(const std::string& name, std::vector<Type> types, MemoryType memory,
-                  std::vector<Range> bounds, Stmt body);
+                  std::vector<Range> bounds, Stmt body, StorageLayout layout = {});
+// The same storage around another statement, or with other bounds.
+Stmt with_body(const Realize& n, Stmt body);
+Stmt with_bounds(const Realize& n, std::vector<Range> bounds, Stmt body);
 Stmt make_allocate(const std::string& name, Type type, MemoryType memory, Expr elements, Stmt body,
                    Expr offset = {});
 Stmt make_free(const std::string& name);

@@ -72,6 +72,13 @@ class Comparer {
     const int result = compare(a.min, b.min);
     return result ? result : compare(a.extent, b.extent);
   }
+  int compare(const StorageLayout& a, const StorageLayout& b) {
+    int result = 0;
+    (void)((result = compare(a.order, b.order)) || (result = compare(a.folds, b.folds)) ||
+           (result = compare(a.place, b.place)) || (result = compare(a.first, b.first)) ||
+           (result = compare(a.lead, b.lead)));
+    return result;
+  }
   template <class T>
   int compare(const std::vector<T>& a, const std::vector<T>& b) {
     if (const int result = order(a.size(), b.size())) return result;

@@ -423,12 +423,24 @@ struct Provide : StmtNode {
   const std::vector<Expr> values, args;
   const Expr predicate;
 };
+// How the points of a Func lie in its storage, and who uses it when.
+struct StorageLayout {
+  std::vector<int> order;  // dimensions, innermost first; empty: as declared
+  std::vector<Expr>
+      folds;  // per dimension: coordinates are stored modulo this; undefined or missing: not folded
+  std::string
+      place;  // the Realize around it that provides the memory (hoist_storage); empty: its own memory
+  Expr first;  // the element of `place` at which it begins; undefined: 0
+  // By how many iterations the producer of an async Func may be ahead of its consumer; 0: any number.
+  int lead = 1;
+};
 struct Realize : StmtNode {  // Loops phase: storage for a Func over a box, alive during body
-  RETROGRADE_NODE(Realize, name, types, memory, bounds, body)
+  RETROGRADE_NODE(Realize, name, types, memory, bounds, layout, body)
   const std::string name;
   const std::vector<Type> types;
   const MemoryType memory;
   const std::vector<Range> bounds;
+  const StorageLayout layout;
   const Stmt body;
 };
 struct Allocate

@@ -469,8 +469,30 @@ class Parser {
     expect(")");
     const MemoryType where = memory();
     std::vector<Range> bounds = ranges();
+    StorageLayout storage = layout();
     types_.declare_components(func, types);
-    return make_realize(func, std::move(types), where, std::move(bounds), block());
+    return make_realize(func, std::move(types), where, std::move(bounds), block(),
+                        std::move(storage));
+  }
+  StorageLayout layout() {
+    StorageLayout result;
+    if (accept("order")) {
+      expect("(");
+      result.order = several([&] { return integer(); });
+      expect(")");
+    }
+    while (accept("fold")) {
+      expect("(");
+      const auto dimension = static_cast<size_t>(integer());
+      expect(",");
+      result.folds.resize(std::max(result.folds.size(), dimension + 1));
+      result.folds[dimension] = expr();
+      expect(")");
+    }
+    if (accept("in")) result.place = name();
+    if (accept("at")) result.first = expr();
+    if (accept("lead")) result.lead = integer();
+    return result;
   }
   Stmt prefetch() {
     const std::string target = name();

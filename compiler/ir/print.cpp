@@ -286,6 +286,7 @@ class StmtPrinter {
           write("realize ", quote_name(n.name), "(",
                 listed(n.types, [](Type type) { return to_string(type); }), ") ",
                 memory_name(n.memory), n.bounds);
+          put(n.layout);
           types_.declare_components(n.name, n.types);
           put(Body{n.body});
         },
@@ -333,6 +334,15 @@ class StmtPrinter {
   void put(const std::vector<Range>& bounds) {
     for (size_t i = 0; i < bounds.size(); ++i)
       write(i ? ", [" : " [", bounds[i].min, ", ", bounds[i].extent, "]");
+  }
+  void put(const StorageLayout& layout) {
+    if (!layout.order.empty())
+      write(" order(", listed(layout.order, [](int d) { return std::to_string(d); }), ")");
+    for (size_t d = 0; d < layout.folds.size(); d++)
+      if (layout.folds[d].defined()) write(" fold(", std::to_string(d), ", ", layout.folds[d], ")");
+    if (!layout.place.empty()) write(" in ", quote_name(layout.place));
+    if (layout.first.defined()) write(" at ", layout.first);
+    if (layout.lead != 1) write(" lead ", std::to_string(layout.lead));
   }
   void put(If store) {
     if (store.predicate.defined()) write(" if ", store.predicate);

@@ -1,6 +1,7 @@
 // Checks the rules of each phase in one walk over the statement.
 #include "ir/validate.h"
 
+#include <algorithm>
 #include <list>
 #include <unordered_set>
 
@@ -15,7 +16,7 @@ namespace retrograde::ir {
 namespace {
 
 const char* phase_name(Phase phase) {
-  static constexpr const char* names[] = {"Loops", "FlatStorage", "Vector"};
+  static constexpr const char* names[] = {"Nests", "Loops", "FlatStorage", "Vector"};
   return names[static_cast<int>(phase)];
 }
 
@@ -92,18 +93,20 @@ class Validator {
    public:
     template <class Tree>
     Binding(Validator& v, const std::string& name, const Tree& where) : v_(v), name_(name) {
-      if (!v.bound_.insert(name).second)
+      const bool is_new = v.bound_.insert(name).second;
+      if (!is_new && v.phase_ != Phase::Nests)
         v.fail(where, "names are unique: " + quoted(name) + " is bound twice");
-      v.visible_.insert(name);
+      hides_ = !v.visible_.insert(name).second;
     }
     ~Binding() {
-      v_.visible_.erase(name_);
+      if (!hides_) v_.visible_.erase(name_);
       v_.checked_.clear();  // expressions that mention the name are invalid from now on
     }
 
    private:
     Validator& v_;
     const std::string name_;
+    bool hides_ = false;  // another binding of the name (Phase::Nests)
   };
 
   // ---- expressions: each node is checked once while the names in scope are unchanged ----
@@ -167,7 +170,7 @@ class Validator {
       return;
     }
     if (n.call_type == CallType::Extern) return;
-    if (phase_ != Phase::Loops) fail(e, "calls of Funcs and images belong to the phase Loops");
+    if (phase_ > Phase::Loops) fail(e, "calls of Funcs and images belong to the phase Loops");
     for (const Expr& arg : n.args) check_index(arg);
   }
   void check_load(const Expr& e, const Load& n) {
@@ -252,6 +255,7 @@ class Validator {
     only_in_loops(s);
     require(!n.types.empty(), s, "a Realize has types");
     check_bounds(s, n.bounds);
+    check_layout(s, n);
     // Metadata of the storage, which flattening gives values.
     std::vector<std::string> facts;
     for (size_t d = 0; d < n.bounds.size(); d++) {
@@ -262,6 +266,20 @@ class Validator {
     check(n.body);
     for (const std::string& fact : facts) visible_.erase(fact);
     checked_.clear();
+  }
+  void check_layout(const Stmt& s, const Realize& n) {
+    const auto check_integer = [&](const Expr& e) {
+      if (!e.defined()) return;
+      check(e);
+      require(e.type() == Int(32), s, "folds and the first element of a Realize are int32");
+    };
+    std::ranges::for_each(n.layout.folds, check_integer);
+    check_integer(n.layout.first);
+    std::vector<int> order = n.layout.order;
+    std::ranges::sort(order);
+    for (size_t d = 0; d < order.size(); d++)
+      require(order[d] == static_cast<int>(d) && order.size() == n.bounds.size(), s,
+              "the order of a Realize names each dimension once");
   }
   void check_allocate(const Stmt& s, const Allocate& n) {
     only_in_flat(s);
@@ -319,12 +337,12 @@ class Validator {
   }
   template <class Tree>
   void only_in_loops(const Tree& node) {
-    if (phase_ != Phase::Loops)
+    if (phase_ > Phase::Loops)
       fail(node, std::string(kind_name(node.kind())) + " belongs to the phase Loops");
   }
   template <class Tree>
   void only_in_flat(const Tree& node) {
-    if (phase_ == Phase::Loops)
+    if (phase_ <= Phase::Loops)
       fail(node, std::string(kind_name(node.kind())) + " belongs to the phase FlatStorage");
   }
 

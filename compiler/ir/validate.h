@@ -8,6 +8,7 @@
 
 namespace retrograde::ir {
 enum class Phase : uint8_t {
+  Nests,        // like Loops, but a name may be bound again, also inside of its scope
   Loops,        // Realize, Provide, calls of Funcs and images
   FlatStorage,  // Allocate, Store, Load; no calls of Funcs or images
   Vector,       // like FlatStorage, without Vectorized or Unrolled loops

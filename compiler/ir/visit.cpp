@@ -26,6 +26,7 @@ struct ChildVisit {
     if (s.defined()) on_stmt(s);
   }
   void operator()(const Range& r) const { (*this)(r.min), (*this)(r.extent); }
+  void operator()(const StorageLayout& l) const { (*this)(l.folds), (*this)(l.first); }
   template <class T>
   void operator()(const std::vector<T>& fields) const {
     for (const T& field : fields) (*this)(field);
@@ -56,6 +57,11 @@ struct ChildMap {
   Range operator()(const Range& r) {
     Expr min = (*this)(r.min);
     return {min, (*this)(r.extent)};
+  }
+  StorageLayout operator()(const StorageLayout& l) {
+    std::vector<Expr> folds = (*this)(l.folds);
+    return {l.order, std::move(folds), l.place.empty() ? l.place : (*this)(l.place),
+            (*this)(l.first), l.lead};
   }
   const std::string& operator()(const std::string& name) {
     if (!names) return name;
@@ -175,7 +181,12 @@ Stmt map_children(const Stmt& s, ChildMap mapped) {
         return mapped.of(s, make_provide, n.name, n.values, n.args, n.predicate);
       },
       [&](const Realize& n) {
-        return mapped.of(s, make_realize, n.name, n.types, n.memory, n.bounds, n.body);
+        const auto make = [](auto name, auto types, MemoryType memory, auto bounds, auto layout,
+                             Stmt body) {
+          return make_realize(name, std::move(types), memory, std::move(bounds), std::move(body),
+                              std::move(layout));
+        };
+        return mapped.of(s, make, n.name, n.types, n.memory, n.bounds, n.layout, n.body);
       },
       [&](const Allocate& n) {
         const auto make = [](auto name, Type type, MemoryType memory, Expr elements, Expr offset,

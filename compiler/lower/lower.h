@@ -20,7 +20,8 @@ constexpr bool validates_passes = false;
 struct LowerOptions {
   Target target;
   bool validate = validates_passes;  // after every pass, blaming it by name
-  // Told of every pass that ran: its name, seconds, and the statement it gave. May be empty.
+  // Told of every pass that ran: its name, seconds, and the statement it gave, which is
+  // undefined before build_loop_nests. May be empty.
   std::function<void(const std::string& pass, double seconds, const Stmt& after)> observe;
   std::string stop_after;  // name of a pass; empty: all of them
 };
@@ -30,6 +31,13 @@ struct LowerOptions {
 // unbounded regions, recursion; see the passes. Requires: lowering stops after one of its passes.
 LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outputs,
                       const std::vector<LoweredArgument>& inputs, const LowerOptions& options);
+
+// Runs one pass alone on `s`, a statement over the Funcs of `outputs` as the passes before it would
+// leave it; undefined for build_loop_nests and the passes before it. Returns the text after the
+// pass: a statement, or a graph while there is no statement. Requires: lowering stops after one of
+// its passes.
+std::string run_pass_alone(const std::string& name, const std::vector<FuncPtr>& outputs,
+                           const Stmt& s, const Target& target);
 
 // The inputs that `outputs` need, in first-use order.
 std::vector<LoweredArgument> infer_arguments(const std::vector<FuncPtr>& outputs);

@@ -9,6 +9,7 @@
 #include "ir/print.h"
 #include "ir/validate.h"
 #include "ir/vector_bytes.h"
+#include "lower/bind_symbols.h"
 #include "lower/checks/argument_checks.h"
 #include "lower/checks/refuse_unsupported.h"
 #include "lower/definitions/inline_functions.h"
@@ -38,96 +39,35 @@
 namespace retrograde::lower {
 namespace {
 
+// The data that passes have besides the statement. Only program passes change it.
 struct Lowering {
+  const std::string& name;  // of the function
   const std::vector<FuncPtr>& outputs;
   const std::vector<LoweredArgument>& args;
-  Program program;
-  std::map<std::string, std::vector<Expr>> folds;  // see LoopNests
-  AsyncRoom async_room;
-  const std::string& name;
-  const LowerOptions& options;
+  const Target& target;
+  Program program = {};
 };
 
+// A pass over the program, before there are loops.
+struct ProgramPass {
+  const char* name;
+  void (*run)(Lowering&);
+};
 struct Pass {
   const char* name;
-  Phase phase;  // of what it gives
-  Stmt (*run)(Lowering&, const Stmt&);
+  Phase phase;  // of the statement after it
+  Stmt (*run)(const Lowering&, const Stmt&);
 };
 
-StorageLayouts storage_layouts(const Lowering& lowering) {
-  StorageLayouts layouts;
-  for (const LoopedFunc& f : lowering.program.funcs) {
-    StorageLayout& layout = layouts[f.name()];
-    if (auto it = lowering.folds.find(f.name()); it != lowering.folds.end())
-      layout.folds = it->second;
-    for (const std::string& var : f.schedule.storage_dims)
-      layout.order.push_back(static_cast<int>(
-          std::find(f.func->args.begin(), f.func->args.end(), var) - f.func->args.begin()));
-    if (!is_hoisted(f)) continue;
-    layout.lies_in = place_name(f.name());
-    layout.is_in_ring = f.schedule.ring.defined();
-    layouts[layout.lies_in].is_place = layout.lies_in;
-    layouts[layout.lies_in].folds = layout.folds;
-  }
-  for (const auto& [name, original] : lowering.program.renamed) layouts[name] = layouts[original];
-  return layouts;
-}
-
-Stmt nest_loops(Lowering& lowering, const Stmt&) {
-  lowering.program = inline_functions(lowering.outputs);
-  check_devices(lowering.program, lowering.options.target);
-  const auto shared = share_parameters(lowering.program);
-  LoopNests nests = build_loop_nests(lowering.program);
-  nests.bounds.insert(nests.bounds.begin(), shared.begin(), shared.end());
-  lowering.folds = nests.folds;
-  lowering.async_room = nests.async_room;
-  inject_tracing(nests, lowering.program, lowering.name, lowering.options.target);
-  UniqueNames unique =
-      make_names_unique(add_argument_checks(nests, lowering.args, lowering.program,
-                                            lowering.options.target.has_feature(Target::CUDA)),
-                        mapped(lowering.args, &LoweredArgument::name));
-  lowering.program.renamed = std::move(unique.original);
-  return unique.stmt;
-}
-
-// Whether a schedule has `var` as a loop, and as one over pure variables wherever it has it.
-struct LoopKinds {
-  bool is_pure = false, is_reduction = false;
-};
-void find_kinds(const StageLoops& schedule, const std::string& var, LoopKinds& kinds) {
-  for (const Dim& dim : schedule.dims) {
-    if (dim.var == var) (dim.is_reduction ? kinds.is_reduction : kinds.is_pure) = true;
-  }
-  for (const StageLoops& other : schedule.specializations) find_kinds(other, var, kinds);
-}
-
-// Iterations of a loop over a pure variable touch elements of their own (define.cpp sees to it).
-bool is_pure_loop(const Lowering& lowering, const For& loop) {
-  const LoopName name = decode_loop_name(loop.name);
-  const LoopedFunc* func = lowering.program.find(name.func);
-  if (!func) return false;
-  const auto stage = static_cast<size_t>(std::stoi(name.stage));
-  LoopKinds kinds;
-  if (stage < func->stages.size()) find_kinds(func->stages[stage].schedule, name.var, kinds);
-  return kinds.is_pure && !kinds.is_reduction;
-}
-
-Stmt vectorize_unscheduled(const Lowering& lowering, const Stmt& s) {
-  const Target& target = lowering.options.target;
-  if (target.has_feature(Target::DisableLLVMLoopOpt)) return s;
-  return vectorize_inner_loops(
-      s, {ir::vector_bytes(target), [&](const For& loop) { return is_pure_loop(lowering, loop); }});
-}
-
-Stmt run_simplify(Lowering&, const Stmt& s) { return simplify(s); }
+Stmt run_simplify(const Lowering&, const Stmt& s) { return simplify(s); }
 
 template <Stmt (*pass)(const Stmt&)>
-Stmt alone(Lowering&, const Stmt& s) {
+Stmt alone(const Lowering&, const Stmt& s) {
   return pass(s);
 }
 template <Target::Feature feature, Stmt (*pass)(const Stmt&)>
-Stmt wanted(Lowering& lowering, const Stmt& s) {
-  return lowering.options.target.has_feature(feature) ? pass(s) : s;
+Stmt wanted(const Lowering& lowering, const Stmt& s) {
+  return lowering.target.has_feature(feature) ? pass(s) : s;
 }
 
 std::vector<std::string> buffer_names(const std::vector<LoweredArgument>& args) {
@@ -154,41 +94,82 @@ GivenBuffers given_buffers(const Lowering& lowering) {
   return given;
 }
 
+// ---- passes with parameters ----
+
+Stmt run_vectorize_inner_loops(const Lowering& lowering, const Stmt& s) {
+  if (lowering.target.has_feature(Target::DisableLLVMLoopOpt)) return s;
+  return vectorize_inner_loops(s, {ir::vector_bytes(lowering.target), [&](const For& loop) {
+                                     return is_pure_loop(lowering.program, loop.name);
+                                   }});
+}
+
+Stmt run_skip_stages(const Lowering& lowering, const Stmt& s) {
+  return skip_stages(s, [&](const std::string& name) {
+    const LoopedFunc* f = lowering.program.find(name);
+    return !f || !f->schedule.async;
+  });
+}
+
+Stmt run_keep_accumulators(const Lowering& lowering, const Stmt& s) {
+  return keep_accumulators(
+      s, [&](const For& loop) { return is_pure_loop(lowering.program, loop.name); });
+}
+
+Stmt run_add_argument_checks(const Lowering& lowering, const Stmt& s) {
+  return add_argument_checks(s, lowering.args, lowering.program,
+                             lowering.target.has_feature(Target::CUDA));
+}
+
+Stmt run_inject_profiling(const Lowering& lowering, const Stmt& s) {
+  if (!lowering.target.has_feature(Target::Profile)) return s;
+  return inject_profiling(s, lowering.program, lowering.name);
+}
+
+Stmt run_check_accesses(const Lowering& lowering, const Stmt& s) {
+  const bool wanted = lowering.target.has_feature(Target::CheckedAccesses) ||
+                      lowering.target.has_feature(Target::ASAN);
+  return wanted ? check_accesses(s, lowering.args) : s;
+}
+
+// A pass that reads the program of the lowering, too.
+template <Stmt (*pass)(const Stmt&, const Program&)>
+Stmt with_program(const Lowering& lowering, const Stmt& s) {
+  return pass(s, lowering.program);
+}
+
+constexpr ProgramPass program_passes[] = {
+    {"inline_functions",
+     [](Lowering& lowering) { lowering.program = inline_functions(lowering.outputs); }},
+    {"check_devices", [](Lowering& lowering) { check_devices(lowering.program, lowering.target); }},
+    {"share_parameters", [](Lowering& lowering) { share_parameters(lowering.program); }},
+};
+
 constexpr Pass passes[] = {
-    {"build_loop_nests", Phase::Loops, nest_loops},
+    {"build_loop_nests", Phase::Nests,
+     [](const Lowering& lowering, const Stmt&) { return build_loop_nests(lowering.program); }},
+    {"inject_tracing", Phase::Nests,
+     [](const Lowering& lowering, const Stmt& s) {
+       return inject_tracing(s, lowering.program, lowering.name, lowering.target);
+     }},
+    {"add_argument_checks", Phase::Nests, run_add_argument_checks},
+    {"make_names_unique", Phase::Loops,
+     [](const Lowering& lowering, const Stmt& s) {
+       return make_names_unique(s, mapped(lowering.args, &LoweredArgument::name));
+     }},
     {"drop_bounds_query", Phase::Loops, wanted<Target::NoBoundsQuery, drop_bounds_query>},
     {"check_promises", Phase::Loops, wanted<Target::CheckUnsafePromises, check_promises>},
-    {"write_debug_files", Phase::Loops,
-     [](Lowering& lowering, const Stmt& s) { return write_debug_files(s, lowering.program); }},
-    {"skip_stages", Phase::Loops,
-     [](Lowering& lowering, const Stmt& s) {
-       return skip_stages(s, [&](const std::string& name) {
-         const LoopedFunc* f = lowering.program.find(name);
-         return !f || !f->schedule.async;
-       });
-     }},
-    {"insert_prefetches", Phase::Loops,
-     [](Lowering& lowering, const Stmt& s) { return insert_prefetches(s, lowering.program); }},
-    {"lower_prefetches", Phase::Loops,
-     [](Lowering& lowering, const Stmt& s) { return lower_prefetches(s, lowering.program); }},
-    {"fork_async", Phase::Loops,
-     [](Lowering& lowering, const Stmt& s) {
-       return fork_async(s, lowering.program, lowering.async_room);
-     }},
+    {"write_debug_files", Phase::Loops, with_program<write_debug_files>},
+    {"skip_stages", Phase::Loops, run_skip_stages},
+    {"insert_prefetches", Phase::Loops, with_program<insert_prefetches>},
+    {"lower_prefetches", Phase::Loops, with_program<lower_prefetches>},
+    {"fork_async", Phase::Loops, with_program<fork_async>},
     {"memoize", Phase::Loops,
-     [](Lowering& lowering, const Stmt& s) {
-       return memoize(s, lowering.program, lowering.name, lowering.options.target, lowering.folds);
+     [](const Lowering& lowering, const Stmt& s) {
+       return memoize(s, lowering.program, lowering.name, lowering.target);
      }},
-    {"keep_accumulators", Phase::Loops,
-     [](Lowering& lowering, const Stmt& s) {
-       return keep_accumulators(s, [&](const For& loop) { return is_pure_loop(lowering, loop); });
-     }},
-    {"ring_buffers", Phase::Loops,
-     [](Lowering& lowering, const Stmt& s) { return ring_buffers(s, lowering.program); }},
-    {"flatten_storage", Phase::FlatStorage,
-     [](Lowering& lowering, const Stmt& s) {
-       return flatten_storage(s, storage_layouts(lowering));
-     }},
+    {"keep_accumulators", Phase::Loops, run_keep_accumulators},
+    {"ring_buffers", Phase::Loops, with_program<ring_buffers>},
+    {"flatten_storage", Phase::FlatStorage, alone<flatten_storage>},
     {"simplify_storage", Phase::FlatStorage, run_simplify},
     {"lower_atomics", Phase::FlatStorage, alone<lower_atomics>},
     {"skip_empty_tiles", Phase::FlatStorage, alone<skip_empty_tiles>},
@@ -198,8 +179,7 @@ constexpr Pass passes[] = {
     {"unroll_loops", Phase::FlatStorage, alone<unroll_loops>},
     {"join_indices", Phase::FlatStorage, alone<join_indices>},
     {"hoist_calls", Phase::FlatStorage, alone<hoist_calls>},
-    {"vectorize_inner_loops", Phase::FlatStorage,
-     [](Lowering& lowering, const Stmt& s) { return vectorize_unscheduled(lowering, s); }},
+    {"vectorize_inner_loops", Phase::FlatStorage, run_vectorize_inner_loops},
     {"vectorize_loops", Phase::Vector, alone<vectorize_loops>},
     {"accumulate_vectors", Phase::Vector, alone<accumulate_vectors>},
     {"interleave_vectors", Phase::Vector, alone<interleave_vectors>},
@@ -211,31 +191,29 @@ constexpr Pass passes[] = {
     {"blend_masked_stores", Phase::Vector, alone<blend_masked_stores>},
     {"fuzz_float_stores", Phase::Vector, wanted<Target::FuzzFloatStores, fuzz_float_stores>},
     {"make_kernels", Phase::Vector,
-     [](Lowering& lowering, const Stmt& s) {
-       return make_kernels(s, lowering.options.target, given_buffers(lowering));
+     [](const Lowering& lowering, const Stmt& s) {
+       return make_kernels(s, lowering.target, given_buffers(lowering));
      }},
-    {"inject_profiling", Phase::Vector,
-     [](Lowering& lowering, const Stmt& s) {
-       if (!lowering.options.target.has_feature(Target::Profile)) return s;
-       return inject_profiling(s, lowering.program, lowering.name);
-     }},
+    {"inject_profiling", Phase::Vector, run_inject_profiling},
     {"free_early", Phase::Vector, alone<free_early>},
     {"drop_asserts", Phase::Vector, wanted<Target::NoAsserts, drop_asserts>},
-    {"check_accesses", Phase::Vector,
-     [](Lowering& lowering, const Stmt& s) {
-       const Target& target = lowering.options.target;
-       const bool wanted =
-           target.has_feature(Target::CheckedAccesses) || target.has_feature(Target::ASAN);
-       return wanted ? check_accesses(s, lowering.args) : s;
-     }},
+    {"check_accesses", Phase::Vector, run_check_accesses},
     // Last: accesses are checked against what was asked for.
     {"bound_allocations", Phase::Vector, alone<bound_allocations>},
 };
 
-std::vector<std::string> names_of(const std::vector<LoweredArgument>& args) {
-  return mapped(args, [&](const LoweredArgument& arg) {
-    return arg.is_buffer() ? arg.name + ".buffer" : arg.name;
-  });
+// The names that the caller binds. Before make_names_unique, those of the buffers' metadata belong to them:
+// add_argument_checks binds these.
+std::vector<std::string> names_of(const std::vector<LoweredArgument>& args, Phase phase) {
+  std::vector<std::string> names;
+  for (const LoweredArgument& arg : args) {
+    names.push_back(arg.is_buffer() ? arg.name + ".buffer" : arg.name);
+    for (int d = 0; d < arg.dimensions && phase == Phase::Nests; d++) {
+      for (const char* fact : {".min.", ".extent.", ".stride."})
+        names.push_back(arg.name + fact + std::to_string(d));
+    }
+  }
+  return names;
 }
 
 void append_outputs(const std::vector<FuncPtr>& outputs, std::vector<LoweredArgument>& args) {
@@ -252,24 +230,48 @@ void append_outputs(const std::vector<FuncPtr>& outputs, std::vector<LoweredArgu
   }
 }
 
+// Runs a pass, checks and reports its result.
+template <class Run>
+Stmt timed(const char* pass, const Lowering& lowering, const LowerOptions& options, Run run) {
+  const auto start = std::chrono::steady_clock::now();
+  const Stmt after = run();
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  if (options.observe) options.observe(pass, seconds.count(), after);
+  tell_pass_observers({lowering.name, pass, seconds.count(),
+                       [&] { return after.defined() ? print(after) : to_text(lowering.program); }});
+  return after;
+}
+
+// Whether lowering stops after one of these passes.
+bool run_program_passes(Lowering& lowering, const LowerOptions& options) {
+  for (const ProgramPass& pass : program_passes) {
+    timed(pass.name, lowering, options, [&] {
+      pass.run(lowering);
+      return Stmt();
+    });
+    if (options.stop_after == pass.name) return true;
+  }
+  return false;
+}
+
+Stmt run_pass(const Pass& pass, const Lowering& lowering, const Stmt& before,
+              const LowerOptions& options) {
+  const Stmt after =
+      timed(pass.name, lowering, options, [&] { return pass.run(lowering, before); });
+  if (options.validate)
+    validate(after, pass.phase, pass.name, names_of(lowering.args, pass.phase), before);
+  return after;
+}
+
 Stmt run_passes(Lowering& lowering, const LowerOptions& options) {
   Stmt stmt;
+  if (run_program_passes(lowering, options)) return stmt;
   for (const Pass& pass : passes) {
-    auto start = std::chrono::steady_clock::now();
-    const Stmt before = stmt;
-    stmt = pass.run(lowering, before);
-    std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    if (options.validate) validate(stmt, pass.phase, pass.name, names_of(lowering.args), before);
-    if (options.observe) options.observe(pass.name, seconds.count(), stmt);
-    tell_pass_observers({lowering.name, pass.name, seconds.count(), [&] { return print(stmt); }});
+    stmt = run_pass(pass, lowering, stmt, options);
     if (options.stop_after == pass.name) break;
   }
   return stmt;
 }
-
-}  // namespace
-
-namespace {
 
 void check_stop(const std::string& stop_after) {
   const std::vector<std::string> names = pass_names();
@@ -287,13 +289,37 @@ LoweredFunction lower(const std::string& name, const std::vector<FuncPtr>& outpu
   LoweredFunction function{name, inputs, {}, {}};
   run_on_large_stack([&] {
     append_outputs(outputs, function.args);
-    Lowering lowering{outputs, function.args, {}, {}, {}, name, options};
+    Lowering lowering{name, outputs, function.args, options.target};
     function.body = run_passes(lowering, options);
     function.loop_nest = [program = std::move(lowering.program)] {
       return loop_nest_text(program);
     };
   });
   return function;
+}
+
+std::string run_pass_alone(const std::string& name, const std::vector<FuncPtr>& outputs,
+                           const Stmt& s, const Target& target) {
+  check_stop(name);
+  std::vector<LoweredArgument> args = infer_arguments(outputs);
+  append_outputs(outputs, args);
+  const std::string function = "function";
+  Lowering lowering{function, outputs, args, target};
+  const LowerOptions options{target, true, {}, name};
+  std::string result;
+  run_on_large_stack([&] {
+    if (run_program_passes(lowering, options)) {
+      result = to_text(lowering.program);
+      return;
+    }
+    const Stmt before = bind_symbols(s, lowering.program, parameters_of(outputs));
+    const auto* pass = std::ranges::find_if(passes, [&](const Pass& p) { return p.name == name; });
+    const Stmt after = pass->run(lowering, before);
+    // The text need not hold the argument checks, which bind the metadata of buffers.
+    validate(after, pass->phase, name, names_of(args, Phase::Nests), before);
+    result = print(after);
+  });
+  return result;
 }
 
 std::vector<LoweredArgument> infer_arguments(const std::vector<FuncPtr>& outputs) {
@@ -313,6 +339,7 @@ std::vector<LoweredArgument> infer_arguments(const std::vector<FuncPtr>& outputs
 
 std::vector<std::string> pass_names() {
   std::vector<std::string> names;
+  for (const ProgramPass& pass : program_passes) names.push_back(pass.name);
   for (const Pass& pass : passes) names.push_back(pass.name);
   return names;
 }

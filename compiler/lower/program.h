@@ -10,8 +10,12 @@
 #include <vector>
 
 #include "graph/function.h"
+#include "ir/build.h"
 
 namespace retrograde::lower {
+
+// The name before it was made unique: "f" for "f.$1", a copy of f. No Func, loop or let has "$" in a name of its own.
+std::string original_name(const std::string& name);
 
 // A Func that gets loops. Expressions are DAGs over the names that the user wrote: pure variables, reduction variables,
 // parameters.
@@ -33,26 +37,25 @@ struct Program {
   std::vector<LoopedFunc>
       funcs;  // producers before consumers; pure inlined Funcs have been substituted
   std::unordered_map<std::string, int> index_of;
+  // Large expressions of parameters, by the names that stand for them in the definitions (share_parameters).
+  Lets shared;
 
-  // Maps names in the statement to the Func's original name where they differ, for example if a Func is copied.
-  std::map<std::string, std::string> renamed;
-
-  const std::string& original(const std::string& name) const {
-    auto it = renamed.find(name);
-    return it == renamed.end() ? name : it->second;
-  }
   // Renumbers the Funcs after the order of `funcs` has changed.
   void number() {
     for (size_t f = 0; f < funcs.size(); ++f) index_of[funcs[f].name()] = static_cast<int>(f);
   }
+  // The Func of that name, which may be one that make_names_unique has given: "f.$1" is a copy of "f".
   const LoopedFunc* find(const std::string& name) const {
-    auto it = index_of.find(original(name));
+    auto it = index_of.find(original_name(name));
     return it == index_of.end() ? nullptr : &funcs[it->second];
   }
 };
 
 // "f" alone, or "f.0", "f.1" ... for Tuples: the buffer that holds value `index` of a Func.
 std::string value_buffer_name(const FuncContents& f, int index);
+
+// The text of the program as that of a graph (graph.h), with the definitions as they are now.
+std::string to_text(const Program& program);
 
 bool is_stored_where_computed(const LoopedFunc& f);
 // Whether the memory of f is allocated further out than its storage level (hoist_storage), and the name of that
@@ -63,5 +66,9 @@ bool is_place_name(const std::string& name);
 
 // "f.s1.": the prefix of the names of a stage's loops and bounds.
 std::string stage_prefix(const std::string& func, int stage);
+
+// Whether the loop of that name runs over a pure variable wherever the schedule has it. Its iterations touch elements
+// of their own (the rules for definitions in graph/definitions/define.h).
+bool is_pure_loop(const Program& program, const std::string& loop);
 
 }  // namespace retrograde::lower

@@ -8,6 +8,8 @@
 
 namespace retrograde::opt {
 
+using namespace autodiff;
+
 struct GraphPass {
   const char* name;
   std::vector<FuncPtr> (*run)(const std::vector<FuncPtr>& outputs);

@@ -2,10 +2,13 @@
 //
 //   opt --pass=vectorize_loops program.ir           on IR text; "-" or nothing: standard input
 //   opt --pass=unroll_loops,simplify program.ir     several passes in this order
+//   opt --print program.ir                          prints the text as the compiler writes it
 //   opt --pass=simplify --expr                      the text is one expression
 //   opt --graph [--pass=schedule_unscheduled] program.graph
 //                                                   the text is an algorithm (graph/graph.h), which
 //                                                   is checked; --stop-after=PASS also lowers it up to PASS
+//   opt --graph --pass=fork_async program.lowered   runs one pass of lowering on an algorithm with a statement
+//                                                   (program_text.h)
 //   opt --graph --log=FILE program.graph            applies a schedule (graph/directives/schedule_log.h) before
 //                                                   the passes run
 //   opt --time-passes --dump-after=all ...          prints the time and the result of each pass
@@ -39,6 +42,7 @@
 #include "ir/print.h"
 #include "lower/lower.h"
 #include "lower/statement_passes.h"
+#include "program_text.h"
 #include "simplify/simplify.h"
 
 namespace {
@@ -49,7 +53,8 @@ struct Options {
   std::vector<std::string> passes, dumped;
   std::string file = "-", stop_after, log;
   std::vector<char*> program;  // the words after "--", null-terminated
-  bool lists = false, lists_pipeline = false, is_expr = false, is_graph = false, times = false;
+  bool lists = false, lists_pipeline = false, is_expr = false, is_graph = false, times = false,
+       prints = false;
   bool dumps(const std::string& pass) const {
     return std::find(dumped.begin(), dumped.end(), pass) != dumped.end() ||
            std::find(dumped.begin(), dumped.end(), "all") != dumped.end();
@@ -77,6 +82,8 @@ bool read_option(const std::string& arg, Options& options) {
     options.log = *log;
   } else if (const auto dumped = value_of(arg, "dump-after")) {
     options.dumped = split(*dumped, ',');
+  } else if (arg == "--print") {
+    options.prints = true;
   } else if (arg == "--list") {
     options.lists = true;
   } else if (arg == "--list-pipeline") {
@@ -107,7 +114,7 @@ std::optional<Options> parse_options(int argc, char** argv) {
     if (!read_option(argv[i], options)) return std::nullopt;
   }
   const bool has_task = !options.passes.empty() || options.lists || options.lists_pipeline ||
-                        options.is_graph || !options.program.empty();
+                        options.prints || options.is_graph || !options.program.empty();
   if (!has_task) return std::nullopt;
   if (!options.program.empty()) options.program.push_back(nullptr);
   return options;
@@ -167,29 +174,24 @@ void run_expr(const Options& options) {
 }
 
 void run_graph(const Options& options) {
-  graph::Graph graph = graph::parse_graph(read_all(options.file));
-  graph::validate(graph, "parse_graph");
+  opt::ProgramText program = opt::parse_program(read_all(options.file), get_host_target());
   if (!options.log.empty()) {
-    graph =
-        graph::graph_of(graph::with_log(ScheduleLog::parse(read_all(options.log)), graph.outputs));
-    graph::validate(graph, "with_log");
+    const ScheduleLog log = ScheduleLog::parse(read_all(options.log));
+    program.graph = graph::graph_of(graph::with_log(log, program.graph.outputs));
+    graph::validate(program.graph, "with_log");
   }
-  for (const std::string& name : options.passes) {
-    const opt::GraphPass* pass = opt::find_graph_pass(name);
-    if (!pass) {
-      user_error(text("run the pass ", quoted(name), " on a graph"),
-                 "it must be one from graph to graph, as --list marks them");
-    }
-    graph = graph::graph_of(pass->run(graph.outputs));
-    graph::validate(graph, name);
-  }
-  if (options.stop_after.empty()) {
-    std::cout << graph::to_text(graph);
+  if (!options.stop_after.empty()) {
+    const lower::LowerOptions lowering{program.target, true, {}, options.stop_after};
+    const auto args = lower::infer_arguments(program.graph.outputs);
+    std::cout << lower::lower("graph", program.graph.outputs, args, lowering).body;
     return;
   }
-  lower::LowerOptions lowering{get_host_target(), true, {}, options.stop_after};
-  std::cout
-      << lower::lower("graph", graph.outputs, lower::infer_arguments(graph.outputs), lowering).body;
+  std::string result = graph::to_text(program.graph);
+  for (const std::string& pass : options.passes) {
+    result = opt::text_after(pass, program);
+    if (&pass != &options.passes.back()) program = opt::parse_program(result, program.target);
+  }
+  std::cout << result;
 }
 
 void run_passes(const Options& options) {
@@ -293,7 +295,8 @@ int main(int argc, char** argv) {
   if (!options) {
     std::cerr << "usage: opt --pass=NAME,... [--expr] [--time-passes] [--dump-after=NAME,...|all] "
                  "[FILE]\n"
-                 "       opt --graph [--log=FILE] [--pass=NAME,...] [--stop-after=NAME] [FILE]\n"
+                 "       opt --print [FILE]\n"
+                 "       opt --graph [--log=FILE] [--pass=NAME,... | --stop-after=NAME] [FILE]\n"
                  "       opt [--time-passes] [--dump-after=NAME,...|all] -- PROGRAM ARGS...\n"
                  "       opt --list | --list-pipeline\n";
     return 2;

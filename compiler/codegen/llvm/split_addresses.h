@@ -13,6 +13,8 @@
 // arithmetic and so breaks sums and products that match machine instructions.
 #pragma once
 
+#pragma once
+
 #include <llvm/IR/PassManager.h>
 
 namespace retrograde::codegen {

@@ -8,6 +8,7 @@
 #include "lower/checks/buffer_constraints.h"
 #include "lower/checks/run_time_check.h"
 #include "lower/checks/schedule_checks.h"
+#include "lower/nests/root_statement.h"
 #include "lower/runtime_call.h"
 #include "retrograde_runtime.h"
 #include "simplify/simplify.h"
@@ -26,9 +27,9 @@ constexpr const char *check_shape = "retrograde_check_shape",
 
 class Checks {
  public:
-  Checks(const LoopNests& nests, const std::vector<LoweredArgument>& args, const Program& program,
-         bool has_device)
-      : nests_(nests),
+  Checks(const RootStatement& root, const std::vector<LoweredArgument>& args,
+         const Program& program, bool has_device)
+      : root_(root),
         args_(args),
         program_(program),
         has_device_(has_device),
@@ -40,7 +41,7 @@ class Checks {
       if (arg.is_buffer()) add_shape_checks(arg, shape_checks);
     }
     Stmt body = make_block({emit_query_or_run()});
-    body = make_lets(nests_.bounds, body);
+    body = make_lets(root_.bounds, body);
     std::vector<Stmt> fact_checks;
     for (const LoweredArgument& arg : args_) {
       if (arg.is_buffer()) {
@@ -56,7 +57,7 @@ class Checks {
   }
 
  private:
-  const LoopNests& nests_;
+  const RootStatement& root_;
   const std::vector<LoweredArgument>& args_;
   const Program& program_;
   const bool has_device_;
@@ -158,16 +159,7 @@ class Checks {
 
   // The box that a buffer must contain; sides are undefined if nothing of it is used.
   Box required_box(const LoweredArgument& arg) const {
-    if (arg.kind == LoweredArgument::Kind::OutputBuffer) {
-      for (const LoopedFunc& f : program_.funcs) {
-        for (size_t i = 0; i < f.func->types.size(); i++) {
-          if (f.is_output && value_buffer_name(*f.func, static_cast<int>(i)) == arg.name)
-            return nests_.outputs.at(f.name());
-        }
-      }
-    }
-    auto it = nests_.images.find(arg.name);
-    return it == nests_.images.end() ? Box{} : it->second.box;
+    return value_or(root_.regions, arg.name, Box{});
   }
 
   void check_bounded(const LoweredArgument& arg, const Box& box) const {
@@ -201,7 +193,7 @@ class Checks {
     }
     add_requirements(run);
     for (Stmt& sizes : schedule_checks(program_)) run.push_back(std::move(sizes));
-    run.push_back(nests_.body);
+    run.push_back(root_.loops);
     return make_if(any_query, make_block(answers), make_block(run));
   }
 
@@ -384,9 +376,9 @@ bool is_check_by_runtime(const Stmt& s) {
   return function == check_shape || function == check_region;
 }
 
-Stmt add_argument_checks(const LoopNests& nests, const std::vector<LoweredArgument>& args,
+Stmt add_argument_checks(const Stmt& s, const std::vector<LoweredArgument>& args,
                          const Program& program, bool has_device) {
-  return Checks(nests, args, program, has_device).build();
+  return Checks(split_root(s), args, program, has_device).build();
 }
 
 }  // namespace retrograde::lower

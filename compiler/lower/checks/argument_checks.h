@@ -1,7 +1,7 @@
 // argument_checks -- check the arguments of a generated function before it runs, and answer bounds queries.
 //
-// In:  the loop nests, with the boxes that they read of inputs and access of outputs.
-// Out: the loop nests inside the checks, in this order:
+// In:  Nests: the loops, with the regions that they read of inputs and access of outputs (root_statement.h).
+// Out: Nests: the loops inside the checks, in this order:
 //      - buffers are not null and have the right element type, dimensions and sane extents; scalars are in range;
 //      - if any buffer is a bounds query (null host pointer), every query receives its required box and the function
 //        returns;
@@ -15,12 +15,12 @@
 #pragma once
 
 #include "ir/lowered_function.h"
-#include "lower/nests/build_loop_nests.h"
+#include "lower/program.h"
 
 namespace retrograde::lower {
 
 // `has_device`: data may be in device memory only.
-Stmt add_argument_checks(const LoopNests& nests, const std::vector<LoweredArgument>& args,
+Stmt add_argument_checks(const Stmt& s, const std::vector<LoweredArgument>& args,
                          const Program& program, bool has_device);
 
 // Whether the statement is such a call of the runtime, which returns from the function if the check fails.

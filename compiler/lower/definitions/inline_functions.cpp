@@ -17,35 +17,6 @@
 
 namespace retrograde::lower {
 
-std::string value_buffer_name(const FuncContents& f, int index) {
-  return f.types.size() == 1 ? f.name : f.name + "." + std::to_string(index);
-}
-
-static bool is_given(const LoopLevel& level) { return level.kind != LoopLevel::Kind::Inlined; }
-static bool is_same_loop(const LoopLevel& a, const LoopLevel& b) {
-  return a.kind == b.kind && a.func == b.func && a.var == b.var;
-}
-
-bool is_stored_where_computed(const LoopedFunc& f) {
-  const LoopLevel& store = f.schedule.store_level;
-  return !is_given(store) || is_same_loop(store, f.schedule.compute_level);
-}
-
-bool is_hoisted(const LoopedFunc& f) {
-  const FuncPlacement& at = f.schedule;
-  return !f.is_output && is_given(at.hoist_level) &&
-         !is_same_loop(at.hoist_level,
-                       is_given(at.store_level) ? at.store_level : at.compute_level);
-}
-
-constexpr const char* place_suffix = ".place";
-std::string place_name(const std::string& func) { return func + place_suffix; }
-bool is_place_name(const std::string& name) { return name.ends_with(place_suffix); }
-
-std::string stage_prefix(const std::string& func, int stage) {
-  return func + ".s" + std::to_string(stage) + ".";
-}
-
 namespace {
 
 struct InlinedFunc {

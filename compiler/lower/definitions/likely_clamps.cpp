@@ -12,16 +12,16 @@ namespace retrograde::lower {
 
 namespace {
 
-using Names = std::unordered_set<std::string>;
+using NameSet = std::unordered_set<std::string>;
 
-Names loop_variables(const LoopedFunc& f, const Definition& stage) {
-  Names names(f.func->args.begin(), f.func->args.end());
+NameSet loop_variables(const LoopedFunc& f, const Definition& stage) {
+  NameSet names(f.func->args.begin(), f.func->args.end());
   for (const ReductionVariable& r : stage.rvars) names.insert(r.var);
   return names;
 }
 
 // Whether the expression is an integer made of loop variables and parameters only, and not marked yet.
-bool is_place_of_loops(const Expr& e, const Names& loops) {
+bool is_place_of_loops(const Expr& e, const NameSet& loops) {
   if (!e.type().is_int_or_uint() || !uses_any_variable(e, loops)) return false;
   return !any_node(e, [](const Expr& part) {
     return part.kind() == Kind::Call || part.kind() == Kind::Load || part.kind() == Kind::Select;
@@ -38,7 +38,7 @@ struct Clamp {
   Expr place, inner_limit, outer_limit;
 };
 
-std::optional<Clamp> as_clamp(const Expr& e, const Names& loops) {
+std::optional<Clamp> as_clamp(const Expr& e, const NameSet& loops) {
   if (e.kind() != Kind::Min && e.kind() != Kind::Max) return {};
   const auto fixed_and_moving = [&](const Binary& n) -> std::optional<std::pair<Expr, Expr>> {
     const bool a_moves = uses_any_variable(n.a, loops), b_moves = uses_any_variable(n.b, loops);
@@ -59,7 +59,7 @@ Expr with_likely_place(const Clamp& clamp) {
 }
 
 void mark_stage(const LoopedFunc& f, Definition& stage) {
-  const Names loops = loop_variables(f, stage);
+  const NameSet loops = loop_variables(f, stage);
   StepRewriter index([&](const Expr& e, const auto& recurse) {
     const std::optional<Clamp> clamp = as_clamp(e, loops);
     return clamp ? with_likely_place(*clamp) : map_children(e, recurse);

@@ -79,14 +79,14 @@ bool has_memoized(const Program& program) {
 
 }  // namespace
 
-std::vector<std::pair<std::string, Expr>> share_parameters(Program& program) {
-  if (has_memoized(program)) return {};
+void share_parameters(Program& program) {
+  if (has_memoized(program)) return;
   ParameterSharer sharer;
   const auto share = [&](const Expr& e) { return sharer(e); };
   for (LoopedFunc& f : program.funcs) {
     for (Definition& stage : f.stages) stage = map_exprs(stage, share);
   }
-  return std::move(sharer.names);
+  program.shared = std::move(sharer.names);
 }
 
 }  // namespace retrograde::lower

@@ -14,15 +14,11 @@
 // Not done: programs with a memoized Func, whose key consists of the parameters that it mentions.
 #pragma once
 
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "lower/program.h"
 
 namespace retrograde::lower {
 
-// The values may use names bound before them.
-std::vector<std::pair<std::string, Expr>> share_parameters(Program& program);
+// Fills program.shared; values may use names bound before them.
+void share_parameters(Program& program);
 
 }  // namespace retrograde::lower

@@ -44,17 +44,20 @@ bool is_small(const Allocate& n) {
   return elements && n.memory != MemoryType::Heap && *elements <= stack_block_bytes / element_bytes;
 }
 
+bool is_element_name(const std::string& name) {
+  return name.find_first_not_of("0123456789", name.rfind('.') + 1) == std::string::npos;
+}
+
 class Profiling : public StatementRewriter {
  public:
   explicit Profiling(const Program& program) {
-    for (const LoopedFunc& f : program.funcs) add(f, f.name());
-    for (const auto& [name, original] : program.renamed) {
-      if (const LoopedFunc* f = program.find(original)) add(*f, name);
+    for (const LoopedFunc& f : program.funcs) {
+      const int number = static_cast<int>(numbers_.size()) + 1;
+      numbers_[f.name()] = number;
+      names += "\n" + f.name();
     }
-    names = "overhead";
-    for (const LoopedFunc& f : program.funcs) names += "\n" + f.name();
   }
-  std::string names;  // ordered by number
+  std::string names = "overhead";  // ordered by number
 
   // Code that runs on a thread of its own, with its own slot.
   Stmt on_a_thread(const Stmt& s) {
@@ -82,26 +85,23 @@ class Profiling : public StatementRewriter {
   }
 
  private:
-  std::map<std::string, int> numbers_;  // of Funcs and of the buffers of their values
+  std::map<std::string, int> numbers_;  // of Funcs
   int current_ = 0;
   std::string place_;  // the variable that holds this thread's slot
   int places_ = 0;
-
-  void add(const LoopedFunc& f, const std::string& name) {
-    const auto it = numbers_.find(f.name());
-    const int number = it == numbers_.end() ? next_++ : it->second;
-    numbers_[name] = number;
-    for (size_t i = 0; i < f.func->types.size(); i++)
-      numbers_[name + "." + std::to_string(i)] = number;
-  }
-  int next_ = 1;
 
   Expr place() const { return variable(place_, Handle()); }
   Stmt enter(int number) const {
     return make_evaluate(call_runtime("retrograde_profiler_enter", {place(), Expr(number)}));
   }
 
-  int number_of(const std::string& name) const { return value_or(numbers_, name, 0); }
+  // The Func "f" also has the names "f.$1", of a copy, and "f.0" and "f.$1.0", of the values of a Tuple.
+  int number_of(const std::string& name) const {
+    const auto found = numbers_.find(original_name(name));
+    if (found != numbers_.end()) return found->second;
+    const std::string func = name.substr(0, name.rfind('.'));
+    return is_element_name(name) ? value_or(numbers_, original_name(func), 0) : 0;
+  }
 
   Stmt produce(const ProducerConsumer& n) {
     const int outer = current_;

@@ -1,6 +1,6 @@
 // inject_tracing -- insert trace events for loads, stores and realizations.
-// In:  Loops, as build_loop_nests gives it.
-// Out: Loops; the same stores in the same order, with events between them.
+// In:  Nests, as build_loop_nests gives it.
+// Out: Nests; the same stores in the same order, with events between them.
 //
 //   realize f [a, n] {              let f.trace_id = begin_realization f [a, n] in
 //     produce f { f(x) = v }          realize f [a, n] {
@@ -25,6 +25,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/nests/root_statement.h"
 #include "lower/runtime_call.h"
 #include "lower/walk_in_bounds.h"
 #include "simplify/simplify.h"
@@ -186,7 +187,7 @@ class Tracer : public Rewriter {
     for (const Range& range : n.bounds)
       region.push_back({(*this)(range.min), (*this)(range.extent)});
     const Stmt inside = within(n.name, [&] { return (*this)(n.body); });
-    return make_realize(n.name, n.types, n.memory, n.bounds, realization(n.name, region, inside));
+    return with_body(n, realization(n.name, region, inside));
   }
 
   Stmt produce_or_consume(const ProducerConsumer& n) {
@@ -276,10 +277,11 @@ std::map<std::string, Box> regions_at_root(const Stmt& s) {
 
 }  // namespace
 
-void inject_tracing(LoopNests& nests, const Program& program, const std::string& pipeline,
+Stmt inject_tracing(const Stmt& s, const Program& program, const std::string& pipeline,
                     const Target& target) {
+  RootStatement root = split_root(s);
   Tracer tracer(program, target);
-  std::function<Stmt()> body = [&] { return tracer(nests.body); };
+  std::function<Stmt()> body = [&] { return tracer(root.loops); };
   for (auto it = program.funcs.begin(); it != program.funcs.end(); ++it) {
     if (!it->is_output || !tracer.traces_realizations(it->name())) continue;
     body = [&tracer, f = &*it, inner = body] {
@@ -287,8 +289,8 @@ void inject_tracing(LoopNests& nests, const Program& program, const std::string&
     };
   }
   const Stmt traced = body();
-  if (tracer.traced.empty() && !target.has_feature(Target::TracePipeline)) return;
-  const std::map<std::string, Box> regions = regions_at_root(nests.body);
+  if (tracer.traced.empty() && !target.has_feature(Target::TracePipeline)) return s;
+  const std::map<std::string, Box> regions = regions_at_root(root.loops);
   std::vector<Stmt> types, tags;
   for (const LoopedFunc& f : program.funcs) {
     if (!tracer.traces(f.name())) continue;
@@ -304,9 +306,10 @@ void inject_tracing(LoopNests& nests, const Program& program, const std::string&
   all.push_back(traced);
   all.push_back(
       make_evaluate(region_event(pipeline, halide_trace_end_pipeline, variable(pipeline_id), {})));
-  nests.body =
+  root.loops =
       make_let(pipeline_id, region_event(pipeline, halide_trace_begin_pipeline, Expr(0), {}),
                make_block(std::move(all)));
+  return joined(root);
 }
 
 }  // namespace retrograde::lower

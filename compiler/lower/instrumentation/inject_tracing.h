@@ -4,13 +4,12 @@
 #include <string>
 
 #include "ir/target.h"
-#include "lower/nests/build_loop_nests.h"
 #include "lower/program.h"
 
 namespace retrograde::lower {
 
-// Changes nests.body, whose names need not be unique yet.
-void inject_tracing(LoopNests& nests, const Program& program, const std::string& pipeline,
+// Nests to Nests: changes the loops of a root statement (root_statement.h).
+Stmt inject_tracing(const Stmt& s, const Program& program, const std::string& pipeline,
                     const Target& target);
 
 }  // namespace retrograde::lower

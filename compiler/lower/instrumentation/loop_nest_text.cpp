@@ -205,12 +205,7 @@ class LoopNestPrinter {
 
 std::string loop_nest_text(const Program& program) {
   std::string result;
-  run_on_large_stack([&] {
-    const LoopNests nests = build_loop_nests(program, {.slide = true});
-    LoopNestPrinter printer(program);
-    for (const auto& [name, value] : nests.bounds) printer.bind(name, value);
-    result = printer.print(nests.body);
-  });
+  run_on_large_stack([&] { result = LoopNestPrinter(program).print(build_loop_nests(program)); });
   return result;
 }
 

@@ -151,7 +151,7 @@ bool is_group_read(const Stmt& s, const std::string& func) {
 FuncNames hoisted_places_of(const Stmt& s, const Program& program) {
   FuncNames places, inside;
   if (!s.defined()) return places;
-  for (const std::string& name : realized_in(s)) inside.insert(program.original(name));
+  for (const std::string& name : realized_in(s)) inside.insert(original_name(name));
   for (const std::string& name : inside) {
     const LoopedFunc* f = program.find(name);
     if (f && is_hoisted(*f) && !inside.count(place_name(name))) places.insert(place_name(name));
@@ -164,7 +164,7 @@ namespace {
 // Whether the statement uses the Func, or the hoisted storage, that was realized under this name.
 bool needs(const Stmt& s, const std::string& name, const Program& program) {
   return s.defined() &&
-         (uses_func(s, name) || hoisted_places_of(s, program).count(program.original(name)));
+         (uses_func(s, name) || hoisted_places_of(s, program).count(original_name(name)));
 }
 
 }  // namespace
@@ -229,7 +229,7 @@ class BranchSplitter {
 
   // Both branches may compute a Func, in its own loops or fused with another, only if each has storage for it.
   void check_is_apart() const {
-    const std::string name = quoted(program_.original(n_.name));
+    const std::string name = quoted(original_name(n_.name));
     const FuncNames inside = realized_in(n_.body);
     FuncNames computed = produced_in(producer);
     computed.insert(in_producer_branch_.begin(), in_producer_branch_.end());
@@ -241,10 +241,10 @@ class BranchSplitter {
       user_error(text("compute ", name, " async"),
                  "what an async Func and its consumer both read is stored no further out than the "
                  "async Func, or computed outside of the loops that they share",
-                 text(quoted(program_.original(other)),
+                 text(quoted(original_name(other)),
                       " is computed in these loops and stored around ", name),
-                 text("Compute ", quoted(program_.original(other)), " at root, store it where ",
-                      name, " is stored, or call async() on it"));
+                 text("Compute ", quoted(original_name(other)), " at root, store it where ", name,
+                      " is stored, or call async() on it"));
     }
   }
 
@@ -297,7 +297,7 @@ class BranchSplitter {
     }
     if (const For* n = s.as<For>()) {
       if (n->runs != ForType::Serial && produces(n->body, n_.name)) {
-        refuse_async_loops(program_.original(n_.name),
+        refuse_async_loops(original_name(n_.name),
                            text("the loop ", describe_loop(n->name), " is not serial"),
                            "Store the Func inside of that loop");
       }

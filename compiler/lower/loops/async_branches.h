@@ -39,7 +39,7 @@ struct AsyncBranches {
   Stmt producer, consumer;
 };
 // Splits the code inside the storage `n` of an async Func. `room`: how many iterations the producer may be ahead
-// (AsyncRoom); nullopt: it runs once. `forked`: the async Funcs whose Forks are around this code.
+// (StorageLayout::lead); nullopt: it runs once. `forked`: the async Funcs whose Forks are around this code.
 AsyncBranches split_branches(const Realize& n, std::optional<int> room,
                              const std::vector<std::string>& forked, const Program& program,
                              Semaphores& semaphores);

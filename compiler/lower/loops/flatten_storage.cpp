@@ -68,8 +68,7 @@ Usage find_usage(const Stmt& s) {
 
 class Flattener : public Rewriter {
  public:
-  Flattener(const Stmt& s, const StorageLayouts& layouts)
-      : asked_(layouts), usage_(find_usage(s)), fresh_(s) {}
+  explicit Flattener(const Stmt& s) : usage_(find_usage(s)), fresh_(s) {}
 
  protected:
   Expr rewrite(const Expr& e) override {
@@ -113,24 +112,11 @@ class Flattener : public Rewriter {
 
   // ---- Realize ----
 
-  std::vector<int> storage_order(const std::string& func, size_t dimensions) const {
-    auto it = asked_.find(func);
-    if (it != asked_.end() && !it->second.order.empty()) {
-      RETROGRADE_ASSERT(it->second.order.size() == dimensions, "storage order of ", func, " has ",
-                        it->second.order.size(), " of ", dimensions, " dimensions");
-      return it->second.order;
-    }
-    std::vector<int> order(dimensions);
+  static std::vector<int> storage_order(const Realize& n) {
+    if (!n.layout.order.empty()) return n.layout.order;
+    std::vector<int> order(n.bounds.size());
     std::iota(order.begin(), order.end(), 0);
     return order;
-  }
-
-  std::vector<Expr> folds_of(const std::string& func, size_t dimensions) const {
-    auto it = asked_.find(func);
-    std::vector<Expr> folds;
-    if (it != asked_.end()) folds = it->second.folds;
-    folds.resize(dimensions);
-    return folds;
   }
 
   // Binds the value to the name, unless it is a constant that nothing refers to by name.
@@ -149,13 +135,13 @@ class Flattener : public Rewriter {
   Stmt allocate(const Realize& n) {
     Lets bindings;
     Layout layout;
-    const auto asked = asked_.find(n.name);
-    const bool is_in_ring = asked != asked_.end() && asked->second.is_in_ring;
-    const size_t dimensions = n.bounds.size() - (is_in_ring ? 1 : 0);
-    if (is_in_ring) layout.first = bind(n.name + ".first", (*this)(n.bounds.back().min), bindings);
+    const size_t dimensions = n.bounds.size();
+    if (n.layout.first.defined())
+      layout.first = bind(n.name + ".first", (*this)(n.layout.first), bindings);
     layout.strides.resize(dimensions);
     std::vector<Expr> extents;
-    layout.folds = folds_of(n.name, dimensions);
+    layout.folds = n.layout.folds;
+    layout.folds.resize(dimensions);
     for (size_t d = 0; d < dimensions; ++d) {
       const Expr& fold = layout.folds[d];
       Expr min = fold.defined() ? Expr(0) : (*this)(n.bounds[d].min);
@@ -165,31 +151,20 @@ class Flattener : public Rewriter {
       extents.push_back(is_named ? bind(fact(n.name, "extent", d), extent, bindings) : extent);
     }
     Expr stride = Expr(1), elements = make_const(Int(64), 1);
-    for (int d : storage_order(n.name, dimensions)) {
+    for (int d : storage_order(n)) {
       layout.strides[d] = stride = bind(fact(n.name, "stride", d), stride, bindings);
       stride = binary(Kind::Mul, stride, extents[d]);
       elements = binary(Kind::Mul, elements, cast_to(Int(64), count_of(extents[d])));
     }
     layouts_[n.name] = std::move(layout);
-    const auto places_around = places_;
-    const bool has_memory = !find_place(n.name);
+    const bool has_memory = n.layout.place.empty();
+    if (!has_memory) memory_of_[n.name] = n.layout.place;
     Stmt body = (*this)(n.body);
-    places_ = places_around;
     for (size_t i = n.types.size(); has_memory && i-- > 0;) {
       body = make_allocate(element_name(n.name, n.types.size(), i), n.types[i], n.memory, elements,
                            body);
     }
     return make_lets(bindings, body);
-  }
-
-  // Records where hoisted storage begins, or which hoisted storage the Func lies in; true in the second case.
-  bool find_place(const std::string& name) {
-    auto it = asked_.find(name);
-    if (it == asked_.end()) return false;
-    if (!it->second.is_place.empty()) places_[it->second.is_place] = name;
-    if (it->second.lies_in.empty()) return false;
-    memory_of_[name] = places_.at(it->second.lies_in);
-    return true;
   }
 
   // ---- Provide ----
@@ -225,20 +200,15 @@ class Flattener : public Rewriter {
     bind_if_loading(predicate, "predicate");
   }
 
-  const StorageLayouts& asked_;
   const Usage usage_;
   FreshNames fresh_;
   std::unordered_map<std::string, Layout> layouts_;
-  std::unordered_map<std::string, std::string>
-      places_;  // hoisted storage by name before renaming, the innermost
   std::unordered_map<std::string, std::string>
       memory_of_;  // by Func: the hoisted storage that it lies in
 };
 
 }  // namespace
 
-Stmt flatten_storage(const Stmt& s, const StorageLayouts& layouts) {
-  return Flattener(s, layouts)(s);
-}
+Stmt flatten_storage(const Stmt& s) { return Flattener(s)(s); }
 
 }  // namespace retrograde::lower

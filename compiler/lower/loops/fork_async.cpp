@@ -47,23 +47,21 @@ namespace {
 
 class AsyncForker : public StatementRewriter {
  public:
-  AsyncForker(const Stmt& s, const Program& program, const AsyncRoom& room)
-      : program_(program), room_(room), semaphores_(s) {}
+  AsyncForker(const Stmt& s, const Program& program) : program_(program), semaphores_(s) {}
 
  protected:
   Stmt rewrite(const Stmt& original_stmt) override {
     const Stmt s = producers_outermost(original_stmt);
     const Realize* n = s.as<Realize>();
-    if (n) around_[original(n->name)] = s;
+    if (n) around_[original_name(n->name)] = s;
     if (const Realize* func = n ? ring_at(*n) : nullptr) return fork_ring(*n, *func);
     if (!n || !is_async(n->name) || !produces(n->body, n->name)) return children(s);
     const Stmt body = has_loop_around(n->body, n->name) ? fork_loops(*n) : fork_once(*n);
-    return make_realize(n->name, n->types, n->memory, n->bounds, body);
+    return with_body(*n, body);
   }
 
  private:
   const Program& program_;
-  const AsyncRoom& room_;
   Semaphores semaphores_;
   std::vector<std::string>
       forked_;  // async Funcs whose consumer branch contains the current statement
@@ -73,7 +71,6 @@ class AsyncForker : public StatementRewriter {
   FuncNames rings_;                     // Funcs whose ring buffer is around and has been forked
   FuncNames shared_places_;             // their hoisted storage, which both branches share
 
-  const std::string& original(const std::string& name) const { return program_.original(name); }
   bool is_async(const std::string& name) const {
     const LoopedFunc* f = program_.find(name);
     return f && f->schedule.async && !rings_.count(f->name());
@@ -81,14 +78,14 @@ class AsyncForker : public StatementRewriter {
 
   // The Realize of the async Func whose ring buffer is `place`; null if `place` is not such storage.
   const Realize* ring_at(const Realize& place) const {
-    const std::string& name = original(place.name);
+    const std::string name = original_name(place.name);
     const LoopedFunc* f = program_.find(name.substr(0, name.rfind('.')));
     if (!f || !f->schedule.ring.defined() || !is_async(f->name()) || name != place_name(f->name()))
       return nullptr;
     const Realize* found = nullptr;
     int places = 0;
     walk(place.body, [&](const Realize& n) {
-      if (original(n.name) != f->name()) return;
+      if (original_name(n.name) != f->name()) return;
       found = &n;
       places++;
     });
@@ -102,16 +99,16 @@ class AsyncForker : public StatementRewriter {
   // Both branches realize the Func; the hoisted storage around provides the memory.
   Stmt fork_ring(const Realize& place, const Realize& func) {
     const LoopedFunc& f = *program_.find(func.name);
-    const Stmt around = make_realize(func.name, func.types, func.memory, func.bounds, place.body);
+    const Stmt around = with_body(func, place.body);
     const Realize& whole = *around.as<Realize>();
     check_is_consumed(whole);
     const int room = copies_in_ring(f);
     rings_.insert(f.name());
-    shared_places_.insert(original(place.name));
+    shared_places_.insert(original_name(place.name));
     const Stmt both = forked(whole, room, branches_of(whole, room));
-    shared_places_.erase(original(place.name));
+    shared_places_.erase(original_name(place.name));
     rings_.erase(f.name());
-    return make_realize(place.name, place.types, place.memory, place.bounds, both);
+    return with_body(place, both);
   }
 
   // Sorts directly nested Realizes: async Funcs come first, producers outside of their consumers. The others are then
@@ -122,16 +119,14 @@ class AsyncForker : public StatementRewriter {
     if (chain.size() < 2) return s;
     const Stmt body = chain.back()->body;
     const auto position = [&](const Realize* n) {
-      const auto it = program_.index_of.find(original(n->name));
+      const auto it = program_.index_of.find(original_name(n->name));
       const bool is_func = it != program_.index_of.end();
       return std::pair(is_func && !is_async(n->name), is_func ? it->second : -1);
     };
     std::stable_sort(chain.begin(), chain.end(),
                      [&](const Realize* a, const Realize* b) { return position(a) < position(b); });
     Stmt result = body;
-    for (size_t i = chain.size(); i-- > 0;)
-      result =
-          make_realize(chain[i]->name, chain[i]->types, chain[i]->memory, chain[i]->bounds, result);
+    for (size_t i = chain.size(); i-- > 0;) result = with_body(*chain[i], result);
     return result;
   }
 
@@ -153,8 +148,7 @@ class AsyncForker : public StatementRewriter {
       const auto around = around_.find(place);
       const bool is_shared = shared_places_.count(place) > 0;
       if (!there.count(place) || around == around_.end() || is_shared) continue;
-      const Realize& n = *around->second.as<Realize>();
-      producer = make_realize(n.name, n.types, n.memory, n.bounds, producer);
+      producer = with_body(*around->second.as<Realize>(), producer);
     }
     return producer;
   }
@@ -214,18 +208,16 @@ class AsyncForker : public StatementRewriter {
           if (!around || !may_be_skipped(*around) || fused_funcs_of(*around).count(n.name) ||
               !produces(around->body, n.name))
             return true;
-          refuse_async_loops(
-              original(n.name),
-              text("they are those of ", quoted(original(around->name)), ", which is memoized"),
-              "Store the Func inside of that loop, or do not memoize the other");
+          refuse_async_loops(original_name(n.name),
+                             text("they are those of ", quoted(original_name(around->name)),
+                                  ", which is memoized"),
+                             "Store the Func inside of that loop, or do not memoize the other");
         });
   }
 
   Stmt fork_loops(const Realize& n) {
     check_is_consumed(n);
-    const auto found = room_.find(original(n.name));
-    const int room = found == room_.end() ? 1 : found->second;
-    return forked(n, room, branches_of(n, room));
+    return forked(n, n.layout.lead, branches_of(n, n.layout.lead));
   }
 
   // The handshake of an outer async Func belongs to the branch that reads it. If both branches do, one gets semaphores
@@ -254,15 +246,12 @@ class AsyncForker : public StatementRewriter {
 
 }  // namespace
 
-Stmt fork_async(const Stmt& s, Program& program, const AsyncRoom& room) {
+Stmt fork_async(const Stmt& s, const Program& program) {
   const bool any = std::any_of(program.funcs.begin(), program.funcs.end(),
                                [](const LoopedFunc& f) { return f.schedule.async; });
   if (!any) return s;
   // Both branches contain copies of the loops around them, and may compute the same Func.
-  UniqueNames unique = make_names_unique(AsyncForker(s, program, room)(s));
-  for (const auto& [name, copied] : unique.original)
-    program.renamed[name] = program.original(copied);
-  return unique.stmt;
+  return make_names_unique(AsyncForker(s, program)(s));
 }
 
 }  // namespace retrograde::lower

@@ -49,9 +49,9 @@ class Inserter : public StatementRewriter {
  protected:
   Stmt rewrite(const Stmt& s) override {
     if (const Realize* n = s.as<Realize>()) {
-      realized_[program_.original(n->name)] = n->name;
+      realized_[original_name(n->name)] = n->name;
       Stmt result = children(s);
-      realized_.erase(program_.original(n->name));
+      realized_.erase(original_name(n->name));
       return result;
     }
     if (const LetStmt* n = s.as<LetStmt>()) {

@@ -155,9 +155,8 @@ class KeyRegions {
 
 class Memoizer : public Rewriter {
  public:
-  Memoizer(const Program& program, const std::string& function, const Target& target,
-           const StorageFolds& folds)
-      : program_(program), function_(function), target_(target), folds_(folds) {}
+  Memoizer(const Program& program, const std::string& function, const Target& target)
+      : program_(program), function_(function), target_(target) {}
 
  protected:
   Expr rewrite(const Expr& e) override {
@@ -166,7 +165,7 @@ class Memoizer : public Rewriter {
   }
 
   Stmt rewrite(const Stmt& s) override {
-    if (const Realize* n = s.as<Realize>()) bounds_[n->name] = n->bounds;
+    if (const Realize* n = s.as<Realize>()) storage_[n->name] = n;
     if (const LetStmt* n = s.as<LetStmt>()) regions_.note(n->name);
     const ProducerConsumer* n = s.as<ProducerConsumer>();
     const LoopedFunc* f = n && n->produces ? program_.find(n->name) : nullptr;
@@ -186,20 +185,16 @@ class Memoizer : public Rewriter {
     return key;
   }
 
-  // The fold factor of a dimension. Folded storage starts at coordinate 0.
-  Expr fold_of(const LoopedFunc& f, size_t dimension) const {
-    const auto it = folds_.find(f.name());
-    return it == folds_.end() || it->second.size() <= dimension ? Expr() : it->second[dimension];
-  }
-
   Stmt lookup(const LoopedFunc& f, const std::string& name, const Stmt& produce) {
-    const auto found = bounds_.find(name);
-    RETROGRADE_ASSERT(found != bounds_.end(), "no storage of ", name);
-    const std::vector<Range>& bounds = found->second;
+    const auto found = storage_.find(name);
+    RETROGRADE_ASSERT(found != storage_.end(), "no storage of ", name);
+    const std::vector<Range>& bounds = found->second->bounds;
+    std::vector<Expr> folds = found->second->layout.folds;
+    folds.resize(bounds.size());
     std::vector<Expr> first;
     Expr elements = make_const(Int(64), 1);
     for (size_t d = 0; d < bounds.size(); d++) {
-      const Expr fold = fold_of(f, d);
+      const Expr& fold = folds[d];  // folded storage starts at coordinate 0
       first.push_back(fold.defined() ? Expr(0) : bounds[d].min);
       const Expr extent = fold.defined() ? fold : max(bounds[d].extent, Expr(0));
       elements = elements * cast(Int(64), extent);
@@ -247,8 +242,7 @@ class Memoizer : public Rewriter {
   const Program& program_;
   const std::string& function_;
   const Target& target_;
-  const StorageFolds& folds_;
-  std::map<std::string, std::vector<Range>> bounds_;
+  std::map<std::string, const Realize*> storage_;
   KeyRegions regions_;
 };
 
@@ -263,10 +257,10 @@ Stmt with_key_region(const std::string& func, const Box& read, Stmt storage) {
 }
 
 Stmt memoize(const Stmt& s, const Program& program, const std::string& function,
-             const Target& target, const StorageFolds& folds) {
+             const Target& target) {
   const bool any = std::any_of(program.funcs.begin(), program.funcs.end(),
                                [](const LoopedFunc& f) { return is_memoized(&f); });
-  return any ? Memoizer(program, function, target, folds)(s) : s;
+  return any ? Memoizer(program, function, target)(s) : s;
 }
 
 }  // namespace retrograde::lower

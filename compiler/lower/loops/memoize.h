@@ -1,7 +1,6 @@
 // memoize -- look up the results of memoized Funcs in a cache before computing them.
 #pragma once
 
-#include <map>
 #include <string>
 
 #include "analysis/interval.h"
@@ -10,15 +9,12 @@
 
 namespace retrograde::lower {
 
-// For each Func, by its original name: the fold factor of each dimension of its storage, undefined if not folded.
-using StorageFolds = std::map<std::string, std::vector<Expr>>;
-
 // Wraps `storage` of a memoized Func in lets that hold the region that its consumers read, which becomes part of the
 // key. Storage may be larger: the part that only a rounded split computes holds no valid values of the Func.
 Stmt with_key_region(const std::string& func, const Box& read, Stmt storage);
 
 // `function`: the name of the compiled function.
 Stmt memoize(const Stmt& s, const Program& program, const std::string& function,
-             const Target& target, const StorageFolds& folds);
+             const Target& target);
 
 }  // namespace retrograde::lower

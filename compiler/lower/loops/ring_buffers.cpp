@@ -75,7 +75,7 @@ class RingBuffers : public StatementRewriter {
 
   // The Func with a ring buffer whose hoisted storage is realized under this name.
   const LoopedFunc* func_at_place(const std::string& name) const {
-    const std::string& place = program_.original(name);
+    const std::string place = original_name(name);
     const LoopedFunc* f = program_.find(place.substr(0, place.rfind('.')));
     return f && f->schedule.ring.defined() && place == place_name(f->name()) ? f : nullptr;
   }
@@ -90,7 +90,7 @@ class RingBuffers : public StatementRewriter {
       place = around;
     else
       places_.erase(f.name());
-    return make_realize(n.name, n.types, n.memory, bounds, body);
+    return with_bounds(n, bounds, body);
   }
 
   Stmt in_copy(const Realize& n, const LoopedFunc& f, const Place& place) {
@@ -112,9 +112,9 @@ class RingBuffers : public StatementRewriter {
       elements = binary(Kind::Mul, elements,
                         variable(place.realize->name + ".extent." + std::to_string(d)));
     }
-    std::vector<Range> bounds = n.bounds;
-    bounds.push_back({binary(Kind::Mul, copy, elements), 1});
-    return make_realize(n.name, n.types, n.memory, bounds, (*this)(n.body));
+    StorageLayout layout = n.layout;
+    layout.first = binary(Kind::Mul, copy, elements);
+    return make_realize(n.name, n.types, n.memory, n.bounds, (*this)(n.body), layout);
   }
 
   static void check_is_serial(const For& loop, const LoopedFunc& f) {

@@ -8,9 +8,8 @@
 
 namespace retrograde::lower {
 
-// Loops -> Loops. The hoisted storage of Funcs with a ring buffer, and the Realizes of these Funcs, get one bound more
-// than dimensions, which flatten_storage reads. For the hoisted storage it is the number of copies, for the Func the
-// first element of its copy.
+// Loops to Loops. The hoisted storage of Funcs with a ring buffer gets one dimension more, the number of copies. The
+// layouts of these Funcs get the first element of their copy.
 Stmt ring_buffers(const Stmt& s, const Program& program);
 
 // The constant number of copies of an async Func.

@@ -6,16 +6,10 @@
 #include "lower/checks/nest_checks.h"
 #include "lower/nests/nest_emitter.h"
 #include "lower/nests/own_joining.h"
+#include "lower/nests/root_statement.h"
 #include "lower/nests/shared_loops.h"
 
 namespace retrograde::lower {
-
-Box buffer_box(const std::string& buffer, int dimensions) {
-  return numbered(dimensions, [&](int d) {
-    Expr min = variable(text(buffer, ".min.", d));
-    return Interval{min, min + variable(text(buffer, ".extent.", d)) - 1};
-  });
-}
 
 NestEmitter::NestEmitter(const Program& program, const LoopNestOptions& options)
     : program_(program),
@@ -30,20 +24,23 @@ NestEmitter::NestEmitter(const Program& program, const LoopNestOptions& options)
   for (size_t i = 0; i < program.funcs.size(); i++) note_site(static_cast<int>(i));
 }
 
-LoopNests NestEmitter::emit() {
-  LoopNests nests;
+Stmt NestEmitter::emit() {
   ComputePlace root({});
   Emitted all = emit_place(root_, Emitted(), root);
-  nests.bounds = std::move(root.bindings);
   all.stmt = storage_.realize_stored(
       all, [](const LoopLevel& level) { return level.kind == LoopLevel::Kind::Root; });
   check_everything_found_its_place(all);
+  RootStatement result;
+  result.bounds = program_.shared;
+  result.bounds.insert(result.bounds.end(), root.bindings.begin(), root.bindings.end());
   for (auto& [name, use] : all.uses)
-    if (use.is_image) nests.images[name] = use;
-  nests.body = all.stmt;
-  nests.outputs = std::move(outputs_);
-  storage_.report(nests);
-  return nests;
+    if (use.is_image) result.regions[name] = use.box;
+  for (const LoopedFunc& f : program_.funcs) {
+    for (size_t i = 0; f.is_output && i < f.func->types.size(); i++)
+      result.regions[value_buffer_name(*f.func, static_cast<int>(i))] = outputs_.at(f.name());
+  }
+  result.loops = storage_.with_layouts(all.stmt);
+  return joined(result);
 }
 
 void NestEmitter::note_site(int index) {
@@ -134,7 +131,7 @@ void NestEmitter::check_everything_found_its_place(const Emitted& all) const {
   }
 }
 
-LoopNests build_loop_nests(const Program& program, const LoopNestOptions& options) {
+Stmt build_loop_nests(const Program& program, const LoopNestOptions& options) {
   return NestEmitter(program, options).emit();
 }
 

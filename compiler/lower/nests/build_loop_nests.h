@@ -1,9 +1,9 @@
 // build_loop_nests -- from Funcs and schedules to loops, with every region inferred on the way.
 //
 // In:  a Program (definitions as DAGs, nothing inlined left).
-// Out: Loops phase. One statement for all outputs; each Func is realised at its storage level and
+// Out: Nests phase. One statement for all outputs; each Func is realised at its storage level and
 //      produced at its compute level over exactly the box that the code below reads; the boxes are
-//      bound to names "f.s0.x.min" / "f.s0.x.max" just outside.
+//      bound to names "f.s0.x.min" / "f.s0.x.max" just outside. root_statement.h describes its head.
 //
 //   out(x, y) = f(x - 1, y) + f(x + 1, y)        for out.s0.y:
 //   f at out's y                                   let f.s0.x.max = out.s0.x.max + 1 ...
@@ -21,29 +21,9 @@
 // walk is ours. Tests: test/unit/lower/loop_nest_test.cpp, sliding_window_test.cpp, test/property.
 #pragma once
 
-#include <string>
-#include <utility>
-#include <vector>
-
-#include "analysis/interval.h"
 #include "lower/program.h"
 
 namespace retrograde::lower {
-
-using Requirements = std::map<std::string, Footprint>;  // box read of each Func and image
-
-struct LoopNests {
-  std::vector<std::pair<std::string, Expr>>
-      bounds;  // names of the regions at root, each may use those before it
-  Stmt body;
-  Requirements images;                 // what is read of each input
-  std::map<std::string, Box> outputs;  // what is written or read of each output Func
-  std::map<std::string, std::vector<Expr>>
-      folds;  // of Funcs: after how many coordinates each dimension wraps around, or undefined
-  // For async Funcs stored outside of the loop that computes them: how many iterations the producer may be ahead of its
-  // consumer; 0: any number.
-  std::map<std::string, int> async_room;
-};
 
 struct LoopNestOptions {
   bool slide = true;  // false: each Func computed whole wherever it is computed, as users wrote it
@@ -51,9 +31,6 @@ struct LoopNestOptions {
 
 // UserError: a compute or storage level that is no loop around every use, an unbounded region, a
 // Func stored outside of a parallel loop in which it is computed.
-LoopNests build_loop_nests(const Program& program, const LoopNestOptions& options = {});
-
-// "out" -> [out.min.d, out.min.d + out.extent.d - 1] in every dimension
-Box buffer_box(const std::string& buffer, int dimensions);
+Stmt build_loop_nests(const Program& program, const LoopNestOptions& options = {});
 
 }  // namespace retrograde::lower

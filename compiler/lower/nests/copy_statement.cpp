@@ -4,18 +4,13 @@
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "lower/program.h"
 
 namespace retrograde::lower {
 
 namespace {
 
 // The name without the number of a copy.
-std::string original_name(const std::string& name) {
-  size_t mark = name.rfind(".$");
-  bool is_copy = mark != std::string::npos && mark + 2 < name.size() &&
-                 name.find_first_not_of("0123456789", mark + 2) == std::string::npos;
-  return is_copy ? name.substr(0, mark) : name;
-}
 
 template <class Found>
 void for_each_name(const Stmt& s, Found found) {

@@ -7,6 +7,7 @@
 #include "lower/loops/memoize.h"
 #include "lower/nests/emit_definition.h"
 #include "lower/nests/nest_emitter.h"
+#include "lower/nests/root_statement.h"
 #include "lower/storage/promised_bounds.h"
 #include "simplify/simplify.h"
 
@@ -242,7 +243,7 @@ void NestEmitter::keep(Member& member, Box allocated, Emitted& code, Emitted& ge
   generated.stmt = storage_.fold(f, touched, member.loops, member.slides, code.has_vectors, site,
                                  generated.stmt);
   if (f.schedule.async && !member.loops.empty())
-    storage_.note_async_room(f, member.loops, member.slides, site.touched(touched));
+    storage_.note_lead(f, member.loops, member.slides, site.touched(touched));
   if (is_stored_where_computed(f)) {
     piece.realized.push_back({&f, member.required, allocated});
     storage_.note_place(f, allocated, code.storage);

@@ -64,10 +64,13 @@ class Uniquifier {
           std::vector<Range> bounds;
           for (const Range& range : realize.bounds)
             bounds.push_back({rename(range.min), rename(range.extent)});
+          StorageLayout layout = realize.layout;
+          for (Expr& fold : layout.folds) fold = rename(fold);
+          layout.first = rename(layout.first);
+          layout.place = current(renamings_, layout.place);
           Binding name(*this, realize.name);
-          if (name.unique != realize.name) original[name.unique] = realize.name;
           return make_realize(name.unique, realize.types, realize.memory, bounds,
-                              rename(realize.body));
+                              rename(realize.body), layout);
         },
         [&](const StmtNode&) {
           return map_children(
@@ -76,8 +79,6 @@ class Uniquifier {
               [&](Kind, const std::string& name) { return current(renamings_, name); });
         });
   }
-
-  std::map<std::string, std::string> original;
 
  private:
   FreshNames fresh_;
@@ -108,10 +109,8 @@ class Uniquifier {
 
 }  // namespace
 
-UniqueNames make_names_unique(const Stmt& s, const std::vector<std::string>& taken) {
-  Uniquifier uniquifier(s, taken);
-  Stmt stmt = uniquifier.rename(s);
-  return {stmt, std::move(uniquifier.original)};
+Stmt make_names_unique(const Stmt& s, const std::vector<std::string>& taken) {
+  return Uniquifier(s, taken).rename(s);
 }
 
 }  // namespace retrograde::lower

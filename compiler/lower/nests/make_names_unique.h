@@ -11,7 +11,6 @@
 // Method: one walk with a stack of renamings. Tests: test/unit/lower/lower_names_test.cpp.
 #pragma once
 
-#include <map>
 #include <string>
 #include <vector>
 
@@ -19,11 +18,7 @@
 
 namespace retrograde::lower {
 
-struct UniqueNames {
-  Stmt stmt;
-  std::map<std::string, std::string> original;  // original name of each renamed Func
-};
-// `taken`: names that are visible in all of s, such as arguments of its function.
-UniqueNames make_names_unique(const Stmt& s, const std::vector<std::string>& taken = {});
+// `taken`: names that are visible in all of s, such as arguments of its function. original_name() gives the name back.
+Stmt make_names_unique(const Stmt& s, const std::vector<std::string>& taken = {});
 
 }  // namespace retrograde::lower

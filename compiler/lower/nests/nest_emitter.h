@@ -24,7 +24,7 @@ namespace retrograde::lower {
 class NestEmitter {
  public:
   NestEmitter(const Program& program, const LoopNestOptions& options);
-  LoopNests emit();
+  Stmt emit();
 
  private:
   const Program& program_;

@@ -15,6 +15,9 @@
 
 namespace retrograde::lower {
 
+using Requirements =
+    std::map<std::string, Footprint>;  // the box that is read of each Func and image
+
 struct Loop {
   std::string var;   // as the user names it: "xo"
   std::string name;  // in the IR: "f.s0.xo"

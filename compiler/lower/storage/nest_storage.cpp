@@ -6,6 +6,7 @@
 #include "ir/markers.h"
 #include "lower/checks/nest_checks.h"
 #include "lower/nests/copy_statement.h"
+#include "lower/statement_rewriter.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::lower {
@@ -54,6 +55,15 @@ void apply(const StorageRule& rule, const LoopedFunc& f, size_t d, Range& range,
     range.extent = simplify((range.extent + rule.alignment - 1) / rule.alignment * rule.alignment);
 }
 
+// The dimensions of f, innermost first; empty if that is the order in which they are declared.
+std::vector<int> storage_order(const LoopedFunc& f) {
+  const std::vector<std::string>& args = f.func->args;
+  if (f.schedule.storage_dims == args) return {};
+  return mapped(f.schedule.storage_dims, [&](const std::string& var) {
+    return static_cast<int>(std::ranges::find(args, var) - args.begin());
+  });
+}
+
 Stmt realize_place(const LoopedFunc& f, const Box& room, const Stmt& stmt) {
   check_room(f, room);
   std::vector<Range> ranges;
@@ -97,11 +107,23 @@ bool NestStorage::is_site(const LoopedFunc& f, const Loop& loop) const {
   return sites_.count(f.name() + "\n" + loop.var) > 0;
 }
 
-void NestStorage::report(LoopNests& nests) const {
-  nests.async_room = async_room_;
+// Folds and leads are those of all places at which a Func is computed, so they are known last.
+Stmt NestStorage::with_layouts(const Stmt& s) const {
+  std::map<std::string, std::vector<Expr>> factors;
   for (const auto& [name, folds] : folds_) {
-    for (const Fold& fold : folds) nests.folds[name].push_back(fold.factor);
+    if (std::ranges::none_of(folds, [](const Fold& fold) { return fold.factor.defined(); }))
+      continue;
+    factors[name] = factors[place_name(name)] = mapped(folds, &Fold::factor);
   }
+  if (factors.empty() && leads_.empty()) return s;
+  return rewrite_statements(s, [&](const Stmt& part, auto& all) {
+    const Realize* n = part.as<Realize>();
+    if (!n) return all.children(part);
+    StorageLayout layout = n->layout;
+    layout.folds = value_or(factors, n->name, {});
+    layout.lead = value_or(leads_, n->name, 1);
+    return make_realize(n->name, n->types, n->memory, n->bounds, all(n->body), layout);
+  });
 }
 
 Stmt NestStorage::fold(const LoopedFunc& f, const Box& touched, const std::vector<Loop>& loops,
@@ -131,15 +153,15 @@ Stmt NestStorage::fold(const LoopedFunc& f, const Box& touched, const std::vecto
 // accesses W and computes S, by (F - W) / S further iterations. Under several loops, the window starts again in each
 // iteration of the outer ones and overwrites elements that the consumer may still read. This is harmless only if
 // nothing is folded and the same value is written; an update definition writes other values in between.
-void NestStorage::note_async_room(const LoopedFunc& f, const std::vector<Loop>& loops,
-                                  const std::vector<Slide>& slides, const Box& touched) {
+void NestStorage::note_lead(const LoopedFunc& f, const std::vector<Loop>& loops,
+                            const std::vector<Slide>& slides, const Box& touched) {
   const std::vector<Fold>& folds = folds_.at(f.name());
   const bool is_folded =
       std::ranges::any_of(folds, [](const Fold& fold) { return fold.factor.defined(); });
   const bool is_computed_once = !slides.empty() && loops.size() == 1;
   const bool keeps_values = !slides.empty() && !is_folded && f.stages.size() == 1;
   int room = is_computed_once ? room_in_folds(folds, slides, touched) : keeps_values ? 0 : 1;
-  auto [it, is_first] = async_room_.emplace(f.name(), room);
+  auto [it, is_first] = leads_.emplace(f.name(), room);
   if (!is_first && (it->second == 0 || (room != 0 && room < it->second))) it->second = room;
 }
 
@@ -167,7 +189,11 @@ Stmt NestStorage::realize(const LoopedFunc& f, const Box& box, Stmt stmt) {
     if (const StorageRule* rule = rule_of(f, d)) apply(*rule, f, d, range, factor, checks);
     ranges.push_back(range);
   }
-  checks.push_back(make_realize(f.name(), f.func->types, f.schedule.memory, ranges, stmt));
+  StorageLayout layout;
+  layout.order = storage_order(f);
+  if (is_hoisted(f)) layout.place = place_name(f.name());
+  checks.push_back(
+      make_realize(f.name(), f.func->types, f.schedule.memory, ranges, stmt, std::move(layout)));
   return make_block(checks);
 }
 

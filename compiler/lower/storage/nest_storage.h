@@ -25,8 +25,8 @@ class NestStorage {
   Stmt fold(const LoopedFunc& f, const Box& touched, const std::vector<Loop>& loops,
             const std::vector<Slide>& slides, bool is_vectorized, ComputePlace& site, Stmt stmt);
   // Decides how far an async producer may run ahead. `loops`: between f's computation and its storage.
-  void note_async_room(const LoopedFunc& f, const std::vector<Loop>& loops,
-                       const std::vector<Slide>& slides, const Box& touched);
+  void note_lead(const LoopedFunc& f, const std::vector<Loop>& loops,
+                 const std::vector<Slide>& slides, const Box& touched);
 
   Stmt realize(const LoopedFunc& f, const Box& box, Stmt stmt);
   // Hoisted storage of f: needs room for the largest region stored at any time.
@@ -39,14 +39,15 @@ class NestStorage {
   // The Func to which an entry of Emitted::storage belongs, also if the entry is its hoisted storage.
   const LoopedFunc* stored_func(const std::string& name) const;
 
-  void report(LoopNests& nests) const;
+  // The statement with the folds and leads of all Funcs in the layouts of its Realizes.
+  Stmt with_layouts(const Stmt& s) const;
 
  private:
   const Program& program_;
   const bool folds_any_;
   std::set<std::string> sites_;  // "consumer\nloop" of loops at which a Func is stored
   std::map<std::string, std::vector<Fold>> folds_;
-  std::map<std::string, int> async_room_;
+  std::map<std::string, int> leads_;  // of async Funcs, see StorageLayout::lead
 
   void note_folds(const LoopedFunc& f, std::vector<Fold> folds);
 };

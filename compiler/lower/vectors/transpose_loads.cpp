@@ -85,18 +85,14 @@ std::vector<StridedFamily> find_families(const Run& run) {
 
 using Replacements = std::unordered_map<const ExprNode*, Expr>;
 
-class Transposer : public StatementRewriter {
+class Transposer {
  public:
   explicit Transposer(const Stmt& s) : fresh_(s) {}
 
- protected:
-  Stmt rewrite(const Stmt& s) override {
-    const Stmt copy = children(s);
-    const auto* block = copy.as<Block>();
-    if (!block) return copy;
+  Stmt transposed(const Block& block) {
     std::vector<Stmt> result;
     Run run;
-    for (const Stmt& part : block->stmts) {
+    for (const Stmt& part : block.stmts) {
       if (joins(run, part)) continue;
       if (!run.stmts.empty()) result.push_back(transposed(run));
       run = {};
@@ -167,6 +163,14 @@ class Transposer : public StatementRewriter {
 
 }  // namespace
 
-Stmt transpose_loads(const Stmt& s) { return s.defined() ? Transposer(s)(s) : s; }
+Stmt transpose_loads(const Stmt& s) {
+  if (!s.defined()) return s;
+  Transposer transposer(s);
+  return rewrite_statements(s, [&](const Stmt& part, auto& all) {
+    const Stmt inner = all.children(part);
+    const auto* block = inner.as<Block>();
+    return block ? transposer.transposed(*block) : inner;
+  });
+}
 
 }  // namespace retrograde::lower

@@ -14,6 +14,7 @@
 #include "ir/operators.h"
 #include "simt/simt_driver.h"
 #include "support/page_table.h"
+#include "support/reference_functions.h"
 
 namespace retrograde {
 
@@ -33,50 +34,6 @@ constexpr int samples = 1 << 20;
 #else
 constexpr int samples = 1 << 14;
 #endif
-
-long double exact(Op op, long double x, long double y) {
-  switch (op) {
-    case Op::exp:
-      return std::exp(x);
-    case Op::log:
-      return std::log(x);
-    case Op::pow:
-      return std::pow(x, y);
-    case Op::hypot:
-      return std::hypot(x, y);
-    case Op::sin:
-      return std::sin(x);
-    case Op::cos:
-      return std::cos(x);
-    case Op::tan:
-      return std::tan(x);
-    case Op::asin:
-      return std::asin(x);
-    case Op::acos:
-      return std::acos(x);
-    case Op::atan:
-      return std::atan(x);
-    case Op::atan2:
-      return std::atan2(x, y);
-    case Op::sinh:
-      return std::sinh(x);
-    case Op::cosh:
-      return std::cosh(x);
-    case Op::tanh:
-      return std::tanh(x);
-    case Op::asinh:
-      return std::asinh(x);
-    case Op::acosh:
-      return std::acosh(x);
-    case Op::atanh:
-      return std::atanh(x);
-    case Op::erf:
-      return std::erf(x);
-    default:
-      ADD_FAILURE() << ir::op_info(op).name << " has no reference: add one";
-      return 0;
-  }
-}
 
 // ---- operands ----
 
@@ -114,23 +71,6 @@ T operand(std::mt19937_64& engine, int i) {
 
 // ---- errors ----
 
-// In units of the last place of the type at the exact value.
-template <typename T>
-double error_in_ulp(T got, long double wanted) {
-  using Limits = std::numeric_limits<T>;
-  if (std::isnan(got) || std::isnan(wanted))
-    return std::isnan(got) && std::isnan(wanted) ? 0 : INFINITY;
-  const long double beyond = std::ldexp(1.0L, Limits::max_exponent);
-  long double value = got;
-  if (std::isinf(got)) value = std::copysign(beyond, value);
-  if (std::abs(wanted) > beyond) wanted = std::copysign(beyond, wanted);
-  if (value == wanted) return 0;
-  int exponent = Limits::min_exponent - 1;
-  if (wanted != 0) exponent = std::max(exponent, std::ilogb(wanted));
-  const long double ulp = std::ldexp(1.0L, exponent - Limits::digits + 1);
-  return static_cast<double>(std::abs(value - wanted) / ulp);
-}
-
 struct Worst {
   double ulp = 0;
   std::string where;
@@ -156,7 +96,7 @@ Worst worst_error(Op op) {
       get_host_target().with_feature(Target::CUDA).with_feature(Target::CUDACapability80));
   Worst worst;
   for (int k = 0; k < samples; ++k) {
-    const double ulp = error_in_ulp<T>(got(k), exact(op, x(k), y(k)));
+    const double ulp = error_in_ulp(got(k), reference_value(op, x(k), y(k)));
     if (!(ulp > worst.ulp)) continue;
     std::ostringstream where;
     where << ir::op_info(op).name << "(" << std::hexfloat << x(k);

@@ -57,7 +57,7 @@ Stmt random_stmt(test::RandomIr& random, int depth) {
                           random.chance(50) ? e(Bool()) : Expr());
     case 6:
       return make_realize(name, {Float(32), UInt(8)}, MemoryType::Stack, {{e(), e()}, {e(), e()}},
-                          inner());
+                          inner(), {{1, 0}, {Expr(), e()}, "place", e(), random.below(3)});
     case 7:
       return make_allocate(name, Float(32), MemoryType::Heap, e(Int(64)), inner());
     case 8:

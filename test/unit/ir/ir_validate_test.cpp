@@ -127,6 +127,13 @@ TEST(Validate, StatementsTakeTheirTypes) {
   broken(make_realize("a", {}, MemoryType::Auto, {}, body), Phase::Loops, "a Realize has types");
   broken(make_realize("a", {Int(32)}, MemoryType::Auto, {{f, n}}, body), Phase::Loops,
          "bounds of a Realize");
+  const auto realized = [&](const StorageLayout& layout) {
+    return make_realize("a", {Int(32)}, MemoryType::Auto, {{n, n}, {n, n}}, body, layout);
+  };
+  broken(realized({.folds = {f}}), Phase::Loops, "folds and the first element");
+  broken(realized({.first = f}), Phase::Loops, "folds and the first element");
+  broken(realized({.order = {0, 0}}), Phase::Loops, "names each dimension once");
+  broken(realized({.order = {0}}), Phase::Loops, "names each dimension once");
   broken(make_allocate("a", Int(32), MemoryType::Auto, n, body), Phase::Vector, "an int64");
   broken(make_allocate("a", Int(32, 4), MemoryType::Auto, make_const(Int(64), 3), body),
          Phase::Vector, "holds scalars");

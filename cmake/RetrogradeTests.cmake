@@ -1,0 +1,125 @@
+# retrograde_test(<name>... [SOURCES <file>...] [LAYERS <layer>...] [LIBS <target>...] [LABELS <label>]
+#   [TIMEOUT <seconds>] [SHARDS <n>] [OPTIMIZED] [READS_FILES] [ALONE] [EXPORTS] [RUNTIME])
+#
+# Declares GoogleTest programs that are alike. The source of each is <name>.cpp beside the list that calls this, unless
+# SOURCES names others, relative to CMAKE_CURRENT_SOURCE_DIR. ctest lists the tests of a program one by one.
+#
+# LAYERS       Link only these layers (ir, simplify ...) and what lies below them, instead of the shared library: such a
+#              test builds while a layer above is broken.
+# LIBS         Further targets (retrograde_dep_halide, retrograde_dep_json ...).
+# LABELS       The default is the first folder of the first source.
+# SHARDS       ctest lists <name>.shard_0, <name>.shard_1 ..., each a process that runs its share of the tests: for a
+#              program that takes longer to start than most of its tests to run.
+# OPTIMIZED    The test itself computes much; see RETROGRADE_QUICK_TESTS.
+# READS_FILES  Define RETROGRADE_TEST_DIR as the folder of the tests. Only on request: a path among the flags keeps
+#              ccache from sharing objects between checkouts.
+# ALONE        The test measures time and runs beside no other.
+# EXPORTS      Compiled pipelines call C functions of the test program.
+# RUNTIME      The test includes headers of runtime/.
+include(GoogleTest)
+
+# With RETROGRADE_QUICK_TESTS, the headers that nearly every test includes are compiled once for all of them.
+# retrograde_precompiled(<name> <header>...) adds a target that holds them; no one runs it. It needs the libraries and
+# definitions of its users, which call retrograde_use_precompiled(<target> <name>).
+file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/test/headers.cpp CONTENT "int main() {}" @ONLY)
+function(retrograde_precompiled name)
+  # A program, as the tests are: position-independent code of libraries is compiled otherwise.
+  add_executable(${name} ${PROJECT_BINARY_DIR}/test/headers.cpp)
+  target_compile_options(${name} PRIVATE -O0)
+  target_precompile_headers(${name} PRIVATE ${ARGN})
+endfunction()
+function(retrograde_use_precompiled target name)
+  if(TARGET ${name})
+    target_precompile_headers(${target} REUSE_FROM ${name})
+  endif()
+endfunction()
+
+function(retrograde_test)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "OPTIMIZED;READS_FILES;ALONE;EXPORTS;RUNTIME" "TIMEOUT;SHARDS"
+    "SOURCES;LAYERS;LIBS;LABELS")
+  file(RELATIVE_PATH folder ${CMAKE_CURRENT_SOURCE_DIR} ${CMAKE_CURRENT_LIST_DIR})
+  foreach(name ${arg_UNPARSED_ARGUMENTS})
+    set(sources ${arg_SOURCES})
+    if(NOT sources)
+      set(sources ${folder}/${name}.cpp)
+    endif()
+    set(label ${arg_LABELS})
+    if(NOT label)
+      list(GET sources 0 first)
+      string(REGEX REPLACE "/.*" "" label "${first}")
+    endif()
+    add_executable(${name} ${sources})
+    retrograde_compile_test(${name})
+    retrograde_list_test(${name})
+  endforeach()
+endfunction()
+
+# The flags and libraries of one program; a part of retrograde_test that reads its arguments.
+function(retrograde_compile_test name)
+  if(arg_OPTIMIZED)
+    target_compile_options(${name} PRIVATE -O2)
+  elseif(RETROGRADE_QUICK_TESTS AND NOT label STREQUAL "property")
+    target_compile_options(${name} PRIVATE -O0)
+    if(arg_LAYERS)
+      retrograde_use_precompiled(${name} retrograde_layer_test_headers)
+    elseif(NOT "retrograde_dep_halide" IN_LIST arg_LIBS)
+      retrograde_use_precompiled(${name} retrograde_test_headers)
+    endif()
+  endif()
+  set(library retrograde)
+  if(arg_LAYERS)
+    list(TRANSFORM arg_LAYERS PREPEND retrograde_ OUTPUT_VARIABLE library)
+  endif()
+  target_link_libraries(${name} PRIVATE ${arg_LIBS} ${library} GTest::gtest_main)
+  target_include_directories(${name} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
+  if(arg_RUNTIME)
+    target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/runtime)
+  endif()
+  if(arg_EXPORTS)
+    set_target_properties(${name} PROPERTIES ENABLE_EXPORTS ON)
+  endif()
+  if(arg_READS_FILES)
+    target_compile_definitions(${name} PRIVATE RETROGRADE_TEST_DIR="${CMAKE_CURRENT_SOURCE_DIR}")
+  endif()
+endfunction()
+
+# The properties that ctest has of one program; a part of retrograde_test that reads its arguments.
+function(retrograde_list_test name)
+  set(timeout 300)
+  if(arg_TIMEOUT)
+    set(timeout ${arg_TIMEOUT})
+  endif()
+  set(properties LABELS "${label}" TIMEOUT ${timeout} RUN_SERIAL ${arg_ALONE})
+  set(environment
+    "LSAN_OPTIONS=print_suppressions=0:suppressions=${CMAKE_CURRENT_SOURCE_DIR}/leaks_of_others.supp")
+  if(NOT arg_SHARDS)
+    # PRE_TEST: the program is asked for its tests when ctest runs, not on every link.
+    gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
+      PROPERTIES ${properties} ENVIRONMENT "${environment}")
+    return()
+  endif()
+  math(EXPR last "${arg_SHARDS} - 1")
+  foreach(shard RANGE ${last})
+    add_test(NAME ${name}.shard_${shard} COMMAND ${name})
+    set_tests_properties(${name}.shard_${shard} PROPERTIES ${properties}
+      ENVIRONMENT "${environment};GTEST_TOTAL_SHARDS=${arg_SHARDS};GTEST_SHARD_INDEX=${shard}")
+  endforeach()
+endfunction()
+
+# retrograde_many_programs(<name> ...), with the arguments of retrograde_test: a test again, with all of the programs
+# of which it runs a part by default.
+function(retrograde_many_programs name)
+  retrograde_test(${name} ${ARGN} LABELS fuzz TIMEOUT 1800)
+  target_compile_definitions(${name} PRIVATE RETROGRADE_MANY_PROGRAMS)
+endfunction()
+
+# retrograde_fuzz(<program> FROM <first> TO <last> STEP <count> [OPTIONS <option>...]): one test for each `count` of the
+# program's seeds.
+function(retrograde_fuzz program)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "FROM;TO;STEP" "OPTIONS")
+  foreach(first RANGE ${arg_FROM} ${arg_TO} ${arg_STEP})
+    add_test(NAME ${program}.from_${first}
+      COMMAND ${program} --from ${first} --count ${arg_STEP} ${arg_OPTIONS})
+    set_tests_properties(${program}.from_${first} PROPERTIES LABELS fuzz TIMEOUT 1800)
+  endforeach()
+endfunction()

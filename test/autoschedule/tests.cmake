@@ -1,0 +1,23 @@
+# Directives of the autoscheduler, and the cost model.
+retrograde_test(
+  atomic_scatters_test
+  autoschedule_options_test
+  built_in_scheduler_test
+  chain_growth_test
+  choose_schedule_test
+  cost_model_test
+  data_places_test
+  default_schedule_test
+  epilogues_test
+  forward_schedules_test
+  memory_budget_test
+  row_sweeps_test
+  schedule_search_test
+  sum_blocks_test
+  LIBS retrograde_dep_halide_runtime)
+retrograde_test(auto_schedule_test OPTIMIZED)
+retrograde_test(gpu_auto_schedule_test SOURCES autoschedule/gpu_auto_schedule_test.cpp support/gpu_programs.cpp
+  LIBS retrograde_simt retrograde_dep_halide_runtime)
+retrograde_test(gpu_auto_schedules_test OPTIMIZED LIBS retrograde_simt)
+retrograde_test(schedule_replay_test READS_FILES LIBS retrograde_dep_halide_runtime)
+retrograde_test(tune_test LIBS retrograde_tune_parts retrograde_dep_halide_runtime)

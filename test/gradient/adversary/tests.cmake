@@ -1,0 +1,15 @@
+# Random programs designed to break derivatives, and the programs that try them without end.
+set(parts auto_scheduled check dense differences extern_stage gradient_pipeline higher machine_code
+  probe program schedule_rules scheduled_program)
+list(TRANSFORM parts PREPEND gradient/adversary/)
+list(TRANSFORM parts APPEND .cpp)
+add_library(gradient_adversary STATIC ${parts})
+target_link_libraries(gradient_adversary PUBLIC retrograde_dep_halide_runtime retrograde)
+target_include_directories(gradient_adversary PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
+add_executable(fuzz_adjoints gradient/adversary/fuzz.cpp)
+add_executable(fuzz_schedules gradient/adversary/fuzz_schedules.cpp)
+foreach(program fuzz_adjoints fuzz_schedules)
+  target_link_libraries(${program} PRIVATE gradient_adversary fuzzing)
+  set_target_properties(${program} PROPERTIES ENABLE_EXPORTS ON)
+endforeach()
+retrograde_test(adversary_test EXPORTS LIBS gradient_adversary)
