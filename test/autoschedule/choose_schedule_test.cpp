@@ -9,7 +9,7 @@
 #include "autodiff/derivative.h"
 #include "frontend/include/retrograde/retrograde.h"
 #include "gradient/gradient_check.h"
-#include "support/errors.h"
+#include "support/loop_nest.h"
 
 namespace retrograde {
 namespace {
@@ -123,9 +123,11 @@ TEST(ChooseSchedule, WithoutSizesTheRulesAreKept) {
   out(x, y) = exp(image(x, y)) + image(x + 1, y);
   const auto results = Pipeline(out).auto_schedule(get_host_target(), searching());
   EXPECT_EQ(results.search.tried, 0u);
-  expect_mentions(results.search.note,
-                  {"cannot search for a schedule of \"out\"", "known or estimated", "\"unsized\"",
-                   "what the rules choose is taken", "set_estimates"});
+  EXPECT_EQ(
+      results.search.note,
+      "cannot search for a schedule of \"out\": sizes of images and outputs are known or "
+      "estimated; the extent of dimension 0 of \"unsized\" is not known, so that what the rules "
+      "choose is taken. Give set_estimates() or bind the image.");
   EXPECT_FALSE(results.schedule_source.empty());
 }
 
@@ -134,7 +136,11 @@ TEST(ChooseSchedule, OutputsWithoutSizesAreNamed) {
   Var x("x");
   out(x) = cast<float>(x);
   const auto results = Pipeline(out).auto_schedule(get_host_target(), searching());
-  expect_mentions(results.search.note, {"the extent of \"x\" of \"endless\" is not known"});
+  EXPECT_EQ(
+      results.search.note,
+      "cannot search for a schedule of \"endless\": sizes of images and outputs are known or "
+      "estimated; the extent of \"x\" of \"endless\" is not known, so that what the rules choose "
+      "is taken. Give set_estimates() or bind the image.");
 }
 
 TEST(ChooseSchedule, WhatIsScheduledIsNotSearched) {
@@ -143,7 +149,10 @@ TEST(ChooseSchedule, WhatIsScheduledIsNotSearched) {
   pipeline.auto_schedule(get_host_target());
   const ScheduleReport report = pipeline.explain_schedule(Target(), {}, {.runner_up = true});
   EXPECT_EQ(report.search.tried, 0u);
-  expect_mentions(report.to_string(), {"a search is for what nobody scheduled"});
+  EXPECT_EQ(graph::without_numbers(report.search.note),
+            "cannot search for a schedule of \"loss\", \"b_adj\": a search is for what nobody "
+            "scheduled; every Func has a directive, so that what the rules choose is taken. Search "
+            "before anything else schedules them.");
 }
 
 TEST(ChooseSchedule, ForwardProgramsAreSearchedWhenTheyAreScheduled) {
@@ -153,7 +162,11 @@ TEST(ChooseSchedule, ForwardProgramsAreSearchedWhenTheyAreScheduled) {
   out.set_estimate(x, 0, 100);
   Pipeline pipeline(out);
   pipeline.set_autoschedule(searching());
-  expect_mentions(pipeline.explain_schedule().search.note, {"auto_schedule()"});
+  EXPECT_EQ(
+      pipeline.explain_schedule().search.note,
+      "cannot search for a schedule of \"forward\": compiling searches schedules of gradients; "
+      "none of its Funcs is one, so that what the rules choose is taken. Call auto_schedule() "
+      "with these options.");
 }
 
 TEST(ChooseSchedule, OverridesHoldInASearch) {
@@ -164,7 +177,7 @@ TEST(ChooseSchedule, OverridesHoldInASearch) {
   const Pipeline pipeline = program.pipeline();
   pipeline.auto_schedule(get_host_target(), options);
   EXPECT_EQ(program.heavy.function()->schedule.compute_level.kind, graph::LoopLevel::Kind::Root);
-  EXPECT_EQ(pipeline.schedule_log().to_text().find("parallel"), std::string::npos);
+  EXPECT_EQ(names_in_nest(pipeline.loop_nest(), "parallel"), std::vector<std::string>());
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 #include "support/errors.h"
+#include "support/facts.h"
 
 namespace retrograde {
 namespace {
@@ -908,8 +909,9 @@ TEST_F(DefaultSchedule, AScanIsNotComputedAgainForEachElement) {
   total() += squares(all.x, all.y) * squares(all.x, all.y);
   const Derivative d = propagate_adjoints(total);
   EXPECT_TRUE(is_stored(d(a), scan));
-  expect_mentions(d.explain(Detail::All), {"performance \"scan\": without a directive it is "
-                                           "computed at root"});
+  expect_fact(d.costs(), Fact::Performance, scan.name(),
+              "without a directive it is computed at root: inside the loops of its consumer its "
+              "updates would run again for each element");
 }
 
 TEST_F(DefaultSchedule, AHandScheduleKeepsSmallReductionsThatAreReadOnceInline) {
@@ -950,11 +952,14 @@ TEST(PrivateParts, AreFewerForLargeTargets) {
     RDom r(0, 4 * side, 0, 4 * side);
     total() = 0.0f;
     total() += warped(r.x, r.y) * warped(r.x, r.y);
-    return propagate_adjoints(total, {.wrt = {image}}).explain(Detail::All);
+    return propagate_adjoints(total, {.wrt = {image}}).explanations();
   };
-  expect_mentions(explained(256), {"32 privatised copies of 524288 bytes each"});
-  expect_mentions(explained(1024),
-                  {"8 privatised copies of 8388608 bytes each, as many as fit 67108864"});
+  expect_fact(explained(256), Fact::Performance, "image",
+              "\"image_adj\": accumulated in 32 privatised copies of 524288 bytes each, as many as "
+              "fit 67108864 bytes");
+  expect_fact(explained(1024), Fact::Performance, "image",
+              "\"image_adj\": accumulated in 8 privatised copies of 8388608 bytes each, as many as "
+              "fit 67108864 bytes");
 }
 
 // The number of copies that fit is known when the pipeline runs; bits are the same on any number of threads.
@@ -967,7 +972,9 @@ TEST(PrivateParts, OfSizesKnownAtRunTime) {
   total() = 0.0f;
   total() += read(r) * read(r) * cast<float>(r % 7);
   const Derivative d = propagate_adjoints(total, {.wrt = {image}});
-  expect_mentions(d.explain(Detail::All), {"at most 32 privatised copies"});
+  expect_fact(
+      d.explanations(), Fact::Performance, image.name(),
+      "\"image_adj\": accumulated in at most 32 privatised copies, as many as fit 67108864 bytes");
   Buffer<float> values(37), expected(37);
   Buffer<int> places(5000);
   for (int i = 0; i < 37; ++i) values(i) = 0.25f * static_cast<float>(i - 18);

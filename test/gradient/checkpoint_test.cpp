@@ -6,6 +6,7 @@
 #include "autodiff/time/revolve.h"
 #include "gradient/programs_suite.h"
 #include "support/errors.h"
+#include "support/facts.h"
 
 namespace retrograde::gradient {
 namespace {
@@ -317,8 +318,11 @@ TEST(Checkpoints, TheGradientCanBeDifferentiatedAgain) {
 TEST(Checkpoints, ExplainSaysWhatIsKeptAndWhatIsComputedAgain) {
   Program p = pushed(10);
   Derivative d = propagate_adjoints(p.loss, {.checkpoint_states = 3});
-  expect_mentions(d.explain(Detail::All), {"a loop of 10 steps", "3 kept states of 28 bytes",
-                                           "15 steps recomputed beside the 10 that are reversed"});
+  EXPECT_EQ(
+      details_of(d.explanations(), Fact::Version),
+      std::vector<std::string>{
+          "update 0 is a loop of 10 steps that \"pushed_u_checkpoints\" runs backward: from 3 "
+          "kept states of 28 bytes, 15 steps recomputed beside the 10 that are reversed"});
 }
 
 TEST(Checkpoints, ALoopOfOneStepNeedsNoCheckpointAndIsNoError) {
@@ -444,8 +448,12 @@ TEST(Checkpoints, MoreStepsAtRunTimeThanATableMayHaveFailTheCall) {
   expect_error<RuntimeError>(
       {"room for 1 kept state has at most 5789 steps", "this one has 100000", "larger budget"},
       [&] { d(start).realize({1}); });
-  expect_mentions(d.explain(Detail::All),
-                  {"a loop of n steps", "1 kept state of 4 bytes", "at run time"});
+  EXPECT_EQ(
+      details_of(d.explanations(), Fact::Version),
+      std::vector<std::string>{
+          "update 0 is a loop of n steps that \"counted_u_checkpoints\" runs backward: from 1 "
+          "kept state of 4 bytes, each step at most r times, as \"counted_u_actions\" finds at "
+          "run time, recomputed beside the n that are reversed"});
 }
 
 // ---- refusals ----

@@ -9,6 +9,7 @@
 #include "frontend/data/param.h"
 #include "gradient/gradient_check.h"
 #include "support/errors.h"
+#include "support/facts.h"
 
 namespace retrograde::gradient {
 namespace {
@@ -56,8 +57,8 @@ TEST_F(CustomAdjoints, StandForTheDefinition) {
   Derivative d = propagate_adjoints(sum_of(with_slope(3.0f)));
   for (int n = 0; n < 6; ++n) EXPECT_EQ(at(d(a), n), 3.0 * (n + 1));
   expect_machine_code_agrees(d(a), all);
-  expect_mentions(d.explain(Detail::All),
-                  {"custom \"f", "its custom adjoint contributes", "_from_f"});
+  EXPECT_EQ(details_of(d.explanations(), Fact::Custom),
+            std::vector<std::string>{"its custom adjoint contributes \"b_from_f\" to \"b\""});
 }
 
 TEST_F(CustomAdjoints, ReplaceOneAnother) {
@@ -68,7 +69,8 @@ TEST_F(CustomAdjoints, ReplaceOneAnother) {
   });
   Derivative d = propagate_adjoints(sum_of(f));
   EXPECT_EQ(at(d(a), 2), 0.0);
-  expect_mentions(d.explain(Detail::All), {"by the custom adjoint of \"f"});
+  expect_fact(d.explanations(), Fact::Zero, a.name(),
+              text("by the custom adjoint of \"", f.name(), "\""));
 }
 
 TEST_F(CustomAdjoints, OfAStencilReadSeveralTimes) {
@@ -166,7 +168,10 @@ TEST_F(CustomAdjoints, OfSeveralFuncsTogether) {
   for (int n = 0; n < 6; ++n) EXPECT_NEAR(at(d(a), n), at(expected, n), 1e-12);
   EXPECT_TRUE(d(s.f).defined());
   EXPECT_THROW(d(s.total), CompileError);
-  expect_mentions(d.explain(Detail::All), {"\"total\": inside of the custom adjoint of \"softmax"});
+  for (const Func& inside : {s.exponential, s.total}) {
+    expect_fact(d.explanations(), Fact::Custom, inside.name(),
+                "inside of the custom adjoint of \"softmax\": it has no adjoint of its own");
+  }
 }
 
 TEST_F(CustomAdjoints, WhatIsInsideKeepsItsOtherReaders) {
@@ -379,7 +384,7 @@ TEST_F(CustomAdjoints, TangentsOfInputsThatMove) {
     EXPECT_NEAR(at(t(f), n), at(expected, n), 1e-12);
     EXPECT_NEAR(at(found_g, n), at(expected_g, n), 1e-12);
   }
-  expect_mentions(t.explain(Detail::All), {"custom \"f", "from its custom tangent"});
+  expect_fact(t.explanations(), Fact::Custom, f.name(), "\"f_tan\", from its custom tangent");
 }
 
 TEST_F(CustomAdjoints, OfAnInputWhoseBoundsAloneAreReadContributeNothingToIt) {
@@ -400,7 +405,10 @@ TEST_F(CustomAdjoints, OfAnInputWhoseBoundsAloneAreReadContributeNothingToIt) {
     EXPECT_EQ(at(d(a), n), 3.0 * (n + 1));
     EXPECT_EQ(at(d(sized), n), 0.0);
   }
-  expect_mentions(d.explain(Detail::All), {"zero \"sized\"", "reads no element of it"});
+  expect_fact(
+      d.explanations(), Fact::Zero, sized.name(),
+      "the output reads no element of it, at most its bounds: the contribution of the custom "
+      "adjoint of \"f\" is ignored");
 }
 
 // rule: a Func with a custom adjoint needs a rule for tangents, too

@@ -7,6 +7,7 @@
 #include "autodiff/second_order.h"
 #include "frontend/data/param.h"
 #include "gradient/gradient_check.h"
+#include "graph/names.h"
 #include "support/errors.h"
 
 namespace retrograde::gradient {
@@ -96,7 +97,8 @@ TEST_F(Jacobians, OfAThreePointStencilHaveThree) {
   EXPECT_FALSE(j.by_rows());
   expect_right(f, {n - 2}, a, j);
   expect_band_agrees(j, {n - 2});
-  expect_mentions(j.explain(), {"tangents for 3 seeds", "share no row"});
+  EXPECT_EQ(graph::without_numbers(j.explain()),
+            "tangents for 3 seeds in \"f_tan_by_colour\": elements of one colour share no row\n");
 }
 
 TEST_F(Jacobians, OfTheFivePointStencilHaveFive) {
@@ -307,7 +309,8 @@ TEST_F(Jacobians, WithoutAPathAreZero) {
   Jacobian j = jacobian(f, b, {{0, n}});
   EXPECT_EQ(j.colours(), 1);
   EXPECT_EQ(at(j.dense(), {2, 2}), 0.0);
-  expect_mentions(j.explain(), {"identically zero"});
+  EXPECT_EQ(j.explain(),
+            "identically zero: no differentiable path leads from the input to the output\n");
 }
 
 // ---- Hessians ----

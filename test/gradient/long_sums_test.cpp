@@ -10,7 +10,7 @@
 #include "frontend/language/func.h"
 #include "graph/copy_graph.h"
 #include "ir/build.h"
-#include "support/errors.h"
+#include "support/facts.h"
 
 namespace retrograde {
 namespace {
@@ -88,7 +88,8 @@ void check_scatter(int elements, Terms& terms) {
   loss() = 0.0f;
   loss() += table(clamp(place(r % elements), 0, elements - 1)) * all(r);
   Derivative d = propagate_adjoints(loss);
-  expect_mentions(d.explain(Detail::All), {"depend"});
+  expect_fact(d.explanations(), Fact::Scattered, table.name(),
+              text("read by \"", loss.name(), "\": an index depends on \"", place.name(), "\""));
   expect_sums(d(table).realize({elements}), terms);
 }
 
@@ -241,6 +242,10 @@ Derivative filter_gradient(const Buffer<float>& a, float decay, int length) {
   return propagate_adjoints(loss, {.wrt = {a}});
 }
 
+const std::string carried =
+                      "update 0: its adjoint carries long sums from element to element, in double",
+                  recurrence = "update 0 is a recurrence: its adjoint runs backward";
+
 // Scans that are damped by a constant below 1, or that carry few elements, stay in float32. The carried term uses each
 // value of the step twice; expanded as a tree it would have 2^40 nodes.
 TEST(CarriedSums, OfStepsThatUseTheirValuesTwiceAreFoundInTime) {
@@ -257,18 +262,20 @@ TEST(CarriedSums, OfStepsThatUseTheirValuesTwiceAreFoundInTime) {
   loss() = 0.0f;
   loss() += f(all);
   Derivative d = propagate_adjoints(loss);
-  expect_mentions(d.explain(Detail::All), {"carried"});
+  EXPECT_EQ(details_of(d.explanations(), Fact::Version),
+            (std::vector<std::string>{carried, recurrence}));
   Buffer<float> found = d(input).realize({n});
   for (int i = 0; i < n; ++i) EXPECT_EQ(found(i), static_cast<float>(n - i)) << i;
 }
 
 TEST(CarriedSums, ThatAreShortStayInFloat32) {
   Buffer<float> a(100'000);
-  EXPECT_EQ(filter_gradient(a, 0.9f, 100'000).explain(Detail::All).find("in double"),
-            std::string::npos);
-  expect_mentions(filter_gradient(a, 0.99f, 100'000).explain(Detail::All), {"in double"});
-  EXPECT_EQ(filter_gradient(a, 0.99f, 63).explain(Detail::All).find("in double"),
-            std::string::npos);
+  const auto versions = [&](float decay, int length) {
+    return details_of(filter_gradient(a, decay, length).explanations(), Fact::Version);
+  };
+  EXPECT_EQ(versions(0.9f, 100'000), std::vector<std::string>{recurrence});
+  EXPECT_EQ(versions(0.99f, 100'000), (std::vector<std::string>{carried, recurrence}));
+  EXPECT_EQ(versions(0.99f, 63), std::vector<std::string>{recurrence});
 }
 
 TEST(LongSums, ShortOnesStayInFloat32) {
@@ -284,7 +291,9 @@ TEST(LongSums, ShortOnesStayInFloat32) {
   EXPECT_EQ(d.accumulator(d(a)).name(), d(a).name());
   EXPECT_EQ(d.accumulator(d(b)).types()[0], Float(64));
   EXPECT_EQ(d(b).types()[0], Float(32));
-  expect_mentions(d.explain(Detail::All), {"accumulates in double"});
+  expect_fact(d.explanations(), Fact::Built, b.name(),
+              text('"', d.accumulator(d(b)).name(), "\" accumulates in double, and \"", d(b).name(),
+                   "\" rounds the sum once, because an element may sum many terms"));
 }
 
 // loss = sum of p h(i), computed in 16 bits: neither the gradient by p nor a sum of three values each can be

@@ -1,6 +1,6 @@
 // Gradients of complete programs against central differences.
 #include "gradient/gradient_check.h"
-#include "support/errors.h"
+#include "support/facts.h"
 #include "support/measured_threads.h"
 
 namespace retrograde::gradient {
@@ -109,7 +109,8 @@ TEST_F(Programs, DataDependentGatherScatters) {
   Func loss = weighted_sum(f, {9});
   Derivative d = propagate_adjoints(loss);
   expect_gradient(loss, d, a);
-  expect_mentions(d.explain(Detail::All), {"scattered"});
+  expect_fact(d.explanations(), Fact::Scattered, a.name(),
+              "read by \"f\": an index depends on \"index\"");
 }
 
 // Numbers of these types wrap around at 2^8, 2^16 or 2^32, or exceed int32.
@@ -126,8 +127,7 @@ void expect_place_chosen_by_data_of_the_row(Buffer<float>& image) {
     Func loss = weighted_sum(f, {5, 6});
     Derivative d = propagate_adjoints(loss);
     expect_gradient(loss, d, image);
-    EXPECT_EQ(d.explain(Detail::All).find("scattered"), std::string::npos)
-        << d.explain(Detail::All);
+    EXPECT_EQ(details_of(d.explanations(), Fact::Scattered), std::vector<std::string>());
   }
 }
 TEST_F(Programs, PlaceChosenByUnsignedAndNarrowDataOfTheRow) {
@@ -262,7 +262,8 @@ TEST_F(Programs, ScalarParameterSumsInParts) {
   loss() = 0.0f;
   loss() += f(r.x, r.y);
   Derivative d = propagate_adjoints(loss);
-  expect_mentions(d.explain(Detail::All), {"privatised"});
+  expect_fact(d.explanations(), Fact::Privatised, gain.name(),
+              "accumulated in a fixed number of privatised copies, which are summed in order");
   double expected = 0;
   for (int j = 0; j < 48; ++j) {
     for (int i = 0; i < 64; ++i) expected += (i + 2 * j) * 1.5;
@@ -280,8 +281,15 @@ TEST_F(Programs, PrivatisedScatterIsTheSameForEveryNumberOfThreads) {
   loss() = 0.0f;
   loss() += f(r.x, r.y) * f(r.x, r.y);
   Derivative d = propagate_adjoints(loss);
-  expect_mentions(d.explain(Detail::All), {"privatised"});
+  expect_fact(d.explanations(), Fact::Privatised, table.name(),
+              "accumulated in a fixed number of privatised copies, which are summed in order");
   expect_machine_code_agrees(d(table), {{0}, {16}});
+}
+
+void expect_stored_versions(const Func& loss, Buffer<float>& a) {
+  EXPECT_THROW(propagate_adjoints(loss, {.overwritten = Overwritten::Refuse}), UserError);
+  expect_gradient(loss, a, {.overwritten = Overwritten::Store});
+  expect_gradient(loss, a);
 }
 
 TEST_F(Programs, ProductNeedsStoredVersions) {
@@ -289,10 +297,7 @@ TEST_F(Programs, ProductNeedsStoredVersions) {
   RDom r(0, 4);
   f(x) = 1.0f;
   f(x) *= a(x + r);
-  Func loss = weighted_sum(f, {6});
-  EXPECT_THROW(propagate_adjoints(loss, {.overwritten = Overwritten::Refuse}), UserError);
-  expect_gradient(loss, a, {.overwritten = Overwritten::Store});
-  expect_gradient(loss, a);
+  expect_stored_versions(weighted_sum(f, {6}), a);
 }
 
 TEST_F(Programs, InPlaceSquareNeedsStoredVersions) {
@@ -300,10 +305,7 @@ TEST_F(Programs, InPlaceSquareNeedsStoredVersions) {
   f(x) = a(x) + 1.0f;
   f(x) = f(x) * f(x) * a(x);
   f(x) += f(x) * f(x);
-  Func loss = weighted_sum(f, {9});
-  EXPECT_THROW(propagate_adjoints(loss, {.overwritten = Overwritten::Refuse}), UserError);
-  expect_gradient(loss, a, {.overwritten = Overwritten::Store});
-  expect_gradient(loss, a);
+  expect_stored_versions(weighted_sum(f, {9}), a);
 }
 
 TEST_F(Programs, ReductionWithPredicate) {
@@ -346,7 +348,8 @@ TEST_F(Programs, OnlyRequestedGradientsAreBuilt) {
   Derivative d = propagate_adjoints(loss, {.wrt = {a}});
   EXPECT_TRUE(d(a).defined());
   EXPECT_THROW(d(image), CompileError);
-  expect_mentions(d.explain(Detail::All), {"not requested"});
+  expect_fact(d.explanations(), Fact::NotRequested, image.name(),
+              "no requested gradient needs its adjoint");
   expect_gradient(loss, d, a);
 }
 

@@ -10,7 +10,7 @@
 #include "graph/definitions/define.h"
 #include "graph/function.h"
 #include "ir/build.h"
-#include "support/errors.h"
+#include "support/facts.h"
 
 namespace retrograde::gradient {
 namespace {
@@ -50,7 +50,8 @@ TEST(SharedAdjoints, AnInnerAdjointThatSeveralInputsNeedIsKept) {
   ASSERT_TRUE(inner.defined());
   EXPECT_EQ(inner.dimensions(), 2);
   EXPECT_EQ(inner.outputs(), 1) << "that of drive()";
-  expect_mentions(d.explain(Detail::All), {"keeps 1 inner adjoint of each iteration, shared by 3"});
+  expect_fact(d.explanations(), Fact::Version, s.h.name(),
+              "\"h_adj_inner\" keeps 1 inner adjoint of each iteration, shared by 3 contributions");
   const autodiff::OperationCount count = d.operations().gradient;
   const autodiff::FuncOperations* kept = count.find(inner.function().get());
   ASSERT_NE(kept, nullptr);

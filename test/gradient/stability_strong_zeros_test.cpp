@@ -12,6 +12,17 @@ namespace {
 constexpr float inf = std::numeric_limits<float>::infinity();
 const float nan = std::nanf("");
 
+// Whether the expressions of a Func have products or quotients that are zero wherever an operand is.
+bool is_strong(const graph::FuncPtr& f) {
+  for (int s = 0; s < f->stage_count(); ++s) {
+    const bool found = any_node(f->stage(s), [](const ir::Call& n) {
+      return n.op == ir::Op::strong_mul || n.op == ir::Op::strong_div;
+    });
+    if (found) return true;
+  }
+  return false;
+}
+
 class StrongZeros : public ::testing::Test {
  protected:
   Var x{"x"};
@@ -81,14 +92,7 @@ TEST_F(StrongZeros, StandOnlyWhereAFactorMayBeInfinite) {
   const auto has_strong_zeros = [&](const Expr& factor) {
     Func f("f");
     f(x) = select(a(x) > 0, a(x) * factor, 0.0f);
-    const Func gradient = propagate_adjoints(sum_of(f))(a);
-    const auto is_strong = [](const Expr& e) {
-      return ir::print(e).find("strong_") != std::string::npos;
-    };
-    bool found = is_strong(gradient.value());
-    for (int u = 0; u < gradient.num_update_definitions(); ++u)
-      found |= is_strong(gradient.update_value(u));
-    return found;
+    return is_strong(propagate_adjoints(sum_of(f))(a).function());
   };
   EXPECT_FALSE(has_strong_zeros(1.0f - cast<float>(x % 3) * 0.25f)) << "a weight";
   EXPECT_FALSE(has_strong_zeros(cast<float>(counts(x)))) << "an integer, whatever it is";
@@ -106,8 +110,7 @@ TEST_F(StrongZeros, StandNotWhereAUserPromisesThatFactorsAreFinite) {
     Func f("f");
     f(x) = select(a(x) > 0, a(x) * factor, 0.0f);
     const Func gradient = propagate_adjoints(sum_of(f))(a);
-    return graph::to_text(graph::graph_of({gradient.function()})).find("strong_mul") !=
-           std::string::npos;
+    return std::ranges::any_of(graph::topological_order({gradient.function()}), is_strong);
   };
   const auto through = [&](const Expr& value) {
     Func held("held");
@@ -132,8 +135,7 @@ TEST_F(StrongZeros, StandOnlyWhereAnInfiniteFactorMayMeetASlopeOfZero) {
     held(x) = factor;
     product(x) = a(x) * held(x);
     f(x) = levels_off ? tanh(product(x)) : 3.0f * product(x);
-    const Func gradient = propagate_adjoints(sum_of(f))(a);
-    return ir::print(gradient.value()).find("strong_") != std::string::npos;
+    return is_strong(propagate_adjoints(sum_of(f))(a).function());
   };
   EXPECT_TRUE(has_strong_zeros(exp(b(x)), true));
   EXPECT_TRUE(has_strong_zeros(1.0f / b(x), true));

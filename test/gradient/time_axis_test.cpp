@@ -2,7 +2,7 @@
 // read. Such loops run backward from a few kept states. Oracles: central differences; the gradient without a budget,
 // bit by bit; the memory that the profiler reports.
 #include "gradient/programs_suite.h"
-#include "support/errors.h"
+#include "support/facts.h"
 
 namespace retrograde::gradient {
 namespace {
@@ -115,22 +115,49 @@ Program power_of_a_matrix(int n) {
   return {weighted_sum(last, {3}), {start, m}};
 }
 
-const NamedLoop cases[] = {{"at_own_place", at_own_place},
-                           {"filter_along_an_image", filter_along_an_image},
-                           {"two_steps_back", two_steps_back},
-                           {"stencil_with_a_border", stencil_with_a_border},
-                           {"tuple_and_its_last_difference", tuple_and_its_last_difference},
-                           {"backward_in_time", backward_in_time},
-                           {"sweep_within_a_step", sweep_within_a_step},
-                           {"one_loop_after_another", one_loop_after_another},
-                           {"power_of_a_matrix", power_of_a_matrix}};
+// A loop over time that keeps only its last steps.
+struct FoldedLoop {
+  std::string func;
+  int kept, state_bytes;  // kept steps; bytes of a state
+  int steps = 6, recomputed = 8;
+
+  std::vector<std::string> facts() const {
+    return {
+        text("only its last steps are read: \"", func, "_folded\" keeps ", kept,
+             kept == 1 ? " of them" : " of them in turn", " and has the adjoint; \"", func,
+             "\" has none"),
+        text("update 0 is a loop of ", steps, " steps that \"", func,
+             "_folded_checkpoints\" runs backward: from 2 kept states of ", state_bytes, " bytes, ",
+             recomputed, " steps recomputed beside the ", steps, " that are reversed")};
+  }
+};
+
+struct FoldedProgram {
+  NamedLoop program;
+  std::vector<FoldedLoop> loops;
+};
+
+const FoldedProgram cases[] = {
+    {{"at_own_place", at_own_place}, {{"u", 1, 28}}},
+    {{"filter_along_an_image", filter_along_an_image}, {{"f", 1, 20}}},
+    {{"two_steps_back", two_steps_back}, {{"u", 2, 48}}},
+    {{"stencil_with_a_border", stencil_with_a_border}, {{"u", 2, 72}}},
+    {{"tuple_and_its_last_difference", tuple_and_its_last_difference}, {{"u", 2, 80}}},
+    {{"backward_in_time", backward_in_time}, {{"v", 2, 48}}},
+    {{"sweep_within_a_step", sweep_within_a_step}, {{"u", 2, 64}}},
+    {{"one_loop_after_another", one_loop_after_another}, {{"u", 1, 20}, {"v", 1, 20, 7, 11}}},
+    {{"power_of_a_matrix", power_of_a_matrix}, {{"v", 2, 24}}}};
 
 TEST(TimeAxis, GradientsAgreeWithCentralDifferences) {
-  for (const NamedLoop& c : cases) {
-    SCOPED_TRACE(c.name);
-    Program p = c.build(6);
+  for (const FoldedProgram& c : cases) {
+    SCOPED_TRACE(c.program.name);
+    Program p = c.program.build(6);
     Derivative d = propagate_adjoints(p.loss, {.checkpoint_states = 2});
-    expect_mentions(d.explain(Detail::All), {"only its last steps are read", "2 kept states"});
+    std::vector<std::string> expected, found = details_of(d.explanations(), Fact::Version);
+    for (const FoldedLoop& loop : c.loops) std::ranges::copy(loop.facts(), back_inserter(expected));
+    std::ranges::sort(expected);
+    std::ranges::sort(found);
+    EXPECT_EQ(found, expected);
     for (Buffer<float>& input : p.inputs) expect_gradient(p.loss, d, input);
   }
 }
@@ -149,12 +176,12 @@ std::vector<float> gradient_of(const Derivative& d, const Buffer<float>& input) 
 // In float32, bits agree operation by operation with the gradient that keeps all steps. Gradients by inputs that every
 // step reads are summed in another order.
 TEST(TimeAxis, GradientsAreThoseOfAllStepsKept) {
-  for (const NamedLoop& c : cases) {
+  for (const FoldedProgram& c : cases) {
     for (int n : {1, 2, 3, 12}) {
-      Program p = c.build(n);
+      Program p = c.program.build(n);
       Derivative all = propagate_adjoints(p.loss, {.overwritten = Overwritten::Store});
       for (int s : {1, 3, 20}) {
-        SCOPED_TRACE(text(c.name, ", ", n, " steps, ", s, " states"));
+        SCOPED_TRACE(text(c.program.name, ", ", n, " steps, ", s, " states"));
         Derivative d = propagate_adjoints(p.loss, {.checkpoint_states = s});
         for (const Buffer<float>& input : p.inputs) {
           std::vector<float> found = gradient_of(d, input), expected = gradient_of(all, input);
@@ -204,6 +231,15 @@ Program random_loop(unsigned seed) {
   return {weighted_sum(last, {width}), {start, k}};
 }
 
+// A loop over time has become one that keeps only its last steps.
+bool is_folded(const Derivative& d) {
+  std::vector<graph::FuncPtr> generated;
+  for (const Func& f : d.funcs()) generated.push_back(f.function());
+  return std::ranges::any_of(graph::topological_order(generated), [](const graph::FuncPtr& f) {
+    return f->made && f->made->role == graph::Role::TimeFold;
+  });
+}
+
 TEST(TimeAxis, RandomLoopsAgreeWithThoseThatKeepAllSteps) {
   int folded = 0;
   for (unsigned seed = 0; seed < 60; ++seed) {
@@ -212,7 +248,7 @@ TEST(TimeAxis, RandomLoopsAgreeWithThoseThatKeepAllSteps) {
     Derivative all = propagate_adjoints(p.loss, {.overwritten = Overwritten::Store});
     Derivative d = propagate_adjoints(
         p.loss, {.overwritten = Overwritten::Store, .checkpoint_states = 1 + int(seed % 3)});
-    folded += d.explain(Detail::All).find("only its last steps are read") != std::string::npos;
+    folded += is_folded(d);
     for (const Buffer<float>& input : p.inputs) {
       ASSERT_EQ(d.has(input), all.has(input)) << d.explain(Detail::All) << all.explain(Detail::All);
       if (!d.has(input)) continue;  // not read
@@ -257,7 +293,15 @@ TEST(TimeAxis, TheNumberOfStepsMayBeAParam) {
   last(x) = f(x, n);
   Func loss = weighted_sum(last, {5});
   Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
-  expect_mentions(d.explain(Detail::All), {"_folded", "a loop of n steps"});
+  const std::vector<std::string> expected{
+      "only its last steps are read: \"f_folded\" keeps 1 of them and has the adjoint; \"f\" has "
+      "none",
+      "update 0 is a loop of n steps that \"f_folded_checkpoints\" runs backward: from 2 kept "
+      "states "
+      "of 20 bytes, each step at most r times, as \"f_folded_actions\" finds at run time, "
+      "recomputed "
+      "beside the n that are reversed"};
+  EXPECT_EQ(details_of(d.explanations(), Fact::Version), expected);
   for (int steps : {0, 1, 2, 9}) {
     SCOPED_TRACE(steps);
     n.set(steps);
@@ -310,8 +354,10 @@ TEST(TimeAxis, WithStepsThatDataSkipIsLeftAsItIs) {
   last(x) = u(x, 6);
   Func loss = weighted_sum(last, {5});
   Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
-  EXPECT_EQ(d.explain(Detail::All).find("only its last steps are read"), std::string::npos)
-      << d.explain(Detail::All);
+  EXPECT_EQ(details_of(d.explanations(), Fact::Version),
+            std::vector<std::string>{
+                "update 0 is a loop of 6 steps that \"u_checkpoints\" runs backward: from 2 kept "
+                "states of 140 bytes, 8 steps recomputed beside the 6 that are reversed"});
   expect_gradient(loss, d, start);
 }
 
@@ -323,7 +369,11 @@ TEST(TimeAxis, WhoseEveryStepIsReadIsLeftAsItIs) {
   u(x, r + 1) = 0.5f * sin(u(x, r));
   Func loss = weighted_sum(u, {5, 7});
   Derivative d = propagate_adjoints(loss, {.checkpoint_states = 2});
-  expect_mentions(d.explain(Detail::All), {"the budget for checkpoints is not used"});
+  expect_fact(
+      d.explanations(), Fact::Performance, u.name(),
+      "update 0 needs no checkpoints: \"u\" keeps every step along a dimension of its own, so "
+      "the budget for checkpoints is not used; written in place, as f(x) = g(f(x), t), it is "
+      "run backward from kept states");
   expect_gradient(loss, d, start);
 }
 

@@ -5,6 +5,7 @@
 #include "frontend/data/param.h"
 #include "gradient/gradient_check.h"
 #include "support/errors.h"
+#include "support/facts.h"
 
 namespace retrograde::gradient {
 namespace {
@@ -92,9 +93,9 @@ TEST_F(VersionBudget, ExplainSaysWhatIsKept) {
   RDom r(0, 4);
   f(x) = 1.0f;
   f(x) *= a(x + r);
-  const std::string words = propagate_adjoints(weighted_sum(f, {6})).explain(Detail::All);
-  expect_mentions(words, {"keeps versions within the budget of 268435456 bytes",
-                          "120 bytes, all together 120"});
+  expect_fact(propagate_adjoints(weighted_sum(f, {6})).explanations(), Fact::Version, f.name(),
+              "\"f_steps\" keeps versions within the budget of 268435456 bytes "
+              "(AdjointOptions::version_bytes): 120 bytes, all together 120");
 }
 
 std::string error_of(const Func& loss, const AdjointOptions& options) {
@@ -141,7 +142,11 @@ TEST_F(VersionBudget, SizesKnownAtRunTimeOnlyAreCheckedByTheCall) {
   loss() = 0.0f;
   loss() += f(q) * cast<float>(q + 1);
   Derivative d = propagate_adjoints(loss, {.version_bytes = 4 * 3 * 5});
-  expect_mentions(d.explain(Detail::All), {"its size is known at run time only"});
+  expect_fact(
+      d.explanations(), Fact::Version, f.name(),
+      "\"f_steps\" keeps versions within the budget of 60 bytes "
+      "(AdjointOptions::version_bytes): its size is known at run time only, when a call that "
+      "needs more fails");
   Func gradient = d(a);
 
   Buffer<float> small = positive({3, 4}), large = positive({3, 5});

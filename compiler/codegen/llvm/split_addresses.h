@@ -11,6 +11,7 @@
 // that ShiftInwards moves, and data-dependent indices.
 // Source: folklore (reassociation by loop depth), restricted to addresses. LLVM's own pass reorders all integer
 // arithmetic and so breaks sums and products that match machine instructions.
+#pragma once
 
 #pragma once
 

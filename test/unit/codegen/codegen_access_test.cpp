@@ -93,16 +93,23 @@ void fill_mask(Array& mask) {
   for (size_t i = 0; i < mask.size(); i++) mask.set(i, Scalar::of_bool(is_on(static_cast<int>(i))));
 }
 
+// A function of an input, a mask, an output and the base of the indices.
+LoweredFunction masked_access(const std::string& name, Type type, const Stmt& body) {
+  LoweredFunction f;
+  f.name = name;
+  f.args = {input("in", type), input("mask", Bool()), output("out", type),
+            scalar_argument("b", Int(32))};
+  f.body = body;
+  return f;
+}
+
 void check_load(const Shape& shape, Type type, int lanes, bool masked, const Target& target,
                 Array::Guard guard) {
   const Span span = span_of(shape, lanes, masked);
-  LoweredFunction f;
-  f.name = "loads";
-  f.args = {input("in", type), input("mask", Bool()), output("out", type),
-            scalar_argument("b", Int(32))};
   const Expr load =
       make_load(type.with_lanes(lanes), "in", shape.index, masked ? mask_of(lanes) : Expr());
-  f.body = make_store("out", load, make_ramp(0, 1, lanes));
+  const LoweredFunction f =
+      masked_access("loads", type, make_store("out", load, make_ramp(0, 1, lanes)));
   Array in(type, static_cast<size_t>(span.high - span.low + 1), guard),
       mask(Bool(), static_cast<size_t>(lanes)), out(type, static_cast<size_t>(lanes));
   for (size_t i = 0; i < in.size(); i++) in.set(i, nth_value(type, static_cast<int64_t>(i)));
@@ -122,12 +129,9 @@ void check_load(const Shape& shape, Type type, int lanes, bool masked, const Tar
 void check_store(const Shape& shape, Type type, int lanes, bool masked, const Target& target,
                  Array::Guard guard) {
   const Span span = span_of(shape, lanes, masked);
-  LoweredFunction f;
-  f.name = "stores";
-  f.args = {input("in", type), input("mask", Bool()), output("out", type),
-            scalar_argument("b", Int(32))};
   const Expr value = make_load(type.with_lanes(lanes), "in", make_ramp(0, 1, lanes));
-  f.body = make_store("out", value, shape.index, masked ? mask_of(lanes) : Expr());
+  const LoweredFunction f = masked_access(
+      "stores", type, make_store("out", value, shape.index, masked ? mask_of(lanes) : Expr()));
   const auto size = static_cast<size_t>(span.high - span.low + 1);
   Array in(type, static_cast<size_t>(lanes)), mask(Bool(), static_cast<size_t>(lanes)),
       out(type, size, guard);

@@ -6,11 +6,8 @@
 
 #include <retrograde/retrograde.h>
 
-#include <fstream>
-#include <iterator>
-
+#include "ir/visit.h"
 #include "support/guarded_array.h"
-#include "support/temporary_folder.h"
 
 namespace retrograde {
 namespace {
@@ -103,12 +100,9 @@ TEST(VectorAccess, DividedCoordinatesUnscheduled) {
 }
 
 bool has_vectors(Func f, const Target& target) {
-  const TemporaryFolder folder;
-  const std::string path = folder.path() / "f.stmt";
-  f.compile_to_lowered_stmt(path, f.infer_arguments(), Text, target);
-  std::ifstream file(path);
-  const std::string lowered{std::istreambuf_iterator<char>(file), {}};
-  return lowered.find("ramp(") != std::string::npos;
+  const Module module = f.compile_to_module(f.infer_arguments(), "f", target);
+  return ir::any_node(module.get_function_by_name("f").lowered.body,
+                      [](const ir::Ramp&) { return true; });
 }
 
 TEST(VectorAccess, OnlyPureVariablesGetLanesUnasked) {

@@ -66,21 +66,20 @@ TEST_F(Memoize, TheSecondCallComputesNothing) {
 
 TEST_F(Memoize, AParameterIsPartOfTheKey) {
   Scaled program;
-  program.expect(3, 10);
-  program.expect(4, 10);
-  EXPECT_EQ(calls, 22);
-  program.expect(3, 10);
-  program.expect(4, 10);
-  EXPECT_EQ(calls, 22);
+  for (int round = 0; round < 2; round++) {
+    program.expect(3, 10);
+    program.expect(4, 10);
+    EXPECT_EQ(calls, 22);
+  }
 }
 
 TEST_F(Memoize, TheRegionIsPartOfTheKey) {
   Scaled program;
-  program.expect(3, 10);
-  program.expect(3, 12);
-  EXPECT_EQ(calls, 11 + 13);
-  program.expect(3, 10);
-  EXPECT_EQ(calls, 11 + 13);
+  for (int round = 0; round < 2; round++) {
+    program.expect(3, 10);
+    program.expect(3, 12);
+    EXPECT_EQ(calls, 11 + 13);
+  }
 }
 
 TEST_F(Memoize, FuncsOfOneShapeDoNotShareResults) {

@@ -2,24 +2,37 @@
 #include <gtest/gtest.h>
 
 #include "frontend/include/retrograde/retrograde.h"
+#include "graph/names.h"
+#include "ir/build.h"
 #include "ir/print.h"
+#include "ir/visit.h"
 #include "lower/lower.h"
-#include "support/errors.h"
 
 namespace retrograde {
 namespace {
 
-std::string lowered(const Func& f, const std::string& pass) {
+// The statement after a pass.
+Stmt lowered(const Func& f, const std::string& pass) {
   lower::LowerOptions options;
   options.target = get_jit_target_from_environment();
   options.validate = true;
-  std::string result;
+  Stmt result;
   options.observe = [&](const std::string& name, double, const Stmt& s) {
-    if (name == pass) result = ir::print(s);
+    if (name == pass) result = s;
   };
   const std::vector<graph::FuncPtr> outputs = {f.function()};
   lower::lower("f", outputs, lower::infer_arguments(outputs), options);
   return result;
+}
+
+std::string as_text(const Expr& e) { return graph::without_numbers(ir::print(e)); }
+
+// The one prefetched box.
+const ir::Prefetch* prefetch_in(const Stmt& s) {
+  std::vector<const ir::Prefetch*> found;
+  ir::walk(s, [&](const ir::Prefetch& n) { found.push_back(&n); });
+  EXPECT_EQ(found.size(), 1u);
+  return found.at(0);
 }
 
 struct Blur {
@@ -40,11 +53,11 @@ struct Blur {
 TEST(Prefetch, TheBoxOfALaterIterationIsAskedFor) {
   Blur blur;
   blur.out.prefetch(blur.in, blur.y, blur.y, 2, PrefetchBoundStrategy::NonFaulting);
-  const std::string text = lowered(blur.out, "insert_prefetches");
-  const size_t at = text.find("prefetch in");
-  ASSERT_NE(at, std::string::npos) << text;
-  const std::string line = text.substr(at, text.find('\n', at) - at);
-  expect_mentions(line, {".s0.y + 2, 2]"});
+  const Stmt s = lowered(blur.out, "insert_prefetches");
+  const ir::Prefetch* box = prefetch_in(s);
+  EXPECT_EQ(box->name, "in");
+  EXPECT_EQ(as_text(box->bounds.at(1).min), "out.s0.y + 2");
+  EXPECT_EQ(as_text(box->bounds.at(1).extent), "2");
   blur.expect_right();
 }
 
@@ -53,17 +66,15 @@ TEST(Prefetch, EveryBoundStrategyKeepsTheResult) {
                         PrefetchBoundStrategy::NonFaulting}) {
     Blur blur;
     blur.out.prefetch(blur.in, blur.y, blur.y, 3, strategy).vectorize(blur.x, 8);
-    const std::string text = lowered(blur.out, "insert_prefetches");
-    const size_t at = text.find("prefetch in"), loop = text.rfind("for ", at);
-    ASSERT_NE(at, std::string::npos) << text;
-    const std::string before = text.substr(loop, at - loop);
-    const std::string line = text.substr(at, text.find('\n', at) - at);
-    EXPECT_EQ(before.find("if ") != std::string::npos,
-              strategy == PrefetchBoundStrategy::GuardWithIf)
-        << before;
-    EXPECT_EQ(line.find("in.extent.1") != std::string::npos,
-              strategy == PrefetchBoundStrategy::Clamp)
-        << line;
+    const Stmt s = lowered(blur.out, "insert_prefetches");
+    const bool is_guarded = ir::any_node(s, [](const ir::IfThenElse& n) {
+      return ir::any_node(n.when_true, [](const ir::Prefetch&) { return true; });
+    });
+    EXPECT_EQ(is_guarded, strategy == PrefetchBoundStrategy::GuardWithIf) << ir::print(s);
+    const bool is_clamped =
+        ir::any_node(prefetch_in(s)->bounds.at(1).min,
+                     [](const ir::Variable& n) { return n.name == "in.extent.1"; });
+    EXPECT_EQ(is_clamped, strategy == PrefetchBoundStrategy::Clamp) << ir::print(s);
     blur.expect_right();
   }
 }
@@ -94,9 +105,18 @@ TEST(Prefetch, LaterCoordinatesKeepNoPromises) {
 TEST(Prefetch, OneRequestForEachCacheLine) {
   Blur blur;
   blur.out.prefetch(blur.in, blur.y, blur.y, 1, PrefetchBoundStrategy::NonFaulting);
-  const std::string text = lowered(blur.out, "lower_prefetches");
-  expect_mentions(text, {"prefetch<int32>(address_of"});
-  EXPECT_NE(text.find("* 16"), std::string::npos) << "16 floats a line:\n" << text;
+  int requests = 0;
+  ir::walk(lowered(blur.out, "lower_prefetches"), [&](const ir::Call& n) {
+    if (n.op != ir::Op::prefetch) return;
+    ++requests;
+    EXPECT_TRUE(ir::any_node(n.args.at(0),
+                             [](const ir::Binary& product) {
+                               return product.kind == ir::Kind::Mul &&
+                                      ir::is_const_int(product.b, 16);
+                             }))
+        << "16 floats a line: " << ir::print(n.args.at(0));
+  });
+  EXPECT_EQ(requests, 1);
 }
 
 TEST(Prefetch, AFuncAndInsideOfATile) {
@@ -107,7 +127,10 @@ TEST(Prefetch, AFuncAndInsideOfATile) {
   f.compute_root();
   out.tile(x, y, xo, yo, xi, yi, 16, 8).parallel(yo);
   out.prefetch(f, xo, yo, 1);
-  expect_mentions(lowered(out, "insert_prefetches"), {"prefetch f"});
+  std::vector<std::string> names;
+  ir::walk(lowered(out, "insert_prefetches"),
+           [&](const ir::Prefetch& n) { names.push_back(graph::without_numbers(n.name)); });
+  EXPECT_EQ(names, std::vector<std::string>{"f"});
   Buffer<int> result = out.realize({100, 50});
   result.for_each_element([&](int i, int j) { ASSERT_EQ(result(i, j), 2 * i + j); });
 }

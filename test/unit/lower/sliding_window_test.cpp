@@ -64,6 +64,18 @@ class SlidingWindow : public testing::Test {
     return scheduled;
   }
 
+  // The same for a chain of two stencils, f and g.
+  void expect_same_stencils(const std::function<void(Func& f, Func& g, Func& out)>& schedule) {
+    expect_same([&](bool scheduled) {
+      Func f("f"), g("g"), out("out");
+      f(x, y) = x * 3 + y * y;
+      g(x, y) = f(x - 1, y) + f(x, y + 1) * 2 + f(x + 1, y - 1);
+      out(x, y) = g(x, y - 1) + g(x + 1, y + 1);
+      if (scheduled) schedule(f, g, out);
+      return out;
+    });
+  }
+
   Var x{"x"}, y{"y"}, xi{"xi"}, yi{"yi"}, xo{"xo"}, yo{"yo"};
 };
 
@@ -371,46 +383,25 @@ TEST_F(SlidingWindow, SharedByConsumersThatStartAtDifferentTimes) {
 }
 
 TEST_F(SlidingWindow, VectorsAndUnrolledRows) {
-  expect_same([&](bool scheduled) {
-    Func f("f"), g("g"), out("out");
-    f(x, y) = x * 3 + y * y;
-    g(x, y) = f(x - 1, y) + f(x, y + 1) * 2 + f(x + 1, y - 1);
-    out(x, y) = g(x, y - 1) + g(x + 1, y + 1);
-    if (scheduled) {
-      out.split(y, yo, yi, 4).unroll(yi).vectorize(x, 8);
-      g.store_at(out, yo).compute_at(out, yi).vectorize(x, 8);
-      f.store_at(out, yo).compute_at(out, yi).vectorize(x, 8);
-    }
-    return out;
+  expect_same_stencils([&](Func& f, Func& g, Func& out) {
+    out.split(y, yo, yi, 4).unroll(yi).vectorize(x, 8);
+    g.store_at(out, yo).compute_at(out, yi).vectorize(x, 8);
+    f.store_at(out, yo).compute_at(out, yi).vectorize(x, 8);
   });
 }
 
 TEST_F(SlidingWindow, TilesThatKeepRows) {
-  expect_same([&](bool scheduled) {
-    Func f("f"), g("g"), out("out");
-    f(x, y) = x * 3 + y * y;
-    g(x, y) = f(x - 1, y) + f(x, y + 1) * 2 + f(x + 1, y - 1);
-    out(x, y) = g(x, y - 1) + g(x + 1, y + 1);
-    if (scheduled) {
-      out.tile(x, y, xo, yo, xi, yi, 8, 4).parallel(yo).vectorize(xi, 4);
-      g.store_at(out, xo).compute_at(out, yi).vectorize(x, 4);
-      f.store_at(out, yo).compute_at(out, yi).vectorize(x, 4);
-    }
-    return out;
+  expect_same_stencils([&](Func& f, Func& g, Func& out) {
+    out.tile(x, y, xo, yo, xi, yi, 8, 4).parallel(yo).vectorize(xi, 4);
+    g.store_at(out, xo).compute_at(out, yi).vectorize(x, 4);
+    f.store_at(out, yo).compute_at(out, yi).vectorize(x, 4);
   });
 }
 
 TEST_F(SlidingWindow, FoldsOfConsumersInsideProducers) {
-  expect_same([&](bool scheduled) {
-    Func f("f"), g("g"), out("out");
-    f(x, y) = counted("f", x * 3 + y * y);
-    g(x, y) = f(x - 1, y) + f(x, y + 1) * 2 + f(x + 1, y - 1);
-    out(x, y) = g(x, y - 1) + g(x + 1, y + 1);
-    if (scheduled) {
-      g.store_root().compute_at(out, y);
-      f.store_root().compute_at(g, y);
-    }
-    return out;
+  expect_same_stencils([&](Func& f, Func& g, Func& out) {
+    g.store_root().compute_at(out, y);
+    f.store_root().compute_at(g, y);
   });
 }
 

@@ -329,19 +329,22 @@ TEST(Messages, LongTextIsCut) {
 TEST(Messages, CodesHaveNamesAndHalidesValues) {
   EXPECT_STREQ(retrograde_error_name(retrograde_error_out_of_memory), "out of memory");
   EXPECT_STREQ(retrograde_error_name(-12345), "unknown error");
-  EXPECT_EQ(+retrograde_error_out_of_memory, +halide_error_code_out_of_memory);
-  EXPECT_EQ(+retrograde_error_access_out_of_bounds, +halide_error_code_access_out_of_bounds);
-  EXPECT_EQ(+retrograde_error_bad_type, +halide_error_code_bad_type);
-  EXPECT_EQ(+retrograde_error_bad_dimensions, +halide_error_code_bad_dimensions);
-  EXPECT_EQ(+retrograde_error_buffer_argument_is_null, +halide_error_code_buffer_argument_is_null);
-  EXPECT_EQ(+retrograde_error_requirement_failed, +halide_error_code_requirement_failed);
-  EXPECT_EQ(+retrograde_error_extents_negative, +halide_error_code_buffer_extents_negative);
-  EXPECT_EQ(+retrograde_error_extents_too_large, +halide_error_code_buffer_extents_too_large);
-  EXPECT_EQ(+retrograde_error_allocation_too_large, +halide_error_code_buffer_allocation_too_large);
-  EXPECT_EQ(+retrograde_error_host_is_null, +halide_error_code_host_is_null);
-  EXPECT_EQ(+retrograde_error_constraint_violated, +halide_error_code_constraint_violated);
-  EXPECT_EQ(+retrograde_error_param_too_small, +halide_error_code_param_too_small);
-  EXPECT_EQ(+retrograde_error_param_too_large, +halide_error_code_param_too_large);
+  const std::pair<int, int> codes[] = {
+      {retrograde_error_out_of_memory, halide_error_code_out_of_memory},
+      {retrograde_error_access_out_of_bounds, halide_error_code_access_out_of_bounds},
+      {retrograde_error_bad_type, halide_error_code_bad_type},
+      {retrograde_error_bad_dimensions, halide_error_code_bad_dimensions},
+      {retrograde_error_buffer_argument_is_null, halide_error_code_buffer_argument_is_null},
+      {retrograde_error_requirement_failed, halide_error_code_requirement_failed},
+      {retrograde_error_extents_negative, halide_error_code_buffer_extents_negative},
+      {retrograde_error_extents_too_large, halide_error_code_buffer_extents_too_large},
+      {retrograde_error_allocation_too_large, halide_error_code_buffer_allocation_too_large},
+      {retrograde_error_host_is_null, halide_error_code_host_is_null},
+      {retrograde_error_constraint_violated, halide_error_code_constraint_violated},
+      {retrograde_error_param_too_small, halide_error_code_param_too_small},
+      {retrograde_error_param_too_large, halide_error_code_param_too_large},
+  };
+  for (const auto& [ours, halides] : codes) EXPECT_EQ(ours, halides) << retrograde_error_name(ours);
 }
 
 }  // namespace
