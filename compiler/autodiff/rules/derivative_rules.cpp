@@ -198,7 +198,7 @@ DerivativeRule no_rule(const char* reason) {
 using OpTable = std::map<Op, DerivativeRule>;
 constexpr const char* approximated = "that of the function it approximates";
 
-OpTable smooth_operators() {
+OpTable algebraic_operators() {
   return {
       {Op::abs, smooth(abs_partials, "x != 0", "0 at 0", "sign(x)", "-1 and 1", 0)},
       {Op::absd, smooth(absd_partials, "a != b", "0 where a == b", "sign(x - y), -sign(x - y)",
@@ -211,6 +211,22 @@ OpTable smooth_operators() {
       {Op::sqrt,
        smooth(sqrt_partials, "x > 0", "+inf at 0 (-inf at -0), times a strong zero; NaN below 0",
               "1 / (2 v)", "0 at +inf", 2)},
+      {Op::hypot,
+       smooth(hypot_partials, "(x, y) != (0, 0)", "0 at the origin: the smallest subgradient",
+              "x / v, y / v, scaled by max(|x|, |y|)", "NaN", 2)},
+      {Op::saturating_cast, smooth(saturating_cast_partials, "inside the type's range",
+                                   "0 where the value saturates; to integers: 0", "1 or 0",
+                                   "0: the value saturates", 0, "definition")},
+      {Op::strong_div,
+       smooth(strong_div_partials, "b != 0", "as a quotient, with strong zeros", "1 / y, -v / y",
+              "as a quotient, with strong zeros", 2, "definition")},
+      {Op::strong_mul, smooth(strong_mul_partials, "everywhere", "as a product, with strong zeros",
+                              "y, x", "as a product, with strong zeros", 0, "definition")},
+  };
+}
+
+OpTable transcendental_operators() {
+  return {
       {Op::exp, smooth(exp_partials, "everywhere", "inf where exp overflows", "v",
                        "0 at -inf, inf at +inf", 1)},
       {Op::log,
@@ -221,9 +237,6 @@ OpTable smooth_operators() {
               "dx is 0 where p == 0; dp is 0 where x == 0 and NaN where x < 0",
               "y x^(y-1), or y v / x, v log x",
               "as x^(y-1) and v log x; a pole may have either sign where y - 1 is rounded", 3)},
-      {Op::hypot,
-       smooth(hypot_partials, "(x, y) != (0, 0)", "0 at the origin: the smallest subgradient",
-              "x / v, y / v, scaled by max(|x|, |y|)", "NaN", 2)},
       {Op::sin,
        smooth(sin_partials, "everywhere", "NaN at infinities", "cos x", "NaN, as the value", 1)},
       {Op::cos,
@@ -253,6 +266,11 @@ OpTable smooth_operators() {
                          "1 / ((1 - x)(1 + x))", "0, where the value is NaN", 3, "[DLMF] 4.40")},
       {Op::erf, smooth(erf_partials, "everywhere", "0 at infinities", "2 / sqrt(pi) exp(-x^2)", "0",
                        4, "[DLMF] 7.2")},
+  };
+}
+
+OpTable approximate_operators() {
+  return {
       {Op::fast_exp, smooth(exp_partials, "as exp", approximated, "exp's, with v", "as exp", -1)},
       {Op::fast_log, smooth(fast_log_partials, "x > 0", approximated, "log's", "as log", 1)},
       {Op::fast_pow, smooth(fast_pow_partials, "as pow", approximated,
@@ -264,14 +282,6 @@ OpTable smooth_operators() {
       {Op::fast_inverse, smooth(fast_inverse_partials, "x != 0", approximated, "-v^2", "0", -1)},
       {Op::fast_inverse_sqrt,
        smooth(fast_inverse_sqrt_partials, "x > 0", approximated, "-v^3 / 2", "0 at +inf", -1)},
-      {Op::saturating_cast, smooth(saturating_cast_partials, "inside the type's range",
-                                   "0 where the value saturates; to integers: 0", "1 or 0",
-                                   "0: the value saturates", 0, "definition")},
-      {Op::strong_div,
-       smooth(strong_div_partials, "b != 0", "as a quotient, with strong zeros", "1 / y, -v / y",
-              "as a quotient, with strong zeros", 2, "definition")},
-      {Op::strong_mul, smooth(strong_mul_partials, "everywhere", "as a product, with strong zeros",
-                              "y, x", "as a product, with strong zeros", 0, "definition")},
   };
 }
 
@@ -308,8 +318,10 @@ OpTable other_operators() {
 }
 
 OpTable make_op_table() {
-  OpTable t = smooth_operators();
-  t.merge(other_operators());
+  OpTable t = other_operators();
+  t.merge(algebraic_operators());
+  t.merge(transcendental_operators());
+  t.merge(approximate_operators());
   for (int i = 0; i < op_count; ++i) {
     const Op op = static_cast<Op>(i);
     if (op_info(op).cls == OpClass::Internal) {
@@ -397,72 +409,5 @@ bool has_poles(const Call& call) {
 }
 
 bool levels_off(Op op) { return op_info(op).real.levels == Levels::LevelsOff; }
-
-Type adjoint_type(Type type) {
-  const bool is_kept = type.is_float() && type.bits() >= 32;
-  return is_kept ? type : Float(32, type.lanes());
-}
-
-bool is_finite_constant(const Expr& e) {
-  auto value = as_const_float(e);
-  return value && std::isfinite(*value);
-}
-
-namespace {
-
-bool is_cut(Strength strength) { return strength == Strength::Cut || strength == Strength::Both; }
-bool is_strong(Strength strength) {
-  return strength == Strength::Strong || strength == Strength::Both;
-}
-
-// Computes adjoint / divisor * factor in that order. A constant factor, whose magnitude is at most 1, is applied first:
-// it cannot overflow, and one division is enough.
-Expr divided_first(const Expr& adjoint, const Partial& partial) {
-  const Expr divisor = cast_to(adjoint.type(), partial.divisor);
-  const bool is_scaled = is_const(partial.factor);
-  const Expr scaled =
-      is_scaled ? times_partial(adjoint, {partial.factor, Strength::Plain}) : adjoint;
-  const Expr divided = partial.strength == Strength::Strong
-                           ? call_op(Op::strong_div, adjoint.type(), {scaled, divisor})
-                           : scaled / divisor;
-  // The quotient may have overflowed where the factor is 0.
-  return is_scaled ? divided : times_partial(divided, {partial.factor, Strength::Both});
-}
-
-}  // namespace
-
-Strength as_strong(Strength strength) {
-  return is_cut(strength) ? Strength::Both : Strength::Strong;
-}
-Strength as_cut(Strength strength) { return is_strong(strength) ? Strength::Both : Strength::Cut; }
-
-Expr times_partial(const Expr& adjoint, const Partial& partial) {
-  if (is_zero(partial.factor)) return make_zero(adjoint.type());
-  // A select stays a select: inf * 0 would put a NaN into the adjoint of the operand that was not chosen.
-  if (const auto* choice = partial.factor.as<Select>()) {
-    return make_select(
-        choice->condition,
-        times_partial(adjoint, {choice->when_true, partial.strength, partial.divisor}),
-        times_partial(adjoint, {choice->when_false, partial.strength, partial.divisor}));
-  }
-  if (partial.divisor.defined()) {
-    if (!is_cut(partial.strength)) return divided_first(adjoint, partial);
-    const Expr factor = partial.is_strong_quotient ? call_op(Op::strong_div, partial.factor.type(),
-                                                             {partial.factor, partial.divisor})
-                                                   : partial.factor / partial.divisor;
-    return times_partial(adjoint, {factor, partial.strength});
-  }
-  Expr factor = cast_to(adjoint.type(), partial.factor);
-  if (is_one(factor)) return adjoint;
-  if (is_finite_constant(factor) || partial.strength == Strength::Plain) return adjoint * factor;
-  if (partial.strength == Strength::Cut)
-    return call_op(Op::strong_mul, adjoint.type(), {factor, adjoint});
-  Expr product = call_op(Op::strong_mul, adjoint.type(), {adjoint, factor});
-  if (partial.strength != Strength::Both) return product;
-  // Both branches are products, so that differentiating this expression again gives the derivative of a product where
-  // the factor is 0.
-  return make_select(factor == make_zero(factor.type()),
-                     call_op(Op::strong_mul, product.type(), {factor, adjoint}), product);
-}
 
 }  // namespace retrograde::autodiff
