@@ -44,7 +44,10 @@ namespace {
 
 Type times_lanes(Type type, int lanes) { return type.with_lanes(type.lanes() * lanes); }
 
-bool is_comparison(Kind kind) { return kind >= Kind::EQ && kind <= Kind::GE; }
+Type binary_type(Kind kind, Type operands) {
+  const bool is_comparison = kind >= Kind::EQ && kind <= Kind::GE;
+  return is_comparison ? Bool(operands.lanes()) : operands;
+}
 
 void match_lanes(Expr& a, Expr& b) {
   if (a.type().lanes() == b.type().lanes()) return;
@@ -78,7 +81,7 @@ Expr binary(Kind kind, Expr a, Expr b) {
                     ": ", a, ", ", b);
   const bool logical = kind == Kind::And || kind == Kind::Or;
   RETROGRADE_ASSERT(!logical || a.type().is_bool(), kind_name(kind), " of ", a.type());
-  const Type type = is_comparison(kind) ? Bool(a.type().lanes()) : a.type();
+  const Type type = binary_type(kind, a.type());
   Expr folded = fold_binary(kind, type, a, b);
   if (folded.defined() && !loses_names(folded, a) && !loses_names(folded, b)) return folded;
   return new_binary(kind, type, std::move(a), std::move(b));

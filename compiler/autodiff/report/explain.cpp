@@ -6,6 +6,7 @@
 #include <set>
 
 #include "diagnostics/error.h"
+#include "graph/names.h"
 
 namespace retrograde {
 
@@ -74,23 +75,18 @@ std::string summary_of(const std::vector<Explanation>& all) {
   return result + "explain(Detail::All) lists every fact with its reason.\n";
 }
 
-std::string without_numbers(const std::string& name) {
-  static const std::regex number("[$][0-9]+");
-  return std::regex_replace(name, number, "");
-}
-
 // Drops the numbers of quoted names where the short names stay distinct.
 std::string with_short_names(const std::string& words) {
   static const std::regex name("\"[^\"\n]*\"");
   std::map<std::string, std::set<std::string>> alike;
   for (auto i = std::sregex_iterator(words.begin(), words.end(), name); i != std::sregex_iterator();
        ++i)
-    alike[without_numbers(i->str())].insert(i->str());
+    alike[graph::without_numbers(i->str())].insert(i->str());
   std::string result;
   auto copied = words.cbegin();
   for (auto i = std::sregex_iterator(words.begin(), words.end(), name); i != std::sregex_iterator();
        ++i) {
-    const std::string shorter = without_numbers(i->str());
+    const std::string shorter = graph::without_numbers(i->str());
     result.append(copied, words.cbegin() + i->position());
     result += alike[shorter].size() == 1 ? shorter : i->str();
     copied = words.cbegin() + i->position() + i->length();
