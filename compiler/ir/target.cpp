@@ -1,4 +1,4 @@
-// What a target has: its features and those they imply, its vectors, its devices.
+// The features of a target and those that they imply; its vectors and devices.
 #include "ir/target.h"
 
 #include <algorithm>
