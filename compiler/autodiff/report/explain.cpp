@@ -12,22 +12,23 @@ namespace retrograde {
 
 namespace {
 
-using What = Explanation::Kind;
+using ExplanationKind = Explanation::Kind;
 
 constexpr size_t most_names = 8;  // listed for each kind in a summary
 
 // The order of a summary: what users ask first comes first.
-constexpr What told_first[] = {What::Cost,    What::Stored,       What::Recomputed,
-                               What::Version, What::Scattered,    What::Privatised,
-                               What::Zero,    What::NotRequested, What::LeftOut,
-                               What::Custom,  What::Built,        What::Performance};
+constexpr ExplanationKind told_first[] = {
+    ExplanationKind::Cost,    ExplanationKind::Stored,       ExplanationKind::Recomputed,
+    ExplanationKind::Version, ExplanationKind::Scattered,    ExplanationKind::Privatised,
+    ExplanationKind::Zero,    ExplanationKind::NotRequested, ExplanationKind::LeftOut,
+    ExplanationKind::Custom,  ExplanationKind::Built,        ExplanationKind::Performance};
 
 std::string line_of(const Explanation& e) {
   return text(to_string(e.kind), " ", quoted(e.subject), ": ", e.detail, "\n");
 }
 
 // The facts of one kind, the largest first, each subject once.
-std::vector<Explanation> of_kind(const std::vector<Explanation>& all, What kind) {
+std::vector<Explanation> of_kind(const std::vector<Explanation>& all, ExplanationKind kind) {
   std::vector<Explanation> found;
   std::set<std::string> seen;
   for (const Explanation& e : all) {
@@ -55,23 +56,23 @@ std::string line_of(const char* what, const std::vector<Explanation>& facts) {
 // An adjoint that is built may still have contributions that are zero; it is listed as zero in part.
 std::string zeros_of(const std::vector<Explanation>& all) {
   std::set<std::string> built;
-  for (const Explanation& e : of_kind(all, What::Built)) built.insert(e.subject);
+  for (const Explanation& e : of_kind(all, ExplanationKind::Built)) built.insert(e.subject);
   std::vector<Explanation> entirely, in_part;
-  for (const Explanation& e : of_kind(all, What::Zero))
+  for (const Explanation& e : of_kind(all, ExplanationKind::Zero))
     (built.count(e.subject) ? in_part : entirely).push_back(e);
   return line_of("zero", entirely) + line_of("zero in part", in_part);
 }
 
-std::string summary_of(const std::vector<Explanation>& all, What kind) {
-  if (kind == What::Zero) return zeros_of(all);
+std::string summary_of(const std::vector<Explanation>& all, ExplanationKind kind) {
+  if (kind == ExplanationKind::Zero) return zeros_of(all);
   const std::vector<Explanation> facts = of_kind(all, kind);
-  if (kind == What::Cost && !facts.empty()) return line_of(facts.front());
+  if (kind == ExplanationKind::Cost && !facts.empty()) return line_of(facts.front());
   return line_of(to_string(kind), facts);
 }
 
 std::string summary_of(const std::vector<Explanation>& all) {
   std::string result;
-  for (What kind : told_first) result += summary_of(all, kind);
+  for (ExplanationKind kind : told_first) result += summary_of(all, kind);
   return result + "explain(Detail::All) lists every fact with its reason.\n";
 }
 
