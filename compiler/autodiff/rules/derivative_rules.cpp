@@ -4,14 +4,13 @@
 // of Mathematical Functions. "definition" means that the rule follows from the operator's definition in this project.
 #include "autodiff/rules/derivative_rules.h"
 
-#include <cmath>
 #include <limits>
 #include <map>
 #include <numbers>
 
+#include "autodiff/rules/power_partials.h"
 #include "autodiff/rules/stable_norms.h"
 #include "ir/build.h"
-#include "ir/scalar.h"
 
 namespace retrograde::autodiff {
 
@@ -22,12 +21,6 @@ using Partials = std::vector<Partial>;
 
 Expr num(const Expr& like, double value) { return make_const(like.type(), value); }
 Expr square(const Expr& a) { return a * a; }
-Expr infinity(Type type) { return make_const(type, std::numeric_limits<double>::infinity()); }
-double smallest_normal_of(Type type) {
-  return type.bits() == 64                       ? std::numeric_limits<double>::min()
-         : type.bits() == 32 || type.is_bfloat() ? std::numeric_limits<float>::min()
-                                                 : 0x1p-14;
-}
 double largest_of(Type type) {
   return type.bits() == 64   ? std::numeric_limits<double>::max()
          : type.bits() == 32 ? std::numeric_limits<float>::max()
@@ -37,9 +30,6 @@ double largest_of(Type type) {
 Partial plain(Expr e) { return {std::move(e), Strength::Plain}; }
 Partial quotient(Expr e, Expr divisor) {
   return {std::move(e), Strength::Strong, std::move(divisor)};
-}
-Expr zero_where(const Expr& condition, const Expr& e) {
-  return make_select(condition, make_zero(e.type()), e);
 }
 
 // The derivative of |u|: sign(u), which is 0 at 0.
@@ -61,36 +51,6 @@ Partials fma_partials(Args a, const Expr&) {
 Partials sqrt_partials(Args a, const Expr& v) { return {quotient(num(a[0], 0.5), v)}; }
 Partials exp_partials(Args, const Expr& v) { return {strong(v)}; }
 Partials log_partials(Args a, const Expr&) { return {quotient(num(a[0], 1), a[0])}; }
-// Whether p - 1 is exact in p's type.
-bool has_exact_predecessor(const Expr& p) {
-  auto value = as_const_float(p);
-  return value && round_to_type(p.type(), *value - 1) == *value - 1;
-}
-// dx = p x^(p-1), and 0 where p is 0. dp = x^p log x, and 0 where x is 0.
-//
-// If p - 1 is inexact, x^(p-1) is off by the rounding error times log x, or is a different power altogether. Then dx is
-// p v / x, except where v overflowed or underflowed.
-//
-// Both expressions are built so that their own derivatives are right, too. Where p is 0, dx is p / x, whose derivative
-// by p is 1 / x. Where x is 0, neither dx nor dp depends on p.
-Partials power_partials(Args a, const Expr& v, Op power, Op logarithm) {
-  const Expr& x = a[0];
-  const Expr at_origin = x == num(x, 0);
-  const Expr p =
-      is_const(a[1]) ? a[1] : make_select(at_origin, call_op(Op::stop_gradient, {a[1]}), a[1]);
-  Expr dx = p * call_op(power, x.type(), {x, p - num(p, 1)});
-  if (!has_exact_predecessor(p)) {
-    Expr size = call_op(Op::abs, {v});
-    Expr lost = size < num(x, smallest_normal_of(x.type())) || size == infinity(x.type()) ||
-                call_op(Op::abs, {x}) == infinity(x.type());
-    dx = make_select(lost, dx, p * v / x);
-  }
-  if (is_zero(p)) dx = num(x, 0);
-  if (!is_const(p))
-    dx = make_select(a[1] == num(p, 0), call_op(Op::strong_div, x.type(), {p, x}), dx);
-  Expr dp = zero_where(at_origin, v * call_op(logarithm, {x}));
-  return {strong(dx), strong(dp)};
-}
 Partials pow_partials(Args a, const Expr& v) { return power_partials(a, v, Op::pow, Op::log); }
 Partials fast_pow_partials(Args a, const Expr& v) {
   return power_partials(a, v, Op::fast_pow, Op::fast_log);
