@@ -50,6 +50,14 @@ class BoundsEngine {
 
   Interval compute(const Expr& e);
   bool finds_varying(const Expr& e);
+  Interval bounds_of_atom(const Expr& atom);
+  Interval atom_bounds(const Expr& e);
+  Interval cast_bounds(Type type, const Expr& value);
+  Interval ramp_bounds(const Ramp& ramp);
+  Interval binary_bounds(const Expr& e, const Binary& op);
+  Interval select_bounds(const Expr& condition, const Expr& when_true, const Expr& when_false);
+
+  // bounds_of_sums.cpp
   Interval sum_bounds(const Sum& form);
   Interval sum_of_bounds(const Sum& form);
   std::optional<Interval> bounds_by_facts(const Sum& form);
@@ -57,18 +65,16 @@ class BoundsEngine {
   void collect_varying(const Sum& form, bool negated, std::vector<std::pair<Expr, bool>>& found);
   bool may_cancel(const Sum& rest, const Sum& side, int64_t factor);
   Sum join_correlated_terms(Sum form);
-  Interval bounds_of_atom(const Expr& atom);
-  Interval atom_bounds(const Expr& e);
-  Interval cast_bounds(Type type, const Expr& value);
-  Interval ramp_bounds(const Ramp& ramp);
-  Interval binary_bounds(const Expr& e, const Binary& op);
-  Interval select_bounds(const Expr& condition, const Expr& when_true, const Expr& when_false);
+
+  // bounds_of_calls.cpp
   Interval call_bounds(const Call& call);
   Interval operator_bounds(const Call& call);
   Interval bounds_within(const Call& call, const OpInfo& info);
   Interval bounds_at_ends(const Call& call, const OpInfo& info);
   Interval bounds_by_rule(const Call& call);
   Interval value_of_func(const Call& call);
+
+  // bounds_under_conditions.cpp
   Truth compare_truth(Kind kind, const Expr& a, const Expr& b);
   // The consequences of a condition: ranges of single variables of the scope, and sums that are <=
   // 0.

@@ -1,12 +1,10 @@
-// There are two representations of ends. For wide signed integers they are expressions in canonical
-// linear form. For all other types they are useful only if they fold to constants, or if the
-// operation keeps them unchanged.
 #include "analysis/interval_arithmetic.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "analysis/interval_ends.h"
 #include "analysis/linear.h"
 #include "ir/build.h"
 #include "ir/scalar.h"
@@ -14,42 +12,6 @@
 namespace retrograde::analysis {
 
 namespace {
-
-using Wide = __int128;
-
-// A constant end; undefined when the type cannot represent it.
-Expr wide_const(Type type, Wide value) {
-  if (type.is_uint()) {
-    if (value < 0 || value > static_cast<Wide>(type.max_uint())) return {};
-    return make_uint_const(type, static_cast<uint64_t>(value));
-  }
-  if (value < type.min_int() || value > type.max_int()) return {};
-  return make_const(type, static_cast<int64_t>(value));
-}
-
-// An interval with two constant ends. An end that the type cannot represent is unbounded; a narrow
-// type then falls back to its range.
-Interval wide_interval(Type type, Wide min, Wide max) {
-  Interval v{wide_const(type, min), wide_const(type, max)};
-  if (has_linear_form(type)) return v;  // does not overflow, so each end holds by itself
-  return v.is_bounded() ? v : type_range(type);
-}
-
-std::optional<Wide> wide_end(const Expr& end) {
-  if (!end.defined()) return std::nullopt;
-  auto s = as_scalar(end);
-  if (!s || !s->type.is_int_or_uint()) return std::nullopt;
-  return s->type.is_uint() ? static_cast<Wide>(s->u) : static_cast<Wide>(s->i);
-}
-
-struct WidePair {
-  Wide min, max;
-};
-std::optional<WidePair> wide_ends(const Interval& v) {
-  auto min = wide_end(v.min), max = wide_end(v.max);
-  if (min && max) return WidePair{*min, *max};
-  return std::nullopt;
-}
 
 Wide wide_floor_div(Wide a, Wide b) { return a / b - (a % b < 0); }
 
@@ -60,38 +22,6 @@ Interval combine_corners(Type type, const WidePair& a, const WidePair& b, F f) {
                                  f(a.max, b.max)};
   auto [min, max] = std::minmax_element(corners.begin(), corners.end());
   return wide_interval(type, *min, *max);
-}
-
-std::optional<double> float_end(const Expr& end) {
-  auto value = end.defined() ? as_const_float(end) : std::nullopt;
-  return value && !std::isnan(*value) ? value : std::nullopt;
-}
-
-// Constant, finite ends.
-struct DoublePair {
-  double min, max;
-};
-std::optional<DoublePair> float_ends(const Interval& v) {
-  auto min = float_end(v.min), max = float_end(v.max);
-  if (!min || !max || !std::isfinite(*min) || !std::isfinite(*max)) return std::nullopt;
-  return DoublePair{*min, *max};
-}
-
-bool is_nan_end(const Expr& end) {
-  auto value = end.defined() ? as_const_float(end) : std::nullopt;
-  return value && std::isnan(*value);
-}
-
-Interval without_nan(const Interval& v) {
-  return is_nan_end(v.min) || is_nan_end(v.max) ? Interval::everything() : v;
-}
-
-Expr end_op(Kind kind, const Expr& a, const Expr& b) {
-  return a.defined() && b.defined() ? canonical(binary(kind, a, b)) : Expr();
-}
-
-Expr negate(const Expr& e) {
-  return e.defined() ? canonical(binary(Kind::Sub, make_zero(e.type()), e)) : e;
 }
 
 // For constant ends.

@@ -23,11 +23,8 @@ std::string asked_of_adjoints(const Func& output) {
 }
 
 void check_loss(const Func& output) {
-  if (!output.defined())
-    user_error(asked_of_adjoints(output), "the output must be defined", "it has no definition",
-               "Define it first");
-  check_is_floating(asked_of_adjoints(output), output.types(), "its type is",
-                    "Convert it to float where the gradient starts");
+  check_output(asked_of_adjoints(output), *output.function(),
+               "Convert it to float where the gradient starts");
 }
 
 CheckpointBudget budget_of(const AdjointOptions& options) {

@@ -16,15 +16,6 @@ std::string asked_of_tangents(const Func& output) {
   return "propagate tangents to " + quoted(output.name());
 }
 
-void check_moves(const Func& output) {
-  if (!output.defined()) {
-    user_error(asked_of_tangents(output), "the output must be defined", "it has no definition",
-               "Define it first");
-  }
-  check_is_floating(asked_of_tangents(output), output.types(), "its type is",
-                    "Convert it to float");
-}
-
 InputShape shape_of(const Func& output, const Symbol* symbol) {
   InputShape shape = autodiff::shape_of(symbol);
   if (shape.types.empty()) {
@@ -78,7 +69,7 @@ std::vector<Func> Tangents::funcs() const { return {result_->funcs.begin(), resu
 const std::vector<Explanation>& Tangents::explanations() const { return result_->explanations; }
 
 Tangents propagate_tangents(const Func& output, const std::vector<Direction>& directions) {
-  check_moves(output);
+  check_output(asked_of_tangents(output), *output.function(), "Convert it to float");
   if (directions.empty()) {
     user_error(asked_of_tangents(output), "something has to move", "there is no direction",
                "Give each input that moves with its direction");

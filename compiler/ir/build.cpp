@@ -1,115 +1,15 @@
-// Node builders: type checks and constant folding.
+// Node builders: variables, expressions and statements, with type checks.
 #include "ir/build.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
+#include "ir/constants.h"
+#include "ir/fold.h"
 #include "ir/print.h"
 #include "ir/scalar.h"
 #include "ir/visit.h"
 
-namespace retrograde {
-
-Expr Type::max() const {
-  if (is_float()) return ir::make_const(*this, std::numeric_limits<double>::infinity());
-  if (is_int()) return ir::make_const(*this, max_int());
-  if (is_uint()) return ir::make_uint_const(*this, max_uint());
-  user_error("take the largest value of a handle", "only numbers have one",
-             "a handle is an address", "Ask a type of numbers");
-}
-
-Expr Type::min() const {
-  if (is_float()) return ir::make_const(*this, -std::numeric_limits<double>::infinity());
-  if (is_int()) return ir::make_const(*this, min_int());
-  if (is_uint()) return ir::make_uint_const(*this, 0);
-  user_error("take the smallest value of a handle", "only numbers have one",
-             "a handle is an address", "Ask a type of numbers");
-}
-
-}  // namespace retrograde
-
 namespace retrograde::ir {
 
-// ---- constants ----
-
-namespace {
-
-Type times_lanes(Type type, int lanes) { return type.with_lanes(type.lanes() * lanes); }
-
-Expr splat(Expr value, int lanes) {
-  if (lanes == 1) return value;
-  const Type type = times_lanes(value.type(), lanes);
-  return make_node<Broadcast>(type, std::move(value), lanes);
-}
-
-// Every NaN becomes the one quiet NaN that the printer can print.
-Expr float_const(Type scalar, double value) {
-  if (std::isnan(value)) value = std::numeric_limits<double>::quiet_NaN();
-  return make_node<FloatImm>(scalar, round_to_type(scalar, value));
-}
-
-Expr scalar_const(const Scalar& s) {
-  if (s.type.is_float()) return float_const(s.type, s.f);
-  if (s.type.is_int()) return make_node<IntImm>(s.type, s.i);
-  if (s.type.is_uint()) return make_node<UIntImm>(s.type, s.u);
-  return make_node<Reinterpret>(s.type, make_node<UIntImm>(UInt(64), s.u));
-}
-
-Expr constant(const Scalar& s, int lanes) { return splat(scalar_const(s), lanes); }
-
-}  // namespace
-
-Expr make_const(Type type, int64_t value) {
-  if (type.is_float())
-    return constant(eval_cast(type.element_of(), Scalar::of_int(Int(64), value)), type.lanes());
-  return constant(Scalar::of_int(type, value), type.lanes());
-}
-
-Expr make_const(Type type, double value) {
-  if (type.is_float()) return splat(float_const(type.element_of(), value), type.lanes());
-  return constant(eval_cast(type.element_of(), Scalar::of_float(Float(64), value)), type.lanes());
-}
-
-Expr make_uint_const(Type type, uint64_t value) {
-  if (type.is_float())
-    return constant(eval_cast(type.element_of(), Scalar::of_uint(UInt(64), value)), type.lanes());
-  return constant(Scalar::of_uint(type, value), type.lanes());
-}
-
-Expr make_zero(Type type) { return make_const(type, int64_t{0}); }
-Expr make_one(Type type) { return make_const(type, int64_t{1}); }
-Expr const_true(int lanes) { return make_one(Bool(lanes)); }
-Expr const_false(int lanes) { return make_zero(Bool(lanes)); }
-
-std::optional<int64_t> as_const_int(const Expr& e) {
-  const std::optional<Scalar> s = as_scalar(e);
-  if (!s || !s->type.is_int_or_uint()) return std::nullopt;
-  if (s->type.is_uint() && s->u > static_cast<uint64_t>(INT64_MAX)) return std::nullopt;
-  return s->i;
-}
-
-std::optional<double> as_const_float(const Expr& e) {
-  const std::optional<Scalar> s = as_scalar(e);
-  if (!s || !s->type.is_float()) return std::nullopt;
-  return s->f;
-}
-
-namespace {
-bool is_number(const Expr& e, int value) {
-  const std::optional<Scalar> s = as_scalar(e);
-  return s && (s->type.is_float() ? s->f == value
-               : s->type.is_int() ? s->i == value
-                                  : s->u == uint64_t(value));
-}
-}  // namespace
-
-bool is_const(const Expr& e) { return as_scalar(e).has_value(); }
-bool is_zero(const Expr& e) { return is_number(e, 0); }
-bool is_one(const Expr& e) { return is_number(e, 1); }
-bool is_const_true(const Expr& e) { return e.defined() && e.type().is_bool() && is_one(e); }
-bool is_const_false(const Expr& e) { return e.defined() && e.type().is_bool() && is_zero(e); }
-bool is_const_int(const Expr& e, int64_t value) { return as_const_int(e) == value; }
+// ---- variables ----
 
 Expr variable(const std::string& name, Type type, SymbolRef symbol) {
   return make_node<Variable>(type, name, std::move(symbol));
@@ -140,7 +40,12 @@ std::vector<Expr> variables_of(const std::vector<std::string>& names) {
 
 namespace {
 
-bool is_comparison(Kind kind) { return kind >= Kind::EQ && kind <= Kind::GE; }
+Type times_lanes(Type type, int lanes) { return type.with_lanes(type.lanes() * lanes); }
+
+Type binary_type(Kind kind, Type operands) {
+  const bool is_comparison = kind >= Kind::EQ && kind <= Kind::GE;
+  return is_comparison ? Bool(operands.lanes()) : operands;
+}
 
 void match_lanes(Expr& a, Expr& b) {
   if (a.type().lanes() == b.type().lanes()) return;
@@ -161,110 +66,9 @@ Expr new_binary(Kind kind, Type type, Expr a, Expr b) {
   }
 }
 
-bool is_negative_zero(const Expr& e) {
-  const std::optional<double> value = as_const_float(e);
-  return value && *value == 0 && std::signbit(*value);
-}
-
-// x + -0.0, x - 0.0, x * 1.0 and x / 1.0 equal x for every x, including NaN, infinities and -0.0. x
-// + 0.0 does not.
-Expr fold_float(Kind kind, const Expr& a, const Expr& b) {
-  switch (kind) {
-    case Kind::Add:
-      return is_negative_zero(b) ? a : is_negative_zero(a) ? b : Expr();
-    case Kind::Sub:
-      return is_zero(b) && !is_negative_zero(b) ? a : Expr();
-    case Kind::Mul:
-      return is_one(b) ? a : is_one(a) ? b : Expr();
-    case Kind::Div:
-      return is_one(b) ? a : Expr();
-    case Kind::Min:
-    case Kind::Max:
-      return a.same_as(b) ? a : Expr();
-    default:
-      return {};
-  }
-}
-
-Expr fold_integer_compare(Kind kind, const Expr& a, const Expr& b) {
-  if (!a.same_as(b)) return {};
-  const bool result = kind == Kind::EQ || kind == Kind::LE || kind == Kind::GE;
-  return make_const(Bool(a.type().lanes()), int64_t{result});
-}
-
-Expr fold_integer(Kind kind, const Expr& a, const Expr& b) {
-  switch (kind) {
-    case Kind::Add:
-      return is_zero(b) ? a : is_zero(a) ? b : Expr();
-    case Kind::Sub:
-      return is_zero(b) ? a : a.same_as(b) ? make_zero(a.type()) : Expr();
-    case Kind::Mul:
-      return is_one(b) || is_zero(a) ? a : is_one(a) || is_zero(b) ? b : Expr();
-    case Kind::Div:  // 0 / x and x / 0 are 0
-      return is_one(b) || is_zero(a) ? a : is_zero(b) ? b : Expr();
-    case Kind::Mod:
-      return is_one(b) || is_zero(b) || is_zero(a) ? make_zero(a.type()) : Expr();
-    case Kind::Min:
-    case Kind::Max:
-      return a.same_as(b) ? a : Expr();
-    default:
-      return fold_integer_compare(kind, a, b);
-  }
-}
-
-Expr fold_logical(Kind kind, const Expr& a, const Expr& b) {
-  const bool absorbing = kind == Kind::Or;  // true || x, false && x
-  for (const auto& [x, y] : {std::pair(a, b), std::pair(b, a)}) {
-    if (is_const_true(x)) return absorbing ? x : y;
-    if (is_const_false(x)) return absorbing ? y : x;
-  }
-  return a.same_as(b) ? a : Expr();
-}
-
-// Evaluates an expression over constants that calls functions which only code generation folds.
-// Used for integers and conditions that depend on them, such as loop extents. `budget` limits the
-// size, because shared nodes are visited again.
-std::optional<Scalar> value_over_constants(const Expr& e, int& budget) {
-  if (--budget < 0) return std::nullopt;
-  if (auto known = as_scalar(e)) return known;
-  std::vector<Scalar> args;
-  bool is_known = true;
-  for_each_child(e, [&](const Expr& child) {
-    const auto value = is_known ? value_over_constants(child, budget) : std::nullopt;
-    is_known = value.has_value();
-    if (value) args.push_back(*value);
-  });
-  if (!is_known || args.empty() || !e.type().is_float()) return std::nullopt;
-  const Type type = e.type().element_of();
-  if (const auto* call = e.as<Call>())
-    return call->call_type == CallType::Operator ? eval_operator(call->op, args, type)
-                                                 : std::nullopt;
-  if (e.kind() == Kind::Cast) return eval_cast(type, args[0]);
-  if (e.kind() == Kind::Broadcast) return args[0];
-  const bool is_arithmetic = e.kind() >= Kind::Add && e.kind() <= Kind::Max;
-  return is_arithmetic ? std::optional(eval_binary(e.kind(), args[0], args[1])) : std::nullopt;
-}
-std::optional<Scalar> value_over_constants(const Expr& e) {
-  int budget = 100;
-  return value_over_constants(e, budget);
-}
-
 // Whether folding to `result` would drop a loose name of the operand.
 bool loses_names(const Expr& result, const Expr& operand) {
   return operand->has_loose_names && !operand.same_as(result);
-}
-
-Expr fold_binary(Kind kind, Type result, const Expr& a, const Expr& b) {
-  const std::optional<Scalar> x = as_scalar(a);
-  const std::optional<Scalar> y = x ? as_scalar(b) : std::nullopt;
-  if (x && y) return constant(eval_binary(kind, *x, *y), result.lanes());
-  if (is_comparison(kind) && a.type().is_float()) {
-    const auto u = value_over_constants(a), v = u ? value_over_constants(b) : u;
-    if (u && v) return constant(eval_binary(kind, *u, *v), result.lanes());
-  }
-  if (kind == Kind::And || kind == Kind::Or) return fold_logical(kind, a, b);
-  if (a.type().is_float()) return fold_float(kind, a, b);
-  return a.type().is_int_or_uint() ? fold_integer(kind, a, b) : Expr();
 }
 
 }  // namespace
@@ -275,7 +79,7 @@ Expr binary(Kind kind, Expr a, Expr b) {
                     ": ", a, ", ", b);
   const bool logical = kind == Kind::And || kind == Kind::Or;
   RETROGRADE_ASSERT(!logical || a.type().is_bool(), kind_name(kind), " of ", a.type());
-  const Type type = is_comparison(kind) ? Bool(a.type().lanes()) : a.type();
+  const Type type = binary_type(kind, a.type());
   Expr folded = fold_binary(kind, type, a, b);
   if (folded.defined() && !loses_names(folded, a) && !loses_names(folded, b)) return folded;
   return new_binary(kind, type, std::move(a), std::move(b));
@@ -290,16 +94,6 @@ Expr logical_not(Expr a) {
   return make_node<Not>(a.type(), std::move(a));
 }
 
-namespace {
-
-// A float outside an integer type's range converts as the machine does, so it is not folded.
-bool cast_is_defined(Type to, const Scalar& from) {
-  if (!from.type.is_float() || to.is_float() || to.is_bool()) return true;
-  return std::isfinite(from.f) && to.can_represent(std::trunc(from.f));
-}
-
-}  // namespace
-
 Expr cast_to(Type type, Expr value) {
   if (type.lanes() != value.type().lanes()) {
     RETROGRADE_ASSERT(type.is_scalar() || value.type().is_scalar(), "cast of ", value.type(),
@@ -311,10 +105,7 @@ Expr cast_to(Type type, Expr value) {
   if (type == value.type()) return value;
   RETROGRADE_ASSERT(!type.is_handle() && !value.type().is_handle(), "cast of ", value.type(),
                     " to ", type);
-  const bool may_round = value.type().is_float() && !type.is_float();
-  const std::optional<Scalar> s = may_round ? value_over_constants(value) : as_scalar(value);
-  if (s && cast_is_defined(type.element_of(), *s))
-    return constant(eval_cast(type.element_of(), *s), type.lanes());
+  if (Expr folded = fold_cast(type, value); folded.defined()) return folded;
   return make_node<Cast>(type, std::move(value));
 }
 
@@ -322,12 +113,7 @@ Expr reinterpret_as(Type type, Expr value) {
   if (type == value.type()) return value;
   RETROGRADE_ASSERT(type.bits() * type.lanes() == value.type().bits() * value.type().lanes(),
                     "reinterpret ", value.type(), " as ", type);
-  const std::optional<Scalar> s = as_scalar(value);
-  if (s && type.lanes() == value.type().lanes() && !type.is_handle()) {
-    const Scalar result = eval_reinterpret(type.element_of(), *s);
-    if (!type.is_float() || !std::isnan(result.f))
-      return constant(result, type.lanes());  // NaNs carry payloads
-  }
+  if (Expr folded = fold_reinterpret(type, value); folded.defined()) return folded;
   return make_node<Reinterpret>(type, std::move(value));
 }
 
@@ -410,84 +196,6 @@ Expr make_vector_reduce(Kind op, Expr value, int result_lanes) {
   if (lanes == result_lanes) return value;
   const Type type = value.type().with_lanes(result_lanes);
   return make_node<VectorReduce>(type, op, std::move(value));
-}
-
-namespace {
-
-// Generated code implements these functions itself, and may differ in the last bit. Code generation
-// folds them (codegen/math/constant_math.h).
-bool is_rounded_otherwise(Op op) { return op_info(op).real.error.kind == OpError::Kind::Library; }
-
-bool is_zero_or_one(const Scalar& s) { return s.f == 0 || s.f == 1; }
-
-Expr fold_operator(Op op, Type type, const std::vector<Expr>& args) {
-  std::vector<Scalar> values;
-  for (const Expr& arg : args) {
-    const std::optional<Scalar> value = as_scalar(arg);
-    if (!value) return {};
-    values.push_back(*value);
-  }
-  const Scalar result = *eval_operator(op, values, type.element_of());
-  // Exact cases: cos(0), log(1) and the like.
-  const bool is_exact = !is_rounded_otherwise(op) ||
-                        (is_zero_or_one(result) && std::ranges::all_of(values, is_zero_or_one));
-  return is_exact ? constant(result, type.lanes()) : Expr();
-}
-
-// Scalar arguments of a vector operator are broadcast.
-Type match_argument_lanes(Type type, std::vector<Expr>& args) {
-  int lanes = type.lanes();
-  for (const Expr& arg : args) lanes = std::max(lanes, arg.type().lanes());
-  for (Expr& arg : args) {
-    if (lanes > 1 && arg.type().is_scalar()) arg = make_broadcast(std::move(arg), lanes);
-    RETROGRADE_ASSERT(arg.type().lanes() == lanes, "operator arguments of ", arg.type().lanes(),
-                      " and ", lanes, " lanes");
-  }
-  return type.with_lanes(lanes);
-}
-
-}  // namespace
-
-Expr call_op(Op op, Type type, std::vector<Expr> args) {
-  const OpInfo& info = op_info(op);
-  RETROGRADE_ASSERT(info.arity < 0 || info.arity == static_cast<int>(args.size()), info.name,
-                    " of ", args.size(), " arguments");
-  if (info.cls == OpClass::Pure || info.cls == OpClass::Marker)
-    type = match_argument_lanes(type, args);
-  if (info.cls == OpClass::Pure) {
-    if (Expr folded = fold_operator(op, type, args); folded.defined()) return folded;
-  }
-  return make_node<Call>(type, CallType::Operator, op, info.name, std::move(args), 0, SymbolRef());
-}
-
-Expr call_op(Op op, std::vector<Expr> args) {
-  RETROGRADE_ASSERT(!args.empty(), op_info(op).name, " of no arguments needs a type");
-  const Type type = args[0].type();
-  return call_op(op, type, std::move(args));
-}
-
-Expr call_extern(const std::string& name, Type type, std::vector<Expr> args, bool is_pure) {
-  return make_node<Call>(type, CallType::Extern, Op::none, name, std::move(args),
-                         is_pure ? Call::pure_extern : 0, SymbolRef());
-}
-
-Expr call_func(const std::string& name, Type type, std::vector<Expr> args, int component,
-               SymbolRef symbol) {
-  return make_node<Call>(type, CallType::Func, Op::none, name, std::move(args), component,
-                         std::move(symbol));
-}
-
-Expr call_image(const std::string& name, Type type, std::vector<Expr> args, SymbolRef symbol) {
-  return make_node<Call>(type, CallType::Image, Op::none, name, std::move(args), 0,
-                         std::move(symbol));
-}
-
-Expr likely(Expr e) {
-  if (!e.defined()) {
-    user_error("apply likely", "every operand must be a defined expression",
-               "it was never assigned", "Assign the Expr before its use");
-  }
-  return call_op(Op::likely, {std::move(e)});
 }
 
 Expr conjunction(const std::vector<Expr>& terms) {

@@ -34,7 +34,7 @@ enum class BoundsRule : uint8_t {
   OfSecond,    // the value is the second operand
   AtEnds,      // increasing and exact: the value lies between those at the operand's ends
   Within,      // the value lies within `values`, or is NaN
-  ByRule,      // by a rule in analysis/bounds_engine.cpp
+  ByRule,      // by a rule in analysis/bounds_of_calls.cpp
 };
 
 // The range of every non-NaN value, for any operands, rounding errors included.

@@ -10,13 +10,9 @@
 #include "ir/interval.h"
 #include "ir/node_memo.h"
 #include "ir/sum.h"
+#include "simplify/constant_range.h"
 
 namespace retrograde::simplification {
-
-// The range of values of a type.
-ConstantRange range_of(Type type);
-ConstantRange operator+(const ConstantRange& a, const ConstantRange& b);
-ConstantRange operator*(const ConstantRange& a, int64_t factor);
 
 // An integer known to be modulus * k + remainder for some k. Modulus 0 means the constant
 // `remainder`; modulus 1 means that nothing is known.
@@ -54,11 +50,11 @@ class Facts {
   // The truth of the condition if it or its negation was assumed.
   std::optional<bool> decided(const Expr& condition) const;
 
-  ConstantRange range(const Expr& e);
+  ConstantRange range(const Expr& e);  // See ranges.cpp.
   // See congruence.cpp.
   Congruence congruence(const Expr& e);
   Congruence congruence(const Sum& sum);
-  // The tightest constant bounds found for a sum of an index type.
+  // The tightest constant bounds found for a sum of an index type. See bounds_of_sums.cpp.
   int64_t upper_bound(const Sum& sum);
   int64_t lower_bound(const Sum& sum);
   // Drops the memoised ranges; call it when variables or conditions change.

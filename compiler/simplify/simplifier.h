@@ -31,6 +31,7 @@ class Simplifier {
  private:
   // ---- rules: operands are simplified and have one type ----
   Expr apply(Kind kind, const Expr& a, const Expr& b);
+  Expr apply_rule(Kind kind, const Expr& a, const Expr& b);
   Expr add(const Expr& a, const Expr& b);
   Expr sub(const Expr& a, const Expr& b);
   Expr mul(const Expr& a, const Expr& b);

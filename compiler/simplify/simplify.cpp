@@ -86,49 +86,40 @@ Expr Simplifier::apply(Kind kind, const Expr& a, const Expr& b) {
     --depth_;
     return binary(kind, a, b);
   }
-  Expr result;
-  switch (kind) {
-    case Kind::Add:
-      result = add(a, b);
-      break;
-    case Kind::Sub:
-      result = sub(a, b);
-      break;
-    case Kind::Mul:
-      result = mul(a, b);
-      break;
-    case Kind::Div:
-      result = div(a, b);
-      break;
-    case Kind::Mod:
-      result = mod(a, b);
-      break;
-    case Kind::Min:
-    case Kind::Max:
-      result = min_max(kind, a, b);
-      break;
-    case Kind::EQ:
-      result = equals(a, b);
-      break;
-    case Kind::NE:
-      result = negate(equals(a, b));
-      break;
-    case Kind::LT:
-    case Kind::LE:
-      result = less(kind, a, b);
-      break;
-    case Kind::GT:
-      result = less(Kind::LT, b, a);
-      break;
-    case Kind::GE:
-      result = less(Kind::LE, b, a);
-      break;
-    default:
-      result = logical(kind, a, b);
-      break;
-  }
+  Expr result = apply_rule(kind, a, b);
   --depth_;
   return result;
+}
+
+Expr Simplifier::apply_rule(Kind kind, const Expr& a, const Expr& b) {
+  switch (kind) {
+    case Kind::Add:
+      return add(a, b);
+    case Kind::Sub:
+      return sub(a, b);
+    case Kind::Mul:
+      return mul(a, b);
+    case Kind::Div:
+      return div(a, b);
+    case Kind::Mod:
+      return mod(a, b);
+    case Kind::Min:
+    case Kind::Max:
+      return min_max(kind, a, b);
+    case Kind::EQ:
+      return equals(a, b);
+    case Kind::NE:
+      return negate(equals(a, b));
+    case Kind::LT:
+    case Kind::LE:
+      return less(kind, a, b);
+    case Kind::GT:
+      return less(Kind::LT, b, a);
+    case Kind::GE:
+      return less(Kind::LE, b, a);
+    default:
+      return logical(kind, a, b);
+  }
 }
 
 Expr Simplifier::constant(const Expr& like, int64_t value) const {

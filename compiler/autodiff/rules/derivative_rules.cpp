@@ -4,14 +4,13 @@
 // of Mathematical Functions. "definition" means that the rule follows from the operator's definition in this project.
 #include "autodiff/rules/derivative_rules.h"
 
-#include <cmath>
 #include <limits>
 #include <map>
 #include <numbers>
 
+#include "autodiff/rules/power_partials.h"
 #include "autodiff/rules/stable_norms.h"
 #include "ir/build.h"
-#include "ir/scalar.h"
 
 namespace retrograde::autodiff {
 
@@ -22,12 +21,6 @@ using Partials = std::vector<Partial>;
 
 Expr num(const Expr& like, double value) { return make_const(like.type(), value); }
 Expr square(const Expr& a) { return a * a; }
-Expr infinity(Type type) { return make_const(type, std::numeric_limits<double>::infinity()); }
-double smallest_normal_of(Type type) {
-  return type.bits() == 64                       ? std::numeric_limits<double>::min()
-         : type.bits() == 32 || type.is_bfloat() ? std::numeric_limits<float>::min()
-                                                 : 0x1p-14;
-}
 double largest_of(Type type) {
   return type.bits() == 64   ? std::numeric_limits<double>::max()
          : type.bits() == 32 ? std::numeric_limits<float>::max()
@@ -37,9 +30,6 @@ double largest_of(Type type) {
 Partial plain(Expr e) { return {std::move(e), Strength::Plain}; }
 Partial quotient(Expr e, Expr divisor) {
   return {std::move(e), Strength::Strong, std::move(divisor)};
-}
-Expr zero_where(const Expr& condition, const Expr& e) {
-  return make_select(condition, make_zero(e.type()), e);
 }
 
 // The derivative of |u|: sign(u), which is 0 at 0.
@@ -61,36 +51,6 @@ Partials fma_partials(Args a, const Expr&) {
 Partials sqrt_partials(Args a, const Expr& v) { return {quotient(num(a[0], 0.5), v)}; }
 Partials exp_partials(Args, const Expr& v) { return {strong(v)}; }
 Partials log_partials(Args a, const Expr&) { return {quotient(num(a[0], 1), a[0])}; }
-// Whether p - 1 is exact in p's type.
-bool has_exact_predecessor(const Expr& p) {
-  auto value = as_const_float(p);
-  return value && round_to_type(p.type(), *value - 1) == *value - 1;
-}
-// dx = p x^(p-1), and 0 where p is 0. dp = x^p log x, and 0 where x is 0.
-//
-// If p - 1 is inexact, x^(p-1) is off by the rounding error times log x, or is a different power altogether. Then dx is
-// p v / x, except where v overflowed or underflowed.
-//
-// Both expressions are built so that their own derivatives are right, too. Where p is 0, dx is p / x, whose derivative
-// by p is 1 / x. Where x is 0, neither dx nor dp depends on p.
-Partials power_partials(Args a, const Expr& v, Op power, Op logarithm) {
-  const Expr& x = a[0];
-  const Expr at_origin = x == num(x, 0);
-  const Expr p =
-      is_const(a[1]) ? a[1] : make_select(at_origin, call_op(Op::stop_gradient, {a[1]}), a[1]);
-  Expr dx = p * call_op(power, x.type(), {x, p - num(p, 1)});
-  if (!has_exact_predecessor(p)) {
-    Expr size = call_op(Op::abs, {v});
-    Expr lost = size < num(x, smallest_normal_of(x.type())) || size == infinity(x.type()) ||
-                call_op(Op::abs, {x}) == infinity(x.type());
-    dx = make_select(lost, dx, p * v / x);
-  }
-  if (is_zero(p)) dx = num(x, 0);
-  if (!is_const(p))
-    dx = make_select(a[1] == num(p, 0), call_op(Op::strong_div, x.type(), {p, x}), dx);
-  Expr dp = zero_where(at_origin, v * call_op(logarithm, {x}));
-  return {strong(dx), strong(dp)};
-}
 Partials pow_partials(Args a, const Expr& v) { return power_partials(a, v, Op::pow, Op::log); }
 Partials fast_pow_partials(Args a, const Expr& v) {
   return power_partials(a, v, Op::fast_pow, Op::fast_log);
@@ -188,8 +148,7 @@ DerivativeRule constant_rule(const char* convention) {
   return {RuleClass::Constant,           nullptr,    -1,
           "everywhere but at the steps", convention, "definition"};
 }
-DerivativeRule transparent(int arg,
-                           const char* convention = "1: the value is the argument unchanged") {
+DerivativeRule transparent(int arg, const char* convention = "the value is the argument's") {
   return {RuleClass::Transparent, nullptr, arg, "everywhere", convention, "definition"};
 }
 DerivativeRule no_rule(const char* reason) {
@@ -199,7 +158,7 @@ DerivativeRule no_rule(const char* reason) {
 using OpTable = std::map<Op, DerivativeRule>;
 constexpr const char* approximated = "as for the exact function";
 
-OpTable smooth_operators() {
+OpTable algebraic_operators() {
   return {
       {Op::abs, smooth(abs_partials, "x != 0", "0 at 0", "sign(x)", "-1 at -inf, 1 at +inf", 0)},
       {Op::absd, smooth(absd_partials, "x != y", "0 where x = y", "sign(x - y), -sign(x - y)",
@@ -211,6 +170,22 @@ OpTable smooth_operators() {
       {Op::sqrt,
        smooth(sqrt_partials, "x > 0", "+inf at +0, -inf at -0, with strong zeros; NaN for x < 0",
               "1 / (2 v)", "0 at +inf", 2)},
+      {Op::hypot,
+       smooth(hypot_partials, "(x, y) != (0, 0)", "0 at the origin, the smallest subgradient",
+              "x / v, y / v, scaled by max(|x|, |y|)", "NaN", 2)},
+      {Op::saturating_cast, smooth(saturating_cast_partials, "inside the type's range",
+                                   "0 where the value saturates; casts to integers: 0", "1 or 0",
+                                   "0, because the value saturates", 0, "definition")},
+      {Op::strong_div, smooth(strong_div_partials, "y != 0", "as for Div, always with strong zeros",
+                              "1 / y, -v / y", "as for Div, with strong zeros", 2, "definition")},
+      {Op::strong_mul,
+       smooth(strong_mul_partials, "everywhere", "as for Mul, always with strong zeros", "y, x",
+              "as for Mul, with strong zeros", 0, "definition")},
+  };
+}
+
+OpTable transcendental_operators() {
+  return {
       {Op::exp, smooth(exp_partials, "everywhere", "no kinks; inf where exp overflows", "v",
                        "0 at -inf, inf at +inf", 1)},
       {Op::log, smooth(log_partials, "x > 0",
@@ -221,9 +196,6 @@ OpTable smooth_operators() {
               "dx = 0 where y = 0; dy = 0 where x = 0; dy is NaN for x < 0",
               "y x^(y-1), or y v / x, v log x",
               "as for x^(y-1) and v log x; a pole may have either sign if y - 1 is inexact", 3)},
-      {Op::hypot,
-       smooth(hypot_partials, "(x, y) != (0, 0)", "0 at the origin, the smallest subgradient",
-              "x / v, y / v, scaled by max(|x|, |y|)", "NaN", 2)},
       {Op::sin, smooth(sin_partials, "everywhere", "no kinks", "cos x", "NaN, like the value", 1)},
       {Op::cos, smooth(cos_partials, "everywhere", "no kinks", "-sin x", "NaN, like the value", 1)},
       {Op::tan, smooth(tan_partials, "x != pi/2 + k pi", "large near the poles", "1 + v^2",
@@ -251,6 +223,11 @@ OpTable smooth_operators() {
                          "1 / ((1 - x)(1 + x))", "0, although the value is NaN", 3, "[DLMF] 4.40")},
       {Op::erf, smooth(erf_partials, "everywhere", "no kinks", "2 / sqrt(pi) exp(-x^2)", "0", 4,
                        "[DLMF] 7.2")},
+  };
+}
+
+OpTable approximate_operators() {
+  return {
       {Op::fast_exp, smooth(exp_partials, "everywhere", approximated, "v", "as for exp", -1)},
       {Op::fast_log, smooth(fast_log_partials, "x > 0", approximated, "1 / x", "as for log", 1)},
       {Op::fast_pow, smooth(fast_pow_partials, "as for pow", approximated,
@@ -262,23 +239,15 @@ OpTable smooth_operators() {
       {Op::fast_inverse, smooth(fast_inverse_partials, "x != 0", approximated, "-v^2", "0", -1)},
       {Op::fast_inverse_sqrt,
        smooth(fast_inverse_sqrt_partials, "x > 0", approximated, "-v^3 / 2", "0 at +inf", -1)},
-      {Op::saturating_cast, smooth(saturating_cast_partials, "inside the type's range",
-                                   "0 where the value saturates; casts to integers: 0", "1 or 0",
-                                   "0, because the value saturates", 0, "definition")},
-      {Op::strong_div, smooth(strong_div_partials, "y != 0", "as for Div, always with strong zeros",
-                              "1 / y, -v / y", "as for Div, with strong zeros", 2, "definition")},
-      {Op::strong_mul,
-       smooth(strong_mul_partials, "everywhere", "as for Mul, always with strong zeros", "y, x",
-              "as for Mul, with strong zeros", 0, "definition")},
   };
 }
 
 // Operators whose derivative is 0, and operators that return an argument under a promise.
 OpTable other_operators() {
-  const char* bits = "defined on integers only";
-  const char* test = "its value is true or false";
-  const char* steps = "constant between steps; 0 at the steps by convention";
-  const char* promise = "1 for the first argument; the bounds are only promises";
+  const char* bits = "integers only: derivative 0";
+  const char* test = "a truth value: derivative 0";
+  const char* steps = "0 everywhere, at the steps too";
+  const char* promise = "the bounds are promises, not values";
   return {
       {Op::bitwise_and, constant_rule(bits)},
       {Op::bitwise_or, constant_rule(bits)},
@@ -306,8 +275,10 @@ OpTable other_operators() {
 }
 
 OpTable make_op_table() {
-  OpTable t = smooth_operators();
-  t.merge(other_operators());
+  OpTable t = other_operators();
+  t.merge(algebraic_operators());
+  t.merge(transcendental_operators());
+  t.merge(approximate_operators());
   for (int i = 0; i < op_count; ++i) {
     const Op op = static_cast<Op>(i);
     if (op_info(op).cls == OpClass::Internal) {
@@ -359,7 +330,7 @@ KindTable make_kind_table() {
   };
   for (Kind k : {Kind::EQ, Kind::NE, Kind::LT, Kind::LE, Kind::GT, Kind::GE, Kind::And, Kind::Or,
                  Kind::Not}) {
-    t.emplace(k, constant_rule("its value is true or false"));
+    t.emplace(k, constant_rule("a truth value: derivative 0"));
   }
   return t;
 }
@@ -397,72 +368,5 @@ bool has_poles(const Call& call) {
 }
 
 bool levels_off(Op op) { return op_info(op).real.levels == Levels::LevelsOff; }
-
-Type adjoint_type(Type type) {
-  const bool is_kept = type.is_float() && type.bits() >= 32;
-  return is_kept ? type : Float(32, type.lanes());
-}
-
-bool is_finite_constant(const Expr& e) {
-  auto value = as_const_float(e);
-  return value && std::isfinite(*value);
-}
-
-namespace {
-
-bool is_cut(Strength strength) { return strength == Strength::Cut || strength == Strength::Both; }
-bool is_strong(Strength strength) {
-  return strength == Strength::Strong || strength == Strength::Both;
-}
-
-// Computes adjoint / divisor * factor in that order. A constant factor, whose magnitude is at most 1, is applied first:
-// it cannot overflow, and one division is enough.
-Expr divided_first(const Expr& adjoint, const Partial& partial) {
-  const Expr divisor = cast_to(adjoint.type(), partial.divisor);
-  const bool is_scaled = is_const(partial.factor);
-  const Expr scaled =
-      is_scaled ? times_partial(adjoint, {partial.factor, Strength::Plain}) : adjoint;
-  const Expr divided = partial.strength == Strength::Strong
-                           ? call_op(Op::strong_div, adjoint.type(), {scaled, divisor})
-                           : scaled / divisor;
-  // The quotient may have overflowed where the factor is 0.
-  return is_scaled ? divided : times_partial(divided, {partial.factor, Strength::Both});
-}
-
-}  // namespace
-
-Strength as_strong(Strength strength) {
-  return is_cut(strength) ? Strength::Both : Strength::Strong;
-}
-Strength as_cut(Strength strength) { return is_strong(strength) ? Strength::Both : Strength::Cut; }
-
-Expr times_partial(const Expr& adjoint, const Partial& partial) {
-  if (is_zero(partial.factor)) return make_zero(adjoint.type());
-  // A select stays a select: inf * 0 would put a NaN into the adjoint of the operand that was not chosen.
-  if (const auto* choice = partial.factor.as<Select>()) {
-    return make_select(
-        choice->condition,
-        times_partial(adjoint, {choice->when_true, partial.strength, partial.divisor}),
-        times_partial(adjoint, {choice->when_false, partial.strength, partial.divisor}));
-  }
-  if (partial.divisor.defined()) {
-    if (!is_cut(partial.strength)) return divided_first(adjoint, partial);
-    const Expr factor = partial.is_strong_quotient ? call_op(Op::strong_div, partial.factor.type(),
-                                                             {partial.factor, partial.divisor})
-                                                   : partial.factor / partial.divisor;
-    return times_partial(adjoint, {factor, partial.strength});
-  }
-  Expr factor = cast_to(adjoint.type(), partial.factor);
-  if (is_one(factor)) return adjoint;
-  if (is_finite_constant(factor) || partial.strength == Strength::Plain) return adjoint * factor;
-  if (partial.strength == Strength::Cut)
-    return call_op(Op::strong_mul, adjoint.type(), {factor, adjoint});
-  Expr product = call_op(Op::strong_mul, adjoint.type(), {adjoint, factor});
-  if (partial.strength != Strength::Both) return product;
-  // Both branches are products, so that differentiating this expression again gives the derivative of a product where
-  // the factor is 0.
-  return make_select(factor == make_zero(factor.type()),
-                     call_op(Op::strong_mul, product.type(), {factor, adjoint}), product);
-}
 
 }  // namespace retrograde::autodiff

@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "autodiff/rules/partial.h"
 #include "ir/expr.h"
 
 namespace retrograde::autodiff {
@@ -16,29 +17,6 @@ enum class RuleClass : uint8_t {
   Blocked,      // 0 because the user requested it: stop_gradient
   NoRule,  // no derivative, for the reason in `convention`; an adjoint that reaches it is an error
 };
-
-// How a partial is multiplied with the adjoint. A strong zero keeps the product 0 where the other factor is infinite.
-enum class Strength : uint8_t {
-  Plain,  // the rule promises a finite partial for finite operands; sweeps also check the operands
-  Strong,  // the partial may be infinite or NaN where the primal is finite: an adjoint of 0 is a strong zero
-  Cut,   // the adjoint may be infinite (it passed a pole): a partial of 0 is a strong zero
-  Both,  // Strong and Cut
-};
-Strength as_strong(Strength strength);
-Strength as_cut(Strength strength);
-
-struct Partial {
-  Expr factor;  // undefined: no contribution to this operand
-  Strength strength = Strength::Strong;
-  // The partial is factor / divisor; an undefined divisor means 1. The adjoint is divided before it is multiplied,
-  // because 1 / y may overflow where adjoint / y does not.
-  Expr divisor = {};
-  // The factor is the value of a strong quotient: where it is 0 the partial is 0, whatever the divisor is.
-  bool is_strong_quotient = false;
-};
-
-// A partial that may be infinite where the adjoint is 0.
-inline Partial strong(Expr factor) { return {std::move(factor)}; }
 
 // Returns the partials for the operands `args`. `value` is the node itself, for rules that reuse it.
 using PartialsFn = std::vector<Partial> (*)(const std::vector<Expr>& args, const Expr& value);
@@ -64,17 +42,9 @@ const DerivativeRule& derivative_rule(Op op);
 const DerivativeRule& derivative_rule(Kind kind);
 bool has_derivative_rule(Kind kind);
 
-// Whether `e` is a finite constant: 0 times it is 0, so no strong zero is needed.
-bool is_finite_constant(const Expr& e);
-
-// The type in which the adjoint of a value of floating-point `type` is accumulated: float32 for the 16-bit types.
-Type adjoint_type(Type type);
 // Whether a partial of the operator may be infinite where its value is finite, as that of sqrt at 0.
 bool has_poles(const Call& call);
 // Whether the value may be finite, and the partial 0, at an infinite operand, as for exp at -inf.
 bool levels_off(Op op);
-// Returns adjoint * partial, multiplied as the strength of the partial says. `adjoint` and the result have the adjoint
-// type.
-Expr times_partial(const Expr& adjoint, const Partial& partial);
 
 }  // namespace retrograde::autodiff

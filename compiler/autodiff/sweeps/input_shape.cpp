@@ -19,6 +19,14 @@ void check_is_floating(const std::string& asked, const std::vector<Type>& types,
              text(whose, " ", to_string(types[0])), what_to_do);
 }
 
+void check_output(const std::string& asked, const FuncContents& output,
+                  const std::string& what_to_do) {
+  if (!output.is_defined()) {
+    user_error(asked, "the output must be defined", "it has no definition", "Define it first");
+  }
+  check_is_floating(asked, output.types, "its type is", what_to_do);
+}
+
 InputShape shape_of(const Symbol* symbol) {
   if (const auto* p = dynamic_cast<const ParameterContents*>(symbol))
     return {p->name, p->is_buffer ? p->dimensions : 0, {p->type}};

@@ -21,6 +21,9 @@ bool is_floating(const std::vector<Type>& types);
 // Throws CompileError unless some value is a float. `whose` is the message's subject, for example "its type".
 void check_is_floating(const std::string& asked, const std::vector<Type>& types,
                        const std::string& whose, const std::string& what_to_do);
+// Throws CompileError unless the output of a derivative is defined and floating.
+void check_output(const std::string& asked, const FuncContents& output,
+                  const std::string& what_to_do);
 
 // Throws CompileError unless `candidate` is defined and has the dimensions and number of values of `shape`, all floats.
 // `what` names `candidate` in the message, for example "a direction"; `of` names the input.

@@ -2,11 +2,9 @@
 #include "autodiff/updates/recurrence.h"
 
 #include <algorithm>
-#include <set>
 
 #include "autodiff/sums/carried_sums.h"
-#include "autodiff/time/checkpoint.h"
-#include "autodiff/updates/versions.h"
+#include "autodiff/updates/self_reads.h"
 #include "frontend/language/var.h"
 #include "ir/build.h"
 #include "simplify/simplify.h"
@@ -24,27 +22,27 @@ class Recurrence {
   bool run() {
     if (!relations_.write_is_affine()) return false;
     if (!relations_.write_is_injective()) return last_writers();
-    auto reads = self_reads();
+    auto reads = find_self_reads(c_, relations_);
     if (!reads) return false;
     SweepResult sweep = c_.sweep_at_write(result_.current.func);
-    mark(*reads, sweep);
+    mark(*reads, c_, sweep);
     bool has_recurrence = false;
     for (const SelfRead& r : *reads) has_recurrence |= r.carries_adjoint && !r.relation.never_new;
     if (has_recurrence && !find_order(*reads)) return false;
     Expr written = written_elements();
     if (!written.defined()) return false;
-    if (!find_values(*reads)) return false;
+    if (!keep_needed_values(*reads, c_, relations_, result_)) return false;
     if (has_recurrence) {
-      if (carries_long_sums(self_contributions(*reads, sweep, true))) {
+      if (carries_long_sums(contributions(*reads, sweep, true))) {
         carry_in_double();
       } else {
         own_current();
       }
       sweep = c_.sweep_iterations(result_.current.func,
                                   [&] { return c_.adjoints_at_write(result_.current.func); });
-      append_reverse_loop(self_contributions(*reads, sweep, true));
+      append_reverse_loop(contributions(*reads, sweep, true));
     }
-    start_previous(written, self_contributions(*reads, sweep, false));
+    start_previous(written, contributions(*reads, sweep, false));
     result_.values = c_.values;
     result_.domains = {c_.domain};
     result_.keeps_steps = true;
@@ -52,12 +50,10 @@ class Recurrence {
   }
 
  private:
-  struct SelfRead {
-    Expr call;
-    UpdateRelations::Read relation;
-    bool carries_adjoint = false;  // the sweep reaches it
-    bool is_needed = false;        // a partial or an index needs its value
-  };
+  std::vector<Contribution> contributions(const std::vector<SelfRead>& reads,
+                                          const SweepResult& sweep, bool to_new) const {
+    return self_contributions(reads, c_, sweep, result_.self_values, to_new);
+  }
 
   // Several iterations may write an element and none reads it, so only the last writer counts.
   bool last_writers() {
@@ -66,58 +62,6 @@ class Recurrence {
     result_.domains = {restricted(c_.domain, relations_.last_writers())};
     start_previous(relations_.written(c_.point), {});
     return true;
-  }
-
-  // Returns nullopt if a read has a data-dependent index.
-  std::optional<std::vector<SelfRead>> self_reads() {
-    std::vector<SelfRead> reads;
-    for (const Expr& call : c_.self_reads()) {
-      auto relation = relations_.read(as_call_of(call, f_)->args);
-      if (!relation) return std::nullopt;
-      reads.push_back({call, *relation});
-    }
-    return reads;
-  }
-
-  void mark(std::vector<SelfRead>& reads, const SweepResult& sweep) const {
-    std::set<Expr, StructuralLess> carrying;
-    for (const LeafAdjoint& leaf : sweep.leaves) {
-      if (as_call_of(leaf.leaf, f_)) carrying.insert(leaf.leaf);
-    }
-    const std::vector<Expr> needed = c_.needed_reads(sweep);
-    for (SelfRead& r : reads) {
-      r.carries_adjoint = carrying.contains(r.call);
-      r.is_needed = std::ranges::any_of(needed, [&](const Expr& e) { return equal(e, r.call); });
-    }
-  }
-
-  // Finds the needed values: each must be the final value or a kept version. Returns false if a value is to be
-  // recomputed from checkpoints.
-  bool find_values(const std::vector<SelfRead>& reads) {
-    for (const SelfRead& r : reads) {
-      if (!r.is_needed) continue;
-      const auto* call = r.call.as<Call>();
-      bool later = is_written_later(c_, relations_, r.relation);
-      if (!later && !r.relation.overwritten) continue;
-      if (wants_checkpoints(c_)) return false;
-      c_.check_versions_are_kept(r.call);
-      Expr after = later ? call_value(prefix(c_.query.stage + 1), call->args, call->component)
-                         : call_value(c_.query.f, call->args, call->component);
-      Expr before = call_value(prefix(c_.query.stage), call->args, call->component);
-      result_.self_values[r.call] = r.relation.never_new ? before
-                                    : r.relation.always_new
-                                        ? after
-                                        : make_select(r.relation.sees_new_condition, after, before);
-      c_.note(text(": the value of ", point_text(f_->name, call->args), " is kept in a copy"),
-              result_);
-    }
-    for (const auto& [stages, copy] : prefixes_) c_.take_room(copy, c_.extents(), result_);
-    return true;
-  }
-  const FuncPtr& prefix(int stages) {
-    FuncPtr& copy = prefixes_[stages];
-    if (!copy) copy = clone_prefix(c_.query.f, stages);
-    return copy;
   }
 
   // The recurrence extends the adjoint after the stage; if that one has consumers, a copy is extended.
@@ -161,49 +105,6 @@ class Recurrence {
     return exact_ ? carried_in_double(term, result_.current.func, exact_) : term;
   }
 
-  // Merges equal reads and adds their adjoints, so that there is one domain to sum over.
-  std::vector<LeafAdjoint> self_leaves(const SweepResult& sweep) const {
-    std::vector<LeafAdjoint> result;
-    for (const LeafAdjoint& leaf : sweep.leaves) {
-      if (!as_call_of(leaf.leaf, f_)) continue;
-      auto known = std::ranges::find_if(
-          result, [&](const LeafAdjoint& l) { return equal(l.leaf, leaf.leaf); });
-      if (known == result.end()) {
-        result.push_back(leaf);
-      } else {
-        known->adjoint = known->adjoint + leaf.adjoint;
-      }
-    }
-    return result;
-  }
-
-  // Contributions of self reads to new values (`to_new`) or to values from before the stage.
-  std::vector<Contribution> self_contributions(const std::vector<SelfRead>& reads,
-                                               const SweepResult& sweep, bool to_new) {
-    std::vector<Contribution> result;
-    for (const LeafAdjoint& leaf : self_leaves(sweep)) {
-      const Call* call = as_call_of(leaf.leaf, f_);
-      auto read =
-          std::ranges::find_if(reads, [&](const SelfRead& r) { return equal(r.call, leaf.leaf); });
-      const UpdateRelations::Read& relation = read->relation;
-      if (to_new ? relation.never_new : relation.always_new) continue;
-      Expr adjoint = with_values(leaf.adjoint, c_.query.f, result_.self_values);
-      for (const Gather& g : inverted(*call, relation, to_new).gathers)
-        result.push_back({call->component, g, substitute(adjoint, g.iteration)});
-    }
-    return result;
-  }
-  Inversion inverted(const Call& call, const UpdateRelations::Read& relation, bool to_new) const {
-    Expr condition = relation.sees_new_condition;
-    if (!to_new) condition = logical_not(condition);
-    if (to_new ? relation.always_new : relation.never_new) condition = const_true();
-    AccessQuery query{restricted(c_.domain, condition), call.args, c_.query.target.args,
-                      c_.query.target.region};
-    query.narrows =
-        !to_new;  // terms without a sum are added in its first iteration, so it must not be empty
-    return invert_access(query);
-  }
-
   // Finds the order of p in A(p) += sum over reads of A(W(i)) dV/df. It runs against the order in which elements were
   // written.
   bool find_order(const std::vector<SelfRead>& reads) {
@@ -214,7 +115,7 @@ class Recurrence {
       if (!r.carries_adjoint || r.relation.never_new) continue;
       relevant.push_back(r.relation);
       // Several sums would have to run inside of one element, which is not supported.
-      for (const Gather& g : inverted(*as_call_of(r.call, f_), r.relation, true).gathers) {
+      for (const Gather& g : inverted(c_, *as_call_of(r.call, f_), r.relation, true).gathers) {
         if (g.scatters) return false;
         if (g.rdom) sums.push_back(g.rdom);
       }
@@ -308,40 +209,12 @@ class Recurrence {
   UpdateRelations relations_;
   std::vector<ReverseLoop> order_;
   FuncPtr exact_;  // the sum in double that the current adjoint rounds; null: the adjoint itself
-  std::map<int, FuncPtr> prefixes_;
 };
 
 }  // namespace
 
 bool differentiate_recurrence(const UpdateContext& context, UpdateAdjoint& result) {
   return Recurrence(context, result).run();
-}
-
-bool is_written_later(const UpdateContext& c, const UpdateRelations& relations,
-                      const UpdateRelations::Read& read) {
-  for (int s = c.query.stage + 1; s < c.f->stage_count(); ++s) {
-    IterationDomain domain = c.query.regions.domain(*c.query.f, s);
-    if (relations.may_write(read, domain, c.f->stage(s).args)) return true;
-  }
-  return false;
-}
-
-FinalValues::FinalValues(const UpdateContext& context) : c_(context) {
-  try {
-    relations_ = std::make_unique<UpdateRelations>(c_.domain, c_.write, c_.pure);
-  } catch (const isl::exception&) {
-    relations_ = nullptr;
-  }
-}
-
-bool FinalValues::contains(const Expr& e) {
-  if (!relations_ || !relations_->write_is_affine()) return false;
-  try {
-    auto read = relations_->read(as_call_of(e, c_.f)->args);
-    return read && !read->overwritten && !is_written_later(c_, *relations_, *read);
-  } catch (const isl::exception&) {
-    return false;
-  }
 }
 
 }  // namespace retrograde::autodiff

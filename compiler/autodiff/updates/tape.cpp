@@ -1,7 +1,7 @@
 #include "autodiff/updates/tape.h"
 
 #include "autodiff/sweeps/local_derivative.h"
-#include "autodiff/updates/recurrence.h"
+#include "autodiff/updates/self_reads.h"
 #include "autodiff/updates/tape_layout.h"
 #include "autodiff/updates/versions.h"
 #include "diagnostics/error.h"

@@ -1,5 +1,7 @@
 #include "autodiff/updates/update.h"
 
+#include <isl/cpp.h>
+
 #include <algorithm>
 
 #include "autodiff/time/checkpoint.h"
