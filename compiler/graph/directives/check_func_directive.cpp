@@ -4,6 +4,7 @@
 
 #include "diagnostics/error.h"
 #include "graph/definitions/define.h"
+#include "graph/definitions/definition_rules.h"
 #include "graph/directives/give_directive.h"
 #include "ir/build.h"
 #include "ir/literal.h"

@@ -7,6 +7,7 @@
 #include "diagnostics/error.h"
 #include "graph/definitions/associative_update.h"
 #include "graph/definitions/define.h"
+#include "graph/definitions/definition_rules.h"
 #include "graph/definitions/race_checks.h"
 #include "graph/directives/give_directive.h"
 #include "graph/names.h"
