@@ -25,6 +25,7 @@ py::object shape(const Buffer<>& buffer) {
 
 using Box = std::vector<std::pair<int, int>>;
 
+// Changes of the shape that all handles see.
 void bind_shapes(BufferClass& c) {
   c.def("crop", py::overload_cast<int, int, int>(&Buffer<>::crop), py::arg("dimension"),
         py::arg("min"), py::arg("extent"))
@@ -47,13 +48,17 @@ void bind_shapes(BufferClass& c) {
       .def("add_dimension", &Buffer<>::add_dimension)
       .def("allocate", &Buffer<>::allocate)
       .def("deallocate", &Buffer<>::deallocate)
-      .def("reset", &Buffer<>::reset)
-      .def(
-          "cropped",
-          [](const Buffer<>& b, int d, int min, int extent) {
-            return changed(b, [&](Buffer<>& to) { to.crop(d, min, extent); });
-          },
-          py::arg("dimension"), py::arg("min"), py::arg("extent"))
+      .def("reset", &Buffer<>::reset);
+}
+
+// New handles to the same memory.
+void bind_views(BufferClass& c) {
+  c.def(
+       "cropped",
+       [](const Buffer<>& b, int d, int min, int extent) {
+         return changed(b, [&](Buffer<>& to) { to.crop(d, min, extent); });
+       },
+       py::arg("dimension"), py::arg("min"), py::arg("extent"))
       .def(
           "cropped",
           [](const Buffer<>& b, const Box& box) {
@@ -267,6 +272,7 @@ void bind_buffer(py::module_& m) {
           py::arg("source"), py::arg("name") = "");
   bind_facts(c);
   bind_shapes(c);
+  bind_views(c);
   bind_buffer_elements(c);
   bind_arrays(c);
   add_buffer_protocol(c);
