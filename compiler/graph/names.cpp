@@ -20,23 +20,24 @@ std::string as_identifier(std::string name) {
   return name;
 }
 
-enum class NameUse { Func, Parameter };
+enum class NameOwner { Func, Parameter };
 
-// Records the use of each claimed name. Names that contain '$' come from unique_name and need no
+// Records the owner of each claimed name. Names that contain '$' come from unique_name and need no
 // entry.
 class NameTable {
  public:
-  std::string claim(const std::string& name, NameUse use) {
+  std::string claim(const std::string& name, NameOwner owner) {
     if (name.find('$') != std::string::npos) return unique_name(name);
     std::lock_guard lock(mutex_);
-    auto [it, is_new] = used_.try_emplace(name, use);
-    if (is_new || (use == NameUse::Parameter && it->second == NameUse::Parameter)) return name;
+    auto [it, is_new] = owners_.try_emplace(name, owner);
+    if (is_new || (owner == NameOwner::Parameter && it->second == NameOwner::Parameter))
+      return name;
     return unique_name(name);
   }
 
  private:
   std::mutex mutex_;
-  std::unordered_map<std::string, NameUse> used_;
+  std::unordered_map<std::string, NameOwner> owners_;
 };
 
 NameTable& name_table() {
@@ -47,11 +48,11 @@ NameTable& name_table() {
 }  // namespace
 
 std::string claim_name(const std::string& wanted) {
-  return name_table().claim(as_identifier(wanted), NameUse::Func);
+  return name_table().claim(as_identifier(wanted), NameOwner::Func);
 }
 
 std::string claim_parameter_name(const std::string& wanted) {
-  return name_table().claim(as_identifier(wanted), NameUse::Parameter);
+  return name_table().claim(as_identifier(wanted), NameOwner::Parameter);
 }
 
 std::string without_numbers(const std::string& name) {
