@@ -21,7 +21,7 @@ class WeightFile {
  public:
   WeightFile(std::string program, std::filesystem::path path);
 
-  // What `body` makes of the contents. An entry that is missing, or of another type than `body` asks for, is an error.
+  // Returns body(contents). An entry that is missing, or not of the type that `body` reads, is an error.
   template <typename Body>
   auto parse(const Body& body) const {
     try {

@@ -19,6 +19,14 @@ double dot(const Values& a, const Values& b) {
   return sum;
 }
 
+double weighted_sum(const std::vector<Values>& values, const std::vector<Values>& weights) {
+  double sum = 0;
+  for (size_t k = 0; k < weights.size(); ++k) {
+    if (!weights[k].empty()) sum += dot(values[k], weights[k]);
+  }
+  return sum;
+}
+
 double typical(const Values& a, const Values& b) {
   double sum = 0;
   for (size_t i = 0; i < a.size(); ++i) sum += a[i] * a[i] * b[i] * b[i];

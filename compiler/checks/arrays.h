@@ -16,6 +16,8 @@ namespace retrograde::checks {
 using Values = std::vector<double>;
 
 double dot(const Values& a, const Values& b);
+// The sum of dot(values[k], weights[k]) where there are weights.
+double weighted_sum(const std::vector<Values>& values, const std::vector<Values>& weights);
 // The expected magnitude of dot(a, b) if the signs of its terms are random.
 double typical(const Values& a, const Values& b);
 // The largest magnitude among the finite elements.

@@ -1,8 +1,6 @@
 #include "checks/check_gradients.h"
 
 #include <algorithm>
-#include <chrono>
-#include <cmath>
 #include <limits>
 #include <map>
 #include <random>
@@ -11,7 +9,7 @@
 #include "autodiff/sweeps/regions.h"
 #include "autodiff/tangents.h"
 #include "checks/arrays.h"
-#include "checks/complex_step.h"
+#include "checks/slopes.h"
 #include "checks/widen.h"
 #include "diagnostics/error.h"
 #include "frontend/data/image_param.h"
@@ -23,29 +21,6 @@ namespace {
 
 using namespace checks;
 using checks::Values;
-using Clock = std::chrono::steady_clock;
-
-// The complex step, relative to the input's size. Its square is negligible beside 1 but does not underflow.
-const double tiny_step = std::ldexp(1.0, -200);
-
-// A result and the time that it took.
-template <class T>
-struct Timed {
-  T value;
-  double seconds;
-};
-template <class F>
-auto timed(F&& f) -> Timed<decltype(f())> {
-  const auto start = Clock::now();
-  auto value = f();
-  return {value, std::chrono::duration<double>(Clock::now() - start).count()};
-}
-// Runs f twice and times the second run, since the first one compiles.
-template <class F>
-auto timed_warm(F&& f) {
-  f();
-  return timed(f);
-}
 
 class Checker {
  public:
@@ -122,14 +97,6 @@ class Checker {
       unsupported(asked(), "derivatives are of floats", "the output has integers only",
                   "Check a Func of floats");
   }
-  double weighted(const std::vector<Values>& values) const {
-    double sum = 0;
-    for (size_t k = 0; k < weights_.size(); ++k) {
-      if (!weights_[k].empty()) sum += dot(values[k], weights_[k]);
-    }
-    return sum;
-  }
-
   // The weights as a Func with the types of `of`.
   Func seed(const Func& of) {
     std::vector<Expr> values;
@@ -165,12 +132,8 @@ class Checker {
     for (const auto& p : parameters_of(all)) bind(p);
     Func primal = scheduled_for(output_, shape_);
     report_.primal_seconds = timed_warm([&] { return realize_values(primal, shape_); }).seconds;
-    wide_primal_ = scheduled_for(wide_output_, shape_);
-    complex_ = complex_graph(wide_output_);
-    report_.complex_step_refused = complex_.refused;
-    if (!complex_.refused.empty()) return;
-    bind_imaginary();
-    complex_primal_ = scheduled_for(complex_.output, shape_);
+    slopes_ = std::make_unique<Slopes>(wide_output_, shape_, weights_, inputs_);
+    report_.complex_step_refused = slopes_->complex_step_refused();
   }
   // Custom derivative rules consist of Funcs in the user's precision. To check them, the Funcs of the adjoint are
   // widened to double; their constants keep their values. Without custom rules the widened graph is differentiated.
@@ -220,80 +183,8 @@ class Checker {
     return Func(widened.funcs.at(own.function().get()));
   }
 
-  // ---- slopes along a direction v ----
-
-  struct Difference {
-    double central, seconds;
-  };
-  Difference central(Input& input, const Values& v, double h) {
-    auto at = [&](double step) {
-      Values moved = input.values;
-      for (size_t i = 0; i < moved.size(); ++i) moved[i] += step * v[i];
-      input.set_wide(moved);
-      return weighted(realize_values(wide_primal_, shape_));
-    };
-    auto slope = timed([&] { return (at(h) - at(-h)) / (2 * h); });
-    input.set_wide(input.values);
-    return {slope.value, slope.seconds};
-  }
-
-  static double size_of(const Input& input) { return std::max(largest(input.values), 1e-3); }
-
-  // The best estimate from the differences; the time includes all steps that were tried.
-  Timed<double> difference(Input& input, const Values& v, double adjoint, double scale,
-                           std::vector<GradientReport::Step>* steps) {
-    Timed<double> best{0, 0};
-    double best_gap = std::numeric_limits<double>::infinity();
-    double last_slope = 0, last_extrapolated = 0;
-    for (int k = 4, n = 0; k <= options_.smallest_step; k += 2, ++n) {
-      Difference s = central(input, v, std::ldexp(size_of(input), -k));
-      double extrapolated = n == 0 ? s.central : (16 * s.central - last_slope) / 15;
-      double gap = n < 2 ? best_gap : std::abs(extrapolated - last_extrapolated);
-      if (n == 0 || gap < best_gap) best.value = extrapolated, best_gap = gap;
-      last_slope = s.central;
-      last_extrapolated = extrapolated;
-      best.seconds += s.seconds;
-      if (steps)
-        steps->push_back({std::ldexp(1.0, -k), relative_error(s.central, adjoint, scale),
-                          relative_error(extrapolated, adjoint, scale), s.seconds});
-    }
-    return best;
-  }
-
-  void bind_imaginary() {
-    for (const Input& input : inputs_) {
-      const auto& p = complex_.imaginary.at(input.wide.get());
-      imaginary_.push_back(input);
-      Input& to = imaginary_.back();
-      to.wide = p;
-      if (p->is_buffer) {
-        to.buffer = new_buffer(Float(64), to.shape);
-        ImageParam(p).set(to.buffer);
-      }
-      to.set_wide(Values(to.values.size(), 0.0));
-    }
-  }
-  // The slope by a complex step.
-  Timed<double> complex_step(const Input& input, const Values& v) {
-    Input& moved = imaginary_[static_cast<size_t>(&input - inputs_.data())];
-    const double h = tiny_step * size_of(input);
-    Values step = v;
-    for (double& s : step) s *= h;
-    moved.set_wide(step);
-    auto result = timed_warm([&] {
-      std::vector<Values> parts = realize_values(complex_primal_, shape_), imaginary;
-      for (size_t k = 0, at = 0; k < weights_.size(); ++k) {
-        const bool is_float = !weights_[k].empty();
-        imaginary.push_back(is_float ? parts[at + 1] : Values());
-        at += is_float ? 2 : 1;
-      }
-      return weighted(imaginary) / h;
-    });
-    moved.set_wide(Values(v.size(), 0.0));
-    return result;
-  }
-
   void check(Input& input) {
+    const bool has_complex_step = slopes_->complex_step_refused().empty();
     GradientReport::Input result;
     result.name = input.own->name;
     Func own = own_->of(AdjointInput(input.own)),
@@ -308,26 +199,27 @@ class Checker {
       Values v = own_precision(random_values(count(input.shape)));
       fill(direction, v);
       const double adjoint = dot(g.value, v), scale = 1e-2 * typical(g.value, v);
-      const auto forward = timed_warm([&] { return weighted(realize_values(moved, shape_)); });
-      const auto slope = difference(input, v, adjoint, scale, d == 0 ? &result.steps : nullptr);
-      const auto by_complex = complex_.refused.empty() ? complex_step(input, v) : Timed<double>{};
+      const auto forward =
+          timed_warm([&] { return weighted_sum(realize_values(moved, shape_), weights_); });
+      const auto slope = slopes_->by_differences(input, v, options_.smallest_step, adjoint, scale,
+                                                 d == 0 ? &result.steps : nullptr);
+      const auto by_complex =
+          has_complex_step ? slopes_->by_complex_step(input, v) : Timed<double>{};
       auto error = [&](double value, double reference) {
         return relative_error(value, reference, scale);
       };
       worsen(result.adjoint_error, error(adjoint, slope.value));
-      if (complex_.refused.empty())
-        worsen(result.complex_step_error, error(adjoint, by_complex.value));
+      if (has_complex_step) worsen(result.complex_step_error, error(adjoint, by_complex.value));
       worsen(result.dot_product_error, error(adjoint, forward.value));
       worsen(result.own_precision_error, error(dot(g_own.value, v), adjoint));
       if (d > 0) continue;
-      const double reference = complex_.refused.empty() ? by_complex.value : adjoint;
+      const double reference = has_complex_step ? by_complex.value : adjoint;
       result.methods = {
           {"differences", error(slope.value, reference), slope.seconds},
           {"tangent in double", error(forward.value, reference), forward.seconds},
           {"adjoint in double", error(adjoint, reference), g.seconds},
           {"adjoint in its own precision", error(dot(g_own.value, v), reference), g_own.seconds}};
-      if (complex_.refused.empty())
-        result.methods.push_back({"complex step", 0, by_complex.seconds});
+      if (has_complex_step) result.methods.push_back({"complex step", 0, by_complex.seconds});
     }
     report_.inputs.push_back(result);
   }
@@ -388,9 +280,9 @@ class Checker {
   std::vector<Values> weights_;
   std::unique_ptr<Derivative> own_, wide_;  // wide_: null if there are custom derivative rules
   Widened widened_;
-  Func wide_output_, wide_primal_, complex_primal_;  // the last two run
-  std::vector<Input> inputs_, imaginary_;
-  ComplexGraph complex_;
+  Func wide_output_;
+  std::vector<Input> inputs_;
+  std::unique_ptr<Slopes> slopes_;
   GradientReport report_;
 };
 

@@ -22,21 +22,22 @@ std::string as_identifier(std::string name) {
 
 enum class NameOwner { Func, Parameter };
 
-// Records the use of each claimed name. Names that contain '$' come from unique_name and need no
+// Records the owner of each claimed name. Names that contain '$' come from unique_name and need no
 // entry.
 class NameTable {
  public:
-  std::string claim(const std::string& name, NameOwner use) {
+  std::string claim(const std::string& name, NameOwner owner) {
     if (name.find('$') != std::string::npos) return unique_name(name);
     std::lock_guard lock(mutex_);
-    auto [it, is_new] = used_.try_emplace(name, use);
-    if (is_new || (use == NameOwner::Parameter && it->second == NameOwner::Parameter)) return name;
+    auto [it, is_new] = owners_.try_emplace(name, owner);
+    if (is_new || (owner == NameOwner::Parameter && it->second == NameOwner::Parameter))
+      return name;
     return unique_name(name);
   }
 
  private:
   std::mutex mutex_;
-  std::unordered_map<std::string, NameOwner> used_;
+  std::unordered_map<std::string, NameOwner> owners_;
 };
 
 NameTable& name_table() {

@@ -1,118 +1,14 @@
-// buffer.cpp -- binds Buffer: elements, shapes, and conversions to and from arrays that share its memory.
-#include <pybind11/functional.h>
-
+// buffer.cpp -- binds Buffer: shapes, and conversions to and from arrays that share its memory.
 #include <algorithm>
 
 #include "bind_all.h"
 #include "binding.h"
+#include "buffer_class.h"
 #include "buffer_memory.h"
-#include "frontend/data/param.h"
-#include "numbers.h"
 
 namespace retrograde::python {
 
 namespace {
-
-// ---- elements ----
-
-bool are_numbers(const py::tuple& index) {
-  for (py::handle i : index) {
-    if (!PyIndex_Check(i.ptr()) || py::isinstance<Expr>(i)) return false;
-  }
-  return true;
-}
-
-py::tuple as_tuple(const py::object& index) {
-  return py::isinstance<py::tuple>(index) ? py::tuple(index) : py::make_tuple(index);
-}
-
-char* address(const Buffer<>& buffer, const py::tuple& index) {
-  std::vector<int> at;
-  for (py::handle i : index) at.push_back(i.cast<int>());
-  if (static_cast<int>(at.size()) != buffer.dimensions()) {
-    user_error("access the Buffer " + quoted(buffer.name()),
-               "an access gives one coordinate for each dimension",
-               text("it has ", buffer.dimensions(), " dimensions and was given ", at.size(),
-                    " coordinates"),
-               "Give that many coordinates");
-  }
-  frontend::check_in_bounds(buffer.contents()->buffer, buffer.name(), at.data(),
-                            static_cast<int>(at.size()));
-  int64_t elements = 0;
-  for (int d = 0; d < buffer.dimensions(); d++) {
-    // C++ accepts one past the end, for pointers, but there is no element.
-    if (at[d] >= buffer.min(d) + buffer.extent(d))
-      throw py::index_error("the coordinate lies outside of the Buffer");
-    elements += static_cast<int64_t>(at[d] - buffer.min(d)) * buffer.stride(d);
-  }
-  return reinterpret_cast<char*>(buffer.raw_buffer()->host) + elements * buffer.type().bytes();
-}
-
-template <class T>
-T read(const char* from) {
-  T value;
-  std::memcpy(&value, from, sizeof(T));
-  return value;
-}
-
-ir::Scalar load(Type type, const char* from) {
-  const auto bits = [&]() -> uint64_t {
-    switch (type.bytes()) {
-      case 1:
-        return read<uint8_t>(from);
-      case 2:
-        return read<uint16_t>(from);
-      case 4:
-        return read<uint32_t>(from);
-      default:
-        return read<uint64_t>(from);
-    }
-  };
-  return type.is_uint()
-             ? ir::Scalar::of_uint(type, bits())
-             : ir::eval_reinterpret(type, ir::Scalar::of_uint(UInt(type.bits()), bits()));
-}
-
-void store(Type type, char* to, const ir::Scalar& value) {
-  const uint64_t bits =
-      type.is_float() ? ir::eval_reinterpret(UInt(type.bits()), value).u : value.u;
-  std::memcpy(to, &bits, type.bytes());  // this machine is little-endian
-}
-
-// buffer[x, y]: an element if the coordinates are numbers, an Expr that loads it if they are Exprs.
-py::object get_item(const Buffer<>& buffer, const py::object& index) {
-  const py::tuple at = as_tuple(index);
-  if (!are_numbers(at)) return py::cast(buffer(coordinates(index)));
-  return object_of(load(buffer.type(), address(buffer, at)));
-}
-
-void set_item(const Buffer<>& buffer, const py::object& index, const py::object& value) {
-  check_writable(buffer, "store an element of the Buffer " + quoted(buffer.name()));
-  char* const to = address(buffer, as_tuple(index));
-  store(buffer.type(), to, scalar_of(buffer.type(), value));
-}
-
-void fill(const Buffer<>& buffer, const py::object& value) {
-  check_writable(buffer, "fill the Buffer " + quoted(buffer.name()));
-  const Type type = buffer.type();
-  const ir::Scalar scalar = scalar_of(type, value);
-  char* const base = reinterpret_cast<char*>(buffer.raw_buffer()->host);
-  buffer.get()->for_each_element([&](const int* at) {
-    int64_t elements = 0;
-    for (int d = 0; d < buffer.dimensions(); d++) {
-      elements += static_cast<int64_t>(at[d] - buffer.min(d)) * buffer.stride(d);
-    }
-    store(type, base + elements * type.bytes(), scalar);
-  });
-}
-
-// ---- shapes ----
-
-Buffer<> bits_of(const Buffer<>& buffer) {
-  Runtime::Buffer<> same = buffer.contents()->buffer;
-  same.raw_buffer()->type = to_halide_type(UInt(8 * buffer.type().bytes()));
-  return with_owner_of(buffer, Buffer<>(same));
-}
 
 template <class Change>
 Buffer<> changed(const Buffer<>& buffer, Change change) {
@@ -129,7 +25,8 @@ py::object shape(const Buffer<>& buffer) {
 
 using Box = std::vector<std::pair<int, int>>;
 
-void bind_shapes(Class<Buffer<>>& c) {
+// Changes of the shape that all handles see.
+void bind_shapes(BufferClass& c) {
   c.def("crop", py::overload_cast<int, int, int>(&Buffer<>::crop), py::arg("dimension"),
         py::arg("min"), py::arg("extent"))
       .def("crop", py::overload_cast<const Box&>(&Buffer<>::crop), py::arg("box"))
@@ -151,13 +48,17 @@ void bind_shapes(Class<Buffer<>>& c) {
       .def("add_dimension", &Buffer<>::add_dimension)
       .def("allocate", &Buffer<>::allocate)
       .def("deallocate", &Buffer<>::deallocate)
-      .def("reset", &Buffer<>::reset)
-      .def(
-          "cropped",
-          [](const Buffer<>& b, int d, int min, int extent) {
-            return changed(b, [&](Buffer<>& to) { to.crop(d, min, extent); });
-          },
-          py::arg("dimension"), py::arg("min"), py::arg("extent"))
+      .def("reset", &Buffer<>::reset);
+}
+
+// New handles to the same memory.
+void bind_views(BufferClass& c) {
+  c.def(
+       "cropped",
+       [](const Buffer<>& b, int d, int min, int extent) {
+         return changed(b, [&](Buffer<>& to) { to.crop(d, min, extent); });
+       },
+       py::arg("dimension"), py::arg("min"), py::arg("extent"))
       .def(
           "cropped",
           [](const Buffer<>& b, const Box& box) {
@@ -206,7 +107,7 @@ void bind_shapes(Class<Buffer<>>& c) {
       .def("alias", [](const Buffer<>& b) { return changed(b, [](Buffer<>&) {}); });
 }
 
-void bind_facts(Class<Buffer<>>& c) {
+void bind_facts(BufferClass& c) {
   c.def("defined", &Buffer<>::defined)
       .def("name", &Buffer<>::name)
       .def("set_name", &Buffer<>::set_name, py::arg("name"))
@@ -251,65 +152,6 @@ void bind_facts(Class<Buffer<>>& c) {
       .def("copy_to_device", [](Buffer<>& b) { return b.copy_to_device(); });
 }
 
-std::string repr(const Buffer<>& b) {
-  if (!b.defined()) return "<retrograde.Buffer, undefined>";
-  std::string out = "<retrograde.Buffer " + quoted(b.name()) + " " + to_string(b.type());
-  for (int d = 0; d < b.dimensions(); d++) {
-    out += text(d == 0 ? " over " : " x ", "[", b.min(d), ", ", b.min(d) + b.extent(d), ")");
-  }
-  return out + ">";
-}
-
-void bind_elements(Class<Buffer<>>& c) {
-  c.def("copy", [](const Buffer<>& b) { return b.copy(); })
-      .def("copy_to_planar", [](const Buffer<>& b) { return b.copy_to_planar(); })
-      .def("copy_to_interleaved", [](const Buffer<>& b) { return b.copy_to_interleaved(); })
-      .def(
-          "copy_from",
-          [](Buffer<>& b, const Buffer<>& source) {
-            check_writable(b, "copy into the Buffer " + quoted(b.name()));
-            b.copy_from(source);
-          },
-          py::arg("source"))
-      .def(
-          "fill", [](const Buffer<>& b, const py::object& value) { return fill(b, value), b; },
-          py::arg("value"))
-      .def(
-          "all_equal",
-          [](const Buffer<>& b, const py::object& value) {
-            const ir::Scalar wanted = scalar_of(b.type(), value);
-            bool equal = true;
-            const char* const base = reinterpret_cast<const char*>(b.raw_buffer()->host);
-            b.get()->for_each_element([&](const int* at) {
-              int64_t elements = 0;
-              for (int d = 0; d < b.dimensions(); d++)
-                elements += static_cast<int64_t>(at[d] - b.min(d)) * b.stride(d);
-              equal = equal &&
-                      ir::eval_binary(ir::Kind::EQ,
-                                      load(b.type(), base + elements * b.type().bytes()), wanted)
-                          .as_bool();
-            });
-            return equal;
-          },
-          py::arg("value"))
-      .def(
-          "for_each_element",
-          [](const Buffer<>& b, const py::function& f) {
-            b.get()->for_each_element([&](const int* at) {
-              py::tuple point(b.dimensions());
-              for (int d = 0; d < b.dimensions(); d++) point[d] = at[d];
-              f(*point);
-            });
-            return b;
-          },
-          py::arg("function"))
-      .def("__getitem__", &get_item, py::arg("index"))
-      .def("__setitem__", &set_item, py::arg("index"), py::arg("value"))
-      .def("__call__", [](const Buffer<>& b, const py::args& index) { return get_item(b, index); })
-      .def("bits", &bits_of)
-      .def("__repr__", &repr);
-}
-
 // The memory as a dict of NumPy's array interface.
 py::dict array_interface(const ArrayMemory& memory) {
   using namespace py::literals;
@@ -326,7 +168,7 @@ py::dict array_interface(const ArrayMemory& memory) {
       "strides"_a = py::tuple(py::cast(memory.strides_bytes)));
 }
 
-void bind_arrays(Class<Buffer<>>& c) {
+void bind_arrays(BufferClass& c) {
   c.def(
        "__dlpack__",
        [](const Buffer<>& b, const py::object& stream, const py::object& max_version,
@@ -391,7 +233,7 @@ void bind_dimension(py::module_& m) {
 
 void bind_buffer(py::module_& m) {
   bind_dimension(m);
-  Class<Buffer<>> c(m, "Buffer", {}, py::buffer_protocol());
+  BufferClass c(m, "Buffer", {}, py::buffer_protocol());
   c.def(py::init<>())
       .def(py::init([](const Buffer<>& other) { return other; }), py::arg("buffer"))
       .def(py::init(&buffer_over), py::arg("array"), py::arg("name") = "",
@@ -430,7 +272,8 @@ void bind_buffer(py::module_& m) {
           py::arg("source"), py::arg("name") = "");
   bind_facts(c);
   bind_shapes(c);
-  bind_elements(c);
+  bind_views(c);
+  bind_buffer_elements(c);
   bind_arrays(c);
   add_buffer_protocol(c);
 }

@@ -10,43 +10,29 @@ namespace {
 
 using py::arg;
 
-// Passes a loop as Var or RVar; a one-dimensional RDom means its variable.
-template <class Give>
-Func& at_loop(const Func& consumer, const VarOrRVar& var, Give give) {
-  return give(LoopLevel(consumer, var));
-}
-
 std::vector<Var> vars_of(const py::args& args) {
   if (args.size() == 1 && !py::isinstance<Var>(args[0])) return args[0].cast<std::vector<Var>>();
   return py::list(args).cast<std::vector<Var>>();
 }
 
+// A level by a consumer and one of its loops (Var, RVar or an RDom of one variable), or as a LoopLevel.
+void bind_place(FuncClass& c, const char* name, Func& (Func::*directive)(const LoopLevel&)) {
+  c.def(
+       name,
+       [directive](Func& f, const Func& consumer, VarOrRVar var) -> Func& {
+         return (f.*directive)(LoopLevel(consumer, var));
+       },
+       arg("f"), arg("var"))
+      .def(name, directive, arg("level"));
+}
+
 void bind_places(FuncClass& c) {
-  c.def("compute_inline", &Func::compute_inline)
-      .def("compute_root", &Func::compute_root)
-      .def(
-          "compute_at",
-          [](Func& f, const Func& g, VarOrRVar v) -> Func& {
-            return at_loop(g, v, [&](const LoopLevel& l) -> Func& { return f.compute_at(l); });
-          },
-          arg("f"), arg("var"))
-      .def("compute_at", py::overload_cast<const LoopLevel&>(&Func::compute_at), arg("level"))
-      .def("store_root", &Func::store_root)
-      .def(
-          "store_at",
-          [](Func& f, const Func& g, VarOrRVar v) -> Func& {
-            return at_loop(g, v, [&](const LoopLevel& l) -> Func& { return f.store_at(l); });
-          },
-          arg("f"), arg("var"))
-      .def("store_at", py::overload_cast<const LoopLevel&>(&Func::store_at), arg("level"))
-      .def(
-          "hoist_storage",
-          [](Func& f, const Func& g, VarOrRVar v) -> Func& {
-            return at_loop(g, v, [&](const LoopLevel& l) -> Func& { return f.hoist_storage(l); });
-          },
-          arg("f"), arg("var"))
-      .def("hoist_storage", py::overload_cast<const LoopLevel&>(&Func::hoist_storage), arg("level"))
-      .def("hoist_storage_root", &Func::hoist_storage_root)
+  c.def("compute_inline", &Func::compute_inline).def("compute_root", &Func::compute_root);
+  bind_place(c, "compute_at", &Func::compute_at);
+  c.def("store_root", &Func::store_root);
+  bind_place(c, "store_at", &Func::store_at);
+  bind_place(c, "hoist_storage", &Func::hoist_storage);
+  c.def("hoist_storage_root", &Func::hoist_storage_root)
       .def("store_in", &Func::store_in, arg("memory"))
       .def("reorder_storage",
            [](Func& f, const py::args& dims) -> Func& { return f.reorder_storage(vars_of(dims)); })

@@ -104,11 +104,24 @@ void bind_loop_kinds(Class<Self>& c) {
       .def("unscheduled", &Self::unscheduled);
 }
 
+// Prefetching of a Func or an image, an argument called `name`.
+template <class Source, class Self>
+void bind_prefetch(Class<Self>& c, const char* name) {
+  using py::arg;
+  c.def(
+      "prefetch",
+      [](Self& s, const Source& source, VarOrRVar at, VarOrRVar from, Expr offset,
+         PrefetchBoundStrategy strategy) -> Self& {
+        return s.prefetch(source, at, from, offset, strategy);
+      },
+      arg(name), arg("at"), arg("from_"), arg("offset") = Expr(1),
+      arg("strategy") = PrefetchBoundStrategy::GuardWithIf);
+}
+
 template <class Self>
 void bind_loop_places(Class<Self>& c) {
   using py::arg;
   constexpr auto automatic = LoopAlignStrategy::Auto;
-  constexpr auto guarded = PrefetchBoundStrategy::GuardWithIf;
   c.def(
        "compute_with",
        [](Self& s, const LoopLevel& level, LoopAlignStrategy align) -> Self& {
@@ -134,23 +147,11 @@ void bind_loop_places(Class<Self>& c) {
           },
           arg("stage"), arg("var"), arg("align"))
       .def("specialize", &Self::specialize, arg("condition"))
-      .def("specialize_fail", &Self::specialize_fail, arg("message"))
-      .def(
-          "prefetch",
-          [](Self& s, const ImageParam& image, VarOrRVar at, VarOrRVar from, Expr offset,
-             PrefetchBoundStrategy strategy) -> Self& {
-            return s.prefetch(image, at, from, offset, strategy);
-          },
-          arg("image"), arg("at"), arg("from_"), arg("offset") = Expr(1), arg("strategy") = guarded)
-      .def(
-          "prefetch",
-          [](Self& s, const Func& f, VarOrRVar at, VarOrRVar from, Expr offset,
-             PrefetchBoundStrategy strategy) -> Self& {
-            return s.prefetch(f, at, from, offset, strategy);
-          },
-          arg("f"), arg("at"), arg("from_"), arg("offset") = Expr(1), arg("strategy") = guarded)
-      .def(
-          "hexagon", [](Self& s, VarOrRVar x) -> Self& { return s.hexagon(x); }, arg("x"));
+      .def("specialize_fail", &Self::specialize_fail, arg("message"));
+  bind_prefetch<ImageParam>(c, "image");
+  bind_prefetch<Func>(c, "f");
+  c.def(
+      "hexagon", [](Self& s, VarOrRVar x) -> Self& { return s.hexagon(x); }, arg("x"));
 }
 
 template <class Self>

@@ -19,39 +19,36 @@ std::optional<Type> type_named(const std::string& name) {
   return {};
 }
 
+// `value` is a Type or a number.
+bool can_represent(const Type& type, const py::object& value) {
+  if (py::isinstance<Type>(value)) return type.can_represent(value.cast<Type>());
+  if (PyFloat_Check(value.ptr())) return type.can_represent(value.cast<double>());
+  int overflow = 0;
+  const long long number = PyLong_AsLongLongAndOverflow(value.ptr(), &overflow);
+  if (overflow < 0) return false;
+  if (number == -1 && PyErr_Occurred()) throw py::error_already_set();
+  if (overflow == 0) return type.can_represent(static_cast<int64_t>(number));
+  const unsigned long long large = PyLong_AsUnsignedLongLong(value.ptr());
+  if (PyErr_Occurred()) return PyErr_Clear(), false;
+  return type.can_represent(static_cast<uint64_t>(large));
+}
+
 // The NumPy dtype of a type's elements.
 py::object dtype_of(Type type) {
   const std::string name = type.is_bool() ? "bool" : to_string(type.element_of());
   return py::module_::import("numpy").attr("dtype")(name);
 }
 
-}  // namespace
-
-std::optional<Type> type_from(py::handle object) {
-  if (py::isinstance<py::str>(object)) return type_named(object.cast<std::string>());
-  // numpy.dtype and NumPy's scalar types, if they have a name that is a Type.
-  if (py::hasattr(object, "kind") && py::hasattr(object, "name")) {
-    if (py::hasattr(object, "isnative") && !object.attr("isnative").cast<bool>()) return {};
-    return type_named(py::str(object.attr("name")));
-  }
-  const bool is_numpy_class =
-      PyType_Check(object.ptr()) &&
-      (py::hasattr(object, "dtype") || std::string(py::str(object.attr("__module__"))) == "numpy");
-  if (is_numpy_class) {
-    return type_from(py::module_::import("numpy").attr("dtype")(object));
-  }
-  if (object.ptr() == reinterpret_cast<PyObject*>(&PyBool_Type)) return Bool();
-  return {};
-}
-
-void bind_types(py::module_& m) {
+void bind_codes(py::module_& m) {
   py::enum_<TypeCode>(m, "TypeCode")
       .value("Int", TypeCode::Int)
       .value("UInt", TypeCode::UInt)
       .value("Float", TypeCode::Float)
       .value("BFloat", TypeCode::BFloat)
       .value("Handle", TypeCode::Handle);
+}
 
+Class<Type> bind_type(py::module_& m) {
   Class<Type> type(m, "Type");
   type.attr("Int") = TypeCode::Int;
   type.attr("UInt") = TypeCode::UInt;
@@ -82,25 +79,16 @@ void bind_types(py::module_& m) {
       .def("narrow", &Type::narrow)
       .def("can_overflow_int", &Type::can_overflow_int)
       .def("can_overflow", &Type::can_overflow)
-      .def("same_handle_type", &Type::same_handle_type, py::arg("other"))
-      .def("min_int", &Type::min_int)
+      .def("same_handle_type", &Type::same_handle_type, py::arg("other"));
+  return type;
+}
+
+// Values of a type, comparison and text.
+void bind_values(Class<Type>& type) {
+  type.def("min_int", &Type::min_int)
       .def("max_int", &Type::max_int)
       .def("max_uint", &Type::max_uint)
-      .def(
-          "can_represent",
-          [](const Type& t, const py::object& value) {
-            if (py::isinstance<Type>(value)) return t.can_represent(value.cast<Type>());
-            if (PyFloat_Check(value.ptr())) return t.can_represent(value.cast<double>());
-            int overflow = 0;
-            const long long number = PyLong_AsLongLongAndOverflow(value.ptr(), &overflow);
-            if (overflow < 0) return false;
-            if (number == -1 && PyErr_Occurred()) throw py::error_already_set();
-            if (overflow == 0) return t.can_represent(static_cast<int64_t>(number));
-            const unsigned long long large = PyLong_AsUnsignedLongLong(value.ptr());
-            if (PyErr_Occurred()) return PyErr_Clear(), false;
-            return t.can_represent(static_cast<uint64_t>(large));
-          },
-          py::arg("value"))
+      .def("can_represent", &can_represent, py::arg("value"))
       .def("is_max", py::overload_cast<uint64_t>(&Type::is_max, py::const_), py::arg("value"))
       .def("is_max", py::overload_cast<int64_t>(&Type::is_max, py::const_), py::arg("value"))
       .def("is_min", py::overload_cast<int64_t>(&Type::is_min, py::const_), py::arg("value"))
@@ -117,7 +105,9 @@ void bind_types(py::module_& m) {
       .def("__str__", [](const Type& t) { return to_string(t); })
       .def("__repr__", [](const Type& t) { return "<retrograde.Type " + to_string(t) + ">"; })
       .def_property_readonly("dtype", &dtype_of);
+}
 
+void bind_makers(py::module_& m) {
   const auto maker = [&](const char* name, Type (*make)(int, int)) {
     def(m, name, make, py::arg("bits"), py::arg("lanes") = 1);
   };
@@ -129,6 +119,32 @@ void bind_types(py::module_& m) {
   def(m, "Handle", &Handle, py::arg("lanes") = 1);
   def(
       m, "type_of", [](const Type& type) { return type; }, py::arg("type"));
+}
+
+}  // namespace
+
+std::optional<Type> type_from(py::handle object) {
+  if (py::isinstance<py::str>(object)) return type_named(object.cast<std::string>());
+  // numpy.dtype and NumPy's scalar types, if they have a name that is a Type.
+  if (py::hasattr(object, "kind") && py::hasattr(object, "name")) {
+    if (py::hasattr(object, "isnative") && !object.attr("isnative").cast<bool>()) return {};
+    return type_named(py::str(object.attr("name")));
+  }
+  const bool is_numpy_class =
+      PyType_Check(object.ptr()) &&
+      (py::hasattr(object, "dtype") || std::string(py::str(object.attr("__module__"))) == "numpy");
+  if (is_numpy_class) {
+    return type_from(py::module_::import("numpy").attr("dtype")(object));
+  }
+  if (object.ptr() == reinterpret_cast<PyObject*>(&PyBool_Type)) return Bool();
+  return {};
+}
+
+void bind_types(py::module_& m) {
+  bind_codes(m);
+  Class<Type> type = bind_type(m);
+  bind_values(type);
+  bind_makers(m);
 }
 
 }  // namespace retrograde::python

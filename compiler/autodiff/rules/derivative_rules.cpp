@@ -148,7 +148,7 @@ DerivativeRule constant_rule(const char* convention) {
   return {RuleClass::Constant,           nullptr,    -1,
           "everywhere but at the steps", convention, "definition"};
 }
-DerivativeRule transparent(int arg, const char* convention = "the value is the argument's") {
+DerivativeRule transparent(int arg, const char* convention = "1: the value is the argument unchanged") {
   return {RuleClass::Transparent, nullptr, arg, "everywhere", convention, "definition"};
 }
 DerivativeRule no_rule(const char* reason) {
@@ -244,10 +244,10 @@ OpTable approximate_operators() {
 
 // Operators whose derivative is 0, and operators that return an argument under a promise.
 OpTable other_operators() {
-  const char* bits = "integers only: derivative 0";
-  const char* test = "a truth value: derivative 0";
-  const char* steps = "0 everywhere, at the steps too";
-  const char* promise = "the bounds are promises, not values";
+  const char* bits = "defined on integers only";
+  const char* test = "its value is true or false";
+  const char* steps = "constant between steps; 0 at the steps by convention";
+  const char* promise = "1 for the first argument; the bounds are only promises";
   return {
       {Op::bitwise_and, constant_rule(bits)},
       {Op::bitwise_or, constant_rule(bits)},
@@ -330,7 +330,7 @@ KindTable make_kind_table() {
   };
   for (Kind k : {Kind::EQ, Kind::NE, Kind::LT, Kind::LE, Kind::GT, Kind::GE, Kind::And, Kind::Or,
                  Kind::Not}) {
-    t.emplace(k, constant_rule("a truth value: derivative 0"));
+    t.emplace(k, constant_rule("its value is true or false"));
   }
   return t;
 }

@@ -5,6 +5,7 @@
 
 #include "frontend/language/func.h"
 #include "graph/definitions/define.h"
+#include "graph/definitions/definition_rules.h"
 #include "graph/directives/wrappers.h"
 #include "ir/literal.h"
 #include "ir/print.h"

@@ -2,6 +2,7 @@
 #include "frontend/data/param.h"
 
 #include "graph/definitions/define.h"
+#include "graph/definitions/definition_rules.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"

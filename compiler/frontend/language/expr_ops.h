@@ -258,9 +258,6 @@ void collect_parts(std::vector<Expr>& parts, First&& first, Rest&&... rest) {
 Expr print_values(std::vector<Expr> values);
 Expr print_values_when(Expr condition, std::vector<Expr> values);
 Expr require_values(Expr condition, std::vector<Expr> values);
-// Checks an operand; `what` names the operator.
-void check_defined(const Expr& e, const char* what);
-void check_integer(const Expr& e, const char* what);
 }  // namespace frontend
 // The first value; each evaluation also prints all values on one line.
 // Requires: it returns its first argument; every operand must be a defined expression.

@@ -3,6 +3,7 @@
 
 #include "frontend/language/func.h"
 #include "graph/definitions/define.h"
+#include "graph/definitions/definition_rules.h"
 #include "ir/build.h"
 #include "ir/print.h"
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "frontend/language/operand_checks.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 

@@ -1,198 +1,22 @@
-// define.cpp -- the rules for definitions.
-//
-// Checks of every definition, in this order: number of arguments, defined expressions, types, free
-// variables. For pure definitions, the arguments must be distinct Vars. For updates, all reduction
-// variables must come from one domain, the Func must not be frozen, and a pure variable must keep
-// its position in every reference of the Func to itself.
+// define.cpp -- builds definitions once definition_rules.h accepts both sides.
 #include "graph/definitions/define.h"
 
 #include <algorithm>
-#include <unordered_set>
 
 #include "diagnostics/error.h"
+#include "graph/definitions/definition_rules.h"
 #include "graph/definitions/own_reads.h"
 #include "graph/definitions/random_sequence.h"
 #include "graph/directives/directive.h"
 #include "graph/names.h"
 #include "ir/build.h"
-#include "ir/literal.h"
-#include "ir/overflow.h"
-#include "ir/print.h"
 #include "ir/visit.h"
 
 namespace retrograde::graph {
 
 namespace {
 
-std::string list(const std::vector<Expr>& exprs) {
-  return "(" + listed(exprs, [](const Expr& e) { return text(e); }) + ")";
-}
-
-// The definition in question as messages show it: "define "f"(x, r.x)".
-struct Site {
-  const FuncContents& f;
-  std::string asked;
-};
-
-Site site_of(const FuncContents& f, const std::vector<Expr>& args, bool is_update) {
-  for (const Expr& arg : args) {
-    if (arg.defined()) continue;
-    user_error("define " + quoted(f.name),
-               "every argument on the left-hand side must be a defined expression",
-               "one of them was never assigned", "Assign every Expr before it is used");
-  }
-  return {f, text(is_update ? "update " : "define ", quoted(f.name), list(args))};
-}
-
-void check_values(const Site& site, const std::vector<Expr>& values) {
-  if (values.empty())
-    user_error(site.asked, "a definition has at least one value", "the Tuple is empty",
-               "Give it an Expr");
-  for (size_t i = 0; i < values.size(); i++) {
-    if (!values[i].defined()) {
-      user_error(site.asked, "the right-hand side must be a defined expression",
-                 values.size() == 1 ? "it was never assigned"
-                                    : text("element ", i, " of the Tuple was never assigned"),
-                 "Assign every Expr before it is used");
-    }
-  }
-}
-
-bool mentions_undef(const Expr& root) {
-  return any_node(root, [](const Expr& e) { return is_undef(e); });
-}
-
-// An undef value means that nothing is stored; an undef coordinate has no meaning. `exprs`: all
-// expressions of both sides.
-void check_coordinates(const Site& site, const std::vector<Expr>& args,
-                       const std::vector<Expr>& exprs) {
-  const auto refuse = [&](const Expr& coordinate, const std::string& where) {
-    user_error(site.asked, "a coordinate has a value, and undef has none",
-               text("the coordinate ", coordinate, " ", where, " comes from undef"),
-               "Give the place a value, and store undef there to leave it as it is");
-  };
-  for (const Expr& arg : args)
-    if (mentions_undef(arg)) refuse(arg, "on the left-hand side");
-  for (const Expr& root : exprs) {
-    if (!mentions_undef(root)) continue;
-    walk(root, [&](const Call& call) {
-      if (call.call_type != CallType::Func && call.call_type != CallType::Image) return;
-      for (const Expr& arg : call.args)
-        if (mentions_undef(arg)) refuse(arg, "of " + quoted(call.name));
-    });
-  }
-}
-
-// `exprs`: all expressions of both sides, as the user wrote them.
-void check_constants(const Site& site, const std::vector<Expr>& exprs) {
-  for (const Expr& root : exprs) {
-    const Expr part = overflowing_part(root);
-    if (!part.defined()) continue;
-    user_error(site.asked, "constants of int32 and int64 do not overflow",
-               text(part, " does not fit ", to_string(part.type())),
-               "Cast an operand to a wider type, or to an unsigned one, which wraps around");
-  }
-}
-
-void check_types(const Site& site, const std::vector<Expr>& values, const std::vector<Type>& types,
-                 const char* whose) {
-  if (values.size() != types.size()) {
-    user_error(site.asked, "all definitions of a Func have the same number of values",
-               text(whose, " has ", types.size(), " and this one has ", values.size()),
-               "Give the same number of values");
-  }
-  for (size_t i = 0; i < types.size(); i++) {
-    if (values[i].type() == types[i]) continue;
-    user_error(site.asked, "all definitions of a Func have the same types",
-               text(whose, values.size() > 1 ? text(" for element ", i) : std::string(), " gives ",
-                    to_string(types[i]), " and this one ", to_string(values[i].type())),
-               text("Convert the right-hand side: cast(", to_string(types[i]), ", ...)"));
-  }
-}
-
-// The names in a definition: each free variable once, without names bound by lets.
-struct Names {
-  std::vector<const Variable*> free;
-  std::vector<const Call*> self_calls;
-  std::vector<FuncPtr> callees;
-};
-
-Names names_in(const FuncContents& f, const std::vector<Expr>& roots) {
-  Names names;
-  std::unordered_set<const ExprNode*> seen;
-  std::unordered_set<std::string> bound;
-  std::unordered_set<const Symbol*> called;
-  for (const Expr& root : roots) {
-    if (!root.defined()) continue;
-    walk(root, [&](const Expr& e) {
-      if (!seen.insert(e.get()).second) return false;
-      if (const Variable* v = e.as<Variable>()) names.free.push_back(v);
-      if (const Let* let = e.as<Let>()) bound.insert(let->name);
-      const Call* call = e.as<Call>();
-      if (call && call->call_type == CallType::Func) {
-        if (call->symbol.raw() == &f) {
-          names.self_calls.push_back(call);
-        } else if (called.insert(call->symbol.raw()).second) {
-          names.callees.push_back(func_of(*call));
-        }
-      }
-      return true;
-    });
-  }
-  std::erase_if(names.free, [&](const Variable* v) { return bound.count(v->name) != 0; });
-  return names;
-}
-
-// A plain Var, as opposed to a parameter or reduction variable, which carry a symbol.
-const Variable* as_plain_var(const Expr& e) {
-  const Variable* v = e.as<Variable>();
-  return v && !v->symbol.defined() && v->type == Int(32) ? v : nullptr;
-}
-
-// The reduction domain of a definition, null when it has none. `result`: the domain, if already
-// known.
-DomainPtr domain_in(const Site& site, const Names& names, DomainPtr result = nullptr) {
-  for (const Variable* v : names.free) {
-    auto domain = domain_of(*v);
-    if (!domain) continue;
-    if (result && domain != result) {
-      user_error(
-          site.asked, "all reduction variables of one definition come from one RDom",
-          text(quoted(v->name), " and ", quoted(result->vars[0].var), " are of different RDoms"),
-          "Make one RDom with all of the variables");
-    }
-    result = domain;
-  }
-  return result;
-}
-
-void check_free_variables(const Site& site, const Names& names,
-                          const std::vector<std::string>& args) {
-  for (const Variable* v : names.free) {
-    const bool is_arg = std::ranges::find(args, v->name) != args.end();
-    if (v->symbol.defined()) {
-      if (is_arg && !domain_of(*v)) {
-        user_error(site.asked,
-                   "a parameter and a pure variable of one definition have different names",
-                   "both are called " + quoted(v->name), "Rename the Var or the Param");
-      }
-      continue;
-    }
-    if (is_arg) continue;
-    if (implicit_index(v->name) >= 0 || is_placeholder(v->name)) {
-      user_error(site.asked, "a right-hand side that uses _ needs _ on the left-hand side",
-                 text("it uses ", quoted(v->name)),
-                 text("Write ", quoted(site.f.name), "(..., _) = ..."));
-    }
-    user_error(site.asked,
-               "every variable on the right-hand side appears on the left-hand side, or belongs to "
-               "an RDom",
-               text(quoted(v->name), " appears only on the right-hand side"),
-               "Add it as an argument, or reduce over an RDom");
-  }
-}
-
-void freeze(const Names& names) {
+void freeze(const NamesInDefinition& names) {
   for (const FuncPtr& callee : names.callees) callee->frozen = true;
 }
 
@@ -223,85 +47,9 @@ std::vector<Expr> bind_all_random(const FuncContents& f, int stage,
   return values;
 }
 
-std::vector<std::string> pure_names(const Site& site, const std::vector<Expr>& args) {
-  std::vector<std::string> names;
-  for (const Expr& arg : args) {
-    const Variable* v = as_plain_var(arg);
-    if (!v) {
-      user_error(site.asked, "the arguments of a first definition are Vars",
-                 text(arg, " is not a Var"),
-                 "Define all points first, as in f(x) = 0, then update some of them");
-    }
-    if (std::ranges::find(names, v->name) != names.end()) {
-      user_error(site.asked, "the arguments of a first definition are different Vars",
-                 quoted(v->name) + " appears twice", "Use a Var of its own for each dimension");
-    }
-    names.push_back(v->name);
-  }
-  return names;
-}
-
-void check_declared(const Site& site, size_t dimensions, const std::vector<Expr>& values) {
-  const FuncContents& f = site.f;
-  if (f.required_dimensions >= 0 && static_cast<int>(dimensions) != f.required_dimensions) {
-    user_error(site.asked, "a definition has the dimensions that the Func was declared with",
-               text("it was declared with ", f.required_dimensions, " and is given ", dimensions),
-               "Give that many arguments");
-  }
-  if (!f.required_types.empty()) check_types(site, values, f.required_types, "the declaration");
-}
-
 std::vector<Expr> with(std::vector<Expr> all, const std::vector<Expr>& more) {
   append(all, more);
   return all;
-}
-
-void check_update_arity(const Site& site, const std::vector<Expr>& args) {
-  if (args.size() == site.f.args.size()) return;
-  user_error(site.asked, "all definitions of a Func have the same number of arguments",
-             text("its first definition has ", site.f.args.size(), " and this one ", args.size()),
-             "Give the same number of arguments");
-}
-
-// The coordinates of the left-hand side as int32.
-std::vector<Expr> update_coordinates(const Site& site, const std::vector<Expr>& args) {
-  std::vector<Expr> result;
-  for (const Expr& arg : args) {
-    if (!arg.type().is_int_or_uint() || !arg.type().is_scalar()) {
-      user_error(site.asked, "coordinates are integers",
-                 text(arg, " has type ", to_string(arg.type())), "Convert it: cast<int>(...)");
-    }
-    result.push_back(int32_literal(arg, site.asked));
-  }
-  return result;
-}
-
-// Dimensions in which the left-hand side is the pure variable itself; their iterations are
-// independent.
-std::vector<std::string> pure_positions(const FuncContents& f, const std::vector<Expr>& args) {
-  std::vector<std::string> result(args.size());
-  for (size_t i = 0; i < args.size(); i++) {
-    const Variable* v = as_plain_var(args[i]);
-    if (v && v->name == f.args[i]) result[i] = v->name;
-  }
-  return result;
-}
-
-void check_self_calls(const Site& site, const Names& names, const std::vector<std::string>& pure) {
-  for (const Call* call : names.self_calls) {
-    for (size_t i = 0; i < pure.size(); i++) {
-      if (pure[i].empty()) continue;
-      const Variable* v = call->args[i].as<Variable>();
-      if (v && v->name == pure[i]) continue;
-      user_error(site.asked,
-                 "a pure variable keeps its position in every reference of a Func to itself, "
-                 "so that its "
-                 "iterations are independent",
-                 text("the right-hand side reads ", quoted(site.f.name), list(call->args),
-                      ", where argument ", i, " is not ", quoted(pure[i])),
-                 "Use an RDom for the dimension that the recurrence runs along");
-    }
-  }
 }
 
 // The domain in a form that an update of f may own. If its predicate reads f, ownership would be
@@ -313,19 +61,6 @@ DomainPtr domain_for(const FuncPtr& f, const DomainPtr& domain) {
   const auto copy = std::make_shared<ReductionDomainContents>(*domain);
   copy->predicate = rebind_symbol(released, domain.get(), SymbolRef::weak(copy));
   return copy;
-}
-
-void check_bounds(const Site& site, const FuncPtr& f, const ReductionDomainContents& domain) {
-  for (const ReductionVariable& v : domain.vars) {
-    for (const Expr& bound : {v.min, v.extent}) {
-      if (redirect_calls(bound, f, f, true).same_as(bound)) continue;
-      user_error(site.asked, "the bounds of a reduction domain are known before its update runs",
-                 text("the domain of ", quoted(v.var), " has the bound ", bound, ", which reads ",
-                      quoted(f->name), " itself"),
-                 text("Compute the bound in another Func, or give the domain a constant bound and "
-                      "say with RDom::where which points count"));
-    }
-  }
 }
 
 Definition make_update(const FuncPtr& f, std::vector<Expr> args, std::vector<Expr> values,
@@ -364,41 +99,6 @@ void make_outputs(FuncContents& f) {
   }
 }
 
-namespace {
-
-// Why an expression has no single value in a call; empty when it has one.
-std::string varying_part(const Expr& root) {
-  std::string part;
-  walk(root, [&](const Expr& e) {
-    if (!part.empty()) return false;
-    if (const Variable* v = e.as<Variable>()) {
-      if (!std::dynamic_pointer_cast<ParameterContents>(v->symbol.lock()))
-        part = text(quoted(v->name), " is a variable of loops");
-    }
-    if (const Call* call = e.as<Call>()) {
-      if (call->call_type == CallType::Func)
-        part = text(e, " is a value of the Func ", quoted(call->name));
-      if (call->call_type == CallType::Image)
-        part = text(e, " is an element of the image ", quoted(call->name));
-      if (call->is_op(Op::random)) part = text(e, " is random");
-    }
-    return part.empty();
-  });
-  return part;
-}
-
-}  // namespace
-
-void check_over_parameters(const Expr& e, const char* what, const std::string& asked) {
-  const std::string part = varying_part(e);
-  if (part.empty()) return;
-  user_error(asked,
-             text(what,
-                  " has one value in each call: it is made of parameters and facts "
-                  "about buffers"),
-             part, "Use a Param, or a fact such as in.dim(0).extent()");
-}
-
 std::string source_location_of(const FuncContents& f) {
   return f.declared_at.file.empty() ? "" : text(f.declared_at.file, ":", f.declared_at.line);
 }
@@ -415,22 +115,17 @@ Expr redirect_calls(const Expr& e, const FuncPtr& from, const FuncPtr& to, bool 
 }
 
 void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vector<Expr>& raw) {
-  const Site site = site_of(*f, args, false);
-  if (f->is_defined())
-    user_error(site.asked, "a Func is defined once", "it has a definition already", "Update it");
-  check_values(site, raw);
-  check_constants(site, raw);
-  const std::vector<std::string> variables = pure_names(site, args);
-  check_declared(site, args.size(), raw);
-  if (auto domain = domain_in(site, names_in(*f, raw))) {
-    user_error(site.asked, "a first definition has no reduction variables",
-               text("it uses ", quoted(domain->vars[0].var)),
-               "Reduce in an update, f(x) += ..., or inside the expression with sum(...)");
-  }
+  const DefinitionRules rules(*f, args, false);
+  rules.check_is_first();
+  rules.check_values(raw);
+  rules.check_constants(raw);
+  const std::vector<std::string> variables = rules.pure_names(args);
+  rules.check_declared(args.size(), raw);
+  rules.check_no_reduction(rules.domain_in(names_in(*f, raw)));
   const std::vector<Expr> values = settled(raw);
-  check_coordinates(site, {}, values);
-  const Names names = names_in(*f, values);
-  check_free_variables(site, names, variables);
+  rules.check_coordinates({}, values);
+  const NamesInDefinition names = names_in(*f, values);
+  rules.check_free_variables(names, variables);
 
   freeze(names);
   f->args = variables;
@@ -449,36 +144,24 @@ void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vec
 // expressions.
 void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
                    const std::vector<Expr>& raw_values, const DomainPtr& declared) {
-  const Site site = site_of(*f, raw_args, true);
-  if (!f->is_defined())
-    user_error(site.asked, "a Func is updated after its first definition", "it has none",
-               "Define it first: f(x) = 0");
-  if (f->is_extern()) {
-    user_error(site.asked, "a Func that a C function computes has no updates",
-               text("it is defined by ", quoted(f->extern_definition->function)),
-               "Update a Func that reads it");
-  }
-  if (f->frozen) {
-    user_error(site.asked, "a Func is complete when another Func uses it",
-               "another Func uses it already",
-               "Move the update before that use, or put it into a new Func");
-  }
-  check_update_arity(site, raw_args);
-  check_values(site, raw_values);
-  check_constants(site, with(raw_args, raw_values));
-  check_types(site, raw_values, f->types, "the first definition");
-  const auto domain = domain_in(site, names_in(*f, with(raw_args, raw_values)), declared);
-  std::vector<Expr> exprs = settled(with(update_coordinates(site, raw_args), raw_values));
+  const DefinitionRules rules(*f, raw_args, true);
+  rules.check_is_updatable();
+  rules.check_arity(raw_args);
+  rules.check_values(raw_values);
+  rules.check_constants(with(raw_args, raw_values));
+  rules.check_types(raw_values, f->types, "the first definition");
+  const auto domain = rules.domain_in(names_in(*f, with(raw_args, raw_values)), declared);
+  std::vector<Expr> exprs = settled(with(rules.update_coordinates(raw_args), raw_values));
   const auto first_value = exprs.begin() + static_cast<std::ptrdiff_t>(raw_args.size());
   const std::vector<Expr> args(exprs.begin(), first_value), values(first_value, exprs.end());
   if (domain && domain->predicate.defined()) exprs.push_back(domain->predicate);
-  check_coordinates(site, args, exprs);
-  const Names names = names_in(*f, exprs);
-  domain_in(site, names, domain);  // the predicate may mention another domain
-  if (domain) check_bounds(site, f, *domain);
-  const std::vector<std::string> pure = pure_positions(*f, args);
-  check_free_variables(site, names, pure);
-  check_self_calls(site, names, pure);
+  rules.check_coordinates(args, exprs);
+  const NamesInDefinition names = names_in(*f, exprs);
+  rules.domain_in(names, domain);  // the predicate may mention another domain
+  if (domain) rules.check_bounds(*domain);
+  const std::vector<std::string> pure = rules.pure_positions(args);
+  rules.check_free_variables(names, pure);
+  rules.check_self_calls(names, pure);
 
   freeze(names);
   auto variables = filtered(pure, [&](const std::string& name) { return !name.empty(); });

@@ -22,10 +22,6 @@ void define_extern(const FuncPtr& f, ExternDefinition definition, const std::vec
 // or those of its declaration while f is undefined.
 void make_outputs(FuncContents& f);
 
-// CompileError unless `e` has one value throughout a call: it may contain parameters, buffer
-// metadata, constants and operators. `what` names it in the message: "the condition".
-void check_over_parameters(const Expr& e, const char* what, const std::string& asked);
-
 // "blur.cpp:12"
 std::string source_location_of(const FuncContents& f);
 

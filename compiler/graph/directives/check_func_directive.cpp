@@ -4,6 +4,7 @@
 
 #include "diagnostics/error.h"
 #include "graph/definitions/define.h"
+#include "graph/definitions/definition_rules.h"
 #include "graph/directives/give_directive.h"
 #include "ir/build.h"
 #include "ir/literal.h"
@@ -94,6 +95,15 @@ void check_range(const FuncContents& f, const std::vector<Bound>& bounds, const 
   check_alignment(changed, asked);
 }
 
+// Checks a directive that the message calls "`verb` the storage of f in dimension", and its size.
+void check_storage(const FuncContents& f, const char* verb, const std::string& dimension,
+                   Expr& size, const char* what) {
+  const std::string asked =
+      text(verb, " the storage of ", quoted(f.name), " in ", quoted(dimension));
+  check_size(size, what, asked);
+  check_is_dimension(f, dimension, asked);
+}
+
 // ---- one function per directive with rules ----
 
 template <typename D>
@@ -123,25 +133,16 @@ void check(ReorderStorage& reorder, const FuncContents& f) {
 }
 
 void check(AlignStorage& align, const FuncContents& f) {
-  const std::string asked =
-      text("align the storage of ", quoted(f.name), " in ", quoted(align.dimension));
-  check_size(align.alignment, "alignment", asked);
-  check_is_dimension(f, align.dimension, asked);
+  check_storage(f, "align", align.dimension, align.alignment, "alignment");
 }
 void check(FoldStorage& fold, const FuncContents& f) {
-  const std::string asked =
-      text("fold the storage of ", quoted(f.name), " in ", quoted(fold.dimension));
-  check_size(fold.extent, "extent", asked);
-  check_is_dimension(f, fold.dimension, asked);
+  check_storage(f, "fold", fold.dimension, fold.extent, "extent");
 }
 void check(RingBuffer& ring, const FuncContents& f) {
   check_size(ring.copies, "number of copies", "keep a ring buffer of " + quoted(f.name));
 }
 void check(BoundStorage& bound, const FuncContents& f) {
-  const std::string asked =
-      text("bound the storage of ", quoted(f.name), " in ", quoted(bound.dimension));
-  check_size(bound.extent, "bound", asked);
-  check_is_dimension(f, bound.dimension, asked);
+  check_storage(f, "bound", bound.dimension, bound.extent, "bound");
 }
 
 void check(Memoize& memoize, const FuncContents& f) {

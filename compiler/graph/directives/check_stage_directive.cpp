@@ -2,13 +2,12 @@
 // conditions as numbered checks.
 #include <algorithm>
 #include <optional>
-#include <unordered_set>
 
 #include "diagnostics/error.h"
-#include "graph/definitions/associative_update.h"
 #include "graph/definitions/define.h"
-#include "graph/definitions/race_checks.h"
+#include "graph/definitions/definition_rules.h"
 #include "graph/directives/give_directive.h"
+#include "graph/directives/iteration_order.h"
 #include "graph/names.h"
 #include "ir/build.h"
 #include "ir/equal.h"
@@ -44,26 +43,6 @@ std::string replacement_of(const StageLoops& schedule, const std::string& var) {
     }
   }
   return "";
-}
-
-// The reduction variables that a loop derives from.
-std::unordered_set<std::string> reduction_roots(const Definition& definition,
-                                                const StageLoops& schedule,
-                                                const std::string& loop) {
-  std::unordered_set<std::string> names{loop};
-  const auto& splits = schedule.splits;
-  for (auto split = splits.rbegin(); split != splits.rend(); ++split) {
-    if (split->kind == Split::Kind::Fuse) {
-      if (names.erase(split->old_var)) names.insert({split->outer, split->inner});
-    } else if (names.erase(split->outer) + names.erase(split->inner) > 0) {
-      names.insert(split->old_var);
-    }
-  }
-  std::unordered_set<std::string> roots;
-  for (const ReductionVariable& rvar : definition.rvars) {
-    if (names.count(rvar.var)) roots.insert(rvar.var);
-  }
-  return roots;
 }
 
 void check_factor(const Expr& factor, const std::string& asked) {
@@ -145,51 +124,6 @@ TailStrategy without_blending(TailStrategy tail) {
   return blends ? TailStrategy::PredicateStores : tail;
 }
 
-// The reduction variable that makes a loop's iterations depend on each other; empty when none does.
-std::string dependent_root(const FuncContents& f, const Definition& definition,
-                           const StageLoops& schedule, const std::string& loop) {
-  for (const std::string& root : reduction_roots(definition, schedule, loop)) {
-    if (!can_prove_race_free(f, definition, root)) return root;
-  }
-  return "";
-}
-
-// Reduction loops keep their order unless the update is proven to commute. Loops whose iterations
-// access different elements may move freely.
-void check_reduction_order(const FuncContents& f, const Definition& definition,
-                           const StageLoops& now, const std::vector<Dim>& dims,
-                           const std::string& asked) {
-  const auto dependent_loops = [&](const std::vector<Dim>& all) {
-    std::vector<std::string> order;
-    for (const Dim& dim : all) {
-      if (dim.is_reduction && !dependent_root(f, definition, now, dim.var).empty())
-        order.push_back(dim.var);
-    }
-    return order;
-  };
-  const std::vector<std::string> before = dependent_loops(now.dims), after = dependent_loops(dims);
-  if (before == after || stores_one_value(f, definition) || can_prove_commutative(f, definition))
-    return;
-  size_t i = 0;
-  while (before[i] == after[i]) i++;
-  user_error(asked, "the order of reduction loops may change only where it changes no result",
-             text("the update of ", quoted(f.name), " over ",
-                  quoted(dependent_root(f, definition, now, after[i])),
-                  " is neither an accumulation nor independent from point to point"),
-             "Keep the reduction loops in their order; pure loops may go anywhere");
-}
-
-// An atomic update protects only the element that it writes; other iterations may write the others
-// at any time. An update of several points takes one lock for all of them.
-void check_atomic_reads(const FuncContents& f, const Definition& update, const std::string& asked) {
-  if (point_number(update)) return;
-  const Expr other = read_of_other_element(f, update);
-  if (!other.defined()) return;
-  user_error(asked, "an atomic update reads no element of its Func but the one that it writes",
-             text("it reads ", other, ", which another iteration may write"),
-             "Keep the loop serial, or compute what is read in another Func");
-}
-
 std::string level_text(const LoopLevel& level) {
   if (level.kind == LoopLevel::Kind::Root) return quoted("root");
   return level.kind == LoopLevel::Kind::At ? quoted(level.func + "." + level.var)
@@ -216,45 +150,6 @@ void check_fuse_level(const SchedulePlace& at, const LoopLevel& level) {
 
 std::string list_of(const std::vector<NamedLoop>& names) {
   return listed(names, [](const NamedLoop& name) { return quoted(name); });
-}
-
-// Iterations that may access the same element need one of these: an associative and commutative
-// update with atomic(), an update that always stores the same value, atomic(true), or
-// allow_race_conditions(). Vector lanes under atomic(true) run one after the other, so they may
-// read each other's elements. `otherwise` is the advice in the message; empty: to choose a pure
-// loop.
-void check_race_free(const SchedulePlace& at, const std::string& loop, bool is_vectorized,
-                     const std::string& asked, const std::string& otherwise = {}) {
-  const Definition& stage = at.definition();
-  const StageLoops& now = at.schedule();
-  if (now.allow_races) return;
-  for (const std::string& root : reduction_roots(stage, now, loop)) {
-    if (can_prove_race_free(*at.f, stage, root)) continue;
-    if (now.atomic) {
-      if (now.override_associativity && is_vectorized) continue;
-      if (stores_one_value(*at.f, stage)) continue;
-      check_atomic_reads(*at.f, stage, asked);
-      if (now.override_associativity) continue;
-      const AssociativityProof update = prove_associative(*at.f, stage);
-      if (update.op && update.op->commutative) return;
-      user_error(asked, "an atomic update is associative and commutative",
-                 update.op ? update.why_not_commutative : update.why_not,
-                 "Give atomic(true) if its order does not matter, or keep the loop serial");
-    }
-    std::string pure;
-    for (const Dim& dim : now.dims) {
-      if (!dim.is_reduction) pure += (pure.empty() ? "" : " or ") + quoted(dim.var);
-    }
-    user_error(
-        asked, "iterations that run at the same time must not touch the same element",
-        text(quoted(root),
-             " is a reduction variable, and its iterations may read or write one element of ",
-             quoted(at.f->name)),
-        text(!otherwise.empty() ? otherwise
-             : pure.empty()     ? "Reduce into more elements first, with rfactor"
-                                : "Use " + pure + " instead: its iterations are independent",
-             "; or make the update atomic(), or allow_race_conditions()"));
-  }
 }
 
 void check_not_closed(const StageLoops& schedule, const std::string& asked) {
@@ -288,27 +183,6 @@ void check(SplitLoop& split, const SchedulePlace& at) {
   split.factor = cast_to(Int(32), split.factor);
 }
 
-bool has_concurrent_iterations(const Dim& loop) {
-  return runs_at_once(loop.runs) || loop.runs == ForType::Vectorized;
-}
-
-// If one of the loops is parallel or vectorized, the fused loop would run iterations of both
-// concurrently. Making it serial would not be what the user asked for.
-void check_fused_race(const SchedulePlace& at, const Dim& inner, const Dim& outer,
-                      const std::string& asked) {
-  for (const Dim* concurrent : {&inner, &outer}) {
-    if (!has_concurrent_iterations(*concurrent)) continue;
-    const std::string asked_with_reason =
-        text(asked, ", where ", quoted(concurrent->var),
-             concurrent->runs == ForType::Vectorized ? " is vectorized"
-             : is_gpu(concurrent->runs)              ? " runs on a GPU"
-                                                     : " is parallel");
-    for (const Dim* loop : {&inner, &outer})
-      check_race_free(at, loop->var, concurrent->runs == ForType::Vectorized, asked_with_reason,
-                      text("Keep ", quoted(inner.var), " and ", quoted(outer.var), " apart"));
-  }
-}
-
 // 1. Both loops exist and differ. 2. The fused name is new. 3. Iterations that run concurrently
 // access different elements. 4. The outer loop may move directly around the inner one.
 void check(FuseLoops& fuse, const SchedulePlace& at) {
@@ -324,7 +198,7 @@ void check(FuseLoops& fuse, const SchedulePlace& at) {
   const auto from = dims.begin() + static_cast<std::ptrdiff_t>(outer);
   const auto to = dims.begin() + static_cast<std::ptrdiff_t>(inner);
   outer < inner ? std::rotate(from, from + 1, to + 1) : std::rotate(to + 1, from, from + 1);
-  check_reduction_order(*at.f, at.definition(), at.schedule(), dims, asked);
+  check_reduction_order(at, dims, asked);
 }
 
 void check(RenameLoop& rename, const SchedulePlace& at) {
@@ -347,7 +221,7 @@ void check(ReorderLoops& reorder, const SchedulePlace& at) {
   StageLoops after;
   after.dims = at.schedule().dims;
   apply_directive(reorder, after);
-  check_reduction_order(*at.f, at.definition(), at.schedule(), after.dims, asked);
+  check_reduction_order(at, after.dims, asked);
 }
 
 void check(RunLoop& run, const SchedulePlace& at) {

@@ -79,7 +79,8 @@ def unit_of(path):
 
 
 def sources_of(folder, tracked):
-    """The source files that the README of the folder describes: those whose nearest README it is."""
+    """The source files that the README of the folder describes: those whose nearest README it is. Lists of tests do not
+    count."""
     readmes = {path.parent for path in tracked if path.name == "README.md"}
     return [path for path in tracked
-            if path.suffix in SOURCES and next((p for p in path.parents if p in readmes), None) == folder]
+            if path.suffix in SOURCES and path.name != "tests.cmake" and next((p for p in path.parents if p in readmes), None) == folder]
