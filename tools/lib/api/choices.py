@@ -5,7 +5,7 @@ HEADER_FOLDERS = ["frontend", "generator", "checks"]
 MORE_HEADERS = [
     "autodiff/custom_derivative.h", "autodiff/derivative.h", "autodiff/jacobian.h", "autodiff/matrices/compressed.h",
     "autodiff/second_order.h", "autodiff/straight_through.h", "autodiff/tangents.h", "diagnostics/error.h", "diagnostics/pass_observer.h",
-    "graph/directives/schedule_log.h", "ir/build.h", "ir/expr.h", "ir/target.h", "ir/type.h"]
+    "graph/directives/schedule_log.h", "ir/build.h", "ir/expr.h", "ir/node.h", "ir/target.h", "ir/type.h"]
 INTERNAL_HEADERS = {
     "checks/arrays.h", "checks/complex_step.h", "checks/culprit.h", "checks/json_number.h",
     "checks/slopes.h", "checks/timed.h", "checks/widen.h", "frontend/data/argument.h", "frontend/data/buffer_contents.h",
