@@ -10,7 +10,6 @@
 # namespaces. Unlike CMake's unity builds, the units name their files relative to compiler/, so ccache can share them
 # between checkouts. A COLD layer takes no noticeable time at run time, so it is optimized less, which saves a third of
 # its compile time.
-# would notice: it is optimized less then, which saves a third of compiling it.
 option(RETROGRADE_QUICK_BUILD "Compile several sources as one unit" OFF)
 set(retrograde_files_per_unit 8)
 define_property(GLOBAL PROPERTY RETROGRADE_LAYERS BRIEF_DOCS "All layers that have sources")

@@ -21,7 +21,8 @@ class WeightFile {
  public:
   WeightFile(std::string program, std::filesystem::path path);
 
-  // Returns body(contents). An entry that is missing, or not of the type that `body` reads, is an error.
+  // Returns the result of `body` for the contents. An entry that is missing, or of another type than `body` asks for, is
+  // an error.
   template <typename Body>
   auto parse(const Body& body) const {
     try {

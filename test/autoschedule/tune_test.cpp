@@ -4,13 +4,13 @@
 
 #include <filesystem>
 #include <fstream>
-#include <regex>
 #include <sstream>
 
 #include "database.h"
 #include "fit_database.h"
 #include "frontend/include/retrograde/retrograde.h"
 #include "graph/graph.h"
+#include "graph/names.h"
 #include "support/errors.h"
 #include "tune_program.h"
 #include "tuning/fit_machine.h"
@@ -92,19 +92,15 @@ TEST_F(Tune, ASecondRunGoesOnWhereTheFirstWasStopped) {
   EXPECT_EQ(third.before, first.left + 2);
 }
 
-// The copies that a schedule creates have different names in each graph.
-std::string without_numbers(const std::string& log) {
-  return std::regex_replace(log, std::regex("\\$[0-9]+"), "");
-}
-
 TEST_F(Tune, TheBestScheduleIsWrittenAsALogThatReplays) {
   tuned(path("measured.sqlite"), 0, path(""));
   const ScheduleLog log = ScheduleLog::parse(contents_of(path("product.schedule")));
   EXPECT_GT(log.size(), 0u);
   graph::Graph graph = graph::parse_graph(program());
   const auto scheduled = graph::with_log(log, graph.outputs);
-  EXPECT_EQ(without_numbers(graph::schedule_log(scheduled).to_text()),
-            without_numbers(log.to_text()));
+  // The copies that a schedule creates have different names in each graph.
+  EXPECT_EQ(graph::without_numbers(graph::schedule_log(scheduled).to_text()),
+            graph::without_numbers(log.to_text()));
   EXPECT_NE(contents_of(path("product.cpp")).find("out"), std::string::npos);
 }
 

@@ -1,12 +1,10 @@
 // loop_directives.h -- directives that schedule the loops of one definition. Stage has these
-// methods, and Func has
-// them for its first definition.
+// methods, and Func has them for its first definition.
 //
 // Directives change the order and the manner in which the points of a definition are computed,
-// never the values. A
-// stage starts with one loop for each variable: the reduction variables innermost, in their order,
-// then the pure
-// variables. Directives name loops by Var or RVar. They throw CompileError if a rule is broken.
+// never the values. A stage starts with one loop for each variable: the reduction variables
+// innermost, in their order, then the pure variables. Directives name loops by Var or RVar. They
+// throw CompileError if a rule is broken.
 #pragma once
 
 #include <string>
@@ -56,8 +54,8 @@ class LoopDirectives {
   //     body(x)          =>     for xi in [0, f):
   //                               body(xo * f + xi)
   // The tail strategy decides what happens if f does not divide n; see TailStrategy. ShiftInwards
-  // applies to first
-  // definitions only; a loop over a reduction variable takes GuardWithIf or Predicate.
+  // applies to first definitions only; a loop over a reduction variable takes GuardWithIf or
+  // Predicate.
   // Requires: the factor must be a defined expression; a factor is an integer; a factor is at least
   // 1; a factor fits an int32; the two new loops have different names; a loop over a reduction
   // variable runs exactly over its domain; an update definition does not run a point twice.
@@ -143,8 +141,7 @@ class LoopDirectives {
   //   for y:          parallel for y:
   //     body(y)   =>    body(y)
   // A reduction loop can be parallel if its iterations are independent, the update is atomic(), or
-  // race conditions
-  // are allowed.
+  // race conditions are allowed.
   // Requires: iterations that run at the same time must not touch the same element; a parallel loop
   // is not inside of a vectorized one.
   Self& parallel(const VarOrRVar& var) {
@@ -156,8 +153,7 @@ class LoopDirectives {
   // Reduction loops follow the rule of parallel().
   // Requires: iterations that run at the same time must not touch the same element; the extent of a
   // vectorized loop must be a constant, or have a constant above it; vectors have at most 4096
-  // lanes;
-  // loops around the calls of a C function are serial, parallel or unrolled.
+  // lanes; loops around the calls of a C function are serial, parallel or unrolled.
   Self& vectorize(const VarOrRVar& var) {
     return give(graph::RunLoop{var.name(), ForType::Vectorized});
   }
@@ -167,8 +163,7 @@ class LoopDirectives {
   // Requires: the extent of an unrolled loop must be a constant, or have a constant above it.
   Self& unroll(const VarOrRVar& var) { return give(graph::RunLoop{var.name(), ForType::Unrolled}); }
   // Splits a loop and runs the new outer loop in parallel. vectorize and unroll with a factor also
-  // split, and apply to
-  // the new inner loop. The outer loop keeps the name of `var`.
+  // split, and apply to the new inner loop. The outer loop keeps the name of `var`.
   //   parallel(y, 4):            vectorize(x, 8), unroll(x, 8):
   //     parallel for y:            for x:
   //       for y' in [0, 4):          vectorized (unrolled) for x' in [0, 8):
@@ -222,14 +217,14 @@ class LoopDirectives {
   // ---- reductions ----
 
   // Makes each read-modify-write of an element indivisible. Reduction loops may then run in
-  // parallel, by atomic
-  // operations or locks, or be vectorized, by a reduction of the vector followed by one update:
+  // parallel, by atomic operations or locks, or be vectorized, by a reduction of the vector
+  // followed by one update:
   //   f(g(r)) += h(r)
   //   parallel for r:                parallel for r:
   //     f[g(r)] = f[g(r)] + h(r)  =>   atomic: f[g(r)] = f[g(r)] + h(r)
   // For such a loop the update must be provably associative and commutative. The proof assumes
-  // exact arithmetic, so
-  // rounding of floats, and the winner among ties of argmin, may depend on the order of threads.
+  // exact arithmetic, so rounding of floats, and the winner among ties of argmin, may depend on the
+  // order of threads.
   // override_associativity_test: skips the proof; the caller guarantees the property.
   // Requires: an atomic update is associative and commutative; an atomic update reads no element of
   // its Func but the one that it writes; the values of a Tuple are updated under a lock, which must
@@ -238,41 +233,36 @@ class LoopDirectives {
     return give(graph::MakeAtomic{override_associativity_test});
   }
   // Permits parallel and vectorized reduction loops whose iterations access the same elements. The
-  // result is then any
-  // that a race can produce.
+  // result is then any that a race can produce.
   Self& allow_race_conditions() { return give(graph::AllowRaces{}); }
 
   // ---- where it runs ----
 
   // Fuses the loops of this stage with those of another one, from the outermost down to the given
-  // loop. In the shared
-  // loop the other stage runs first:
+  // loop. In the shared loop the other stage runs first:
   //   for y: for x: f(x, y)               for y:
   //   for y: for x: g(x, y)          =>     for x: f(x, y)
   //   g.compute_with(f, y)                  for x: g(x, y)
   // Both stages must be computed at the same place, and neither may read the other. An update may
-  // also join the stage
-  // before it, f.update().compute_with(Stage(f), y), so that sums start while their elements are
-  // in the cache. Each
-  // iteration then accesses only elements that the stage before computed in the same iteration.
-  // If the ranges of the loops differ, the shared loop covers both, and each stage runs only
-  // within its own range.
-  // `align` shifts the ranges: AlignStart makes them begin together, AlignEnd end together;
-  // NoAlign and Auto do not
-  // shift. The stage that joins must not be specialized.
-  // Requires: a stage joins the loops of another one down to a loop; within one Func, a stage
-  // joins the stage before it; stages of one Func that share loops touch the same elements in
-  // each iteration; the stage has loops; a stage that joins the loops of another one has no
-  // specializations;
-  // the loop level is set before the pipeline is compiled; both stages belong to the pipeline and
-  // are computed somewhere; both stages have loops; both stages are computed at one place; both
-  // stages are computed at the same place; compute_with names one stage; the level is a loop of
-  // both stages; both stages have the same loops down to the level; loops that run as one are of
-  // one kind; loops that run as one are partitioned alike; what is prefetched in shared loops is
-  // prefetched by the stage whose loops they are; one of the stages that share loops is the first;
-  // Funcs that share loops do not depend on each other; the stages of a Func run one after another,
-  // also where others run with them; what is computed together is computed after all that any of it
-  // reads; Funcs that share loops are computed whenever any of them is needed (Unsupported).
+  // also join the stage before it, f.update().compute_with(Stage(f), y), so that sums start while
+  // their elements are in the cache. Each iteration then accesses only elements that the stage
+  // before computed in the same iteration. If the ranges of the loops differ, the shared loop
+  // covers both, and each stage runs only within its own range. `align` shifts the ranges:
+  // AlignStart makes them begin together, AlignEnd end together; NoAlign and Auto do not shift. The
+  // stage that joins must not be specialized.
+  // Requires: a stage joins the loops of another one down to a loop; within one Func, a stage joins
+  // the stage before it; stages of one Func that share loops touch the same elements in each
+  // iteration; the stage has loops; a stage that joins the loops of another one has no
+  // specializations; the loop level is set before the pipeline is compiled; both stages belong to
+  // the pipeline and are computed somewhere; both stages have loops; both stages are computed at
+  // one place; both stages are computed at the same place; compute_with names one stage; the level
+  // is a loop of both stages; both stages have the same loops down to the level; loops that run as
+  // one are of one kind; loops that run as one are partitioned alike; what is prefetched in shared
+  // loops is prefetched by the stage whose loops they are; one of the stages that share loops is
+  // the first; Funcs that share loops do not depend on each other; the stages of a Func run one
+  // after another, also where others run with them; what is computed together is computed after all
+  // that any of it reads; Funcs that share loops are computed whenever any of them is needed
+  // (Unsupported).
   Self& compute_with(const LoopLevel& level,
                      const std::vector<std::pair<VarOrRVar, LoopAlignStrategy>>& align) {
     graph::ComputeWith with{{{}, level.contents()}};
@@ -296,9 +286,8 @@ class LoopDirectives {
   }
 
   // Adds a second schedule, which runs if `condition` over parameters holds. The returned stage
-  // holds it. It starts as
-  // a copy of the schedule so far; later directives of the general stage do not affect it.
-  // f.specialize(n > 64).vectorize(x, 8):
+  // holds it. It starts as a copy of the schedule so far; later directives of the general stage do
+  // not affect it. f.specialize(n > 64).vectorize(x, 8):
   //   for x:          if n > 64: for x: for x' in [0, 8): body   (vectorized)
   //     body(x)   =>  else:      for x: body(x)
   // Conditions are tested in order. The same condition returns the same stage again.
@@ -313,8 +302,8 @@ class LoopDirectives {
   void specialize_fail(const std::string& message) { give(graph::SpecializeFail{message}); }
 
   // Prefetches into the cache the region of a Func or image that iteration `from + offset` reads.
-  // The prefetch happens
-  // in every iteration of `at`, which is `from` or a loop inside it. g.prefetch(f, x, x, 2):
+  // The prefetch happens in every iteration of `at`, which is `from` or a loop inside it.
+  // g.prefetch(f, x, x, 2):
   //   for x:                for x:
   //     g(x) = 2 * f(x)  =>   prefetch(f[x + 2])
   //                           g(x) = 2 * f(x)
@@ -347,28 +336,23 @@ class LoopDirectives {
   // ---- GPUs ----
   //
   // Up to three outer loops over blocks become the grid of a kernel, and up to three loops over
-  // threads inside them
-  // become its blocks. The innermost of each kind is dimension x. Other loops between and inside
-  // them stay loops:
+  // threads inside them become its blocks. The innermost of each kind is dimension x. Other loops
+  // between and inside them stay loops:
   //   gpu_blocks(xo), gpu_threads(xi):
   //   for xo:              kernel<<<extent of xo, extent of xi>>>:
   //     for xi:        =>    body(block.x, thread.x)
   //       body(xo, xi)
   // All threads of a block compute Funcs whose compute level is a loop over blocks, or a loop
-  // between blocks and
-  // threads; such Funcs lie in shared memory. A Func that is computed inside the loops over
-  // threads is private to a
-  // thread. The target needs the feature CUDA; other devices are Unsupported.
+  // between blocks and threads; such Funcs lie in shared memory. A Func that is computed inside the
+  // loops over threads is private to a thread. The target needs the feature CUDA; other devices are
+  // Unsupported.
 
   // Maps loops to the threads of a block, at most 1,024 in all.
-  // Requires: iterations that run at the same time must not touch the same element; a directive
-  // for GPUs
-  // names a GPU; code for GPUs is generated for CUDA (Unsupported); the target has a GPU; threads
-  // belong to
-  // blocks; blocks consist of threads; threads compute vectors, and no vector has threads; a
-  // kernel cannot call
-  // functions of the host (Unsupported); kernels are launched by one thread of the host
-  // (Unsupported).
+  // Requires: iterations that run at the same time must not touch the same element; a directive for
+  // GPUs names a GPU; code for GPUs is generated for CUDA (Unsupported); the target has a GPU;
+  // threads belong to blocks; blocks consist of threads; threads compute vectors, and no vector has
+  // threads; a kernel cannot call functions of the host (Unsupported); kernels are launched by one
+  // thread of the host (Unsupported).
   Self& gpu_threads(const VarOrRVar& x, DeviceAPI device = DeviceAPI::Default_GPU) {
     return run_on_gpu(ForType::GpuThread, {x}, device);
   }
@@ -380,9 +364,8 @@ class LoopDirectives {
                     DeviceAPI device = DeviceAPI::Default_GPU) {
     return run_on_gpu(ForType::GpuThread, {x, y, z}, device);
   }
-  // Maps a loop to the lanes of a warp. It must be the innermost loop over threads, with at most
-  // 32 iterations; the
-  // rules of gpu_threads apply.
+  // Maps a loop to the lanes of a warp. It must be the innermost loop over threads, with at most 32
+  // iterations; the rules of gpu_threads apply.
   Self& gpu_lanes(const VarOrRVar& x, DeviceAPI device = DeviceAPI::Default_GPU) {
     return run_on_gpu(ForType::GpuLane, {x}, device);
   }
@@ -419,9 +402,8 @@ class LoopDirectives {
     return run_on_gpu(ForType::GpuBlock, {Var::outermost()}, device);
   }
   // Tiles up to three loops, with one block for each tile and one thread for each point of a tile.
-  // Without names for
-  // the loops over blocks, these keep the names of the original loops. gpu_tile(x, y, xi, yi, 16,
-  // 8):
+  // Without names for the loops over blocks, these keep the names of the original loops.
+  // gpu_tile(x, y, xi, yi, 16, 8):
   //   for y:                 gpu_block for y, x:
   //     for x:         =>      gpu_thread for yi in [0, 8), xi in [0, 16):
   //       body(x, y)             body(16 * x + xi, 8 * y + yi)
@@ -471,8 +453,7 @@ class LoopDirectives {
   }
 
   // Inlines these Funcs into this definition immediately, so that later directives, such as
-  // rfactor, see the result.
-  // Other consumers still call the Funcs.
+  // rfactor, see the result. Other consumers still call the Funcs.
   //   g(x) = x * x                    g(x) = x * x
   //   f(x) = g(x) + g(x + 1)     =>   f(x) = x * x + (x + 1) * (x + 1)
   // Requires: an inlined Func has one pure definition; an inlined Func has no schedule of its own.
@@ -485,8 +466,7 @@ class LoopDirectives {
   // through the caches.
   Self& stream_stores() { return hint(); }
   // Hints that loaded values, of all Funcs or the given ones, are not read again soon. Today this
-  // changes no code: all
-  // loads go through the caches.
+  // changes no code: all loads go through the caches.
   Self& stream_loads() { return hint(); }
   Self& stream_loads(const std::vector<Func>&) { return hint(); }
 

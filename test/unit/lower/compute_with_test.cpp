@@ -30,6 +30,23 @@ class ComputeWith : public testing::Test {
     return graph::without_numbers(lower::loop_nest_text({f.function()}));
   }
 
+  // The nest of h, which reads f and g, with these loops of f and g at root.
+  static std::string nest_of_sum(const std::string& loops) {
+    return "produce f:\n  produce g:\n" + loops + R"(consume f:
+  consume g:
+    produce h:
+      for y:
+        for x:
+          h(...) = ...
+)";
+  }
+  static constexpr const char* sharing_y = R"(    for y:
+      for x:
+        f(...) = ...
+      for x:
+        g(...) = ...
+)";
+
   static int count(const Func& output, const char* stop_after,
                    const std::function<bool(const Stmt&)>& is_counted) {
     lower::LowerOptions options;
@@ -54,20 +71,7 @@ TEST_F(ComputeWith, SharesLoopsDownToTheLevel) {
   h(x, y) = f(x, y) + g(x, y);
   f.compute_root();
   g.compute_root().compute_with(f, y);
-  EXPECT_EQ(nest_of(h), R"(produce f:
-  produce g:
-    for y:
-      for x:
-        f(...) = ...
-      for x:
-        g(...) = ...
-consume f:
-  consume g:
-    produce h:
-      for y:
-        for x:
-          h(...) = ...
-)");
+  EXPECT_EQ(nest_of(h), nest_of_sum(sharing_y));
 }
 
 TEST_F(ComputeWith, ChainsShareEachWhatTheySay) {
@@ -80,45 +84,38 @@ TEST_F(ComputeWith, ChainsShareEachWhatTheySay) {
   out.split(y, yo, yi, 4);
   g.compute_with(f, y);
   h.compute_with(g, x);
-  EXPECT_EQ(nest_of(out), R"(produce out:
+  const auto nest = [](const std::string& loops) {
+    return R"(produce out:
   for y.yo:
     produce f:
       produce g:
         produce h:
-          for y:
-            for x:
-              f(...) = ...
-            for x:
-              g(...) = ...
-              h(...) = ...
-    consume f:
+)" + loops +
+           R"(    consume f:
       consume g:
         consume h:
           for y.yi in [0, 3]:
             for x:
               out(...) = ...
-)");
+)";
+  };
+  EXPECT_EQ(nest_of(out), nest(R"(          for y:
+            for x:
+              f(...) = ...
+            for x:
+              g(...) = ...
+              h(...) = ...
+)"));
   // g cannot pass on loops that it does not share with f.
   g.compute_with(f, x);
   h.compute_with(g, y);
-  EXPECT_EQ(nest_of(out), R"(produce out:
-  for y.yo:
-    produce f:
-      produce g:
-        produce h:
-          for y:
+  EXPECT_EQ(nest_of(out), nest(R"(          for y:
             for x:
               f(...) = ...
               g(...) = ...
             for x:
               h(...) = ...
-    consume f:
-      consume g:
-        consume h:
-          for y.yi in [0, 3]:
-            for x:
-              out(...) = ...
-)");
+)"));
 }
 
 TEST_F(ComputeWith, UpdatesRunTogetherInTheOrderOfTheirFuncs) {
@@ -388,34 +385,13 @@ TEST_F(ComputeWith, TheLevelMayBeSetLater) {
   f.compute_root();
   g.compute_root().compute_with(level);
   level.set(LoopLevel(f, x));
-  EXPECT_EQ(nest_of(h), R"(produce f:
-  produce g:
-    for y:
+  EXPECT_EQ(nest_of(h), nest_of_sum(R"(    for y:
       for x:
         f(...) = ...
         g(...) = ...
-consume f:
-  consume g:
-    produce h:
-      for y:
-        for x:
-          h(...) = ...
-)");
+)"));
   level.set(LoopLevel(f, y));
-  EXPECT_EQ(nest_of(h), R"(produce f:
-  produce g:
-    for y:
-      for x:
-        f(...) = ...
-      for x:
-        g(...) = ...
-consume f:
-  consume g:
-    produce h:
-      for y:
-        for x:
-          h(...) = ...
-)");
+  EXPECT_EQ(nest_of(h), nest_of_sum(sharing_y));
 }
 
 TEST_F(ComputeWith, TheFirstStageMayBeSpecialized) {

@@ -8,7 +8,8 @@ MORE_HEADERS = [
     "graph/directives/schedule_log.h", "ir/build.h", "ir/expr.h", "ir/target.h", "ir/type.h"]
 INTERNAL_HEADERS = {
     "checks/arrays.h", "checks/complex_step.h", "checks/culprit.h", "checks/json_number.h",
-    "checks/widen.h", "frontend/data/argument.h", "frontend/run/call.h", "frontend/run/compiler_interface.h",
+    "checks/slopes.h", "checks/timed.h", "checks/widen.h", "frontend/data/argument.h", "frontend/data/buffer_contents.h",
+    "frontend/language/operand_checks.h", "frontend/run/call.h", "frontend/run/pipeline_contents.h", "frontend/run/compiler_interface.h",
     "generator/command_line.h", "generator/cpp_stub.h", "generator/members.h",
     "graph/definitions/associative_update.h", "graph/text/binder.h", "graph/copy_graph.h", "graph/definitions/define.h",
     "graph/directives/directive.h", "graph/directives/directive_choices.h", "graph/directives/directive_fields.h", "graph/directives/directive_text.h",
