@@ -28,7 +28,7 @@ class TokenReader {
   int integer();
   Type type();
   Type type_in(const char* open, const char* close);
-  // What `read` reads, once or more, between commas.
+  // Calls `read` once or more, with commas between.
   template <class Read>
   std::vector<std::invoke_result_t<const Read&>> several(const Read& read) {
     std::vector<decltype(read())> result;
