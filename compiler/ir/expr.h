@@ -239,12 +239,14 @@ struct Provide : StmtNode {
 };
 // How the points of a Func lie in its storage, and who uses it when.
 struct StorageLayout {
-  std::vector<int> order;  // dimensions, innermost first; empty: as declared
-  std::vector<Expr>
-      folds;  // per dimension: coordinates are stored modulo this; undefined or missing: not folded
-  std::string
-      place;  // the Realize around it that provides the memory (hoist_storage); empty: its own memory
-  Expr first;  // the element of `place` at which it begins; undefined: 0
+  // The dimensions, innermost first; empty: as declared.
+  std::vector<int> order;
+  // Per dimension: coordinates are stored modulo this. Undefined or missing: not folded.
+  std::vector<Expr> folds;
+  // The Realize around it that provides the memory; empty: memory of its own.
+  std::string place;
+  // The element of `place` at which it begins; undefined: 0.
+  Expr first;
   // By how many iterations the producer of an async Func may be ahead of its consumer; 0: any number.
   int lead = 1;
 };

@@ -108,8 +108,8 @@ bool cast_is_defined(Type to, const Scalar& from) {
   return std::isfinite(from.f) && to.can_represent(std::trunc(from.f));
 }
 
-// Generated code implements these functions itself, and may differ in the last bit. Code generation
-// folds them (codegen/math/constant_math.h).
+// Generated code implements these functions itself, and may differ in the last bit: they are folded
+// where it is generated.
 bool is_rounded_otherwise(Op op) { return op_info(op).real.error.kind == OpError::Kind::Library; }
 
 bool is_zero_or_one(const Scalar& s) { return s.f == 0 || s.f == 1; }

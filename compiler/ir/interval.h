@@ -1,9 +1,8 @@
 // Closed intervals, one template for every type of end.
 //
-// Ends are expressions for symbolic intervals (analysis/interval.h), integers for the constant
-// range of a node in the simplifier (simplify/facts.h), and doubles for the range of a value
-// (autodiff/rules/value_range.h). Expressions alone would not do: the simplifier needs the range of
-// every node, where integers cost nothing. This file defines the intervals; arithmetic on them
+// Ends are expressions for symbolic intervals, integers for the constant range of a node, and
+// doubles for the range of a value. Expressions alone would not do: simplification needs the range
+// of every node, where integers cost nothing. This file defines the intervals; arithmetic on them
 // differs for each kind of end (integers saturate, doubles round, expressions fold) and lives
 // beside each use.
 #pragma once
@@ -53,7 +52,7 @@ using Interval = IntervalOf<Expr>;
 // The extremes of int64 mean unbounded.
 using ConstantRange = IntervalOf<int64_t>;
 
-// Hull and intersection of numeric intervals; analysis/interval.h has those of expressions.
+// Hull and intersection of numeric intervals.
 template <class End>
 requires std::is_arithmetic_v<End> IntervalOf<End> hull(const IntervalOf<End>& a,
                                                         const IntervalOf<End>& b) {

@@ -34,7 +34,7 @@ enum class BoundsRule : uint8_t {
   OfSecond,    // the value is the second operand
   AtEnds,      // increasing and exact: the value lies between those at the operand's ends
   Within,      // the value lies within `values`, or is NaN
-  ByRule,      // by a rule in analysis/bounds_of_calls.cpp
+  ByRule,      // by a rule of its own in bounds inference
 };
 
 // The range of every non-NaN value, for any operands, rounding errors included.
@@ -73,8 +73,8 @@ struct OpError {
   enum class Kind : uint8_t {
     Exact = 1,     // correctly rounded, once
     Arithmetic,    // sums, products and quotients, each of which is rounded
-    Library,       // a function of codegen/math/math_table.h, with a maximum error in ULP
-    Approximates,  // a fast approximation, whose domain and error are in codegen's table
+    Library,       // a library function with a maximum error in ULP
+    Approximates,  // a fast approximation with a domain and error of its own
   };
   Kind kind = {};
   double ulp_float32 = 0, ulp_float64 = 0;  // Library: guaranteed on the host

@@ -6,7 +6,7 @@
 // sum invalid. Otherwise moving a sentinel like INT_MAX to the other side of a comparison could
 // overflow where the program did not. Terms keep the order in which they were found.
 //
-// Linear sums (analysis/linear.h), for index types only, also take divisions apart. Their numbers
+// Linear sums, for index types only, also take divisions apart. Their numbers
 // have 64 bits whatever the type; one that does not fit makes the sum invalid. Terms are in
 // structural order, so equal sums have equal text.
 #pragma once

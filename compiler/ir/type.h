@@ -100,8 +100,7 @@ class Type {
                             BFloat = TypeCode::BFloat, Handle = TypeCode::Handle;
 
   constexpr Type() = default;
-  // Conversion from the runtime's buffer types; defined by frontend/data/buffer.cpp, which knows
-  // them.
+  // Conversion from and to the runtime's type, which this folder only declares.
   Type(const halide_type_t& type);
   operator halide_type_t() const;
   Type(halide_type_code_t code, int bits, int lanes = 1);
