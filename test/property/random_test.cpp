@@ -19,7 +19,7 @@ namespace {
 constexpr uint64_t first_seed = 1000;
 constexpr int programs_per_shard = 50;
 constexpr int shards = 4;
-constexpr int step = many_or_few(1, 2);        // 200 programs, or 100: every second shard
+constexpr int step = many_or_few(1, 4);        // 200 programs, or 50: every fourth shard
 constexpr double max_refused_fraction = 0.15;  // the share of one shard's programs
 constexpr double max_unstable_fraction = 0.1;
 

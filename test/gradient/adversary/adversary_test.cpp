@@ -20,8 +20,8 @@ namespace {
 
 constexpr unsigned programs_per_shard = 15, shards = 16, one_compiled_of = 8;
 constexpr unsigned scheduled_per_shard = 5, shards_scheduled = 6;
-// 240 programs, and 30 that the compiler schedules; or half of them: every second shard.
-constexpr unsigned step = many_or_few(1, 2);
+// 240 programs, and 30 that the compiler schedules; or a third of them: every third shard.
+constexpr unsigned step = many_or_few(1, 3);
 
 class Adversary : public ::testing::TestWithParam<unsigned> {};
 
