@@ -43,6 +43,13 @@ Expr ExprParser::whole_expr() {
   return e;
 }
 
+void ExprParser::refuse_operands(const Token& at, const InternalError& error) {
+  const std::string what = error.what();
+  user_error("read IR text",
+             text("line ", at.line, ", column ", at.column, ": operands must fit each other"),
+             what.substr(0, what.find('\n')), "Cast an operand, or write its type after a colon");
+}
+
 Type ExprParser::type_suffix(NameUse use, const std::string& name, int lanes, int component) {
   const Type result = accept(":") ? type() : types_.implied(use, name, lanes, component);
   types_.mention(use, name, use == NameUse::Variable ? result : result.element_of(), component);

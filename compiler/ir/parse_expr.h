@@ -26,13 +26,10 @@ class ExprParser : protected TokenReader {
     try {
       return make();
     } catch (const InternalError& error) {
-      const std::string what = error.what();
-      user_error("read IR text",
-                 text("line ", at.line, ", column ", at.column, ": operands must fit each other"),
-                 what.substr(0, what.find('\n')),
-                 "Cast an operand, or write its type after a colon");
+      refuse_operands(at, error);
     }
   }
+  [[noreturn]] static void refuse_operands(const Token& at, const InternalError& error);
   Expr expr();
   // An expression followed, or preceded, by a mark.
   Expr expr_before(const char* mark);

@@ -91,7 +91,7 @@ TEST(Explain, ZerosAndWhatWasNotRequestedSayWhy) {
               "the output does not depend on its value along a differentiable path: "
               "\"explained_f\" reads it in floor, whose derivative is 0");
   expect_fact(d.explanations(), Fact::Zero, f.name(),
-              "floor has derivative 0 (0 everywhere, at the steps too)");
+              "floor has derivative 0 (constant between steps; 0 at the steps by convention)");
   Derivative only = propagate_adjoints(weighted_sum(f, {9}), {.wrt = {a}});
   expect_fact(only.explanations(), Fact::NotRequested, b.name(),
               "no requested gradient needs its adjoint");

@@ -129,7 +129,7 @@ TEST_F(Gradients, ZeroGradientsSayWhy) {
   sum_up();
   Derivative d = propagate_adjoints(loss);
   expect_fact(d.explanations(), Fact::Zero, g.name(),
-              "floor has derivative 0 (0 everywhere, at the steps too)");
+              "floor has derivative 0 (constant between steps; 0 at the steps by convention)");
   expect_fact(d.explanations(), Fact::Zero, bytes.name(),
               "its type is uint8: integers have no derivative");
   EXPECT_EQ(Buffer<float>(d(bytes).realize({8}))(3), 0.0f);

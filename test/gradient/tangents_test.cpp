@@ -206,7 +206,7 @@ TEST_F(TangentsTest, WhatDoesNotMoveIsZeroAndSaysSo) {
   EXPECT_EQ(evaluate(t(constant), {{0}, {n}}).at({3}).scalar.as_double(), 0);
   EXPECT_EQ(evaluate(t(rounded), {{0}, {n}}).at({3}).scalar.as_double(), 0);
   expect_fact(t.explanations(), Fact::Zero, rounded.name(),
-              "floor has derivative 0 (0 everywhere, at the steps too)");
+              "floor has derivative 0 (constant between steps; 0 at the steps by convention)");
   EXPECT_FALSE(t(elsewhere).defined());
 }
 

@@ -470,6 +470,8 @@ In Kernel::add(Op op) {
     case Op::trace:
     case Op::error:
       return In::HostsAlone;
+    case Op::buffer_region:  // lowering replaces it
+      return In::NoCode;
     default:
       functions_of_floats(op);
       return In::Kernels;

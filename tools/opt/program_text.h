@@ -25,7 +25,8 @@ struct ProgramText {
 // `target` is that of texts without a target line. UserError at a line that cannot be read.
 ProgramText parse_program(const std::string& text, const Target& target);
 
-// The text after the pass, which may be one from graph to graph or one of lowering (lower/lower.h).
+// The text after the pass, which may be one from graph to graph or one of lowering (lower/lower.h). UserError for other
+// names, and if a pass of lowering needs a statement that the text lacks.
 std::string text_after(const std::string& pass, const ProgramText& program);
 
 }  // namespace retrograde::opt

@@ -137,6 +137,11 @@ TEST_F(Opt, ReadsGraphsAndLowersThemSoFar) {
   const std::string log = text_file("f.split(x, xo, xi, 4, RoundUp)\n", "p.log");
   EXPECT_TRUE(has(opt("--graph --log=" + log + " " + graph), "split(x, xo, xi, 4, RoundUp)\n"));
   EXPECT_TRUE(has(opt("--graph --pass=simplify " + graph, 1), "from graph to graph"));
+  EXPECT_TRUE(has(opt("--graph --pass=build_loop_nests " + graph), "f(f.s0.x) = {f.s0.x * 2}"));
+  EXPECT_TRUE(has(opt("--graph --pass=fork_async " + graph, 1), "start from a statement"));
+  const std::string both = text_file(
+      "func f(x) int32\n  define\n    value x\noutput f\nstatement\nf(0) = {(1 + 2)}\n", "p.both");
+  EXPECT_TRUE(has(opt("--graph --pass=flatten_storage " + both), "f[(0 - f.min.0) * f.stride.0"));
   EXPECT_TRUE(has(opt("--graph --stop-after=nothing " + graph, 1),
                   "lowering stops after one of its passes"));
 }

@@ -5,7 +5,7 @@ from api.cpp_text import TOKEN, arguments, one_line, pieces, unescape, without_c
 
 FOLDERS = ["graph", "frontend", "generator", "autoschedule", "autodiff", "checks", "lower", "ir", "jit", "aot"]
 # IR text is for tools and tests; its errors are one rule per position in a text.
-INTERNAL_FILES = {"ir/lexer.cpp", "ir/parse.cpp"}
+INTERNAL_FILES = {"ir/lexer.cpp", "ir/parse_expr.cpp"}
 # Functions that raise an error: the index of the rule among their arguments, and the kind of error.
 RAISERS = {"user_error": (1, "CompileError"), "call_error": (1, "RuntimeError"),
            "unsupported": (1, "Unsupported"), "type_error": (1, "CompileError"),
