@@ -17,7 +17,7 @@ constexpr uint64_t first_seed = 7000;
 constexpr int programs_per_shard = 40;
 constexpr int shards = 4;
 // Programs without a schedule, and partly scheduled ones.
-constexpr int step = many_or_few(1, 2);  // 160, or 80: every second shard
+constexpr int step = many_or_few(1, 4);  // 160, or 40: every fourth shard
 
 // The directives for half of the Funcs, and for the Funcs generated from these.
 ScheduleLog part_of(const ScheduleLog& log, Choices& choices) {

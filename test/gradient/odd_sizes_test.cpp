@@ -14,7 +14,7 @@
 namespace retrograde::gradient {
 namespace {
 
-constexpr uint64_t first_program = 0, programs = many_or_few(200, 8);
+constexpr uint64_t first_program = 0, programs = many_or_few(200, 5);
 
 // The budget of interpreter operations for one program.
 constexpr uint64_t operations = 20'000'000;
