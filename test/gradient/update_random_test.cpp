@@ -13,7 +13,7 @@
 namespace retrograde::gradient {
 namespace {
 
-constexpr unsigned programs = many_or_few(300, 100);
+constexpr unsigned programs = many_or_few(300, 150);
 
 AdversaryProgram program_of(unsigned seed, const AdjointOptions& options) {
   Choices choices(seed);
