@@ -148,7 +148,8 @@ DerivativeRule constant_rule(const char* convention) {
   return {RuleClass::Constant,           nullptr,    -1,
           "everywhere but at the steps", convention, "definition"};
 }
-DerivativeRule transparent(int arg, const char* convention = "1: the value is the argument unchanged") {
+DerivativeRule transparent(int arg,
+                           const char* convention = "1: the value is the argument unchanged") {
   return {RuleClass::Transparent, nullptr, arg, "everywhere", convention, "definition"};
 }
 DerivativeRule no_rule(const char* reason) {
