@@ -13,7 +13,7 @@ using retrograde::Var;
 
 namespace {
 
-constexpr int cell = 20;       // pixels
+constexpr int cell_pixels = 20;
 constexpr double bin = 0.033;  // of brightness
 constexpr double darkest =
     -0.25;  // what lies further out, as rings may, counts as this and as 1.25
@@ -21,9 +21,9 @@ constexpr int bins = 47;
 // Added to each cell: this many pixels of the image's own brightness, to avoid a division by 0 in empty cells.
 constexpr double prior = 1e-3;
 
-class Grid {
+class BilateralGrid {
  public:
-  Grid(Func image, const ImageParam& smoothing, int width, int height, Type scalar)
+  BilateralGrid(Func image, const ImageParam& smoothing, int width, int height, Type scalar)
       : image_(std::move(image)),
         smoothing_(smoothing),
         width_(width),
@@ -51,9 +51,9 @@ class Grid {
 
   // The border's pixels are repeated where a cell extends beyond it.
   Func splat() {
-    const RDom r(0, cell, 0, cell, 0, 2, "pixel");
-    const Expr x = clamp(x_ * cell + r.x - cell / 2, 0, width_ - 1);
-    const Expr y = clamp(y_ * cell + r.y - cell / 2, 0, height_ - 1);
+    const RDom r(0, cell_pixels, 0, cell_pixels, 0, 2, "pixel");
+    const Expr x = clamp(x_ * cell_pixels + r.x - cell_pixels / 2, 0, width_ - 1);
+    const Expr y = clamp(y_ * cell_pixels + r.y - cell_pixels / 2, 0, height_ - 1);
     const Expr below = floor(place_(x, y, n_)), above = place_(x, y, n_) - below;
     const Expr share = select(r.z == 0, number(1) - above, above);
     const Expr z = clamp(retrograde::cast<int>(below), 0, bins - 2) + r.z;
@@ -82,12 +82,12 @@ class Grid {
   Tuple slice(const Func& grid) {
     const Expr below = floor(place_(x_, y_, n_)), above = place_(x_, y_, n_) - below;
     const Expr z = clamp(retrograde::cast<int>(below), 0, bins - 2);
-    const Expr fx = retrograde::cast(scalar_, x_ % cell) * number(1.0 / cell);
-    const Expr fy = retrograde::cast(scalar_, y_ % cell) * number(1.0 / cell);
+    const Expr fx = retrograde::cast(scalar_, x_ % cell_pixels) * number(1.0 / cell_pixels);
+    const Expr fy = retrograde::cast(scalar_, y_ % cell_pixels) * number(1.0 / cell_pixels);
     const auto mix = [](const Expr& a, const Expr& b, const Expr& f) { return a + f * (b - a); };
     const auto value = [&](int k) {
       const auto at = [&](int dx, int dy, int dz) {
-        return Expr(Tuple(grid(x_ / cell + dx, y_ / cell + dy, z + dz, n_))[k]);
+        return Expr(Tuple(grid(x_ / cell_pixels + dx, y_ / cell_pixels + dy, z + dz, n_))[k]);
       };
       const auto along_z = [&](int dx, int dy) { return mix(at(dx, dy, 0), at(dx, dy, 1), above); };
       return mix(mix(along_z(0, 0), along_z(1, 0), fx), mix(along_z(0, 1), along_z(1, 1), fx), fy);
@@ -106,7 +106,7 @@ class Grid {
 }  // namespace
 
 Func clean(const Func& image, const ImageParam& smoothing, int width, int height, Type scalar) {
-  return Grid(image, smoothing, width, height, scalar).cleaned();
+  return BilateralGrid(image, smoothing, width, height, scalar).cleaned();
 }
 
 }  // namespace deconvolution

@@ -20,14 +20,6 @@ namespace {
 // pieces count less than that.
 constexpr double usual_error = 2e-3;
 
-const lang::Var x("x"), y("y"), n("n");
-
-void compile(lang::Pipeline& pipeline, int threads) {
-  const auto target = lang::get_jit_target_from_environment();
-  pipeline.auto_schedule(target, demosaic::machine_of(threads));
-  pipeline.compile_jit(target);
-}
-
 std::vector<int> full_sizes(const Extent& e) { return {e.full_width(), e.full_height(), e.count}; }
 
 }  // namespace
@@ -54,6 +46,7 @@ template <typename T>
 void Objective<T>::compile_loss(int threads) {
   const auto number = [](double value) { return lang::cast(lang::type_of<T>(), Expr(value)); };
   const Extent& e = extent_;
+  const lang::Var x("x"), y("y"), n("n");
   Func error("error"), sum("sum"), loss("loss");
   error(x, y, n) = result_(x + e.margin(), y + e.margin(), n) - truth_(x, y, n);
   const lang::RDom seen(0, e.width, 0, e.height, "seen"), each(0, e.count, "each");
@@ -64,11 +57,12 @@ void Objective<T>::compile_loss(int threads) {
   loss() += number(10 / std::numbers::ln10 / e.count) * lang::log(mean + number(usual_error));
   const auto adjoints = lang::propagate_adjoints(loss, {.wrt = {result_}});
   loss_ = lang::Pipeline({loss, adjoints(result_)});
-  compile(loss_, threads);
+  demosaic::schedule_and_compile(loss_, threads);
 }
 
 template <typename T>
 void Objective<T>::compile_slope(int threads) {
+  const lang::Var x("x"), y("y"), n("n");
   Func direction("direction");
   direction(x, y, n) = lambda_(x, y, n);
   const Func slope =
@@ -79,7 +73,7 @@ void Objective<T>::compile_slope(int threads) {
   std::vector<Func> outputs{(*adjoints_)(stage_.before)};
   for (const Array array : arrays_) outputs.push_back((*adjoints_)(stage_.of(array)));
   slope_ = lang::Pipeline(outputs);
-  compile(slope_, threads);
+  demosaic::schedule_and_compile(slope_, threads);
 }
 
 template <typename T>

@@ -15,14 +15,6 @@ using lang::Func;
 
 namespace {
 
-const lang::Var x("x"), y("y"), n("n");
-
-void compile(lang::Pipeline& pipeline, int threads) {
-  const auto target = lang::get_jit_target_from_environment();
-  pipeline.auto_schedule(target, demosaic::machine_of(threads));
-  pipeline.compile_jit(target);
-}
-
 // A quotient of sums, in the images' type; 0 if the divisor is not positive.
 Expr quotient(lang::Type scalar, const Expr& a, const Expr& b) {
   return lang::cast(scalar, lang::select(b > 0.0, a / lang::select(b > 0.0, b, Expr(1.0)), 0.0));
@@ -75,6 +67,7 @@ template <typename T>
 Func Solver<T>::sum_of_products(const Func& a, const Func& b, const char* name) const {
   const Extent& e = stage_.extent;
   const lang::RDom all(0, e.full_width(), 0, e.full_height(), "all");
+  const lang::Var n("n");
   Func sum(name);
   sum(n) = 0.0;
   sum(n) += lang::cast<double>(a(all.x, all.y, n)) * lang::cast<double>(b(all.x, all.y, n));
@@ -84,14 +77,16 @@ Func Solver<T>::sum_of_products(const Func& a, const Func& b, const char* name) 
 template <typename T>
 void Solver<T>::compile_start(int threads) {
   const auto adjoints = lang::propagate_adjoints(stage_.energy, {.wrt = {stage_.image}});
+  const lang::Var x("x"), y("y"), n("n");
   Func residual("residual");
   residual(x, y, n) = -adjoints(stage_.image)(x, y, n);
   start_ = lang::Pipeline({residual, sum_of_products(residual, residual, "square")});
-  compile(start_, threads);
+  demosaic::schedule_and_compile(start_, threads);
 }
 
 template <typename T>
 void Solver<T>::compile_step(int threads) {
+  const lang::Var x("x"), y("y"), n("n");
   Func direction("direction"), length("length"), ratio("ratio");
   direction(x, y, n) = p_(x, y, n);
   const Func product =
@@ -105,7 +100,7 @@ void Solver<T>::compile_step(int threads) {
   ratio(n) = quotient(stage_.scalar, square(n), square_(n));
   next(x, y, n) = residual(x, y, n) + ratio(n) * p_(x, y, n);
   step_ = lang::Pipeline({image, residual, next, square});
-  compile(step_, threads);
+  demosaic::schedule_and_compile(step_, threads);
 }
 
 template <typename T>

@@ -15,7 +15,7 @@ namespace {
 constexpr int median_rounds = 3;
 constexpr int ball = 2;  // radius of the neighbourhood in which homogeneity is counted
 
-Expr decoded(const Expr& v) {
+Expr linear_light(const Expr& v) {
   return lang::select(v <= 0.04045f, v / 12.92f,
                       lang::pow((lang::max(v, 0.0f) + 0.055f) / 1.055f, 2.4f));
 }
@@ -61,7 +61,7 @@ void Ahd::define_lab() {
                                   {0.212671f, 0.715160f, 0.072169f},
                                   {0.017758f, 0.109477f, 0.872765f}};
   Func light("light"), curved("curved");
-  light(x, y, c, d) = decoded(candidate(x, y, c, d));
+  light(x, y, c, d) = linear_light(candidate(x, y, c, d));
   const auto row = [&](int n) {
     return to_xyz[n][0] * light(x, y, 0, d) + to_xyz[n][1] * light(x, y, 1, d) +
            to_xyz[n][2] * light(x, y, 2, d);

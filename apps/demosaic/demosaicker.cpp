@@ -19,6 +19,12 @@ lang::MachineParams machine_of(int threads) {
   return {threads, cache_bytes, lang::MachineParams().balance};
 }
 
+void schedule_and_compile(lang::Pipeline& pipeline, int threads) {
+  const auto target = lang::get_jit_target_from_environment();
+  pipeline.auto_schedule(target, machine_of(threads));
+  pipeline.compile_jit(target);
+}
+
 std::string name_of(const Shape& shape) {
   return retrograde::text("relaxed ", shape.filters, " ", shape.size, "x", shape.size);
 }
@@ -55,9 +61,7 @@ void Demosaicker::use(const Weights& weights) {
 void Demosaicker::compile(lang::Func image) {
   image.set_estimates({{0, usual_width}, {0, usual_height}, {0, 3}});
   pipeline_ = lang::Pipeline(image);
-  const auto target = lang::get_jit_target_from_environment();
-  pipeline_.auto_schedule(target, machine_of(threads_));
-  pipeline_.compile_jit(target);
+  schedule_and_compile(pipeline_, threads_);
 }
 
 void Demosaicker::run_into(std::vector<float>& mosaic, int width, int height,

@@ -42,6 +42,8 @@ class Demosaicker {
 
 // This machine's threads and caches, for the autoscheduler.
 lang::MachineParams machine_of(int threads);
+// Schedules the pipeline for this machine and compiles it.
+void schedule_and_compile(lang::Pipeline& pipeline, int threads);
 // "relaxed 9 5x5"
 std::string name_of(const Shape& shape);
 

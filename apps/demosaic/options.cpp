@@ -11,7 +11,7 @@ namespace {
 
 constexpr long usual_steps = 4000;
 
-void check(const Options& options) {
+void require_valid(const Options& options) {
   if (options.common.input.empty() && options.dataset.empty()) {
     apps::refuse_command_line("there must be a picture to demosaic or photographs to learn from",
                               "neither --input nor --dataset was given",
@@ -66,7 +66,7 @@ std::optional<Options> read_options(int argc, char** argv) {
                "with --compare: also measure the time of a learning step with fewer groups");
   cli.add_flag("--brief", options.brief, "leave out the shipped variants");
   if (!apps::parse_command_line(cli, argc, argv, options.common)) return std::nullopt;
-  check(options);
+  require_valid(options);
   return options;
 }
 

@@ -114,11 +114,7 @@ TrainingPipeline::TrainingPipeline(const Shape& shape, const BatchShape& batch,
   pipeline = lang::Pipeline(outputs);
 }
 
-void TrainingPipeline::compile(int threads) {
-  const auto target = lang::get_jit_target_from_environment();
-  pipeline.auto_schedule(target, machine_of(threads));
-  pipeline.compile_jit(target);
-}
+void TrainingPipeline::compile(int threads) { schedule_and_compile(pipeline, threads); }
 
 // Only by the learned arrays, so that explain() describes the program that runs.
 lang::Derivative TrainingPipeline::differentiate() const {
