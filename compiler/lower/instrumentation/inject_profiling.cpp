@@ -31,11 +31,11 @@ namespace retrograde::lower {
 
 namespace {
 
-const char* const run_name = "profiler.run";
-const char* const place_name = "profiler.place";
+const char* const run_variable = "profiler.run";
+const char* const place_variable = "profiler.place";
 constexpr int64_t stack_block_bytes = 16 << 10;
 
-Expr run() { return variable(run_name, Handle()); }
+Expr run() { return variable(run_variable, Handle()); }
 
 // Whether the allocation is small enough that code generation usually puts it on the stack.
 bool is_small(const Allocate& n) {
@@ -62,7 +62,7 @@ class Profiling : public StatementRewriter {
   // Code that runs on a thread of its own, with its own slot.
   Stmt on_a_thread(const Stmt& s) {
     const std::string outer = place_;
-    place_ = places_ == 0 ? place_name : place_name + ("." + std::to_string(places_));
+    place_ = places_ == 0 ? place_variable : place_variable + ("." + std::to_string(places_));
     places_++;
     const Expr place =
         call_runtime("retrograde_profiler_thread", {run(), Expr(current_)}, Handle());
@@ -159,7 +159,7 @@ Stmt inject_profiling(const Stmt& s, const Program& program, const std::string& 
   const auto wrap = [&](const Stmt& work) {
     const Expr begin = call_runtime("retrograde_profiler_begin",
                                     {Expr(pipeline), Expr(profiling.names)}, Handle());
-    return make_let(run_name, begin,
+    return make_let(run_variable, begin,
                     make_block({profiling.on_a_thread(work),
                                 make_evaluate(call_runtime("retrograde_profiler_end", {run()}))}));
   };
