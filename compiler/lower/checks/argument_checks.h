@@ -9,9 +9,6 @@
 //      - if every output is empty, the function returns;
 //      - every buffer has memory, is dense and contains its required box.
 //      Messages name the buffer, the dimension and both boxes.
-//
-// The checks of every buffer are two calls of the runtime (runtime/buffer.cpp), because inline checks took longer to
-// compile than a small kernel. Asserts that generate no code tell the simplifier what these calls guarantee.
 #pragma once
 
 #include "ir/lowered_function.h"
@@ -22,8 +19,5 @@ namespace retrograde::lower {
 // `has_device`: data may be in device memory only.
 Stmt add_argument_checks(const Stmt& s, const std::vector<LoweredArgument>& args,
                          const Program& program, bool has_device);
-
-// Whether the statement is such a call of the runtime, which returns from the function if the check fails.
-bool is_check_by_runtime(const Stmt& s);
 
 }  // namespace retrograde::lower

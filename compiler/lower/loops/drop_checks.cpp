@@ -17,7 +17,7 @@
 #include "diagnostics/error.h"
 #include "ir/build.h"
 #include "ir/visit.h"
-#include "lower/checks/argument_checks.h"
+#include "lower/checks/buffer_checks.h"
 #include "lower/checks/run_time_check.h"
 #include "lower/statement_rewriter.h"
 #include "retrograde_runtime.h"
