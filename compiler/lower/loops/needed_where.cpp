@@ -149,6 +149,10 @@ Expr without_reads(const Expr& condition, FunctionRef<bool(const Call&)> may_rea
   });
 }
 
+Expr without_reads(const Expr& condition) {
+  return without_reads(condition, [](const Call&) { return false; });
+}
+
 Expr without_calls(const Expr& condition) {
   return without_parts(condition, [](const Expr& part) {
     return any_node(part, [](const Call& call) { return call.call_type == CallType::Extern; });

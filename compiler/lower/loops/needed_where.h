@@ -39,6 +39,8 @@ Expr from_outside(const Expr& condition, const Binder& binder, AtLoops at_loops)
 
 // Without the parts that read Funcs or images for which `may_read` is false.
 Expr without_reads(const Expr& condition, FunctionRef<bool(const Call&)> may_read);
+// Without the parts that read Funcs or images.
+Expr without_reads(const Expr& condition);
 
 // Without the parts that call C functions.
 Expr without_calls(const Expr& condition);
