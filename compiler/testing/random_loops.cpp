@@ -1,18 +1,18 @@
 // Draws random loop directives. They are legal by construction:
 // - reduction loops keep their order and run serially, unless the iterations are independent or the update is
 //   associative and atomic;
-// - outputs are rounded up or shifted inwards only if the extents of all runs allow it;
+// - the tail of a split is legal for its loop (schedules/tails.h);
 // - a loop inside a vectorized one has a constant extent.
 #include "testing/random_loops.h"
 
 #include <algorithm>
-#include <functional>
 #include <map>
 
 #include "graph/definitions/associative_update.h"
 #include "graph/definitions/race_checks.h"
 #include "graph/names.h"
 #include "ir/build.h"
+#include "testing/schedules/tails.h"
 
 namespace retrograde::fuzz {
 
@@ -101,7 +101,8 @@ class LoopScheduler {
     Loop outer = old, inner = old;
     outer.name = outer_name;
     inner.name = names_.fresh(stem(old) + "i");
-    add(graph::SplitLoop{old.name, outer.name, inner.name, factor, choose_tail(old, factor)});
+    add(graph::SplitLoop{old.name, outer.name, inner.name, factor,
+                         random_tail(old, factor, context_, random_)});
     outer.is_original = inner.is_original = false;
     outer.extent =
         old.extent == unknown_extent ? unknown_extent : (old.extent + factor - 1) / factor;
@@ -115,40 +116,6 @@ class LoopScheduler {
   // The stem of new names, which marks reduction loops.
   static std::string stem(const Loop& loop) {
     return loop.is_reduction ? "rr" : loop.name.substr(0, 1);
-  }
-
-  TailStrategy choose_tail(const Loop& loop, int factor) {
-    std::vector<TailStrategy> legal = {TailStrategy::GuardWithIf, TailStrategy::GuardWithIf,
-                                       TailStrategy::Predicate};
-    if (loop.is_reduction) {
-      legal.push_back(TailStrategy::Auto);
-      return random_.pick(legal);
-    }
-    const bool inside_output = !context_.output_extents.empty();
-    if (!loop.is_original && (inside_output || context_.is_update)) return random_.pick(legal);
-    const bool fits = fits_output(loop, factor), divides = divides_output(loop, factor);
-    if (fits && !context_.is_update) legal.push_back(TailStrategy::ShiftInwards);
-    if (context_.is_update ? divides : fits) legal.push_back(TailStrategy::Auto);
-    if (divides) {
-      legal.insert(legal.end(), {TailStrategy::RoundUp, TailStrategy::RoundUp});
-      if (loop.is_original) {
-        legal.insert(legal.end(), {TailStrategy::PredicateLoads, TailStrategy::PredicateStores});
-      }
-    }
-    return random_.pick(legal);
-  }
-
-  bool fits_output(const Loop& loop, int factor) const {
-    return holds_for_output(loop, [&](int extent) { return extent >= factor; });
-  }
-  bool divides_output(const Loop& loop, int factor) const {
-    return holds_for_output(loop, [&](int extent) { return extent % factor == 0; });
-  }
-  bool holds_for_output(const Loop& loop, const std::function<bool(int)>& test) const {
-    if (context_.output_extents.empty()) return true;
-    if (loop.dimension < 0) return false;
-    const std::vector<int>& extents = context_.output_extents[loop.dimension];
-    return std::all_of(extents.begin(), extents.end(), test);
   }
 
   void fuse() {
