@@ -57,6 +57,11 @@ size_t count(const Shape& shape) {
   return n;
 }
 
+std::vector<std::shared_ptr<ParameterContents>> floating_inputs(const Func& output) {
+  return filtered(parameters_of({output.function()}),
+                  [](const auto& p) { return p->type.is_float(); });
+}
+
 Shape shape_of_bound(const ParameterContents& p) {
   Shape shape;
   for (int d = 0; p.buffer && d < p.dimensions; ++d) {

@@ -32,6 +32,8 @@ struct Shape {
   std::vector<int> mins, extents;
 };
 size_t count(const Shape& shape);
+// The images and scalars of floats that the output depends on.
+std::vector<std::shared_ptr<ParameterContents>> floating_inputs(const Func& output);
 // The shape of the bound buffer; empty for a scalar or without a buffer.
 Shape shape_of_bound(const ParameterContents& p);
 // The shape from `mins`, where empty means zeros, and `sizes`. If one does not fit the output, throws

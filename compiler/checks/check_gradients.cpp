@@ -5,15 +5,12 @@
 #include <map>
 #include <random>
 
-#include "autodiff/sweeps/custom_rules.h"
 #include "autodiff/sweeps/regions.h"
-#include "autodiff/tangents.h"
 #include "checks/arrays.h"
+#include "checks/derivative_pair.h"
 #include "checks/slopes.h"
 #include "checks/widen.h"
 #include "diagnostics/error.h"
-#include "frontend/data/image_param.h"
-#include "ir/build.h"
 
 namespace retrograde {
 
@@ -31,15 +28,12 @@ class Checker {
         random_(options.seed) {
     widen({output.function()});  // throws first for operations without a meaning in double
     draw_weights();
-    for (const auto& p : parameters_of({output.function()})) {
-      if (p->type.is_float()) own_inputs_.push_back(p);
-    }
     check_wrt();
   }
 
   GradientReport run() {
     differentiate();
-    for (Input& input : inputs_) {
+    for (Input& input : pair_->inputs()) {
       if (is_wanted(input)) check(input);
     }
     compare_funcs();
@@ -65,10 +59,9 @@ class Checker {
     return options_.wrt.empty();
   }
   void check_wrt() const {
+    const auto inputs = floating_inputs(output_);
     for (const AdjointInput& w : options_.wrt) {
-      bool found = false;
-      for (const auto& own : own_inputs_) found |= own == w.symbol();
-      if (!found) {
+      if (std::ranges::find(inputs, w.symbol()) == inputs.end()) {
         user_error(asked(), "`wrt` names floating inputs that the output depends on",
                    "it names something else", "Give an ImageParam, a Buffer or a Param");
       }
@@ -97,104 +90,26 @@ class Checker {
       unsupported(asked(), "derivatives are of floats", "the output has integers only",
                   "Check a Func of floats");
   }
-  // The weights as a Func with the types of `of`.
-  Func seed(const Func& of) {
-    std::vector<Expr> values;
-    for (size_t k = 0; k < weights_.size(); ++k) {
-      if (weights_[k].empty()) {
-        values.push_back(0.0f);
-        continue;
-      }
-      Buffer<> buffer = new_buffer(of.types()[k], shape_);
-      fill(buffer, weights_[k]);
-      std::vector<Expr> point;
-      for (const Var& v : of.args()) point.push_back(v);
-      values.push_back(buffer(point));
-    }
-    Func result("weights");
-    result(of.args()) = Tuple(values);
-    return result;
-  }
-  Region bounds() const { return region_of(shape_); }
 
   void differentiate() {
-    const AdjointOptions store{.overwritten = Overwritten::Store};
-    own_ =
-        std::make_unique<Derivative>(propagate_adjoints(output_, seed(output_), bounds(), store));
-    std::vector<FuncPtr> all{output_.function()};
-    if (has_rules()) add_adjoints(all);
-    widened_ = widen(all);
-    wide_output_ = Func(widened_.funcs.at(output_.function().get()));
-    if (!has_rules()) {
-      wide_ = std::make_unique<Derivative>(
-          propagate_adjoints(wide_output_, seed(wide_output_), bounds(), store));
-    }
-    for (const auto& p : parameters_of(all)) bind(p);
+    pair_ = std::make_unique<DerivativePair>(output_, shape_, weights_, asked());
     Func primal = scheduled_for(output_, shape_);
     report_.primal_seconds = timed_warm([&] { return realize_values(primal, shape_); }).seconds;
-    slopes_ = std::make_unique<Slopes>(wide_output_, shape_, weights_, inputs_);
+    slopes_ = std::make_unique<Slopes>(pair_->wide_output(), shape_, weights_, pair_->inputs());
     report_.complex_step_refused = slopes_->complex_step_refused();
-  }
-  // Custom derivative rules consist of Funcs in the user's precision. To check them, the Funcs of the adjoint are
-  // widened to double; their constants keep their values. Without custom rules the widened graph is differentiated.
-  bool has_rules() const {
-    const auto order = topological_order({output_.function()});
-    return std::any_of(order.begin(), order.end(),
-                       [](const FuncPtr& f) { return f->custom_derivatives != nullptr; });
-  }
-  void add_adjoints(std::vector<FuncPtr>& to) const {
-    for (const auto& p : own_inputs_) to.push_back(own_->of(AdjointInput(p)).function());
-    for (const FuncPtr& f : topological_order({output_.function()})) {
-      if (own_->has(Func(f))) to.push_back(own_->adjoint(Func(f)).function());
-    }
-  }
-  // The adjoint of `input`, whose copy in double is `wide`.
-  Func wide_adjoint(const AdjointInput& input, const AdjointInput& wide) const {
-    if (wide_) return wide_->of(wide);
-    return Func(widened_.funcs.at(own_->of(input).function().get()));
-  }
-  // Binds parameters other than the inputs: weights, and parameters that custom rules read.
-  void bind(const std::shared_ptr<ParameterContents>& p) {
-    auto wide = widened_.parameters.find(p.get());
-    if (wide == widened_.parameters.end()) return;
-    Input bound = bind_wide(p, wide->second, asked());
-    if (std::ranges::find(own_inputs_, p) != own_inputs_.end()) inputs_.push_back(bound);
-  }
-
-  // The tangent in double. Funcs without a custom tangent rule are differentiated.
-  Func tangent(const Input& input, const Buffer<>& direction) const {
-    for (const FuncPtr& f : topological_order({output_.function()})) {
-      if (autodiff::has_custom_tangent(*f)) return tangent_by_rules(input, direction);
-    }
-    return propagate_tangents(wide_output_, {{AdjointInput(input.wide), direction}})(wide_output_);
-  }
-  Func tangent_by_rules(const Input& input, const Buffer<>& direction) const {
-    Func own = propagate_tangents(output_, {{AdjointInput(input.own), direction}})(output_);
-    Widened widened = widen({own.function()});
-    for (const auto& p : parameters_of({own.function()})) {
-      auto wide = widened.parameters.find(p.get());
-      if (wide == widened.parameters.end()) continue;
-      if (p == direction.parameter()) {
-        ImageParam(wide->second).set(direction);
-      } else {
-        bind_wide(p, wide->second, asked());
-      }
-    }
-    return Func(widened.funcs.at(own.function().get()));
   }
 
   void check(Input& input) {
     const bool has_complex_step = slopes_->complex_step_refused().empty();
     GradientReport::Input result;
     result.name = input.own->name;
-    Func own = own_->of(AdjointInput(input.own)),
-         wide = wide_adjoint(AdjointInput(input.own), AdjointInput(input.wide));
+    Func own = pair_->own_adjoint(input), wide = pair_->wide_adjoint(input);
     const auto g_own = timed_warm([&] { return realize(own, input.shape); });
     const auto g = timed_warm([&] { return realize(wide, input.shape); });
     report_.adjoint_seconds += g_own.seconds;
 
     Buffer<> direction = new_buffer(Float(64), input.shape);
-    Func moved = tangent(input, direction);
+    Func moved = pair_->tangent(input, direction);
     for (int d = 0; d < options_.directions; ++d) {
       Values v = own_precision(random_values(count(input.shape)));
       fill(direction, v);
@@ -251,9 +166,9 @@ class Checker {
     Batch own, wide;
     for (const FuncPtr& f : order) {
       auto shape = constant_shape(regions.of(f.get()));
-      Func adjoint = own_->adjoint(Func(f));
+      Func adjoint = pair_->own_adjoint(f);
       if (!shape || shape->extents.size() != f->args.size() || !adjoint.defined()) continue;
-      Func in_double = wide_adjoint(Func(f), Func(widened_.funcs.at(f.get())));
+      Func in_double = pair_->wide_adjoint(f);
       if (!in_double.defined()) continue;
       funcs.push_back(f.get());
       own.add(adjoint, *shape);
@@ -276,12 +191,8 @@ class Checker {
   Shape shape_;
   GradientCheckOptions options_;
   std::mt19937_64 random_;
-  std::vector<std::shared_ptr<ParameterContents>> own_inputs_;
   std::vector<Values> weights_;
-  std::unique_ptr<Derivative> own_, wide_;  // wide_: null if there are custom derivative rules
-  Widened widened_;
-  Func wide_output_;
-  std::vector<Input> inputs_;
+  std::unique_ptr<DerivativePair> pair_;
   std::unique_ptr<Slopes> slopes_;
   GradientReport report_;
 };

@@ -2,11 +2,11 @@
 
 #include <cmath>
 #include <limits>
-#include <random>
 
 #include "autodiff/sweeps/regions.h"
 #include "checks/arrays.h"
 #include "checks/culprit.h"
+#include "checks/stability_inputs.h"
 #include "checks/widen.h"
 #include "diagnostics/error.h"
 #include "frontend/data/param.h"
@@ -18,36 +18,6 @@ namespace {
 using namespace checks;
 using checks::Values;
 using Limits = std::numeric_limits<float>;
-
-// The largest, the smallest normal and the smallest number of a type. Inputs in double are limited to the range of
-// float32, since nothing exists to compare larger values with.
-struct Ends {
-  double max, min, denormal;
-};
-Ends ends_of(Type type) {
-  if (type == Float(16)) return {65504.0, std::ldexp(1.0, -14), std::ldexp(1.0, -24)};
-  if (type == BFloat(16))
-    return {std::ldexp(255.0, 120), std::ldexp(1.0, -126), std::ldexp(1.0, -133)};
-  return {Limits::max(), Limits::min(), Limits::denorm_min()};
-}
-double magnitude(Extreme extreme, Type type) {
-  const Ends ends = ends_of(type);
-  switch (extreme) {
-    case Extreme::Zeros:
-      return 0;
-    case Extreme::Denormals:
-      return ends.denormal * 100;
-    case Extreme::Huge:
-      return ends.max / 4;
-    case Extreme::Tiny:
-      return ends.min * 2;
-    case Extreme::Infinities:
-      return std::numeric_limits<double>::infinity();
-    case Extreme::NaNs:
-      return std::numeric_limits<double>::quiet_NaN();
-  }
-  return 0;
-}
 
 // A Func or adjoint to compare with double. The version in double has the same definitions, so the two differ only by
 // rounding.
@@ -67,31 +37,31 @@ class StabilityChecker {
         asked_("check the stability of " + retrograde::quoted(output.name())),
         shape_(shape_of_output(output, options.mins, sizes, asked_, "check_stability")),
         options_(options),
-        random_(options.seed) {
+        inputs_(options) {
     amount_.set(0);
     seed_.set(0);
     watch();
-    check_ranges();
+    inputs_.check_ranges(asked_);
   }
-  ~StabilityChecker() { restore(); }
+  ~StabilityChecker() { inputs_.restore(); }
 
   StabilityReport run() {
     add_case("as bound");
     estimate(report_.cases.back());
     for (Extreme extreme : options_.extremes) {
-      replace_some(extreme);
+      inputs_.replace_some(extreme);
       add_case(to_string(extreme));
-      restore();
+      inputs_.restore();
     }
     if (!options_.ranges.empty()) {
       for (int s = 0; s < options_.samples; ++s) {
-        draw([&](const InputRange& r) { return inside(r); });
+        inputs_.draw_in_ranges();
         add_case("in the ranges");
         if (s == 0) estimate(report_.cases.back());
       }
-      draw([&](const InputRange& r) { return random_() % 2 ? r.low : r.high; });
+      inputs_.draw_ends_of_ranges();
       add_case("at the ends of the ranges");
-      restore();
+      inputs_.restore();
     }
     return std::move(report_);
   }
@@ -128,8 +98,7 @@ class StabilityChecker {
       }
     }
     watched_.insert(watched_.end(), adjoints.rbegin(), adjoints.rend());
-    for (const auto& p : parameters_of({output_.function()})) {
-      if (!p->type.is_float()) continue;
+    for (const auto& p : floating_inputs(output_)) {
       if (derivative.has(AdjointInput(p)))
         watched_.push_back({p->name, true, derivative.of(AdjointInput(p)), shape_of_bound(*p)});
     }
@@ -158,68 +127,8 @@ class StabilityChecker {
       own_.add(w.own, w.shape);
       wide_.add(Func(widened.funcs.at(w.own.function().get())), w.shape);
     }
-    for (const auto& p : parameters_of({output_.function()})) {
-      if (p->type.is_float())
-        inputs_.push_back(bind_wide(p, widened.parameters.at(p.get()), asked_));
-    }
-    for (const Input& input : inputs_) now_.push_back(input.values);
-  }
-
-  // ---- the inputs ----
-
-  void check_ranges() {
-    for (const InputRange& r : options_.ranges) {
-      if (!(std::isfinite(r.low) && std::isfinite(r.high) && r.low <= r.high)) {
-        user_error(asked_, "a range has two finite ends, the lower first",
-                   text("there is one from ", r.low, " to ", r.high),
-                   "Give the lower end first, and leave infinities to StabilityOptions::extremes");
-      }
-      bool found = false;
-      for (const Input& input : inputs_) found |= input.own == r.input.symbol();
-      if (!found) {
-        user_error(asked_, "a range belongs to a floating input that the output depends on",
-                   "there is one of something else", "Give an ImageParam, a Buffer or a Param");
-      }
-    }
-  }
-  void set(size_t i, const Values& values) {
-    now_[i] = values;
-    inputs_[i].set_own(values);
-    inputs_[i].set_wide(values);
-  }
-  void restore() {
-    for (size_t i = 0; i < inputs_.size(); ++i) set(i, inputs_[i].values);
-  }
-  void replace_some(Extreme extreme) {
-    for (size_t k = 0; k < inputs_.size(); ++k) {
-      Values values = inputs_[k].values;
-      bool any = false;
-      for (size_t i = 0; i < values.size(); ++i) {
-        bool chosen = random_() % 4 == 0 || (i + 1 == values.size() && !any);
-        if (!chosen) continue;
-        any = true;
-        values[i] = magnitude(extreme, inputs_[k].own->type) * (random_() % 2 ? 1 : -1);
-      }
-      set(k, values);
-    }
-  }
-  template <class Pick>
-  void draw(Pick pick) {
-    for (const InputRange& range : options_.ranges) {
-      for (size_t k = 0; k < inputs_.size(); ++k) {
-        if (inputs_[k].own != range.input.symbol()) continue;
-        Values values = inputs_[k].values;
-        for (double& v : values) v = held_by(inputs_[k].own->type, pick(range));
-        set(k, values);
-      }
-    }
-  }
-  double inside(const InputRange& range) {
-    std::uniform_real_distribution<double> at(0, 1);
-    const double t = at(random_);
-    if (range.low > 0 && range.high > 1000 * range.low)
-      return range.low * std::pow(range.high / range.low, t);
-    return range.low + (range.high - range.low) * t;
+    for (const auto& p : floating_inputs(output_))
+      inputs_.add(bind_wide(p, widened.parameters.at(p.get()), asked_));
   }
 
   // ---- errors ----
@@ -263,19 +172,13 @@ class StabilityChecker {
   // ---- estimates: computed in double, whose own rounding is negligible ----
 
   void estimate(StabilityReport::Case& to) {
-    const double eps = Limits::epsilon();
     const Arrays base = wide_.realize();
-    std::uniform_real_distribution<double> rounding(-eps, eps);
     for (int n = 0; n < options_.perturbations; ++n) {
-      for (size_t k = 0; k < inputs_.size(); ++k) {
-        Values moved = now_[k];
-        for (double& v : moved) v *= 1 + rounding(random_);
-        inputs_[k].set_wide(moved);
-      }
+      inputs_.round_at_random();
       grow(to, base, &StabilityReport::FuncResult::condition);
     }
-    for (size_t k = 0; k < inputs_.size(); ++k) inputs_[k].set_wide(now_[k]);
-    amount_.set(eps / 2);
+    inputs_.undo_rounding();
+    amount_.set(Limits::epsilon() / 2);
     for (int n = 0; n < options_.perturbations; ++n) {
       seed_.set(n + 1);
       grow(to, base, &StabilityReport::FuncResult::rounding);
@@ -304,13 +207,11 @@ class StabilityChecker {
   std::string asked_;
   Shape shape_;
   StabilityOptions options_;
-  std::mt19937_64 random_;
+  StabilityInputs inputs_;
   Param<double> amount_{"rounding_amount"};
   Param<int> seed_{"rounding_seed"};
   std::vector<Watched> watched_;
   Batch own_, wide_;  // the watched Funcs in their own precision and in double
-  std::vector<Input> inputs_;
-  std::vector<Values> now_;  // current values of the inputs
   StabilityReport report_;
 };
 

@@ -5,6 +5,7 @@
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
 #include "diagnostics/pass_observer.h"
+#include "ir/buffer_metadata.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/validate.h"
@@ -208,10 +209,8 @@ std::vector<std::string> names_of(const std::vector<LoweredArgument>& args, Phas
   std::vector<std::string> names;
   for (const LoweredArgument& arg : args) {
     names.push_back(arg.is_buffer() ? arg.name + ".buffer" : arg.name);
-    for (int d = 0; d < arg.dimensions && phase == Phase::Nests; d++) {
-      for (const char* fact : {".min.", ".extent.", ".stride."})
-        names.push_back(arg.name + fact + std::to_string(d));
-    }
+    if (phase == Phase::Nests)
+      append(names, metadata_names(arg.name, static_cast<size_t>(arg.dimensions)));
   }
   return names;
 }

@@ -7,6 +7,7 @@
 #include "graph/definitions/define.h"
 #include "graph/definitions/definition_rules.h"
 #include "graph/directives/wrappers.h"
+#include "ir/buffer_metadata.h"
 #include "ir/literal.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -43,6 +44,12 @@ Expr as_size(const Expr& e, const std::string& asked) {
   return ir::int32_literal(e, asked);
 }
 
+Expr metadata_of(const std::shared_ptr<graph::ParameterContents>& buffer, ir::Metadata what,
+                 int d) {
+  return ir::variable(ir::metadata_name(buffer->name, what, static_cast<size_t>(d)), Int(32),
+                      ir::SymbolRef(buffer));
+}
+
 }  // namespace
 
 Dimension::Dimension(std::shared_ptr<graph::ParameterContents> parameter, int d)
@@ -53,14 +60,9 @@ Dimension::Dimension(std::shared_ptr<graph::ParameterContents> parameter, int d)
              text("it has ", parameter_->dimensions, " dimensions"), "Give a number below that");
 }
 
-Expr Dimension::fact(const char* which) const {
-  return ir::variable(text(parameter_->name, ".", which, ".", d_), Int(32),
-                      ir::SymbolRef(parameter_));
-}
-
-Expr Dimension::min() const { return fact("min"); }
-Expr Dimension::extent() const { return fact("extent"); }
-Expr Dimension::stride() const { return fact("stride"); }
+Expr Dimension::min() const { return metadata_of(parameter_, ir::Metadata::Min, d_); }
+Expr Dimension::extent() const { return metadata_of(parameter_, ir::Metadata::Extent, d_); }
+Expr Dimension::stride() const { return metadata_of(parameter_, ir::Metadata::Stride, d_); }
 
 void Dimension::set(Expr graph::BufferConstraint::*field, Expr value, const char* which) {
   const std::string asked =

@@ -50,7 +50,6 @@ class Dimension {
 
  private:
   graph::BufferConstraint& constraint() const { return parameter_->constraints[d_]; }
-  Expr fact(const char* which) const;
   void set(Expr graph::BufferConstraint::*field, Expr value, const char* which);
   std::shared_ptr<graph::ParameterContents> parameter_;
   int d_;

@@ -225,7 +225,8 @@ class Replay {
   void note_parameters(const Expr& e) {
     if (!e.defined()) return;
     walk(e, [&](const Variable& v) {
-      if (v.symbol.defined() || names_.parameters.count(v.name) || names_.buffer_of_fact(v.name))
+      if (v.symbol.defined() || names_.parameters.count(v.name) ||
+          names_.buffer_of_metadata(v.name))
         return;
       const auto parameter = std::make_shared<ParameterContents>();
       parameter->name = v.name;

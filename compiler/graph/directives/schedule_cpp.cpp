@@ -9,6 +9,7 @@
 #include "graph/directives/directive_choices.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/names.h"
+#include "ir/buffer_metadata.h"
 #include "ir/print.h"
 #include "ir/text.h"
 #include "ir/visit.h"
@@ -248,10 +249,10 @@ class CppPrinter {
   }
   // A Param, or buffer metadata: input.extent.1
   std::string parameter(const std::string& name) {
-    const size_t last = name.rfind('.'), fact = last ? name.rfind('.', last - 1) : last;
-    if (last == std::string::npos || fact == std::string::npos) return identifiers_(name);
-    return text(identifiers_(name.substr(0, fact)), ".dim(", name.substr(last + 1), ").",
-                name.substr(fact + 1, last - fact - 1), "()");
+    const auto parsed = parse_metadata_name(name);
+    if (!parsed) return identifiers_(name);
+    return text(identifiers_(parsed->buffer), ".dim(", parsed->dimension, ").",
+                ir::to_string(parsed->what), "()");
   }
 
   const ScheduleLog& log_;

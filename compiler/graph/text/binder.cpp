@@ -5,6 +5,7 @@
 
 #include "diagnostics/error.h"
 #include "graph/directives/directive_fields.h"
+#include "ir/buffer_metadata.h"
 #include "ir/build.h"
 #include "ir/lexer.h"
 #include "ir/parse.h"
@@ -48,15 +49,11 @@ Expr parse_with_names(const std::string& text, const NameTypes& types, const Nam
   }
 }
 
-ParameterPtr NamedEntities::buffer_of_fact(const std::string& name) const {
-  for (const char* fact : {".min.", ".extent.", ".stride."}) {
-    const size_t at = name.rfind(fact);
-    if (at == std::string::npos) continue;
-    const std::string buffer = name.substr(0, at);
-    if (const auto* found = find_or_null(parameters, buffer)) return *found;
-    if (const auto* found = find_or_null(outputs, buffer)) return *found;
-  }
-  return nullptr;
+ParameterPtr NamedEntities::buffer_of_metadata(const std::string& name) const {
+  const auto parsed = ir::parse_metadata_name(name);
+  if (!parsed) return nullptr;
+  if (const auto* found = find_or_null(parameters, parsed->buffer)) return *found;
+  return value_or(outputs, parsed->buffer, nullptr);
 }
 
 Expr Binder::operator()(const Expr& root) const {
@@ -112,7 +109,7 @@ SymbolRef Binder::symbol_of(const std::string& name) const {
   if (f_ && std::ranges::find(f_->args, name) != f_->args.end()) return {};
   if (const auto found = names_.parameters.find(name); found != names_.parameters.end())
     return SymbolRef(found->second);
-  const ParameterPtr buffer = names_.buffer_of_fact(name);
+  const ParameterPtr buffer = names_.buffer_of_metadata(name);
   return buffer ? SymbolRef(buffer) : SymbolRef();
 }
 

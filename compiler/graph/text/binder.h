@@ -18,7 +18,7 @@ struct NamedEntities {
   std::map<std::string, ParameterPtr> parameters, outputs;  // outputs: the output buffers of Funcs
 
   // The buffer behind a metadata variable such as "input.extent.1"; null for other names.
-  ParameterPtr buffer_of_fact(const std::string& name) const;
+  ParameterPtr buffer_of_metadata(const std::string& name) const;
 };
 
 // Declares the types that graph text omits where it mentions a Func, an image or a parameter.

@@ -23,6 +23,7 @@
 #include <set>
 
 #include "diagnostics/error.h"
+#include "ir/buffer_metadata.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/nests/root_statement.h"
@@ -233,8 +234,7 @@ class Tracer : public Rewriter {
 std::vector<Range> buffer_region(const LoopedFunc& f) {
   std::vector<Range> region;
   const std::string buffer = value_buffer_name(*f.func, 0);
-  for (int d = 0; d < f.func->dimensions(); d++)
-    region.push_back({variable(text(buffer, ".min.", d)), variable(text(buffer, ".extent.", d))});
+  for (int d = 0; d < f.func->dimensions(); d++) region.push_back(metadata_range(buffer, d));
   return region;
 }
 

@@ -12,6 +12,7 @@
 #include <algorithm>
 
 #include "diagnostics/error.h"
+#include "ir/buffer_metadata.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/nests/extern_stage.h"
@@ -52,10 +53,9 @@ Stmt write(const LoopedFunc& f, const std::string& name, int number) {
   std::vector<Range> region;
   std::vector<Expr> first, strides;
   for (int d = 0; d < f.func->dimensions(); d++) {
-    const auto fact = [&](const char* what) { return variable(text(name, what, d)); };
-    region.push_back({fact(".min."), fact(".extent.")});
-    first.push_back(fact(".min."));
-    strides.push_back(fact(".stride."));
+    region.push_back(metadata_range(name, d));
+    first.push_back(region.back().min);
+    strides.push_back(metadata(name, Metadata::Stride, d));
   }
   const Type type = f.func->types[0];
   const Expr host =

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "diagnostics/error.h"
+#include "ir/buffer_metadata.h"
 #include "ir/build.h"
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
@@ -16,8 +17,9 @@ namespace {
 bool reads_func(const Expr& e, const std::string& func) {
   const Call* call = e.as<Call>();
   const Variable* variable = e.as<Variable>();
+  const auto name = variable ? parse_metadata_name(variable->name) : std::nullopt;
   return (call && call->call_type == CallType::Func && call->name == func) ||
-         (variable && variable->name.rfind(func + ".stride.", 0) == 0);
+         (name && name->buffer == func && name->what == Metadata::Stride);
 }
 
 bool writes_func(const Stmt& s, const std::string& func) {

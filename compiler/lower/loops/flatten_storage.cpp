@@ -22,6 +22,7 @@
 
 #include "diagnostics/error.h"
 #include "graph/function.h"
+#include "ir/buffer_metadata.h"
 #include "ir/build.h"
 #include "ir/memory_reads.h"
 #include "ir/visit.h"
@@ -31,10 +32,6 @@
 namespace retrograde::lower {
 
 namespace {
-
-std::string fact(const std::string& name, const char* what, size_t dimension) {
-  return name + "." + what + "." + std::to_string(dimension);
-}
 
 std::string element_name(const std::string& func, size_t value_count, size_t component) {
   return value_count == 1 ? func : func + "." + std::to_string(component);
@@ -100,8 +97,8 @@ class Flattener : public Rewriter {
     Expr index = first.defined() ? first : Expr(0);
     for (size_t d = 0; d < args.size(); ++d) {
       bool known = realized != layouts_.end();
-      Expr min = known ? realized->second.mins[d] : variable(fact(buffer, "min", d));
-      Expr stride = known ? realized->second.strides[d] : variable(fact(buffer, "stride", d));
+      Expr min = known ? realized->second.mins[d] : metadata(buffer, Metadata::Min, d);
+      Expr stride = known ? realized->second.strides[d] : metadata(buffer, Metadata::Stride, d);
       Expr offset = binary(Kind::Sub, cast_to(Int(32), args[d]), min);
       if (known && realized->second.folds[d].defined())
         offset = binary(Kind::Mod, offset, realized->second.folds[d]);
@@ -145,14 +142,15 @@ class Flattener : public Rewriter {
     for (size_t d = 0; d < dimensions; ++d) {
       const Expr& fold = layout.folds[d];
       Expr min = fold.defined() ? Expr(0) : (*this)(n.bounds[d].min);
-      layout.mins.push_back(bind(fact(n.name, "min", d), min, bindings));
+      layout.mins.push_back(bind(metadata_name(n.name, Metadata::Min, d), min, bindings));
       Expr extent = fold.defined() ? fold : (*this)(n.bounds[d].extent);
-      bool is_named = usage_.variables.count(fact(n.name, "extent", d)) > 0;
-      extents.push_back(is_named ? bind(fact(n.name, "extent", d), extent, bindings) : extent);
+      const std::string name = metadata_name(n.name, Metadata::Extent, d);
+      extents.push_back(usage_.variables.count(name) ? bind(name, extent, bindings) : extent);
     }
     Expr stride = Expr(1), elements = make_const(Int(64), 1);
     for (int d : storage_order(n)) {
-      layout.strides[d] = stride = bind(fact(n.name, "stride", d), stride, bindings);
+      layout.strides[d] = stride =
+          bind(metadata_name(n.name, Metadata::Stride, d), stride, bindings);
       stride = binary(Kind::Mul, stride, extents[d]);
       elements = binary(Kind::Mul, elements, cast_to(Int(64), count_of(extents[d])));
     }

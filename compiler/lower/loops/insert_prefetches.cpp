@@ -15,6 +15,7 @@
 //         test/golden/pipeline/lower_prefetches/, test/unit/lower/prefetch_test.cpp.
 #include "lower/loops/insert_prefetches.h"
 
+#include "ir/buffer_metadata.h"
 #include "ir/build.h"
 #include "ir/markers.h"
 #include "ir/visit.h"
@@ -122,7 +123,7 @@ class Inserter : public StatementRewriter {
   Range extent_of_data(const std::string& name, size_t d) const {
     const LoopedFunc* f = program_.find(name);
     const std::string buffer = f && f->is_output ? value_buffer_name(*f->func, 0) : name;
-    return {variable(text(buffer, ".min.", d)), variable(text(buffer, ".extent.", d))};
+    return metadata_range(buffer, d);
   }
 
   Type type_of_func(const std::string& name) const {

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "diagnostics/error.h"
+#include "ir/buffer_metadata.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "lower/nests/copy_statement.h"
@@ -109,8 +110,7 @@ class RingBuffers : public StatementRewriter {
       copy = binary(Kind::Mod, binary(Kind::Add, copy, here), f.schedule.ring);
     }
     for (size_t d = 0; d < n.bounds.size(); d++) {
-      elements = binary(Kind::Mul, elements,
-                        variable(place.realize->name + ".extent." + std::to_string(d)));
+      elements = binary(Kind::Mul, elements, metadata(place.realize->name, Metadata::Extent, d));
     }
     StorageLayout layout = n.layout;
     layout.first = binary(Kind::Mul, copy, elements);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "diagnostics/error.h"
+#include "ir/buffer_metadata.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/checks/run_time_check.h"
@@ -153,8 +154,7 @@ class Query {
     inputs_.emplace_back(&arg, args.back());
   }
   static Range range_of_image(const ExternArgument& arg, int d) {
-    return {variable(text(arg.buffer->name, ".min.", d)),
-            variable(text(arg.buffer->name, ".extent.", d))};
+    return metadata_range(arg.buffer->name, d);
   }
   Box box_in(const Expr& buffer, size_t dimensions) const {
     const auto field = [&](Op op, int d) {
@@ -312,7 +312,7 @@ class Emitter {
     std::vector<Expr> first;
     for (size_t i = 0; i < region.size(); i++) {
       first.push_back(region[i].min);
-      d.strides.push_back(variable(text(buffer, ".stride.", i)));
+      d.strides.push_back(metadata(buffer, Metadata::Stride, i));
     }
     d.host = call_op(Op::address_of, Handle(),
                      {call_func(f.name(), d.type, first, value, SymbolRef(f.func))});

@@ -3,6 +3,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "ir/buffer_metadata.h"
 #include "ir/build.h"
 #include "lower/nests/copy_statement.h"
 
@@ -16,14 +17,10 @@ std::string current(const Renamings& renamings, const std::string& name) {
 }
 
 // The new name of "f.stride.1" and similar names if Func "f" has been renamed to "f.$1" here.
-std::string renamed_fact(const Renamings& renamings, const std::string& name) {
-  for (const char* fact : {".stride.", ".min.", ".extent."}) {
-    const size_t at = name.rfind(fact);
-    if (at == std::string::npos) continue;
-    if (const auto* now = find_or_null(renamings, name.substr(0, at)))
-      return *now + name.substr(at);
-  }
-  return {};
+std::string renamed_metadata(const Renamings& renamings, const std::string& name) {
+  const auto parsed = parse_metadata_name(name);
+  const auto* now = parsed ? find_or_null(renamings, parsed->buffer) : nullptr;
+  return now ? metadata_name(*now, parsed->what, parsed->dimension) : "";
 }
 
 // Renames the uses of renamed variables and Funcs.
@@ -31,8 +28,8 @@ Expr with_uses_renamed(const Expr& root, const Renamings& renamings) {
   return rewrite(root, [&](const Expr& e, const auto& recurse) -> Expr {
     if (const Variable* v = e.as<Variable>()) {
       if (renamings.count(v->name)) return variable(renamings.at(v->name), v->type, v->symbol);
-      const std::string fact = renamed_fact(renamings, v->name);
-      return fact.empty() ? e : variable(fact, v->type, v->symbol);
+      const std::string renamed = renamed_metadata(renamings, v->name);
+      return renamed.empty() ? e : variable(renamed, v->type, v->symbol);
     }
     const Call* call = e.as<Call>();
     if (!call || call->call_type != CallType::Func || !renamings.count(call->name)) return {};

@@ -1,6 +1,7 @@
 #include "lower/nests/root_statement.h"
 
 #include "diagnostics/error.h"
+#include "ir/buffer_metadata.h"
 #include "ir/print.h"
 #include "ir/visit.h"
 
@@ -62,8 +63,8 @@ RootStatement split_root(const Stmt& s) {
 
 Box buffer_box(const std::string& buffer, int dimensions) {
   return numbered(dimensions, [&](int d) {
-    Expr min = variable(text(buffer, ".min.", d));
-    return Interval{min, min + variable(text(buffer, ".extent.", d)) - 1};
+    const auto [min, extent] = metadata_range(buffer, d);
+    return Interval{min, min + extent - 1};
   });
 }
 

@@ -79,7 +79,7 @@ Value Expressions::variable(const Frame& frame, const Expr& e, const Variable& n
   if (place != frame.places.end()) return {Scalar::of_int(Int(32), frame.point[place->second])};
   const auto* parameter = dynamic_cast<const ParameterContents*>(n.symbol.raw());
   if (!parameter) internal_error("unbound variable " + quoted(n.name));
-  if (parameter->is_buffer) return Inputs::buffer_fact(*parameter, n);
+  if (parameter->is_buffer) return Inputs::metadata(*parameter, n);
   return apply_cast(Rounding::Strict, widened(e.type()), Inputs::value_of(*parameter));
 }
 

@@ -3,6 +3,7 @@
 #include <HalideRuntime.h>
 
 #include "diagnostics/error.h"
+#include "ir/buffer_metadata.h"
 #include "ir/lists.h"
 
 namespace retrograde::oracle {
@@ -27,13 +28,13 @@ Value Inputs::value_of(const ParameterContents& parameter) {
   return {*parameter.value};
 }
 
-Value Inputs::buffer_fact(const ParameterContents& image, const ir::Variable& variable) {
-  const std::string fact = variable.name.substr(image.name.size());
-  const size_t dot = fact.rfind('.');
-  const int d = std::stoi(fact.substr(dot + 1));
-  const halide_dimension_t& dim = buffer_of(image).dim[d];
-  const std::string kind = fact.substr(1, dot - 1);
-  const int value = kind == "min" ? dim.min : kind == "extent" ? dim.extent : dim.stride;
+Value Inputs::metadata(const ParameterContents& image, const ir::Variable& variable) {
+  const auto name = ir::parse_metadata_name(variable.name);
+  RETROGRADE_ASSERT(name, quoted(variable.name), " is no metadata of ", quoted(image.name));
+  const halide_dimension_t& dim = buffer_of(image).dim[name->dimension];
+  const int value = name->what == ir::Metadata::Min      ? dim.min
+                    : name->what == ir::Metadata::Extent ? dim.extent
+                                                         : dim.stride;
   return {ir::Scalar::of_int(variable.type, value)};
 }
 

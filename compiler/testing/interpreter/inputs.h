@@ -14,7 +14,7 @@ class Inputs {
   // Requires: the parameter has a value.
   static Value value_of(const graph::ParameterContents& parameter);
   // The min, extent or stride that the variable names: "in.extent.1".
-  static Value buffer_fact(const graph::ParameterContents& image, const ir::Variable& variable);
+  static Value metadata(const graph::ParameterContents& image, const ir::Variable& variable);
   // Requires: the image has a host buffer that holds the point.
   Value read(const graph::ParameterContents& image, const Point& point);
   // The smallest box around the elements that were read so far.
