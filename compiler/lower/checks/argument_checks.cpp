@@ -121,7 +121,7 @@ class Checks {
       if (arg.kind != LoweredArgument::Kind::OutputBuffer) continue;
       Expr has_elements = const_true();
       for (int d = 0; d < arg.dimensions; d++)
-        has_elements = has_elements && fact(arg, "extent", d) > 0;
+        has_elements = has_elements && fact(arg, Metadata::Extent, d) > 0;
       has_output = has_output || has_elements;
     }
     has_output = simplify(has_output);

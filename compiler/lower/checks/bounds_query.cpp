@@ -13,8 +13,9 @@ Stmt answer_query(const LoweredArgument& arg, const Box& required, const ShapeFa
   Substitution needed;
   for (size_t d = 0; d < required.size(); d++) {
     const int dimension = static_cast<int>(d);
-    needed[fact_name(arg, "min", dimension)] = required[d].min;
-    needed[fact_name(arg, "extent", dimension)] = simplify(required[d].max - required[d].min + 1);
+    needed[fact_name(arg, Metadata::Min, dimension)] = required[d].min;
+    needed[fact_name(arg, Metadata::Extent, dimension)] =
+        simplify(required[d].max - required[d].min + 1);
   }
   const auto said = [&](const Expr& promise) {
     return facts.in_actual_facts(substitute(promise, needed));
@@ -27,9 +28,9 @@ Stmt answer_query(const LoweredArgument& arg, const Box& required, const ShapeFa
     const Expr min = promised.min.defined() ? said(promised.min) : required[d].min;
     const Expr extent =
         promised.extent.defined() ? said(promised.extent) : simplify(required[d].max - min + 1);
-    needed[fact_name(arg, "stride", dimension)] = stride;
+    needed[fact_name(arg, Metadata::Stride, dimension)] = stride;
     if (promised.stride.defined()) stride = said(promised.stride);
-    needed[fact_name(arg, "stride", dimension)] = stride;
+    needed[fact_name(arg, Metadata::Stride, dimension)] = stride;
     for (const Expr& side : {min, extent, stride}) sides.push_back(cast(Int(32), side));
     stride = stride * extent;
   }

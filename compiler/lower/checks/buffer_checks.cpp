@@ -35,7 +35,7 @@ int32_t region_rules(const LoweredArgument& arg, bool has_device) {
 
 Stmt box_check(const LoweredArgument& arg, const Interval& used, int d, const Expr& inside) {
   const char* verb = is_output(arg) ? "written" : "read";
-  const Expr min = fact(arg, "min", d), extent = fact(arg, "extent", d);
+  const Expr min = fact(arg, Metadata::Min, d), extent = fact(arg, Metadata::Extent, d);
   return run_time_check(
       inside, retrograde_error_access_out_of_bounds,
       text("cannot run: every access must lie inside its buffer; ", quoted(arg.name), " is ", verb,
@@ -67,7 +67,8 @@ void add_region_checks(const LoweredArgument& arg, const Box& used, bool has_dev
   int32_t dimensions = 0;  // bit set of the dimensions to check
   for (size_t d = 0; d < used.size(); d++) {
     const int dimension = static_cast<int>(d);
-    const Expr min = fact(arg, "min", dimension), extent = fact(arg, "extent", dimension);
+    const Expr min = fact(arg, Metadata::Min, dimension),
+               extent = fact(arg, Metadata::Extent, dimension);
     const Expr inside = simplify(min <= used[d].min && used[d].max <= min + extent - 1);
     if (is_const_true(inside)) continue;
     const BufferConstraint promised = constraint_of(arg, dimension);

@@ -9,21 +9,21 @@ namespace {
 
 // Whether the stride is irrelevant because there is at most one element. Array libraries set such strides arbitrarily.
 Expr has_one_element_at_most(const LoweredArgument& arg, int d) {
-  return fact(arg, "extent", d) <= 1;
+  return fact(arg, Metadata::Extent, d) <= 1;
 }
 
-void add_constraint_check(const LoweredArgument& arg, const char* what, int d, const Expr& promised,
+void add_constraint_check(const LoweredArgument& arg, Metadata what, int d, const Expr& promised,
                           std::vector<Stmt>& checks) {
   if (!promised.defined()) return;
   const Expr actual = actual_fact(arg, what, d);
   Expr holds = actual == promised;
-  if (what == std::string("stride")) holds = holds || has_one_element_at_most(arg, d);
-  checks.push_back(run_time_check(
-      holds, retrograde_error_constraint_violated,
-      text("cannot run: the ", what, " of dimension ", d, " of ", quoted(arg.name),
-           " was promised to be "),
-      promised, Expr(", but it is "), actual,
-      text(". Pass such a buffer, or lift the promise with dim(", d, ").set_", what, "(Expr()).")));
+  if (what == Metadata::Stride) holds = holds || has_one_element_at_most(arg, d);
+  checks.push_back(run_time_check(holds, retrograde_error_constraint_violated,
+                                  text("cannot run: the ", to_string(what), " of dimension ", d,
+                                       " of ", quoted(arg.name), " was promised to be "),
+                                  promised, Expr(", but it is "), actual,
+                                  text(". Pass such a buffer, or lift the promise with dim(", d,
+                                       ").set_", to_string(what), "(Expr()).")));
 }
 
 }  // namespace
@@ -56,9 +56,10 @@ void add_constraint_checks(const LoweredArgument& arg, const ShapeFacts& facts,
                            std::vector<Stmt>& checks) {
   for (int d = 0; d < arg.dimensions; d++) {
     BufferConstraint promised = facts.promise_of(arg, d);
-    add_constraint_check(arg, "min", d, promised.min, checks);
-    add_constraint_check(arg, "extent", d, promised.extent, checks);
-    if (d > 0 || !is_dense(arg)) add_constraint_check(arg, "stride", d, promised.stride, checks);
+    add_constraint_check(arg, Metadata::Min, d, promised.min, checks);
+    add_constraint_check(arg, Metadata::Extent, d, promised.extent, checks);
+    if (d > 0 || !is_dense(arg))
+      add_constraint_check(arg, Metadata::Stride, d, promised.stride, checks);
   }
 }
 

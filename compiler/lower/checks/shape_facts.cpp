@@ -6,13 +6,13 @@ namespace {
 void name_actual_facts(const LoweredArgument& arg, int d, Substitution& names) {
   const BufferConstraint promised = constraint_of(arg, d);
   // A constant promise stands for the constant, also for a stride that actually differs (see add_constraint_check).
-  const auto add = [&](const char* what, const Expr& promise) {
+  const auto add = [&](Metadata what, const Expr& promise) {
     if (!promise.defined()) return;
     names[fact_name(arg, what, d)] = is_const(promise) ? promise : actual_fact(arg, what, d);
   };
-  add("min", promised.min);
-  add("extent", promised.extent);
-  add("stride", promised.stride);
+  add(Metadata::Min, promised.min);
+  add(Metadata::Extent, promised.extent);
+  add(Metadata::Stride, promised.stride);
 }
 
 Substitution actual_facts(const std::vector<LoweredArgument>& args) {
@@ -23,7 +23,7 @@ Substitution actual_facts(const std::vector<LoweredArgument>& args) {
   return names;
 }
 
-void add_fact(const LoweredArgument& arg, const char* what, Op op, int d, const Expr& promised,
+void add_fact(const LoweredArgument& arg, Metadata what, Op op, int d, const Expr& promised,
               Lets& facts, Lets& promises) {
   std::string name = fact_name(arg, what, d);
   Expr actual = call_op(op, Int(32), {buffer_handle(arg), d});
@@ -35,15 +35,15 @@ void add_fact(const LoweredArgument& arg, const char* what, Op op, int d, const 
 
 Expr buffer_handle(const LoweredArgument& arg) { return variable(arg.name + ".buffer", Handle()); }
 
-std::string fact_name(const LoweredArgument& arg, const char* what, int d) {
-  return arg.name + "." + what + "." + std::to_string(d);
+std::string fact_name(const LoweredArgument& arg, Metadata what, int d) {
+  return metadata_name(arg.name, what, static_cast<size_t>(d));
 }
 
-Expr fact(const LoweredArgument& arg, const char* what, int d) {
+Expr fact(const LoweredArgument& arg, Metadata what, int d) {
   return variable(fact_name(arg, what, d));
 }
 
-Expr actual_fact(const LoweredArgument& arg, const char* what, int d) {
+Expr actual_fact(const LoweredArgument& arg, Metadata what, int d) {
   return variable(fact_name(arg, what, d) + ".actual");
 }
 
@@ -56,9 +56,9 @@ Lets ShapeFacts::lets() const {
     if (!arg.is_buffer()) continue;
     for (int d = 0; d < arg.dimensions; d++) {
       BufferConstraint promised = promise_of(arg, d);
-      add_fact(arg, "min", Op::buffer_min, d, promised.min, facts, promises);
-      add_fact(arg, "extent", Op::buffer_extent, d, promised.extent, facts, promises);
-      add_fact(arg, "stride", Op::buffer_stride, d, promised.stride, facts, promises);
+      add_fact(arg, Metadata::Min, Op::buffer_min, d, promised.min, facts, promises);
+      add_fact(arg, Metadata::Extent, Op::buffer_extent, d, promised.extent, facts, promises);
+      add_fact(arg, Metadata::Stride, Op::buffer_stride, d, promised.stride, facts, promises);
     }
   }
   facts.insert(facts.end(), promises.begin(), promises.end());

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "ir/buffer_metadata.h"
 #include "ir/build.h"
 #include "ir/lowered_function.h"
 #include "ir/visit.h"
@@ -20,11 +21,11 @@ namespace retrograde::lower {
 // The buffer as functions of the runtime take it.
 Expr buffer_handle(const LoweredArgument& arg);
 
-// The fact that the code below uses. `what`: min, extent or stride.
-std::string fact_name(const LoweredArgument& arg, const char* what, int d);
-Expr fact(const LoweredArgument& arg, const char* what, int d);
+// The fact that the code below uses.
+std::string fact_name(const LoweredArgument& arg, Metadata what, int d);
+Expr fact(const LoweredArgument& arg, Metadata what, int d);
 // The buffer's own value of a promised fact.
-Expr actual_fact(const LoweredArgument& arg, const char* what, int d);
+Expr actual_fact(const LoweredArgument& arg, Metadata what, int d);
 
 class ShapeFacts {
  public:
