@@ -15,6 +15,7 @@ retrograde_test(
   operation_count_test
   passed_reads_test
   second_derivatives_test
+  several_outputs_test
   shared_adjoints_test
   stability_strong_zeros_test
   stable_forms_test
