@@ -22,6 +22,7 @@ retrograde_test(
   straight_through_test
   tangents_test
   time_axis_test
+  unbounded_reads_test
   value_range_test
   version_budget_test
   zero_borders_test

@@ -87,6 +87,8 @@ class Synthesis {
       if (primal_.active.contains(f->get())) differentiate(*f);
     }
     for (const auto& parameter : parameters_of(primal_.outputs)) finish_parameter(*parameter);
+    covered_.insert(contributions_.without_adjoint().begin(),
+                    contributions_.without_adjoint().end());
     // Covered Funcs may get an adjoint along paths beside the rule. That is not the gradient of the output by them.
     std::erase_if(result_.after_stage,
                   [&](const auto& entry) { return covered_.contains(entry.first.first); });
@@ -259,7 +261,8 @@ class Synthesis {
   SynthesisAccount account_;
   Contributions contributions_;
   VersionBudget versions_;
-  std::unordered_set<const Symbol*> covered_;  // Funcs inside of a custom adjoint
+  // Funcs without an adjoint of their own: those inside of a custom adjoint, and those without a size.
+  std::unordered_set<const Symbol*> covered_;
   SynthesisResult result_;
 };
 
