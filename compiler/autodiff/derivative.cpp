@@ -67,9 +67,9 @@ Expr seed_value(const Func& output, size_t k, const Expr& value) {
   return type.is_float() ? cast_to(adjoint_type(type), value) : Expr();
 }
 
-Derivative run(const Seed& seed, const AdjointOptions& options) {
+Derivative run(const Seeds& seeds, const AdjointOptions& options) {
   const SynthesisOptions how = to_synthesis(options);
-  auto result = std::make_shared<SynthesisResult>(synthesize_supported(seed, how));
+  auto result = std::make_shared<SynthesisResult>(synthesize_supported(seeds, how));
   for (const AdjointInput& input : options.wrt) result->requested.push_back(input.symbol());
   return Derivative(result);
 }
@@ -89,6 +89,26 @@ void check_dimensions(const Func& output, size_t bounds, int adjoint,
   }
 }
 
+Seed seed_of(const OutputAdjoint& given) {
+  const auto& [output, adjoint, bounds] = given;
+  check_loss(output);
+  if (!adjoint.defined()) {
+    user_error(asked_of_adjoints(output), "the adjoint must be defined",
+               quoted(adjoint.name()) + " has no definition", "Define it before it is given");
+  }
+  check_dimensions(output, bounds.size(), adjoint.dimensions(), adjoint.name());
+  if (adjoint.outputs() != output.outputs()) {
+    user_error(asked_of_adjoints(output), "an adjoint has as many values as its Func",
+               text(quoted(adjoint.name()), " has ", adjoint.outputs(), " and ",
+                    quoted(output.name()), " has ", output.outputs()),
+               "Define it as a Tuple of as many values, with zeros for values without an adjoint");
+  }
+  const FuncRef values = adjoint(variables_of(output.function()->args));
+  return {output.function(), box_of(bounds), numbered(output.types().size(), [&](size_t k) {
+            return seed_value(output, k, values.element(static_cast<int>(k)));
+          })};
+}
+
 }  // namespace
 
 Derivative::Derivative(std::shared_ptr<const SynthesisResult> result)
@@ -99,8 +119,8 @@ Func Derivative::absent(const std::shared_ptr<const Symbol>& symbol,
   return Func(zeros_->find(symbol, name, result_->explanations));
 }
 
-bool Derivative::output_uses(const FuncContents& f) const {
-  const std::vector<FuncPtr> order = topological_order({result_->output.func});
+bool Derivative::outputs_use(const FuncContents& f) const {
+  const std::vector<FuncPtr> order = topological_order(mapped(result_->outputs, &WantedFunc::func));
   return std::ranges::any_of(order, [&](const FuncPtr& used) { return used.get() == &f; });
 }
 
@@ -128,7 +148,7 @@ Func Derivative::operator()(const Func& func, int update_id) const {
   auto it = result_->after_stage.find({&f, update_id + 1});
   if (it != result_->after_stage.end()) return Func(it->second);
   const auto image = image_read_by(f);
-  return image && !output_uses(f) ? of_parameter(image) : absent(func.function(), f.name);
+  return image && !outputs_use(f) ? of_parameter(image) : absent(func.function(), f.name);
 }
 
 Func Derivative::adjoint(const Func& func) const {
@@ -168,7 +188,7 @@ std::vector<Explanation> Derivative::explanations() const {
 
 std::vector<Explanation> Derivative::costs() const {
   GradientOperations counts = operations();
-  return explain_costs(result_->output, result_->gradients, counts.primal, counts.gradient);
+  return explain_costs(result_->outputs, result_->gradients, counts.primal, counts.gradient);
 }
 
 std::string Derivative::explain(Detail detail) const {
@@ -178,7 +198,7 @@ std::string Derivative::explain(Detail detail) const {
 }
 
 GradientOperations Derivative::operations() const {
-  return {count_operations({result_->output}), count_operations(result_->gradients)};
+  return {count_operations(result_->outputs), count_operations(result_->gradients)};
 }
 
 std::optional<double> GradientOperations::ratio() const {
@@ -189,24 +209,15 @@ std::optional<double> GradientOperations::ratio() const {
 
 Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Region& output_bounds,
                               const AdjointOptions& options) {
-  check_loss(output);
-  if (!adjoint.defined()) {
-    user_error(asked_of_adjoints(output), "the adjoint must be defined",
-               quoted(adjoint.name()) + " has no definition", "Define it before it is given");
-  }
-  check_dimensions(output, output_bounds.size(), adjoint.dimensions(), adjoint.name());
-  if (adjoint.outputs() != output.outputs()) {
-    user_error(asked_of_adjoints(output), "an adjoint has as many values as its Func",
-               text(quoted(adjoint.name()), " has ", adjoint.outputs(), " and ",
-                    quoted(output.name()), " has ", output.outputs()),
-               "Define it as a Tuple of as many values, with zeros for values without an adjoint");
-  }
-  Seed seed{output.function(), box_of(output_bounds), {}};
-  for (size_t k = 0; k < output.types().size(); ++k) {
-    seed.values.push_back(seed_value(
-        output, k, adjoint(variables_of(output.function()->args)).element(static_cast<int>(k))));
-  }
-  return run(seed, options);
+  return run({seed_of({output, adjoint, output_bounds})}, options);
+}
+
+Derivative propagate_adjoints(const std::vector<OutputAdjoint>& outputs,
+                              const AdjointOptions& options) {
+  if (outputs.empty())
+    user_error("propagate adjoints from several outputs", "there is at least one output",
+               "none is given", "Give each output with its adjoint and its bounds");
+  return run(mapped(outputs, seed_of), options);
 }
 
 Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint,
@@ -226,7 +237,7 @@ Derivative propagate_adjoints(const Func& output, const Buffer<float>& adjoint,
                           SymbolRef(parameter));
   for (size_t k = 0; k < output.types().size(); ++k)
     seed.values.push_back(seed_value(output, k, value));
-  return run(seed, options);
+  return run({seed}, options);
 }
 
 Derivative propagate_adjoints(const Func& output, const AdjointOptions& options) {
@@ -243,7 +254,7 @@ Derivative propagate_adjoints(const Func& output, const AdjointOptions& options)
                "Sum its elements up in a Func without dimensions, as in loss() += f(r.x, r.y), or "
                "give the adjoint of each element: propagate_adjoints(f, adjoint, bounds)");
   }
-  return run({output.function(), {}, {seed_value(output, 0, make_one(output.type()))}}, options);
+  return run({{output.function(), {}, {seed_value(output, 0, make_one(output.type()))}}}, options);
 }
 
 }  // namespace retrograde

@@ -5,7 +5,7 @@
 // Func grad = d(weights);            // weights: a Func, Buffer, ImageParam or Param
 //
 // The adjoint of a Func or image has its dimensions; that of a Param has none. It is 0 outside of the region that the
-// output depends on. Adjoints are ordinary Funcs without side effects, so they can be scheduled and differentiated
+// outputs depend on. Adjoints are ordinary Funcs without side effects, so they can be scheduled and differentiated
 // again.
 #pragma once
 
@@ -32,7 +32,7 @@ struct SynthesisResult;
 class AdjointInput;
 class ZeroGradients;
 
-// The operations to compute the output, and those to compute all requested gradients (by default: by all images and
+// The operations to compute the outputs, and those to compute all requested gradients (by default: by all images and
 // parameters), each as a pipeline of its own. Primal values that the gradients read count among the gradients.
 struct GradientOperations {
   autodiff::OperationCount primal, gradient;
@@ -89,7 +89,7 @@ class Derivative {
  private:
   Func of_parameter(const std::shared_ptr<const graph::ParameterContents>& parameter) const;
   Func absent(const std::shared_ptr<const ir::Symbol>& symbol, const std::string& name) const;
-  bool output_uses(const graph::FuncContents& f) const;
+  bool outputs_use(const graph::FuncContents& f) const;
   std::shared_ptr<const autodiff::SynthesisResult> result_;
   std::shared_ptr<ZeroGradients> zeros_;  // zero gradients that were looked up
 };
@@ -161,6 +161,16 @@ struct AdjointOptions {
 // function has no known derivative (Unsupported); elements of a scatter have 32-bit numbers: there
 // may be 2147483647 at most (Unsupported); every variable needs a range.
 Derivative propagate_adjoints(const Func& output, const Func& adjoint, const Region& output_bounds,
+                              const AdjointOptions& options = {});
+// One of several outputs: its adjoint over output_bounds, as above.
+struct OutputAdjoint {
+  Func output, adjoint;
+  Region output_bounds;
+};
+// The gradient of the sum over all outputs of what the form above differentiates, in one backward pass: what the outputs
+// have in common is differentiated once. An output may read another, and may occur more than once.
+// Requires: there is at least one output.
+Derivative propagate_adjoints(const std::vector<OutputAdjoint>& outputs,
                               const AdjointOptions& options = {});
 // The same with an adjoint in memory, whose shape gives the bounds.
 // Requires: the adjoint must be a defined Buffer.

@@ -163,6 +163,11 @@ Storage& FunctionContext::storage(const std::string& name) {
   return found->second;
 }
 
+Value* FunctionContext::block_name(const std::string& name) {
+  const auto found = frame.block_names.find(name);
+  return found == frame.block_names.end() ? string_constant(name) : found->second;
+}
+
 Value* FunctionContext::string_constant(const std::string& text) {
   Value*& constant = strings_[text];
   if (!constant) {

@@ -68,6 +68,8 @@ struct Frame {
   std::unordered_map<std::string, Value*>
       indices;  // int32 variables as 64-bit integers, see Values::index64
   std::unordered_map<std::string, Storage> storages;
+  // Texts that messages about heap blocks show, where a closure passes them; else the names themselves.
+  std::unordered_map<std::string, Value*> block_names;
   std::unordered_map<std::string, Coordinate> coordinates;  // plain coordinates, by name
   std::unordered_map<std::string, LinearIndex> ramps;       // linear vectors, by name
 };
@@ -110,6 +112,7 @@ struct FunctionContext {
                 const std::function<Value*()>& otherwise);
 
   Storage& storage(const std::string& name);
+  Value* block_name(const std::string& name);  // what messages call a heap block
   Value* string_constant(const std::string& text);
   // Calls a function of the runtime with the context and `args`; `more` are its variadic arguments.
   llvm::CallInst* call_runtime(const std::string& name, llvm::Type* result,

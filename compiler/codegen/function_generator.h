@@ -7,7 +7,9 @@
 //   calls.h             operators that need more than the values of their arguments; runtime calls
 #pragma once
 
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "codegen/device/kernels.h"
 #include "codegen/values/values.h"
@@ -42,15 +44,38 @@ class FunctionGenerator {
   Storage allocate_on_heap(const ir::Allocate& s);
   void free_owned(Storage& storage);
 
-  // parallel.cpp: bodies of parallel loops as separate functions
+  // outline.cpp: statements as separate functions
   struct Task {
     llvm::Function* function;
     Value* closure;
   };
-  // Emits the statement as a function. `index` names the variable that holds the iteration number, if any. `what`
-  // becomes part of the function's name.
+  // What a statement uses from outside, by name, in the order of the closure's fields.
+  struct Captures {
+    std::vector<std::string> variables, storages, blocks;
+  };
+  // A statement that has a function. `index` names its iteration number, if it has one.
+  struct Outlined {
+    Stmt body;
+    std::string index;
+    Captures captures;
+    std::vector<size_t> aliases;  // of the storages
+    llvm::StructType* closure;
+    llvm::Function* function;
+  };
+  // Emits the statement as a function; one that is equal up to names to an earlier one shares its function. `index`
+  // names the variable that holds the iteration number, if any. `what` becomes part of the function's name.
   Task outline(const Stmt& body, const std::string& what, const std::string& name,
                const std::string& index = "", Type index_type = Int(32));
+  Captures captures_of(const Stmt& body, const std::string& index) const;
+  std::optional<std::vector<Value*>> values_of(const Captures& captures);
+  std::vector<size_t> aliases_of(const Captures& captures) const;
+  Value* make_closure(llvm::StructType* type, const std::vector<Value*>& values,
+                      const std::string& name);
+  std::optional<Task> shared_task(const Stmt& body, const std::string& index,
+                                  const std::string& name);
+  void emit_task(const Outlined& task, Type index_type);
+
+  // parallel.cpp: parallel loops
   void parallel_loop(const ir::For& s);
 
   // long_functions.cpp: outermost loops as separate functions
@@ -85,7 +110,7 @@ class FunctionGenerator {
   KernelSet kernels_;
   FunctionContext c_;
   Values values_{c_};
-  int outlined_ = 0;
+  std::vector<Outlined> outlined_;
   bool is_long_ = false;
   int loops_around_ = 0;
 };

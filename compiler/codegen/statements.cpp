@@ -220,7 +220,7 @@ Storage FunctionGenerator::allocate_on_heap(const Allocate& s) {
   block->getCalledFunction()->setReturnDoesNotAlias();
   c_.fail_unless(b_.CreateICmpNE(block, c_.null_pointer()), [&] {
     return c_.call_runtime("retrograde_allocation_error", b_.getInt32Ty(),
-                           {c_.string_constant(s.name), elements, element_bytes});
+                           {c_.block_name(s.name), elements, element_bytes});
   });
   if (!c_.frame.owned_slots) c_.frame.owned_slots = c_.entry_alloca(b_.getPtrTy(), 1, "owned");
   Value* slot = b_.CreateConstGEP1_64(b_.getPtrTy(), c_.frame.owned_slots,

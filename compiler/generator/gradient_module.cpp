@@ -9,8 +9,8 @@
 // small changes of the inputs; L_y is float for these. If y does not read an image, its gradient is zero, has the type
 // of L_y, and its name begins with _dummy.
 //
-// Separate gradients are an alternative for callers that need only some of the gradients. They are summed over the
-// outputs, include scalar inputs, and omit gradients that are known to be 0.
+// Separate gradients are an alternative for callers that need only some of the gradients. They are those of the sum
+// over all outputs, computed in one backward pass, include scalar inputs, and omit gradients that are known to be 0.
 #include <optional>
 #include <set>
 
@@ -72,16 +72,6 @@ ImageParam add_seed(const NamedOutput& output, std::vector<Argument>& arguments,
 
 AdjointInput adjoint_input(const std::shared_ptr<graph::ParameterContents>& parameter) {
   return AdjointInput(std::shared_ptr<ir::Symbol>(parameter));
-}
-
-// Sum of the parts as a Func with the dimensions and type of an input; 0 if there are no parts.
-Func sum_of(const std::vector<Func>& parts, const graph::ParameterContents& input) {
-  const auto at = ir::numbered(input.dimensions, [&](int d) { return Var::implicit(d); });
-  Func f(parts.empty() ? "zeros" : "gradient");
-  Expr total = cast(input.type, 0);
-  for (const Func& part : parts) total = total + part(at);
-  f(at) = total;
-  return f;
 }
 
 Func zeros(const Type& type, int dimensions) {
@@ -186,22 +176,21 @@ Module GeneratorBase::gradient_function(const std::string& function_name,
 
   AdjointOptions options;
   for (const auto& [name, parameter] : by) options.wrt.push_back(adjoint_input(parameter));
-  std::vector<Derivative> derivatives;
+  std::vector<OutputAdjoint> adjoints;
   for (const NamedOutput& output : outputs) {
     if (!output.func.type().is_float()) continue;
     const ImageParam seed = add_seed(output, arguments, names);
-    derivatives.push_back(propagate_adjoints(output.func, seed, region_of(seed), options));
+    adjoints.push_back({output.func, seed, region_of(seed)});
   }
+  const Derivative derivative = propagate_adjoints(adjoints, options);
   std::vector<Func> gradients;
   std::set<const graph::FuncContents*> seen;
   for (const auto& [name, parameter] : by) {
-    std::vector<Func> parts;
-    for (const Derivative& derivative : derivatives) {
-      if (derivative.has(adjoint_input(parameter)))
-        parts.push_back(derivative.of(adjoint_input(parameter)));
-    }
-    const bool is_one = parts.size() == 1 && seen.insert(parts[0].function().get()).second;
-    gradients.push_back(is_one ? parts[0] : sum_of(parts, *parameter));
+    const AdjointInput input = adjoint_input(parameter);
+    Func gradient = derivative.has(input) ? derivative.of(input)
+                                          : zeros(parameter->type, parameter->dimensions);
+    if (!seen.insert(gradient.function().get()).second) gradient = lambda(gradient(_));
+    gradients.push_back(gradient);
     names.push_back("_grad_loss_wrt_" + name);
   }
   Pipeline pipeline(gradients);

@@ -17,13 +17,33 @@ int order(const T& a, const T& b) {
   return a < b ? -1 : b < a ? 1 : 0;
 }
 
+// Pairs of names that stand for each other.
+class NamePairs {
+ public:
+  explicit NamePairs(const Renaming& known) {
+    for (const auto& [a, b] : known) match(a, b);
+  }
+  // Whether they are a pair; names that have no partner yet become one.
+  bool match(const std::string& a, const std::string& b) {
+    const auto [forward, is_new] = forward_.try_emplace(a, b);
+    if (!is_new) return forward->second == b;
+    return backward_.try_emplace(b, a).second;
+  }
+  Renaming take() { return std::move(forward_); }
+
+ private:
+  Renaming forward_, backward_;
+};
+
 // Compares two trees and remembers the pairs of expressions found equal, so the cost is linear in
-// the number of distinct pairs.
+// the number of distinct pairs. With `names`, only decides whether the trees are equal up to names.
 class Comparer {
  public:
+  explicit Comparer(NamePairs* names = nullptr) : names_(names) {}
+
   int compare(const Expr& a, const Expr& b) {
-    if (a.same_as(b)) return 0;
-    if (!a.defined() || !b.defined()) return a.defined() ? 1 : -1;
+    if (!names_ && a.same_as(b)) return 0;
+    if (!a.defined() || !b.defined()) return a.defined() - b.defined();
     if (const int result = order(a->kind, b->kind)) return result;
     if (const int result = order(a->type, b->type)) return result;
     if (equal_pairs_.count({a.get(), b.get()})) return 0;
@@ -32,8 +52,9 @@ class Comparer {
     return result;
   }
   int compare(const Stmt& a, const Stmt& b) {
-    if (a.same_as(b)) return 0;
-    if (!a.defined() || !b.defined()) return a.defined() ? 1 : -1;
+    if (!names_ && a.same_as(b)) return 0;
+    if (!a.defined() || !b.defined()) return a.defined() - b.defined();
+    if (names_ && a.kind() == Kind::Launch) return 1;  // its kernel has its name
     const int result = order(a->kind, b->kind);
     return result ? result : compare_nodes(a, b);
   }
@@ -49,7 +70,7 @@ class Comparer {
               return std::apply(
                   [&](const auto&... of_b) {
                     int result = 0;
-                    ((result = compare(of_a, of_b)) || ...);
+                    ((result = compare_field<N>(of_a, of_b)) || ...);
                     return result;
                   },
                   static_cast<const N*>(b.get())->fields());
@@ -61,6 +82,17 @@ class Comparer {
     });
   }
 
+  // Texts, and names of operators and functions, are no names that a renaming changes.
+  template <class N, class T>
+  int compare_field(const T& a, const T& b) {
+    if constexpr (std::is_same_v<N, StringImm> || std::is_same_v<N, Call>) {
+      if constexpr (std::is_same_v<T, std::string>) return order(a, b);
+    }
+    return compare(a, b);
+  }
+  int compare(const std::string& a, const std::string& b) {
+    return names_ ? !names_->match(a, b) : order(a, b);
+  }
   template <class T>
   int compare(const T& a, const T& b) {
     return order(a, b);
@@ -94,6 +126,7 @@ class Comparer {
     }
   };
   std::unordered_set<std::pair<const Node*, const Node*>, PairHash> equal_pairs_;
+  NamePairs* names_;
 };
 
 // ---- hash ----
@@ -154,5 +187,11 @@ bool equal(const Expr& a, const Expr& b) {
 
 bool equal(const Stmt& a, const Stmt& b) { return Comparer().compare(a, b) == 0; }
 int compare(const Expr& a, const Expr& b) { return a.same_as(b) ? 0 : Comparer().compare(a, b); }
+
+std::optional<Renaming> renaming(const Stmt& a, const Stmt& b, const Renaming& known) {
+  NamePairs names(known);
+  if (Comparer(&names).compare(a, b) != 0) return std::nullopt;
+  return names.take();
+}
 
 }  // namespace retrograde::ir

@@ -100,6 +100,7 @@ class Facts {
   ConstantRange range_of_node(const Expr& e);
   ConstantRange range_of_variable(const Expr& e, const Variable& n);
   ConstantRange range_of_binary(const Binary& n);
+  ConstantRange range_of_remainder(const Binary& n);
   ConstantRange range_of_call(const Call& n);
   Congruence congruence_of_node(const Expr& e);
   Congruence congruence_of_variable(const Variable& n);

@@ -1,7 +1,9 @@
 // The constant range of each node, from the ranges of its operands and from facts.
 #include <algorithm>
+#include <numeric>
 
 #include "ir/build.h"
+#include "ir/scalar.h"
 #include "ir/visit.h"
 #include "simplify/facts.h"
 
@@ -76,7 +78,7 @@ ConstantRange Facts::range_of_binary(const Binary& n) {
     case Kind::Div:
       return wrapped(divide(a, b), n.type);
     case Kind::Mod:
-      return modulo(a, b);
+      return intersection(modulo(a, b), range_of_remainder(n));
     case Kind::Min:
       return {std::min(a.min, b.min), std::min(a.max, b.max)};
     case Kind::Max:
@@ -84,6 +86,16 @@ ConstantRange Facts::range_of_binary(const Binary& n) {
     default:
       return all_values;
   }
+}
+
+// x % c, for x congruent to r modulo m: the values below c that are congruent to r modulo gcd(m, c).
+ConstantRange Facts::range_of_remainder(const Binary& n) {
+  const std::optional<int64_t> divisor = as_const_int(n.b);
+  if (!divisor || *divisor <= 0 || !is_index_type(n.type)) return range_of(n.type);
+  const Congruence known = congruence(n.a);
+  const int64_t step = std::gcd(known.modulus, *divisor);
+  const int64_t first = euclidean_mod(known.remainder, step);
+  return {first, *divisor - step + first};
 }
 
 ConstantRange Facts::range_of_call(const Call& n) {

@@ -141,6 +141,16 @@ void bind_propagation(py::module_& m) {
         });
       },
       arg("output"), arg("adjoint"), arg("options") = AdjointOptions());
+  def(
+      m, "propagate_adjoints",
+      [](const std::vector<std::tuple<Func, Func, Region>>& outputs,
+         const AdjointOptions& options) {
+        const auto given = ir::mapped(outputs, [](const auto& one) {
+          return std::apply([](const auto&... parts) { return OutputAdjoint{parts...}; }, one);
+        });
+        return unlocked([=](const Interruption&) { return propagate_adjoints(given, options); });
+      },
+      arg("outputs"), arg("options") = AdjointOptions());
 }
 
 }  // namespace

@@ -15,12 +15,14 @@ retrograde_test(
   operation_count_test
   passed_reads_test
   second_derivatives_test
+  several_outputs_test
   shared_adjoints_test
   stability_strong_zeros_test
   stable_forms_test
   straight_through_test
   tangents_test
   time_axis_test
+  unbounded_reads_test
   value_range_test
   version_budget_test
   zero_borders_test

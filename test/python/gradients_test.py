@@ -49,6 +49,17 @@ class Adjoints(unittest.TestCase):
         d = rg.propagate_adjoints(b.blur, s, [(0, 64)])
         np.testing.assert_allclose(d(b.weights).realize([3]), b.rows.T @ seed, rtol=1e-5)
 
+    def test_several_outputs(self):
+        b = Blur()
+        seed, square = np.arange(64, dtype=np.float32), rg.Func("square")
+        square[x] = b.blur[x] * b.blur[x]
+        given = [(b.blur, rg.Func(rg.Buffer(seed)), [(0, 64)]), (square, rg.Func(rg.Buffer(seed)), [(0, 64)])]
+        d = rg.propagate_adjoints(given, rg.AdjointOptions(wrt=[b.weights]))
+        expected = b.rows.T @ (seed * (1 + 2 * (b.rows @ b.kernel)))
+        np.testing.assert_allclose(d(b.weights).realize([3]), expected, rtol=1e-5)
+        with self.assertRaisesRegex(rg.CompileError, "there is at least one output"):
+            rg.propagate_adjoints([])
+
     def test_options(self):
         b = Blur()
         d = rg.propagate_adjoints(b.loss, rg.AdjointOptions(wrt=[b.weights]))

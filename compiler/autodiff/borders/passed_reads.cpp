@@ -51,7 +51,7 @@ bool is_look_up(const FuncContents& f) {
                      [&](const Expr& value) { return is_look_up(without_lets(value), f.args); });
 }
 
-Expr looked_up(const FuncContents& f, const Call& read) {
+Expr value_of_read(const FuncContents& f, const Call& read) {
   Substitution place;
   for (size_t d = 0; d < f.args.size(); ++d) place[f.args[d]] = read.args[d];
   return substitute(without_lets(f.pure->values[static_cast<size_t>(read.component)]), place);

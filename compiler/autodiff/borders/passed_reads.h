@@ -35,8 +35,8 @@ struct PassedRead {
 // Whether f only reads an element at indices that are functions of one coordinate each, or a constant where its
 // coordinates select that.
 bool is_look_up(const FuncContents& f);
-// The value of a read of such a Func, expressed by the Func that it looks up.
-Expr looked_up(const FuncContents& f, const Call& read);
+// The value of a read of a pure Func, expressed by what that Func reads.
+Expr value_of_read(const FuncContents& f, const Call& read);
 // Whether the inversion has few pieces, none of which sums. Then it may replace the inversion of two reads in sequence.
 bool is_short(const Inversion& inversion);
 

@@ -146,8 +146,10 @@ class FibrePlanner {
       const LoopVariable& v = space_.vars[static_cast<size_t>(c.var)];
       if (!v.min.defined()) {
         user_error("differentiate an access over an unbounded domain",
-                   "every variable needs a range", text(quoted(v.name), " has none"),
-                   "clamp the index that it comes from");
+                   "every variable needs a range",
+                   text("the Func with the dimension ", quoted(v.name),
+                        " is read at indices that depend on data and have no bounds"),
+                   "Clamp these indices, as in clamp(index, 0, extent - 1)");
       }
       return on_space(space_.bridge.bound(v.min), fibre.exact);
     }

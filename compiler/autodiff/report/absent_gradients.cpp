@@ -25,7 +25,7 @@ class AbsentGradients {
       AdjointFunc zero = make_adjoint(primal_.target_of(f.get()), f->name + "_adj", {});
       for (int s = 0; s < f->stage_count(); ++s) result_.after_stage[{f.get(), s}] = zero.func;
     }
-    for (const auto& p : parameters_of({primal_.seed.output})) {
+    for (const auto& p : parameters_of(primal_.outputs)) {
       if (result_.parameters.contains(p.get()) ||
           !is_wanted_zero(p.get(), p->name, p->type.is_float(), p->type))
         continue;
@@ -37,7 +37,7 @@ class AbsentGradients {
   void find_strangers() {
     std::unordered_set<const Symbol*> reached;
     for (const FuncPtr& f : primal_.order) reached.insert(f.get());
-    for (const auto& p : parameters_of({primal_.seed.output})) reached.insert(p.get());
+    for (const auto& p : parameters_of(primal_.outputs)) reached.insert(p.get());
     std::map<std::string, const Symbol*> strangers;  // by name, for a deterministic order
     for (const Symbol* symbol : primal_.options.requested) {
       if (symbol && !reached.contains(symbol)) strangers[shape_of(symbol).name] = symbol;

@@ -12,6 +12,12 @@ namespace {
 
 using What = Explanation::Kind;
 
+std::string names_of(const std::vector<WantedFunc>& outputs) {
+  std::string names;
+  for (const WantedFunc& output : outputs) names += (names.empty() ? "" : ", ") + output.func->name;
+  return names;
+}
+
 std::string counted(const Count& count, const char* what) {
   return count.text() + " " + what + (count.value() == 1.0 ? "" : "s");
 }
@@ -52,7 +58,7 @@ Explanation recomputed(const FuncOperations& f) {
                " each time, no memory")};
 }
 
-Explanation totals(const WantedFunc& output, const OperationCount& primal,
+Explanation totals(const std::string& outputs, const OperationCount& primal,
                    const OperationCount& gradient) {
   Count before = primal.operations(), after = gradient.operations();
   std::string ratio;
@@ -61,7 +67,7 @@ Explanation totals(const WantedFunc& output, const OperationCount& primal,
     std::snprintf(digits, sizeof digits, "%.2f", *after.value() / *before.value());
     ratio = text(", ", digits, " times as many");
   }
-  return {What::Cost, output.func->name,
+  return {What::Cost, outputs,
           text(counted(before, "operation"), " and ", counted(primal.bytes(), "byte"),
                "; its gradient alone: ", counted(after, "operation"), ratio, ", and ",
                counted(gradient.bytes(), "byte"))};
@@ -82,10 +88,10 @@ std::optional<double> kept_between(const OperationCount& count,
 }
 
 // Adds a note if a gradient stores more than twice the intermediate results of the program, and names the largest.
-void note_memory(const WantedFunc& output, const std::vector<WantedFunc>& gradients,
+void note_memory(const std::vector<WantedFunc>& outputs, const std::vector<WantedFunc>& gradients,
                  const OperationCount& primal, const OperationCount& gradient,
                  std::vector<Explanation>& result) {
-  const auto own = kept_between(primal, {output}), more = kept_between(gradient, gradients);
+  const auto own = kept_between(primal, outputs), more = kept_between(gradient, gradients);
   if (!own || !more || *more <= 2 * *own) return;
   const FuncOperations* largest = nullptr;
   for (const FuncOperations& f : gradient.funcs) {
@@ -95,7 +101,7 @@ void note_memory(const WantedFunc& output, const std::vector<WantedFunc>& gradie
     if (!largest || *f.bytes.value() > *largest->bytes.value()) largest = &f;
   }
   result.push_back(
-      {What::Performance, output.func->name,
+      {What::Performance, names_of(outputs),
        text("its gradient stores ", Count(*more).text(),
             " bytes of intermediate results, the program ", Count(*own).text(),
             "; most of them in ", quoted(largest->func->name), ", ", largest->bytes.text(),
@@ -104,7 +110,7 @@ void note_memory(const WantedFunc& output, const std::vector<WantedFunc>& gradie
 
 }  // namespace
 
-std::vector<Explanation> explain_costs(const WantedFunc& output,
+std::vector<Explanation> explain_costs(const std::vector<WantedFunc>& outputs,
                                        const std::vector<WantedFunc>& gradients,
                                        const OperationCount& primal,
                                        const OperationCount& gradient) {
@@ -117,8 +123,8 @@ std::vector<Explanation> explain_costs(const WantedFunc& output,
     if (gradient.find(f.func.get())) continue;
     result.push_back({What::LeftOut, f.func->name, "the gradient needs none of its values"});
   }
-  result.push_back(totals(output, primal, gradient));
-  note_memory(output, gradients, primal, gradient, result);
+  result.push_back(totals(names_of(outputs), primal, gradient));
+  note_memory(outputs, gradients, primal, gradient, result);
   return result;
 }
 

@@ -210,16 +210,18 @@ Response response_of_node(const Expr& e, FunctionRef<const Response&(const Expr&
 class Propagation {
  public:
   Propagation(const std::vector<FuncPtr>& order,
-              const std::vector<std::vector<std::shared_ptr<Symbol>>>& reads)
-      : order_(order), reads_(reads) {}
+              const std::vector<std::vector<std::shared_ptr<Symbol>>>& reads,
+              const std::vector<FuncPtr>& outputs)
+      : order_(order), reads_(reads), outputs_(outputs) {}
 
-  bool output_ignores(size_t source, How kind) {
+  bool outputs_ignore(size_t source, How kind) {
     responses_.clear();
     responses_[order_[source].get()] = {{kind, 1, variables_of(order_[source]->args)}};
     for (size_t i = source + 1; i < order_.size(); ++i) {
       if (responds(i) && !add(order_[i])) return false;
     }
-    return !responses_.contains(order_.back().get());
+    return std::ranges::none_of(
+        outputs_, [&](const FuncPtr& output) { return responses_.contains(output.get()); });
   }
 
  private:
@@ -298,6 +300,7 @@ class Propagation {
 
   const std::vector<FuncPtr>& order_;
   const std::vector<std::vector<std::shared_ptr<Symbol>>>& reads_;
+  const std::vector<FuncPtr>& outputs_;
   std::unordered_map<const Symbol*, std::vector<Response>> responses_;
 };
 
@@ -330,17 +333,18 @@ Suspects suspects_among(const std::vector<FuncPtr>& order) {
 
 }  // namespace
 
-std::unordered_set<const Symbol*> cancelling_funcs(const std::vector<FuncPtr>& order) {
+std::unordered_set<const Symbol*> cancelling_funcs(const std::vector<FuncPtr>& order,
+                                                   const std::vector<FuncPtr>& outputs) {
   std::unordered_set<const Symbol*> result;
   const Suspects suspects = suspects_among(order);
   if (suspects.subtracted.empty() && suspects.divisors.empty()) return result;
   const auto reads = mapped(order, [&](const FuncPtr& f) { return read_by(*f); });
-  Propagation propagation(order, reads);
-  for (size_t i = 0; i + 1 < order.size(); ++i) {
+  Propagation propagation(order, reads, outputs);
+  for (size_t i = 0; i < order.size(); ++i) {
     const Symbol* f = order[i].get();
     if (order[i]->types.size() != 1 || !order[i]->types[0].is_float()) continue;
-    if ((suspects.subtracted.contains(f) && propagation.output_ignores(i, How::Shifted)) ||
-        (suspects.divisors.contains(f) && propagation.output_ignores(i, How::Scaled)))
+    if ((suspects.subtracted.contains(f) && propagation.outputs_ignore(i, How::Shifted)) ||
+        (suspects.divisors.contains(f) && propagation.outputs_ignore(i, How::Scaled)))
       result.insert(f);
   }
   return result;

@@ -13,8 +13,8 @@
 //   Shifted  v + c d(place)        Scaled  v * exp(c d(place))        Fixed  v
 //
 // Sums, products, powers, exp and log turn one response into another. A sum over x keeps the response that all its
-// terms share. Every other response is Unknown. If every value of the output is Fixed, the derivative by m is 0
-// wherever it exists. As in derivatives, integers, conditions and stop_gradient count as constants.
+// terms share. Every other response is Unknown. If every value of every output is Fixed, the derivative by m is
+// 0 wherever it exists. As in derivatives, integers, conditions and stop_gradient count as constants.
 //
 // Cost: one walk for each Func that a stage of more dimensions subtracts or divides by. The walk covers the Funcs that
 // depend on it and stops at the first Unknown.
@@ -27,7 +27,8 @@
 
 namespace retrograde::autodiff {
 
-// Returns the Funcs of `order` that cancel. `order` has producers before consumers, and the output last.
-std::unordered_set<const Symbol*> cancelling_funcs(const std::vector<FuncPtr>& order);
+// Returns the Funcs of `order` that cancel in all outputs. `order` has producers before consumers.
+std::unordered_set<const Symbol*> cancelling_funcs(const std::vector<FuncPtr>& order,
+                                                   const std::vector<FuncPtr>& outputs);
 
 }  // namespace retrograde::autodiff

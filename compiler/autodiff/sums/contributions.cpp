@@ -1,5 +1,6 @@
 #include "autodiff/sums/contributions.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "autodiff/sweeps/input_shape.h"
@@ -28,8 +29,12 @@ void Contributions::add(const FuncPtr& f, const LeafAdjoint& leaf, const Expr& a
                         const IterationDomain& domain) {
   const Symbol* symbol = symbol_of(leaf.leaf);
   const auto* call = leaf.leaf.as<Call>();
-  const Inversion& inversion = inversion_of(*f, leaf, domain);
   const auto* read = dynamic_cast<const FuncContents*>(symbol);
+  if (read && !has_size(*read)) {
+    add_to_what_it_reads(*read, f, {leaf.leaf, adjoint}, domain);
+    return;
+  }
+  const Inversion& inversion = inversion_of(*f, leaf, domain);
   if (read && is_look_up(*read) && !primal_.is_named(symbol))
     passed_.note(symbol, {f, {leaf.leaf, adjoint}, domain});
   if (!inversion.note.empty())
@@ -39,11 +44,28 @@ void Contributions::add(const FuncPtr& f, const LeafAdjoint& leaf, const Expr& a
     pending_[symbol].push_back({call ? call->component : 0, g, substitute(adjoint, g.iteration)});
 }
 
+// False only for Funcs whose consumers can contribute to what they read.
+bool Contributions::has_size(const FuncContents& f) const {
+  if (!f.is_pure() || f.is_extern() || f.custom_derivatives || primal_.is_named(&f)) return true;
+  return std::ranges::all_of(primal_.regions.of(&f), &Interval::is_bounded);
+}
+
+void Contributions::add_to_what_it_reads(const FuncContents& read, const FuncPtr& f,
+                                         const LeafAdjoint& leaf, const IterationDomain& domain) {
+  if (without_adjoint_.insert(&read).second)
+    account_.add(Explanation::Kind::NotRequested, read.name,
+                 "it is read at indices that depend on data and have no bounds, so its adjoint has "
+                 "no size: its consumers contribute to what it reads");
+  const SweepResult sweep =
+      primal_.sweep({value_of_read(read, *leaf.leaf.as<Call>())}, {leaf.adjoint});
+  for (const LeafAdjoint& further : sweep.leaves) add(f, further, domain);
+}
+
 bool Contributions::pass_on(const FuncContents& f) {
   std::vector<PassedRead> further;
   for (const PassedRead& read : passed_.of(&f)) {
     const SweepResult sweep =
-        primal_.sweep({looked_up(f, *read.read.leaf.as<Call>())}, {read.read.adjoint});
+        primal_.sweep({value_of_read(f, *read.read.leaf.as<Call>())}, {read.read.adjoint});
     for (const LeafAdjoint& leaf : sweep.leaves) {
       if (!is_short(inversion_of(*read.reader, leaf, read.domain))) return false;
       further.push_back({read.reader, leaf, read.domain});

@@ -5,6 +5,7 @@
 
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "autodiff/borders/passed_reads.h"
@@ -24,6 +25,8 @@ class Contributions {
   void add_pointwise(const Symbol* symbol, const std::vector<std::string>& args, const Box& box,
                      const std::vector<LoopVariable>& read, const std::vector<Expr>& values);
   // Adds the contribution of a stage of f to the symbol that the leaf reads. `adjoint` replaces the leaf's own adjoint.
+  // If consumers read a pure Func at indices without bounds, its adjoint has no size: f contributes to what that Func
+  // reads instead.
   void add(const FuncPtr& f, const LeafAdjoint& leaf, const Expr& adjoint,
            const IterationDomain& domain);
   void add(const FuncPtr& f, const LeafAdjoint& leaf, const IterationDomain& domain) {
@@ -34,8 +37,13 @@ class Contributions {
   bool pass_on(const FuncContents& f);
   // Returns and removes all contributions to the symbol.
   std::vector<Contribution> take(const Symbol* symbol);
+  // The Funcs without an adjoint of their own, because their consumers contribute to what they read.
+  const std::unordered_set<const Symbol*>& without_adjoint() const { return without_adjoint_; }
 
  private:
+  bool has_size(const FuncContents& f) const;
+  void add_to_what_it_reads(const FuncContents& read, const FuncPtr& f, const LeafAdjoint& leaf,
+                            const IterationDomain& domain);
   const Inversion& inversion_of(const FuncContents& reader, const LeafAdjoint& leaf,
                                 const IterationDomain& domain);
 
@@ -44,6 +52,7 @@ class Contributions {
   std::unordered_map<const Symbol*, std::vector<Contribution>> pending_;
   ReadInversions inversions_;
   PassedReads passed_;
+  std::unordered_set<const Symbol*> without_adjoint_;
 };
 
 }  // namespace retrograde::autodiff

@@ -21,10 +21,10 @@ Symbol* symbol_of(const Expr& leaf) {
              : nullptr;
 }
 
-ActiveSymbols::ActiveSymbols(const FuncPtr& output, const std::vector<FuncPtr>& order,
+ActiveSymbols::ActiveSymbols(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& order,
                              const SynthesisOptions& options)
-    : options_(options), cancelling_(cancelling_funcs(order)) {
-  for (const auto& parameter : parameters_of({output})) {
+    : options_(options), cancelling_(cancelling_funcs(order, outputs)) {
+  for (const auto& parameter : parameters_of(outputs)) {
     if (parameter->type.is_float() && is_requested(parameter.get()))
       active_.insert(parameter.get());
   }

@@ -1,6 +1,6 @@
 // active_symbols.h -- finds the Funcs and parameters that need an adjoint.
 //
-// These are the symbols on a path from a requested input to the output.
+// These are the symbols on a path from a requested input to an output.
 #pragma once
 
 #include <unordered_set>
@@ -17,8 +17,8 @@ Symbol* symbol_of(const Expr& leaf);
 
 class ActiveSymbols {
  public:
-  // `order` has all Funcs that the output depends on, producers first.
-  ActiveSymbols(const FuncPtr& output, const std::vector<FuncPtr>& order,
+  // `order` has all Funcs that the outputs depend on, producers first.
+  ActiveSymbols(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& order,
                 const SynthesisOptions& options);
 
   bool is_requested(const Symbol* symbol) const;
@@ -26,7 +26,7 @@ class ActiveSymbols {
   bool contains(const Expr& leaf) const;
   // Whether derivatives pass through the Func to a wanted input.
   bool is_passed_by(const Symbol* f) const { return passing_.contains(f); }
-  // Whether the output does not depend on the values of the Func (rules/invariance.h).
+  // Whether the outputs do not depend on the values of the Func (rules/invariance.h).
   bool cancels(const Symbol* f) const { return cancelling_.contains(f); }
 
  private:

@@ -9,26 +9,26 @@ namespace {
 
 using Names = std::vector<const Symbol*>;
 
-SynthesisResult synthesize(const Seed& seed, const SynthesisOptions& options) {
-  return options.checkpoints.is_set() ? synthesize_folded(seed, options)
-                                      : synthesize_adjoints(seed, options);
+SynthesisResult synthesize(const Seeds& seeds, const SynthesisOptions& options) {
+  return options.checkpoints.is_set() ? synthesize_folded(seeds, options)
+                                      : synthesize_adjoints(seeds, options);
 }
 
 // Scalars that were not requested; they get gradients only because everything does.
-Names unrequested_scalars(const Seed& seed, const SynthesisOptions& options) {
+Names unrequested_scalars(const Seeds& seeds, const SynthesisOptions& options) {
   Names scalars;
   if (options.only_requested) return scalars;
-  for (const auto& p : parameters_of({seed.output})) {
+  for (const auto& p : parameters_of(outputs_of(seeds))) {
     if (!p->is_buffer && p->type.is_float()) scalars.push_back(p.get());
   }
   return scalars;
 }
 
-std::optional<SynthesisResult> without(const Names& names, const Seed& seed,
+std::optional<SynthesisResult> without(const Names& names, const Seeds& seeds,
                                        SynthesisOptions options, const std::string& why) {
   for (const Symbol* symbol : names) options.left_out[symbol] = why;
   try {
-    return synthesize(seed, options);
+    return synthesize(seeds, options);
   } catch (const InternalError&) {
     throw;
   } catch (const Error&) {
@@ -38,18 +38,18 @@ std::optional<SynthesisResult> without(const Names& names, const Seed& seed,
 
 }  // namespace
 
-SynthesisResult synthesize_supported(const Seed& seed, const SynthesisOptions& options) {
+SynthesisResult synthesize_supported(const Seeds& seeds, const SynthesisOptions& options) {
   try {
-    return synthesize(seed, options);
+    return synthesize(seeds, options);
   } catch (const InternalError&) {
     throw;
   } catch (const Error& error) {
-    const Names scalars = unrequested_scalars(seed, options);
+    const Names scalars = unrequested_scalars(seeds, options);
     for (const Symbol* symbol : scalars) {
-      if (auto result = without({symbol}, seed, options, error.what())) return *std::move(result);
+      if (auto result = without({symbol}, seeds, options, error.what())) return *std::move(result);
     }
     if (scalars.size() > 1) {
-      if (auto result = without(scalars, seed, options, error.what())) return *std::move(result);
+      if (auto result = without(scalars, seeds, options, error.what())) return *std::move(result);
     }
     throw;
   }

@@ -10,6 +10,6 @@ namespace retrograde::autodiff {
 
 // Calls synthesize_adjoints or, with a budget for checkpoints, synthesize_folded. Throws what they throw, unless the
 // cause is a scalar parameter that was not requested.
-SynthesisResult synthesize_supported(const Seed& seed, const SynthesisOptions& options);
+SynthesisResult synthesize_supported(const Seeds& seeds, const SynthesisOptions& options);
 
 }  // namespace retrograde::autodiff

@@ -7,13 +7,14 @@
 
 namespace retrograde::autodiff {
 
-Primal::Primal(const Seed& seed, const SynthesisOptions& options)
-    : seed(seed),
+Primal::Primal(const Seeds& seeds, const SynthesisOptions& options)
+    : seeds(seeds),
       options(options),
-      order(topological_order({seed.output})),
-      regions(order, seed.region),
+      outputs(outputs_of(seeds)),
+      order(topological_order(outputs)),
+      regions(order, regions_of(seeds)),
       ranges(order),
-      active(seed.output, order, options) {}
+      active(outputs, order, options) {}
 
 AdjointTarget Primal::target_of(const Symbol* symbol) const {
   const auto* f = dynamic_cast<const FuncContents*>(symbol);

@@ -1,6 +1,6 @@
 // primal.h -- facts about the program being differentiated.
 //
-// These are its Funcs, the regions read of them, and which of them lie between the requested inputs and the output.
+// These are its Funcs, the regions read of them, and which of them lie between the requested inputs and the outputs.
 #pragma once
 
 #include <vector>
@@ -12,10 +12,11 @@
 namespace retrograde::autodiff {
 
 struct Primal {
-  Primal(const Seed& seed, const SynthesisOptions& options);
+  Primal(const Seeds& seeds, const SynthesisOptions& options);
 
-  const Seed& seed;
+  const Seeds& seeds;
   const SynthesisOptions& options;
+  std::vector<FuncPtr> outputs;
   std::vector<FuncPtr> order;  // producers first
   Regions regions;
   ValueRanges ranges;

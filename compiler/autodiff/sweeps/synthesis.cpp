@@ -20,7 +20,7 @@ namespace retrograde::autodiff {
 namespace {
 
 // Throws: an extern stage, or a Func with a rule for the other mode only, has no definitions to differentiate.
-[[noreturn]] void refuse_without_rule(const FuncContents& f, const FuncContents& output) {
+[[noreturn]] void refuse_without_rule(const FuncContents& f, const std::vector<FuncPtr>& outputs) {
   if (f.custom_derivatives) {
     unsupported(text("propagate adjoints through ", quoted(f.name)),
                 "a Func with a custom tangent needs a rule for adjoints, too",
@@ -28,9 +28,11 @@ namespace {
                 "the rule",
                 "Give it a custom_adjoint");
   }
-  unsupported(text("differentiate ", quoted(output.name)), "derivatives come from definitions",
-              text("it depends on ", quoted(f.name), ", which the C function ",
-                   quoted(f.extern_definition->function), " computes"),
+  std::string names;
+  for (const FuncPtr& output : outputs) names += (names.empty() ? "" : ", ") + quoted(output->name);
+  unsupported("differentiate " + names, "derivatives come from definitions",
+              text(outputs.size() == 1 ? "it depends on " : "they depend on ", quoted(f.name),
+                   ", which the C function ", quoted(f.extern_definition->function), " computes"),
               text("Give ", quoted(f.name),
                    " a custom_adjoint, leave its inputs out of what is "
                    "differentiated by, or differentiate what comes after it, with its values in "
@@ -61,8 +63,7 @@ std::vector<WantedFunc> gradients_of(const Primal& primal, const SynthesisResult
     gradients.push_back(
         {found->second, mapped(primal.target_of(symbol).region, &LoopVariable::range)});
   };
-  for (const auto& p : parameters_of({primal.seed.output}))
-    add(p.get(), result.parameters, p.get());
+  for (const auto& p : parameters_of(primal.outputs)) add(p.get(), result.parameters, p.get());
   if (!gradients.empty() && !primal.options.only_requested) return gradients;
   for (const FuncPtr& f : primal.order)
     add(f.get(), result.after_stage, std::pair(f.get(), f->stage_count() - 1));
@@ -71,24 +72,27 @@ std::vector<WantedFunc> gradients_of(const Primal& primal, const SynthesisResult
 
 class Synthesis {
  public:
-  Synthesis(const Seed& seed, const SynthesisOptions& options)
-      : primal_(seed, options), contributions_(primal_, account_), versions_(options.versions) {}
+  Synthesis(const Seeds& seeds, const SynthesisOptions& options)
+      : primal_(seeds, options), contributions_(primal_, account_), versions_(options.versions) {}
 
   SynthesisResult run() {
-    const auto& [output, region, values] = primal_.seed;
-    // The seed covers the specified bounds. Updates of the output may reach further, where the seed is 0.
-    contributions_.add_pointwise(output.get(), output->args, region,
-                                 primal_.regions.loop_variables(output.get(), output->args),
-                                 values);
+    // A seed covers the specified bounds. Updates of the output, and its consumers, may reach further, where it is 0.
+    for (const auto& [output, region, values] : primal_.seeds) {
+      contributions_.add_pointwise(output.get(), output->args, region,
+                                   primal_.regions.loop_variables(output.get(), output->args),
+                                   values);
+      result_.outputs.push_back({output, region});
+    }
     for (auto f = primal_.order.rbegin(); f != primal_.order.rend(); ++f) {
       if (primal_.active.contains(f->get())) differentiate(*f);
     }
-    for (const auto& parameter : parameters_of({output})) finish_parameter(*parameter);
+    for (const auto& parameter : parameters_of(primal_.outputs)) finish_parameter(*parameter);
+    covered_.insert(contributions_.without_adjoint().begin(),
+                    contributions_.without_adjoint().end());
     // Covered Funcs may get an adjoint along paths beside the rule. That is not the gradient of the output by them.
     std::erase_if(result_.after_stage,
                   [&](const auto& entry) { return covered_.contains(entry.first.first); });
     explain_absent(primal_, covered_, result_, account_);
-    result_.output = {output, region};
     result_.gradients = gradients_of(primal_, result_);
     result_.explanations = account_.take();
     return std::move(result_);
@@ -163,7 +167,7 @@ class Synthesis {
   }
 
   void contribute_by_rule(const FuncPtr& f, const FuncPtr& adjoint) {
-    if (!has_custom_adjoint(*f)) refuse_without_rule(*f, *primal_.seed.output);
+    if (!has_custom_adjoint(*f)) refuse_without_rule(*f, primal_.outputs);
     CustomAdjointResult rule = run_custom_adjoint(
         f, adjoint, primal_.regions, [&](const Symbol* s) { return primal_.active.contains(s); },
         [&](const Symbol* s) { return primal_.is_named(s); });
@@ -257,14 +261,26 @@ class Synthesis {
   SynthesisAccount account_;
   Contributions contributions_;
   VersionBudget versions_;
-  std::unordered_set<const Symbol*> covered_;  // Funcs inside of a custom adjoint
+  // Funcs without an adjoint of their own: those inside of a custom adjoint, and those without a size.
+  std::unordered_set<const Symbol*> covered_;
   SynthesisResult result_;
 };
 
 }  // namespace
 
-SynthesisResult synthesize_adjoints(const Seed& seed, const SynthesisOptions& options) {
-  return Synthesis(seed, options).run();
+std::vector<FuncPtr> outputs_of(const Seeds& seeds) { return mapped(seeds, &Seed::output); }
+
+std::map<const Symbol*, Box> regions_of(const Seeds& seeds) {
+  std::map<const Symbol*, Box> result;
+  for (const Seed& seed : seeds) {
+    Box& box = result[seed.output.get()];
+    box = hull(box, seed.region);
+  }
+  return result;
+}
+
+SynthesisResult synthesize_adjoints(const Seeds& seeds, const SynthesisOptions& options) {
+  return Synthesis(seeds, options).run();
 }
 
 }  // namespace retrograde::autodiff

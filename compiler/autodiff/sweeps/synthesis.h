@@ -35,12 +35,17 @@ struct SynthesisOptions {
   std::unordered_map<const Symbol*, std::string> left_out;  // parameters, with the reason
 };
 
-// The adjoint of the output: for each value an expression in the output's pure variables; undefined means zero.
+// The adjoint of an output: for each value an expression in the output's pure variables; undefined means zero.
 struct Seed {
   FuncPtr output;
   Box region;
   std::vector<Expr> values;
 };
+// Those of all outputs. One may be read by another, and may occur again: its adjoints add up.
+using Seeds = std::vector<Seed>;
+std::vector<FuncPtr> outputs_of(const Seeds& seeds);
+// The region of each output.
+std::map<const Symbol*, Box> regions_of(const Seeds& seeds);
 
 struct SynthesisResult {
   // Key: Func and stage. Value: the adjoint of the Func as it is after that stage.
@@ -50,12 +55,11 @@ struct SynthesisResult {
   std::vector<FuncPtr> funcs;                     // all generated Funcs, producers before consumers
   std::vector<Explanation> explanations;
   std::vector<std::shared_ptr<Symbol>> requested;  // kept alive here, possibly by nothing else
-  // The output that was differentiated, and its gradients: those of the requested symbols; else of all images and
-  // parameters; else, if there are none, of all Funcs.
-  WantedFunc output;
-  std::vector<WantedFunc> gradients;
+  // The outputs that were differentiated, in the order of the seeds, and their gradients: those of the requested
+  // symbols; else of all images and parameters; else, if there are none, of all Funcs.
+  std::vector<WantedFunc> outputs, gradients;
 };
 
-SynthesisResult synthesize_adjoints(const Seed& seed, const SynthesisOptions& options);
+SynthesisResult synthesize_adjoints(const Seeds& seeds, const SynthesisOptions& options);
 
 }  // namespace retrograde::autodiff

@@ -21,9 +21,10 @@ Expr slot_of(const Expr& time, const TimeAxis& axis) {
 
 class Folder {
  public:
-  Folder(const Seed& seed, const SynthesisOptions& options)
-      : order_(topological_order({seed.output})),
-        regions_(order_, seed.region),
+  Folder(const Seeds& seeds, const SynthesisOptions& options)
+      : outputs_(outputs_of(seeds)),
+        order_(topological_order(outputs_)),
+        regions_(order_, regions_of(seeds)),
         ranges_(order_),
         options_(options) {}
 
@@ -46,8 +47,9 @@ class Folder {
   // ---- one loop ----
 
   bool fold(const FuncPtr& f) {
-    bool wanted = options_.only_requested && options_.requested.contains(f.get());
-    if (wanted || f == order_.back() || f->updates.empty()) return false;
+    const bool is_requested = options_.only_requested && options_.requested.contains(f.get());
+    const bool is_output = std::ranges::find(outputs_, f) != outputs_.end();
+    if (is_requested || is_output || f->updates.empty()) return false;
     const int stage = f->stage_count() - 1;
     const AdjointTarget target{f->name, f->args, {}, {}};
     const AdjointFunc none;
@@ -149,7 +151,7 @@ class Folder {
     };
   }
 
-  std::vector<FuncPtr> order_;
+  std::vector<FuncPtr> outputs_, order_;
   Regions regions_;
   ValueRanges ranges_;
   const SynthesisOptions& options_;
@@ -158,23 +160,24 @@ class Folder {
 
 }  // namespace
 
-SynthesisResult synthesize_folded(const Seed& seed, SynthesisOptions options) {
-  Folder folder(seed, options);
+SynthesisResult synthesize_folded(const Seeds& seeds, SynthesisOptions options) {
+  Folder folder(seeds, options);
   folder.run();
-  auto copy_of = [&](const Symbol* f) { return value_or(folder.copies, f, nullptr); };
-  FuncPtr output = copy_of(seed.output.get());
-  if (!output) return synthesize_adjoints(seed, options);
+  if (folder.copies.empty()) return synthesize_adjoints(seeds, options);
+  const Seeds copied = mapped(seeds, [&](const Seed& seed) {
+    return Seed{value_or(folder.copies, seed.output.get(), seed.output), seed.region, seed.values};
+  });
   for (const auto& [f, copy] : folder.copies) {
     if (options.requested.erase(f) > 0) options.requested.insert(copy.get());
   }
-  SynthesisResult result = synthesize_adjoints({output, seed.region, seed.values}, options);
+  SynthesisResult result = synthesize_adjoints(copied, options);
   for (const auto& [f, copy] : folder.copies) {
     for (int s = 0; s < copy->stage_count(); ++s) {
       auto found = result.after_stage.find({copy.get(), s});
       if (found != result.after_stage.end()) result.after_stage[{f, s}] = found->second;
     }
   }
-  result.output.func = seed.output;
+  for (size_t i = 0; i < seeds.size(); ++i) result.outputs[i].func = seeds[i].output;
   result.explanations.insert(result.explanations.begin(), folder.explanations.begin(),
                              folder.explanations.end());
   return result;

@@ -6,7 +6,7 @@
 //   last(x) = f(x, n)                 last'(x) = f_folded(x, n % K)
 //
 // This applies if other Funcs read only the last slices (time_axis.h). These and the slices that a step reads must fit
-// into K slots: K = 1 if a step reads its own element one step back. Funcs between f and the output are copied, so the
+// into K slots: K = 1 if a step reads its own element one step back. Funcs between f and the outputs are copied, so the
 // user's program does not change. Elements that no step writes are read from the pure definition. The folded loop is
 // one for checkpoint.h: n steps take the memory of a few states.
 //
@@ -18,7 +18,7 @@
 namespace retrograde::autodiff {
 
 // Calls synthesize_adjoints on the folded program. Adjoints of copies are reported as those of the original Funcs.
-// Folded Funcs have no adjoint, and explanations say so. A requested Func is not folded.
-SynthesisResult synthesize_folded(const Seed& seed, SynthesisOptions options);
+// Folded Funcs have no adjoint, and explanations say so. Requested Funcs and outputs are not folded.
+SynthesisResult synthesize_folded(const Seeds& seeds, SynthesisOptions options);
 
 }  // namespace retrograde::autodiff

@@ -7,27 +7,44 @@
 
 namespace retrograde::lower {
 
+namespace {
+
+// The Func of the program that f is the adjoint of; empty if it is none.
+std::string adjoint_of(const FuncContents& f) {
+  return f.made && f.made->role == graph::Role::Adjoint ? f.made->of : "";
+}
+
+// How messages name a Func: an adjoint by the Func of the program.
+std::string named(const FuncContents& f) {
+  const std::string of = adjoint_of(f);
+  return of.empty() ? quoted(f.name) : "the adjoint of " + quoted(of);
+}
+
+}  // namespace
+
 std::string consumers_of(const Program& program, const LoopedFunc& f) {
   std::string names;
   for (const LoopedFunc& other : program.funcs) {
     for (const FuncPtr& callee : direct_callees(*other.func)) {
-      if (callee == f.func) names += (names.empty() ? "" : ", ") + quoted(other.name());
+      if (callee == f.func) names += (names.empty() ? "" : ", ") + named(*other.func);
     }
   }
-  return names.empty() ? quoted(f.name()) : names;
+  return names.empty() ? named(*f.func) : names;
 }
 
 void check_bounded(const Program& program, const LoopedFunc& f, const Box& box) {
   for (size_t d = 0; d < box.size(); d++) {
     if (box[d].is_bounded()) continue;
-    user_error(text("compute ", quoted(f.name())),
+    const std::string of = adjoint_of(*f.func);
+    user_error("compute " + named(*f.func),
                "the region of a Func that its consumers read must be bounded",
                text("dimension ", d, " (", quoted(f.func->args[d]), ") is read without ",
                     box[d].has_lower_bound() ? "an upper" : "a lower", " bound by ",
                     consumers_of(program, f)),
-               "Clamp the index that depends on data, as in clamp(index, 0, extent - 1), or "
-               "promise its range with "
-               "unsafe_promise_clamped");
+               text("Clamp the index that depends on data",
+                    of.empty() ? "" : text(" where the program reads ", quoted(of)),
+                    ", as in clamp(index, 0, extent - 1), or promise its range with "
+                    "unsafe_promise_clamped"));
   }
 }
 

@@ -244,7 +244,7 @@ class Plan:
 
     def _gradient(self, wanted, given):
         by = [self.inputs[i] for i in wanted]
-        seeds, derivatives = [], []
+        seeds, adjoints = [], []
         for i in given:
             f = self.outputs[i]
             seed = rg.ImageParam(f.type(), f.dimensions(), f"seed_{next(_numbers)}")
@@ -253,8 +253,9 @@ class Plan:
             else:
                 bounds = [(0, size) for size in reversed(self._result_shapes[i])]
             seeds.append(seed)
-            derivatives.append(rg.propagate_adjoints(f, rg.Func(seed), bounds, rg.AdjointOptions(wrt=by)))
-        gradients = [_sum([d(parameter) for d in derivatives], parameter) for parameter in by]
+            adjoints.append((f, rg.Func(seed), bounds))
+        derivative = rg.propagate_adjoints(adjoints, rg.AdjointOptions(wrt=by))
+        gradients = [_as_gradient(derivative(parameter), parameter) for parameter in by]
         sizes = None if self.sizes is None else [*self.sizes, *(self._result_shapes[i] for i in given)]
         plan = Plan(f"{self.name}, gradient", gradients, self.inputs + seeds,
                     lambda tensors: [tuple(tensors[i].shape) for i in wanted], sizes)
@@ -267,7 +268,7 @@ class Plan:
             dimensions = parameter.dimensions() if is_image(parameter) else 0
             tangents.append(rg.ImageParam(parameter.type(), dimensions, f"tangent_{next(_numbers)}"))
             directions.append(rg.Direction(parameter, rg.Func(tangents[-1])))
-        moved = [_as(f.type(), f.dimensions(), [rg.propagate_tangents(f, directions)(f)] if f.type().is_float() else [])
+        moved = [_as(f.type(), f.dimensions(), rg.propagate_tangents(f, directions)(f) if f.type().is_float() else None)
                  for f in self.outputs]
         count = len(self.inputs)
         sizes = None if self.sizes is None else [*self.sizes, *(self.sizes[i] for i in given)]
@@ -299,17 +300,14 @@ def _set_bounds(buffer, size):
         buffer.dim(d).set_bounds(0, extent)
 
 
-def _sum(parts, parameter):
-    """The sum of the parts of a gradient as a Func with the type of the parameter; the parts may be wider."""
-    return _as(parameter.type(), parameter.dimensions() if is_image(parameter) else 0, parts)
+def _as_gradient(adjoint, parameter):
+    """An adjoint as a Func with the type of the parameter; the adjoint may be wider."""
+    return _as(parameter.type(), parameter.dimensions() if is_image(parameter) else 0, adjoint)
 
 
-def _as(type, dimensions, parts):
-    total = rg.Func(f"derivative_{next(_numbers)}")
-    value = rg.cast(type, 0)
+def _as(type, dimensions, part=None):
+    """A Func with the values of another one, if there is any, in a type."""
+    result = rg.Func(f"derivative_{next(_numbers)}")
     at = tuple(rg.Var(f"d{d}") for d in range(dimensions))
-    for part in parts:
-        if part.defined():
-            value = value + rg.cast(type, part[at])
-    total[at] = value
-    return total
+    result[at] = rg.cast(type, part[at] if part is not None and part.defined() else 0)
+    return result

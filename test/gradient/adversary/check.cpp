@@ -36,7 +36,10 @@ class Judge {
     if (!std::isfinite(at_rest_)) decide(Judgement::Illegal, "its value is not finite");
     differentiate();
     compare(forward(v_->directions()), reverse_, "along the inputs");
-    if (!p_.only_inputs && !p_.has_rule) compare_along_func();
+    if (!p_.has_rule) {
+      if (!p_.only_inputs) compare_along_func();
+      if (p_.checks.several) compare_with_two_outputs();
+    }
     const bool is_smooth = compare_with_differences();
     if (p_.checks.order > 1 && !s_.is_late()) {
       compare_higher(s_, *v_, *derivative_);
@@ -73,9 +76,7 @@ class Judge {
   // ---- the derivative ----
 
   void differentiate() {
-    AdjointOptions options = p_.options;
-    if (p_.only_inputs) options.wrt = s_.options().wrt;
-    derivative_.emplace(propagate_adjoints(p_.output(), s_.seed, s_.bounds(), options));
+    derivative_.emplace(propagate_adjoints(p_.output(), s_.seed, s_.bounds(), options()));
     reverse_ = product_along(*v_);
     const std::vector<AdjointInput> inputs = v_->inputs();
     for (size_t i = 0; i < inputs.size(); ++i) {
@@ -84,6 +85,12 @@ class Judge {
       if (gradient.defined()) check_around(gradient, v_->region(i));
       gradients_.push_back({gradient, v_->region(i)});
     }
+  }
+
+  AdjointOptions options() const {
+    AdjointOptions result = p_.options;
+    if (p_.only_inputs) result.wrt = s_.options().wrt;
+    return result;
   }
 
   // The gradient must be 0 in a ring around the region.
@@ -103,8 +110,12 @@ class Judge {
   // ---- forward mode ----
 
   double forward(const std::vector<Direction>& directions) {
-    const Func t = propagate_tangents(p_.output(), directions)(p_.output());
-    return t.defined() ? weighted(evaluate(t, p_.region()), p_.region(), s_.w).sum : 0;
+    return forward(directions, p_.output(), p_.region(), s_.w);
+  }
+  static double forward(const std::vector<Direction>& directions, const Func& output,
+                        const oracle::Region& region, const std::vector<Buffer<float>>& weights) {
+    const Func t = propagate_tangents(output, directions)(output);
+    return t.defined() ? weighted(evaluate(t, region), region, weights).sum : 0;
   }
   void compare(double jv, const Product& jtw, const std::string& where) {
     const double slack = 1e-11 * (jtw.magnitude + std::abs(jv) + 1 + s_.largest);
@@ -114,24 +125,52 @@ class Judge {
            text("forward and reverse mode differ ", where, ": ", jv, " and ", jtw.sum));
   }
 
-  // Compares the adjoint of a Func with the tangent of the stages after it.
-  void compare_along_func() {
-    if (p_.funcs.size() < 2) return;
+  // The first or the last Func before the output, the region read of it, and weights of its values.
+  struct Inner {
+    Func func;
+    oracle::Region region;
+    std::vector<Buffer<float>> weights;
+    Func reader() const { return reading_inside(weights, region, 0.0f); }
+  };
+  std::optional<Inner> inner_func() {
+    if (p_.funcs.size() < 2) return {};
     const std::vector<graph::FuncPtr> order = graph::topological_order({p_.output().function()});
     const Func f = p_.funcs[static_cast<size_t>(s_.weights.next() > 0) * (p_.funcs.size() - 2)];
-    if (std::find(order.begin(), order.end(), f.function()) == order.end()) return;
+    if (std::find(order.begin(), order.end(), f.function()) == order.end()) return {};
     for (const Type& t : f.types()) {
-      if (!t.is_float()) return;
+      if (!t.is_float()) return {};
     }
     const std::optional<oracle::Region> region = region_of(f, order);
-    const Func adjoint = derivative_->adjoint(f);
-    if (!region || region->points() > 4096 || !adjoint.defined()) return;
-    std::vector<Buffer<float>> directions;
+    if (!region || region->points() > 4096) return {};
+    std::vector<Buffer<float>> weights;
     for (int k = 0; k < f.outputs(); ++k)
-      directions.push_back(s_.weights.over(*region, "along" + std::to_string(k)));
-    const Product product = weighted(evaluate(adjoint, *region), *region, directions);
-    compare(forward({{f, reading_inside(directions, *region, 0.0f)}}), product,
-            "along " + f.name());
+      weights.push_back(s_.weights.over(*region, "along" + std::to_string(k)));
+    return Inner{f, *region, weights};
+  }
+
+  // Compares the adjoint of a Func with the tangent of the stages after it.
+  void compare_along_func() {
+    const std::optional<Inner> inner = inner_func();
+    const Func adjoint = inner ? derivative_->adjoint(inner->func) : Func();
+    if (!adjoint.defined()) return;
+    const Product product =
+        weighted(evaluate(adjoint, inner->region), inner->region, inner->weights);
+    compare(forward({{inner->func, inner->reader()}}), product, "along " + inner->func.name());
+  }
+  // Compares the gradient of the output and of a Func before it, in one pass, with both tangents.
+  void compare_with_two_outputs() {
+    const std::optional<Inner> inner = inner_func();
+    if (!inner || inner->region.points() == 0) return;
+    Region bounds;
+    for (int d = 0; d < inner->func.dimensions(); ++d)
+      bounds.push_back({inner->region.mins[d], inner->region.extents[d]});
+    const Derivative both = propagate_adjoints(
+        {{p_.output(), s_.seed, s_.bounds()}, {inner->func, inner->reader(), bounds}}, options());
+    const Product product = v_->along([&](const AdjointInput& x) { return both.of(x); });
+    const std::vector<Direction> directions = v_->directions();
+    compare(forward(directions) + forward(directions, inner->func, inner->region, inner->weights),
+            product, "with " + inner->func.name() + " as another output");
+    ++counts_["with two outputs"];
   }
   // The region of f that is read; none if it has no constant bounds or is never read.
   std::optional<oracle::Region> region_of(const Func& f,

@@ -29,6 +29,7 @@ AdversaryProgram make_adversary(Choices& choices, const fuzz::Style& style) {
   p.checks.schedule = choices.chance(60) ? choices.between(1, 1 << 16) : 0;
   p.checks.primal = choices.chance(40);
   p.checks.wild = choices.chance(20);
+  p.checks.several = choices.chance(30);
   return p;
 }
 

@@ -10,11 +10,12 @@ using fuzz::natural_size;
 
 // The checks of a program beyond the check of its gradient.
 struct AdversaryChecks {
-  int order = 1;        // derivatives of derivatives, up to this one
-  bool dense = false;   // Jacobian and Hessian by one image
-  int schedule = 0;     // seed of a schedule of the gradient as machine code; 0: none
-  bool primal = false;  // the schedule is given to the primal's Funcs too
-  bool wild = false;    // the seed is NaN outside of its region
+  int order = 1;         // derivatives of derivatives, up to this one
+  bool dense = false;    // Jacobian and Hessian by one image
+  int schedule = 0;      // seed of a schedule of the gradient as machine code; 0: none
+  bool primal = false;   // the schedule is given to the primal's Funcs too
+  bool wild = false;     // the seed is NaN outside of its region
+  bool several = false;  // a Func before the output as a second output
 };
 
 struct AdversaryProgram : fuzz::RandomProgram {

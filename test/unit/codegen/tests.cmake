@@ -4,6 +4,7 @@ retrograde_test(
   codegen_arithmetic_test
   codegen_idioms_test
   codegen_statement_test
+  equal_loops_test
   ptxas_test
   LAYERS jit LIBS retrograde_dep_halide_runtime)
 retrograde_test(

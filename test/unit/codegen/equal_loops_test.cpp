@@ -1,0 +1,138 @@
+// Loops that are equal up to names share one function of machine code.
+#include "codegen/codegen.h"
+#include "ir/equal.h"
+#include "unit/codegen/codegen_testing.h"
+
+namespace retrograde::testing_codegen {
+namespace {
+
+constexpr int n = 32;
+
+std::string number(const std::string& name, int k) { return name + std::to_string(k); }
+
+// for x, in parallel: to[x] = from[x] * factor + x
+Stmt step(int k, const std::string& from, const std::string& to, Expr factor) {
+  const Expr x = variable(number("x", k));
+  return make_for(number("x", k), 0, n, ForType::Parallel,
+                  make_store(to, make_load(Int(32), from, x) * std::move(factor) + x, x));
+}
+
+// Steps from `in` to `out` through blocks of memory.
+LoweredFunction steps(int count, const std::function<Expr(int)>& factor) {
+  LoweredFunction f;
+  f.name = "steps";
+  f.args = {input("in", Int(32)), output("out", Int(32)), scalar_argument("k", Int(32))};
+  const auto memory = [&](int k) { return k == 0 ? "in" : k == count ? "out" : number("step", k); };
+  Stmt body;
+  for (int k = count; k-- > 0;) {
+    const Stmt now = step(k, memory(k), memory(k + 1), factor(k));
+    body = body.defined() ? make_block({now, body}) : now;
+    if (k > 0)
+      body = make_allocate(memory(k), Int(32), MemoryType::Heap, make_const(Int(64), n), body);
+  }
+  f.body = body;
+  return f;
+}
+
+int tasks_of(const LoweredFunction& f) {
+  codegen::Options options;
+  options.target = test_target();
+  const std::string code = codegen::compile_llvm_ir(f, options);
+  int count = 0;
+  for (size_t at = 0; (at = code.find("define internal", at)) != std::string::npos; ++at)
+    count += code.substr(at, code.find('\n', at) - at).find(".parallel") != std::string::npos;
+  return count;
+}
+
+void expect_computes(const LoweredFunction& f, int count, const std::function<int(int)>& factor) {
+  Array in(Int(32), n), out(Int(32), n);
+  for (int x = 0; x < n; ++x) in.data<int32_t>()[x] = x % 5;
+  int32_t k = 3;
+  void* args[] = {in.raw(), out.raw(), &k};
+  ASSERT_EQ(compile_test(f)->call(nullptr, args), 0);
+  for (int x = 0; x < n; ++x) {
+    int32_t value = x % 5;
+    for (int s = 0; s < count; ++s) value = value * factor(s) + x;
+    EXPECT_EQ(out.data<int32_t>()[x], value) << x;
+  }
+}
+
+TEST(EqualLoops, OfManyStepsShareAFunction) {
+  const auto factor = [](int) { return variable("k", Int(32)); };
+  EXPECT_EQ(tasks_of(steps(4, factor)), tasks_of(steps(12, factor)));
+  expect_computes(steps(6, factor), 6, [](int) { return 3; });
+}
+
+TEST(EqualLoops, WithOtherConstantsHaveTheirOwn) {
+  const auto factor = [](int s) { return Expr(s + 1); };
+  EXPECT_EQ(tasks_of(steps(5, factor)), 5);
+  expect_computes(steps(5, factor), 5, [](int s) { return s + 1; });
+}
+
+TEST(EqualLoops, OverOtherTypesHaveTheirOwn) {
+  LoweredFunction f;
+  f.name = "types";
+  f.args = {scalar_argument("a", Int(32)), scalar_argument("b", Int(64)), output("out", Int(32))};
+  const auto loop = [](int k, const Expr& value) {
+    const Expr x = variable(number("x", k));
+    return make_for(number("x", k), 0, 4, ForType::Parallel,
+                    make_store("out", cast_to(Int(32), value) + x, x + 4 * k));
+  };
+  f.body = make_block({loop(0, variable("a", Int(32))), loop(1, variable("b", Int(64)))});
+  EXPECT_EQ(tasks_of(f), 2);
+}
+
+// One reads what it writes; in the other the memories differ, which the code may rely on.
+TEST(EqualLoops, InPlaceAndNotHaveTheirOwn) {
+  LoweredFunction f;
+  f.name = "in_place";
+  f.args = {input("in", Int(32)), output("out", Int(32))};
+  f.body = make_block({step(0, "in", "out", 2), step(1, "out", "out", 2)});
+  EXPECT_EQ(tasks_of(f), 2);
+}
+
+TEST(EqualLoops, NameTheirOwnMemoryInErrors) {
+  LoweredFunction f;
+  f.name = "blocks";
+  f.args = {output("out", Int(32)), scalar_argument("bytes", Int(64))};
+  const auto loop = [](int k, const Expr& elements) {
+    const Expr x = variable(number("x", k));
+    const std::string block = number("block", k);
+    const Stmt body =
+        make_block({make_store(block, x, 0), make_store("out", make_load(Int(32), block, 0), x)});
+    return make_for(number("x", k), 0, 4, ForType::Parallel,
+                    make_allocate(block, Int(32), MemoryType::Heap, elements, body));
+  };
+  f.body = make_let(
+      "small", make_const(Int(64), 100),
+      make_block({loop(0, variable("small", Int(64))), loop(1, variable("bytes", Int(64)))}));
+  EXPECT_EQ(tasks_of(f), 1);
+  std::string message;
+  retrograde_context context = {};
+  context.user_data = &message;
+  context.error_handler = [](retrograde_context* c, int, const char* text) {
+    *static_cast<std::string*>(c->user_data) = text;
+  };
+  Array out(Int(32), 4);
+  int64_t bytes = INT64_MAX / 2;
+  void* args[] = {out.raw(), &bytes};
+  EXPECT_NE(compile_test(f)->call(&context, args), 0);
+  EXPECT_NE(message.find("\"block1\""), std::string::npos) << message;
+}
+
+TEST(Renaming, PairsNamesBothWays) {
+  const auto copy = [](const char* to, const char* from) {
+    return make_store(to, make_load(Int(32), from, variable("i")), variable("i"));
+  };
+  const auto names = renaming(copy("a", "b"), copy("c", "d"));
+  ASSERT_TRUE(names);
+  EXPECT_EQ(*names, (Renaming{{"a", "c"}, {"b", "d"}, {"i", "i"}}));
+  EXPECT_FALSE(renaming(copy("a", "b"), copy("c", "c")));
+  EXPECT_FALSE(renaming(copy("a", "a"), copy("c", "d")));
+  EXPECT_TRUE(renaming(copy("a", "b"), copy("b", "a")));
+  EXPECT_FALSE(renaming(copy("a", "b"), copy("c", "d"), {{"a", "d"}}));
+  EXPECT_FALSE(renaming(make_evaluate(Expr("a text")), make_evaluate(Expr("another"))));
+}
+
+}  // namespace
+}  // namespace retrograde::testing_codegen
