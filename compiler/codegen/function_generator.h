@@ -49,7 +49,7 @@ class FunctionGenerator {
     llvm::Function* function;
     Value* closure;
   };
-  // What a statement uses from outside, by name, in the order of the closure's fields.
+  // The names that a statement uses from outside, in the order of the closure's fields.
   struct Captures {
     std::vector<std::string> variables, storages, blocks;
   };

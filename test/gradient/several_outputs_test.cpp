@@ -18,7 +18,7 @@ class SeveralOutputs : public ::testing::Test {
     const float first = 0.5f * static_cast<float>(outputs_.size() + 1);
     Func adjoint("adjoint");
     adjoint(x) = first - 0.25f * cast<float>(x);
-    outputs_.push_back({output, adjoint, {{0, size}}});
+    outputs_.push_back({.output = output, .adjoint = adjoint, .output_bounds = {{0, size}}});
     RDom r(0, size);
     weighted_() += output(r) * adjoint(r);
   }
