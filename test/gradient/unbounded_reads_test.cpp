@@ -79,7 +79,7 @@ TEST_F(UnboundedReads, InUpdates) {
 TEST_F(UnboundedReads, LeaveTheirFuncWithoutAnAdjoint) {
   const Func bounded = repeated(Func(image), all);
   const Derivative d = propagate_adjoints(weighted_sum(warped(bounded), {n, n}));
-  expect_error({"find the gradient by \"repeat_edge\"", "its adjoint has no size"},
+  expect_error({"find the gradient by \"repeat_edge", "its adjoint has no size"},
                [&] { d(bounded); });
 }
 

@@ -53,9 +53,10 @@ bool Contributions::has_size(const FuncContents& f) const {
 void Contributions::add_to_what_it_reads(const FuncContents& read, const FuncPtr& f,
                                          const LeafAdjoint& leaf, const IterationDomain& domain) {
   if (without_adjoint_.insert(&read).second)
-    account_.add(Explanation::Kind::NotRequested, read.name,
-                 "it is read at indices that depend on data and have no bounds, so its adjoint has "
-                 "no size: its consumers contribute to what it reads");
+    account_.add(
+        Explanation::Kind::NotRequested, read.name,
+        "it is read at indices that depend on data and have no bounds, so its adjoint has "
+        "no size: its consumers contribute to what it reads; clamp the indices to give it one");
   const SweepResult sweep =
       primal_.sweep({value_of_read(read, *leaf.leaf.as<Call>())}, {leaf.adjoint});
   for (const LeafAdjoint& further : sweep.leaves) add(f, further, domain);
