@@ -111,8 +111,8 @@ def row_of(name, options):
 
 
 def add_means(report, held_out):
-    """Adds geometric means and counts: of all programs, of those held out, and of the others. Programs without a result
-    are left out, and counted as failures."""
+    """Adds geometric means and counts: of all programs, of those held out, and of the others. Failed programs
+    are counted; their ratios are not."""
     rows = report["programs"]
     groups = {"all": rows, "held_out": [r for r in rows if r["program"] in held_out],
               "others": [r for r in rows if r["program"] not in held_out]}
@@ -120,7 +120,7 @@ def add_means(report, held_out):
     for group, members in groups.items():
         mean = report["means"][group] = {"programs": len(members), "failures": sum(bool(r["failure"]) for r in members)}
         for what in ("forward", "both"):
-            ratios = [r[f"{what}_ratio"] for r in members if f"{what}_ratio" in r]
+            ratios = [r[f"{what}_ratio"] for r in members if f"{what}_ratio" in r and not r["failure"]]
             if ratios:
                 mean[what] = sides.geometric_mean(ratios)
                 mean[f"{what}_below_1"], mean[f"{what}_below_0.7"] = (sum(v < limit for v in ratios)

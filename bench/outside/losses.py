@@ -1,4 +1,6 @@
 """losses.py -- losses of training and statistics: sums over rows and over whole images, optimal transport."""
+import math
+
 import retrograde as rg
 import torch
 import torch.nn.functional as F
@@ -73,8 +75,8 @@ class Sinkhorn(Program):
         f, g = cost.new_zeros(rows), cost.new_zeros(columns)
         scaled = cost / eps
         for _ in range(Sinkhorn.ITERATIONS):
-            f = -eps * (torch.logsumexp(g / eps - scaled, 1) - torch.log(torch.tensor(float(columns))))
-            g = -eps * (torch.logsumexp(f[:, None] / eps - scaled, 0) - torch.log(torch.tensor(float(rows))))
+            f = -eps * (torch.logsumexp(g / eps - scaled, 1) - math.log(columns))
+            g = -eps * (torch.logsumexp(f[:, None] / eps - scaled, 0) - math.log(rows))
         plan = torch.exp((f[:, None] + g) / eps - scaled) / (rows * columns)
         return (plan * cost).sum()
 
