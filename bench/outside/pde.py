@@ -62,9 +62,8 @@ class WaveReceivers(Program):
         return traces, [speed, source], [width, steps]
 
     def pytorch(speed, source):
-        height, width = speed.shape
         place = torch.zeros_like(speed)
-        place[WaveReceivers.DEPTH, width // 2] = 1
+        place[WaveReceivers.DEPTH, speed.shape[1] // 2] = 1
         before = here = torch.zeros_like(speed)
         traces = []
         for pulse in source:
