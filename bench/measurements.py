@@ -99,6 +99,28 @@ def torch_operators(report):
                                 ) + call_overhead(report.get("overhead_us"))
 
 
+def outside(report):
+    def times(row, what):
+        return " / ".join(f"{row[key]:.3g}" if (key := f"{side}_{what}_ms") in row else "–"
+                          for side in ("retrograde", "eager", "compiled"))
+
+    rows = []
+    for r in report["programs"]:
+        name = r["program"] + (" *" if r["program"] in report["held_out"] else "")
+        ratios = [f"{r[key]:.2f}" if (key := f"{what}_ratio") in r else "–" for what in ("forward", "both")]
+        rows.append([name, times(r, "forward"), ratios[0], times(r, "both"), ratios[1],
+                     f"{r['retrograde_error']:.0e}" if "retrograde_error" in r else "–",
+                     f"{r['retrograde_first_s']:.1f} s" if "retrograde_first_s" in r else "–",
+                     "failed" if r["failure"] else ""])
+    head = [f"ms: ours / PyTorch {report['pytorch']} / torch.compile", "forward", "times as fast",
+            "forward and backward", "times as fast", "error", "compiled in", ""]
+    means = [[group.replace("_", " "), str(m["programs"]), str(m["failures"]),
+              *(f"{m[what]:.2f} ({m[f'{what}_below_1']} below 1, {m[f'{what}_below_0.7']} below 0.7)" if what in m else "–"
+                for what in ("forward", "both"))] for group, m in report["means"].items()]
+    return (table(head, rows) + "\n\\* held out: the compiler is not tuned on it.\n\n"
+            + table(["programs", "count", "failed", "forward, geometric mean", "forward and backward"], means))
+
+
 def call_overhead(report):
     if not report:
         return ""
@@ -179,7 +201,7 @@ def compile_time(report):
 
 SECTIONS = {"demo": demo, "kernels": pairs, "gradient_peers": pairs, "programs": programs,
             "programs_second": programs, "programs_gradients": programs, "gradients": gradients,
-            "pytorch_peers": pytorch, "torch": torch_operators, "operators": operators, "autoscheduled": autoscheduled,
+            "pytorch_peers": pytorch, "torch": torch_operators, "outside": outside, "operators": operators, "autoscheduled": autoscheduled,
             "compile_time": compile_time, "model": model.table,
             "decisions": lambda report: decisions.table(report) + "\n"}
 

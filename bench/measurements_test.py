@@ -86,6 +86,21 @@ class Measurements(unittest.TestCase):
         self.assertIn("forward 4.00, with backward 3.00 times as fast", page)
         self.assertIn("| PyTorch | 2.0 |\n| ours | 5.5 (+3.5) |", page)
 
+    def test_programs_from_outside_say_which_are_held_out_and_which_failed(self):
+        rows = [{"program": "jacobi", "failure": None, "failures": {}, "forward_ratio": 3.0, "both_ratio": 0.5,
+                 "retrograde_forward_ms": 1.0, "retrograde_both_ms": 8.0, "eager_forward_ms": 3.0, "eager_both_ms": 4.0,
+                 "retrograde_error": 2e-7, "retrograde_first_s": 1.25},
+                {"program": "splat", "failure": "its process ended with -11", "failures": {}}]
+        report = {"pytorch": "2.13", "held_out": ["splat"], "programs": rows, "means": {
+            "held_out": {"programs": 1, "failures": 1},
+            "others": {"programs": 1, "failures": 0, "forward": 3.0, "forward_below_1": 0, "forward_below_0.7": 0,
+                       "both": 0.5, "both_below_1": 1, "both_below_0.7": 1}}}
+        page = self.record("outside", report, PAGE.replace("programs", "outside"))
+        self.assertIn("| jacobi | 1 / 3 / – | 3.00 | 8 / 4 / – | 0.50 | 2e-07 | 1.2 s |  |", page)
+        self.assertIn("| splat * | – / – / – | – | – / – / – | – | – | – | failed |", page)
+        self.assertIn("| held out | 1 | 1 | – | – |", page)
+        self.assertIn("| others | 1 | 0 | 3.00 (0 below 1, 0 below 0.7) | 0.50 (1 below 1, 1 below 0.7) |", page)
+
     def test_a_model_says_how_it_orders_all_stages(self):
         row = {"program": "blur", "kind": "kernels", "predicted_ms": 3.0, "measured_ms": 4.0,
                "pairs": [[1.0, 1.5], [2.0, 2.5]], "rank_correlation": 1.0}
