@@ -117,6 +117,18 @@ void bind_options(py::module_& m) {
       .def_readwrite("checkpoint_bytes", &AdjointOptions::checkpoint_bytes);
 }
 
+// Only a list: a Func has elements, too.
+std::vector<OutputAdjoint> outputs_from(const py::list& outputs) {
+  std::vector<OutputAdjoint> result;
+  for (const py::handle& output : outputs) {
+    if (!py::isinstance<py::tuple>(output) || py::len(output) != 3)
+      throw py::type_error("propagate_adjoints: each output is a tuple (output, adjoint, bounds)");
+    auto [func, adjoint, bounds] = output.cast<std::tuple<Func, Func, Region>>();
+    result.push_back({func, adjoint, bounds});
+  }
+  return result;
+}
+
 void bind_propagation(py::module_& m) {
   def(
       m, "propagate_adjoints",
@@ -143,11 +155,8 @@ void bind_propagation(py::module_& m) {
       arg("output"), arg("adjoint"), arg("options") = AdjointOptions());
   def(
       m, "propagate_adjoints",
-      [](const std::vector<std::tuple<Func, Func, Region>>& outputs,
-         const AdjointOptions& options) {
-        const auto given = ir::mapped(outputs, [](const auto& one) {
-          return std::apply([](const auto&... parts) { return OutputAdjoint{parts...}; }, one);
-        });
+      [](const py::list& outputs, const AdjointOptions& options) {
+        const std::vector<OutputAdjoint> given = outputs_from(outputs);
         return unlocked([=](const Interruption&) { return propagate_adjoints(given, options); });
       },
       arg("outputs"), arg("options") = AdjointOptions());

@@ -59,6 +59,8 @@ class Adjoints(unittest.TestCase):
         np.testing.assert_allclose(d(b.weights).realize([3]), expected, rtol=1e-5)
         with self.assertRaisesRegex(rg.CompileError, "there is at least one output"):
             rg.propagate_adjoints([])
+        with self.assertRaisesRegex(TypeError, "each output is a tuple"):
+            rg.propagate_adjoints([b.blur])
 
     def test_options(self):
         b = Blur()

@@ -27,8 +27,8 @@ LoweredFunction steps(int count, const std::function<Expr(int)>& factor) {
   for (int k = count; k-- > 0;) {
     const Stmt now = step(k, memory(k), memory(k + 1), factor(k));
     body = body.defined() ? make_block({now, body}) : now;
-    if (k > 0)
-      body = make_allocate(memory(k), Int(32), MemoryType::Heap, make_const(Int(64), n), body);
+    if (k + 1 < count)
+      body = make_allocate(memory(k + 1), Int(32), MemoryType::Heap, make_const(Int(64), n), body);
   }
   f.body = body;
   return f;
