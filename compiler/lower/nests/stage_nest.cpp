@@ -252,10 +252,19 @@ bool covers_exactly(const LoopedFunc& f, int stage, const std::string& var, cons
          can_prove(reached.max < first + extent, facts);
 }
 
+Expr alignment_of(const LoopedFunc& f, size_t dimension) {
+  for (const Bound& bound : f.schedule.bounds) {
+    if (bound.var == f.func->args[dimension] && bound.modulus.defined() &&
+        bound.remainder.defined())
+      return bound.modulus;
+  }
+  return 1;
+}
+
 bool runs_beyond_regions(const LoopedFunc& f, size_t dimension) {
+  const Expr extent = variable("region.extent") * alignment_of(f, dimension);
   for (size_t s = 0; s < f.stages.size(); s++) {
-    if (!covers_exactly(f, static_cast<int>(s), f.func->args[dimension], variable("region.extent")))
-      return true;
+    if (!covers_exactly(f, static_cast<int>(s), f.func->args[dimension], extent)) return true;
   }
   return false;
 }

@@ -45,6 +45,8 @@ StageNest build_stage_nest(const LoopedFunc& f, int stage, const Domain& domain)
 
 // Whether the loops of a stage, over `extent` (> 0) coordinates of a pure variable, visit no coordinates beyond it.
 bool covers_exactly(const LoopedFunc& f, int stage, const std::string& var, const Expr& extent);
+// The number that divides the extent of every region along a dimension: that of align_bounds, or 1.
+Expr alignment_of(const LoopedFunc& f, size_t dimension);
 // Whether the loops of some stage may run beyond a region along a dimension of the Func.
 bool runs_beyond_regions(const LoopedFunc& f, size_t dimension);
 

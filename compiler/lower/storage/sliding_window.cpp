@@ -170,10 +170,12 @@ class Slider {
     return can_prove(ir::without_promises(without_likely(is_there)), facts_);
   }
   // Clamps may prevent the parts from beginning before the first iteration's box. Then the earliest iteration whose
-  // front is not before the box has the fewest values to compute at once.
+  // front is not before the box has the fewest values to compute at once. Consumers that do not slide hold the front
+  // where it is in the loop's first iteration; starting earlier then gains nothing.
   int earliest_start(const Slide& slide, int lead, const Expr& first) const {
     int k = lead;
     while (k < lead + longest_warm_up && difference(front_at(slide, k), first) != 0 &&
+           difference(front_at(slide, k), front_at(slide, k + 1)) != 0 &&
            reaches(front_at(slide, k + 1), first))
       k++;
     return k;
@@ -214,19 +216,12 @@ class Slider {
     return true;
   }
 
-  Expr alignment(int d) const {  // from align_bounds, which also applies to parts
-    for (const Bound& bound : f_.schedule.bounds) {
-      if (bound.var == f_.func->args[d] && bound.modulus.defined() && bound.remainder.defined())
-        return bound.modulus;
-    }
-    return 1;
-  }
-
   // Whether the loops of every stage, over a part of this extent, write nothing outside of it.
   bool stays_inside(const Slide& slide) const {
     Expr extent = simplify(without_likely(slide.part.max - slide.part.min + 1));
     for (size_t s = 0; s < f_.stages.size(); s++) {
-      Expr known = is_const(extent) ? extent : variable("part.extent") * alignment(slide.dimension);
+      Expr known =
+          is_const(extent) ? extent : variable("part.extent") * alignment_of(f_, slide.dimension);
       if (!covers_exactly(f_, static_cast<int>(s), f_.func->args[slide.dimension], known))
         return false;
     }

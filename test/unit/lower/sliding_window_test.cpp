@@ -785,5 +785,40 @@ TEST_F(SlidingWindow, HoistedStorageHasRoomForIterationsBeforeASplit) {
   for (int i = 0; i < 26; i++) EXPECT_EQ(expected(i), found(i)) << i;
 }
 
+// Iterations of the only loop over `var`, when constant.
+int64_t iterations_of(const Func& output, const std::string& var) {
+  int64_t iterations = -1;
+  const ir::LoweredFunction lowered =
+      lower::lower("test", {output.function()}, lower::infer_arguments({output.function()}), {});
+  ir::walk(lowered.body, [&](const ir::For& loop) {
+    if (loop.name.ends_with("." + var)) iterations = ir::as_const_int(loop.extent).value_or(-1);
+  });
+  return iterations;
+}
+
+// Strips of 16 steps of two rows each. Tiles of two rows that start at even rows stay inside what an iteration needs,
+// and they do not slide, so starting the loop earlier than their consumer does gains nothing.
+TEST_F(SlidingWindow, AlignedTilesBesideWindowsComputeWhatAnIterationNeeds) {
+  const Var yii("yii"), pair("pair");
+  const Func out = expect_same(
+      [&](bool scheduled) {
+        Func f("f"), tiles("tiles"), window("window"), out("out");
+        f(x, y) = counted("f", x * 3 + y * y);
+        tiles(x, y) = counted("tiles", f(x, y - 1) + f(x, y + 1));
+        window(x, y) = tiles(x, y) * 2;
+        out(x, y) = window(x, y - 1) + window(x, y + 1);
+        if (!scheduled) return out;
+        out.split(y, y, yi, 32).split(yi, yi, yii, 2).reorder(x, yii, yi, y);
+        window.store_at(out, y).compute_at(out, yi).align_bounds(y, 2);
+        tiles.compute_at(out, yi).align_bounds(y, 2).split(y, y, pair, 2).unroll(pair);
+        f.store_at(out, y).compute_at(out, yi);
+        return out;
+      },
+      4, 64);
+  EXPECT_LE(computed["tiles"], 2 * (32 + 4) * 4);
+  EXPECT_LE(computed["f"], 2 * (32 + 6) * 4);
+  EXPECT_LE(iterations_of(out, "yi"), 16 + 4);
+}
+
 }  // namespace
 }  // namespace retrograde
