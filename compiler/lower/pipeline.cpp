@@ -22,6 +22,7 @@
 #include "lower/instrumentation/inject_tracing.h"
 #include "lower/instrumentation/loop_nest_text.h"
 #include "lower/instrumentation/write_debug_files.h"
+#include "lower/loops/equal_nests.h"
 #include "lower/loops/flatten_storage.h"
 #include "lower/loops/fork_async.h"
 #include "lower/loops/insert_prefetches.h"
@@ -172,6 +173,7 @@ constexpr Pass passes[] = {
     {"ring_buffers", Phase::Loops, with_program<ring_buffers>},
     {"flatten_storage", Phase::FlatStorage, alone<flatten_storage>},
     {"simplify_storage", Phase::FlatStorage, run_simplify},
+    {"share_equal_nests", Phase::FlatStorage, alone<share_equal_nests>},
     {"lower_atomics", Phase::FlatStorage, alone<lower_atomics>},
     {"skip_empty_tiles", Phase::FlatStorage, alone<skip_empty_tiles>},
     {"partition_loops", Phase::FlatStorage, alone<partition_loops>},
@@ -189,6 +191,7 @@ constexpr Pass passes[] = {
     {"simplify_vectors", Phase::Vector, run_simplify},
     {"mask_guarded_loads", Phase::Vector, alone<mask_guarded_loads>},
     {"try_plain_products", Phase::Vector, alone<try_plain_products>},
+    {"expand_equal_nests", Phase::Vector, alone<expand_equal_nests>},
     {"blend_masked_stores", Phase::Vector, alone<blend_masked_stores>},
     {"fuzz_float_stores", Phase::Vector, wanted<Target::FuzzFloatStores, fuzz_float_stores>},
     {"make_kernels", Phase::Vector,

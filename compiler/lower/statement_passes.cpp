@@ -1,6 +1,7 @@
 #include "lower/statement_passes.h"
 
 #include "lower/instrumentation/check_accesses.h"
+#include "lower/loops/equal_nests.h"
 #include "lower/loops/flatten_storage.h"
 #include "lower/loops/keep_accumulators.h"
 #include "lower/loops/skip_stages.h"
@@ -25,6 +26,7 @@ const std::vector<StatementPass>& statement_passes() {
          return keep_accumulators(
              s, [](const For& loop) { return loop.name.find(".r$") == std::string::npos; });
        }},
+      {"expand_equal_nests", expand_equal_nests},
       {"flatten_storage", [](const Stmt& s) { return flatten_storage(s); }},
       {"free_early", free_early},
       {"fuzz_float_stores", fuzz_float_stores},
@@ -34,6 +36,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"partition_loops", partition_loops},
       {"simplify", [](const Stmt& s) { return simplify(s); }},
       {"mask_guarded_loads", mask_guarded_loads},
+      {"share_equal_nests", share_equal_nests},
       {"skip_stages",  // every Func that is stored may be skipped
        [](const Stmt& s) { return skip_stages(s, [](const std::string&) { return true; }); }},
       {"transpose_loads", transpose_loads},
