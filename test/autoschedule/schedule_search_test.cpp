@@ -125,7 +125,7 @@ TEST(SearchOfLongChains, TriesFewAndEnds) {
   Var x("x"), y("y");
   Func last("stage");
   last(x, y) = image(clamp(x, 0, 63), clamp(y, 0, 63));
-  for (int i = 0; i < 500; ++i) {
+  for (int i = 0; i < 250; ++i) {
     Func next("stage");
     next(x, y) = (last(x - 1, y) + last(x, y + 1)) * 0.5f;
     last = next;
