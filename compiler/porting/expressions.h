@@ -53,8 +53,7 @@ inline bool is_const_one(const Expr& e) { return e.defined() && ir::is_one(e); }
 bool is_positive_const(const Expr& e);
 bool is_negative_const(const Expr& e);
 std::optional<int> is_const_power_of_two_integer(const Expr& e);  // its exponent
-// Nothing unless `e` is a constant of that kind. as_const_int also takes an unsigned constant that
-// fits.
+// Nothing unless `e` is a constant of that kind. as_const_int takes unsigned constants that fit, too.
 using ir::as_const_float;
 using ir::as_const_int;
 std::optional<uint64_t> as_const_uint(const Expr& e);

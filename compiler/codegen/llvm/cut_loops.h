@@ -9,7 +9,6 @@
 //   1. that do so little per execution that the call and lost hoisting would be noticeable;
 //   2. that share values with the rest that may become registers: vectors, small allocations;
 //   3. whose values are used afterwards, except error codes.
-//   3. of which values are used afterwards, error codes apart.
 #pragma once
 
 namespace llvm {

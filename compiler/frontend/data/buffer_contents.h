@@ -43,7 +43,7 @@ void allocate_host(Runtime::Buffer<>& buffer);
 // `storage_order` lists the dimensions from innermost to outermost in memory; empty means 0, 1, 2, ...
 void check_sizes(halide_type_t type, const std::vector<int>& sizes, const std::string& asked,
                  const std::vector<int>& storage_order = {});
-// Dense memory for as many elements, which begin at the same coordinates.
+// How a copy lies in memory; in all cases densely, with the mins and extents of its source.
 enum class Layout { OfSource, Planar, Interleaved };
 // Allocates dense memory with the extents and mins of `source`.
 Runtime::Buffer<> allocate_like(const Runtime::Buffer<>& source, halide_type_t type, Layout layout,

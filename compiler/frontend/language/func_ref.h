@@ -15,8 +15,7 @@ class FuncTupleElementRef;
 
 // A Func at a point: f(x, y). The first assignment defines f at all points; later ones add update
 // definitions. f(x) += e on an undefined f first defines it as 0 everywhere, *= and /= as 1. A
-// string as a
-// value is the address of its characters, which live as long as the compiled code.
+// string as a value is the address of its characters, which live as long as the compiled code.
 class FuncRef {
  public:
   // The function `func` at the coordinates `args`.
@@ -26,9 +25,9 @@ class FuncRef {
   // Defines the Func, or adds an update that overwrites this point.
   // Requires: every argument on the left-hand side must be a defined expression; a definition
   // has at least one value; the right-hand side must be a defined expression; a Func is
-  // defined once; a first definition has no reduction
-  // variables; the arguments of a first definition are Vars; the arguments of a first
-  // definition are different Vars; a definition has the dimensions that the Func was declared
+  // defined once; a first definition has no reduction variables; the arguments of a first
+  // definition are Vars; the arguments of a first definition are different Vars; a definition has
+  // the dimensions that the Func was declared
   // with; a right-hand side that uses _ needs _ on the left-hand side; every variable on the
   // right-hand side appears on the left-hand side, or belongs to an RDom; a parameter and a pure
   // variable of one definition have different names; constants of int32 and int64 do not overflow.
@@ -39,13 +38,11 @@ class FuncRef {
   // Adds an update that combines the value with this point: f(x) += e means f(x) = f(x) + e.
   // Requires: a Func is updated after its first definition; all definitions of a Func have the
   // same number of arguments; coordinates are integers; all definitions of a Func have the same
-  // number of values; all
-  // definitions of a Func have the same types; all reduction variables of one definition come from
-  // one RDom; a pure variable keeps its position in every reference of a Func to itself, so that
-  // its iterations are independent; the bounds of a reduction domain are known before its update
-  // runs; a Func that a C function computes has no updates; a Func is complete when another Func
-  // uses
-  // it.
+  // number of values; all definitions of a Func have the same types; all reduction variables of
+  // one definition come from one RDom; a pure variable keeps its position in every reference of a
+  // Func to itself, so that its iterations are independent; the bounds of a reduction domain are
+  // known before its update runs; a Func that a C function computes has no updates; a Func is
+  // complete when another Func uses it.
 #define RETROGRADE_UPDATE(op)      \
   Stage operator op(Expr value);   \
   Stage operator op(const Tuple&); \
@@ -98,8 +95,7 @@ requires(sizeof...(Rest) >= 1 && (std::is_convertible_v<Rest, Expr> && ...)) Exp
 }
 
 // One value of a Tuple-valued Func at a point: f(x)[1]. Assigning to it updates this value and
-// leaves the
-// others.
+// leaves the others.
 class FuncTupleElementRef {
  public:
   // Value `index` of the Func at a point.

@@ -10,8 +10,8 @@ namespace retrograde {
 constexpr int64_t default_compile_cache_bytes = 1000000000;
 
 // Keeps the machine code of later realize() calls in `folder`, for this process and later ones. An empty
-// string ends that. A missing folder is created. If the files exceed `max_bytes`, the least recently used
-// ones are removed. The environment variables RETROGRADE_CACHE_DIR and RETROGRADE_CACHE_MB (millions of
+// string turns the cache off. A missing folder is created. If the files exceed `max_bytes`, the least recently
+// used ones are removed. The environment variables RETROGRADE_CACHE_DIR and RETROGRADE_CACHE_MB (millions of
 // bytes) do the same.
 // Requires: its folder must be writable; RETROGRADE_CACHE_MB is a whole number of megabytes, 1 or
 // more; its size in bytes is positive; its folder belongs to the user alone (mode 0700).
