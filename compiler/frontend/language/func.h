@@ -390,7 +390,8 @@ class Func : public LoopDirectives<Func>, public Runnable<Func> {
   friend class LoopDirectives<Func>;
   friend class Runnable<Func>;
   graph::SchedulePlace loops() const;  // of the first definition
-  Func& give(graph::Directive directive) {
+  template <typename D>
+  Func& give(D directive) {
     graph::give_directive({func_}, std::move(directive));
     return *this;
   }

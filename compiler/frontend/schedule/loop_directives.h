@@ -37,6 +37,9 @@ PrefetchData prefetch_of(const SchedulePlace& place,
                          const std::shared_ptr<ParameterContents>& image, PrefetchData prefetch);
 void check_device(const SchedulePlace& place, const std::vector<VarOrRVar>& loops,
                   DeviceAPI device);
+// Checks how a loop would run before it is split, so that an illegal directive leaves the stage
+// unchanged.
+void check_run(const SchedulePlace& place, const VarOrRVar& loop, ForType kind);
 
 }  // namespace frontend
 
@@ -170,12 +173,12 @@ class LoopDirectives {
   //         body(4 * y + y')           body(8 * x + x')
   Self& parallel(const VarOrRVar& var, const Expr& task_size,
                  TailStrategy tail = TailStrategy::Auto) {
-    check_run(var, ForType::Parallel);
+    frontend::check_run(place(), var, ForType::Parallel);
     return split(var, var, frontend::fresh_like(var), task_size, tail).parallel(var);
   }
   Self& vectorize(const VarOrRVar& var, const Expr& factor,
                   TailStrategy tail = TailStrategy::Auto) {
-    check_run(var, ForType::Vectorized);
+    frontend::check_run(place(), var, ForType::Vectorized);
     const VarOrRVar lanes = frontend::fresh_like(var);
     return split(var, var, lanes, factor, tail).vectorize(lanes);
   }
@@ -482,7 +485,8 @@ class LoopDirectives {
     place().schedule();  // is a stage that has loops
     return self();
   }
-  Self& give(graph::Directive directive) {
+  template <typename D>
+  Self& give(D directive) {
     graph::give_directive(place(), std::move(directive));
     return self();
   }
@@ -490,15 +494,10 @@ class LoopDirectives {
     for (const VarOrRVar& var : vars) partition(var, how);
     return self();
   }
-  // Checks a directive before the loop is split, so that an illegal one leaves the stage unchanged.
-  void check_run(const VarOrRVar& var, ForType kind) const {
-    graph::Directive run = graph::RunLoop{var.name(), kind};
-    graph::check_directive(place(), run);
-  }
   // Checks all loops before it changes the first.
   Self& run_on_gpu(ForType kind, const std::vector<VarOrRVar>& loops, DeviceAPI device) {
     frontend::check_device(place(), loops, device);
-    for (const VarOrRVar& loop : loops) check_run(loop, kind);
+    for (const VarOrRVar& loop : loops) frontend::check_run(place(), loop, kind);
     for (const VarOrRVar& loop : loops) give(graph::RunLoop{loop.name(), kind});
     return self();
   }

@@ -88,6 +88,11 @@ void check_device(const SchedulePlace& place, const std::vector<VarOrRVar>& loop
               "Leave the device out, or give DeviceAPI::CUDA");
 }
 
+void check_run(const SchedulePlace& place, const VarOrRVar& loop, ForType kind) {
+  Directive run = graph::RunLoop{loop.name(), kind};
+  check_directive(place, run);
+}
+
 }  // namespace frontend
 
 std::string Stage::name() const { return graph::stage_name(*place_.f, place_.stage); }

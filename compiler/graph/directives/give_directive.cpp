@@ -109,6 +109,45 @@ void give_directive(const SchedulePlace& place, Directive directive) {
   log_directive(place, std::move(directive));
 }
 
+template <typename D>
+void give_directive(const SchedulePlace& place, D directive) {
+  give_directive(place, Directive(std::move(directive)));
+}
+#define RETROGRADE_GIVE(D) template void give_directive(const SchedulePlace&, D);
+RETROGRADE_GIVE(SplitLoop)
+RETROGRADE_GIVE(FuseLoops)
+RETROGRADE_GIVE(RenameLoop)
+RETROGRADE_GIVE(ReorderLoops)
+RETROGRADE_GIVE(RunLoop)
+RETROGRADE_GIVE(PartitionLoop)
+RETROGRADE_GIVE(MakeAtomic)
+RETROGRADE_GIVE(AllowRaces)
+RETROGRADE_GIVE(Unscheduled)
+RETROGRADE_GIVE(PrefetchData)
+RETROGRADE_GIVE(ComputeWith)
+RETROGRADE_GIVE(Specialize)
+RETROGRADE_GIVE(SpecializeFail)
+RETROGRADE_GIVE(ComputeAt)
+RETROGRADE_GIVE(StoreAt)
+RETROGRADE_GIVE(HoistStorage)
+RETROGRADE_GIVE(StoreIn)
+RETROGRADE_GIVE(ReorderStorage)
+RETROGRADE_GIVE(AlignStorage)
+RETROGRADE_GIVE(BoundStorage)
+RETROGRADE_GIVE(FoldStorage)
+RETROGRADE_GIVE(RingBuffer)
+RETROGRADE_GIVE(Memoize)
+RETROGRADE_GIVE(Async)
+RETROGRADE_GIVE(BoundDimension)
+RETROGRADE_GIVE(AlignBounds)
+RETROGRADE_GIVE(Estimate)
+RETROGRADE_GIVE(TraceLoads)
+RETROGRADE_GIVE(TraceStores)
+RETROGRADE_GIVE(TraceRealizations)
+RETROGRADE_GIVE(AddTraceTag)
+RETROGRADE_GIVE(DebugToFile)
+#undef RETROGRADE_GIVE
+
 void reset_loops(FuncContents& f) {
   std::erase_if(f.log, [](const LoggedDirective& logged) { return logged.stage >= 0; });
   for (int s = 0; s < f.stage_count(); ++s) {
