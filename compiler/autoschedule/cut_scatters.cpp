@@ -40,6 +40,8 @@ bool is_worth_parts(const FuncContents& f, const SizeEstimate& sizes) {
   if (f.stage_count() != 2 || f.made || f.args.empty() || f.types.size() != 1) return false;
   const Definition& update = f.updates[0];
   if (!scatters_in_order(f, update) || !rows_in_parts(update)) return false;
+  const auto row = as_const_int(update.rvars[0].extent);
+  if (row && *row < merging_lanes) return false;
   double iterations = 1;
   for (const ReductionVariable& r : update.rvars)
     iterations *= static_cast<double>(known_extent(r));

@@ -5,6 +5,7 @@
 #include "autoschedule/only_reader.h"
 #include "autoschedule/size_estimate.h"
 #include "graph/definitions/own_reads.h"
+#include "graph/definitions/parameter_contents.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 
@@ -23,6 +24,14 @@ const Bound* bound_of(const FuncContents& f, size_t d) {
 Interval promised(const Bound& bound) {
   const bool is_whole = bound.min.defined() && bound.extent.defined() && !bound.modulus.defined();
   return is_whole ? constant_ends({bound.min, bound.min + bound.extent - 1}) : Interval();
+}
+
+// By the constraints on the buffer that an output fills, which every call checks.
+Interval promised_of_buffer(const FuncContents& f, size_t d) {
+  if (f.outputs.empty() || d >= f.outputs[0]->constraints.size()) return {};
+  const BufferConstraint& c = f.outputs[0]->constraints[d];
+  if (!c.min.defined() || !c.extent.defined()) return {};
+  return constant_ends({c.min, c.min + c.extent - 1});
 }
 
 // A user's splits may compute more than is asked for, and so do updates that go elsewhere.
@@ -54,7 +63,11 @@ Scope<Interval> fixed_loops(const FuncContents& f, const Definition& stage, cons
 
 FixedDimensions::FixedDimensions(const std::vector<FuncPtr>& outputs) {
   const std::vector<FuncPtr> order = topological_order(outputs);
-  for (const FuncPtr& output : outputs) boxes_[output.get()].resize(output->args.size());
+  for (const FuncPtr& output : outputs) {
+    Box& box = boxes_[output.get()];
+    box.resize(output->args.size());
+    for (size_t d = 0; d < box.size(); ++d) box[d] = promised_of_buffer(*output, d);
+  }
   for (auto f = order.rbegin(); f != order.rend(); ++f) {  // readers first
     Box& box = boxes_[f->get()];
     box.resize((*f)->args.size());

@@ -16,6 +16,7 @@
 #include "autoschedule/reduction_chunks.h"
 #include "autoschedule/row_copies.h"
 #include "autoschedule/scatter_schedule.h"
+#include "autoschedule/short_rows.h"
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
@@ -104,6 +105,7 @@ class LoopChooser {
       return tile(*d);
     if (stages && !scatters && schedule_look_ups(f_, index_, stage_, lanes_of_values(), sizes_))
       return;
+    if (stages && schedule_short_rows(f_, index_, stage_, lanes_of_values(), sizes_)) return;
     const bool may_be_tile = !scatters && !point_number(definition()) && pure_[0] == 0;
     if (may_be_tile && tile_in_registers()) return;
     if (pure_[0] == 0 && scans_rows()) return cut_scan();

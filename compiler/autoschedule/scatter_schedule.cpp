@@ -248,25 +248,43 @@ void schedule_sum_of_parts(const FuncPtr& f, const std::vector<size_t>& layout,
 
 // ---- vectors of iterations ----
 
+namespace {
+
+// The loop whose iterations fill vectors: the first long one, unless too many iterations lie inside of it.
+const ReductionVariable* loop_of_lanes(const Definition& update) {
+  int64_t inside = 1;
+  for (const ReductionVariable& r : update.rvars) {
+    if (r.numbers_points || is_tap(update, r)) continue;
+    const auto extent = as_const_int(r.extent);
+    if (!extent || *extent >= most_lanes) return inside <= few_values ? &r : nullptr;
+    inside *= std::max<int64_t>(*extent, 1);
+  }
+  return nullptr;
+}
+
+}  // namespace
+
 bool scatters_in_order(const FuncContents& f, const Definition& stage) {
-  if (stage.rvars.empty() || stage.args.empty()) return false;
-  auto extent = as_const_int(stage.rvars[0].extent);
-  if (extent && *extent < most_lanes) return false;
-  return !is_pure_position(f, stage, 0) && scatters(f, stage);
+  return !stage.args.empty() && loop_of_lanes(stage) && !is_pure_position(f, stage, 0) &&
+         scatters(f, stage);
 }
 
 void schedule_scatter_in_order(const FuncContents& f, int index, Stage& stage) {
   const Definition& update = f.stage(index);
-  const RVar all(update.rvars[0].var), lane(inner_loop(f, index, all.name()));
-  const std::vector<VarOrRVar> taps = loops_of(update, true);
+  const RVar all(loop_of_lanes(update)->var), lane(inner_loop(f, index, all.name()));
+  std::vector<VarOrRVar> inside = loops_of(update, true), outside = loops_of(update, false);
+  const auto first = std::find_if(outside.begin(), outside.end(),
+                                  [&](const VarOrRVar& loop) { return loop.name() == all.name(); });
+  inside.insert(inside.begin(), outside.begin(), first);  // short ones
+  outside.erase(outside.begin(), first);
   std::vector<VarOrRVar> order{lane};
-  append(order, taps);
-  append(order, loops_of(update, false));
+  append(order, inside);
+  append(order, outside);
   stage.allow_race_conditions()
       .split(all, all, lane, most_lanes, TailStrategy::GuardWithIf)
       .reorder(order)
       .vectorize(lane);
-  for (const VarOrRVar& tap : taps) stage.unroll(tap);
+  for (const VarOrRVar& loop : inside) stage.unroll(loop);
 }
 
 void unroll_taps(const Definition& update, Stage& stage) {

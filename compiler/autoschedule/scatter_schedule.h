@@ -55,7 +55,7 @@ std::vector<VarOrRVar> loops_of_taps(const Definition& update);
 std::vector<VarOrRVar> loops_but_taps(const Definition& update);
 
 // Whether the stage adds to places that data decide, along the first dimension too, over a loop that
-// is worth vectors of iterations.
+// is worth vectors of iterations. Short loops inside of it are unrolled.
 bool scatters_in_order(const FuncContents& f, const Definition& stage);
 void schedule_scatter_in_order(const FuncContents& f, int index, Stage& stage);
 

@@ -1,5 +1,6 @@
 # Derivatives.
 retrograde_test(
+  constant_places_test
   custom_adjoint_test
   deep_programs_test
   explain_test

@@ -8,6 +8,8 @@
 #include "autodiff/borders/join_borders.h"
 #include "autodiff/borders/zero_borders.h"
 #include "autodiff/sums/blocked_sums.h"
+#include "autodiff/sums/chosen_terms.h"
+#include "autodiff/sums/constant_places.h"
 #include "autodiff/sums/gather_places.h"
 #include "autodiff/sums/generated_definitions.h"
 #include "autodiff/sums/privatisation.h"
@@ -254,13 +256,34 @@ class Builder {
 
 namespace {
 
+// Adds the Funcs and facts of a sum that `result` reads.
+void include(AdjointFunc& result, const AdjointFunc& sum) {
+  append(result.helpers, sum.helpers);
+  append(result.notes, sum.notes);
+  append(result.stages, sum.stages);
+}
+
 AdjointFunc make_sum(const AdjointTarget& target, const std::string& name,
                      std::vector<Contribution> contributions, const std::vector<Expr>& initial) {
+  write_out_choices(contributions);
   join_borders(contributions, target);
   leave_zeros_to_adjoints(contributions, target);
+  AdjointFunc read;  // the sums that the adjoint reads
+  for (const ConstantPlaces& places : take_constant_places(contributions, target)) {
+    const AdjointFunc sums = make_sum(places.target, name + "_places", places.terms, {});
+    include(read, sums);
+    read.helpers.push_back(sums.func);
+    const std::vector<Expr> values = values_of(sums.func, variables_of(places.target.args));
+    append(contributions, contributions_of(places, target, values));
+  }
   share_domains(contributions);
   for (Contribution& c : contributions) c.gather = with_safe_places(c.gather, target);
-  return Builder(target, name).build(contributions, initial);
+  AdjointFunc result = Builder(target, name).build(contributions, initial);
+  append(read.helpers, result.helpers);
+  result.helpers = std::move(read.helpers);
+  append(result.notes, read.notes);
+  append(result.stages, read.stages);
+  return result;
 }
 
 }  // namespace

@@ -12,13 +12,12 @@ namespace {
 
 // In a dimension of few elements a fixed index becomes a condition. Then plane_adj(x, 0) and plane_adj(x, 1) are
 // computed in one pass, in the pure definition, instead of an update for each.
-constexpr int64_t few = 8;
 Gather with_few_elements_pure(Gather g, const AdjointTarget& target) {
   if (g.rdom || g.scatters || target.region.size() != g.lhs.size()) return g;
   for (size_t d = 0; d < g.lhs.size(); ++d) {
     if (g.pure[d]) continue;
     auto extent = constant_extent(target.region[d].range());
-    if (!extent || *extent > few) continue;
+    if (!extent || *extent > few_places) continue;
     Expr arg = variable(target.args[d]);
     Expr here = arg == g.lhs[d];
     g.predicate = g.predicate.defined() ? g.predicate && here : here;

@@ -8,6 +8,9 @@
 
 namespace retrograde::autodiff {
 
+// A dimension has few elements if it has at most this many.
+inline constexpr int64_t few_places = 8;
+
 Gather with_safe_places(const Gather& gather, const AdjointTarget& target);
 
 }  // namespace retrograde::autodiff

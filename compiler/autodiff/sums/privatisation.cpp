@@ -127,7 +127,8 @@ class PartSizes {
     if (target_.region.size() != g.pure.size()) return false;
     const double elements = elements_of_target() * lane_count;
     const double iterations = iterations_of(g, many_iterations) * elements_of(g);
-    return elements <= near_elements && elements * parts_of(g) <= iterations;
+    return elements * static_cast<double>(types_.size()) <= near_elements &&
+           elements * parts_of(g) <= iterations;
   }
   std::string note(const Gather& g, const Expr& count) const {
     const double bytes = elements_of_target() * bytes_an_element();

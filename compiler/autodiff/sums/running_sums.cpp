@@ -1,7 +1,5 @@
 #include "autodiff/sums/running_sums.h"
 
-#include <set>
-
 #include "autodiff/sweeps/local_derivative.h"
 #include "graph/definitions/provenance.h"
 #include "ir/visit.h"
@@ -15,7 +13,8 @@ constexpr size_t few_adjoints = 8;   // up to this many adjoints stay in a singl
 
 using Sources = std::set<const Symbol*>;
 
-// The adjoints that a contribution reads.
+}  // namespace
+
 Sources sources_of(const Contribution& contribution) {
   Sources result;
   walk(contribution.adjoint, [&](const Call& call) {
@@ -25,8 +24,6 @@ Sources sources_of(const Contribution& contribution) {
   });
   return result;
 }
-
-}  // namespace
 
 std::vector<std::vector<Contribution>> running_groups(
     const std::vector<Contribution>& contributions) {

@@ -14,11 +14,15 @@
 // 2008, section 3.2), which adds each adjoint as soon as it is computed; ours adds groups.
 #pragma once
 
+#include <set>
 #include <vector>
 
 #include "autodiff/sums/accumulation.h"
 
 namespace retrograde::autodiff {
+
+// The adjoints that a contribution reads.
+std::set<const Symbol*> sources_of(const Contribution& contribution);
 
 // Splits the contributions into groups, in order. One group if the contributions come from few adjoints.
 std::vector<std::vector<Contribution>> running_groups(

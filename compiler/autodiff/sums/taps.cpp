@@ -26,15 +26,7 @@ std::string shape_of(const Gather& g, bool with_places) {
   return key;
 }
 
-namespace {
-
-// Contributions that can share one update definition.
-struct UpdateGroup {
-  Gather gather;          // of the first tap; all have its domain and predicate
-  std::vector<Tap> taps;  // several only in scatters
-};
-
-Expr rename_rdom(const Expr& e, const Gather& from, const Gather& to) {
+Expr in_domain_of(const Gather& to, const Gather& from, const Expr& e) {
   if (!e.defined() || !from.rdom || from.rdom == to.rdom) return e;
   Substitution names;
   for (size_t i = 0; i < from.rdom->vars.size(); ++i) {
@@ -42,6 +34,14 @@ Expr rename_rdom(const Expr& e, const Gather& from, const Gather& to) {
   }
   return substitute(e, names);
 }
+
+namespace {
+
+// Contributions that can share one update definition.
+struct UpdateGroup {
+  Gather gather;          // of the first tap; all have its domain and predicate
+  std::vector<Tap> taps;  // several only in scatters
+};
 
 std::vector<UpdateGroup> group_updates(const std::vector<Contribution>& contributions,
                                        size_t values) {
@@ -54,7 +54,7 @@ std::vector<UpdateGroup> group_updates(const std::vector<Contribution>& contribu
     if (is_new) groups.push_back({g, {{g.lhs, std::vector<Expr>(values)}}});
     UpdateGroup& group = groups[it->second];
     add_term(group.taps[0].sums[static_cast<size_t>(c.component)],
-             rename_rdom(c.adjoint, g, group.gather));
+             in_domain_of(group.gather, g, c.adjoint));
   }
   return groups;
 }
@@ -80,7 +80,7 @@ std::vector<UpdateGroup> join_taps(const std::vector<UpdateGroup>& groups) {
     }
     UpdateGroup& all = joined[it->second];
     Tap tap = group.taps[0];
-    const auto rename = [&](Expr& e) { e = rename_rdom(e, group.gather, all.gather); };
+    const auto rename = [&](Expr& e) { e = in_domain_of(all.gather, group.gather, e); };
     std::ranges::for_each(tap.place, rename);
     std::ranges::for_each(tap.sums, rename);
     all.taps.push_back(std::move(tap));

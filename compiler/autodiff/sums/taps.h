@@ -31,6 +31,9 @@ struct Iterations {
 // scatter the indices outside of the pure dimensions may differ: `with_places` is then false.
 std::string shape_of(const Gather& g, bool with_places = true);
 
+// `e`, in terms of the reduction variables of `from`, in terms of those of `to`, which has the same shape.
+Expr in_domain_of(const Gather& to, const Gather& from, const Expr& e);
+
 // The updates for those contributions that are not pointwise, to a Func with `values` values.
 std::vector<Iterations> updates_of(const std::vector<Contribution>& contributions, size_t values);
 

@@ -1,7 +1,7 @@
 // flatten_storage -- replace accesses of Funcs and images by accesses of flat allocations and buffers.
 // In:  Loops; names unique.
 // Out: FlatStorage; the same stores in the same order, except that all values of a Tuple are computed before the first
-//      of them is stored.
+//      of them is stored. In f(x) = f(x) op operand that goes for the operand: no other store changes the element.
 //
 //   realize f(float32) auto [a, n], [b, m] {       let f.min.0 = a
 //     f(x, y) = f(x - 1, y) + in(x, y)       =>    let f.min.1 = b
@@ -21,6 +21,7 @@
 #include <unordered_set>
 
 #include "diagnostics/error.h"
+#include "graph/definitions/own_reads.h"
 #include "graph/function.h"
 #include "ir/buffer_metadata.h"
 #include "ir/build.h"
@@ -191,11 +192,35 @@ class Flattener : public Rewriter {
       bindings.emplace_back(name, e);
       e = variable(name, e.type());
     };
+    std::vector<Expr> operands(
+        values.size());  // of updates of the element; undefined: no such update
     for (size_t i = 0; i < values.size(); ++i) {
-      if (!is_undef(values[i])) bind_if_loading(values[i], "value." + std::to_string(i));
+      if (is_undef(values[i])) continue;
+      const Binary* update = as_update(n, i);
+      if (update) operands[i] = (*this)(update->b);
+      bind_if_loading(update ? operands[i] : values[i], "value." + std::to_string(i));
     }
     for (size_t d = 0; d < args.size(); ++d) bind_if_loading(args[d], "arg." + std::to_string(d));
     bind_if_loading(predicate, "predicate");
+    for (size_t i = 0; i < values.size(); ++i) {
+      if (!operands[i].defined()) continue;
+      const std::string buffer = element_of(n.name, static_cast<int>(i));
+      const Expr old = make_load(values[i].type(), buffer, index_of(n.name, buffer, args));
+      values[i] = binary(n.values[i].kind(), old, operands[i]);
+    }
+  }
+
+  // Value i of a Tuple if it is f(x) op operand, for the element that it is stored to; else null. Such an update stays
+  // recognisable, so that its loop can become vectors.
+  static const Binary* as_update(const Provide& n, size_t i) {
+    const Kind kind = n.values[i].kind();
+    if (kind != Kind::Add && kind != Kind::Mul && kind != Kind::Min && kind != Kind::Max)
+      return nullptr;
+    const auto* update = n.values[i].as<Binary>();
+    const auto* own = update->a.as<Call>();
+    const bool is_own = own && own->call_type == CallType::Func && own->name == n.name &&
+                        own->component == static_cast<int>(i) && same_args(own->args, n.args);
+    return is_own ? update : nullptr;
   }
 
   const Usage usage_;
