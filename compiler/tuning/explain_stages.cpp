@@ -54,6 +54,14 @@ std::map<std::string, StagePrediction> by_func(const Prediction& prediction,
   return result;
 }
 
+// A read of a Func without the type behind it. Reads of generated Funcs may be long.
+std::string read_in_words(const Expr& read) {
+  constexpr size_t longest = 60;
+  const std::string words = graph::without_numbers(text(read));
+  const std::string call = words.substr(0, words.rfind(')') + 1);
+  return call.size() > longest ? "elements" : call;
+}
+
 // One Func with what is known of it.
 class StageExplainer {
  public:
@@ -91,11 +99,14 @@ class StageExplainer {
       const Expr read = graph::read_elsewhere(*f_, f_->stage(loops.stage));
       if (!read.defined()) continue;
       std::ostringstream out;
-      out << definition_name(loops.stage) << " reads " << graph::without_numbers(text(read))
+      out << definition_name(loops.stage) << " reads " << read_in_words(read)
           << " of earlier iterations, so " << std::llround(loops.serial_trips)
-          << " iterations run one after the other" << (loops.is_parallel ? "" : ", on one thread")
-          << ". Where iterations do not depend on each other, use a Var instead of a reduction "
-             "variable, or one Func per step";
+          << " iterations run one after the other"
+          << (loops.is_parallel
+                  ? ". Make the dimension of independent chains the innermost one, so that a "
+                    "vector holds several of them"
+                  : ", on one thread. Where iterations do not depend on each other, use a Var "
+                    "instead of a reduction variable, or one Func per step");
       chain_ = out.str();
       return;
     }
@@ -104,6 +115,7 @@ class StageExplainer {
   std::string bound() const {
     const std::string kind = time_.bound_by();
     if (kind == "launch") return "the start of parallel loops";
+    if (!chain_.empty()) return "a serial chain";  // whose latency the model does not count
     if (kind != "compute") {
       const double bytes = kind == "memory" ? time_.bytes.back()
                            : kind == "L3"   ? time_.bytes[2]

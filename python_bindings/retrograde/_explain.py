@@ -4,6 +4,7 @@ import re
 from . import _retrograde as rg
 
 MOST_STAGES = 12  # that are listed
+MOST_SMALL_STAGES = 6  # that are listed although they take less than 0.5 %
 
 
 def explain(outputs, sizes=None, input_sizes=None, target=None):
@@ -49,17 +50,35 @@ def size_of(number):
     return f"{number:.0f} bytes"
 
 
+def alike(stages):
+    """Stages of one name with the same loops as one stage, slowest first. They are made for similar terms."""
+    merged = {}
+    for stage in stages:
+        key = stage["name"], tuple(stage["loops"])
+        if key in merged:
+            merged[key]["ms"] += stage["ms"]
+            merged[key]["count"] += 1
+        else:
+            merged[key] = {**stage, "count": 1}
+    return sorted(merged.values(), key=lambda stage: -stage["ms"])
+
+
 def lines(found, indent="  "):
     """The lines about the stages of a pipeline."""
     result, all_ms = [], found["ms"] or 1
-    for stage in found["stages"][:MOST_STAGES]:
-        result.append(f'{indent}"{stage["name"]}": {stage["ms"]:.3g} ms, {100 * stage["ms"] / all_ms:.0f} %, '
+    stages = alike(found["stages"])
+    shown = [stage for at, stage in enumerate(stages[:MOST_STAGES])
+             if at < MOST_SMALL_STAGES or stage["ms"] >= 0.005 * all_ms]
+    for stage in shown:
+        count = f", {stage['count']} times" if stage["count"] > 1 else ""
+        result.append(f'{indent}"{stage["name"]}"{count}: {stage["ms"]:.3g} ms, {100 * stage["ms"] / all_ms:.0f} %, '
                       f'bound by {stage["bound"]}')
         result += [f"{indent}  {loops}" for loops in stage["loops"]]
         result += [f"{indent}  hint: {hint}." for hint in stage["hints"]]
-    rest = found["stages"][MOST_STAGES:]
+    rest = stages[len(shown):]
     if rest:
-        result.append(f"{indent}and {len(rest)} more stages, {sum(stage['ms'] for stage in rest):.3g} ms together")
+        count = sum(stage["count"] for stage in rest)
+        result.append(f"{indent}and {count} more stages, {sum(stage['ms'] for stage in rest):.3g} ms together")
     if found["stored"]:
         result.append(f"{indent}stored: " + listed([f'"{name}" ({size_of(size)})' for name, size in found["stored"]]))
     if found["recomputed"]:

@@ -8,8 +8,8 @@ from ._device import device_of
 from ._plan import GRADIENT, bits
 
 # The facts about a gradient that a reader needs, by the names of Explanation.Kind.
-_FACTS = {"Scattered": " is a sum at data-dependent indices", "Privatised": "", "Zero": " is zero",
-          "Version": " keeps overwritten values", "Performance": ""}
+_FACTS = {"Scattered": " is a sum at data-dependent indices", "Privatised": "", "Zero": " is zero", "Version": "",
+          "Performance": ""}
 
 
 def explain(operator, given):
@@ -34,7 +34,7 @@ def explain(operator, given):
             every = kinds + [(plan.result_dtypes[i], results[i], place) for i in seeds]
             backward = _pipeline(gradient, every, [kinds[i][1] for i in wanted])
             lines += [title + backward[1], *backward[2:]]
-            notes = _facts(gradient.facts())
+            notes = _facts(gradient.facts(), {plan.names[i] for i in wanted})
         except Error as problem:
             lines.append(title + str(problem))
     return "\n".join(lines + notes) + "\n"
@@ -87,12 +87,14 @@ def _pipeline(plan, kinds, results):
     return [_explain.machine_line(found), f"{found['ms']:.3g} ms", *_explain.lines(found)]
 
 
-def _facts(explanations):
-    """Lines about the sums of a gradient, each once."""
+def _facts(explanations, wanted):
+    """Lines about the sums of a gradient, each once. A zero counts if it is the gradient of an input that is wanted."""
     lines = []
     for fact in explanations:
         words = _FACTS.get(fact.kind.name)
         if words is None or "without a directive" in fact.detail:
+            continue
+        if fact.kind.name == "Zero" and fact.subject not in wanted:
             continue
         line = f'  the gradient of "{_explain.plain(fact.subject)}"{words}: {_explain.plain(fact.detail)}'
         if line not in lines:
