@@ -10,6 +10,7 @@
 #include "frontend/data/buffer.h"
 #include "frontend/run/compiler_interface.h"
 #include "graph/directives/schedule_log.h"
+#include "tuning/explain_stages.h"
 #include "tuning/kernels_taken.h"
 #include "tuning/machine.h"
 #include "tuning/measure_stages.h"
@@ -21,17 +22,6 @@ namespace {
 
 using tuning::BufferShape;
 
-// Copies of a Func at several places have names made of its own: "blur.$2" of "blur".
-std::string func_of(std::string stage, const std::vector<std::string>& funcs) {
-  const std::string given = stage;
-  while (std::ranges::find(funcs, stage) == funcs.end()) {
-    const size_t end = stage.rfind('$');
-    if (end == std::string::npos || end == 0) return given;
-    stage.resize(stage[end - 1] == '.' ? end - 1 : end);
-  }
-  return stage;
-}
-
 ScheduleReport::Stage stage_named(const std::string& name) {
   ScheduleReport::Stage stage;
   stage.name = name;
@@ -41,7 +31,7 @@ ScheduleReport::Stage stage_named(const std::string& name) {
 void add_stages(const tuning::Prediction& prediction, const std::vector<std::string>& funcs,
                 ScheduleReport& report) {
   for (const tuning::StagePrediction& found : prediction.stages) {
-    const std::string name = func_of(found.name, funcs);
+    const std::string name = tuning::func_of_stage(found.name, funcs);
     auto at = std::ranges::find(report.stages, name, &ScheduleReport::Stage::name);
     if (at == report.stages.end()) at = report.stages.insert(at, stage_named(name));
     // Of several places, the slowest says what bounds it.

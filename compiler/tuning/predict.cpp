@@ -15,20 +15,27 @@ constexpr double page_bytes = 4096;
 // What units cannot do at the same time: of all that they do beside the slowest of them.
 constexpr double not_overlapped = 0.25;
 
-// Of one iteration, of one thread.
-double compute_ns(const Work& work, const Machine& m) {
+// The time of one iteration on one thread, and the parts of it that StagePrediction lists.
+struct ComputeTime {
+  double all = 0, chains = 0, elements = 0, scalars = 0;
+};
+
+ComputeTime compute_ns(const Work& work, const Machine& m) {
   const double arithmetic = work.operations * m.operation_ns + work.shuffles * m.shuffle_ns +
                             work.divisions * m.divide_ns +
                             work.double_divisions * m.divide_double_ns + work.roots * m.sqrt_ns +
                             work.double_roots * m.sqrt_double_ns + work.exps * m.exp_ns +
                             work.logs * m.log_ns + work.pows * m.pow_ns + work.sines * m.sin_ns;
-  const double loads = work.loads * m.load_ns + work.gather_lanes * m.gather_lane_ns;
-  const double stores = work.stores * m.store_ns + work.scatter_lanes * m.scatter_lane_ns;
+  const double gathers = work.gather_lanes * m.gather_lane_ns;
+  const double scatters = work.scatter_lanes * m.scatter_lane_ns;
+  const double loads = work.loads * m.load_ns + gathers;
+  const double stores = work.stores * m.store_ns + scatters;
   const double scalars = work.scalars * m.scalar_ns + work.scalar_divisions * m.scalar_divide_ns;
   const double slowest = std::max({arithmetic, loads, stores, scalars});
   const double all = arithmetic + loads + stores + scalars;
   const double chains = work.chain * m.latency_ns + work.memory_chain * m.memory_latency_ns;
-  return std::max(slowest + not_overlapped * (all - slowest), chains);
+  const double units = slowest + not_overlapped * (all - slowest);
+  return {std::max(units, chains), chains > units ? chains : 0, gathers + scatters, scalars};
 }
 
 // What does not depend on times, only on how large vectors and caches are.
@@ -87,7 +94,12 @@ class Predictor {
     const double times = tree_.times(static_cast<int>(n)), share = times / node.speedup;
     for (const auto& [stage, work] : node.work) {
       StagePrediction& of = stages_[static_cast<size_t>(stage)];
-      of.compute_seconds += share * compute_ns(work, machine_) * ns;
+      const ComputeTime time = compute_ns(work, machine_);
+      of.compute_seconds += share * time.all * ns;
+      of.chain_seconds += share * time.chains * ns;
+      of.element_seconds += share * time.elements * ns;
+      of.scalar_seconds += share * time.scalars * ns;
+      if (node.speedup <= 1) of.one_thread_seconds += share * time.all * ns;
       of.work.add(work, times);
     }
     StagePrediction& own = stages_[static_cast<size_t>(node.stage)];

@@ -22,6 +22,9 @@ struct StagePrediction {
   std::string name;  // of the Func; "" is what belongs to none
   double seconds = 0;
   double compute_seconds = 0, launch_seconds = 0;
+  // Parts of compute_seconds, which overlap: bodies bound by a chain of dependent operations, accesses element by element
+  // (gathers and scatters), scalar operations, and work outside of parallel loops.
+  double chain_seconds = 0, element_seconds = 0, scalar_seconds = 0, one_thread_seconds = 0;
   // Bytes from behind each cache and the time that they take: "L2" are those that L1 has not.
   std::array<double, Machine::level_count> bytes = {}, memory_seconds = {};
   Work work;                     // of one call, over all threads

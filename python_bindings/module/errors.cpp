@@ -2,22 +2,68 @@
 //
 // The classes are defined in Python (retrograde/_errors.py), so that they can be pickled and inherit from built-in
 // exceptions.
+#include <map>
+#include <regex>
+#include <set>
+
 #include "bind_all.h"
 #include "binding.h"
 #include "diagnostics/error.h"
+#include "graph/names.h"
 
 namespace retrograde::python {
 
 namespace {
 
+// Writes names as the user did, "f" for "f$3". A program that is defined again and again, as in a notebook or by a
+// function, has such names. Where a message mentions two names that differ in their number alone, both keep it.
+class ShortNames {
+ public:
+  explicit ShortNames(const std::string& message) {
+    static const std::regex plain("\"([A-Za-z_]\\w*)\"|([A-Za-z_]\\w*)(?=[.])");
+    for (const std::smatch& match : matches(message, numbered()))
+      alike_[graph::without_numbers(match.str())].insert(match.str());
+    for (const std::smatch& match : matches(message, plain)) {
+      const std::string name = match[1].matched ? match[1].str() : match[2].str();
+      if (const auto found = alike_.find(name); found != alike_.end()) found->second.insert(name);
+    }
+  }
+
+  std::string operator()(const std::string& words) const {
+    std::string result;
+    auto copied = words.cbegin();
+    for (const std::smatch& match : matches(words, numbered())) {
+      const std::string shorter = graph::without_numbers(match.str());
+      const auto found = alike_.find(shorter);
+      result.append(copied, match[0].first);
+      result += found != alike_.end() && found->second.size() == 1 ? shorter : match.str();
+      copied = match[0].second;
+    }
+    return result.append(copied, words.cend());
+  }
+
+ private:
+  std::map<std::string, std::set<std::string>> alike_;  // by the name without numbers
+
+  static const std::regex& numbered() {
+    static const std::regex name("[A-Za-z_]\\w*(\\$\\d+\\w*)+");
+    return name;
+  }
+  static std::vector<std::smatch> matches(const std::string& words, const std::regex& name) {
+    return {std::sregex_iterator(words.begin(), words.end(), name), std::sregex_iterator()};
+  }
+};
+
 void raise(const char* type, const Error& error, const py::dict& more) {
   const py::object cls = py::module_::import("retrograde._errors").attr(type);
-  const py::object exception = cls(error.what());
+  const std::string words = error.what();
+  const ShortNames shown(words);
+  const py::object exception = cls(shown(words));
   const Message& message = error.message();
-  exception.attr("asked") = message.asked;
-  exception.attr("rule") = message.rule;
-  exception.attr("evidence") = message.evidence;
-  exception.attr("instead") = message.instead;
+  exception.attr("asked") = shown(message.asked);
+  exception.attr("rule") = shown(message.rule);
+  exception.attr("evidence") = shown(message.evidence);
+  exception.attr("instead") = shown(message.instead);
   for (const auto& [name, value] : more) py::setattr(exception, name, value);
   PyErr_SetObject(cls.ptr(), exception.ptr());
 }

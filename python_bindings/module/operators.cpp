@@ -75,6 +75,15 @@ const Named binary_operators[] = {
       "Write select() for a choice, & | ~ for and, or, not, and a.same_as(b) to compare handles");
 }
 
+// range(n) and int(n) of a size that is an expression.
+[[noreturn]] int refuse_index(const py::object& self) {
+  user_error(
+      "take an expression as an integer of Python",
+      "its value is known when a pipeline runs, not before", "it is " + std::string(py::str(self)),
+      "Loop over it with an RDom instead of range(), or define the program for sizes that are "
+      "known, which are plain integers");
+}
+
 void add_to(py::object cls) {
   const auto method = [&](const char* name, const auto& function) {
     cls.attr(name) = py::cpp_function(function, py::name(name), py::is_method(cls));
@@ -105,6 +114,10 @@ void bind_operators(py::module_& m) {
     // Setting __eq__ after the class exists does not remove its hash.
     add_to(cls);
   }
+  // Sizes are Exprs. Other classes lack it, because objects with __index__ count as integers elsewhere.
+  const py::object expr = m.attr("Expr");
+  expr.attr("__index__") =
+      py::cpp_function(&refuse_index, py::name("__index__"), py::is_method(expr));
 }
 
 }  // namespace retrograde::python

@@ -4,6 +4,7 @@
 #include "frontend/run/kernel_report.h"
 #include "func_class.h"
 #include "runnable.h"
+#include "tuning/explain_stages.h"
 
 namespace retrograde::python {
 
@@ -81,6 +82,21 @@ void bind_kernel_report(py::module_& m) {
       .def("__str__", &KernelReport::to_string);
 }
 
+// The facts that _explain.py writes as text.
+py::dict as_dict(const tuning::ExplainedPipeline& explained) {
+  py::list stages, stored;
+  for (const tuning::ExplainedStage& stage : explained.stages) {
+    stages.append(py::dict(py::arg("name") = stage.name, py::arg("ms") = stage.ms,
+                           py::arg("bound") = stage.bound, py::arg("loops") = stage.loops,
+                           py::arg("hints") = stage.hints));
+  }
+  for (const tuning::StoredFunc& f : explained.stored)
+    stored.append(py::make_tuple(f.name, f.bytes));
+  return py::dict(py::arg("machine") = explained.machine, py::arg("threads") = explained.threads,
+                  py::arg("ms") = explained.ms, py::arg("stages") = stages,
+                  py::arg("stored") = stored, py::arg("recomputed") = explained.recomputed);
+}
+
 ScheduleReport explained(const Pipeline& pipeline, const Target& target, const py::object& outputs,
                          const ExplainOptions& options) {
   const Outputs to = outputs_from(outputs, "explain the schedule");
@@ -103,6 +119,23 @@ void bind_schedule_log(py::module_& m) {
         return unlocked([=](const Interruption&) { return explain_kernels(pipeline, target); });
       },
       arg("pipeline"), arg("target"));
+  m.def(
+      "_explain_stages",
+      [](const Pipeline& pipeline, const Target& target, const std::vector<std::vector<int>>& sizes,
+         const std::map<std::string, std::vector<int>>& input_sizes) {
+        return as_dict(unlocked([=](const Interruption&) {
+          return tuning::explain_stages(pipeline.spec(), target, sizes, input_sizes);
+        }));
+      },
+      arg("pipeline"), arg("target"), arg("output_sizes"), arg("input_sizes"));
+  reopened<Func>(m, "Func", {"Pipeline"})
+      .def(
+          "explain_schedule",
+          [](const Func& f, const Target& target, const py::object& outputs,
+             const ExplainOptions& options) {
+            return explained(Pipeline(f), target, outputs, options);
+          },
+          arg("target") = Target(), arg("outputs") = py::list(), arg("options") = ExplainOptions());
   reopened<Pipeline>(m, "Pipeline", {})
       .def("schedule_log", &Pipeline::schedule_log)
       .def("apply_schedule", &Pipeline::apply_schedule, arg("log"))

@@ -26,6 +26,7 @@ else:
     from ._retrograde import *
     from . import _display
     from ._command_line import main
+    from ._explain import explain
     from ._generator import *
     from ._linking import *
     from ._names import funcs, vars
@@ -35,6 +36,6 @@ else:
         globals()[_name] = getattr(_retrograde, _name)
     for _n in range(10):
         globals()[f"_{_n}"] = getattr(_retrograde, f"_{_n}")
-    __all__ += ["_", "funcs", "lambda_func", "main"] + _generator.__all__ + _linking.__all__ + [
+    __all__ += ["_", "explain", "funcs", "lambda_func", "main"] + _generator.__all__ + _linking.__all__ + [
         _name for _name in dir(_retrograde) if not _name.startswith("_") and _name not in _BUILTIN]
     __version__ = _retrograde.__version__

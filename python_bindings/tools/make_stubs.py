@@ -213,7 +213,7 @@ def package_stub(module):
             + "".join(f"from ._retrograde import {name} as {name}\n" for name in hidden)
             + "from ._errors import Error as HalideError\nfrom ._errors import CompileError as CompileError, Error as Error, InternalError as InternalError\n"
               "from ._errors import RuntimeError as RuntimeError, Unsupported as Unsupported, UserError as UserError\n"
-              "from ._command_line import main as main\nfrom ._generator import *\nfrom ._linking import *\n"
+              "from ._command_line import main as main\nfrom ._explain import explain as explain\nfrom ._generator import *\nfrom ._linking import *\n"
               "from ._names import funcs as funcs, vars as vars\nfrom ._retrograde import lambda_ as lambda_func\n\n"
               "__version__: str\n")
 

@@ -9,6 +9,7 @@ retrograde_test(
   data_places_test
   default_schedule_test
   epilogues_test
+  explain_stages_test
   forward_schedules_test
   memory_budget_test
   row_sweeps_test

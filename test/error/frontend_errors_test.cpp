@@ -237,6 +237,14 @@ TEST(DefinitionErrors, UpdateOfAnotherTypeOrSize) {
   Setting s;
   expect_error({"same types", "int32", "float32"}, [&] { s.f(s.x, s.y) = 1.5f; });
   expect_error({"same types"}, [&] { s.f(s.x, s.y) += cast<uint64_t>(s.x); });
+  Func sum("sum");
+  sum(s.x) = 0;
+  expect_error({"The constant 0 of the first definition is of type int32", "0.0f, in Python 0.0"},
+               [&] { sum(s.x) += 0.5f; });
+  expect_error({"cast(float64, 0)"}, [&] { sum(s.x) += Expr(0.5); });
+  Func ramp("ramp");
+  ramp(s.x) = s.x;
+  expect_error({"Convert the right-hand side: cast(int32, ...)"}, [&] { ramp(s.x) += 0.5f; });
   expect_error({"the same number of arguments"}, [&] { s.f(s.x) = 1; });
   expect_error({"the same number of values"}, [&] { s.f(s.x, s.y) = Tuple(1, 2); });
   expect_error({"the same number of values"}, [&] { s.f(s.x, s.y) += Tuple(1, 2); });
@@ -247,6 +255,23 @@ TEST(DefinitionErrors, UpdateAfterUse) {
   Func g("user");
   g(s.x, s.y) = s.f(s.x, s.y);
   expect_error({"\"source", "complete when another Func uses it"}, [&] { s.f(s.x, s.y) += 1; });
+}
+
+TEST(DefinitionErrors, AStepOfARecurrenceThatContainsASum) {
+  Var i("i");
+  RDom k(0, 4, "k"), t(1, 8, "t");
+  ImageParam w(Float(32), 2, "w");
+  Var n("n");
+  Func h("hidden");
+  h(i, n) = 0.0f;
+  expect_error({"it runs over one RDom", "make each step a Func of its own"},
+               [&] { h(i, t) = tanh(sum(w(k, i) * h(k, t - 1))); });
+  expect_error({"complete when another Func uses it", "reads \"sum\", which reads \"hidden\"",
+                "step n reads step n - 1"},
+               [&] { h(i, t) = tanh(sum(k, w(k, i) * h(k, t - 1))); });
+  Func user("user");
+  user(i) = h(i, 0);
+  expect_error({"complete when another Func uses it"}, [&] { h(i, t) = h(i, t - 1) + 1.0f; });
 }
 
 TEST(DefinitionErrors, UpdateWithoutFirstDefinition) {

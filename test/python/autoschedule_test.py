@@ -111,6 +111,20 @@ class Logs(unittest.TestCase):
         self.assertGreater(measured.measured_ms, 0)
         self.assertTrue(out.any() and str(measured) and measured.to_json())
 
+    def test_in_plain_words(self):
+        image, horizontal, vertical = blur()
+        horizontal.compute_root()
+        vertical.vectorize(x, 8)
+        text = rg.explain(vertical, [256, 256])
+        self.assertRegex(text, r'"horizontal": \S+ ms, \d+ %, bound by \w+')
+        self.assertIn("definition: y (256), x (32), vectors of 8 along x", text)
+        self.assertRegex(text, r'stored: "horizontal" \(26\d kB\)')
+        self.assertEqual(rg.explain([vertical], [[256, 256]]), text)
+        seed = rg.Buffer(np.ones((256, 256), np.float32))
+        gradient = rg.propagate_adjoints(vertical, seed)(image)
+        self.assertIn("bound by", rg.explain(gradient, [257, 257]))
+        self.assertGreater(gradient.explain_schedule(HOST, [257, 257]).predicted_ms, 0)
+
     def test_what_kernels_take(self):
         image, horizontal, vertical = blur()
         self.assertEqual(rg.explain_kernels(rg.Pipeline(vertical), HOST).kernels, [])

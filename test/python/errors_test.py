@@ -29,6 +29,44 @@ class Classes(unittest.TestCase):
         for part in (error.asked, error.rule, error.evidence):
             self.assertIn(part, str(error))
 
+    def test_names_are_those_of_the_program(self):
+        def program(first, second):
+            f, g = rg.Func(first), rg.Func(second)
+            f[x], g[x] = x, x
+            f[x] = f[x - 1] + g[x]
+
+        for _ in range(2):  # the second program's Funcs have numbers
+            with self.assertRaises(rg.CompileError) as caught:
+                program("once_named", "other")
+            self.assertIn('"once_named"(x)', caught.exception.asked)
+            self.assertNotIn("$", str(caught.exception) + caught.exception.evidence)
+        both = rg.Func("alike"), rg.Func("alike")
+        both[0][x] = x
+        with self.assertRaisesRegex(rg.CompileError, r'"alike\$\d+"'):  # which of the two matters
+            both[0].compute_at(both[1], x)
+            both[1][x] = both[0][x]
+            rg.Func("reader")[x] = both[1][x]
+            both[0].compute_at(both[1], y)
+            both[1].realize([3])
+
+    def test_a_recurrence_that_starts_outside_of_its_output(self):
+        f, image, r = rg.Func("f"), rg.ImageParam("float32", 1, "image"), rg.RDom([(0, 8)])
+        f[x] = 0.0
+        f[r] = f[r - 1] / 2 + image[r]
+        f.output_buffer().dim(0).set_bounds(0, 8)
+        image.set(np.ones(8, np.float32))
+        with self.assertRaisesRegex(rg.RuntimeError, r"used over \[-1, 7\].*If an update reads elements of \"f\""):
+            f.realize(np.zeros(8, np.float32))
+
+    def test_a_sum_of_floats_that_starts_as_an_integer(self):
+        f, image = rg.Func("f"), rg.ImageParam("float32", 1, "image")
+        f[x] = 0
+        for add in (lambda: f[x].__iadd__(image[x]), lambda: f[x].__iadd__(0.5)):
+            with self.assertRaisesRegex(rg.CompileError, "in Python 0.0") as caught:
+                add()
+            self.assertIn("the first definition gives int32 and this one float32", caught.exception.evidence)
+        f[x] += 1
+
     def test_errors_of_calls_carry_their_code(self):
         image = rg.ImageParam("float32", 1, "image")
         f = rg.Func("f")

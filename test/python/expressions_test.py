@@ -141,6 +141,13 @@ class Operators(unittest.TestCase):
         with self.assertRaises(rg.CompileError):
             0 < x < 5
 
+    def test_an_expression_is_no_integer_of_python_and_says_what_to_write(self):
+        image = rg.ImageParam("float32", 1, "image")
+        for take in (range, int, [1, 2].__getitem__):
+            with self.assertRaisesRegex(rg.CompileError, "known when a pipeline runs.*RDom"):
+                take(image.dim(0).extent())
+        self.assertEqual(value(rg.Expr(9) // 2), 9 // 2)  # sizes that are numbers and others divide alike
+
     def test_what_is_no_expression_is_a_type_error(self):
         for other in (None, [1], object(), {}):
             with self.assertRaises(TypeError):

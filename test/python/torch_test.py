@@ -277,6 +277,91 @@ class Operators(unittest.TestCase):
         self.assertEqual(failures, [])
 
 
+class Explanations(unittest.TestCase):
+    def test_of_the_last_call(self):
+        op, taps = blur("float32"), torch.rand(3, requires_grad=True)
+        with self.assertRaisesRegex(rg.CompileError, "has not been called"):
+            op.explain()
+        op(torch.rand(500), taps).sum().backward()
+        text = op.explain()
+        self.assertIn("image: float32 [500], taps: float32 [3]", text)
+        self.assertRegex(text, r"forward: \S+ ms\n")
+        self.assertRegex(text, r'"blur": \S+ ms, \d+ %, bound by ')
+        self.assertIn("backward, gradients of taps: ", text)
+        self.assertIn('"gradient_of_taps"', text)
+        self.assertNotRegex(text, r"\$\d")  # names are those of the program
+
+    def test_of_shapes(self):
+        op = blur("float32")
+        text = op.explain((40,), (3,))
+        self.assertIn("image: float32 [40]", text)
+        self.assertIn("backward, gradients of image and taps: ", text)
+        self.assertIn("one after the other (3)", text)
+        self.assertEqual(op.explain(torch.rand(40), (3,)), text)
+        batch = op.explain((2, 5, 40), (3,))
+        self.assertIn("called for each of a batch of [2, 5]", batch)
+        with self.assertRaisesRegex(TypeError, "a shape, a tensor or a number for each of image, taps"):
+            op.explain((40,))
+
+    def test_of_operators_for_known_sizes_and_of_integers(self):
+        def define(kind, shapes):
+            image, f = rg.ImageParam(kind, 2, "image"), rg.Func("f")
+            f[x, y] = rg.exp(image[x, y])
+            return f, [image]
+
+        self.assertIn("image: float32 [20, 30]", operator("tests::explained", define).explain((20, 30)))
+        image, f = rg.ImageParam("int32", 1, "image"), rg.Func("f")
+        f[x] = image[x] + 1
+        self.assertNotIn("backward", operator(f, [image]).explain((8,)))
+
+    def test_say_which_sums_are_scatters(self):
+        table, index, f = rg.ImageParam("float32", 1, "table"), rg.ImageParam("int64", 1, "index"), rg.Func("f")
+        f[x] = table[rg.clamp(rg.cast("int32", index[x]), 0, 7)]
+        text = operator(f, [table, index], lambda table, index: [index.shape[0]]).explain((8,), (100,))
+        self.assertIn('the gradient of "table" is a sum at data-dependent indices', text)
+
+
+class SizesOfDefinitions(unittest.TestCase):
+    """A size is a number where shapes are known, and an expression elsewhere: both work alike, or say why not."""
+
+    def define(self, use):
+        def define(kind, shapes):
+            image, f = rg.ImageParam(kind, 1, "image"), rg.Func("f")
+            n = shapes[0][0] if shapes else image.dim(0).extent()
+            use(f, image, n)
+            return f, [image], lambda image: [image.shape[0]]
+        return define
+
+    def test_both_kinds_in_domains_and_arithmetic(self):
+        def half_sum(f, image, n):
+            r = rg.RDom([(0, n // 2)])
+            f[x] = image[x] / n
+            f[x] += image[r] + image[n - 1 - r]
+
+        op, t = operator("tests::sizes", self.define(half_sum)), torch.rand(9)
+        want = t / 9 + t[:4].sum() + t[5:].sum()
+        torch.testing.assert_close(op(t), want)
+        for n in range(2, 14):  # more than are compiled for themselves
+            op(torch.rand(n))
+        torch.testing.assert_close(op(torch.ones(21)), torch.full((21,), 1 / 21 + 20))
+
+    def test_python_loops_need_numbers(self):
+        def loop(f, image, n):
+            f[x] = sum(image[k] for k in range(n))
+
+        with self.assertRaisesRegex(rg.CompileError, "an integer of Python.*known when a pipeline runs"):
+            operator("tests::loop", self.define(loop))
+
+    def test_definitions_that_need_shapes_say_so(self):
+        def define(kind, shapes):
+            raise_if_none = shapes[0]
+            return raise_if_none
+
+        with self.assertRaisesRegex(rg.CompileError, "also called with shapes=None.*TypeError") as caught:
+            operator("tests::needs", define)
+        self.assertIn("image.dim(0).extent()", caught.exception.instead)
+
+
 def total(name):
     a, b, f = rg.ImageParam("float32", 1, "a"), rg.ImageParam("float32", 1, "b"), rg.Func("total")
     f[x] = a[x] + b[x]

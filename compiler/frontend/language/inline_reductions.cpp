@@ -64,7 +64,9 @@ class Finder {
         user_error("reduce with " + name_, "it runs over one RDom",
                    text("the expression uses ", quoted(domain_->vars[0].var), " and ",
                         quoted(domain->vars[0].var), " of different RDoms"),
-                   "Name the one to reduce over: " + name_ + "(r, ...)");
+                   "Name the one to reduce over: " + name_ +
+                       "(r, ...). If the other one counts the steps of a recurrence, make each "
+                       "step a Func of its own instead");
       }
       domain_ = domain;
     }

@@ -145,7 +145,7 @@ void define_pure(const FuncPtr& f, const std::vector<Expr>& args, const std::vec
 void define_update(const FuncPtr& f, const std::vector<Expr>& raw_args,
                    const std::vector<Expr>& raw_values, const DomainPtr& declared) {
   const DefinitionRules rules(*f, raw_args, true);
-  rules.check_is_updatable();
+  rules.check_is_updatable(names_in(*f, raw_values));
   rules.check_arity(raw_args);
   rules.check_values(raw_values);
   rules.check_constants(with(raw_args, raw_values));

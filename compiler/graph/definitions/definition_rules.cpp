@@ -51,6 +51,37 @@ std::string varying_part(const Expr& root) {
   return part;
 }
 
+// Whether the Func or one that it reads, directly or not, reads `wanted`.
+bool reads(const FuncContents& f, const FuncContents& wanted) {
+  std::vector<FuncPtr> open = direct_callees(f);
+  std::unordered_set<const FuncContents*> seen;
+  while (!open.empty()) {
+    const FuncPtr next = open.back();
+    open.pop_back();
+    if (next.get() == &wanted) return true;
+    if (seen.insert(next.get()).second) append(open, direct_callees(*next));
+  }
+  return false;
+}
+
+// The advice about an update whose value has another type than that of the first definition. Most often the first
+// definition is a constant such as 0, whose type the user did not think of.
+std::string advice_on_type(const FuncContents& f, size_t i, Type first, Type given) {
+  const bool starts_from_constant =
+      f.is_defined() && i < f.pure->values.size() && is_const(f.pure->values[i]);
+  if (!starts_from_constant || !given.is_float() || first.is_float())
+    return text("Convert the right-hand side: cast(", to_string(first), ", ...)");
+  const Expr& start = f.pure->values[i];
+  const std::string literal =
+      given == Float(32) && first == Int(32) ? text(start, ".0f, in Python ", start, ".0") : "";
+  return text("The constant ", start, " of the first definition is of type ", to_string(first),
+              ". Start from a constant of the type ", to_string(given), ": ",
+              literal.empty() ? text("cast(", to_string(given), ", ", start, ")") : literal,
+              is_zero(start)
+                  ? ". Or leave the first definition out: += starts from a 0 of its operand's type"
+                  : "");
+}
+
 }  // namespace
 
 NamesInDefinition names_in(const FuncContents& f, const std::vector<Expr>& roots) {
@@ -218,7 +249,7 @@ void DefinitionRules::check_no_reduction(const DomainPtr& domain) const {
 
 // ---- of updates ----
 
-void DefinitionRules::check_is_updatable() const {
+void DefinitionRules::check_is_updatable(const NamesInDefinition& names) const {
   if (!f_.is_defined())
     user_error(asked_, "a Func is updated after its first definition", "it has none",
                "Define it first: f(x) = 0");
@@ -228,9 +259,23 @@ void DefinitionRules::check_is_updatable() const {
                "Update a Func that reads it");
   }
   if (f_.frozen) {
+    check_direct_reads(names);
     user_error(asked_, "a Func is complete when another Func uses it",
                "another Func uses it already",
                "Move the update before that use, or put it into a new Func");
+  }
+}
+
+void DefinitionRules::check_direct_reads(const NamesInDefinition& names) const {
+  for (const FuncPtr& callee : names.callees) {
+    if (!reads(*callee, f_)) continue;
+    user_error(
+        asked_, "a Func is complete when another Func uses it",
+        text("the right-hand side reads ", quoted(without_numbers(callee->name)), ", which reads ",
+             quoted(f_.name),
+             " and would have to be computed between two iterations of this update"),
+        "Make each step a Func of its own, in a loop of the program around the definitions: "
+        "step n reads step n - 1. An inline reduction such as sum(...) is another Func, too");
   }
 }
 
@@ -253,7 +298,7 @@ void DefinitionRules::check_types(const std::vector<Expr>& values, const std::ve
     user_error(asked_, "all definitions of a Func have the same types",
                text(whose, values.size() > 1 ? text(" for element ", i) : std::string(), " gives ",
                     to_string(types[i]), " and this one ", to_string(values[i].type())),
-               text("Convert the right-hand side: cast(", to_string(types[i]), ", ...)"));
+               advice_on_type(f_, i, types[i], values[i].type()));
   }
 }
 

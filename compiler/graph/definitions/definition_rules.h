@@ -51,7 +51,8 @@ class DefinitionRules {
 
   // ---- of updates ----
 
-  void check_is_updatable() const;
+  // `names`: those of the new values.
+  void check_is_updatable(const NamesInDefinition& names) const;
   void check_arity(const std::vector<Expr>& args) const;
   // `whose`: the definition or declaration with these types.
   void check_types(const std::vector<Expr>& values, const std::vector<Type>& types,
@@ -65,6 +66,8 @@ class DefinitionRules {
   void check_bounds(const ReductionDomainContents& domain) const;
 
  private:
+  void check_direct_reads(const NamesInDefinition& names) const;
+
   const FuncContents& f_;
   std::string asked_;  // begins messages: "define "f"(x, r.x)"
 };

@@ -26,6 +26,17 @@ void add_constraint_check(const LoweredArgument& arg, Metadata what, int d, cons
                                        ").set_", to_string(what), "(Expr()).")));
 }
 
+// An output may be used outside of its bounds because its own update reads an element there, as a recurrence does that
+// starts too early.
+std::string advice_on_own_reads(const LoweredArgument& arg) {
+  if (arg.kind != LoweredArgument::Kind::OutputBuffer) return "";
+  return " If an update reads elements of " + quoted(arg.name) +
+         " beside those that it writes, as f(r - 1) does, start its RDom where these lie inside, "
+         "or "
+         "let another Func read " +
+         quoted(arg.name) + " and make that the output.";
+}
+
 }  // namespace
 
 void add_promise_checks(const LoweredArgument& arg, const Box& used, const ShapeFacts& facts,
@@ -40,15 +51,15 @@ void add_promise_checks(const LoweredArgument& arg, const Box& used, const Shape
     if (promised.extent.defined()) holds = holds && used[d].max < min + promised.extent;
     holds = simplify(holds);
     if (is_const_true(holds)) continue;
-    checks.push_back(
-        run_time_check(holds, retrograde_error_constraints_make_required_region_smaller,
-                       text("cannot run: a promised region must contain the region that is used; ",
-                            quoted(arg.name), " is used over ["),
-                       used[d].min, Expr(", "), used[d].max,
-                       text("] in dimension ", d, ", but its min is promised to be "), min,
-                       Expr(" and its extent "),
-                       promised.extent.defined() ? promised.extent : Expr("whatever it is"),
-                       Expr(". Promise a larger region, or lift the promise.")));
+    checks.push_back(run_time_check(
+        holds, retrograde_error_constraints_make_required_region_smaller,
+        text("cannot run: a promised region must contain the region that is used; ",
+             quoted(arg.name), " is used over ["),
+        used[d].min, Expr(", "), used[d].max,
+        text("] in dimension ", d, ", but its min is promised to be "), min,
+        Expr(" and its extent "),
+        promised.extent.defined() ? promised.extent : Expr("whatever it is"),
+        Expr(". Promise a larger region, or lift the promise." + advice_on_own_reads(arg))));
   }
 }
 

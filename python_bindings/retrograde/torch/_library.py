@@ -64,6 +64,7 @@ class Calls:
 
     def __init__(self, operator, library, namespace, name):
         self.operator, self._last, self._functions = operator, {}, {}
+        self.seen = {}  # by path: types and shapes of the last call, for explain()
         kernels = {"CPU": self.run, "CUDA": self.run_on_device, "Autograd": self.differentiate,
                    "AutocastCPU": self.cast, "AutocastCUDA": self.cast, "Batched": self.take_batch}
         for key, kernel in kernels.items():
@@ -117,12 +118,18 @@ class Calls:
         plan = self.operator.plan_for(path, tensors)
         results = plan.run(tensors)
         self._last[path] = plan.expected
+        self._see(path, tensors)
         return results
+
+    def _see(self, path, tensors):
+        self.seen.pop(path, None)  # the last one is the last of the dict
+        self.seen[path] = [(t.dtype, tuple(t.shape)) for t in tensors]
 
     def fake(self, path, tensors):
         return self.operator.plan(path, tensors).fake(tensors)
 
     def run_on_device(self, path, tensors):
+        self._see(path, tensors)
         return self.operator.plan_for(path, tensors).run_on_device(tensors)
 
     def differentiate(self, path, tensors):

@@ -11,6 +11,7 @@ from .. import _retrograde as rg
 from .._errors import CompileError, error
 from . import _library
 from ._direct import is_compiling, is_direct
+from ._explaining import explain
 from ._pickling import Function, describe, described
 from ._plan import Plan, is_image
 
@@ -32,8 +33,10 @@ def operator(name, pipeline=None, inputs=None, outputs=None, *, sizes=None):
     (pipeline, inputs, outputs). Then one definition serves tensors of all floating-point types. The first input that is
     float32 in the definition for "float32" determines the type of a call.
     A function of two arguments, (type, shapes), also receives the shapes of the tensors, in PyTorch's order. Its result
-    is compiled for these shapes only, which is faster than general code. After MOST_SIZES different shapes, it is
-    called with None for all others."""
+    is compiled for these shapes only, which is faster than general code. It is also called with None: once when the
+    operator is created, and after MOST_SIZES different shapes for all others. Sizes are then expressions, such as
+    image.dim(0).extent(). They work in an RDom and in arithmetic; `//` divides both kinds alike, while `/` of two
+    Python integers is a float. Python's range() and int() need numbers."""
     if not isinstance(name, str):
         name, pipeline, inputs, outputs = None, name, pipeline, outputs if inputs is None else inputs
     return _registered(Operator(name, pipeline, inputs, sizes if outputs is None else outputs))
@@ -117,9 +120,10 @@ class Operator:
 
     def __init__(self, name, pipeline, inputs, outputs):
         self._define, self._knows_sizes = None, False
+        self.name = name or "without a name"  # until its Funcs are known
         if callable(pipeline) and not isinstance(pipeline, (rg.Func, rg.Pipeline)):
             self._define, self._knows_sizes = pipeline, len(inspect.signature(pipeline).parameters) > 1
-            definition = pipeline("float32", None) if self._knows_sizes else pipeline("float32")
+            definition = self._defined(torch.float32)
         else:
             definition = (pipeline, inputs, outputs)
         self._plans, self._sized, self._lock = {}, {}, threading.Lock()
@@ -160,8 +164,18 @@ class Operator:
                            None if self._define else describe(*self._definition))
 
     def _defined(self, dtype):
+        """The definition for sizes that are not known."""
         kind = str(dtype)[6:]
-        return self._define(kind, None) if self._knows_sizes else self._define(kind)
+        if not self._knows_sizes:
+            return self._define(kind)
+        try:
+            return self._define(kind, None)
+        except (AttributeError, IndexError, TypeError, ValueError) as problem:
+            raise error(CompileError, f'define the operator "{self.name}" for sizes that are not known',
+                        "a definition is also called with shapes=None, for the names and types of its inputs and for "
+                        f"tensors beyond the first {MOST_SIZES} shapes",
+                        f"it raised {type(problem).__name__}: {problem}",
+                        "Where shapes is None, take the sizes from the images: image.dim(0).extent()") from problem
 
     def _plan_of(self, definition, sizes=None):
         pipeline, inputs, outputs = (*definition, None)[:3]
@@ -235,6 +249,17 @@ class Operator:
                 tensor = torch.tensor(tensor, dtype=of if follows else dtype)
             made.append(tensor)
         return tuple(made)
+
+    def explain(self, *inputs):
+        """What the operator and its gradients do, as text: the loops of each stage, slowest first, what bounds the
+        stage (memory traffic, arithmetic, a serial chain), what is stored or recomputed, and hints.
+
+            print(op.explain((480, 640), (3,)))     # a shape, a tensor or a number for each input
+            print(op.explain())                     # inputs like those of the last call
+
+        The gradients are those of the tensors that require them; of shapes, all. Nothing runs: times are predictions of
+        the cost model, to compare stages with each other."""
+        return explain(self, inputs)
 
     def made(self):
         """The paths of the derivatives that exist; see Plan.derived."""

@@ -12,6 +12,7 @@ import torch
 
 from .. import _retrograde as rg
 from .._errors import CompileError, error
+from .._explain import plain
 from ._device import device_of
 
 DTYPES = {torch.float16: rg.Float(16), torch.bfloat16: rg.BFloat(16), torch.float32: rg.Float(32),
@@ -43,7 +44,10 @@ def is_image(parameter):
 
 class Plan:
     """A compiled pipeline with outputs and inputs. `shapes` computes the shapes of the outputs, in PyTorch's order,
-    from the tensors of one batch item. `sizes` holds the shapes of the inputs if the plan is for these only, or None."""
+    from the tensors of one batch item. `sizes` holds the shapes of the inputs if the plan is for these only, or None.
+    `facts()` is what Derivative.explanations() says about a gradient."""
+
+    facts = list
 
     def __init__(self, name, outputs, inputs, shapes, sizes=None):
         self.name, self.outputs, self.inputs, self._shapes = name, list(outputs), list(inputs), shapes
@@ -247,7 +251,7 @@ class Plan:
         seeds, adjoints = [], []
         for i in given:
             f = self.outputs[i]
-            seed = rg.ImageParam(f.type(), f.dimensions(), f"seed_{next(_numbers)}")
+            seed = rg.ImageParam(f.type(), f.dimensions(), f"seed_{next(_numbers)}_of_{plain(f.name())}")
             if self.sizes is None:
                 bounds = [(seed.dim(d).min(), seed.dim(d).extent()) for d in range(seed.dimensions())]
             else:
@@ -259,17 +263,18 @@ class Plan:
         sizes = None if self.sizes is None else [*self.sizes, *(self._result_shapes[i] for i in given)]
         plan = Plan(f"{self.name}, gradient", gradients, self.inputs + seeds,
                     lambda tensors: [tuple(tensors[i].shape) for i in wanted], sizes)
-        plan._seeds = len(seeds)
+        plan._seeds, plan.facts = len(seeds), derivative.explanations
         return plan
 
     def _tangent(self, given, _):
         directions, tangents = [], []
         for parameter in (self.inputs[i] for i in given):
             dimensions = parameter.dimensions() if is_image(parameter) else 0
-            tangents.append(rg.ImageParam(parameter.type(), dimensions, f"tangent_{next(_numbers)}"))
+            name = f"tangent_{next(_numbers)}_of_{plain(parameter.name())}"
+            tangents.append(rg.ImageParam(parameter.type(), dimensions, name))
             directions.append(rg.Direction(parameter, rg.Func(tangents[-1])))
-        moved = [_as(f.type(), f.dimensions(), rg.propagate_tangents(f, directions)(f) if f.type().is_float() else None)
-                 for f in self.outputs]
+        moved = [_as(f.type(), f.dimensions(), f"tangent_of_{plain(f.name())}",
+                     rg.propagate_tangents(f, directions)(f) if f.type().is_float() else None) for f in self.outputs]
         count = len(self.inputs)
         sizes = None if self.sizes is None else [*self.sizes, *(self.sizes[i] for i in given)]
         return Plan(f"{self.name}, tangent", moved, self.inputs + tangents,
@@ -302,12 +307,13 @@ def _set_bounds(buffer, size):
 
 def _as_gradient(adjoint, parameter):
     """An adjoint as a Func with the type of the parameter; the adjoint may be wider."""
-    return _as(parameter.type(), parameter.dimensions() if is_image(parameter) else 0, adjoint)
+    dimensions = parameter.dimensions() if is_image(parameter) else 0
+    return _as(parameter.type(), dimensions, f"gradient_of_{plain(parameter.name())}", adjoint)
 
 
-def _as(type, dimensions, part=None):
+def _as(type, dimensions, name, part):
     """A Func with the values of another one, if there is any, in a type."""
-    result = rg.Func(f"derivative_{next(_numbers)}")
+    result = rg.Func(name)
     at = tuple(rg.Var(f"d{d}") for d in range(dimensions))
     result[at] = rg.cast(type, part[at] if part is not None and part.defined() else 0)
     return result
