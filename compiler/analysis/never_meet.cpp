@@ -11,6 +11,7 @@
 #include <map>
 #include <memory>
 #include <unordered_set>
+#include <utility>
 
 #include "analysis/linear.h"
 #include "ir/build.h"
@@ -22,7 +23,8 @@ namespace retrograde::analysis {
 namespace {
 
 constexpr unsigned long most_operations = 1'000'000;  // isl's limit, about a second
-constexpr size_t most_unknowns = 40;
+constexpr size_t most_unknowns = 60;
+constexpr int most_tests = 100;
 constexpr int max_depth = 16;  // of nested divisions and minima
 
 Sum number(int64_t value) { return linear_sum(Int(64), value); }
@@ -43,9 +45,31 @@ class Conditions {
     if (sum.valid) inequalities_.push_back(sum);
   }
 
-  // Whether the conditions certainly have no solution.
-  bool contradict() const {
-    if (numbers_.size() > most_unknowns) return false;
+  // One of the two is zero.
+  void either_is_zero(const Sum& a, const Sum& b) {
+    if (a.valid && b.valid) choices_.push_back({a, b});
+  }
+
+  // Whether the conditions certainly have no solution. Choices are made one after the other, those of the last
+  // coordinates first: they tell steps apart.
+  bool contradict() {
+    if (numbers_.size() > most_unknowns || ++tests_ > most_tests) return false;
+    if (are_empty()) return true;
+    if (choices_.empty()) return false;
+    const auto [a, b] = choices_.back();
+    choices_.pop_back();
+    bool result = true;
+    for (const Sum& chosen : {a, b}) {
+      equalities_.push_back(chosen);
+      result = result && contradict();
+      equalities_.pop_back();
+    }
+    choices_.emplace_back(a, b);
+    return result;
+  }
+
+ private:
+  bool are_empty() const {
     std::unique_ptr<isl_ctx, void (*)(isl_ctx*)> ctx(isl_ctx_alloc(), isl_ctx_free);
     isl_options_set_on_error(ctx.get(), ISL_ON_ERROR_CONTINUE);
     isl_ctx_set_max_operations(ctx.get(), most_operations);
@@ -62,9 +86,10 @@ class Conditions {
     return is_empty;
   }
 
- private:
   std::unordered_map<std::string, int> numbers_;  // the numbers of the unknowns
   std::vector<Sum> equalities_, inequalities_;
+  std::vector<std::pair<Sum, Sum>> choices_;
+  int tests_ = 0;
 
   isl_basic_set* constrained(isl_basic_set* set, isl_constraint* constraint, const Sum& sum) const {
     isl_ctx* ctx = isl_basic_set_get_ctx(set);
@@ -86,7 +111,7 @@ class Point {
  public:
   // `shared`: unknowns that are equal at both points, as are the variables in `fixed`.
   Point(Conditions& conditions, Known& shared, const MeetingPoints& points,
-        const std::unordered_set<std::string>& fixed)
+        const std::unordered_set<std::string>& fixed, const Expr& where)
       : conditions_(conditions), shared_(shared) {
     for (const auto& v : points.variables) {
       if (!fixed.count(v.name)) varying_.insert(v.name);
@@ -97,6 +122,7 @@ class Point {
       if (v.max.defined()) conditions_.at_least_zero(plus(of(v.max), here, -1));
     }
     for (const Expr& condition : points.conditions) require(condition);
+    if (where.defined()) require(where);
   }
 
   Sum of(const Expr& e) {
@@ -175,6 +201,7 @@ class Point {
       conditions_.at_least_zero(kind == Kind::Min ? plus(of(side), result, -1)
                                                   : plus(result, of(side), -1));
     }
+    conditions_.either_is_zero(plus(result, of(op.a), -1), plus(result, of(op.b), -1));
     return result;
   }
 
@@ -205,33 +232,44 @@ class Point {
 
 // Variables that are the same coordinate in both accesses. They are equal where the points meet,
 // and so are the values read at them.
-std::unordered_set<std::string> common_coordinates(const std::string& loop,
-                                                   const std::vector<Expr>& a,
+std::unordered_set<std::string> common_coordinates(const std::vector<Expr>& a,
                                                    const std::vector<Expr>& b) {
   std::unordered_set<std::string> names;
   for (size_t d = 0; d < a.size(); d++) {
     const Variable *v = a[d].as<Variable>(), *w = b[d].as<Variable>();
-    if (v && w && v->name == w->name && v->name != loop) names.insert(v->name);
+    if (v && w && v->name == w->name) names.insert(v->name);
   }
   return names;
 }
 
 }  // namespace
 
-bool can_prove_never_meet(const MeetingPoints& points, const std::string& loop,
-                          const std::vector<Expr>& a, const std::vector<Expr>& b) {
-  const std::unordered_set<std::string> fixed = common_coordinates(loop, a, b);
-  for (const int64_t later : {1, -1}) {  // the second point comes later, or earlier
-    Conditions conditions;
-    Known shared;
-    Point first(conditions, shared, points, fixed), second(conditions, shared, points, fixed);
-    Sum steps = plus(second.of(variable(loop)), first.of(variable(loop)), -1);
-    conditions.at_least_zero(plus(number(-1), steps, later));
-    for (size_t d = 0; d < a.size(); d++)
-      conditions.is_zero(plus(first.of(a[d]), second.of(b[d]), -1));
-    if (!conditions.contradict()) return false;
+bool can_prove_never_meet(const MeetingPoints& points, const PointOrder& order, const Access& a,
+                          const Access& b) {
+  std::unordered_set<std::string> fixed = common_coordinates(a.at, b.at);
+  for (const auto* differing : {&order.larger, &order.smaller}) {
+    for (const std::string& loop : *differing) fixed.erase(loop);
   }
-  return true;
+  fixed.insert(order.same.begin(), order.same.end());
+  Conditions conditions;
+  Known shared;
+  Point first(conditions, shared, points, fixed, a.where);
+  Point second(conditions, shared, points, fixed, b.where);
+  const auto step = [&](const std::string& loop, int64_t sign) {
+    const Sum steps = plus(second.of(variable(loop)), first.of(variable(loop)), -1);
+    conditions.at_least_zero(plus(number(-1), steps, sign));
+  };
+  for (const std::string& loop : order.larger) step(loop, 1);
+  for (const std::string& loop : order.smaller) step(loop, -1);
+  for (size_t d = 0; d < a.at.size(); d++)
+    conditions.is_zero(plus(first.of(a.at[d]), second.of(b.at[d]), -1));
+  return conditions.contradict();
+}
+
+bool can_prove_never_meet(const MeetingPoints& points, const std::string& loop, const Access& a,
+                          const Access& b, const std::unordered_set<std::string>& same) {
+  return can_prove_never_meet(points, PointOrder{same, {loop}, {}}, a, b) &&
+         can_prove_never_meet(points, PointOrder{same, {}, {loop}}, a, b);
 }
 
 }  // namespace retrograde::analysis

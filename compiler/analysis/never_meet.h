@@ -10,6 +10,7 @@
 #pragma once
 
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "ir/expr.h"
@@ -26,9 +27,26 @@ struct MeetingPoints {
   std::vector<Expr> conditions;
 };
 
-// True when no two points that differ in `loop` have coordinates `a` of one equal to coordinates
-// `b` of the other, in all dimensions. False means unknown.
-bool can_prove_never_meet(const MeetingPoints& points, const std::string& loop,
-                          const std::vector<Expr>& a, const std::vector<Expr>& b);
+// How the second of two points lies to the first one, in the order of the loops.
+struct PointOrder {
+  std::unordered_set<std::string> same;  // variables that have the same value at both
+  // Variables whose value at the second point is larger, and smaller.
+  std::vector<std::string> larger, smaller;
+};
+
+// The coordinates that a point accesses, if a condition (undefined: true) holds there.
+struct Access {
+  std::vector<Expr> at;
+  Expr where;
+};
+
+// True when no two points that lie so to each other have coordinates `a` of the first equal to
+// coordinates `b` of the second, in all dimensions. False means unknown.
+bool can_prove_never_meet(const MeetingPoints& points, const PointOrder& order, const Access& a,
+                          const Access& b);
+
+// The same for all pairs of points that differ in `loop` and agree in the variables `same`.
+bool can_prove_never_meet(const MeetingPoints& points, const std::string& loop, const Access& a,
+                          const Access& b, const std::unordered_set<std::string>& same = {});
 
 }  // namespace retrograde::analysis

@@ -17,6 +17,7 @@
 #include "autoschedule/row_copies.h"
 #include "autoschedule/scatter_schedule.h"
 #include "autoschedule/short_rows.h"
+#include "autoschedule/step_loops.h"
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
@@ -99,6 +100,9 @@ class LoopChooser {
     else if (may_scatter)
       unroll_taps(definition(), stage_);
     if (const FuncPtr block = block_of(definition())) return give_blocks(block);
+    const bool has_pure_rows = !pure_.empty() && pure_[0] == 0;
+    if (!scatters && !has_pure_rows && schedule_steps(function_, index_, lanes_of_values(), sizes_))
+      return;
     if (pure_.empty()) return;
     const bool stages = makes(Decision::LayoutStaging);
     if (auto d = stages && pure_[0] == 0 ? transposed_dimension(f_, definition()) : std::nullopt)

@@ -49,7 +49,8 @@ set(suite_programs
   gradient/update_programs.cpp
   gradient/update_reductions.cpp
   gradient/update_filters.cpp
-  gradient/update_scans.cpp)
+  gradient/update_scans.cpp
+  gradient/update_steps.cpp)
 retrograde_test(gpu_gradients_test SOURCES gradient/gpu_gradients_test.cpp ${suite_programs}
   LIBS retrograde_dep_halide_runtime)
 retrograde_test(gradient_cost_test READS_FILES

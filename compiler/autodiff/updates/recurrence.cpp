@@ -78,8 +78,9 @@ class Recurrence {
   bool carries_long_sums(const std::vector<Contribution>& contributions) const {
     const auto& types = c_.query.target.types;
     if (std::ranges::all_of(types, [](Type t) { return t.bits() == 64; })) return false;
-    double elements = 1;
+    double elements = 1;  // each of which may depend on the one before
     for (const ReverseLoop& loop : order_) {
+      if (!loop.carries) continue;
       const LoopVariable& range = c_.query.target.region[static_cast<size_t>(loop.dim)];
       auto extent = constant_extent(range.range());
       elements *= extent ? static_cast<double>(*extent) : many_carried;

@@ -6,6 +6,7 @@
 
 #include "autodiff/time/checkpoint.h"
 #include "autodiff/updates/fold_into_element.h"
+#include "autodiff/updates/in_place_steps.h"
 #include "autodiff/updates/numbering.h"
 #include "autodiff/updates/recurrence.h"
 #include "autodiff/updates/selection.h"
@@ -35,7 +36,7 @@ class UpdateDifferentiation {
       differentiate_by_checkpoints(c_, result_);
     } else if (is_fold(c_)) {
       differentiate_fold(c_, result_);
-    } else {
+    } else if (!fixed_places || !succeeds(differentiate_in_place_steps)) {
       differentiate_by_tape(c_, result_);
     }
     return std::move(result_);
@@ -136,21 +137,25 @@ class UpdateDifferentiation {
   // ---- overwriting and recurrences ----
 
   bool is_recurrence() {
+    if (!succeeds(differentiate_recurrence)) return false;
+    if (c_.reads_self() && wants_checkpoints(c_)) explain_unused_budget();
+    return true;
+  }
+
+  // Whether a way to differentiate the update applies. If it does not, or isl exceeds its budget, nothing changes.
+  bool succeeds(bool (&differentiate)(const UpdateContext&, UpdateAdjoint&)) {
     UpdateAdjoint trial = result_;
     const VersionBudget untouched = c_.query.versions;
     try {
-      if (!differentiate_recurrence(c_, trial)) {
-        c_.query.versions = untouched;
-        return false;
+      if (differentiate(c_, trial)) {
+        result_ = std::move(trial);
+        return true;
       }
-      result_ = std::move(trial);
-      if (c_.reads_self() && wants_checkpoints(c_)) explain_unused_budget();
-      return true;
     } catch (const isl::exception& e) {
-      c_.query.versions = untouched;
       c_.note(text(": isl gave up on its index sets: ", e.what()), result_);
-      return false;
     }
+    c_.query.versions = untouched;
+    return false;
   }
 
   void explain_unused_budget() {

@@ -16,6 +16,8 @@
 //   checkpoints   With a budget, any other loop over time: it runs backward from a few kept states (checkpoint.h).
 //   fold          Iterations that read and write a single element, as products do. The steps of each element become a
 //                 dimension, and its adjoint a recurrence along it (fold_into_element.h).
+//   steps         In-place updates in steps, the points of one step independent of each other, as in red-black
+//                 relaxation. The steps become a dimension, and the adjoint a recurrence along it (in_place_steps.h).
 //   tape          Anything else. The iterations run backward one by one for each element of the pure dimensions, and
 //                 the values that they need are kept (tape.h).
 //

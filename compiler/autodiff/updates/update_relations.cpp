@@ -122,7 +122,9 @@ bool UpdateRelations::may_write(const Read& read, const IterationDomain& other,
 
 std::vector<ReverseLoop> UpdateRelations::first_guess() const {
   std::vector<ReverseLoop> loops;
-  auto add = [&](size_t d, bool descending) { loops.push_back({static_cast<int>(d), descending}); };
+  auto add = [&](size_t d, bool descending) {
+    loops.push_back({static_cast<int>(d), descending, true});
+  };
   std::vector<bool> done(write_indices_.size());
   for (const LoopVariable& v : domain_expr_.vars) {
     for (size_t d = 0; d < write_indices_.size(); ++d) {
@@ -161,6 +163,17 @@ bool UpdateRelations::is_valid_order(const std::vector<ReverseLoop>& loops,
   return true;
 }
 
+// Elements that depend on each other and differ in a loop, but in none around it, come in the wrong order if the loop
+// changes its direction. If there are none, either direction is valid, whatever the others are.
+void UpdateRelations::find_carrying(std::vector<ReverseLoop>& loops,
+                                    const std::vector<Read>& reads) const {
+  for (ReverseLoop& loop : loops) {
+    loop.descending = !loop.descending;
+    loop.carries = !is_valid_order(loops, reads);
+    loop.descending = loop.carries && !loop.descending;
+  }
+}
+
 std::optional<std::vector<ReverseLoop>> UpdateRelations::reverse_order(
     const std::vector<Read>& reads) const {
   std::vector<ReverseLoop> guess = first_guess();
@@ -169,7 +182,9 @@ std::optional<std::vector<ReverseLoop>> UpdateRelations::reverse_order(
     for (size_t l = 0; l < loops.size(); ++l) {
       if (flips >> l & 1u) loops[l].descending = !loops[l].descending;
     }
-    if (is_valid_order(loops, reads)) return loops;
+    if (!is_valid_order(loops, reads)) continue;
+    find_carrying(loops, reads);
+    return loops;
   }
   return std::nullopt;
 }

@@ -10,10 +10,12 @@
 
 namespace retrograde::autodiff {
 
-// A loop of the reverse recurrence over elements; loops are listed innermost first.
+// A loop of the reverse recurrence over elements; loops are listed innermost first. It carries if its direction
+// matters: elements depend on elements of its other iterations. The others ascend.
 struct ReverseLoop {
   int dim;
   bool descending;
+  bool carries = true;
 };
 
 class UpdateRelations {
@@ -55,6 +57,7 @@ class UpdateRelations {
   isl::map earlier() const;  // {i -> j : j runs before i}
   std::vector<ReverseLoop> first_guess() const;
   bool is_valid_order(const std::vector<ReverseLoop>& loops, const std::vector<Read>& reads) const;
+  void find_carrying(std::vector<ReverseLoop>& loops, const std::vector<Read>& reads) const;
 
   IslContext context_;
   const IterationDomain& domain_expr_;

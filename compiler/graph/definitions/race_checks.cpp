@@ -7,6 +7,7 @@
 #include "graph/definitions/associative_update.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
+#include "ir/lets.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
@@ -41,6 +42,65 @@ bool is_never_written(const Call& call, const Definition& update) {
   return false;
 }
 
+// The reads of a Func by its own update, each with the condition under which its value matters: both
+// arms of a select may be evaluated, but only one is taken.
+class OwnReads {
+ public:
+  OwnReads(const FuncContents& f, const Definition& update) : f_(f), update_(update) {}
+
+  std::vector<Access> find() {
+    const std::vector<Expr> values = mapped(update_.values, without_lets);  // alive while visited
+    for (const Expr& value : values) visit(value, {});
+    if (visits_ > most_visits) {  // paths through shared nodes
+      reads_.clear();
+      for (const Expr& read : own_reads(f_, update_)) add(read, {});
+      return reads_;
+    }
+    Definition places = update_;
+    places.values.clear();
+    for (const Expr& read : own_reads(f_, places)) add(read, {});
+    return reads_;
+  }
+
+ private:
+  static constexpr int most_visits = 5000;
+
+  void add(const Expr& read, const Expr& where) {
+    reads_.push_back({read.as<Call>()->args, where});
+  }
+
+  void visit(const Expr& e, const Expr& where) {
+    if (++visits_ > most_visits || (!where.defined() && !always_.insert(e.get()).second)) return;
+    if (as_call_of(e, &f_)) add(e, where);
+    const auto* select = e.as<Select>();
+    const Call* lazy = as_op(e, Op::if_then_else);
+    if (select) {
+      choose(select->condition, select->when_true, select->when_false, where);
+    } else if (lazy) {
+      choose(lazy->args[0], lazy->args[1], lazy->args[2], where);
+    } else {
+      for_each_child(e, [&](const Expr& child) { visit(child, where); });
+    }
+  }
+  void choose(const Expr& condition, const Expr& if_true, const Expr& if_false, const Expr& where) {
+    const auto with = [&](const Expr& more) { return where.defined() ? where && more : more; };
+    visit(condition, where);
+    visit(if_true, with(condition));
+    visit(if_false, with(logical_not(condition)));
+  }
+
+  const FuncContents& f_;
+  const Definition& update_;
+  std::unordered_set<const ExprNode*> always_;  // nodes that are evaluated at every point
+  int visits_ = 0;
+  std::vector<Access> reads_;
+};
+
+// Those behind position `i`: the variables of the loops around that of position `i`.
+std::unordered_set<std::string> names_after(const std::vector<std::string>& loops, size_t i) {
+  return {loops.begin() + static_cast<std::ptrdiff_t>(i) + 1, loops.end()};
+}
+
 }  // namespace
 
 Expr read_of_other_element(const FuncContents& f, const Definition& update) {
@@ -50,12 +110,42 @@ Expr read_of_other_element(const FuncContents& f, const Definition& update) {
   return {};
 }
 
-bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar) {
+bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar,
+                         const std::unordered_set<std::string>& around) {
   const MeetingPoints points = points_of(update);
-  if (!can_prove_never_meet(points, rvar, update.args, update.args)) return false;
-  return std::ranges::all_of(own_reads(f, update), [&](const Expr& read) {
-    return can_prove_never_meet(points, rvar, update.args, read.as<Call>()->args);
+  const Access write{update.args, {}};
+  if (!can_prove_never_meet(points, rvar, write, write, around)) return false;
+  return std::ranges::all_of(OwnReads(f, update).find(), [&](const Access& read) {
+    return can_prove_never_meet(points, rvar, write, read, around);
   });
+}
+
+bool can_prove_same_order(const FuncContents& f, const Definition& update,
+                          const std::vector<std::string>& before,
+                          const std::vector<std::string>& after) {
+  if (before == after) return true;
+  const MeetingPoints points = points_of(update);
+  const Access write{update.args, {}};
+  const std::vector<Access> reads = OwnReads(f, update).find();
+  const auto never_meet = [&](const PointOrder& order) {
+    return can_prove_never_meet(points, order, write, write) &&
+           std::ranges::all_of(reads, [&](const Access& read) {
+             return can_prove_never_meet(points, order, write, read) &&
+                    can_prove_never_meet(points, order, read, write);
+           });
+  };
+  // The first point runs earlier in the order `before`, which the outermost variable in which the
+  // points differ decides: `earlier`. It runs later in the order `after`, where `later` decides.
+  for (size_t earlier = 0; earlier < before.size(); ++earlier) {
+    for (size_t later = 0; later < after.size(); ++later) {
+      PointOrder order{names_after(before, earlier), {before[earlier]}, {after[later]}};
+      order.same.merge(names_after(after, later));
+      const bool is_pair =
+          !order.same.contains(before[earlier]) && !order.same.contains(after[later]);
+      if (is_pair && before[earlier] != after[later] && !never_meet(order)) return false;
+    }
+  }
+  return true;
 }
 
 bool can_prove_commutative(const FuncContents& f, const Definition& update) {

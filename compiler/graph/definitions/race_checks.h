@@ -3,6 +3,8 @@
 #pragma once
 
 #include <string>
+#include <unordered_set>
+#include <vector>
 
 #include "graph/function.h"
 
@@ -10,8 +12,21 @@ namespace retrograde::graph {
 
 // Whether iterations of `rvar` access different elements, so that they may run concurrently: no
 // iteration writes what an iteration with another value of `rvar` reads or writes, for any values
-// of the other variables (analysis/never_meet.h). False means unknown.
-bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar);
+// of the other variables (analysis/never_meet.h). Variables in `around` belong to loops around it:
+// only iterations that agree in them are compared. False means unknown.
+//
+//   u(r.x, r.t) = u(r.x - 1, r.t - 1) + u(r.x + 1, r.t - 1)     r.x: not race free, since (x, t) reads what
+//                                                               (x + 1, t - 1) writes; inside of a loop over
+//                                                               r.t: race free
+bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar,
+                         const std::unordered_set<std::string>& around = {});
+
+// Whether loops over the reduction variables in the order `after`, instead of `before`, run every two
+// iterations that access one element in the same order, if one of them writes it. Both lists hold all
+// reduction variables, innermost first. False means unknown.
+bool can_prove_same_order(const FuncContents& f, const Definition& update,
+                          const std::vector<std::string>& before,
+                          const std::vector<std::string>& after);
 
 // Whether all points of the update commute: it is f(same point) op e with an operator that is
 // proven associative and commutative, for ties too. Floats are included, although reordering

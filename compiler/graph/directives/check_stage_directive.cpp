@@ -192,7 +192,7 @@ void check(FuseLoops& fuse, const SchedulePlace& at) {
   if (inner == outer)
     user_error(asked, "it takes two loops", "both are " + quoted(fuse.inner), "Name two loops");
   if (fuse.fused != fuse.outer) check_new_loop(at, fuse.fused, fuse.inner, asked);
-  check_fused_race(at, at.schedule().dims[inner], at.schedule().dims[outer], asked);
+  check_fused_race(at, inner, outer, asked);
   if (outer == inner + 1) return;
   std::vector<Dim> dims = at.schedule().dims;
   const auto from = dims.begin() + static_cast<std::ptrdiff_t>(outer);
@@ -237,7 +237,7 @@ void check(RunLoop& run, const SchedulePlace& at) {
                "Let another Func read it, and schedule that one");
   }
   if (runs_at_once(run.kind) || run.kind == ForType::Vectorized)
-    check_race_free(at, run.loop, run.kind == ForType::Vectorized, asked);
+    check_race_free(at, run.loop, run.kind, asked);
 }
 
 void check(PartitionLoop& partition, const SchedulePlace& at) {
