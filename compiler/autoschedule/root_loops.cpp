@@ -15,6 +15,7 @@
 #include "autoschedule/packed_operand.h"
 #include "autoschedule/reduction_chunks.h"
 #include "autoschedule/row_copies.h"
+#include "autoschedule/row_reductions.h"
 #include "autoschedule/scatter_schedule.h"
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
@@ -31,15 +32,6 @@ namespace {
 
 constexpr int scan_vectors = 8;      // of a row, in a block of columns
 constexpr int64_t small_shift = 16;  // values of a dimension, such as the taps of a filter
-
-// The dimension along which what is read lies next to each other in memory.
-size_t innermost_dimension(const Call& call) {
-  const FuncPtr callee = call.call_type == CallType::Func ? func_of(call) : nullptr;
-  if (!callee || callee->schedule.storage_dims.empty()) return 0;
-  const auto& args = callee->args;
-  const auto found = std::find(args.begin(), args.end(), callee->schedule.storage_dims[0]);
-  return static_cast<size_t>(found - args.begin()) % args.size();
-}
 
 // A dimension beyond the first that runs along the rows of what a pure stage reads, through what is
 // computed inline too, while the first one runs across them.
@@ -98,14 +90,16 @@ class LoopChooser {
     else if (may_scatter)
       unroll_taps(definition(), stage_);
     if (const FuncPtr block = block_of(definition())) return give_blocks(block);
-    if (pure_.empty()) return;
+    const auto row = scatters ? std::nullopt : row_to_reduce();
+    if (pure_.empty()) return row ? reduce_along_rows(function_, index_, *row) : void();
     const bool stages = makes(Decision::LayoutStaging);
     if (auto d = stages && pure_[0] == 0 ? transposed_dimension(f_, definition()) : std::nullopt)
       return tile(*d);
     if (stages && !scatters && schedule_look_ups(f_, index_, stage_, lanes_of_values(), sizes_))
       return;
     const bool may_be_tile = !scatters && !point_number(definition()) && pure_[0] == 0;
-    if (may_be_tile && tile_in_registers()) return;
+    if (may_be_tile && tile_in_registers(row.has_value())) return;
+    if (row) return reduce_rows(*row);
     if (pure_[0] == 0 && scans_rows()) return cut_scan();
     make_tasks();
     if (pure_[0] != 0) return;
@@ -152,13 +146,13 @@ class LoopChooser {
   }
 
   // The outermost loop, and those inside of it while their iterations are few; not that of the
-  // vectors. How many private parts there are may be known at run time only: few, where the target
-  // is large.
-  void make_tasks() {
+  // vectors, if elements are their lanes. How many private parts there are may be known at run time
+  // only: few, where the target is large.
+  void make_tasks(bool elements_are_lanes = true) {
     const int64_t unknown = f_.made && f_.made->has_parts ? 1 : sizes_.machine().enough_tasks;
     int64_t tasks = 1;
-    for (size_t i = pure_.size();
-         i-- > 0 && tasks < sizes_.machine().enough_tasks && pure_[i] != 0;) {
+    for (size_t i = pure_.size(); i-- > 0 && tasks < sizes_.machine().enough_tasks;) {
+      if (pure_[i] == 0 && elements_are_lanes) break;
       stage_.parallel(variable_of(pure_[i]));
       tasks *= sizes_.extent(f_, pure_[i]).value_or(unknown);
     }
@@ -192,14 +186,26 @@ class LoopChooser {
     make_tasks();
   }
 
-  // Whether there is a tile.
-  bool tile_in_registers() {
+  std::optional<RowReduction> row_to_reduce() const {
+    if (index_ == 0 || !makes(Decision::LayoutStaging)) return std::nullopt;
+    return row_reduction(f_, definition(), lanes_of_values(), request_.unit, sizes_);
+  }
+
+  // Rows are the tasks.
+  void reduce_rows(const RowReduction& row) {
+    reduce_along_rows(function_, index_, row);
+    if (!row.is_short) make_tasks(false);
+  }
+
+  // Whether there is a tile. `in_rows`: the reduction can run along rows, as a tile that reads across them would not.
+  bool tile_in_registers(bool in_rows) {
     const auto tile = tile_of(f_, definition());
     if (!tile) return false;
     const auto packed = makes(Decision::LayoutStaging)
                             ? packed_operand(f_, definition(), *tile, lanes, sizes_)
                             : std::nullopt;
     const auto rows = packed ? std::nullopt : copied_rows(*tile);
+    if (in_rows && !packed && !rows) return false;
     std::vector<VarOrRVar> loops = cut(*tile, {}, packed || rows);
     if (packed) loops = pack_inside(*packed, loops);
     if (rows) copy_rows_inside(*rows, loops);

@@ -11,6 +11,7 @@ retrograde_test(
   epilogues_test
   forward_schedules_test
   memory_budget_test
+  row_reductions_test
   row_sweeps_test
   schedule_search_test
   sum_blocks_test
