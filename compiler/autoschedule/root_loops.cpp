@@ -9,6 +9,7 @@
 
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/inlined_reads.h"
+#include "autoschedule/long_sums.h"
 #include "autoschedule/look_ups.h"
 #include "autoschedule/loop_order.h"
 #include "autoschedule/new_loop.h"
@@ -101,6 +102,7 @@ class LoopChooser {
     if (may_be_tile && tile_in_registers(row.has_value())) return;
     if (row) return reduce_rows(*row);
     if (pure_[0] == 0 && scans_rows()) return cut_scan();
+    if (may_be_tile && sums_in_blocks()) return;
     make_tasks();
     if (pure_[0] != 0) return;
     vectorize(stage_, variable_of(0), lanes_of_values(), TailStrategy::GuardWithIf);
@@ -156,6 +158,24 @@ class LoopChooser {
       stage_.parallel(variable_of(pure_[i]));
       tasks *= sizes_.extent(f_, pure_[i]).value_or(unknown);
     }
+  }
+
+  // Whether the update is a long sum of floats that the user wrote: vectors of elements add its terms in blocks.
+  bool sums_in_blocks() {
+    if (f_.made || !makes(Decision::CutReductions)) return false;
+    const std::vector<ReductionVariable> loops = reduction_loops(f_, definition());
+    if (!is_long_sum(f_, definition(), loops)) return false;
+    const Var x = variable_of(0), lane = inside(x);
+    std::vector<VarOrRVar> order{lane};
+    for (const ReductionVariable& r : loops) order.push_back(RVar(r.var));
+    for (const size_t d : pure_) order.push_back(variable_of(d));
+    stage_.split(x, x, lane, lanes_of_values(), TailStrategy::GuardWithIf)
+        .reorder(order)
+        .vectorize(lane);
+    add_in_blocks(function_, index_, loops, 1);
+    make_tasks();
+    if (pure_.size() == 1) stage_.parallel(x);  // the vectors
+    return true;
   }
 
   // Whether an update takes elements of other rows that it has made before.

@@ -4,12 +4,12 @@
 #include <cmath>
 #include <cstdlib>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "analysis/linear.h"
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/inlined_reads.h"
+#include "autoschedule/long_sums.h"
 #include "autoschedule/loop_order.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/read_estimate.h"
@@ -18,7 +18,6 @@
 #include "frontend/schedule/loop_level.h"
 #include "graph/definitions/associative_update.h"
 #include "graph/definitions/own_reads.h"
-#include "graph/names.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 #include "ir/memory_reads.h"
@@ -39,7 +38,6 @@ constexpr double as_good = 1.05;         // of the cycles: fewer lanes are prefe
 constexpr double worth_threads = 20000;  // cycles
 constexpr double unknown_extent = 1024;
 constexpr int most_vectors = 4;         // of a row
-constexpr int64_t block_of_sum = 256;  // terms of a lane
 
 double extent_of(const ReductionVariable& r) {
   const auto extent = as_const_int(simplify(r.extent));
@@ -182,50 +180,6 @@ double elements_of(const FuncContents& f, const Definition& update, const SizeEs
   return elements;
 }
 
-bool rounds(const FuncContents& f, const Definition& update) {
-  const Kind kind = without_lets(update.values[0]).kind();
-  return f.types[0].is_float() && f.types[0].bits() < 64 && (kind == Kind::Add || kind == Kind::Sub);
-}
-
-// Cuts the loops of a long sum so that a lane adds few terms in those that stay inside. `loops`: of the reduction,
-// innermost first; the first is in vectors of `lanes`. The result: the loops over blocks, innermost first.
-std::vector<RVar> cut_into_blocks(const FuncContents& f, int index, Stage& stage,
-                                  const std::vector<ReductionVariable>& loops, int lanes) {
-  std::vector<RVar> blocks;
-  int64_t terms = 1;
-  for (const ReductionVariable& r : loops) {
-    const auto extent = as_const_int(simplify(r.extent));
-    const int64_t all = extent.value_or(INT32_MAX);
-    const int64_t iterations = &r == &loops[0] ? (all + lanes - 1) / lanes : all;
-    if (blocks.empty() && terms * iterations <= block_of_sum) {
-      terms *= std::max<int64_t>(iterations, 1);
-      continue;
-    }
-    RVar block(r.var);
-    const int64_t inside = blocks.empty() ? block_of_sum / terms : 1;
-    if (inside > 1) {
-      block = RVar(new_loop(f, index, "block"));
-      stage.split(RVar(r.var), block, RVar(r.var), static_cast<int>(inside),
-                  TailStrategy::GuardWithIf);
-    }
-    blocks.push_back(block);
-  }
-  return blocks;
-}
-
-// The sums of the blocks, in registers.
-void factor_blocks(const FuncPtr& f, int index, const std::vector<RVar>& blocks,
-                   const std::string& lane) {
-  std::vector<std::pair<RVar, Var>> preserved;
-  for (const RVar& block : blocks) {
-    const std::string name = graph::without_numbers(block.name());
-    preserved.emplace_back(block, Var(new_loop(*f, index, name.substr(name.rfind('.') + 1) + "s")));
-  }
-  Func sums = Stage(f, index).rfactor(preserved);
-  sums.compute_at(retrograde::LoopLevel(Func(f), blocks[0], index));
-  sums.update().allow_race_conditions().vectorize(RVar(lane));
-}
-
 // The values of each lane of a Tuple, in registers, and then those of all of them.
 void factor_lanes(const FuncPtr& f, int index, const RVar& lane, int lanes) {
   const Var u(new_loop(*f, index, "lanes"));
@@ -273,12 +227,9 @@ void reduce_along_rows(const FuncPtr& f, int index, const RowReduction& row) {
   }
   stage.reorder(order);
   if (f->types.size() > 1) return factor_lanes(f, index, lane, row.lanes);
-  std::vector<RVar> blocks;
-  if (rounds(*f, f->stage(index))) blocks = cut_into_blocks(*f, index, stage, loops, row.lanes);
-  if (blocks.empty())
-    stage.allow_race_conditions().vectorize(lane);
-  else
-    factor_blocks(f, index, blocks, lane.name());
+  stage.allow_race_conditions().vectorize(lane);
+  if (is_long_sum(*f, f->stage(index), loops, row.lanes))
+    add_in_blocks(f, index, loops, row.lanes);
 }
 
 }  // namespace retrograde::autoschedule
