@@ -38,6 +38,14 @@ bool is_long(const std::vector<ReductionVariable>& loops, int lanes) {
   return false;
 }
 
+// Whether iterations of the reduction write different elements.
+bool moves(const Definition& update) {
+  return std::ranges::any_of(update.args, [&](const Expr& arg) {
+    return std::ranges::any_of(
+        update.rvars, [&](const ReductionVariable& r) { return uses_variable(arg, r.var); });
+  });
+}
+
 // The loops over blocks, innermost first.
 std::vector<RVar> cut(const FuncContents& f, int index, Stage& stage,
                       const std::vector<ReductionVariable>& loops, int lanes) {
@@ -66,7 +74,7 @@ std::vector<RVar> cut(const FuncContents& f, int index, Stage& stage,
 bool is_long_sum(const FuncContents& f, const Definition& update,
                  const std::vector<ReductionVariable>& loops, int lanes) {
   if (update.values.size() != 1 || !f.types[0].is_float() || f.types[0].bits() >= 64 ||
-      !is_long(loops, lanes))
+      !is_long(loops, lanes) || moves(update))
     return false;
   const Expr value = without_lets(update.values[0]);
   if (value.kind() != Kind::Add && value.kind() != Kind::Sub) return false;
