@@ -28,16 +28,16 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr double a_cycle = 2;            // loads, and operations
-constexpr double gathered = 2;           // loads that a lane takes: it is inserted, too
-constexpr double latency = 4;            // cycles from one operation of a partial result to the next
-constexpr double of_an_end = 16;         // cycles that combine the lanes of a partial result
-constexpr double of_a_tuple = 5;         // cycles that combine one lane with the others
-constexpr double worth_while = 0.7;      // of the cycles of vectors of elements
-constexpr double as_good = 1.05;         // of the cycles: fewer lanes are preferred
+constexpr double a_cycle = 2;       // loads, and operations
+constexpr double gathered = 2;      // loads that a lane takes: it is inserted, too
+constexpr double add_latency = 4;   // cycles from one operation of a partial result to the next
+constexpr double of_an_end = 16;    // cycles that combine the lanes of a partial result
+constexpr double of_a_tuple = 5;    // cycles that combine one lane with the others
+constexpr double worth_rows = 0.7;  // of the cycles of vectors of elements
+constexpr double as_good = 1.05;    // of the cycles: fewer lanes are preferred
 constexpr double worth_threads = 20000;  // cycles
 constexpr double unknown_extent = 1024;
-constexpr int most_vectors = 4;         // of a row
+constexpr int most_vectors = 4;  // of a row
 
 double extent_of(const ReductionVariable& r) {
   const auto extent = as_const_int(simplify(r.extent));
@@ -47,26 +47,30 @@ double extent_of(const ReductionVariable& r) {
 // Whether each element is a reduction by itself.
 bool stays_in_place(const FuncContents& f, const Definition& update) {
   const auto moves = [&](const Expr& e) {
-    return std::ranges::any_of(
-        update.rvars, [&](const ReductionVariable& r) { return uses_variable(e, r.var); });
+    return std::ranges::any_of(update.rvars,
+                               [&](const ReductionVariable& r) { return uses_variable(e, r.var); });
   };
   return !update.rvars.empty() && !point_number(update) &&
          std::ranges::none_of(update.args, moves) &&
          !(update.predicate.defined() && calls(update.predicate, &f));
 }
 
-// Whether the update is f = f op e, for an operation whose lanes lowering combines.
+// Whether the update is f = f op e op ..., for an operation whose lanes lowering combines.
 bool is_plain_reduction(const FuncContents& f, const Definition& update) {
   if (update.values.size() != 1) return false;
-  const Expr value = without_lets(update.values[0]);
-  const Kind kind = value.kind();
-  const bool is_difference = kind == Kind::Sub;
-  if (kind != Kind::Add && kind != Kind::Mul && kind != Kind::Min && kind != Kind::Max &&
-      !is_difference)
+  Expr value = without_lets(update.values[0]);
+  const auto kind_of = [](const Expr& e) { return e.kind() == Kind::Sub ? Kind::Add : e.kind(); };
+  const Kind kind = kind_of(value);
+  if (kind != Kind::Add && kind != Kind::Mul && kind != Kind::Min && kind != Kind::Max)
     return false;
-  const auto* n = value.as<Binary>();
-  return (is_old_value(n->a, f, update) && !calls(n->b, &f)) ||
-         (is_old_value(n->b, f, update) && !calls(n->a, &f) && !is_difference);
+  while (!is_old_value(value, f, update)) {
+    if (kind_of(value) != kind) return false;
+    const auto* n = value.as<Binary>();
+    const bool in_a = calls(n->a, &f);
+    if (in_a == calls(n->b, &f) || (!in_a && n->kind == Kind::Sub)) return false;
+    value = Expr(in_a ? n->a : n->b);
+  }
+  return true;
 }
 
 // Whether the values of a Tuple may be combined in any order, as an extreme with its place are.
@@ -144,8 +148,9 @@ class RowCosts {
 
   double of_elements() const {
     if (f_.args.empty() || !is_pure_position(f_, update_, 0))
-      return terms_ * std::max(latency, iteration_.cycles("", 1, 1));
-    const double a_vector = std::max(latency, iteration_.cycles(f_.args[0], lanes_, registers_));
+      return terms_ * std::max(add_latency, iteration_.cycles("", 1, 1));
+    const double a_vector =
+        std::max(add_latency, iteration_.cycles(f_.args[0], lanes_, registers_));
     const double extent = static_cast<double>(sizes_.extent(f_, 0).value_or(lanes_));
     return terms_ * a_vector / std::clamp<double>(extent, 1, lanes_);
   }
@@ -153,7 +158,7 @@ class RowCosts {
   double of_row(const ReductionVariable& r, int vectors, bool is_tuple) const {
     const double extent = std::max(extent_of(r), 1.0);
     const double a_vector = std::max(
-        latency, iteration_.cycles(r.var, lanes_, registers_) * static_cast<double>(vectors));
+        add_latency, iteration_.cycles(r.var, lanes_, registers_) * static_cast<double>(vectors));
     const double steps = std::ceil(extent / (static_cast<double>(lanes_) * vectors));
     const double end = is_tuple ? of_a_tuple * lanes_ * vectors : of_an_end + registers_ * vectors;
     return terms_ / extent * steps * a_vector + end;
@@ -200,7 +205,7 @@ std::optional<RowReduction> row_reduction(const FuncContents& f, const Definitio
   const RowCosts costs(f, update, lanes, unit, sizes);
   const double elements = elements_of(f, update, sizes);
   std::optional<RowReduction> best;
-  double least = costs.of_elements() * worth_while * as_good;
+  double least = costs.of_elements() * worth_rows * as_good;
   for (const ReductionVariable& r : update.rvars) {
     for (int vectors = 1; vectors <= most_vectors; vectors *= 2) {
       if (extent_of(r) < lanes * vectors) break;
@@ -210,13 +215,15 @@ std::optional<RowReduction> row_reduction(const FuncContents& f, const Definitio
       best = RowReduction{r.var, lanes * vectors, cycles * elements < worth_threads};
     }
   }
-  const bool is_legal = best && (is_tuple ? is_reduction_of_tuples(f, update) : is_plain_reduction(f, update));
+  const bool is_legal =
+      best && (is_tuple ? is_reduction_of_tuples(f, update) : is_plain_reduction(f, update));
   return is_legal ? best : std::nullopt;
 }
 
 void reduce_along_rows(const FuncPtr& f, int index, const RowReduction& row) {
   std::vector<ReductionVariable> loops = reduction_loops(*f, f->stage(index));
-  std::ranges::stable_partition(loops, [&](const ReductionVariable& r) { return r.var == row.loop; });
+  std::ranges::stable_partition(loops,
+                                [&](const ReductionVariable& r) { return r.var == row.loop; });
   const RVar all(row.loop), lane(inner_loop(*f, index, row.loop));
   Stage stage(f, index);
   stage.split(all, all, lane, row.lanes, TailStrategy::GuardWithIf);
@@ -228,8 +235,7 @@ void reduce_along_rows(const FuncPtr& f, int index, const RowReduction& row) {
   stage.reorder(order);
   if (f->types.size() > 1) return factor_lanes(f, index, lane, row.lanes);
   stage.allow_race_conditions().vectorize(lane);
-  if (is_long_sum(*f, f->stage(index), loops, row.lanes))
-    add_in_blocks(f, index, loops, row.lanes);
+  if (is_long_sum(*f, f->stage(index), loops, row.lanes)) add_in_blocks(f, index, loops, row.lanes);
 }
 
 }  // namespace retrograde::autoschedule

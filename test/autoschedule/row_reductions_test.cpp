@@ -178,7 +178,8 @@ TEST(RowReductions, AreNotMadeWithoutLayoutStaging) {
 struct Extremes {
   Extremes(bool is_largest, bool is_old_first) {
     in = Buffer<float>(width, rows);
-    in.get()->for_each_value([&, n = 0](float& v) mutable { v = static_cast<float>(n++ * 7 % 11); });
+    in.get()->for_each_value(
+        [&, n = 0](float& v) mutable { v = static_cast<float>(n++ * 7 % 11); });
     const RDom r(0, width, "r");
     const RDom row(0, rows, "row");
     Func extreme("extreme");
@@ -190,7 +191,7 @@ struct Extremes {
     loss() += extreme(row) * cast<float>(row + 1);
     gradient = propagate_adjoints(loss)(in);
   }
-  static constexpr int width = 100;
+  static constexpr int width = 1000;
   Buffer<float> in;
   Func loss{"loss"}, gradient;
 };
@@ -204,7 +205,8 @@ TEST(RowReductions, FindTheFirstOrLastOfEqualExtremes) {
       const oracle::Array expected =
           gradient::evaluate(program.gradient, {{0, 0}, {Extremes::width, rows}});
       found.for_each_element([&](const int* at) {
-        EXPECT_EQ(found(at), expected.at({at[0], at[1]}).scalar.as_double()) << at[0] << ", " << at[1];
+        EXPECT_EQ(found(at), expected.at({at[0], at[1]}).scalar.as_double())
+            << at[0] << ", " << at[1];
       });
     }
   }
@@ -215,6 +217,44 @@ TEST(RowReductions, FindThePlacesOfExtremesInLanes) {
   pipeline.auto_schedule(get_host_target());
   const ScheduleLog log = pipeline.schedule_log();
   EXPECT_TRUE(any_directive<graph::FactorOut>(log)) << log.to_text();
+}
+
+// ---- the backward pass ----
+
+// The mean cross entropy of rows of logits.
+struct CrossEntropy {
+  CrossEntropy() {
+    logits = matrix(classes);
+    labels = Buffer<int>(rows);
+    labels.get()->for_each_value([&, n = 0](int& v) mutable { v = n++ * 7 % classes; });
+    const RDom r(0, classes, "r"), row(0, rows, "row");
+    Func largest("largest"), total("total");
+    largest(y) = maximum(logits(r, y));
+    total(y) = 0.0f;
+    total(y) += exp(logits(r, y) - largest(y));
+    loss() = 0.0f;
+    loss() += log(total(row)) + largest(row) - logits(clamp(labels(row), 0, classes - 1), row);
+  }
+  static constexpr int classes = 100;
+  Buffer<float> logits;
+  Buffer<int> labels;
+  Func loss{"loss"};
+};
+
+// Each element of a row compares its place with the label: nothing scatters, and nothing is summed in double.
+TEST(RowReductions, SelectTheElementOfARowThatDataDecide) {
+  const CrossEntropy program;
+  const Func gradient = propagate_adjoints(program.loss)(program.logits);
+  EXPECT_TRUE(gradient.function()->is_pure());
+  const Buffer<float> found = Pipeline(gradient).realize({CrossEntropy::classes, rows});
+  const oracle::Array expected =
+      gradient::evaluate(gradient, {{0, 0}, {CrossEntropy::classes, rows}});
+  found.for_each_element([&](const int* at) {
+    EXPECT_NEAR(found(at), expected.at({at[0], at[1]}).scalar.as_double(), 1e-6);
+  });
+  Buffer<float> logits = program.logits;
+  for (const std::vector<int>& at : std::vector<std::vector<int>>{{0, 0}, {7, 1}, {8, 1}, {14, 2}})
+    EXPECT_NEAR(found(at[0], at[1]), gradient::difference(program.loss, logits, at), 1e-3);
 }
 
 }  // namespace

@@ -89,7 +89,8 @@ class SelectionFinder {
     int64_t iterations = 1;
     for (const ReductionVariable& r : definition_.rvars) {
       const int64_t extent = as_const_int(r.extent).value_or(many_iterations);
-      iterations = std::min(many_iterations, iterations * std::clamp<int64_t>(extent, 1, many_iterations));
+      iterations =
+          std::min(many_iterations, iterations * std::clamp<int64_t>(extent, 1, many_iterations));
     }
     return iterations >= many_iterations;
   }
