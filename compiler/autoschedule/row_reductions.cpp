@@ -155,14 +155,15 @@ class RowCosts {
     return terms_ * a_vector / std::clamp<double>(extent, 1, lanes_);
   }
 
-  double of_row(const ReductionVariable& r, int vectors, bool is_tuple) const {
-    const double extent = std::max(extent_of(r), 1.0);
-    const double a_vector = std::max(
-        add_latency, iteration_.cycles(r.var, lanes_, registers_) * static_cast<double>(vectors));
-    const double steps = std::ceil(extent / (static_cast<double>(lanes_) * vectors));
-    const double end = is_tuple ? of_a_tuple * lanes_ * vectors : of_an_end + registers_ * vectors;
-    return terms_ / extent * steps * a_vector + end;
+  double of_row(const ReductionVariable& r, int lanes, bool is_tuple) const {
+    const double extent = std::max(extent_of(r), 1.0), registers = registers_ * lanes / lanes_;
+    const double a_vector = std::max(add_latency, iteration_.cycles(r.var, lanes, registers));
+    const double end = is_tuple ? of_a_tuple * lanes : of_an_end + registers;
+    return terms_ / extent * std::ceil(extent / lanes) * a_vector + end;
   }
+
+  // Lanes of one register.
+  int least_lanes() const { return std::max(static_cast<int>(lanes_ / registers_), 1); }
 
  private:
   const FuncContents& f_;
@@ -207,12 +208,11 @@ std::optional<RowReduction> row_reduction(const FuncContents& f, const Definitio
   std::optional<RowReduction> best;
   double least = costs.of_elements() * worth_rows * as_good;
   for (const ReductionVariable& r : update.rvars) {
-    for (int vectors = 1; vectors <= most_vectors; vectors *= 2) {
-      if (extent_of(r) < lanes * vectors) break;
-      const double cycles = costs.of_row(r, vectors, is_tuple);
+    for (int n = costs.least_lanes(); n <= most_vectors * lanes && n <= extent_of(r); n *= 2) {
+      const double cycles = costs.of_row(r, n, is_tuple);
       if (cycles * as_good >= least) continue;
       least = cycles;
-      best = RowReduction{r.var, lanes * vectors, cycles * elements < worth_threads};
+      best = RowReduction{r.var, n, cycles * elements < worth_threads};
     }
   }
   const bool is_legal =
