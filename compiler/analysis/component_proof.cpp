@@ -1,5 +1,6 @@
 #include "analysis/component_proof.h"
 
+#include <algorithm>
 #include <functional>
 
 #include "analysis/associativity_laws.h"
@@ -298,19 +299,43 @@ std::optional<Accepted> prove(const Component& c, const Candidate& candidate) {
 
 }  // namespace
 
+namespace {
+
+// Whether the update compares several of its values, as one that decides equal extremes by their places.
+bool decides_ties(const Component& c) {
+  std::vector<bool> compared(c.size());
+  for (const Expr& value : c.update) {
+    walk(value, [&](const Expr& e) {
+      const Binary* b = e.as<Binary>();
+      const bool compares = b && (e.as<LT>() || e.as<GT>() || e.as<LE>() || e.as<GE>());
+      for (size_t i = 0; compares && i < c.size(); ++i)
+        compared[i] = compared[i] || uses_variable(e, c.xs[i]);
+      return true;
+    });
+  }
+  return std::ranges::count(compared, true) > 1;
+}
+
+}  // namespace
+
 std::optional<Accepted> prove(const Component& c) {
   std::vector<Candidate> candidates;
   if (c.size() == 1) add_single_operators(c, candidates);
   if (c.size() > 1) add_extremes(c, candidates);
+  std::optional<Accepted> first;
   for (const Candidate& candidate : candidates) {
-    if (auto accepted = prove(c, candidate)) return accepted;
+    auto accepted = prove(c, candidate);
+    if (!accepted) continue;
+    if (!accepted->breaks_ties || !decides_ties(c)) return accepted;
+    if (!first) first = std::move(accepted);
   }
   candidates.clear();
   if (c.size() > 1) add_all_identities(c, candidates);
   for (const Candidate& candidate : candidates) {
-    if (auto accepted = prove(c, candidate)) return accepted;
+    auto accepted = prove(c, candidate);
+    if (accepted && (!first || !accepted->breaks_ties)) return accepted;
   }
-  return {};
+  return first;
 }
 
 }  // namespace retrograde::analysis

@@ -50,6 +50,14 @@ std::vector<ReductionVariable> reduction_loops(const FuncContents& f, const Defi
   return loops;
 }
 
+size_t innermost_dimension(const Call& call) {
+  const FuncPtr callee = call.call_type == CallType::Func ? func_of(call) : nullptr;
+  if (!callee || callee->schedule.storage_dims.empty()) return 0;
+  const auto& args = callee->args;
+  const auto found = std::find(args.begin(), args.end(), callee->schedule.storage_dims[0]);
+  return static_cast<size_t>(found - args.begin()) % args.size();
+}
+
 bool shifts_reads(const FuncContents& f, const Definition& update, size_t dimension) {
   const std::string& var = f.args[dimension];
   bool shifts = false;

@@ -9,12 +9,14 @@
 
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/inlined_reads.h"
+#include "autoschedule/long_sums.h"
 #include "autoschedule/look_ups.h"
 #include "autoschedule/loop_order.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/packed_operand.h"
 #include "autoschedule/reduction_chunks.h"
 #include "autoschedule/row_copies.h"
+#include "autoschedule/row_reductions.h"
 #include "autoschedule/scatter_schedule.h"
 #include "autoschedule/short_rows.h"
 #include "autoschedule/step_loops.h"
@@ -33,15 +35,6 @@ namespace {
 
 constexpr int scan_vectors = 8;      // of a row, in a block of columns
 constexpr int64_t small_shift = 16;  // values of a dimension, such as the taps of a filter
-
-// The dimension along which what is read lies next to each other in memory.
-size_t innermost_dimension(const Call& call) {
-  const FuncPtr callee = call.call_type == CallType::Func ? func_of(call) : nullptr;
-  if (!callee || callee->schedule.storage_dims.empty()) return 0;
-  const auto& args = callee->args;
-  const auto found = std::find(args.begin(), args.end(), callee->schedule.storage_dims[0]);
-  return static_cast<size_t>(found - args.begin()) % args.size();
-}
 
 // A dimension beyond the first that runs along the rows of what a pure stage reads, through what is
 // computed inline too, while the first one runs across them.
@@ -103,7 +96,8 @@ class LoopChooser {
     const bool has_pure_rows = !pure_.empty() && pure_[0] == 0;
     if (!scatters && !has_pure_rows && schedule_steps(function_, index_, lanes_of_values(), sizes_))
       return;
-    if (pure_.empty()) return;
+    const auto row = scatters ? std::nullopt : row_to_reduce();
+    if (pure_.empty()) return row ? reduce_along_rows(function_, index_, *row) : void();
     const bool stages = makes(Decision::LayoutStaging);
     if (auto d = stages && pure_[0] == 0 ? transposed_dimension(f_, definition()) : std::nullopt)
       return tile(*d);
@@ -111,8 +105,10 @@ class LoopChooser {
       return;
     if (stages && schedule_short_rows(f_, index_, stage_, lanes_of_values(), sizes_)) return;
     const bool may_be_tile = !scatters && !point_number(definition()) && pure_[0] == 0;
-    if (may_be_tile && tile_in_registers()) return;
+    if (may_be_tile && tile_in_registers(row.has_value())) return;
+    if (row) return reduce_rows(*row);
     if (pure_[0] == 0 && scans_rows()) return cut_scan();
+    if (may_be_tile && sums_in_blocks()) return;
     make_tasks();
     if (pure_[0] != 0) return;
     vectorize(stage_, variable_of(0), lanes_of_values(), TailStrategy::GuardWithIf);
@@ -158,16 +154,34 @@ class LoopChooser {
   }
 
   // The outermost loop, and those inside of it while their iterations are few; not that of the
-  // vectors. How many private parts there are may be known at run time only: few, where the target
-  // is large.
-  void make_tasks() {
+  // vectors, if elements are their lanes. How many private parts there are may be known at run time
+  // only: few, where the target is large.
+  void make_tasks(bool elements_are_lanes = true) {
     const int64_t unknown = f_.made && f_.made->has_parts ? 1 : sizes_.machine().enough_tasks;
     int64_t tasks = 1;
-    for (size_t i = pure_.size();
-         i-- > 0 && tasks < sizes_.machine().enough_tasks && pure_[i] != 0;) {
+    for (size_t i = pure_.size(); i-- > 0 && tasks < sizes_.machine().enough_tasks;) {
+      if (pure_[i] == 0 && elements_are_lanes) break;
       stage_.parallel(variable_of(pure_[i]));
       tasks *= sizes_.extent(f_, pure_[i]).value_or(unknown);
     }
+  }
+
+  // Whether the update is a long sum of floats that the user wrote: vectors of elements add its terms in blocks.
+  bool sums_in_blocks() {
+    if (f_.made || !makes(Decision::CutReductions)) return false;
+    const std::vector<ReductionVariable> loops = reduction_loops(f_, definition());
+    if (!is_long_sum(f_, definition(), loops)) return false;
+    const Var x = variable_of(0), lane = inside(x);
+    std::vector<VarOrRVar> order{lane};
+    for (const ReductionVariable& r : loops) order.push_back(RVar(r.var));
+    for (const size_t d : pure_) order.push_back(variable_of(d));
+    stage_.split(x, x, lane, lanes_of_values(), TailStrategy::GuardWithIf)
+        .reorder(order)
+        .vectorize(lane);
+    add_in_blocks(function_, index_, loops, 1);
+    make_tasks();
+    if (pure_.size() == 1) stage_.parallel(x);  // the vectors
+    return true;
   }
 
   // Whether an update takes elements of other rows that it has made before.
@@ -198,14 +212,26 @@ class LoopChooser {
     make_tasks();
   }
 
-  // Whether there is a tile.
-  bool tile_in_registers() {
+  std::optional<RowReduction> row_to_reduce() const {
+    if (index_ == 0 || !makes(Decision::LayoutStaging)) return std::nullopt;
+    return row_reduction(f_, definition(), lanes_of_values(), request_.unit, sizes_);
+  }
+
+  // Rows are the tasks.
+  void reduce_rows(const RowReduction& row) {
+    reduce_along_rows(function_, index_, row);
+    if (!row.is_short) make_tasks(false);
+  }
+
+  // Whether there is a tile. `in_rows`: the reduction can run along rows, as a tile that reads across them would not.
+  bool tile_in_registers(bool in_rows) {
     const auto tile = tile_of(f_, definition());
     if (!tile) return false;
     const auto packed = makes(Decision::LayoutStaging)
                             ? packed_operand(f_, definition(), *tile, lanes, sizes_)
                             : std::nullopt;
     const auto rows = packed ? std::nullopt : copied_rows(*tile);
+    if (in_rows && !packed && !rows) return false;
     std::vector<VarOrRVar> loops = cut(*tile, {}, packed || rows);
     if (packed) loops = pack_inside(*packed, loops);
     if (rows) copy_rows_inside(*rows, loops);

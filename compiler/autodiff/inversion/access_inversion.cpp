@@ -59,6 +59,7 @@ class Inverter {
     result.note = access_.note;
     std::vector<const GroupPiece*> chosen;
     multiply(groups, pieces, chosen, result);
+    if (std::ranges::none_of(result.gathers, &Gather::scatters)) result.note.clear();
     return result;
   }
 
@@ -103,13 +104,30 @@ class Inverter {
     note_circular(g.iteration);
     append(predicate, access_.residual);
     for (Expr& e : predicate) e = substitute(e, g.iteration);
+    const bool is_selected = extents.empty() && selects_in_row(g);
     for (size_t d = 0; d < g.lhs.size(); ++d) {
-      if (!access_.takes_part[d]) g.scatters = true;
+      if (!access_.takes_part[d] && !is_selected) g.scatters = true;
       g.lhs[d] = substitute(access_.takes_part[d] ? g.lhs[d] : query_.indices[d], g.iteration);
+    }
+    if (is_selected) {
+      const Expr element = variable(query_.target_args[0]);
+      predicate.push_back(element == g.lhs[0]);
+      g.lhs[0] = element;
+      g.pure[0] = true;
     }
     if (!predicate.empty()) g.predicate = conjunction(predicate);
     rename(g, extents);
     return g;
+  }
+
+  // Whether only the index along rows depends on data, as that of a label in rows of logits, while each row is read by
+  // one iteration at most. Then each element of a row asks whether it is the one that is read.
+  bool selects_in_row(const Gather& g) const {
+    if (g.lhs.size() < 2 || access_.takes_part[0]) return false;
+    for (size_t d = 1; d < g.lhs.size(); ++d) {
+      if (!access_.takes_part[d] || !g.pure[d]) return false;
+    }
+    return true;
   }
 
   // For f(x + s(x), x) isl may choose x = e0 - s(x), which is circular. Without parameters it chooses x = e1.

@@ -7,7 +7,9 @@
 // read one element y form the fibre over y. In it each stage variable is either determined, an expression of y, or
 // free: base(y) + stride * rho, with a new reduction variable rho. The extent of rho is the smallest constant, else a
 // parametric one; if the fibre is no box, a predicate restricts it. Data-dependent indices stay on the left-hand side.
-// There the adjoint scatters, serially within each element of the determined dimensions.
+// There the adjoint scatters, serially within each element of the determined dimensions. Exception: if the other indices
+// determine the whole iteration and only the index of dimension 0 depends on data, as in logits(label(i), i), the
+// predicate compares the element's own place with that index, and nothing scatters.
 #pragma once
 
 #include <algorithm>

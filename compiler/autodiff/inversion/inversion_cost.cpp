@@ -1,9 +1,11 @@
 #include "autodiff/inversion/inversion_cost.h"
 
+#include <algorithm>
 #include <optional>
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
+#include "ir/visit.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::autodiff {
@@ -20,9 +22,18 @@ std::optional<double> points_of(const IterationDomain& domain) {
   return points;
 }
 
+// Whether what a gather adds is the same along rows of the target, except that a predicate selects elements. Each element
+// is written once anyway, and compares its place in vectors.
+bool only_selects_in_row(const Gather& g, const AccessQuery& query) {
+  return !g.rdom && !g.pure.empty() && g.pure[0] &&
+         std::ranges::none_of(g.iteration, [&](const auto& entry) {
+           return uses_variable(entry.second, query.target_args[0]);
+         });
+}
+
 std::optional<double> iterations_of(const Gather& g, const AccessQuery& query) {
   double iterations = 1;
-  for (size_t d = 0; d < g.pure.size(); ++d) {
+  for (size_t d = only_selects_in_row(g, query) ? 1 : 0; d < g.pure.size(); ++d) {
     if (!g.pure[d]) continue;
     auto extent = d < query.region.size() ? constant_extent(query.region[d].range()) : std::nullopt;
     if (!extent) return std::nullopt;

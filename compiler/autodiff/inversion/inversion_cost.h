@@ -10,7 +10,7 @@ namespace retrograde::autodiff {
 
 // Returns the inversion of the query; or the scatter, with a note, if the gathers would run more than `dearer` times as
 // many iterations as the stage has points. A gather may cost several times the iterations, because it is parallel and
-// writes each element once. Extents that are not constant count as equal on both sides, so the gather stays.
+// writes each element once. Rows in which a predicate only selects the element that is read count as one iteration. Extents that are not constant count as equal on both sides, so the gather stays.
 constexpr double dearer = 32;
 // The budget of the search in isl operations; a million take about half a second. Clamps with run-time ends need 10,000
 // (a repeated edge) to 900,000 (three of them over sums of variables).

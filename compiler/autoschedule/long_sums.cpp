@@ -1,0 +1,99 @@
+#include "autoschedule/long_sums.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "autoschedule/new_loop.h"
+#include "frontend/language/func.h"
+#include "frontend/language/rdom.h"
+#include "frontend/schedule/loop_level.h"
+#include "frontend/schedule/stage.h"
+#include "graph/definitions/own_reads.h"
+#include "graph/names.h"
+#include "ir/build.h"
+#include "ir/lets.h"
+#include "ir/memory_reads.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::autoschedule {
+
+namespace {
+
+constexpr int64_t terms_of_block = 256;  // that a lane adds
+constexpr int64_t long_chain = 1024;     // terms of a lane from which blocks pay
+
+int64_t iterations_of(const ReductionVariable& r, int lanes) {
+  const int64_t extent = as_const_int(simplify(r.extent)).value_or(INT32_MAX);
+  return (extent + lanes - 1) / lanes;
+}
+
+bool is_long(const std::vector<ReductionVariable>& loops, int lanes) {
+  int64_t terms = 1;
+  for (const ReductionVariable& r : loops) {
+    terms *= std::max<int64_t>(iterations_of(r, &r == &loops[0] ? lanes : 1), 1);
+    if (terms > long_chain) return true;
+  }
+  return false;
+}
+
+// Whether iterations of the reduction write different elements.
+bool moves(const Definition& update) {
+  return std::ranges::any_of(update.args, [&](const Expr& arg) {
+    return std::ranges::any_of(
+        update.rvars, [&](const ReductionVariable& r) { return uses_variable(arg, r.var); });
+  });
+}
+
+// The loops over blocks, innermost first.
+std::vector<RVar> cut(const FuncContents& f, int index, Stage& stage,
+                      const std::vector<ReductionVariable>& loops, int lanes) {
+  std::vector<RVar> blocks;
+  int64_t terms = 1;  // of a block so far
+  for (const ReductionVariable& r : loops) {
+    const int64_t iterations = iterations_of(r, &r == &loops[0] ? lanes : 1);
+    if (blocks.empty() && terms * iterations <= terms_of_block) {
+      terms *= std::max<int64_t>(iterations, 1);
+      continue;
+    }
+    RVar block(r.var);
+    const int64_t inside = blocks.empty() ? terms_of_block / terms : 1;
+    if (inside > 1) {
+      block = RVar(new_loop(f, index, "block"));
+      stage.split(RVar(r.var), block, RVar(r.var), static_cast<int>(inside),
+                  TailStrategy::GuardWithIf);
+    }
+    blocks.push_back(block);
+  }
+  return blocks;
+}
+
+}  // namespace
+
+bool is_long_sum(const FuncContents& f, const Definition& update,
+                 const std::vector<ReductionVariable>& loops, int lanes) {
+  if (update.values.size() != 1 || !f.types[0].is_float() || f.types[0].bits() >= 64 ||
+      !is_long(loops, lanes) || moves(update))
+    return false;
+  const Expr value = without_lets(update.values[0]);
+  if (value.kind() != Kind::Add && value.kind() != Kind::Sub) return false;
+  const auto* n = value.as<Binary>();
+  return (is_old_value(n->a, f, update) && !calls(n->b, &f)) ||
+         (value.kind() == Kind::Add && is_old_value(n->b, f, update) && !calls(n->a, &f));
+}
+
+void add_in_blocks(const FuncPtr& f, int index, const std::vector<ReductionVariable>& loops,
+                   int lanes) {
+  Stage stage(f, index);
+  const std::vector<RVar> blocks = cut(*f, index, stage, loops, lanes);
+  std::vector<std::pair<RVar, Var>> preserved;
+  for (const RVar& block : blocks) {
+    const std::string name = graph::without_numbers(block.name());
+    preserved.emplace_back(block, Var(new_loop(*f, index, name.substr(name.rfind('.') + 1) + "s")));
+  }
+  Func sums = stage.rfactor(preserved);
+  sums.compute_at(retrograde::LoopLevel(Func(f), blocks[0], index));
+}
+
+}  // namespace retrograde::autoschedule

@@ -1,0 +1,27 @@
+// long_sums.h -- adds the terms of long float32 sums in blocks, each in registers of its own.
+//
+//   sum(x) += term(x, r)     =>     for x, in lanes: for o: block(x, o) += term(x, 256 o + i)   over i
+//                                                           sum(x) += block(x, o)
+//
+// A chain of n additions is wrong by up to n * 2^-24 of the sum of absolute values. A block ends every chain after 256
+// terms. The cut depends on the program alone.
+#pragma once
+
+#include <vector>
+
+#include "graph/function.h"
+
+namespace retrograde::autoschedule {
+
+// Whether the update adds numbers that are rounded to less than double, and a lane adds many of them. `loops`: of the
+// reduction, innermost first; the first is in vectors of so many lanes (1: none).
+bool is_long_sum(const FuncContents& f, const Definition& update,
+                 const std::vector<ReductionVariable>& loops, int lanes = 1);
+
+// Cuts the loops of such a sum, which have their final order, so that a lane adds few terms in those that stay inside.
+// Blocks become a Func (rfactor.h) that is computed in the loops of f and takes the vectors of its update. Tasks are
+// made later.
+void add_in_blocks(const FuncPtr& f, int index, const std::vector<ReductionVariable>& loops,
+                   int lanes);
+
+}  // namespace retrograde::autoschedule
