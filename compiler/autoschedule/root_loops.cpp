@@ -13,6 +13,7 @@
 #include "autoschedule/loop_order.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/packed_operand.h"
+#include "autoschedule/phase_loops.h"
 #include "autoschedule/reduction_chunks.h"
 #include "autoschedule/row_copies.h"
 #include "autoschedule/scatter_schedule.h"
@@ -109,8 +110,9 @@ class LoopChooser {
     if (pure_[0] == 0 && scans_rows()) return cut_scan();
     make_tasks();
     if (pure_[0] != 0) return;
-    vectorize(stage_, variable_of(0), lanes_of_values(), TailStrategy::GuardWithIf);
     const bool reduces = !definition().rvars.empty();
+    if (scatters || !split_into_phases(f_, index_, stage_, lanes_of_values(), sizes_))
+      vectorize(stage_, variable_of(0), lanes_of_values(), TailStrategy::GuardWithIf);
     if (pure_.size() == 1 && reduces) stage_.parallel(variable_of(0));  // of the vectors
   }
 
