@@ -33,6 +33,11 @@ int64_t period_of_reads(const FuncContents& f, const Definition& stage, size_t d
   return period == 0 || period > longest_period ? 1 : period;
 }
 
+bool has_odd_phases(const FuncContents& f, const Definition& stage, int lanes) {
+  const int64_t period = period_of_reads(f, stage, 0);
+  return period <= most_phases && lanes % period != 0;
+}
+
 bool split_into_phases(const FuncContents& f, int index, Stage stage, int lanes,
                        const SizeEstimate& sizes) {
   const bool has_lanes = f.made && f.made->lanes > 0;  // of its own, in its first dimension

@@ -24,6 +24,9 @@ namespace retrograde::autoschedule {
 // The period of what a stage reads along a dimension, through Funcs that are computed inline too; 1: none.
 int64_t period_of_reads(const FuncContents& f, const Definition& stage, size_t dimension);
 
+// Whether vectors of `lanes` elements are no multiple of the period along the first dimension, if that is short.
+bool has_odd_phases(const FuncContents& f, const Definition& stage, int lanes);
+
 // Gives a stage vectors of `lanes` elements of one phase along its first dimension; false: it has no phases, too many, or
 // too few elements.
 bool split_into_phases(const FuncContents& f, int index, Stage stage, int lanes,

@@ -105,7 +105,10 @@ class LoopChooser {
       return tile(*d);
     if (stages && !scatters && schedule_look_ups(f_, index_, stage_, lanes_of_values(), sizes_))
       return;
-    const bool may_be_tile = !scatters && !point_number(definition()) && pure_[0] == 0;
+    // Phases that a vector is no multiple of come first: in a tile its lanes would gather.
+    const bool has_phases = pure_[0] == 0 && !scatters && has_odd_phases(f_, definition(), lanes);
+    const bool may_be_tile =
+        !scatters && !point_number(definition()) && pure_[0] == 0 && !has_phases;
     if (may_be_tile && tile_in_registers()) return;
     if (pure_[0] == 0 && scans_rows()) return cut_scan();
     make_tasks();

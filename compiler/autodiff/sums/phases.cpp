@@ -35,7 +35,8 @@ Expr reduced(const Expr& comparison, const std::string& phase,
   const Expr whole = to_expr(parts.quotient), rest = to_expr(parts.remainder);
   if (!whole.defined() || !rest.defined()) return comparison;
   const Expr share = simplify(rest / make_const(Int(32), factor), bounds);
-  return simplify(whole + share >= 0, bounds);
+  const bool is_in_lanes = !as_const_int(share) && factor >= lanes;  // they would divide
+  return is_in_lanes ? comparison : simplify(whole + share >= 0, bounds);
 }
 
 // Index expressions and conditions in terms of quotient and phase, without the divisions that they decide.
