@@ -14,6 +14,7 @@
 #include "autoschedule/loop_order.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/packed_operand.h"
+#include "autoschedule/phase_loops.h"
 #include "autoschedule/reduction_chunks.h"
 #include "autoschedule/row_copies.h"
 #include "autoschedule/row_reductions.h"
@@ -104,15 +105,19 @@ class LoopChooser {
     if (stages && !scatters && schedule_look_ups(f_, index_, stage_, lanes_of_values(), sizes_))
       return;
     if (stages && schedule_short_rows(f_, index_, stage_, lanes_of_values(), sizes_)) return;
-    const bool may_be_tile = !scatters && !point_number(definition()) && pure_[0] == 0;
+    // Phases that a vector is no multiple of come first: in a tile its lanes would gather.
+    const bool has_phases = pure_[0] == 0 && !scatters && has_odd_phases(f_, definition(), lanes);
+    const bool may_be_tile =
+        !scatters && !point_number(definition()) && pure_[0] == 0 && !has_phases;
     if (may_be_tile && tile_in_registers(row.has_value())) return;
     if (row) return reduce_rows(*row);
     if (pure_[0] == 0 && scans_rows()) return cut_scan();
     if (may_be_tile && sums_in_blocks()) return;
     make_tasks();
     if (pure_[0] != 0) return;
-    vectorize(stage_, variable_of(0), lanes_of_values(), TailStrategy::GuardWithIf);
     const bool reduces = !definition().rvars.empty();
+    if (scatters || !split_into_phases(f_, index_, stage_, lanes_of_values(), sizes_))
+      vectorize(stage_, variable_of(0), lanes_of_values(), TailStrategy::GuardWithIf);
     if (pure_.size() == 1 && reduces) stage_.parallel(variable_of(0));  // of the vectors
   }
 

@@ -47,6 +47,22 @@ bool computes_more_than_is_read(const FuncContents& f) {
 
 bool is_adjoint(const FuncPtr& f) { return f->made.has_value(); }
 
+// An adjoint whose rows are put together from others by quotient and remainder, as from the phases of a stride. Inline,
+// vectors of its readers would gather.
+bool interleaves_rows(const FuncContents& f) {
+  if (!f.made || !f.is_pure() || f.is_extern() || f.args.empty()) return false;
+  const auto divides = [&](const Expr& e) {
+    return (e.kind() == Kind::Div || e.kind() == Kind::Mod) && e.type().is_int() &&
+           uses_variable(e, f.args[0]);
+  };
+  return std::ranges::any_of(f.pure->values, [&](const Expr& value) {
+    return any_node(value, [&](const Call& call) {
+      return call.call_type != CallType::Operator &&
+             std::ranges::any_of(call.args, [&](const Expr& index) { return any_node(index, divides); });
+    });
+  });
+}
+
 class StorageChooser {
  public:
   // `limits`: null where the pipeline is compiled as it is. `fixed`: null where choices stay.
@@ -79,6 +95,7 @@ class StorageChooser {
       stored |= left_inline ? computes_more_than_is_read(*f) : is_output(*f) || !f->is_pure();
       stored |= chosen_.preferred.contains(f.get());
       stored |= is_worth_choosing_once(uses_[f.get()]);
+      stored |= uses_[f.get()].reads > 1.5 && interleaves_rows(*f);
       stored |= is_stored_running_sum(f);
       if (limits_) {
         stored |= limits_->need_root.contains(f.get()) || limits_->levels.contains(f.get());

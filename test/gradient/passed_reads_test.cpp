@@ -163,5 +163,72 @@ TEST(PassedReads, OnlyFuncsThatReadOneElementLookUp) {
       autodiff::is_look_up(*BoundaryConditions::constant_exterior(f, 1.0f, {{0, 4}}).function()));
 }
 
+// ---- Funcs with zeros between the elements of another one ----
+
+// A transposed convolution: image -> padded -> spread -> out.
+struct Transposed {
+  int stride, taps;
+  Buffer<float> image = random_image({9}, -1.0, 1.0, 5), kernel = random_image({taps}, -1.0, 1.0, 6);
+  Func spread{"spread"}, out{"out"};
+  Func loss = define();
+
+  Func define() {
+    Func source("source");
+    source(x) = image(x) * image(x);
+    const Func padded = BoundaryConditions::constant_exterior(source, 0.0f, {{0, 9}});
+    spread(x) = select(x % stride == 0, padded(x / stride), 0.0f);
+    RDom r(0, taps);
+    out(x) = 0.0f;
+    out(x) += spread(x + 1 - r) * kernel(r);
+    return weighted_sum(out, {9 * stride});
+  }
+};
+
+bool reads(const Func& gradient, const std::string& name) {
+  const auto order = graph::topological_order({gradient.function()});
+  return std::ranges::any_of(order, [&](const graph::FuncPtr& f) {
+    return f->name.substr(0, f->name.find('$')) == name;
+  });
+}
+
+// Iterations of all updates of the adjoints that a gradient is computed from, for each element.
+int64_t iterations_of(const Func& gradient) {
+  int64_t result = 0;
+  for (const graph::FuncPtr& f : graph::topological_order({gradient.function()})) {
+    if (!f->made) continue;
+    for (const graph::Definition& update : f->updates) {
+      int64_t iterations = 1;
+      for (const graph::ReductionVariable& r : update.rvars)
+        iterations *= ir::as_const_int(r.extent).value_or(1000);
+      result += iterations;
+    }
+  }
+  return result;
+}
+
+TEST(PassedReads, GradientsOfTransposedConvolutionsAreRight) {
+  for (const int stride : {2, 3}) {
+    for (const int taps : {1, 3, 4, 7}) {
+      Transposed program{stride, taps};
+      const Derivative d = propagate_adjoints(program.loss);
+      expect_gradient(program.loss, d, program.image);
+      expect_gradient(program.loss, d, program.kernel);
+    }
+  }
+}
+
+TEST(PassedReads, ZerosBetweenElementsNeedNoAdjoint) {
+  Transposed program{2, 4};
+  const Derivative d = propagate_adjoints(program.loss);
+  EXPECT_FALSE(reads(d(program.image), "spread_adj"));
+  EXPECT_TRUE(d(program.spread).defined());
+}
+
+TEST(PassedReads, ZerosBetweenElementsAreNoTermsOfTheKernel) {
+  Transposed program{3, 4};
+  const Derivative d = propagate_adjoints(program.loss);
+  EXPECT_LE(iterations_of(d(program.kernel)), 9 + 1);  // not 27
+}
+
 }  // namespace
 }  // namespace retrograde::gradient

@@ -15,6 +15,7 @@ retrograde_test(
   odd_sizes_test
   operation_count_test
   passed_reads_test
+  phases_test
   second_derivatives_test
   several_outputs_test
   shared_adjoints_test

@@ -6,6 +6,7 @@
 #include "autodiff/updates/update_context.h"
 #include "ir/build.h"
 #include "ir/lets.h"
+#include "simplify/simplify.h"
 
 namespace retrograde::autodiff {
 
@@ -61,6 +62,22 @@ bool is_short(const Inversion& inversion) {
   return inversion.note.empty() && !inversion.gave_up && inversion.gathers.size() <= most_pieces &&
          std::none_of(inversion.gathers.begin(), inversion.gathers.end(),
                       [](const Gather& g) { return g.rdom || g.scatters; });
+}
+
+bool sums_no_more(const Inversion& passed, const LeafAdjoint& leaf, const Inversion& direct) {
+  const auto is_sum = [](const Inversion& i) {
+    return i.note.empty() && !i.gave_up && i.gathers.size() == 1 && i.gathers[0].rdom &&
+           !i.gathers[0].scatters && i.gathers[0].is_everywhere();
+  };
+  const auto* call = leaf.leaf.as<Call>();
+  const bool divides = call && std::ranges::any_of(call->args, [](const Expr& index) {
+                         return any_node(index, [](const Expr& e) { return e.kind() == Kind::Div; });
+                       });
+  if (!divides || !is_sum(passed) || !is_sum(direct)) return false;
+  const auto &a = passed.gathers[0].rdom->vars, &b = direct.gathers[0].rdom->vars;
+  return std::ranges::equal(a, b, [](const ReductionVariable& r, const ReductionVariable& s) {
+    return can_prove(r.extent <= s.extent);
+  });
 }
 
 const std::vector<PassedRead>& PassedReads::of(const Symbol* symbol) const {

@@ -12,7 +12,12 @@
 //
 //   f_adj(x) = next_adj(min(x + 1, n - 1)) + next_adj(max(x - 1, 0))
 //
-// Not applied to reads that run over reduction variables: their borders would be sums over these variables, too.
+// A Func that spreads another one out is passed, too, because most of its elements are zeros that no adjoint needs:
+//
+//   spread(x) = select(x % 2 == 0, f(x / 2), 0)      out(x) += spread(x - r) * w(r)
+//   f_adj(x) += out_adj(2 * x + r) * w(r)             instead of spread_adj(2 * x), a sum at twice as many elements
+//
+// Not applied to other reads that run over reduction variables: their borders would be sums over these variables, too.
 #pragma once
 
 #include <unordered_map>
@@ -39,6 +44,9 @@ bool is_look_up(const FuncContents& f);
 Expr value_of_read(const FuncContents& f, const Call& read);
 // Whether the inversion has few pieces, none of which sums. Then it may replace the inversion of two reads in sequence.
 bool is_short(const Inversion& inversion);
+// Whether a read through a Func that spreads another one out sums no more terms at each element than the read of that
+// Func, `direct`. There are fewer elements: an index of the leaf divides.
+bool sums_no_more(const Inversion& passed, const LeafAdjoint& leaf, const Inversion& direct);
 
 // The reads of the Funcs that look others up.
 class PassedReads {

@@ -11,17 +11,24 @@
 
 namespace retrograde::autodiff {
 
+// The inversion of a read, and what the read contributes at each of its points.
+struct InvertedRead {
+  const Inversion& inversion;
+  Expr adjoint;
+};
+
 class ReadInversions {
  public:
   // The inversion of a read of `symbol` in a stage of f, which contributes `adjoint` to it. Where a select makes the
   // adjoint 0, the read is ignored if that turns the many pieces of a clamped read into one: select(x < 0 || x > 9, 0,
-  // a(clamp(x, 0, 9))).
-  const Inversion& of(const FuncContents& f, const Symbol& symbol, const AccessQuery& query,
-                      const Expr& adjoint);
+  // a(clamp(x, 0, 9))); or if fewer points then read each element: select(x % 2 == 0, a(x / 2), 0). The same holds for a
+  // factor that is read of a Func with zeros between its elements. The adjoint is then that of the other points.
+  InvertedRead of(const FuncContents& f, const Symbol& symbol, const AccessQuery& query,
+                  const Expr& adjoint);
 
  private:
-  const Inversion* where_selected(const FuncContents& f, const Symbol& symbol, AccessQuery query,
-                                  const Expr& adjoint);
+  const Inversion* where(const Expr& condition, const FuncContents& f, const Symbol& symbol,
+                         AccessQuery query);
   const Inversion& find(const FuncContents& f, const Symbol& symbol, const AccessQuery& query);
   std::map<std::string, Inversion> found_;
   // Inversions without reduction domains, keyed by all their inputs: the steps of an unrolled loop have equal reads.

@@ -12,8 +12,10 @@
 #include "autodiff/sums/constant_places.h"
 #include "autodiff/sums/gather_places.h"
 #include "autodiff/sums/generated_definitions.h"
+#include "autodiff/sums/phases.h"
 #include "autodiff/sums/privatisation.h"
 #include "autodiff/sums/running_sums.h"
+#include "diagnostics/error.h"
 #include "frontend/language/var.h"
 #include "graph/definitions/define.h"
 #include "ir/build.h"
@@ -286,15 +288,41 @@ AdjointFunc make_sum(const AdjointTarget& target, const std::string& name,
   return result;
 }
 
+// Adds what is summed by phases of a stride to `result`. Returns the contributions that are left, which read these sums
+// element by element.
+std::vector<Contribution> with_phases_apart(const AdjointTarget& target, const std::string& name,
+                                            std::vector<Contribution> contributions,
+                                            AdjointFunc& result) {
+  for (const PhasedSum& sum : take_phased_sums(target, contributions)) {
+    const AdjointFunc phases = make_adjoint(sum.target, name + "_phases", sum.contributions);
+    append(result.helpers, phases.helpers);
+    result.helpers.push_back(phases.func);
+    append(result.notes, phases.notes);
+    result.notes.push_back(text("summed by phases of the period ", sum.period, " in ",
+                                quoted(phases.func->name), ", so that no vector divides"));
+    std::set<int> components;
+    for (const Contribution& c : sum.contributions) components.insert(c.component);
+    Gather each;
+    each.lhs = variables_of(target.args);
+    each.pure.assign(target.args.size(), true);
+    for (const int k : components)
+      contributions.push_back({k, each, call_value(phases.func, sum.place, k)});
+  }
+  return contributions;
+}
+
 }  // namespace
 
 AdjointFunc make_adjoint(const AdjointTarget& target, const std::string& name,
-                         const std::vector<Contribution>& contributions,
+                         const std::vector<Contribution>& all_contributions,
                          const std::vector<Expr>& initial) {
+  AdjointFunc phased;
+  const std::vector<Contribution> contributions =
+      with_phases_apart(target, name, all_contributions, phased);
   std::vector<std::vector<Contribution>> groups = running_groups(contributions);
   std::vector<Expr> so_far = initial;
-  std::vector<FuncPtr> helpers;
-  std::vector<std::string> notes;
+  std::vector<FuncPtr> helpers = std::move(phased.helpers);
+  std::vector<std::string> notes = std::move(phased.notes);
   const std::vector<Expr> args = variables_of(target.args);
   for (size_t g = 0; g + 1 < groups.size(); ++g) {
     const AdjointFunc sum = make_sum(target, name + "_so_far", std::move(groups[g]), so_far);

@@ -34,14 +34,16 @@ void Contributions::add(const FuncPtr& f, const LeafAdjoint& leaf, const Expr& a
     add_to_what_it_reads(*read, f, {leaf.leaf, adjoint}, domain);
     return;
   }
-  const Inversion& inversion = inversion_of(*f, leaf, domain);
+  const auto& [inversion, own_adjoint] = inverted(*f, leaf, domain);
+  const Expr& contribution = adjoint.get() == leaf.adjoint.get() ? own_adjoint : adjoint;
   if (read && is_look_up(*read) && !primal_.is_named(symbol))
     passed_.note(symbol, {f, {leaf.leaf, adjoint}, domain});
   if (!inversion.note.empty())
     account_.add(Explanation::Kind::Scattered, shape_of(symbol).name,
                  text("read by ", quoted(f->name), ": ", inversion.note));
   for (const Gather& g : inversion.gathers)
-    pending_[symbol].push_back({call ? call->component : 0, g, substitute(adjoint, g.iteration)});
+    pending_[symbol].push_back(
+        {call ? call->component : 0, g, substitute(contribution, g.iteration)});
 }
 
 // False only for Funcs whose consumers can contribute to what they read.
@@ -68,7 +70,10 @@ bool Contributions::pass_on(const FuncContents& f) {
     const SweepResult sweep =
         primal_.sweep({value_of_read(f, *read.read.leaf.as<Call>())}, {read.read.adjoint});
     for (const LeafAdjoint& leaf : sweep.leaves) {
-      if (!is_short(inversion_of(*read.reader, leaf, read.domain))) return false;
+      const Inversion& passed = inverted(*read.reader, leaf, read.domain).inversion;
+      if (!is_short(passed) &&
+          !sums_no_more(passed, leaf, inverted(*read.reader, read.read, read.domain).inversion))
+        return false;
       further.push_back({read.reader, leaf, read.domain});
     }
   }
@@ -80,8 +85,8 @@ std::vector<Contribution> Contributions::take(const Symbol* symbol) {
   return std::exchange(pending_[symbol], {});
 }
 
-const Inversion& Contributions::inversion_of(const FuncContents& reader, const LeafAdjoint& leaf,
-                                             const IterationDomain& domain) {
+InvertedRead Contributions::inverted(const FuncContents& reader, const LeafAdjoint& leaf,
+                                     const IterationDomain& domain) {
   const Symbol* symbol = symbol_of(leaf.leaf);
   const auto* call = leaf.leaf.as<Call>();
   const AdjointTarget target = primal_.target_of(symbol);

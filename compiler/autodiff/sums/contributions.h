@@ -44,8 +44,8 @@ class Contributions {
   bool has_size(const FuncContents& f) const;
   void add_to_what_it_reads(const FuncContents& read, const FuncPtr& f, const LeafAdjoint& leaf,
                             const IterationDomain& domain);
-  const Inversion& inversion_of(const FuncContents& reader, const LeafAdjoint& leaf,
-                                const IterationDomain& domain);
+  InvertedRead inverted(const FuncContents& reader, const LeafAdjoint& leaf,
+                        const IterationDomain& domain);
 
   const Primal& primal_;
   SynthesisAccount& account_;

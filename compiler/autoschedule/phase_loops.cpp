@@ -1,0 +1,61 @@
+#include "autoschedule/phase_loops.h"
+
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "analysis/periods.h"
+#include "autoschedule/inlined_reads.h"
+#include "autoschedule/new_loop.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::autoschedule {
+
+namespace {
+
+// Vectors of sums that are kept in registers at once.
+constexpr int64_t most_phases = 6;
+
+}  // namespace
+
+int64_t period_of_reads(const FuncContents& f, const Definition& stage, size_t dimension) {
+  int64_t period = 1;
+  for (const Expr& root : roots_with_inlined(stage)) {
+    walk(root, [&](const Call& call) {
+      if (call.call_type == CallType::Operator) return;
+      for (const Expr& index : call.args) {
+        const int64_t of_index = period_in(index, f.args[dimension]);
+        period = period * of_index == 0 ? 0 : std::lcm(period, of_index);
+      }
+    });
+  }
+  return period == 0 || period > longest_period ? 1 : period;
+}
+
+bool has_odd_phases(const FuncContents& f, const Definition& stage, int lanes) {
+  const int64_t period = period_of_reads(f, stage, 0);
+  return period <= most_phases && lanes % period != 0;
+}
+
+bool split_into_phases(const FuncContents& f, int index, Stage stage, int lanes,
+                       const SizeEstimate& sizes) {
+  const bool has_lanes = f.made && f.made->lanes > 0;  // of its own, in its first dimension
+  if (has_lanes) return false;
+  const int64_t period = period_of_reads(f, f.stage(index), 0);
+  if (period <= 1 || period > most_phases) return false;
+  if (f.stage(index).rvars.empty() && lanes % period == 0) return false;
+  if (sizes.extent(f, 0).value_or(period * lanes) < period * lanes) return false;
+  const Var x(f.args[0]), vector(inner_loop(f, index, f.args[0]));
+  stage.split(x, x, vector, static_cast<int>(period) * lanes, TailStrategy::GuardWithIf);
+  const Var phase(new_loop(f, index, "phase"));
+  stage.split(vector, vector, phase, static_cast<int>(period), TailStrategy::GuardWithIf);
+  std::vector<VarOrRVar> order{vector, phase};
+  for (const Dim& loop : f.stage(index).schedule.dims) {
+    if (loop.is_reduction) order.push_back(RVar(loop.var));
+  }
+  stage.reorder(order).vectorize(vector).unroll(phase);
+  return true;
+}
+
+}  // namespace retrograde::autoschedule
