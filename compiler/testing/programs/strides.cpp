@@ -202,7 +202,10 @@ WorkloadMaker::Grid WorkloadMaker::by_parity(const Grid& a) {
   const Expr phase = x % of, here = a(x, y), mirrored = a(a.width - 1 - x, y);
   return c_.one_of<Grid>({
       [&] { return grid_like(a, "parity", select(phase == 0, here, smooth(mirrored))); },
-      [&] { return grid_like(a, "parity", select((x + y) % 2 == 0, here * 2.0f, here * here)); },
+      [&] {
+        return grid_like(a, "parity",
+                         select((a.is_line ? Expr(x) : x + y) % 2 == 0, here * 2.0f, here * here));
+      },
       [&] {
         const Expr value = select(phase == 0, a(x / of, y), smooth(a(a.width - 1 - x / of, y)));
         return grid("interleaved", of * a.width, a.height, a.is_line, Tuple(value));

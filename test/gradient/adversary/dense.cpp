@@ -56,9 +56,11 @@ class Dense {
   void compare_hessian() {
     Func loss("loss");
     const std::vector<Buffer<float>>& w = s_.first().w;
-    RDom r(s_.first().bounds());
+    const Region bounds = s_.first().bounds();
+    RDom r;
+    if (!bounds.empty()) r = RDom(bounds);
     std::vector<Expr> at;
-    for (int d = 0; d < r.dimensions(); ++d) at.push_back(r[d]);
+    for (size_t d = 0; d < bounds.size(); ++d) at.push_back(r[static_cast<int>(d)]);
     loss() = cast<double>(0.0f);
     for (size_t k = 0; k < w.size(); ++k) {
       const Expr e = s_.program.output()(at).element(static_cast<int>(k));
