@@ -1,11 +1,13 @@
 # Random programs that take minutes, for the preset `fuzz`.
 
 retrograde_fuzz(fuzz_adjoints FROM 200000 TO 218000 STEP 2000)
+retrograde_fuzz(fuzz_adjoints FROM 700000 TO 701750 STEP 250 OPTIONS --style workloads)
 retrograde_fuzz(fuzz_forms FROM 300000 TO 318000 STEP 2000 OPTIONS --compile 5)
 retrograde_fuzz(fuzz_gpu FROM 500000 TO 501800 STEP 200)
 retrograde_fuzz(fuzz_pipelines FROM 100000 TO 119500 STEP 500)
 retrograde_fuzz(fuzz_ptx FROM 600000 TO 604500 STEP 500)
 retrograde_fuzz(fuzz_schedules FROM 400000 TO 402700 STEP 300)
+retrograde_fuzz(fuzz_schedules FROM 800000 TO 800400 STEP 200 OPTIONS --style workloads)
 
 # The tests that run a part of their programs by default.
 retrograde_many_programs(adversary_fuzz SOURCES gradient/adversary/adversary_test.cpp EXPORTS

@@ -48,7 +48,7 @@ Scheduled make(Choices& choices) {
   return result;
 }
 
-bool take(const std::string& name, const std::string& directive) {
+bool take(Fuzzer&, const std::string& name, const std::string& directive) {
   if (name == "--style") {
     style = directive;
     return style == "chains" || style == "pipelines";

@@ -106,7 +106,7 @@ class Fuzzing {
     if (name == "--seconds") return is_number(value, seconds_);
     if (name == "--compile") return is_number(value, fuzzer_.compile);
     if (name == "--choices") return take_list(value);
-    return name == "--want" || (fuzzer_.take && fuzzer_.take(name, value));
+    return name == "--want" || (fuzzer_.take && fuzzer_.take(fuzzer_, name, value));
   }
   bool take_list(const std::string& value) {
     std::istringstream in(value);
@@ -244,8 +244,10 @@ class Fuzzing {
     for (const auto& [reason, n] : reasons_) reasons.emplace_back(n, reason);
     std::sort(reasons.rbegin(), reasons.rend());
     if (reasons.size() > most_reasons) reasons.resize(most_reasons);
+    const double share = 100.0 / static_cast<double>(std::max<uint64_t>(tried_, 1));
     for (const auto& [n, reason] : reasons)
-      std::printf("  %llu refused: %s\n", static_cast<unsigned long long>(n), reason.c_str());
+      std::printf("  %llu refused (%.2f %%): %s\n", static_cast<unsigned long long>(n),
+                  static_cast<double>(n) * share, reason.c_str());
   }
 
   Fuzzer fuzzer_;

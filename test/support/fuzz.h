@@ -30,8 +30,8 @@ struct Fuzzer {
       0.1;  // largest share of legal programs that may be refused; beyond it, too little is tested
   double most_slow = 0;  // largest share of programs that may time out without being a finding
   unsigned compile = 100;
-  // Handles an additional argument and its value.
-  std::function<bool(const std::string& name, const std::string& value)> take = {};
+  // Handles an additional argument and its value, which may change the limits.
+  std::function<bool(Fuzzer& fuzzer, const std::string& name, const std::string& value)> take = {};
   // Programs that the options exclude are not counted.
   std::function<bool(Choices& choices)> passes_over = {};
 };

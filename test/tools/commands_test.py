@@ -61,6 +61,10 @@ class Commands(unittest.TestCase):
         printed = self.run_program("test/fuzz_adjoints", "--seed", 1234, "--print")
         self.assertRegex(printed, r"(?m)^func ")
 
+    def test_fuzz_draws_programs_in_the_forms_of_users(self):
+        text = self.run_program("test/fuzz_adjoints", "--style", "workloads", "--from", 1, "--count", 4)
+        self.assertIn("4 programs, 0 findings", text)
+
     def test_fuzz_looks_for_a_refusal(self):
         self.run_program("test/fuzz_adjoints", "--from", 1, "--count", 3, "--want", "must be bounded")
 

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -36,11 +37,12 @@ struct RandomProgram {
   std::vector<Func> funcs;  // in the order in which they were defined
   std::vector<Func> outputs;
   std::vector<std::vector<oracle::Region>> runs;  // for each output; the first run is the main one
-  std::vector<Func> roots;       // Funcs computed at root if the program is not scheduled
-  bool has_loop = false;         // has a loop over time
-  bool has_rule = false;         // a custom rule for all inputs, which covers the Funcs between
-  bool stops_gradients = false;  // second derivatives differ from those of the values
-  bool has_stage = false;        // one Func may be replaced by an extern stage
+  std::vector<Func> roots;         // Funcs computed at root if the program is not scheduled
+  bool has_loop = false;           // has a loop over time
+  bool has_rule = false;           // a custom rule for all inputs, which covers the Funcs between
+  bool stops_gradients = false;    // second derivatives differ from those of the values
+  bool has_stage = false;          // one Func may be replaced by an extern stage
+  std::set<std::string> contents;  // of a workload, for statistics
 
   const Func& output() const { return outputs.front(); }
   const oracle::Region& region() const { return runs.front().front(); }

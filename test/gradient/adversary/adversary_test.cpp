@@ -19,8 +19,9 @@ namespace retrograde::gradient {
 namespace {
 
 constexpr unsigned programs_per_shard = 15, shards = 16, one_compiled_of = 8;
+constexpr unsigned workloads_per_shard = 10, shards_of_workloads = 6;
 constexpr unsigned scheduled_per_shard = 5, shards_scheduled = 6;
-// 240 programs, and 30 that the compiler schedules; or a third of them: every third shard.
+// 240 programs, 60 workloads, and 30 that the compiler schedules; or a third of them: every third shard.
 constexpr unsigned step = many_or_few(1, 3);
 
 class Adversary : public ::testing::TestWithParam<unsigned> {};
@@ -39,6 +40,24 @@ TEST_P(Adversary, IsRightOrRefused) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Shard, Adversary, ::testing::Range(0u, shards, step));
+
+// Programs in the forms of users' programs; fuzz_adjoints --style workloads runs many more.
+class Workloads : public ::testing::TestWithParam<unsigned> {};
+
+TEST_P(Workloads, AreRight) {
+  unsigned checked = 0;
+  for (unsigned i = 0; i < workloads_per_shard; ++i) {
+    const unsigned seed = GetParam() * workloads_per_shard + i + 1;
+    Choices choices(seed);
+    const Judged judged = judge_workload(choices, i % one_compiled_of == 0, fuzz::Workload::Any);
+    EXPECT_LT(judged.judgement, Judgement::Wrong)
+        << "fuzz_adjoints --style workloads --seed " << seed << ": " << judged.detail;
+    checked += judged.judgement <= Judgement::Kink;
+  }
+  EXPECT_GE(checked, workloads_per_shard - 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shard, Workloads, ::testing::Range(0u, shards_of_workloads, step));
 
 // Regressions found under random schedules, by seed: two threads computed into shared memory (4402864), a value was
 // read before it was written (4300969), and a value was never computed (4400916).
@@ -81,6 +100,23 @@ TEST(AdversaryOracle, AcceptsARightGradient) {
 TEST(AdversaryOracle, FindsAGradientThatLacksATerm) {
   const auto cut = [](const Expr& e) { return e * stop_gradient(e); };
   EXPECT_EQ(judge_pointwise(cut, 0.5f).judgement, Judgement::Wrong);
+}
+
+// The second output lacks a term of its gradient; the first one is right.
+TEST(AdversaryOracle, FindsAWrongGradientOfASecondOutput) {
+  for (const bool is_wrong : {false, true}) {
+    AdversaryProgram p;
+    Buffer<float> image(std::vector<int>{natural_size}, "image");
+    image.fill(0.5f);
+    p.images.push_back(image);
+    p.scale.set(1.0f);
+    p.runs = {{{{0}, {natural_size}}, {{1}, {2}}}};
+    Func first("first"), second("second");
+    first(x) = image(x) * p.scale;
+    second(x) = image(x) * (is_wrong ? stop_gradient(image(x)) : image(x));
+    p.outputs = p.funcs = {first, second};
+    EXPECT_EQ(judge(p, 1, false).judgement, is_wrong ? Judgement::Wrong : Judgement::Right);
+  }
 }
 
 TEST(AdversaryOracle, KnowsAKinkAndAJump) {

@@ -251,6 +251,7 @@ std::map<std::string, uint64_t> checked(const ScheduledProgram& made, bool compi
   AutoScheduled interpreted(made, made.small ? *made.small : made.program, compiles_all);
   interpreted.compare_interpreted();
   std::set<std::string> rules = interpreted.rules();
+  for (const std::string& content : made.program.contents) counts[content] = 1;
   if (made.small) {
     AutoScheduled large(made, made.program, compiles_all);
     note_memory(large, large.compare_with_serial_loops(), counts);
@@ -263,10 +264,11 @@ std::map<std::string, uint64_t> checked(const ScheduledProgram& made, bool compi
 
 }  // namespace
 
-Judged judge_auto_scheduled(Choices& choices, bool compiles_all) {
+Judged judge_auto_scheduled(Choices& choices, bool compiles_all,
+                            std::optional<fuzz::Workload> workload) {
   std::optional<ScheduledProgram> made;
   try {
-    made.emplace(make_scheduled(choices));
+    made.emplace(make_scheduled(choices, workload));
   } catch (const UserError& error) {
     return {Judgement::Illegal, error.what()};
   }
@@ -283,7 +285,9 @@ Judged judge_auto_scheduled(Choices& choices, bool compiles_all) {
   }
 }
 
-std::string auto_scheduled_text(Choices& choices) { return to_text(make_scheduled(choices)); }
+std::string auto_scheduled_text(Choices& choices, std::optional<fuzz::Workload> workload) {
+  return to_text(make_scheduled(choices, workload));
+}
 
 void limit_memory(int percent) { memory_limit_percent = percent; }
 

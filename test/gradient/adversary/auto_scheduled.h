@@ -1,6 +1,8 @@
 // Checks the autoscheduler on random programs: one pipeline holds the program and all of its gradients.
 #pragma once
 
+#include <optional>
+
 #include "gradient/adversary/check.h"
 
 namespace retrograde::gradient {
@@ -15,8 +17,11 @@ namespace retrograde::gradient {
 //
 // The counts in the result say which checks ran, which rules were seen (schedule_rules.h), and which programs used more
 // memory than inputs, outputs and twice the largest Func of the program.
-Judged judge_auto_scheduled(Choices& choices, bool compiles_all);
-std::string auto_scheduled_text(Choices& choices);
+//
+// workload: such programs instead of those of all kinds.
+Judged judge_auto_scheduled(Choices& choices, bool compiles_all,
+                            std::optional<fuzz::Workload> workload = {});
+std::string auto_scheduled_text(Choices& choices, std::optional<fuzz::Workload> workload = {});
 
 // Large programs that use more than `percent` of that memory are judged wrong; 0: no limit.
 void limit_memory(int percent);

@@ -27,16 +27,14 @@ class Judge {
         counts_(counts) {}
 
   void run() {
-    for (int k = 0; k < p_.output().outputs(); ++k)
-      s_.w.push_back(s_.weights.over(p_.region(), "w" + std::to_string(k)));
-    s_.seed =
-        p_.checks.wild ? reading_inside(s_.w, p_.region(), std::nanf("")) : reading(s_.w, "w");
+    seed_outputs();
     v_.emplace(p_, s_.weights, "v");
     at_rest_ = primal("it");
     if (!std::isfinite(at_rest_)) decide(Judgement::Illegal, "its value is not finite");
     differentiate();
     compare(forward(v_->directions()), reverse_, "along the inputs");
-    if (!p_.has_rule) {
+    if (p_.checks.one_input) compare_one_input();
+    if (!p_.has_rule && s_.outputs.size() == 1) {
       if (!p_.only_inputs) compare_along_func();
       if (p_.checks.several) compare_with_two_outputs();
     }
@@ -51,8 +49,12 @@ class Judge {
     }
     if (machine_code_) {
       ++counts_["as machine code"];
-      counts_["gradients scheduled"] +=
-          static_cast<uint64_t>(compare_machine_code(s_, *derivative_, gradients_, twin_));
+      const int scheduled = compare_machine_code(s_, *derivative_, gradients_, twin_);
+      if (scheduled < 0) {
+        ++counts_["that do not run as machine code"];
+      } else {
+        counts_["gradients scheduled"] += static_cast<uint64_t>(scheduled);
+      }
     }
     if (!is_smooth) decide(Judgement::Kink, "");
   }
@@ -60,10 +62,22 @@ class Judge {
  private:
   // ---- the primal ----
 
+  void seed_outputs() {
+    for (size_t i = 0; i < p_.outputs.size(); ++i) {
+      SeededOutput each{p_.outputs[i], p_.runs.front()[i], {}, {}};
+      for (int k = 0; k < each.output.outputs(); ++k)
+        each.w.push_back(s_.weights.over(each.region, text("w", s_.outputs.size() * 10 + k)));
+      each.seed = p_.checks.wild ? reading_inside(each.w, each.region, std::nanf(""))
+                                 : reading(each.w, "w");
+      s_.outputs.push_back(each);
+    }
+  }
   // sum w * output in double. A program that cannot be evaluated is not legal.
   double primal(const char* what) {
     try {
-      const Product sum = weighted(interpret(p_.output(), p_.region()), p_.region(), s_.w);
+      const Product sum = s_.total([](const SeededOutput& each) {
+        return weighted(interpret(each.output, each.region), each.region, each.w);
+      });
       s_.largest = std::max(s_.largest, sum.magnitude);
       return sum.sum;
     } catch (const InternalError&) {
@@ -76,7 +90,7 @@ class Judge {
   // ---- the derivative ----
 
   void differentiate() {
-    derivative_.emplace(propagate_adjoints(p_.output(), s_.seed, s_.bounds(), options()));
+    derivative_.emplace(propagate_adjoints(s_.adjoints(), options()));
     reverse_ = product_along(*v_);
     const std::vector<AdjointInput> inputs = v_->inputs();
     for (size_t i = 0; i < inputs.size(); ++i) {
@@ -107,10 +121,34 @@ class Judge {
     });
   }
 
+  // The gradient by one input, requested alone, must be that of all gradients together.
+  void compare_one_input() {
+    const std::vector<AdjointInput> inputs = v_->inputs();
+    const auto i = static_cast<size_t>(s_.weights.below(static_cast<int>(inputs.size())));
+    AdjointOptions alone = options();
+    alone.wrt = {inputs[i]};
+    const Func gradient = propagate_adjoints(s_.adjoints(), alone).of(inputs[i]);
+    const auto& [with_others, region] = gradients_[i];
+    if (!gradient.defined() || !with_others.defined()) return;
+    const oracle::Array a = evaluate(gradient, region)[0], b = evaluate(with_others, region)[0];
+    for (size_t k = 0; k < a.values.size(); ++k) {
+      const double found = as_double(a.values[k]), expected = as_double(b.values[k]);
+      if (!std::isfinite(found) && !std::isfinite(expected)) continue;
+      if (std::abs(found - expected) <= 1e-11 * (std::abs(expected) + reverse_.magnitude + 1))
+        continue;
+      decide(Judgement::Wrong, text(gradient.name(), " is ", found, " if requested alone, and ",
+                                    expected, " with others"));
+    }
+    ++counts_["with one gradient alone"];
+  }
+
   // ---- forward mode ----
 
   double forward(const std::vector<Direction>& directions) {
-    return forward(directions, p_.output(), p_.region(), s_.w);
+    double sum = 0;
+    for (const SeededOutput& each : s_.outputs)
+      sum += forward(directions, each.output, each.region, each.w);
+    return sum;
   }
   static double forward(const std::vector<Direction>& directions, const Func& output,
                         const oracle::Region& region, const std::vector<Buffer<float>>& weights) {
@@ -165,7 +203,7 @@ class Judge {
     for (int d = 0; d < inner->func.dimensions(); ++d)
       bounds.push_back({inner->region.mins[d], inner->region.extents[d]});
     const Derivative both = propagate_adjoints(
-        {{p_.output(), s_.seed, s_.bounds()}, {inner->func, inner->reader(), bounds}}, options());
+        {s_.adjoints().front(), {inner->func, inner->reader(), bounds}}, options());
     const Product product = v_->along([&](const AdjointInput& x) { return both.of(x); });
     const std::vector<Direction> directions = v_->directions();
     compare(forward(directions) + forward(directions, inner->func, inner->region, inner->weights),
@@ -176,7 +214,7 @@ class Judge {
   std::optional<oracle::Region> region_of(const Func& f,
                                           const std::vector<graph::FuncPtr>& order) const {
     analysis::Box box;
-    for (const Range& r : s_.bounds())
+    for (const Range& r : s_.first().bounds())
       box.push_back({r.min, simplification::simplify(r.min + r.extent - 1)});
     const autodiff::Regions regions(order, box);
     oracle::Region region;
@@ -200,7 +238,7 @@ class Judge {
   bool compare_with_differences() {
     const Differences first = differences_along(*v_, reverse_);
     if (first.is_right() || !first.slope.is_smooth) return first.slope.is_smooth;
-    if (turns_within_a_step(p_.output(), reverse_.magnitude)) return false;
+    if (turns_within_a_step(p_.outputs, reverse_.magnitude)) return false;
     for (int i = 0; i < 6; ++i) {
       const Motion another(p_, s_.weights, "v_again");
       const Differences second = differences_along(another, product_along(another));
@@ -230,7 +268,7 @@ class Judge {
       return result;
     };
     return {gradient.sum,
-            slope_of(moved, at_rest_, gradient.magnitude, s_.largest, precision_of(p_.output()))};
+            slope_of(moved, at_rest_, gradient.magnitude, s_.largest, precision_of(p_.outputs))};
   }
 
   const AdversaryProgram& p_;
@@ -263,11 +301,22 @@ Judged guard(const F& f) {
   }
 }
 
+// A program that is refused while it is made is illegal.
+Judged guard_making(const std::function<void()>& make) {
+  Judged made = guard([&] {
+    make();
+    return Judged{};
+  });
+  if (made.judgement == Judgement::Refused) made.judgement = Judgement::Illegal;
+  return made;
+}
+
 }  // namespace
 
 Judged judge(const AdversaryProgram& program, uint64_t seed, bool machine_code,
              const AdversaryProgram* twin) {
   std::map<std::string, uint64_t> counts;
+  for (const std::string& content : program.contents) counts[content] = 1;
   Judged result = guard([&] {
     Judge(program, twin, seed, machine_code, counts).run();
     return Judged{};
@@ -278,15 +327,21 @@ Judged judge(const AdversaryProgram& program, uint64_t seed, bool machine_code,
 
 Judged judge(Choices& choices, bool machine_code) {
   std::optional<AdversaryProgram> program, twin;
-  Judged made = guard([&] {
+  Judged made = guard_making([&] {
     program.emplace(make_adversary(choices));
     Choices again(choices.taken());
     if (machine_code && program->has_stage) twin.emplace(make_adversary(again, true));
-    return Judged{};
   });
-  if (made.judgement == Judgement::Refused) made.judgement = Judgement::Illegal;
   if (made.judgement != Judgement::Right) return made;
   return judge(*program, 1, machine_code, twin ? &*twin : nullptr);
+}
+
+Judged judge_workload(Choices& choices, bool machine_code, fuzz::Workload kind) {
+  std::optional<AdversaryProgram> program;
+  const Judged made =
+      guard_making([&] { program.emplace(make_workload_adversary(choices, kind)); });
+  if (made.judgement != Judgement::Right) return made;
+  return judge(*program, 1, machine_code);
 }
 
 }  // namespace retrograde::gradient

@@ -37,7 +37,7 @@ class Dense {
     const Func& output = s_.program.output();
     const Func column = propagate_tangents(output, {{input_, unit_}})(output);
     const auto dense = [&](Compression c) {
-      return jacobian(output, input_, s_.bounds(), {.compression = c}).dense();
+      return jacobian(output, input_, s_.first().bounds(), {.compression = c}).dense();
     };
     compare("Jacobian", dense(Compression::Auto), column, s_.program.region());
     for (Compression forced : {Compression::Columns, Compression::Rows}) {
@@ -55,13 +55,16 @@ class Dense {
 
   void compare_hessian() {
     Func loss("loss");
-    RDom r(s_.bounds());
+    const std::vector<Buffer<float>>& w = s_.first().w;
+    const Region bounds = s_.first().bounds();
+    RDom r;
+    if (!bounds.empty()) r = RDom(bounds);
     std::vector<Expr> at;
-    for (int d = 0; d < r.dimensions(); ++d) at.push_back(r[d]);
+    for (size_t d = 0; d < bounds.size(); ++d) at.push_back(r[static_cast<int>(d)]);
     loss() = cast<double>(0.0f);
-    for (size_t k = 0; k < s_.w.size(); ++k) {
+    for (size_t k = 0; k < w.size(); ++k) {
       const Expr e = s_.program.output()(at).element(static_cast<int>(k));
-      if (e.type().is_float()) loss() += cast<double>(e) * cast<double>(s_.w[k](at));
+      if (e.type().is_float()) loss() += cast<double>(e) * cast<double>(w[k](at));
     }
     const Func dense = hessian(loss, input_).dense();
     const Func column = hessian_vector_product(loss, input_, {{input_, unit_}});

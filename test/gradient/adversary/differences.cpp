@@ -18,14 +18,16 @@ double extrapolated(const double (&slopes)[3], double first, double second) {
   return (second * bc - ab) / (second - 1);
 }
 
-void for_each_node(const Func& output, ir::FunctionRef<void(const Expr&)> visit) {
-  for (const graph::FuncPtr& f : graph::topological_order({output.function()}))
+void for_each_node(const std::vector<Func>& outputs, ir::FunctionRef<void(const Expr&)> visit) {
+  std::vector<graph::FuncPtr> functions;
+  for (const Func& output : outputs) functions.push_back(output.function());
+  for (const graph::FuncPtr& f : graph::topological_order(functions))
     walk(*f, [&](const Expr& e) { return visit(e), true; });
 }
 
-int narrowest_float(const Func& output) {
+int narrowest_float(const std::vector<Func>& outputs) {
   int bits = 64;  // the width of the type, a rough measure of its mantissa
-  for_each_node(output, [&](const Expr& e) {
+  for_each_node(outputs, [&](const Expr& e) {
     if (e.type().is_float()) bits = std::min(bits, e.type().is_bfloat() ? 8 : e.type().bits());
   });
   return bits;
@@ -33,10 +35,10 @@ int narrowest_float(const Func& output) {
 
 }  // namespace
 
-bool turns_within_a_step(const Func& output, double slope) {
+bool turns_within_a_step(const std::vector<Func>& outputs, double slope) {
   if (slope * step <= 1) return false;
   bool has_waves = false;
-  for_each_node(output, [&](const Expr& e) {
+  for_each_node(outputs, [&](const Expr& e) {
     const auto* call = e.as<ir::Call>();
     has_waves |=
         call && (call->is_op(ir::Op::sin) || call->is_op(ir::Op::cos) || call->is_op(ir::Op::tan));
@@ -44,8 +46,8 @@ bool turns_within_a_step(const Func& output, double slope) {
   return has_waves;
 }
 
-double precision_of(const Func& output) {
-  const int bits = narrowest_float(output);
+double precision_of(const std::vector<Func>& outputs) {
+  const int bits = narrowest_float(outputs);
   return bits == 8 ? 3e-2 : bits == 16 ? 4e-3 : 1e-6;
 }
 

@@ -1,7 +1,11 @@
 // fuzz_adjoints -- searches for programs that propagate_adjoints differentiates wrongly. support/fuzz.h describes its
-// arguments.
+// arguments; this program adds
+//
+//   --style STYLE    programs in the forms of users' programs (testing/programs/workloads.h) instead of expressions of
+//                    every kind: `workloads`, or only `loops`, `strides` or `indices`. At most 6 % may be refused
 #include "support/fuzz.h"
 #include "gradient/adversary/check.h"
+#include "gradient/adversary/workload_kinds.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr size_t memory_bytes = 0;  // no limit: the sanitizers' shadow memory takes address space
@@ -10,12 +14,28 @@ constexpr size_t memory_bytes = size_t{6} << 30;
 #endif
 
 int main(int argc, char** argv) {
+  using namespace retrograde;
   using namespace retrograde::gradient;
-  const auto text = [](Choices& choices) { return to_text(make_adversary(choices)); };
-  return retrograde::fuzz::fuzz_main({.judge = static_cast<Judged (*)(Choices&, bool)>(judge),
-                                      .text = text,
-                                      .limits = {60, 600, memory_bytes},
-                                      .most_refused = 1.0 / 3,
-                                      .compile = 25},
-                                     argc, argv);
+  std::optional<fuzz::Workload> workload;
+  const auto judge_one = [&](Choices& choices, bool machine_code) {
+    return workload ? judge_workload(choices, machine_code, *workload)
+                    : judge(choices, machine_code);
+  };
+  const auto text = [&](Choices& choices) {
+    return to_text(workload ? make_workload_adversary(choices, *workload)
+                            : make_adversary(choices));
+  };
+  const auto take = [&](fuzz::Fuzzer& fuzzer, const std::string& name, const std::string& value) {
+    if (name != "--style") return false;
+    workload = workload_named(value);
+    fuzzer.most_refused = most_workloads_refused;
+    return workload.has_value();
+  };
+  return fuzz::fuzz_main({.judge = judge_one,
+                          .text = text,
+                          .limits = {60, 600, memory_bytes},
+                          .most_refused = 1.0 / 3,
+                          .compile = 25,
+                          .take = take},
+                         argc, argv);
 }

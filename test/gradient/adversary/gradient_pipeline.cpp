@@ -30,14 +30,13 @@ Param<int> parameter(const Expr& value, int estimate_factor) {
 
 GradientPipeline::GradientPipeline(const AdversaryProgram& program, Extents extents)
     : p_(program), extents_(extents) {
-  for (int k = 0; k < p_.output().outputs(); ++k) seeds_.push_back(seed(k));
   std::vector<AdjointInput> by;
   for (size_t i = 0; i < p_.images.size(); ++i) by.push_back(p_.image(i));
   by.push_back(p_.scale);
   AdjointOptions options = p_.options;
   options.wrt = by;
-  const Derivative d = propagate_adjoints(p_.output(), reading(seeds_, "w"), bounds(), options);
-  add(p_.output(), p_.region());
+  const Derivative d = propagate_adjoints(seeded_outputs(), options);
+  for (size_t o = 0; o < p_.outputs.size(); ++o) add(p_.outputs[o], p_.runs.front()[o]);
   for (size_t i = 0; i < by.size(); ++i) {
     const Func gradient = d.of(by[i]);
     if (gradient.defined())
@@ -46,11 +45,24 @@ GradientPipeline::GradientPipeline(const AdversaryProgram& program, Extents exte
   }
 }
 
+std::vector<OutputAdjoint> GradientPipeline::seeded_outputs() {
+  std::vector<OutputAdjoint> result;
+  for (size_t o = 0; o < p_.outputs.size(); ++o) {
+    const oracle::Region& region = p_.runs.front()[o];
+    std::vector<Buffer<float>> seeds;
+    for (int k = 0; k < p_.outputs[o].outputs(); ++k)
+      seeds.push_back(seed(static_cast<int>(seeds_.size()) + k, region));
+    seeds_.insert(seeds_.end(), seeds.begin(), seeds.end());
+    result.push_back({p_.outputs[o], reading(seeds, "w"), bounds(region)});
+  }
+  return result;
+}
+
 // Values from -1 to 1, in a pattern that no program contains.
-Buffer<float> GradientPipeline::seed(int k) const {
-  Buffer<float> result(p_.region().extents, "w" + std::to_string(k));
-  result.set_min(p_.region().mins);
-  auto state = static_cast<uint32_t>(k + 1) * 2654435761u;
+Buffer<float> GradientPipeline::seed(int number, const oracle::Region& region) const {
+  Buffer<float> result(region.extents, "w" + std::to_string(number));
+  result.set_min(region.mins);
+  auto state = static_cast<uint32_t>(number + 1) * 2654435761u;
   for (size_t i = 0; i < result.number_of_elements(); ++i) {
     state = state * 1664525u + 1013904223u;
     result.data()[i] = static_cast<float>(static_cast<int32_t>(state) >> 8) * 0x1p-23f;
@@ -58,11 +70,11 @@ Buffer<float> GradientPipeline::seed(int k) const {
   return result;
 }
 
-Region GradientPipeline::bounds() const {
+Region GradientPipeline::bounds(const oracle::Region& region) const {
   Region result;
   const bool is_known_late = extents_ == Extents::Parameters || extents_ == Extents::Estimated;
-  for (size_t d = 0; d < p_.region().mins.size(); ++d) {
-    Range side{Expr(p_.region().mins[d]), Expr(p_.region().extents[d])};
+  for (size_t d = 0; d < region.mins.size(); ++d) {
+    Range side{Expr(region.mins[d]), Expr(region.extents[d])};
     const int factor = extents_ == Extents::Estimated ? 2 : 0;
     if (is_known_late) side = {parameter(side.min, factor), parameter(side.extent, factor)};
     result.push_back(side);
@@ -111,10 +123,13 @@ Buffers GradientPipeline::realize(Pipeline pipeline, JITUserContext* context) co
 }
 
 int64_t GradientPipeline::largest_bytes() const {
-  const std::vector<graph::FuncPtr> primal = graph::copy_graph({p_.output().function()}).outputs;
-  Func output(primal[0]);
-  for (size_t d = 0; d < p_.region().mins.size(); ++d)
-    output.set_estimate(output.args()[d], p_.region().mins[d], p_.region().extents[d]);
+  const std::vector<graph::FuncPtr> primal = graph::copy_graph(contents_of(p_.outputs)).outputs;
+  for (size_t o = 0; o < primal.size(); ++o) {
+    Func output(primal[o]);
+    const oracle::Region& region = p_.runs.front()[o];
+    for (size_t d = 0; d < region.mins.size(); ++d)
+      output.set_estimate(output.args()[d], region.mins[d], region.extents[d]);
+  }
   const autoschedule::SizeEstimate sizes(primal);
   int64_t largest = 0;
   for (const graph::FuncPtr& f : graph::topological_order(primal))

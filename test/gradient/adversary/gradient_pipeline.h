@@ -41,9 +41,10 @@ class GradientPipeline {
   int64_t callers_bytes() const;
 
  private:
-  Region bounds() const;
+  Region bounds(const oracle::Region& region) const;
   void add(const Func& f, const oracle::Region& region);
-  Buffer<float> seed(int k) const;
+  std::vector<OutputAdjoint> seeded_outputs();
+  Buffer<float> seed(int number, const oracle::Region& region) const;
 
   const AdversaryProgram& p_;
   const Extents extents_;

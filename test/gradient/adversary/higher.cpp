@@ -20,7 +20,7 @@ class Higher {
     if (s_.is_late()) return;
     compare_with_differences();
     if (s_.is_late()) return;
-    compare("tangents of tangents", weighted_output(tangent_twice()), second_);
+    compare("tangents of tangents", tangents_of_tangents(), second_);
     if (s_.is_late()) return;
     if (s_.weights.below(2) == 0) {
       compare("adjoints of tangents", adjoint_of_tangent(), second_);
@@ -37,14 +37,22 @@ class Higher {
   Product u_and_v() const {
     return v_.along([&](const AdjointInput& x) { return along(d_.of(x), u_.directions()); });
   }
-  Func tangent() const { return along(s_.program.output(), v_.directions()); }
-  Func tangent_twice() const { return along(tangent(), u_.directions()); }
-  Product weighted_output(const Func& f) const {
+  Func tangent(const SeededOutput& of) const { return along(of.output, v_.directions()); }
+  Func tangent_twice(const SeededOutput& of) const { return along(tangent(of), u_.directions()); }
+  static Product weighted_output(const Func& f, const SeededOutput& like) {
     if (!f.defined()) return {};
-    return weighted(evaluate(f, s_.program.region()), s_.program.region(), s_.w);
+    return weighted(evaluate(f, like.region), like.region, like.w);
+  }
+  Product tangents_of_tangents() const {
+    return s_.total(
+        [&](const SeededOutput& each) { return weighted_output(tangent_twice(each), each); });
   }
   Product adjoint_of_tangent() const {
-    const Derivative d = propagate_adjoints(tangent(), s_.seed, s_.bounds(), s_.options());
+    std::vector<OutputAdjoint> tangents = s_.adjoints();
+    for (size_t i = 0; i < tangents.size(); ++i) tangents[i].output = tangent(s_.outputs[i]);
+    std::erase_if(tangents, [](const OutputAdjoint& each) { return !each.output.defined(); });
+    if (tangents.empty()) return {};
+    const Derivative d = propagate_adjoints(tangents, s_.options());
     return u_.along([&](const AdjointInput& x) { return d.of(x); });
   }
   // The adjoint of an adjoint: the derivative of the sum over inputs of <v, gradient>, one input at a time.
@@ -61,8 +69,7 @@ class Higher {
       const Derivative d =
           propagate_adjoints(gradient, directions[i].tangent, bounds, s_.options());
       const Product part = u_.along([&](const AdjointInput& x) { return d.of(x); });
-      result.sum += part.sum;
-      result.magnitude += part.magnitude;
+      result.add(part);
     }
     return result;
   }
@@ -84,7 +91,7 @@ class Higher {
       return result.sum;
     };
     const Slope slope = slope_of(moved, first_.sum, second_.magnitude, first_.magnitude,
-                                 10 * precision_of(s_.program.output()));
+                                 10 * precision_of(s_.program.outputs));
     if (!slope.is_smooth) return;
     if (std::abs(slope.value - second_.sum) <= slope.doubt) return;
     decide(Judgement::Wrong, text("tangents of adjoints say ", second_.sum, " and differences ",
@@ -94,7 +101,9 @@ class Higher {
   void compare_third() const {
     const auto u = u_.directions(), v = v_.directions();
     const Product a = v_.along([&](const AdjointInput&x) { return along(along(d_.of(x), u), v); }),
-                  b = weighted_output(along(tangent_twice(), v));
+                  b = s_.total([&](const SeededOutput&each) {
+                    return weighted_output(along(tangent_twice(each), v), each);
+                  });
     if (!a.is_finite() || !b.is_finite()) return;
     const double slack = 1e-8 * (a.magnitude + b.magnitude + second_.magnitude + 1 + s_.largest);
     if (std::abs(a.sum - b.sum) <= slack) return;

@@ -70,7 +70,8 @@ class Compiled {
     AdjointOptions options = s_.program.options;
     for (size_t i = 0; i < twin.images.size(); ++i) options.wrt.push_back(twin.image(i));
     options.wrt.push_back(twin.scale);
-    const Derivative d = propagate_adjoints(twin.output(), s_.seed, s_.bounds(), options);
+    const Derivative d =
+        propagate_adjoints(twin.output(), s_.first().seed, s_.first().bounds(), options);
     for (size_t i = 0; i < options.wrt.size(); ++i) {
       const Func gradient = d.of(options.wrt[i]);
       if (gradient.defined() && gradients_[i].first.defined())
@@ -81,10 +82,11 @@ class Compiled {
  private:
   bool primal_runs() const {
     try {
-      Func output = s_.program.output();
-      std::vector<Buffer<>> results;
-      for (const Type& t : output.types()) results.push_back(room_for(t, s_.program.region()));
-      output.realize(Realization(results));
+      for (const SeededOutput& each : s_.outputs) {
+        std::vector<Buffer<>> results;
+        for (const Type& t : each.output.types()) results.push_back(room_for(t, each.region));
+        Func(each.output).realize(Realization(results));
+      }
       return true;
     } catch (const UserError& error) {
       decide_by_access(error);
@@ -154,7 +156,7 @@ class Compiled {
 int compare_machine_code(Subject& s, const Derivative& derivative, const Gradients& gradients,
                          const AdversaryProgram* twin) {
   Compiled code(s, gradients);
-  if (!code.compare_unscheduled()) return 0;
+  if (!code.compare_unscheduled()) return -1;
   try {
     if (twin) code.compare_twin(*twin);
   } catch (const UserError& error) {  // operands of a C function must have bounds, and no versions

@@ -21,6 +21,10 @@ void Product::add(double a, double b) {
   sum += a * b;
   magnitude += std::abs(a * b);
 }
+void Product::add(const Product& other) {
+  sum += other.sum;
+  magnitude += other.magnitude;
+}
 bool Product::is_finite() const { return std::isfinite(sum) && std::isfinite(magnitude); }
 
 Buffer<float> Weights::over(const oracle::Region& region, const std::string& name) {
@@ -193,10 +197,23 @@ bool is_finite(const oracle::Array& values) {
                      [](const oracle::Value& v) { return std::isfinite(as_double(v)); });
 }
 
-Region Subject::bounds() const {
+Region SeededOutput::bounds() const {
   Region result;
-  for (size_t d = 0; d < program.region().mins.size(); ++d)
-    result.push_back({Expr(program.region().mins[d]), Expr(program.region().extents[d])});
+  for (size_t d = 0; d < region.mins.size(); ++d)
+    result.push_back({Expr(region.mins[d]), Expr(region.extents[d])});
+  return result;
+}
+
+Product Subject::total(const std::function<Product(const SeededOutput&)>& of) const {
+  Product result;
+  for (const SeededOutput& each : outputs) result.add(of(each));
+  return result;
+}
+
+std::vector<OutputAdjoint> Subject::adjoints() const {
+  std::vector<OutputAdjoint> result;
+  for (const SeededOutput& each : outputs)
+    result.push_back({each.output, each.seed, each.bounds()});
   return result;
 }
 

@@ -26,6 +26,7 @@ void decide_by_access(const UserError& error);
 struct Product {
   double sum = 0, magnitude = 0;
   void add(double a, double b);
+  void add(const Product& other);
   bool is_finite() const;
 };
 
@@ -80,15 +81,26 @@ class Motion {
   float of_scale_;
 };
 
-// One program and the seed of its gradient.
+// One output and the seed of its gradient.
+struct SeededOutput {
+  Func output;
+  oracle::Region region;
+  std::vector<Buffer<float>> w;  // one for each value of the output
+  Func seed;
+  Region bounds() const;
+};
+
+// One program and the seeds of its gradient.
 struct Subject {
   const AdversaryProgram& program;
   Weights weights;
-  std::vector<Buffer<float>> w = {};  // one for each value of the output
-  Func seed = {};
+  std::vector<SeededOutput> outputs = {};
   double largest = 0;  // the largest sum of magnitudes in the primal
   std::clock_t begun = std::clock();
-  Region bounds() const;
+  const SeededOutput& first() const { return outputs.front(); }
+  // The sum over all outputs of `of`.
+  Product total(const std::function<Product(const SeededOutput&)>& of) const;
+  std::vector<OutputAdjoint> adjoints() const;
   AdjointOptions options() const;  // options that request gradients by inputs only
   // The interpreter has already taken long: expensive checks that have not begun are skipped.
   bool is_late() const;
@@ -98,7 +110,7 @@ struct Subject {
 
 // Whether a sine may turn within one step of the differences, given the sum of slopes along the direction. Differences
 // see such a sine as noise, whatever its derivative is. (Found with sin(9^8 x).)
-bool turns_within_a_step(const Func& output, double slope);
+bool turns_within_a_step(const std::vector<Func>& outputs, double slope);
 
 // The slope of f at 0, by sixth-order central differences. is_smooth: one-sided slopes agree.
 struct Slope {
@@ -110,7 +122,7 @@ Slope slope_of(const std::function<double(double)>& f, double at_rest, double sc
                double precision);
 // The precision of the narrowest floats of a program. Partials have that precision, even if they are computed in
 // double.
-double precision_of(const Func& output);
+double precision_of(const std::vector<Func>& outputs);
 
 // ---- machine code ----
 
@@ -125,7 +137,8 @@ void compare_higher(Subject& s, const Motion& v, const Derivative& derivative);
 void compare_dense(Subject& s);
 // The gradient by each input; undefined if the input is not read.
 using Gradients = std::vector<std::pair<Func, oracle::Region>>;
-// Returns the number of gradients that also have machine code under a random schedule. twin: null, or the same program
+// Returns the number of gradients that also have machine code under a random schedule; -1: the program itself does not
+// run as machine code. twin: null, or the same program
 // with an extern stage.
 int compare_machine_code(Subject& s, const Derivative& derivative, const Gradients& gradients,
                          const AdversaryProgram* twin);

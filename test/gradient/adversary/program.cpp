@@ -33,6 +33,22 @@ AdversaryProgram make_adversary(Choices& choices, const fuzz::Style& style) {
   return p;
 }
 
+// Overwritten values are kept, as users get them by default: a workload should not be refused.
+AdversaryProgram make_workload_adversary(Choices& choices, fuzz::Workload kind) {
+  AdversaryProgram p{fuzz::make_workload(choices, kind), {}, false, {}};
+  p.options.overwritten = choices.chance(30) ? Overwritten::Store : Overwritten::Auto;
+  p.only_inputs = !choices.chance(30);
+  if (choices.chance(p.has_loop ? 15 : 0)) p.options.checkpoint_states = choices.between(1, 4);
+  p.checks.order = choices.chance(12) ? 2 : 1;
+  p.checks.dense = choices.chance(4);
+  p.checks.schedule = choices.chance(40) ? choices.between(1, 1 << 16) : 0;
+  p.checks.primal = choices.chance(40);
+  p.checks.wild = choices.chance(15);
+  p.checks.several = choices.chance(20);
+  p.checks.one_input = choices.chance(30);
+  return p;
+}
+
 std::string to_text(const AdversaryProgram& program) {
   const char* const overwritten = program.options.overwritten == Overwritten::Store ? "values kept"
                                   : program.options.overwritten == Overwritten::Refuse

@@ -35,14 +35,16 @@ AdversaryProgram large(Choices& choices, fuzz::LargeSizes sizes) {
 
 }  // namespace
 
-ScheduledProgram make_scheduled(Choices& choices) {
+ScheduledProgram make_scheduled(Choices& choices, std::optional<fuzz::Workload> workload) {
   const int kind = choices.below(20);
-  const bool is_large = kind >= 12;
+  const bool is_large = kind >= 12 && !workload;
   ScheduledProgram result;
   result.extents = choose_extents(choices, is_large);
   result.told = choose_options(choices);
   result.is_whole = !choices.chance(20);
-  if (is_large) {
+  if (workload) {
+    result.program = make_workload_adversary(choices, *workload);
+  } else if (is_large) {
     Choices again = choices;
     result.small = large(again, fuzz::LargeSizes::Small);
     result.program = large(choices, fuzz::LargeSizes::Full);
@@ -51,8 +53,10 @@ ScheduledProgram make_scheduled(Choices& choices) {
         make_adversary(choices, kind < 8 ? fuzz::Style::gradients()
                                          : fuzz::Style::pieces());  // programs of any size
   }
-  std::vector<int>& sides = result.program.runs.front().front().extents;
-  if (result.extents == Extents::One) std::fill(sides.begin(), sides.end(), 1);
+  for (oracle::Region& region : result.program.runs.front()) {
+    std::vector<int>& sides = region.extents;
+    if (result.extents == Extents::One) std::fill(sides.begin(), sides.end(), 1);
+  }
   return result;
 }
 

@@ -19,7 +19,7 @@ struct ScheduledProgram {
 };
 
 // Throws UserError if the choices describe no legal program.
-ScheduledProgram make_scheduled(Choices& choices);
+ScheduledProgram make_scheduled(Choices& choices, std::optional<fuzz::Workload> workload = {});
 std::string to_text(const ScheduledProgram& scheduled);
 
 }  // namespace retrograde::gradient

@@ -9,6 +9,7 @@
 #include "graph/graph.h"
 #include "ir/visit.h"
 #include "support/same_numbers.h"
+#include "testing/programs/workloads.h"
 #include "testing/random_schedule.h"
 
 namespace retrograde::fuzz {
@@ -135,6 +136,36 @@ TEST(RandomPrograms, OfGradientsCoverEveryStructure) {
   expect_all(Style::pieces(), 100,
              {"Func stencil", "Func window", "Func argmax", "Func argmin", "Func border",
               "Func half", "Func rows", "Func bins", "Func filter", "Func pointwise"});
+}
+
+// A kind draws only its own pieces.
+TEST(RandomPrograms, OfWorkloadsCoverEveryForm) {
+  const std::map<Workload, std::vector<std::string>> forms{
+      {Workload::TimeLoops,
+       {"Func state", "Func last", "Func change", "Func steps", "Func trace", "Func some",
+        "Func swept", "Func relaxed", "Func filtered", "Func aligned", "Func powers"}},
+      {Workload::Strides,
+       {"Func conv", "Func dilated", "Func transposed", "Func phases", "Func frames", "Func signal",
+        "Func down", "Func up", "Func coarse", "Func fine", "Func shuffled", "Func unshuffled",
+        "Func parity", "Func interleaved", "Func swapped", "Func cyclic", "Func lifted"}},
+      {Workload::IndexArrays,
+       {"Func gathered", "Func rows", "Func pairs", "Func bag", "Func scattered", "Func stored",
+        "Func message", "Func received", "Func product", "Func segments", "Func residual",
+        "Func luma", "Func norm", "Func colours", "Func turned", "Func interpolated",
+        "Func beyond"}}};
+  for (const auto& [kind, wanted] : forms) {
+    Counts seen;
+    std::map<size_t, int> outputs;
+    for (uint64_t seed = 0; seed < 300; ++seed) {
+      Choices choices(seed);
+      const RandomProgram program = make_workload(choices, kind);
+      ASSERT_NO_THROW(graph::validate(graph::graph_of(outputs_of(program)), "make_workload"));
+      ++outputs[program.outputs.size()];
+      for (const auto& [what, n] : counts_of(program)) seen[what] += n;
+    }
+    for (const std::string& what : wanted) EXPECT_GT(seen[what], 0) << what;
+    for (const size_t n : {1u, 2u, 3u}) EXPECT_GT(outputs[n], 60) << n << " outputs";
+  }
 }
 
 TEST(RandomPrograms, CoverEveryDirectiveAndPlacement) {
