@@ -21,8 +21,8 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int64_t terms_of_block = 256;  // that a lane adds
-constexpr int64_t long_chain = 1024;     // terms of a lane from which blocks pay
+constexpr int64_t terms_of_block = 64;  // that a lane adds
+constexpr int64_t long_chain = 512;     // terms of a lane from which blocks pay
 
 int64_t iterations_of(const ReductionVariable& r, int lanes) {
   const int64_t extent = as_const_int(simplify(r.extent)).value_or(INT32_MAX);

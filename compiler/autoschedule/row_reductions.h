@@ -9,8 +9,8 @@
 // cache line, where a vector of terms is one load. The partial results stay in registers over all loops of the
 // reduction. Several vectors of one row hide the latency of the addition.
 //
-// Long sums of floats are added in blocks, each of which has its own partial results. Lanes of a block are added in
-// pairs. An element of 131,072 terms has an error of 1e-7 of the sum of their absolute values instead of 1e-3.
+// Long sums of floats are added in blocks (long_sums.h), each of which has its own partial results. Lanes of a block are
+// added in pairs.
 //
 // The values of a Tuple, such as an extreme and its place, have partial results for each lane, which are combined one
 // after the other.

@@ -111,17 +111,41 @@ TEST(RowReductions, StopWhereAPredicateDoes) {
 
 // Float32 sums of 131,072 equal terms lose three digits in their declared order.
 TEST(RowReductions, KeepTheDigitsOfLongSums) {
-  constexpr int terms = 1 << 17, few = 17;
-  Buffer<float> in(terms, few);
-  in.fill(0.1f);
-  Func f("f");
-  const RDom r(0, terms, "r");
-  f(y) = 0.0f;
-  f(y) += in(r, y);
-  f.bound(y, 0, few);
-  const Buffer<float> found = scheduled(f).realize({few});
+  constexpr int terms = 1 << 17, few = 37;
   const double exact = 0.1f * static_cast<double>(terms);
-  for (int i = 0; i < few; ++i) EXPECT_NEAR(found(i), exact, 3e-6 * exact) << i;
+  for (const bool along_rows : {true, false}) {
+    Buffer<float> in = along_rows ? Buffer<float>(terms, few) : Buffer<float>(few, terms);
+    in.fill(0.1f);
+    Func f("f");
+    const RDom r(0, terms, "r");
+    f(y) = 0.0f;
+    f(y) += along_rows ? in(r, y) : in(y, r);
+    f.bound(y, 0, few);
+    const Buffer<float> found = scheduled(f).realize({few});
+    for (int i = 0; i < few; ++i) EXPECT_NEAR(found(i), exact, 2e-6 * exact) << i << along_rows;
+  }
+}
+
+// Neither rows nor their number are multiples of blocks.
+TEST(RowReductions, AddAllTermsOfBlocks) {
+  constexpr int width = 4099, height = 67, few = 21;
+  const auto sum = [](bool along_rows) {
+    const Buffer<float> in = gradient::random_image(
+        along_rows ? std::vector<int>{width, height, few} : std::vector<int>{few, width, height},
+        -1, 2, 3);
+    Func f("f");
+    const RDom r(0, width, 0, height, "r");
+    f(y) = 0.0f;
+    f(y) += along_rows ? in(r.x, r.y, y) : in(y, r.x, r.y);
+    f.bound(y, 0, few);
+    return f;
+  };
+  for (const bool along_rows : {true, false}) {
+    const Buffer<float> found = scheduled(sum(along_rows)).realize({few});
+    const Buffer<float> expected = sum(along_rows).realize({few});
+    for (int i = 0; i < few; ++i)
+      EXPECT_NEAR(found(i), expected(i), 1e-4 * std::abs(expected(i))) << i << along_rows;
+  }
 }
 
 TEST(RowReductions, RunOverPlanesOfSeveralDimensions) {
