@@ -76,6 +76,18 @@ TEST_F(UnboundedReads, InUpdates) {
   expect_right(sums);
 }
 
+// The one element that a stage of one point reads: its place is known to be inside of the image by a promise only.
+TEST_F(UnboundedReads, AtAPromisedIndexOfOneElement) {
+  constexpr int size = 9;
+  Buffer<float> line = random_image({size}, -1, 1, 5);
+  Buffer<int> indices({1}, "indices");
+  indices(0) = 4;
+  Func out("out");
+  out(x) = line(unsafe_promise_clamped(indices(x), 0, size - 1)) * 0.75f;
+  const Func loss = weighted_sum(out, {1});
+  expect_gradient(loss, propagate_adjoints(loss), line);
+}
+
 TEST_F(UnboundedReads, LeaveTheirFuncWithoutAnAdjoint) {
   const Func bounded = repeated(Func(image), all);
   const Derivative d = propagate_adjoints(weighted_sum(warped(bounded), {n, n}));

@@ -160,6 +160,19 @@ std::optional<isl::pw_aff> IslBridge::bits(const Call& c, const Expr& e) {
                                            : c.args[0] % factor);
 }
 
+namespace {
+
+// Whether the call promises the range of a value that isl cannot represent. The parameter that stands for it keeps the
+// promise, so that an element at this place has bounds.
+bool promises_data(const Call& c) {
+  if (!c.is_op(Op::promise_clamped, Op::unsafe_promise_clamped)) return false;
+  if (const auto* read = c.args[0].as<Call>()) return read->call_type != CallType::Operator;
+  const auto* cast = c.args[0].as<Cast>();
+  return cast && (cast->value.type().is_float() || cast->value.type().bits() < 32);
+}
+
+}  // namespace
+
 std::optional<isl::pw_aff> IslBridge::affine(const Expr& e) {
   return known_.get(e, [&] { return affine_form(e); });
 }
@@ -192,6 +205,7 @@ std::optional<isl::pw_aff> IslBridge::affine_form(const Expr& e) {
         return exact ? affine(c.value) : obstacle(e);
       },
       [&](const Call& c) -> std::optional<isl::pw_aff> {
+        if (promises_data(c)) return obstacle(e);
         return c.is_marker() ? affine(c.args[0]) : bits(c, e);
       },
       [&](const ExprNode&) { return obstacle(e); });
