@@ -58,7 +58,8 @@ bool interleaves_rows(const FuncContents& f) {
   return std::ranges::any_of(f.pure->values, [&](const Expr& value) {
     return any_node(value, [&](const Call& call) {
       return call.call_type != CallType::Operator &&
-             std::ranges::any_of(call.args, [&](const Expr& index) { return any_node(index, divides); });
+             std::ranges::any_of(call.args,
+                                 [&](const Expr& index) { return any_node(index, divides); });
     });
   });
 }

@@ -168,7 +168,8 @@ TEST(PassedReads, OnlyFuncsThatReadOneElementLookUp) {
 // A transposed convolution: image -> padded -> spread -> out.
 struct Transposed {
   int stride, taps;
-  Buffer<float> image = random_image({9}, -1.0, 1.0, 5), kernel = random_image({taps}, -1.0, 1.0, 6);
+  Buffer<float> image = random_image({9}, -1.0, 1.0, 5);
+  Buffer<float> kernel = random_image({taps}, -1.0, 1.0, 6);
   Func spread{"spread"}, out{"out"};
   Func loss = define();
 

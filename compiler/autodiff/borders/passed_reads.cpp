@@ -70,9 +70,10 @@ bool sums_no_more(const Inversion& passed, const LeafAdjoint& leaf, const Invers
            !i.gathers[0].scatters && i.gathers[0].is_everywhere();
   };
   const auto* call = leaf.leaf.as<Call>();
-  const bool divides = call && std::ranges::any_of(call->args, [](const Expr& index) {
-                         return any_node(index, [](const Expr& e) { return e.kind() == Kind::Div; });
-                       });
+  const auto has_quotient = [](const Expr& index) {
+    return any_node(index, [](const Expr& e) { return e.kind() == Kind::Div; });
+  };
+  const bool divides = call && std::ranges::any_of(call->args, has_quotient);
   if (!divides || !is_sum(passed) || !is_sum(direct)) return false;
   const auto &a = passed.gathers[0].rdom->vars, &b = direct.gathers[0].rdom->vars;
   return std::ranges::equal(a, b, [](const ReductionVariable& r, const ReductionVariable& s) {

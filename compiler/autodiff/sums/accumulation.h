@@ -1,9 +1,10 @@
 // accumulation.h -- builds the adjoint of one Func, image or parameter from its contributions.
 //
 // Contributions that reach each element at most once are summed in the pure definition. The others become update
-// definitions; contributions that can share an update do (taps.h). Gathers whose indices divide by a stride are summed by
-// its phases, in a Func of their own that the pure definition reads (phases.h). Short gathers whose predicates differ only at
-// borders are merged, too: their predicates become selects. Each kind of accumulation owns its elements as follows.
+// definitions; contributions that can share an update do (taps.h). Gathers whose indices divide by a stride are summed
+// by its phases, in a Func of their own that the pure definition reads (phases.h). Short gathers whose predicates differ
+// only at borders are merged, too: their predicates become selects. Each kind of accumulation owns its elements as
+// follows.
 //   gather      Iterations of an element's own pure variables write it, so parallel loops over these are race-free.
 //   scatter     An index depends on data. Iterations run serially for each element of the pure dimensions; indices and
 //               terms are computed in vectors.

@@ -62,7 +62,8 @@ int64_t period_of(const Contribution& c, const AdjointTarget& target) {
   if (!sums_at_each_element(c.gather) || target.region.size() != target.args.size()) return 1;
   const std::string& row = target.args[0];
   const int64_t of_terms = period_in(c.adjoint, row);
-  const int64_t of_predicate = c.gather.predicate.defined() ? period_in(c.gather.predicate, row) : 1;
+  const Expr& predicate = c.gather.predicate;
+  const int64_t of_predicate = predicate.defined() ? period_in(predicate, row) : 1;
   const int64_t period = of_terms * of_predicate == 0 ? 1 : std::lcm(of_terms, of_predicate);
   if (period <= 1 || period > longest_period) return 1;
   const auto extent = constant_extent(target.region[0].range());

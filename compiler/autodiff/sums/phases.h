@@ -12,8 +12,8 @@
 // Method: with the period P of all divisions in y (analysis/periods.h), y = P * q + p - offset with 0 <= p < P, and no
 // division contains q. Only the first dimension is split: its neighbours are the lanes of vectors. In others a division
 // is the same for all lanes.
-// Not done: contributions that reach an element at most once, which need no loop (lower/interleave_vectors splits them);
-// few blocks of a short period, which fill half a vector.
+// Not done: contributions that reach an element at most once, which need no loop (lower/interleave_vectors splits
+// them); few blocks of a short period, which fill half a vector.
 // Source: polyphase decomposition (Vaidyanathan, Multirate Systems and Filter Banks, 1993, chapter 4).
 #pragma once
 

@@ -21,6 +21,8 @@ constexpr double elements_an_iteration = 4;
 constexpr int least_parts = 4;
 // The number of elements of one part of a scatter, lanes included, that fit a near cache.
 constexpr double near_elements = 1 << 14;
+// The number of elements of a gather whose lanes are worth the way to a far cache.
+constexpr double far_elements = 1 << 16;
 // Memory budget in bytes for all parts of one adjoint. A larger target is accumulated in place, in parallel over its
 // pure dimensions only.
 constexpr double private_bytes = 64 << 20;
@@ -62,7 +64,14 @@ class PartSizes {
     const auto row = as_const_int(g.rdom->vars[0].extent);
     const bool is_short = extent_of(target_.region[0]) * 2 <= lane_count;
     return g.pure[0] && (is_short || reads_across(update)) && (!row || *row >= lane_count) &&
-           elements_of(g) <= near_elements && iterations_of(g, many_iterations) >= lanes_pay;
+           repays_lanes(g);
+  }
+  // Whether the lanes of all elements fit a near cache; those of more elements, as of a layer with many channels, pay if
+  // each sums many terms.
+  bool repays_lanes(const Gather& g) const {
+    const double elements = elements_of(g), iterations = iterations_of(g, many_iterations);
+    return elements <= near_elements ? iterations >= lanes_pay
+                                     : elements <= far_elements && iterations >= many_iterations;
   }
   // Whether the reads are strided for neighbouring elements and contiguous for neighbouring terms.
   bool reads_across(const Iterations& update) const {

@@ -32,6 +32,7 @@ TEST(Periods, OfSeveralDivisionsAreTheirCommonMultiple) {
 
 TEST(Periods, AreUnknownBehindOtherOperations) {
   EXPECT_EQ(period(min(x, 7) / 2), 0);
+  EXPECT_EQ(period(max(likely(x), y) / 2), 0);
   EXPECT_EQ(period(x / y), 0);
   EXPECT_EQ(period(x % 2 + x / (y + 1)), 0);
 }
@@ -59,7 +60,8 @@ TEST(Periods, AreNoSmallerThanTheyMustBe) {
       int smallest = 1;
       while (!repeats(smallest)) ++smallest;
       const Expr e = binary(Kind::Div, x * factor + 1, make_const(Int(32), divisor));
-      EXPECT_EQ(period(e), factor == 0 || divisor == 1 ? 1 : smallest) << factor << " / " << divisor;
+      EXPECT_EQ(period(e), factor == 0 || divisor == 1 ? 1 : smallest)
+          << factor << " / " << divisor;
     }
   }
 }
