@@ -69,7 +69,7 @@ Func reduction(const Reduce& reduce, int width) {
 }
 
 TEST(RowReductions, HaveTheResultsOfTheDeclaredOrder) {
-  for (const Reduce& reduce : {sum_up, subtract, find_maximum, find_minimum, multiply}) {
+  for (const auto& reduce : {sum_up, subtract, find_maximum, find_minimum, multiply}) {
     for (const int width : {64, 100, 1000}) {
       const Func f = scheduled(reduction(reduce, width));
       EXPECT_TRUE(runs_along_rows(f)) << width;
@@ -129,7 +129,7 @@ TEST(RowReductions, KeepTheDigitsOfLongSums) {
 // Neither rows nor their number are multiples of blocks.
 TEST(RowReductions, AddAllTermsOfBlocks) {
   constexpr int width = 4099, height = 67, few = 21;
-  const auto sum = [](bool along_rows) {
+  const auto sum = [&](bool along_rows) {
     const Buffer<float> in = gradient::random_image(
         along_rows ? std::vector<int>{width, height, few} : std::vector<int>{few, width, height},
         -1, 2, 3);
