@@ -176,7 +176,7 @@ WorkloadMaker::Grid WorkloadMaker::residuals(const Grid& a) {
   const Expr at = c_.chance(70) ? of(x) : x % cameras;
   std::vector<Expr> p;
   for (int k = 0; k < parameters; ++k) p.push_back(camera({Expr(k), at}));
-  const Expr point = a(x, 0), angle = sqrt(p[0] * p[0] + p[1] * p[1] + 0.5f);
+  const Expr point = a(x, 0), angle = sqrt(p[0] * p[0] + p[1] * p[1] + 0.25f);
   const Expr turned = point * cos(angle) + p[1] * sin(angle) / angle;
   const Expr depth = 2.5f + turned * turned;
   Expr scale = 1.0f / depth;

@@ -91,7 +91,7 @@ Expr WorkloadMaker::smooth(const Expr& a) {
       [&] { return tanh(a); },
       [&] { return a * a * 0.5f; },
       [&] { return exp(-a * a); },
-      [&] { return sqrt(a * a + 0.5f); },
+      [&] { return sqrt(a * a + 0.25f); },
       [&] { return a / (1.5f + a * a); },
       [&] { return max(a, 0.1f * a); },
   });
