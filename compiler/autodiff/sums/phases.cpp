@@ -57,7 +57,7 @@ bool sums_at_each_element(const Gather& g) {
   return g.rdom && !g.scatters && g.is_everywhere() && !g.lhs.empty();
 }
 
-// Of a contribution; 1 if it stays as it is.
+// The period of a contribution; 1 if it stays as it is.
 int64_t period_of(const Contribution& c, const AdjointTarget& target) {
   if (!sums_at_each_element(c.gather) || target.region.size() != target.args.size()) return 1;
   const std::string& row = target.args[0];
@@ -173,7 +173,7 @@ class PhaseSplitter {
     }
   }
 
-  // Of quotient and phase.
+  // The regions of quotient and phase.
   std::vector<LoopVariable> regions() const {
     const LoopVariable& all = original_.region[0];
     const auto block = [&](const Expr& end) {
