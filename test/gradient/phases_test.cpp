@@ -180,7 +180,7 @@ TEST(Phases, TwoDimensionsAreRight) {
 
 // ---- loops ----
 
-// The statement of the gradient under the schedule that the compiler chooses.
+// The code of the gradient under the schedule that the compiler chooses.
 Stmt lowered(const Func& gradient) {
   const std::vector<graph::FuncPtr> scheduled =
       autoschedule::schedule_unscheduled({gradient.function()});
