@@ -1,5 +1,6 @@
 # retrograde_test(<name>... [SOURCES <file>...] [LAYERS <layer>...] [LIBS <target>...] [LABELS <label>]
-#   [TIMEOUT <seconds>] [SHARDS <n>] [OPTIMIZED] [READS_FILES] [ALONE] [EXPORTS] [RUNTIME])
+#   [TIMEOUT <seconds>] [SHARDS <n>] [CACHED] [OPTIMIZED] [READS_FILES] [ALONE]
+#   [EXPORTS] [RUNTIME])
 #
 # Declares GoogleTest programs that are alike. The source of each is <name>.cpp beside the list that calls this, unless
 # SOURCES names others, relative to CMAKE_CURRENT_SOURCE_DIR. ctest lists the tests of a program one by one.
@@ -10,6 +11,8 @@
 # LABELS       The default is the first folder of the first source.
 # SHARDS       ctest lists <name>.shard_0, <name>.shard_1 ..., each a process that runs its share of the tests: for a
 #              program that takes longer to start than most of its tests to run.
+# CACHED       The test and the programs that it starts keep their machine code in one folder of the build
+#              (RETROGRADE_CACHE_DIR): for tests that compile the same large pipelines again and again.
 # OPTIMIZED    The test itself computes much; see RETROGRADE_QUICK_TESTS.
 # READS_FILES  Define RETROGRADE_TEST_DIR as the folder of the tests. Only on request: a path among the flags keeps
 #              ccache from sharing objects between checkouts.
@@ -35,7 +38,7 @@ function(retrograde_use_precompiled target name)
 endfunction()
 
 function(retrograde_test)
-  cmake_parse_arguments(PARSE_ARGV 0 arg "OPTIMIZED;READS_FILES;ALONE;EXPORTS;RUNTIME" "TIMEOUT;SHARDS"
+  cmake_parse_arguments(PARSE_ARGV 0 arg "CACHED;OPTIMIZED;READS_FILES;ALONE;EXPORTS;RUNTIME" "TIMEOUT;SHARDS"
     "SOURCES;LAYERS;LIBS;LABELS")
   file(RELATIVE_PATH folder ${CMAKE_CURRENT_SOURCE_DIR} ${CMAKE_CURRENT_LIST_DIR})
   foreach(name ${arg_UNPARSED_ARGUMENTS})
@@ -90,6 +93,10 @@ function(retrograde_list_test name)
     set(timeout ${arg_TIMEOUT})
   endif()
   set(properties LABELS "${label}" TIMEOUT ${timeout} RUN_SERIAL ${arg_ALONE})
+  if(arg_CACHED)
+    list(APPEND properties
+      ENVIRONMENT_MODIFICATION "RETROGRADE_CACHE_DIR=set:${PROJECT_BINARY_DIR}/test/compile_cache")
+  endif()
   set(environment
     "LSAN_OPTIONS=print_suppressions=0:suppressions=${CMAKE_CURRENT_SOURCE_DIR}/leaks_of_others.supp")
   if(NOT arg_SHARDS)

@@ -11,6 +11,7 @@ from pathlib import Path
 sources = Path(os.environ["SITE_SOURCES"])
 sys.path[:0] = [os.environ["SITE_TOOLS"], str(sources / "python")]
 
+from sphinx.domains.cpp import ASTDeclaration  # noqa: E402
 from sphinx.ext.autodoc.mock import _MockModule  # noqa: E402
 
 from api.headers import HeaderReader, public_headers  # noqa: E402
@@ -38,6 +39,19 @@ breathe_projects = {"retrograde": str(sources / "xml")}
 breathe_default_project = "retrograde"
 breathe_show_include = False
 cpp_maximum_signature_line_length = 100
+
+def remember_ids():
+    """Sphinx 5 makes the mangled name of every candidate again for every reference: a third of the time."""
+    newest_id = ASTDeclaration.get_newest_id
+
+    def remembered(declaration):
+        if getattr(declaration, "remembered_id", None) is None:
+            declaration.remembered_id = newest_id(declaration)
+        return declaration.remembered_id
+    ASTDeclaration.get_newest_id = remembered
+
+
+remember_ids()
 
 # ---- Python: the stubs and modules that tools/lib/pages/python_package.py writes ----
 autodoc_mock_imports = ["numpy", "torch"]

@@ -59,6 +59,6 @@ retrograde_test(gradient_cost_test READS_FILES
   LIBS retrograde_dep_halide_runtime)
 retrograde_test(gradient_programs_test SOURCES gradient/programs_test.cpp LIBS retrograde_dep_halide_runtime)
 retrograde_test(gradient_suite_test SOURCES gradient/programs_suite_test.cpp ${suite_programs}
-  LIBS retrograde_dep_halide_runtime)
+  LIBS retrograde_dep_halide_runtime SHARDS 8)
 retrograde_test(gradient_threads_test SOURCES gradient/threads_test.cpp gradient/programs_large.cpp
   LIBS retrograde_dep_halide_runtime)
