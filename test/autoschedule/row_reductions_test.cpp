@@ -129,7 +129,7 @@ TEST(RowReductions, KeepTheDigitsOfLongSums) {
 // Neither rows nor their number are multiples of blocks.
 TEST(RowReductions, AddAllTermsOfBlocks) {
   constexpr int width = 4099, height = 67, few = 21;
-  const auto sum = [](bool along_rows) {
+  const auto sum = [&](bool along_rows) {
     const Buffer<float> in = gradient::random_image(
         along_rows ? std::vector<int>{width, height, few} : std::vector<int>{few, width, height},
         -1, 2, 3);
