@@ -64,10 +64,10 @@ TEST(RandomUpdates, AreTheSameWithABudgetForStates) {
     Weights weights(seed);
     std::vector<Buffer<float>> w;
     for (int k = 0; k < p.output().outputs(); ++k) w.push_back(weights.over(p.region(), "w"));
-    const Func adjoint = reading(w, "w");
+    const SeededOutput seeded{p.output(), p.region(), w, reading(w, "w")};
     const auto gradient = [&](std::optional<int> states) {
       const Derivative d = propagate_adjoints(
-          p.output(), adjoint, Subject{p, weights}.bounds(),
+          seeded.output, seeded.seed, seeded.bounds(),
           {.overwritten = Overwritten::Store, .wrt = {p.image(0)}, .checkpoint_states = states});
       const Func by_image = d.of(p.image(0));
       return by_image.defined()
