@@ -21,21 +21,34 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int64_t terms_of_block = 64;  // that a lane adds
-constexpr int64_t long_chain = 512;     // terms of a lane from which blocks pay
+constexpr int64_t least_of_block = 64, most_of_block = 256;  // terms that a lane adds
+constexpr int64_t long_chain = 512;  // terms of a lane from which blocks pay
 
 int64_t iterations_of(const ReductionVariable& r, int lanes) {
   const int64_t extent = as_const_int(simplify(r.extent)).value_or(INT32_MAX);
   return (extent + lanes - 1) / lanes;
 }
 
-bool is_long(const std::vector<ReductionVariable>& loops, int lanes) {
+// That a lane adds in all, or the given number if there are more.
+int64_t terms_of(const std::vector<ReductionVariable>& loops, int lanes, int64_t most) {
   int64_t terms = 1;
   for (const ReductionVariable& r : loops) {
     terms *= std::max<int64_t>(iterations_of(r, &r == &loops[0] ? lanes : 1), 1);
-    if (terms > long_chain) return true;
+    if (terms > most) return most;
   }
-  return false;
+  return terms;
+}
+
+bool is_long(const std::vector<ReductionVariable>& loops, int lanes) {
+  return terms_of(loops, lanes, long_chain + 1) > long_chain;
+}
+
+// About as many as there are blocks: the error is that of both chains.
+int64_t terms_of_block(const std::vector<ReductionVariable>& loops, int lanes) {
+  const int64_t terms = terms_of(loops, lanes, most_of_block * most_of_block);
+  int64_t block = least_of_block;
+  while (4 * block * block <= terms) block *= 2;
+  return std::min(block, most_of_block);
 }
 
 // Whether iterations of the reduction write different elements.
@@ -50,15 +63,16 @@ bool moves(const Definition& update) {
 std::vector<RVar> cut(const FuncContents& f, int index, Stage& stage,
                       const std::vector<ReductionVariable>& loops, int lanes) {
   std::vector<RVar> blocks;
+  const int64_t most = terms_of_block(loops, lanes);
   int64_t terms = 1;  // of a block so far
   for (const ReductionVariable& r : loops) {
     const int64_t iterations = iterations_of(r, &r == &loops[0] ? lanes : 1);
-    if (blocks.empty() && terms * iterations <= terms_of_block) {
+    if (blocks.empty() && terms * iterations <= most) {
       terms *= std::max<int64_t>(iterations, 1);
       continue;
     }
     RVar block(r.var);
-    const int64_t inside = blocks.empty() ? terms_of_block / terms : 1;
+    const int64_t inside = blocks.empty() ? most / terms : 1;
     if (inside > 1) {
       block = RVar(new_loop(f, index, "block"));
       stage.split(RVar(r.var), block, RVar(r.var), static_cast<int>(inside),
