@@ -10,6 +10,7 @@
 #include "autoschedule/new_loop.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
+#include "graph/definitions/own_reads.h"
 #include "graph/definitions/race_checks.h"
 #include "ir/build.h"
 #include "ir/visit.h"
@@ -22,6 +23,7 @@ namespace {
 using Names = std::vector<std::string>;
 
 constexpr size_t most_variables = 5;
+constexpr size_t most_clamps = 5;  // of an access: with more, proofs take long and seldom succeed
 constexpr int64_t least_row = 4;
 constexpr int chunk_of_row = 2048;  // elements that are a task, if a step is a single row
 // Operations that are worth the launch of a parallel loop, which takes about 10 microseconds.
@@ -58,7 +60,9 @@ class StepFinder {
   // As few steps as possible, the outermost variables first; more only for the sake of vectors.
   StepVariables find() {
     const size_t count = variables_.size();
-    if (count == 0 || count > most_variables || point_number(update_)) return {};
+    if (count == 0 || count > most_variables || point_number(update_) ||
+        clamps_of_an_access() > most_clamps)
+      return {};
     for (const std::string& variable : variables_)
       is_apart_.push_back(graph::can_prove_race_free(f_, update_, variable));
     StepVariables best;
@@ -78,6 +82,23 @@ class StepFinder {
   }
 
  private:
+  // The average number of minima and maxima in the coordinates of an access. A proof looks at the cases of each.
+  size_t clamps_of_an_access() const {
+    size_t clamps = 0;
+    const auto count = [&](const std::vector<Expr>& coordinates) {
+      for (const Expr& e : coordinates) {
+        walk(e, [&](const Expr& part) {
+          clamps += part.kind() == Kind::Min || part.kind() == Kind::Max;
+          return true;
+        });
+      }
+    };
+    const std::vector<Expr> reads = graph::own_reads(f_, update_);
+    count(update_.args);
+    for (const Expr& read : reads) count(read.as<Call>()->args);
+    return clamps / (reads.size() + 1);
+  }
+
   bool has_apart(unsigned bits) const {
     for (size_t i = 0; i < is_apart_.size(); ++i) {
       if ((bits >> i & 1u) && is_apart_[i]) return true;
