@@ -4,6 +4,7 @@
 #include <bit>
 #include <unordered_set>
 
+#include "autodiff/borders/border_conditions.h"
 #include "autodiff/updates/numbering.h"
 #include "autodiff/updates/recurrence.h"
 #include "autodiff/updates/versions.h"
@@ -106,8 +107,17 @@ class InPlaceSteps {
     });
   }
 
-  // Whether the points of a step are a good part of the elements that each step would keep.
+  // Whether the points of a step are a good part of the elements that each step would keep. Those of a triangular
+  // domain become fewer from step to step; a residue, as of red-black orders, keeps a good part.
   bool covers_the_region() const {
+    std::vector<Expr> conditions;
+    add_conjuncts(c_.domain.predicate, conditions);
+    for (const Expr& condition : conditions) {
+      if (is_range_condition(condition) && std::ranges::any_of(loops_.steps, [&](const auto& r) {
+            return uses_variable(condition, r.var);
+          }))
+        return false;
+    }
     const Box& box = c_.query.regions.of(f_);
     for (size_t d = 0; d < box.size(); ++d) {
       if (!box[d].is_bounded()) return false;
