@@ -77,7 +77,8 @@ class CppPrinter {
   std::string loop(const std::string& name, const Source& of) {
     const std::string& id = identifiers_(name);
     if (!declared_.insert(name).second) return id;
-    const size_t dot = name.rfind('.');
+    const bool is_unnamed = log_.places.count("." + name);  // of a domain that the compiler made
+    const size_t dot = is_unnamed ? 0 : name.rfind('.');
     if (dot == std::string::npos && log_.places.count(name)) {
       declarations_ << "Var " << id << " = " << identifiers_(source_of(of).func) << ".args()["
                     << log_.places.at(name) << "];\n";
@@ -94,15 +95,18 @@ class CppPrinter {
   }
   // The position in its domain; empty when unknown.
   std::string index_of(const std::string& name) const {
-    if (const auto place = log_.places.find(name); place != log_.places.end())
-      return std::to_string(place->second);
+    for (const std::string& key : {name, "." + name}) {
+      if (const auto place = log_.places.find(key); place != log_.places.end())
+        return std::to_string(place->second);
+    }
     const std::string variable = name.substr(name.rfind('.') + 1);
     const size_t letter = std::string("xyzw").find(variable);
     if (variable.size() == 1 && letter != std::string::npos) return std::to_string(letter);
     return variable.find_first_not_of("0123456789") == std::string::npos ? variable : "";
   }
   bool is_reduction(const std::string& name) const {
-    return name.find('.') != std::string::npos || reductions_.count(name);
+    return name.find('.') != std::string::npos || log_.places.count("." + name) ||
+           reductions_.count(name);
   }
   // Loops derived from a reduction loop are reduction loops.
   void note(const std::string& old, std::initializer_list<std::string> derived) {

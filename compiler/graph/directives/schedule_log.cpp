@@ -20,7 +20,11 @@ void add_places(const FuncContents& f, std::map<std::string, size_t>& places) {
     if (f.args[d].find('$') != std::string::npos) places.emplace(f.args[d], d);
   }
   for (const Definition& update : f.updates) {
-    for (size_t i = 0; i < update.rvars.size(); ++i) places.emplace(update.rvars[i].var, i);
+    for (size_t i = 0; i < update.rvars.size(); ++i) {
+      const std::string& var = update.rvars[i].var;
+      const bool has_dot = var.find('.') != std::string::npos;  // variables of users' RDoms have
+      places.emplace(has_dot ? var : "." + var, i);
+    }
   }
 }
 

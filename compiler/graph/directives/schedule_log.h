@@ -32,7 +32,8 @@ class ScheduleLog {
   };
   std::vector<Entry> entries;
   // For to_cpp(), where the name does not tell: the positions of reduction variables in their
-  // domains, and of numbered variables among those of their Funcs. Not part of the text.
+  // domains, and of numbered variables among those of their Funcs. Not part of the text. Reduction variables whose names
+  // have no dot, as adjoints have, have one before the name here.
   std::map<std::string, size_t> places = {};
 
   // Requires: every line is a directive of a Func.
