@@ -134,6 +134,8 @@ class SplineDeformation(Program):
     Source: Rueckert et al., Nonrigid registration using free-form deformations, IEEE TMI 1999."""
 
     CELL = 32  # pixels between control points
+    # Coordinates of up to 768 in float32 have fractions of 2^-14, and a floor that they may fall on either side of.
+    tolerance = 5e-3
 
     def inputs(values, small):
         n = 64 if small else 768
