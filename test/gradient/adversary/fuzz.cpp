@@ -26,10 +26,7 @@ int main(int argc, char** argv) {
                             : make_adversary(choices));
   };
   const auto take = [&](fuzz::Fuzzer& fuzzer, const std::string& name, const std::string& value) {
-    if (name != "--style") return false;
-    workload = workload_named(value);
-    fuzzer.most_refused = most_workloads_refused;
-    return workload.has_value();
+    return take_style(fuzzer, name, value, workload);
   };
   return fuzz::fuzz_main({.judge = judge_one,
                           .text = text,

@@ -19,10 +19,7 @@ int main(int argc, char** argv) {
   const auto text = [&](Choices& choices) { return auto_scheduled_text(choices, workload); };
   const auto take = [&](fuzz::Fuzzer& fuzzer, const std::string& name, const std::string& value) {
     if (name == "--memory") return limit_memory(std::atoi(value.c_str())), true;
-    if (name != "--style") return false;
-    workload = workload_named(value);
-    fuzzer.most_refused = most_workloads_refused;
-    return workload.has_value();
+    return take_style(fuzzer, name, value, workload);
   };
   return fuzz::fuzz_main({.judge = judge_one,
                           .text = text,
