@@ -3,7 +3,8 @@
 #   [EXPORTS] [RUNTIME])
 #
 # Declares GoogleTest programs that are alike. The source of each is <name>.cpp beside the list that calls this, unless
-# SOURCES names others, relative to CMAKE_CURRENT_SOURCE_DIR. ctest lists the tests of a program one by one.
+# SOURCES names others, relative to CMAKE_CURRENT_SOURCE_DIR. ctest lists the tests of a program one by one; with
+# RETROGRADE_QUICK_TESTS it runs each program once, because a process needs a tenth of a second to load LLVM.
 #
 # LAYERS       Link only these layers (ir, simplify ...) and what lies below them, instead of the shared library: such a
 #              test builds while a layer above is broken.
@@ -99,18 +100,21 @@ function(retrograde_list_test name)
   endif()
   set(environment
     "LSAN_OPTIONS=print_suppressions=0:suppressions=${CMAKE_CURRENT_SOURCE_DIR}/leaks_of_others.supp")
-  if(NOT arg_SHARDS)
+  if(arg_SHARDS)
+    math(EXPR last "${arg_SHARDS} - 1")
+    foreach(shard RANGE ${last})
+      add_test(NAME ${name}.shard_${shard} COMMAND ${name})
+      set_tests_properties(${name}.shard_${shard} PROPERTIES ${properties}
+        ENVIRONMENT "${environment};GTEST_TOTAL_SHARDS=${arg_SHARDS};GTEST_SHARD_INDEX=${shard}")
+    endforeach()
+  elseif(RETROGRADE_QUICK_TESTS)
+    add_test(NAME ${name} COMMAND ${name})
+    set_tests_properties(${name} PROPERTIES ${properties} ENVIRONMENT "${environment}")
+  else()
     # PRE_TEST: the program is asked for its tests when ctest runs, not on every link.
     gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
       PROPERTIES ${properties} ENVIRONMENT "${environment}")
-    return()
   endif()
-  math(EXPR last "${arg_SHARDS} - 1")
-  foreach(shard RANGE ${last})
-    add_test(NAME ${name}.shard_${shard} COMMAND ${name})
-    set_tests_properties(${name}.shard_${shard} PROPERTIES ${properties}
-      ENVIRONMENT "${environment};GTEST_TOTAL_SHARDS=${arg_SHARDS};GTEST_SHARD_INDEX=${shard}")
-  endforeach()
 endfunction()
 
 # retrograde_many_programs(<name> ...), with the arguments of retrograde_test: a test again, with all of the programs
