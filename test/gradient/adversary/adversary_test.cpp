@@ -21,8 +21,8 @@ namespace {
 constexpr unsigned programs_per_shard = 15, shards = 16, one_compiled_of = 8;
 constexpr unsigned workloads_per_shard = 10, shards_of_workloads = 6;
 constexpr unsigned scheduled_per_shard = 5, shards_scheduled = 6;
-// 240 programs, 60 workloads, and 30 that the compiler schedules; or a third of them: every third shard.
-constexpr unsigned step = many_or_few(1, 3);
+// 240 programs, 60 workloads, and 30 that the compiler schedules; or a quarter of the shards.
+constexpr unsigned step = many_or_few(1, 4);
 
 class Adversary : public ::testing::TestWithParam<unsigned> {};
 
