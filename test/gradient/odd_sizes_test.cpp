@@ -160,6 +160,26 @@ TEST(OddSizes, AReductionOfRunTimeExtentZeroHasAGradientOfZero) {
   }
 }
 
+// The update reads the element beside its own, but it never runs: the gradient reads no index that the program leaves
+// out.
+TEST(OddSizes, UpdatesOverEmptyDomainsNeedNoElements) {
+  ImageParam image(Float(32), 1, "image");
+  Buffer<float> values(5);
+  Buffer<int> indices(1);
+  values.fill(0.5f);
+  indices.fill(2);
+  image.set(values);
+  Var x("x");
+  RDom r(1, 0);
+  Func picked("picked"), state("state"), out("out");
+  picked(x) = image(clamp(indices(x), 0, 4)) * image(clamp(indices(x), 0, 4));
+  state(x) = picked(x);
+  state(r) = state(r + 1) * 0.5f;
+  out() = state(0);
+  const Buffer<float> found = propagate_adjoints(out)(image).realize({5});
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(found(i), i == 2 ? 1.0f : 0.0f) << i;
+}
+
 // One compiled gradient serves seeds of every size. It must not read a row more than the seed has, although bounds of
 // rows and taps taken separately would allow it.
 TEST(OddSizes, AConvolutionsGradientReadsASeedOfRunTimeSizeWhereItIs) {

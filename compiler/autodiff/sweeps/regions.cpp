@@ -25,6 +25,13 @@ std::vector<LoopVariable> loops_of(const FuncContents& f, const Definition& defi
   return loops;
 }
 
+// An update over an empty domain: the range of what it reads of its own Func says nothing.
+bool never_runs(const Definition& definition) {
+  return std::ranges::any_of(definition.rvars, [](const ReductionVariable& r) {
+    return as_const_int(simplify(r.extent)).value_or(1) <= 0;
+  });
+}
+
 // Takes the bounds from `other` where `box` has none: for a data-dependent index only the region that others read is
 // known.
 Box or_else(const Box& box, const Box& other) {
@@ -79,15 +86,16 @@ void Regions::add_func(const FuncPtr& f) {
       const Interval mine = boxes_[f.get()][d];
       return is_pure_position(*f, definition, d) ? mine : bounds_of(definition.args[d], scope);
     });
-    if (s > 0) grow(f.get(), or_else(written, boxes_[f.get()]));
+    const bool grows = !never_runs(definition);
+    if (s > 0 && grows) grow(f.get(), or_else(written, boxes_[f.get()]));
     const bool has_known_reads = is_output || !read_elsewhere(*f, definition).defined();
     for_each_expr(definition, [&](const Expr& e) {
       for (const auto& [name, footprint] : footprints(without_lets(e), scope)) {
         Symbol* symbol = footprint.symbol.raw();
-        if (symbol == f.get())
-          grow(f.get(), has_known_reads ? or_else(footprint.box, boxes_[f.get()]) : footprint.box);
-        else
+        if (symbol != f.get())
           callees[symbol] = hull(callees[symbol], footprint.box);
+        else if (grows)
+          grow(f.get(), has_known_reads ? or_else(footprint.box, boxes_[f.get()]) : footprint.box);
       }
     });
   }
