@@ -24,7 +24,8 @@ constexpr double sums_at_once = 16;  // in registers
 struct Loop {
   std::string name;
   double extent = several;
-  bool is_long = false;  // a pure dimension, as long as what is read
+  bool is_long = false;   // a pure dimension, as long as what is read
+  bool is_block = false;  // counts the blocks of a sum (graph/definitions/provenance.h)
   bool is_used = false;
   bool is_decided = false;  // by an index: the same for all iterations that read an element
 };
@@ -38,7 +39,8 @@ std::vector<Loop> loops_of(const FuncContents& f, const Definition& stage) {
   for (size_t d = 0; d < f.args.size(); ++d) {
     if (!is_pure_position(f, stage, d)) continue;
     const bool is_lane = f.made && f.made->lanes > 0 && d == 0;
-    loops.push_back({f.args[d], is_lane ? f.made->lanes : several, !is_lane});
+    const bool is_block = f.made && d + static_cast<size_t>(f.made->blocks) >= f.args.size();
+    loops.push_back({f.args[d], is_lane ? f.made->lanes : several, !is_lane, is_block});
   }
   return loops;
 }
@@ -67,6 +69,22 @@ Loop* only_loop(const Expr& any_index, std::vector<Loop>& loops) {
   return only;
 }
 
+// In  f(32 x + r - 32 block), the gradient of what was read at  x / 32 + block , blocks repeat the steps of x: each
+// element of f is in a cell that has as many readers as there are blocks. Steps of 1 are those of windows, whose readers
+// are made from one read (sums_at_once).
+double repeats_of_blocks(const LinearDecomposition& form, const std::vector<Loop>& loops) {
+  double repeats = 1;
+  for (size_t i = 0; i < loops.size(); ++i) {
+    const auto step = std::abs(form.coefficients[i].second);
+    if (!loops[i].is_block || loops[i].is_decided || step <= 1) continue;
+    for (size_t j = 0; j < loops.size(); ++j) {
+      const bool is_dimension = loops[j].is_long && !loops[j].is_block && !loops[j].is_decided;
+      if (is_dimension && std::abs(form.coefficients[j].second) == step) repeats *= loops[i].extent;
+    }
+  }
+  return repeats;
+}
+
 // Iterations for each value of one index; nothing when it is not linear in the loops.
 std::optional<double> iterations_a_value(const Expr& any_index, std::vector<Loop>& loops) {
   const Expr index = unclamped(any_index, [&](const Expr& e) { return uses_loops(e, loops); });
@@ -92,7 +110,8 @@ std::optional<double> iterations_a_value(const Expr& any_index, std::vector<Loop
       reach += step * (loops[i].extent - 1);
     }
   }
-  return smallest_step ? iterations / *smallest_step : std::max(1.0, iterations / reach);
+  if (!smallest_step) return std::max(1.0, iterations / reach);
+  return iterations * repeats_of_blocks(*form, loops) / *smallest_step;
 }
 
 }  // namespace

@@ -860,6 +860,18 @@ TEST_F(DefaultSchedule, KnowsHowOftenAnElementIsRead) {
   EXPECT_EQ(reads(parts, heavy), 1) << "y goes over the rows of a part";
 }
 
+// A point of a coarse grid sums over the cells around it, a block for each: so many points read the same element.
+TEST_F(DefaultSchedule, KnowsThatBlocksReadTheCellsOfTheirNeighbours) {
+  Func cells("cells");
+  Var block("block");
+  const RDom cell(0, 32);
+  cells(x, y, block) = 0.0f;
+  cells(x, y, block) += heavy(32 * x + cell - 32 * block, y);
+  EXPECT_EQ(reads(cells, heavy), 1);
+  cells.function()->made = graph::Provenance{.role = graph::Role::Accumulator, .blocks = 1};
+  EXPECT_EQ(reads(cells, heavy), 8) << "blocks, of which nothing is known";
+}
+
 // Each of six sums over the pixels takes the adjoint of a position, which gathers from the image four times.
 TEST_F(DefaultSchedule, WhatManyCutSumsReadIsStored) {
   ImageParam image(Float(32), 2, "image"), motion(Float(32), 1, "motion");
