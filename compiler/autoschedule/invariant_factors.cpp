@@ -193,8 +193,10 @@ class Factors {
   std::vector<Expr> found_;
 };
 
-// A factor as the definition of a Func. Its dimensions are the pure variables, then the reduction variables that it
-// depends on, each in the order of the stage.
+// A factor as the definition of a Func. Its dimensions are the variables that it depends on, in the order of the stage.
+// If vectors of the sum run along one of them, pure variables come first, as rows of a matrix whose elements a vector
+// loads. Otherwise reduction variables come first: vectors of the factor and of its adjoint then run along what the
+// factor reads, and the sum takes single elements of it.
 struct FactorDefinition {
   std::vector<std::string> args;
   Expr value;
@@ -232,8 +234,10 @@ FactorDefinition definition_of(const FuncContents& f, const Definition& update,
     names[variable] = ir::variable(name);
     result.at.push_back(found->second);
   };
-  for (const std::string& arg : f.args) add(arg);
+  const bool is_along_vectors = !f.args.empty() && used.contains(f.args[0]);
+  for (size_t d = 0; is_along_vectors && d < f.args.size(); ++d) add(f.args[d]);
   for (const ReductionVariable& r : update.rvars) add(r.var);
+  for (size_t d = 0; !is_along_vectors && d < f.args.size(); ++d) add(f.args[d]);
   result.value = substitute(factor, names);
   return result;
 }
@@ -246,7 +250,7 @@ class Hoister {
   Hoister(const std::vector<FuncPtr>& outputs, ValuesOfVariable values)
       : outputs_(outputs), order_(topological_order(outputs)), values_(values) {
     for (const FuncPtr& f : order_) {
-      if (f->made && f->made->role == Role::SharedValue) known_.push_back(f);
+      if (is_invariant_factor(*f)) known_.push_back(f);
     }
   }
 
@@ -347,6 +351,10 @@ class Hoister {
 };
 
 }  // namespace
+
+bool is_invariant_factor(const FuncContents& f) {
+  return f.made && f.made->role == Role::SharedValue && !f.made->of.empty();
+}
 
 FactoredGraph hoist_invariant_factors(const std::vector<FuncPtr>& outputs,
                                       ValuesOfVariable values) {

@@ -39,6 +39,9 @@ namespace retrograde::autoschedule {
 using ValuesOfVariable = FunctionRef<std::optional<int64_t>(const FuncContents& f, int stage,
                                                             const std::string& variable)>;
 
+// Whether a Func was made for such a factor.
+bool is_invariant_factor(const FuncContents& f);
+
 struct FactoredGraph {
   std::vector<FuncPtr> outputs;
   // Copies of the Funcs whose terms have factors, and of all that read these, by the original. The others are shared

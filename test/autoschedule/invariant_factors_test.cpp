@@ -50,7 +50,7 @@ struct Histogram {
 std::vector<FuncPtr> factors_in(const std::vector<FuncPtr>& outputs) {
   std::vector<FuncPtr> result;
   for (const FuncPtr& f : topological_order(outputs)) {
-    if (f->made && f->made->role == Role::SharedValue) result.push_back(f);
+    if (is_invariant_factor(*f)) result.push_back(f);
   }
   return result;
 }
@@ -70,8 +70,8 @@ TEST(InvariantFactors, AreFuncsOverTheVariablesThatTheyDependOn) {
   const std::vector<FuncPtr> outputs = with_invariant_factors({h.loss().function()});
   const std::vector<FuncPtr> factors = factors_in(outputs);
   ASSERT_EQ(factors.size(), 2u);
-  EXPECT_EQ(factors[0]->args, (std::vector<std::string>{"a", "x"}));
-  EXPECT_EQ(factors[1]->args, (std::vector<std::string>{"b", "x"}));
+  EXPECT_EQ(factors[0]->args, (std::vector<std::string>{"a", "x"})) << "vectors run along a";
+  EXPECT_EQ(factors[1]->args, (std::vector<std::string>{"x", "b"}));
   for (const FuncPtr& f : topological_order(outputs))
     EXPECT_EQ(exponentials(*f), f->made ? 1 : 0) << f->name;
   EXPECT_EQ(exponentials(*h.counts.function()), 2) << "the user's Func stays as it is";

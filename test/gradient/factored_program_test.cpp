@@ -134,7 +134,7 @@ TEST(FactoredProgram, FactorsOfTheOutputAreThoseOfTheGradient) {
   const Derivative d = propagate_adjoints(h.total);
   const auto factors_in = [](const std::vector<graph::FuncPtr>& outputs) {
     return std::ranges::count_if(graph::topological_order(outputs), [](const graph::FuncPtr& f) {
-      return f->made && f->made->role == graph::Role::SharedValue;
+      return autoschedule::is_invariant_factor(*f);
     });
   };
   const std::vector<graph::FuncPtr> outputs{h.total.function(), d(h.first).function()};
