@@ -20,7 +20,8 @@ namespace retrograde::autoschedule {
 namespace {
 
 constexpr size_t most_term_nodes = 4096;
-constexpr size_t most_loops = 64;  // which are the bits of a mask
+constexpr size_t most_loops = 64;                    // which are the bits of a mask
+constexpr int64_t short_row = 64, two_vectors = 32;  // elements
 
 using LoopSet = uint64_t;
 
@@ -65,12 +66,14 @@ bool is_users(const FuncContents& f) {
   return !f.made && !f.is_extern() && !f.custom_derivatives && !has_directives(f);
 }
 
+// How many values a variable of one stage takes.
+using ValuesInStage = FunctionRef<std::optional<int64_t>(const std::string& variable)>;
+
 // The costly factors of one update.
 class Factors {
  public:
   // `update`: of f, without lets. `values`: of its variables.
-  Factors(const FuncContents& f, const Definition& update,
-          FunctionRef<std::optional<int64_t>(const std::string& variable)> values)
+  Factors(const FuncContents& f, const Definition& update, ValuesInStage values)
       : f_(f), update_(update) {
     for (const std::string& arg : f.args) add_loop(arg, values(arg));
     for (const ReductionVariable& r : update_.rvars) {
@@ -194,9 +197,10 @@ class Factors {
 };
 
 // A factor as the definition of a Func. Its dimensions are the variables that it depends on, in the order of the stage.
-// If vectors of the sum run along one of them, pure variables come first, as rows of a matrix whose elements a vector
-// loads. Otherwise reduction variables come first: vectors of the factor and of its adjoint then run along what the
-// factor reads, and the sum takes single elements of it.
+//
+// Pure variables usually come first. If vectors of the sum run along one of them, they load the factor. Otherwise the
+// sum takes single elements of it, and its adjoint is a sum along rows of the Func, by vectors of terms. Where these rows
+// are short, reduction variables come first if vectors of the adjoint can run along them instead.
 struct FactorDefinition {
   std::vector<std::string> args;
   Expr value;
@@ -215,8 +219,8 @@ std::string plain_name(const std::string& variable) {
   return dot == std::string::npos ? name : name.substr(dot + 1);
 }
 
-FactorDefinition definition_of(const FuncContents& f, const Definition& update,
-                               const Expr& factor) {
+FactorDefinition definition_of(const FuncContents& f, const Definition& update, const Expr& factor,
+                               ValuesInStage values) {
   std::unordered_map<std::string, Expr> used;
   walk(factor, [&](const Expr& e) {
     if (const auto* v = e.as<Variable>()) used.emplace(v->name, e);
@@ -234,10 +238,15 @@ FactorDefinition definition_of(const FuncContents& f, const Definition& update,
     names[variable] = ir::variable(name);
     result.at.push_back(found->second);
   };
-  const bool is_along_vectors = !f.args.empty() && used.contains(f.args[0]);
-  for (size_t d = 0; is_along_vectors && d < f.args.size(); ++d) add(f.args[d]);
+  const auto add_pure = [&] { std::ranges::for_each(f.args, add); };
+  const auto first = std::ranges::find_if(
+      update.rvars, [&](const ReductionVariable& r) { return used.contains(r.var); });
+  const bool has_short_rows = !f.args.empty() && !used.contains(f.args[0]) &&
+                              values(f.args[0]).value_or(short_row + 1) <= short_row &&
+                              values(first->var).value_or(0) >= two_vectors;
+  if (!has_short_rows) add_pure();
   for (const ReductionVariable& r : update.rvars) add(r.var);
-  for (size_t d = 0; !is_along_vectors && d < f.args.size(); ++d) add(f.args[d]);
+  if (has_short_rows) add_pure();
   result.value = substitute(factor, names);
   return result;
 }
@@ -285,14 +294,15 @@ class Hoister {
       const std::vector<Expr> factors = Factors(f, plain, values).find();
       if (factors.empty()) continue;
       updates[u] = plain;
-      for (const Expr& factor : factors) reads[factor.get()] = read_of(f, plain, factor);
+      for (const Expr& factor : factors) reads[factor.get()] = read_of(f, plain, factor, values);
     }
     return updates;
   }
 
   // A call of the factor's Func, which is made unless the graph has it.
-  Expr read_of(const FuncContents& f, const Definition& update, const Expr& factor) {
-    const FactorDefinition definition = definition_of(f, update, redirected(factor, {}));
+  Expr read_of(const FuncContents& f, const Definition& update, const Expr& factor,
+               ValuesInStage values) {
+    const FactorDefinition definition = definition_of(f, update, redirected(factor, {}), values);
     const auto known =
         std::ranges::find_if(known_, [&](const FuncPtr& g) { return definition.is_of(*g); });
     FuncPtr g = known == known_.end() ? nullptr : *known;

@@ -70,7 +70,8 @@ TEST(InvariantFactors, AreFuncsOverTheVariablesThatTheyDependOn) {
   const std::vector<FuncPtr> outputs = with_invariant_factors({h.loss().function()});
   const std::vector<FuncPtr> factors = factors_in(outputs);
   ASSERT_EQ(factors.size(), 2u);
-  EXPECT_EQ(factors[0]->args, (std::vector<std::string>{"a", "x"})) << "vectors run along a";
+  EXPECT_EQ(factors[0]->args, (std::vector<std::string>{"a", "x"}))
+      << "vectors of the sum run along a";
   EXPECT_EQ(factors[1]->args, (std::vector<std::string>{"x", "b"}));
   for (const FuncPtr& f : topological_order(outputs))
     EXPECT_EQ(exponentials(*f), f->made ? 1 : 0) << f->name;
@@ -89,6 +90,21 @@ TEST(InvariantFactors, KeepValues) {
   EXPECT_EQ(value_of(factored), value_of(output));
   Buffer<float> expected = Func(output).realize(), found = Func(factored).realize();
   EXPECT_NEAR(found(), expected(), 1e-5f * expected());
+}
+
+// Vectors of the adjoint of a factor run along its first dimension, unless they take terms along long rows of the sum.
+TEST(InvariantFactors, AreLaidOutForTheirAdjoints) {
+  const auto args_of_second = [](int64_t row, int64_t terms) {
+    Histogram h;
+    h.counts(a, b) += h.near_first() * h.near_second();
+    const auto values = [&](const FuncContents&, int, const std::string& variable) {
+      return std::optional<int64_t>(variable == "a" ? row : variable == "b" ? 100 : terms);
+    };
+    return hoist_invariant_factors({h.counts.function()}, values).factors.at(1)->args;
+  };
+  EXPECT_EQ(args_of_second(16, 1000), (std::vector<std::string>{"x", "b"}));
+  EXPECT_EQ(args_of_second(512, 1000), (std::vector<std::string>{"b", "x"}));
+  EXPECT_EQ(args_of_second(64, 20), (std::vector<std::string>{"b", "x"}));
 }
 
 // A product that is added is contracted with the addition, where a Func would round it.
