@@ -125,7 +125,7 @@ TEST(InvariantFactors, AreSharedByEqualFactors) {
   EXPECT_EQ(factors_in(with_invariant_factors(once)).size(), 2u);
 }
 
-// What needs fewer variables than the rest of a factor is a factor of its own.
+// A part that needs fewer variables than the rest of a factor is a factor of its own.
 TEST(InvariantFactors, AreAsSmallAsTheirVariables) {
   Var c("c");
   Histogram h;

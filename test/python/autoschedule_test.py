@@ -40,7 +40,8 @@ class Autoschedules(unittest.TestCase):
         signal, counts, r = rg.ImageParam("float32", 1, "signal"), rg.Func("counts"), rg.RDom([(0, 256)])
         counts[x, y] = 0.0
         counts[x, y] += rg.exp(-abs(signal[r] - x)) * rg.exp(-abs(signal[r] - y))
-        counts.set_estimates([(0, 16), (0, 16)])
+        for d in range(2):
+            counts.output_buffer().dim(d).set_bounds(0, 16)
         schedule = str(rg.Pipeline(counts)._scheduled_copy(HOST).schedule_log())
         self.assertIn("counts_factor", schedule)
         signal.set((np.arange(256) % 19).astype(np.float32))
