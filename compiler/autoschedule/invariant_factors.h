@@ -8,18 +8,19 @@
 // Each exponential runs once for each of its arguments, not for each (a, b, r). What remains is a matrix product, and
 // so is the adjoint of each factor.
 //
-// 1. The stage is an update f(x, ...) = f(x, ...) + term, or - term, over pure variables x, ... and reduction variables,
-//    without a predicate. Its Func is the user's and has no directives.
+// 1. The stage is an update f(x, ...) = f(x, ...) + term, or - term, over pure variables x, ... and reduction
+//    variables, without a predicate. Its Func is the user's and has no directives.
 // 2. The factor depends on some of the reduction variables, but not on all variables of the stage. What depends on pure
 //    variables alone leaves the loops of the reduction in code generation.
-// 3. It has no effect, and calls no C function that may have one. It is not read conditionally (if_then_else): over all
-//    values of its variables it reads what the term reads, and no more.
+// 3. It has no effect, and calls no C function that may have one. It does not lie in an arm of an if_then_else, which
+//    moves as a whole or stays: over all values of its variables it reads what the term reads, and no more.
 // 4. The sizes of its dimensions are known, and all factors of a Func take at most 64 MB.
 // 5. The operations saved cost clearly more than writing and reading the factor.
 //
 // Values keep their bits: the factor is the same expression in the same type, and no sum changes its order. A product
 // that is added stays where it is, because code generation contracts it with the addition.
 //
+// Not done: factors of scatters, of other reductions and of pure definitions; sizes known at run time only; tangents.
 // Source: A. Aho, M. Lam, R. Sethi and J. Ullman, Compilers (2006), section 9.5, for code motion; the factor is stored
 // for all values of its variables instead of moved in front of one loop.
 #pragma once

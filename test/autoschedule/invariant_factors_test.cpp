@@ -20,7 +20,7 @@ Var a("a"), b("b");
 
 Buffer<float> signal(int size, int step) {
   Buffer<float> result(size);
-  for (int i = 0; i < size; ++i) result(i) = static_cast<float>(i * step % 23) * 0.3125f;
+  for (int i = 0; i < size; ++i) result(i) = static_cast<float>(i % 23 * step % 23) * 0.3125f;
   return result;
 }
 
@@ -138,6 +138,21 @@ TEST(InvariantFactors, AreAsSmallAsTheirVariables) {
   const std::vector<FuncPtr> factors = factors_of(total);
   ASSERT_EQ(factors.size(), 3u);
   for (const FuncPtr& f : factors) EXPECT_EQ(f->args.size(), 2u);
+}
+
+// The default budget of memory is 16 MB beyond inputs and outputs; the factors take 33 MB.
+TEST(InvariantFactors, AreStoredWhateverTheBudget) {
+  constexpr int many = 1 << 19;
+  Histogram h(many);
+  h.first = signal(many, 5);
+  h.second = signal(many, 7);
+  h.counts(a, b) += h.near_first() * h.near_second();
+  const FuncPtr factored = with_invariant_factors({h.loss().function()}).front();
+  Pipeline(Func(factored)).auto_schedule(get_host_target());
+  const std::vector<FuncPtr> factors = factors_in({factored});
+  ASSERT_EQ(factors.size(), 2u);
+  for (const FuncPtr& f : factors)
+    EXPECT_NE(f->schedule.compute_level.kind, graph::LoopLevel::Kind::Inlined) << f->name;
 }
 
 // ---- programs without factors ----
