@@ -12,6 +12,7 @@
 #include "autoschedule/cut_scatters.h"
 #include "autoschedule/epilogues.h"
 #include "autoschedule/gpu_schedule.h"
+#include "autoschedule/invariant_factors.h"
 #include "autoschedule/join_sweeps.h"
 #include "autoschedule/lane_dimension.h"
 #include "autoschedule/memory_budget.h"
@@ -245,6 +246,7 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
   run_on_large_stack([&] {
     result = apply_wrappers(outputs);
     if (is_differentiated(result)) {
+      result = with_invariant_factors(result);
       result = schedule_within_budget(result, request, Scheduling::Gradients).outputs;
     } else if (!stored_by_default(result).empty()) {
       result = copy_graph(result).outputs;

@@ -9,6 +9,7 @@
 #include <unordered_map>
 
 #include "autoschedule/cost_estimate.h"
+#include "autoschedule/invariant_factors.h"
 #include "autoschedule/memory_estimate.h"
 #include "autoschedule/placement_limits.h"
 #include "autoschedule/stored_funcs.h"
@@ -172,7 +173,8 @@ class BudgetedSchedule {
     std::unordered_map<std::string, FuncPtr> result;
     for (const FuncPtr& f : order) {
       const bool may_move = f->is_pure() && !has_directives(*f) && !is_among(f, outputs_) &&
-                            !limits.need_root.contains(f.get()) && !limits.levels.contains(f.get());
+                            !limits.need_root.contains(f.get()) &&
+                            !limits.levels.contains(f.get()) && !is_invariant_factor(*f);
       const auto is_it = [&](const FuncName& named) { return named.name == f->name; };
       if (may_move && std::ranges::none_of(request_.options.store, is_it)) result[f->name] = f;
     }

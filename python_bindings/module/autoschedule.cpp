@@ -1,9 +1,11 @@
 // autoschedule.cpp -- binds auto_schedule, its options and results, and Python autoschedulers.
+#include "autoschedule/invariant_factors.h"
 #include "bind_all.h"
 #include "binding.h"
 #include "callback.h"
 #include "func_class.h"
 #include "graph/copy_graph.h"
+#include "graph/directives/schedule_log.h"
 #include "graph/directives/wrappers.h"
 #include "runnable.h"
 
@@ -145,16 +147,18 @@ void bind_schedulers(py::module_& m) {
   }));
 }
 
-// A copy of the pipeline with the schedule of auto_schedule() for the target. If the user gave directives and the
-// target has no GPU, the copy keeps those instead.
+// A copy of the pipeline with the schedule of auto_schedule() for the target and costly factors of its sums as Funcs of
+// their own. If the user gave directives and the target has no GPU, the copy keeps those instead.
 Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target) {
   const PipelineSpec spec = pipeline.spec();
+  std::vector<graph::FuncPtr> funcs = graph::apply_wrappers(spec.outputs);
+  const bool schedules = target.has_gpu_feature() || graph::schedule_log(funcs).size() == 0;
+  if (schedules) funcs = autoschedule::with_invariant_factors(funcs);
   std::vector<Func> outputs;
-  for (const graph::FuncPtr& f : graph::copy_graph(graph::apply_wrappers(spec.outputs)).outputs)
-    outputs.emplace_back(f);
+  for (const graph::FuncPtr& f : graph::copy_graph(funcs).outputs) outputs.emplace_back(f);
   Pipeline copy(outputs);
   copy.set_autoschedule(spec.autoschedule);
-  if (target.has_gpu_feature() || copy.schedule_log().size() == 0) copy.auto_schedule(target);
+  if (schedules) copy.auto_schedule(target);
   return copy;
 }
 

@@ -11,6 +11,7 @@ retrograde_test(
   epilogues_test
   explain_stages_test
   forward_schedules_test
+  invariant_factors_test
   memory_budget_test
   row_reductions_test
   row_sweeps_test

@@ -5,6 +5,7 @@ retrograde_test(
   deep_programs_test
   explain_test
   extreme_operands_test
+  factored_program_test
   gradient_error_test
   gradient_lookup_test
   hessian_test

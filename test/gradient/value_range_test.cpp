@@ -50,6 +50,9 @@ TEST_F(ValueRanges, PolesAndOverflowAreInfinite) {
 TEST_F(ValueRanges, BoundsProveThatValuesAreFinite) {
   EXPECT_FALSE(may_be_infinite(1.0f / (1.0f + exp(-a(x)))));
   EXPECT_FALSE(may_be_infinite(exp(-a(x) * a(x)))) << "not above 1";
+  EXPECT_FALSE(may_be_infinite(exp(-0.5f * a(x) * a(x)))) << "a Gaussian";
+  EXPECT_FALSE(may_be_infinite(exp(a(x) * (a(x) * -0.5f))));
+  EXPECT_TRUE(may_be_infinite(exp(0.5f * a(x) * a(x))));
   EXPECT_FALSE(may_be_infinite(exp(min(a(x), 80.0f))));
   EXPECT_FALSE(may_be_infinite(clamp(1.0f / a(x), 0.0f, 1.0f)));
   EXPECT_FALSE(may_be_infinite(a(x) / max(sqrt(a(x) * a(x)), 1e-12f)));

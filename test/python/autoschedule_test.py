@@ -36,6 +36,20 @@ class Autoschedules(unittest.TestCase):
         kept = rg.Pipeline(plain)._scheduled_copy(HOST)
         self.assertEqual(str(kept.schedule_log()), str(rg.Pipeline(plain).schedule_log()))
 
+    def test_a_copy_computes_costly_factors_of_sums_once(self):
+        signal, counts, r = rg.ImageParam("float32", 1, "signal"), rg.Func("counts"), rg.RDom([(0, 256)])
+        counts[x, y] = 0.0
+        counts[x, y] += rg.exp(-abs(signal[r] - x)) * rg.exp(-abs(signal[r] - y))
+        for d in range(2):
+            counts.output_buffer().dim(d).set_bounds(0, 16)
+        schedule = str(rg.Pipeline(counts)._scheduled_copy(HOST).schedule_log())
+        self.assertIn("counts_factor", schedule)
+        signal.set((np.arange(256) % 19).astype(np.float32))
+        values = np.exp(-np.abs(np.asarray(signal.get())[:, None] - np.arange(16)))
+        scheduled = rg.Pipeline(counts)._scheduled_copy(HOST).realize([16, 16])
+        np.testing.assert_allclose(scheduled, values.T @ values, rtol=1e-5)
+        self.assertEqual(len(rg.Pipeline(counts).schedule_log()), 0)
+
     def test_by_rules(self):
         image, horizontal, vertical = blur()
         results = rg.Pipeline(vertical).auto_schedule(HOST)

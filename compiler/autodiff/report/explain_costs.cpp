@@ -120,7 +120,7 @@ std::vector<Explanation> explain_costs(const std::vector<WantedFunc>& outputs,
     if (is_stored_by_default(f)) result.push_back(computed_once(f));
   }
   for (const FuncOperations& f : primal.funcs) {
-    if (gradient.find(f.func.get())) continue;
+    if (f.func->made || gradient.find(f.func.get())) continue;
     result.push_back({What::LeftOut, f.func->name, "the gradient needs none of its values"});
   }
   result.push_back(totals(names_of(outputs), primal, gradient));

@@ -6,6 +6,7 @@
 #include <unordered_set>
 
 #include "autodiff/sums/distinct_nodes.h"
+#include "autodiff/sweeps/factored_program.h"
 #include "autodiff/sweeps/local_derivative.h"
 #include "autodiff/sweeps/regions.h"
 #include "autoschedule/cost_estimate.h"
@@ -56,6 +57,15 @@ Body body_of(const std::vector<Expr>& roots) {
   return body;
 }
 
+std::map<const Symbol*, Box> regions_of(const std::vector<WantedFunc>& outputs) {
+  std::map<const Symbol*, Box> result;
+  for (const WantedFunc& wanted : outputs) {
+    Box& box = result[wanted.func.get()];
+    box = hull(box, wanted.region);
+  }
+  return result;
+}
+
 class Counter {
  public:
   explicit Counter(const std::vector<WantedFunc>& outputs)
@@ -72,15 +82,6 @@ class Counter {
   }
 
  private:
-  static std::map<const Symbol*, Box> regions_of(const std::vector<WantedFunc>& outputs) {
-    std::map<const Symbol*, Box> result;
-    for (const WantedFunc& wanted : outputs) {
-      Box& box = result[wanted.func.get()];
-      box = hull(box, wanted.region);
-    }
-    return result;
-  }
-
   bool is_stored(const FuncPtr& f) const {
     return !f->is_pure() || stored_by_default_.contains(f.get()) ||
            f->schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined ||
@@ -285,7 +286,19 @@ const FuncOperations* OperationCount::find(const FuncContents* f) const {
 }
 
 OperationCount count_operations(const std::vector<WantedFunc>& outputs) {
-  return Counter(outputs).run();
+  const FactoredGraph factored =
+      with_factors(mapped(outputs, &WantedFunc::func), regions_of(outputs));
+  std::vector<WantedFunc> compiled = outputs;
+  for (size_t i = 0; i < outputs.size(); ++i) compiled[i].func = factored.outputs[i];
+  OperationCount result = Counter(compiled).run();
+  std::unordered_map<const FuncContents*, const FuncContents*> originals;
+  for (const auto& [f, copy] : factored.copies) originals[copy.get()] = f;
+  for (FuncOperations& entry : result.funcs) {
+    const auto original = originals.find(entry.func.get());
+    if (original != originals.end())
+      entry.func = std::const_pointer_cast<FuncContents>(original->second->shared_from_this());
+  }
+  return result;
 }
 
 }  // namespace retrograde::autodiff

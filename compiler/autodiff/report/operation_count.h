@@ -6,8 +6,8 @@
 //
 // Counted is the floating-point work of every stage over the region that the outputs need: each distinct subexpression
 // of a stage once, both branches of a select, and all points of a reduction domain whatever its predicate is. Whether a
-// Func is stored or recomputed at each read follows its schedule (stored_funcs.h for Funcs without directives). A
-// stored element counts once: recomputation at the borders of tiles is not seen. Integer work serves indices and
+// Func is stored or recomputed at each read follows its schedule (stored_funcs.h for Funcs without directives). Costly
+// factors of sums are Funcs of their own, as when a gradient is compiled (invariant_factors.h). A stored element counts once: recomputation at the borders of tiles is not seen. Integer work serves indices and
 // borders and is not counted. For Tuples that are recomputed at each read, work that the values share counts once for
 // each value.
 #pragma once

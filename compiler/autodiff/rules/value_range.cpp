@@ -147,10 +147,27 @@ ValueRange of_binary(const Binary& e, const ValueRange& a, const ValueRange& b) 
   }
 }
 
-// The range of a constant, or of a node given the ranges `of` its children.
+// Whether e is x * (c * x), (c * x) * x or the like, as exponents of Gaussians are often written. Then `base` is x.
+bool is_scaled_square(const Mul& e, Expr& scale, Expr& base) {
+  for (const auto& [scaled, other] : {std::pair(e.a, e.b), std::pair(e.b, e.a)}) {
+    const auto* product = scaled.as<Mul>();
+    if (!product) continue;
+    const bool is_first = equal(product->a, other);
+    if (!is_first && !equal(product->b, other)) continue;
+    scale = is_first ? product->b : product->a;
+    base = other;
+    return true;
+  }
+  return false;
+}
+
+// The range of a constant, or of a node given the ranges `of` the nodes below it.
 ValueRange range_of_node(const Expr& e, FunctionRef<ValueRange(const Expr&)> of) {
   if (auto value = as_const_float(e)) return constant(*value);
   if (!e.type().is_float()) return {};
+  Expr scale, base;
+  if (const auto* mul = e.as<Mul>(); mul && is_scaled_square(*mul, scale, base))
+    return product(of(scale), square(of(base)));
   if (const auto* binary = e.as<Binary>()) return of_binary(*binary, of(binary->a), of(binary->b));
   if (const auto* choice = e.as<Select>())
     return joined(of(choice->when_true), of(choice->when_false));

@@ -1,5 +1,6 @@
 #include "autodiff/sweeps/omitted_gradients.h"
 
+#include "autodiff/sweeps/factored_program.h"
 #include "autodiff/time/overwrite_time.h"
 #include "diagnostics/error.h"
 
@@ -10,8 +11,9 @@ namespace {
 using Names = std::vector<const Symbol*>;
 
 SynthesisResult synthesize(const Seeds& seeds, const SynthesisOptions& options) {
-  return options.checkpoints.is_set() ? synthesize_folded(seeds, options)
-                                      : synthesize_adjoints(seeds, options);
+  return synthesize_factored(seeds, options, [](const Seeds& s, const SynthesisOptions& o) {
+    return o.checkpoints.is_set() ? synthesize_folded(s, o) : synthesize_adjoints(s, o);
+  });
 }
 
 // Scalars that were not requested; they get gradients only because everything does.
