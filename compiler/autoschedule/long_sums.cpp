@@ -22,7 +22,6 @@ namespace retrograde::autoschedule {
 namespace {
 
 constexpr int64_t least_of_block = 64, most_of_block = 256;  // terms that a lane adds
-constexpr int64_t long_chain = 512;  // terms of a lane from which blocks pay
 
 int64_t iterations_of(const ReductionVariable& r, int lanes) {
   const int64_t extent = as_const_int(simplify(r.extent)).value_or(INT32_MAX);
@@ -37,10 +36,6 @@ int64_t terms_of(const std::vector<ReductionVariable>& loops, int lanes, int64_t
     if (terms > most) return most;
   }
   return terms;
-}
-
-bool is_long(const std::vector<ReductionVariable>& loops, int lanes) {
-  return terms_of(loops, lanes, long_chain + 1) > long_chain;
 }
 
 // About as many as there are blocks: the error is that of both chains.
@@ -86,9 +81,9 @@ std::vector<RVar> cut(const FuncContents& f, int index, Stage& stage,
 }  // namespace
 
 bool is_long_sum(const FuncContents& f, const Definition& update,
-                 const std::vector<ReductionVariable>& loops, int lanes) {
+                 const std::vector<ReductionVariable>& loops, int lanes, int64_t most) {
   if (update.values.size() != 1 || !f.types[0].is_float() || f.types[0].bits() >= 64 ||
-      !is_long(loops, lanes) || moves(update))
+      terms_of(loops, lanes, most + 1) <= most || moves(update))
     return false;
   const Expr value = without_lets(update.values[0]);
   if (value.kind() != Kind::Add && value.kind() != Kind::Sub) return false;
@@ -97,8 +92,8 @@ bool is_long_sum(const FuncContents& f, const Definition& update,
          (value.kind() == Kind::Add && is_old_value(n->b, f, update) && !calls(n->a, &f));
 }
 
-void add_in_blocks(const FuncPtr& f, int index, const std::vector<ReductionVariable>& loops,
-                   int lanes) {
+FuncPtr add_in_blocks(const FuncPtr& f, int index, const std::vector<ReductionVariable>& loops,
+                      int lanes) {
   Stage stage(f, index);
   const std::vector<RVar> blocks = cut(*f, index, stage, loops, lanes);
   std::vector<std::pair<RVar, Var>> preserved;
@@ -108,6 +103,7 @@ void add_in_blocks(const FuncPtr& f, int index, const std::vector<ReductionVaria
   }
   Func sums = stage.rfactor(preserved);
   sums.compute_at(retrograde::LoopLevel(Func(f), blocks[0], index));
+  return sums.function();
 }
 
 }  // namespace retrograde::autoschedule

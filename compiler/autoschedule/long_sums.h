@@ -8,21 +8,27 @@
 // (4e-6) of itself instead of 1e-3. The cut depends on the program alone.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "graph/function.h"
 
 namespace retrograde::autoschedule {
 
-// Whether the update adds numbers that are rounded to less than double, and a lane adds many of them. `loops`: of the
-// reduction, innermost first; the first is in vectors of so many lanes (1: none).
+// Terms of a lane from which blocks pay. Where lanes along rows, each of which adds a part of the terms, would be the
+// alternative, blocks are needed to be as exact.
+inline constexpr int64_t long_chain = 512, long_chain_instead_of_rows = 128;
+
+// Whether the update adds numbers that are rounded to less than double, and a lane adds more of them than `most`.
+// `loops`: of the reduction, innermost first; the first is in vectors of so many lanes (1: none).
 bool is_long_sum(const FuncContents& f, const Definition& update,
-                 const std::vector<ReductionVariable>& loops, int lanes = 1);
+                 const std::vector<ReductionVariable>& loops, int lanes = 1,
+                 int64_t most = long_chain);
 
 // Cuts the loops of such a sum, which have their final order, so that a lane adds few terms in those that stay inside.
-// Blocks become a Func (rfactor.h) that is computed in the loops of f and takes the vectors of its update. Tasks are
-// made later.
-void add_in_blocks(const FuncPtr& f, int index, const std::vector<ReductionVariable>& loops,
-                   int lanes);
+// Blocks become a Func (rfactor.h), which is returned, is computed in the loops of f and takes the vectors of its
+// update. Tasks are made later.
+FuncPtr add_in_blocks(const FuncPtr& f, int index, const std::vector<ReductionVariable>& loops,
+                      int lanes);
 
 }  // namespace retrograde::autoschedule

@@ -28,6 +28,8 @@ constexpr int64_t least_block = 64;       // iterations: sums are fetched and pu
 constexpr int64_t most_rows = 8;          // of tiles that share a copy
 constexpr double worth_sharing = 0.75;    // of what is copied for each alone
 constexpr double least_tiles = 8;  // that use one copy: with fewer, its rows stay in the cache
+constexpr int64_t most_of_whole = 1 << 18;  // elements of a copy of all, which a near cache holds
+constexpr double least_uses_of_whole = 64;  // of an element of such a copy
 
 // How far each loop of a tile runs.
 using Extents = std::unordered_map<std::string, int64_t>;
@@ -77,6 +79,21 @@ class Candidate {
            loads_of_a_tile() * tiles(false) * lanes_ >= least_uses * static_cast<double>(*elements);
   }
   bool fits() const { return elements_of_piece().has_value(); }
+  // Whether lanes across rows are worth a transposed copy of all that is read, if tiles that move it are few tasks.
+  bool is_worth_packing_whole() const {
+    const auto along = lane_dimension();
+    if (!along || *along == 0 || tiles(true) >= static_cast<double>(sizes_.machine().enough_tasks))
+      return false;
+    Extents all = extents_;
+    double uses = 1;
+    for (size_t d = 0; d < f_.args.size(); ++d) {
+      const auto extent = sizes_.extent(f_, d);
+      if (!extent) return false;
+      all[f_.args[d]] = *extent;
+      uses *= depends_on_[d] ? 1 : static_cast<double>(*extent);
+    }
+    return uses >= least_uses_of_whole && Candidate(*this, all).elements_of_piece(most_of_whole);
+  }
   // The dimension and count of tiles that leave the least to copy for each of them.
   std::optional<PackedOperand::Rows> rows_that_share() const {
     const auto alone = elements_of_piece();
@@ -137,13 +154,13 @@ class Candidate {
                        [&](const Expr& e) { return uses_variable(e, var); });
   }
 
-  std::optional<int64_t> elements_of_piece() const {
+  std::optional<int64_t> elements_of_piece(int64_t most = most_elements) const {
     int64_t elements = 1;
     for (const Expr& index : index_) {
       const auto span = span_of(index, extents_);
-      if (!span || *span > most_elements) return std::nullopt;
+      if (!span || *span > most) return std::nullopt;
       elements *= *span;
-      if (elements > most_elements) return std::nullopt;
+      if (elements > most) return std::nullopt;
     }
     return elements;
   }
@@ -218,6 +235,11 @@ std::shared_ptr<graph::ParameterContents> image_of(const Call& call, const FuncC
   return std::static_pointer_cast<graph::ParameterContents>(call.symbol.lock());
 }
 
+Func copy_for(const FuncPtr& f, const PackedOperand& operand) {
+  if (operand.source) return Func(operand.source).in(Func(f));
+  return Func(graph::copied_input(f, operand.image, operand.image->name + "_in_" + f->name));
+}
+
 // Lanes along the rows of the copy; where those are not the rows of the source, blocks of as many
 // rows are loaded whole and turned in registers.
 void schedule_copy(Func copy, size_t lane_dimension, int lanes) {
@@ -238,11 +260,20 @@ void schedule_copy(Func copy, size_t lane_dimension, int lanes) {
   vectorize(Stage(copy.function(), 0), row, lanes, TailStrategy::GuardWithIf);
 }
 
-// Of a read. Where the copy of all of the reduction is too large: of as many iterations of the outermost
+// Whether the lanes of a vector run across the rows of what is read.
+bool has_lanes_across_rows(const Call& call, const FuncContents& f) {
+  const size_t row = innermost_dimension(call);
+  for (size_t d = 0; d < call.args.size(); ++d) {
+    if (d != row && uses_variable(call.args[d], f.args[0])) return true;
+  }
+  return false;
+}
+
+// The piece of one tile. Where the copy of all of the reduction is too large: of as many iterations of the outermost
 // loop as fit, and divide it.
-std::optional<PackedOperand> packed_read(const Call& call, const FuncContents& f,
-                                         const Definition& update, const RegisterTile& tile,
-                                         int lanes, const SizeEstimate& sizes, Extents extents) {
+std::optional<PackedOperand> packed_piece(const Call& call, const FuncContents& f,
+                                          const Definition& update, const RegisterTile& tile,
+                                          int lanes, const SizeEstimate& sizes, Extents extents) {
   const auto candidate = [&] { return Candidate(call, f, update, tile, lanes, sizes, extents); };
   PackedOperand result;
   const std::string loop = reduction_loops(f, update).back().var;
@@ -261,6 +292,21 @@ std::optional<PackedOperand> packed_read(const Call& call, const FuncContents& f
   return result;
 }
 
+std::optional<PackedOperand> packed_read(const Call& call, const FuncContents& f,
+                                         const Definition& update, const RegisterTile& tile,
+                                         int lanes, const SizeEstimate& sizes,
+                                         const Extents& extents) {
+  auto piece = packed_piece(call, f, update, tile, lanes, sizes, extents);
+  if (piece) return piece;
+  const Candidate candidate(call, f, update, tile, lanes, sizes, extents);
+  if (!has_lanes_across_rows(call, f) || !candidate.is_worth_packing_whole()) return std::nullopt;
+  PackedOperand whole;
+  whole.lane_dimension = *candidate.lane_dimension();
+  whole.depends_on = candidate.depends_on();
+  whole.is_whole = true;
+  return whole;
+}
+
 }  // namespace
 
 std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definition& update,
@@ -271,9 +317,11 @@ std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definit
   std::unordered_map<std::string, int> reads;
   std::optional<PackedOperand> result;
   std::string packed;
+  int across = 0;  // reads whose lanes are loaded one by one
   walk_definition(update, [&](const Expr& e) {
     const auto* call = e.as<Call>();
     if (!call) return;
+    across += call->call_type != CallType::Operator && has_lanes_across_rows(*call, f);
     const FuncPtr source = source_of(*call, f);
     const auto image = image_of(*call, f);
     if (!source && !image) return;
@@ -285,18 +333,23 @@ std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definit
     result->image = image;
     packed = call->name;
   });
+  if (result && result->is_whole && across > 1) return std::nullopt;
   // Of several reads the copy would hold what lies between them.
   return result && reads[packed] == 1 ? result : std::nullopt;
 }
 
 void pack(const FuncPtr& f, const PackedOperand& operand, const retrograde::LoopLevel& loop,
           int lanes) {
-  Func copy =
-      operand.source
-          ? Func(operand.source).in(Func(f))
-          : Func(graph::copied_input(f, operand.image, operand.image->name + "_in_" + f->name));
+  Func copy = copy_for(f, operand);
   copy.compute_at(loop);
   schedule_copy(copy, operand.lane_dimension, lanes);
+}
+
+void pack_whole(const FuncPtr& f, const PackedOperand& operand, int lanes) {
+  Func copy = copy_for(f, operand);
+  copy.compute_root();
+  schedule_copy(copy, operand.lane_dimension, lanes);
+  copy.parallel(copy.args().back());
 }
 
 }  // namespace retrograde::autoschedule

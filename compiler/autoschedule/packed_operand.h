@@ -9,6 +9,10 @@
 // run across the rows, as in  product(j, i) += key(k, j) * query(k, i),  the copy is transposed.
 // What is computed inline is computed once an element of the copy. Where a piece of all k is too large,
 // it is of a block of them: all tiles of c add up the terms of one block before the next is copied.
+//
+// If the tiles that move the piece are too few parallel tasks and lanes run across rows, as in
+// frame(k, t) += signal(hop * t + r) * filter(r, k)  for 128 filters, all of the operand is transposed once, before the
+// loops of the sum, whose tasks are tiles of t.
 // Source: K. Goto and R. van de Geijn, Anatomy of High-Performance Matrix Multiplication, ACM TOMS 34
 // (2008), sections 4 and 5; theirs packs operands of matrix products, this what any linear index
 // reads, of Funcs and of images.
@@ -41,6 +45,7 @@ struct PackedOperand {
     int64_t count;
   };
   std::optional<Rows> rows;
+  bool is_whole = false;  // all that the sums read is copied once
 };
 
 // The operand of the update that is worth it, when the update has the tile; nullopt: none.
@@ -50,5 +55,7 @@ std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definit
 // For each iteration of a loop of f, inside of which only dimensions run that do not move it.
 void pack(const FuncPtr& f, const PackedOperand& operand, const retrograde::LoopLevel& loop,
           int lanes);
+// All that f reads of it, before the loops of f.
+void pack_whole(const FuncPtr& f, const PackedOperand& operand, int lanes);
 
 }  // namespace retrograde::autoschedule

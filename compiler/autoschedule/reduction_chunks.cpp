@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numeric>
 #include <unordered_map>
 #include <vector>
 
 #include "analysis/linear.h"
+#include "autoschedule/loop_order.h"
 #include "autoschedule/read_estimate.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
@@ -20,6 +23,8 @@ namespace {
 // For all tiles, as much as a second-level cache holds: those that a thread is at read a part of it.
 constexpr double chunk_bytes = 1 << 20;
 constexpr double worth_a_chunk = 3;  // times as many bytes without: sums are read and written
+constexpr double near_bytes = chunk_bytes / 2;  // of a chunk that stays there beside the sums
+constexpr int64_t least_terms = 64;             // of a chunk: its tiles load and store their sums
 
 // What one Func or image is read of.
 struct ChunkOperand {
@@ -27,17 +32,19 @@ struct ChunkOperand {
   std::vector<bool> depends;  // on the dimensions of the sums
 };
 
-// By all blocks of a chunk.
+using Iterations = std::unordered_map<std::string, int64_t>;  // by the loop
+
+// By all blocks of a chunk, or by the sums themselves.
 class ChunkReads {
  public:
-  // `number`: of blocks along the loop, an argument of the block; of which a chunk has so many.
-  ChunkReads(const FuncContents& sums, const FuncContents& block, const std::string& number,
-             int64_t iterations, const SizeEstimate& sizes)
-      : sums_(sums), block_(block) {
-    extents_[number] = iterations;
+  // `iterations`: of a chunk, along arguments of the block and loops of its reduction; others run whole.
+  ChunkReads(const FuncContents& sums, const FuncContents& block, const Iterations& iterations,
+             const SizeEstimate& sizes)
+      : sums_(sums), block_(block), extents_(iterations) {
     for (size_t d = 0; d < sums.args.size(); ++d) add(sums.args[d], sizes.extent(sums, d));
-    for (const ReductionVariable& r : block.updates[0].rvars)
-      add(r.var, as_const_int(simplify(r.extent)));
+    for (const ReductionVariable& r : block.updates[0].rvars) {
+      if (!iterations.contains(r.var)) add(r.var, as_const_int(simplify(r.extent)));
+    }
     for (const auto& [name, extent] : extents_) names_.push_back(name);
   }
 
@@ -94,7 +101,7 @@ class ChunkReads {
 
   const FuncContents& sums_;
   const FuncContents& block_;
-  std::unordered_map<std::string, int64_t> extents_;
+  Iterations extents_;
   std::vector<std::string> names_;
   bool is_known_ = true;
 };
@@ -154,7 +161,7 @@ std::optional<int64_t> reduction_chunk(const FuncContents& sums, const FuncConte
   if (!extent || *extent <= 0 || !number) return std::nullopt;
   const auto chunk_of = [&](int64_t iterations) -> std::optional<ChunkBytes> {
     const auto operands =
-        ChunkReads(sums, block, block.args[*number], iterations, sizes).operands();
+        ChunkReads(sums, block, {{block.args[*number], iterations}}, sizes).operands();
     return operands ? std::optional(bytes_of(*operands, sums, tile, lanes, sizes)) : std::nullopt;
   };
   int64_t iterations = *extent;
@@ -171,6 +178,41 @@ std::optional<int64_t> reduction_chunk(const FuncContents& sums, const FuncConte
   if (!bytes || bytes->once > chunk_bytes) return std::nullopt;
   const double chunked = bytes->once + 2 * static_cast<double>(sizes.bytes(sums));
   return bytes->by_tiles >= worth_a_chunk * chunked ? std::optional(iterations) : std::nullopt;
+}
+
+std::optional<TermChunk> chunk_of_terms(const FuncContents& sums, const RegisterTile& tile,
+                                        int lanes, const SizeEstimate& sizes) {
+  Iterations counts;  // of a chunk
+  const auto bytes_of_chunk = [&]() -> std::optional<ChunkBytes> {
+    const auto operands = ChunkReads(sums, sums, counts, sizes).operands();
+    return operands ? std::optional(bytes_of(*operands, sums, tile, lanes, sizes)) : std::nullopt;
+  };
+  const auto all = bytes_of_chunk();
+  if (!all || all->once <= chunk_bytes) return std::nullopt;
+  std::vector<int64_t> extents;
+  const std::vector<ReductionVariable> loops = reduction_loops(sums, sums.updates[0]);
+  for (const ReductionVariable& r : loops) extents.push_back(*as_const_int(simplify(r.extent)));
+  if (std::ranges::any_of(extents, [](int64_t extent) { return extent < 1; })) return std::nullopt;
+  double passes = 1;  // over all sums
+  for (size_t i = loops.size(); i-- > 0; passes *= static_cast<double>(extents[i])) {
+    int64_t& count = counts[loops[i].var] = extents[i];
+    double once = bytes_of_chunk()->once;
+    while (once > near_bytes && count > 1) {
+      const double fitting = static_cast<double>(count) * near_bytes / once;
+      count = std::clamp<int64_t>(static_cast<int64_t>(fitting), 1, count - 1);
+      once = bytes_of_chunk()->once;
+    }
+    if (once > near_bytes) continue;
+    const int64_t parts = (extents[i] + count - 1) / count;
+    const int64_t iterations = (extents[i] + parts - 1) / parts;
+    const int64_t terms = std::accumulate(extents.begin(), extents.begin() + static_cast<long>(i),
+                                          iterations, std::multiplies<>());
+    passes *= static_cast<double>(parts);
+    const double chunked = all->once + 2 * passes * static_cast<double>(sizes.bytes(sums));
+    if (terms < least_terms || all->by_tiles < worth_a_chunk * chunked) return std::nullopt;
+    return TermChunk{i, parts > 1 ? iterations : 0};
+  }
+  return std::nullopt;
 }
 
 }  // namespace retrograde::autoschedule

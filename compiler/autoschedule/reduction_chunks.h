@@ -7,6 +7,8 @@
 //       for x: a tile of sums += ...    =>        for y in the chunk:
 //                                                   for x: a tile of sums += ...
 //
+// Sums that are added up in tiles without blocks have chunks of the outermost loops of their reduction in the same way.
+//
 // A tile that runs over all of the images fetches them from memory, as every other tile does again. A
 // chunk of them stays in a cache until all tiles have used it. Each sum is added up in the order that
 // it had.
@@ -36,5 +38,14 @@ std::optional<size_t> number_along(const FuncContents& sums, const FuncContents&
 std::optional<int64_t> reduction_chunk(const FuncContents& sums, const FuncContents& block,
                                        const ReductionVariable& loop, const RegisterTile& tile,
                                        int lanes, const SizeEstimate& sizes);
+
+// The loops of a reduction outside of those over tiles.
+struct TermChunk {
+  size_t loop = 0;         // by reduction_loops(): those that follow are outside
+  int64_t iterations = 0;  // of this one, of which the rest is outside; 0: all of it stays inside
+};
+// Of a sum whose first update has the tile. nullopt: the tiles read little again, or sizes are not known.
+std::optional<TermChunk> chunk_of_terms(const FuncContents& sums, const RegisterTile& tile,
+                                        int lanes, const SizeEstimate& sizes);
 
 }  // namespace retrograde::autoschedule

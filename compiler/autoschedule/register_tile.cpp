@@ -1,8 +1,10 @@
 #include "autoschedule/register_tile.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <unordered_set>
 
+#include "analysis/linear.h"
 #include "autoschedule/cost_estimate.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
@@ -16,12 +18,13 @@ namespace {
 constexpr int64_t most_values = 4;  // of a long dimension, or an unknown one: rests run slower
 constexpr int64_t small_side = 16;  // a dimension that may lie in registers whole
 constexpr double loads_a_cycle = 2, products_a_cycle = 2, latency = 4;
-constexpr int64_t most_of_known = 8;  // of a dimension that it divides: there are no rests
-constexpr double split_lines = 2;     // loads for a vector at any place: it crosses cache lines
-constexpr double far_lines = 4;       // of a row of its own in each iteration: none is at hand yet
-constexpr double worth_while = 0.8;   // of the cycles without a tile
-constexpr double a_rest = 1.03;       // of the cycles
-constexpr double rows_apart = 1.1;    // of the cycles: vectors of several images, say
+constexpr int64_t most_of_known = 8;   // of a dimension that it divides: there are no rests
+constexpr double split_lines = 2;      // loads for a vector at any place: it crosses cache lines
+constexpr double far_lines = 4;        // of a row of its own in each iteration: none is at hand yet
+constexpr double worth_while = 0.8;    // of the cycles without a tile
+constexpr double a_rest = 1.03;        // of the cycles
+constexpr double rows_apart = 1.1;     // of the cycles: vectors of several images, say
+constexpr int64_t line_elements = 16;  // of a cache line
 
 // What an iteration of a reduction loads, by the dimensions that the place depends on.
 struct Operand {
@@ -30,14 +33,23 @@ struct Operand {
   bool is_far = false;           // each iteration reads other rows
 };
 
-// Whether what moves the read moves it from row to row, not along one.
-bool walks_afar(const Call& call, const Definition& stage) {
+// Whether an index grows by a cache line or more in each iteration of a loop, as the hop of overlapping windows.
+bool steps_over_lines(const Expr& index, const std::string& loop) {
+  const auto form = analysis::decompose(index, {loop});
+  return form && std::abs(form->coefficients[0].second) >= line_elements;
+}
+
+// Whether what moves the read moves it from row to row, not along one. Rows are what the lanes of a vector run along,
+// in the source or in its packed copy.
+bool walks_afar(const Call& call, const Definition& stage, const std::string& lane) {
+  size_t row = 0;
+  while (row < call.args.size() && !uses_variable(call.args[row], lane)) ++row;
   bool moves = false, is_far = true;
   for (const ReductionVariable& r : stage.rvars) {
     for (size_t d = call.args.size(); d-- > 0;) {
       if (!uses_variable(call.args[d], r.var)) continue;
       moves = true;
-      is_far &= d > 0;
+      is_far &= d != row || steps_over_lines(call.args[d], r.var);
     }
   }
   return moves && is_far;
@@ -63,7 +75,7 @@ std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Def
       is_plain &= same_args(call->args, stage.args);
       return false;
     }
-    Operand operand{{}, {}, walks_afar(*call, stage)};
+    Operand operand{{}, {}, walks_afar(*call, stage, f.args[0])};
     for (const std::string& arg : f.args) {
       const auto moves = [&](const Expr& index) { return uses_variable(index, arg); };
       operand.depends_on.push_back(std::ranges::any_of(call->args, moves));

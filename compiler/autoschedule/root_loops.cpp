@@ -237,11 +237,47 @@ class LoopChooser {
                             : std::nullopt;
     const auto rows = packed ? std::nullopt : copied_rows(*tile);
     if (in_rows && !packed && !rows) return false;
-    std::vector<VarOrRVar> loops = cut(*tile, {}, packed || rows);
-    if (packed) loops = pack_inside(*packed, loops);
+    const bool packs_whole = packed && packed->is_whole;
+    std::vector<VarOrRVar> loops = cut(*tile, {}, rows || (packed && !packs_whole));
+    if (packs_whole)
+      pack_whole(sums_of_terms(*tile, in_rows), *packed, lanes);
+    else if (packed)
+      loops = pack_inside(*packed, loops);
     if (rows) copy_rows_inside(*rows, loops);
+    if (!packed && !rows && makes(Decision::LayoutStaging)) share_chunks(*tile, loops);
     run_in_parallel(loops, *tile);
     return true;
+  }
+
+  // The Func whose tiles add up the terms: if they are many, it is one of blocks of them, since a tile that was along
+  // rows would be more exact.
+  FuncPtr sums_of_terms(const RegisterTile& tile, bool in_rows) {
+    const int64_t most = in_rows ? long_chain_instead_of_rows : long_chain;
+    const std::vector<ReductionVariable> loops = reduction_loops(f_, definition());
+    if (!is_long_sum(f_, definition(), loops, 1, most)) return function_;
+    const FuncPtr blocks = add_in_blocks(function_, index_, loops, 1);
+    LoopChooser(blocks, 0, request_, sizes_).cut(tile);
+    return blocks;
+  }
+
+  // Moves the loops over tiles into those over chunks of the reduction.
+  void share_chunks(const RegisterTile& tile, const std::vector<VarOrRVar>& tiles) {
+    const bool is_own = f_.made && (f_.made->lanes > 0 || f_.made->has_parts);
+    const auto chunk =
+        index_ == 1 && !is_own ? chunk_of_terms(f_, tile, lanes, sizes_) : std::nullopt;
+    if (!chunk) return;
+    const std::vector<ReductionVariable> loops = reduction_loops(f_, definition());
+    std::vector<VarOrRVar> order;
+    for (size_t i = 0; i <= chunk->loop; ++i) order.emplace_back(RVar(loops[i].var));
+    order.insert(order.end(), tiles.begin(), tiles.end());
+    if (chunk->iterations > 0) {
+      const RVar iteration(loops[chunk->loop].var), chunks(new_loop(f_, index_, "chunks"));
+      stage_.split(iteration, chunks, iteration, static_cast<int>(chunk->iterations),
+                   TailStrategy::GuardWithIf);
+      order.emplace_back(chunks);
+    }
+    for (size_t i = chunk->loop + 1; i < loops.size(); ++i) order.emplace_back(RVar(loops[i].var));
+    stage_.reorder(order);
   }
 
   // Of the loops over tiles, those that do not move the operand come first. The result: the others,

@@ -65,6 +65,7 @@ struct StripLoops {
 
 // Whether something is computed, or is to be, in the loops of a Func.
 bool has_guests(const FuncContents& f) {
+  if (!f.copied_inputs.empty()) return true;
   const auto is_guest = [&](const Expr& e) {
     const auto* call = e.as<Call>();
     const FuncPtr callee = call && call->call_type == CallType::Func ? func_of(*call) : nullptr;

@@ -421,6 +421,23 @@ TEST_F(DefaultSchedule, TilesUseWhatComesFromAfarMoreOften) {
   EXPECT_EQ(from_afar.vectors, 4);
 }
 
+// A window starts some cache lines after the one before, and lanes across rows make each iteration read another row.
+TEST_F(DefaultSchedule, WindowsAndTransposedRowsComeFromAfar) {
+  Buffer<float> matrix(64, 64), line(1 << 14);
+  RDom k(0, 64);
+  const auto sums_of = [&](const Expr& operand) {
+    Func f("f");
+    f(x, y) += matrix(k, y) * operand;
+    f.set_estimates({{0, 64}, {0, 64}});
+    const auto tile = autoschedule::register_tile(*f.function(), f.function()->stage(1), 16, 4, {},
+                                                  autoschedule::SizeEstimate({f.function()}));
+    return tile ? tile->vectors * tile->sides.at(0).size : 0;
+  };
+  const int64_t side_by_side = sums_of(line(x + 4 * k));
+  EXPECT_GT(sums_of(line(x + 64 * k)), side_by_side);
+  EXPECT_GT(sums_of(matrix(k, x)), side_by_side);
+}
+
 TEST_F(DefaultSchedule, TilesFitTheRegisters) {
   Func product("product");
   RDom k(0, 64);
@@ -520,6 +537,57 @@ TEST_F(DefaultSchedule, WhatLanesReadAcrossRowsIsCopiedTurned) {
   }
 }
 
+// Overlapping windows of a signal under filters, which are so few that tiles of them would be two parallel chunks.
+Func windows_under_filters(const Buffer<float>& signal, const Buffer<float>& filters, int hop) {
+  Var k("k"), t("t");
+  Func windows("windows");
+  RDom r(0, filters.width());
+  windows(k, t) += signal(hop * t + r) * filters(r, k);
+  return windows;
+}
+Buffer<float> random_signal(int samples, int seed) {
+  return gradient::random_image({samples}, -1, 1, seed);
+}
+
+// All of the filters are transposed once. Lanes along each filter would add up one window of it at a time.
+TEST_F(DefaultSchedule, WhatFewTilesReadAcrossRowsIsCopiedTurnedAtOnce) {
+  for (const int length : {96, 121}) {
+    const Buffer<float> filters = gradient::random_image({length, 40}, -0.3f, 0.3f, 2);
+    const Func windows = windows_under_filters(random_signal(2000, 1), filters, 8);
+    const ScheduleLog log = log_of(windows, {40, (2000 - length) / 8});
+    EXPECT_TRUE(has_entry(log, "windows.copy_input(b_in_windows, b)")) << log.to_text();
+    EXPECT_TRUE(has_entry(log, "b_in_windows.reorder_storage(_1, _0)")) << log.to_text();
+    EXPECT_TRUE(has_entry(log, "b_in_windows.compute_at(root)")) << log.to_text();
+  }
+}
+
+// Tiles of many terms are added in blocks, so that they are about as exact as sums along rows. Equal terms are the
+// worst case: one after the other, their sum would be wrong by 5e-5 of itself.
+TEST_F(DefaultSchedule, TilesOfManyTermsAreAddedInBlocks) {
+  constexpr int length = 4000, frames = 80, kinds = 32;
+  Buffer<float> signal(8 * (frames - 1) + length), filters(length, kinds);
+  signal.fill(0.1f);
+  filters.fill(0.3f);
+  Func windows = windows_under_filters(signal, filters, 8);
+  windows.set_estimates({{0, kinds}, {0, frames}});
+  Pipeline pipeline(windows);
+  pipeline.auto_schedule(get_host_target());
+  const ScheduleLog log = without_numbers(pipeline.schedule_log());
+  EXPECT_TRUE(any_directive<graph::CopyInput>(log)) << log.to_text();
+  EXPECT_TRUE(any_directive<graph::FactorOut>(log)) << log.to_text();
+  const Buffer<float> found = windows.realize({kinds, frames});
+  const double expected = double(0.1f) * double(0.3f) * length;
+  found.for_each_element(
+      [&](int k, int t) { EXPECT_NEAR(found(k, t), expected, 3e-6 * expected); });
+}
+
+TEST_F(DefaultSchedule, FewUsesAreNotWorthACopyOfAll) {
+  const Buffer<float> filters = gradient::random_image({96, 40}, -0.3f, 0.3f, 2);
+  const ScheduleLog log =
+      log_of(windows_under_filters(random_signal(200, 1), filters, 8), {40, 10});
+  EXPECT_FALSE(any_directive<graph::CopyInput>(log)) << log.to_text();
+}
+
 // A panel of all rows is too large for the inner caches, so one block of rows is packed at a time.
 TEST_F(DefaultSchedule, PanelsOfLongProductsArePackedBlockByBlock) {
   constexpr int rows = 40, inner = 1100, columns = 512;
@@ -554,6 +622,20 @@ TEST_F(DefaultSchedule, TilesOfLongSumsShareChunksOfLargeImages) {
   };
   EXPECT_TRUE(has_chunks(log_for(128, 48)));
   EXPECT_FALSE(has_chunks(log_for(32, 32))) << "caches hold it";
+}
+
+// Tiles of a gradient by filters would each read all windows of the signal, and all adjoints, from beyond the near caches.
+TEST_F(DefaultSchedule, TilesOfWindowsShareChunksOfSignals) {
+  const auto log_for = [](int frames) {
+    constexpr int length = 256, kinds = 32, hop = 64;
+    const Buffer<float> filters = gradient::random_image({length, kinds}, -0.3f, 0.3f, 2);
+    const Buffer<float> seed = gradient::random_image({kinds, frames}, -1, 1, 3);
+    const Func windows =
+        windows_under_filters(random_signal(hop * (frames - 1) + length, 1), filters, hop);
+    return log_of(propagate_adjoints(windows, seed)(filters), {length, kinds});
+  };
+  EXPECT_TRUE(has_chunks(log_for(4000)));
+  EXPECT_FALSE(has_chunks(log_for(1000))) << "caches hold it";
 }
 
 // All blocks of a chunk read the same few rows repeatedly. The packed copy is padded with zeros, so that these reads

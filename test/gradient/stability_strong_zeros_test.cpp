@@ -367,6 +367,36 @@ TEST_F(StrongZeros, SumsOfProductsInRegisters) {
   }
 }
 
+// The adjoint of the image adds up a product for each of two Funcs that read it.
+TEST_F(StrongZeros, SumsOfSeveralProductsInRegisters) {
+  for (const int size : {64, 45}) {
+    Buffer<float> first(size, size), second(size, size), image(size, size), seed(size, size);
+    first.for_each_element([&](int k, int y) {
+      first(k, y) = y % 8 == 3 ? (k % 2 ? inf : nan) : static_cast<float>((k * 7 + y * 5) % 9 - 4);
+      second(k, y) = static_cast<float>((k + y * 3) % 7 - 3);
+    });
+    seed.for_each_element([&](int x, int y) {
+      seed(x, y) = y % 8 == 3 ? 0.0f : static_cast<float>((x * 3 + y) % 5 - 2);
+    });
+    image.fill(1);
+    Var y("y");
+    RDom k(0, size, "k");
+    Func a("a"), b("b"), both("both");
+    a(x, y) = 0.0f;
+    a(x, y) += first(k, y) * image(x, k);
+    b(x, y) = 0.0f;
+    b(x, y) += second(k, y) * image(x, k);
+    both(x, y) = a(x, y) + b(x, y);
+    const Buffer<float> found = propagate_adjoints(both, seed)(image).realize({size, size});
+    found.for_each_element([&](int x, int k) {
+      float expected = 0;
+      for (int row = 0; row < size; ++row)
+        expected += row % 8 == 3 ? 0.0f : seed(x, row) * (first(k, row) + second(k, row));
+      ASSERT_EQ(found(x, k), expected) << x << " " << k;
+    });
+  }
+}
+
 TEST_F(StrongZeros, NaNsThatTheOutputUsesStay) {
   set(a, {-1, 4, 1, 1});
   set(b, {2, 2, 2, 2});

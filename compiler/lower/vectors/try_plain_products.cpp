@@ -40,7 +40,13 @@ namespace retrograde::lower {
 
 namespace {
 
-bool is_strong_product(const Expr& e) { return as_op(e, Op::strong_mul) != nullptr; }
+// Whether e is a strong product or a sum that contains one, such as the adjoint of an image that two Funcs read.
+bool sums_strong_products(const Expr& e) {
+  if (as_op(e, Op::strong_mul)) return true;
+  const auto* sum = e.as<Binary>();
+  const bool is_sum = sum && (sum->kind == Kind::Add || sum->kind == Kind::Sub);
+  return is_sum && (sums_strong_products(sum->a) || sums_strong_products(sum->b));
+}
 
 // The sum e with plain products instead of strong ones.
 Expr with_plain_products(const Expr& e) {
@@ -88,7 +94,7 @@ class SumsInto {
     const auto chain = find_update_chain(store);
     if (!chain || chain->kind != Kind::Add) return false;
     for (const UpdateChain::Term& term : chain->terms)
-      has_strong_products |= is_strong_product(term.value);
+      has_strong_products |= sums_strong_products(term.value);
     return std::any_of(filled_.begin(), filled_.end(),
                        [&](const Store* fill) { return equal(fill->index, store.index); });
   }
