@@ -12,6 +12,7 @@ retrograde_test(
   explain_stages_test
   forward_schedules_test
   memory_budget_test
+  row_hosts_test
   row_reductions_test
   row_sweeps_test
   schedule_search_test
