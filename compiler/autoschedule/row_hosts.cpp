@@ -208,8 +208,11 @@ class HostFinder {
     return true;
   }
 
-  // Rows that stay in a cache near the core, of a Func that does not, and enough of them.
+  // Rows that lie together and stay in a cache near the core, of a Func that does not, and enough of them.
   bool is_worth_while(const RowHost& host) const {
+    if (host.rows.empty() ||
+        host.rows.size() + host.rows.front().dimension < host.host->args.size())
+      return false;
     int64_t rows = 1;
     for (const auto& [dimension, divisor] : host.rows)
       rows *= (sizes_.extent(*host.host, dimension).value_or(0) + divisor - 1) / divisor;

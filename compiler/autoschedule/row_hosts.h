@@ -9,7 +9,8 @@
 //                                               for x: out = ...
 //
 // A row comes from memory once and stays in a cache near the core for all of them. The consumer is the host. A row may
-// have several dimensions, be a plane, and be named by the quotient of a coordinate: out(x, y, c) may read mean(c / 8).
+// be a plane or more, which lies together in memory, and may be named by the quotient of a coordinate: out(x, y, c) may
+// read mean(c / 8).
 // Outputs that only copy such a sum share the loop (compute_with), so that the sum may leave the pipeline.
 //
 // A member of the host is computed once for each row, so all of its reads must be by the host and by other members, at the
