@@ -8,14 +8,15 @@
 //   parallel for y: for x: out = ...     =>     for r: variance += ...
 //                                               for x: out = ...
 //
-// A row comes from memory once and stays in a cache near the core for all of them. The consumer is the host. A row may
-// be a plane or more, which lies together in memory, and may be named by the quotient of a coordinate: out(x, y, c) may
-// read mean(c / 8).
-// Outputs that only copy such a sum share the loop (compute_with), so that the sum may leave the pipeline.
+// The consumer is the host, the sums are its members. A row comes from memory once and stays in a cache near a core. It
+// may be a plane or more, which lies together in memory, and may be named by the quotient of a coordinate: out(x, y, c)
+// may read mean(c / 8). Outputs that only copy a member share the loop (compute_with), so that its values may leave the
+// pipeline.
 //
-// A member of the host is computed once for each row, so all of its reads must be by the host and by other members, at the
-// same row. A sum with other dimensions than those of rows stays where it is, because register tiles need several
-// rows; the private parts of an adjoint do not.
+// A member is computed once for each row, so only the host and other members may read it, at the same row. A sum with
+// other dimensions than those of rows stays where it is, because register tiles need several rows; the private parts of
+// an adjoint do not.
+// Source: folklore; PyTorch's kernels of normalisation layers are written this way by hand.
 // Tests: test/autoschedule/row_hosts_test.cpp.
 #pragma once
 

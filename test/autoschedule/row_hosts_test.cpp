@@ -31,7 +31,7 @@ void run(Pipeline& pipeline, const std::vector<Buffer<>>& results) {
   pipeline.realize(Realization(results));
 }
 
-// Mean and variance over rows of so many elements.
+// The mean and the variance of each row.
 struct Normalisation {
   int width = 1000, height = 601;
   Func in{"in"}, mean{"mean"}, variance{"variance"}, out{"out"};

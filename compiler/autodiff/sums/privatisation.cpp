@@ -124,8 +124,9 @@ class PartSizes {
     }
     return simplify(cast_to(Int(32), min(max(fit, make_one(Int(64))), cast_to(Int(64), most))));
   }
-  // Lanes let a gather add in vectors if its elements do not, as the column sums of a matrix do. In a scatter, neighbouring iterations often meet in one element and would wait
-  // for each other, so lanes get elements of their own if there are few.
+  // Lanes let a gather add in vectors if its elements do not fill them, as the column sums of a matrix do. In a scatter,
+  // neighbouring iterations often meet in one element and would wait for each other, so lanes get elements of their own
+  // if there are few.
   bool has_lanes(const Iterations& update) const {
     const Gather& g = update.over;
     if (!g.scatters) return !reads_along(update);

@@ -98,7 +98,8 @@ def _kept(training):
         return []
     names = sorted({_explain.plain(f.name()) for f in training.residuals})
     size = sum(math.prod(shape) * torch.finfo(dtype).bits // 8 for dtype, shape in training.residual_kinds())
-    return [f"  kept by the forward pass for the gradient, {_explain.size_of(size)}: {', '.join(names[:_explain.MOST_STAGES])}"]
+    shown = ", ".join(names[:_explain.MOST_STAGES])
+    return [f"  kept by the forward pass for the gradient, {_explain.size_of(size)}: {shown}"]
 
 
 def _facts(explanations, wanted):
