@@ -21,6 +21,7 @@
 #include "autoschedule/placement_limits.h"
 #include "autoschedule/reduction_slices.h"
 #include "autoschedule/root_loops.h"
+#include "autoschedule/row_hosts.h"
 #include "autoschedule/row_order.h"
 #include "autoschedule/row_sweeps.h"
 #include "autoschedule/scatter_schedule.h"
@@ -141,6 +142,18 @@ void move_and_join(Movable funcs, const ScheduleRequest& request, const GiveLoop
   if (joins) join_sweeps(outputs, given, sizes);
 }
 
+// `chosen`: what stays at root; `slices`, `along`: what gets other loops.
+RowHosts find_row_hosts(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
+                        std::unordered_set<const Symbol*> excluded, const ChosenPlaces& chosen,
+                        const SlicedScatters& slices, const LaneDimensions& along,
+                        const SizeEstimate& sizes) {
+  excluded.insert(chosen.store.begin(), chosen.store.end());
+  for (const FuncPtr& f : stored) {
+    if (slices.of_scatter(*f) || slices.of_reader(*f) || along.of(*f) > 0) excluded.insert(f.get());
+  }
+  return RowHosts(outputs, stored, excluded, sizes);
+}
+
 // So that the log tells of every Func.
 void name_inlined(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& order) {
   for (const FuncPtr& f : order) {
@@ -197,6 +210,9 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   const LaneDimensions along(
       outputs, request.makes(Decision::LayoutStaging) ? stored : std::vector<FuncPtr>(), lanes,
       sizes);
+  const RowHosts rows =
+      find_row_hosts(outputs, request.makes(Decision::Slices) ? stored : std::vector<FuncPtr>(),
+                     whole, chosen, slices, along, sizes);
   const AtomicScatters atomic(outputs, stored, whole, request, sizes);
   const Readers before(outputs, stored);
   std::vector<FuncPtr> given;    // loops, at root
@@ -204,6 +220,12 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   for (const FuncPtr& f : stored) {
     if (has_directives(*f)) continue;
     Func(f).compute_root();
+    if (rows.contains(*f)) {
+      rows.give_loops(f, [&](const FuncPtr& g, int stage, const SizeEstimate& of_row) {
+        give_root_loops(g, stage, request, of_row);
+      });
+      continue;
+    }
     if (f->is_extern() || limits.levels.contains(f.get()) || atomic.schedule(f)) continue;
     if (request.makes(Decision::ScatterStrategy) && schedule_scatter(f, slices, sizes)) {
       if (atomic.is_part(*f)) run_serially(f);
@@ -218,6 +240,8 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
     else
       given.push_back(f);
   }
+  rows.move();
+  whole.merge(rows.all());
   if (may_choose) unroll_choices(given, fixed, sizes);
   const auto give_rows = [&](const FuncPtr& sum, const std::vector<size_t>& dimensions) {
     std::erase(started, sum);

@@ -29,7 +29,7 @@ namespace retrograde::autoschedule {
 namespace {
 
 constexpr double a_cycle = 2;       // loads, and operations
-constexpr double gathered = 2;      // loads that a lane takes: it is inserted, too
+constexpr double gathered = 2;      // loads that a lane takes, and operations that insert it
 constexpr double add_latency = 4;   // cycles from one operation of a partial result to the next
 constexpr double of_an_end = 16;    // cycles that combine the lanes of a partial result
 constexpr double of_a_tuple = 5;    // cycles that combine one lane with the others
@@ -115,10 +115,13 @@ class Iteration {
 
   // Cycles of a vector along the variable, or of one term where it is empty. `registers`: of such a vector.
   double cycles(const std::string& var, double lanes, double registers) const {
-    double loads = 0;
-    for (const Call* read : reads_)
-      loads += var.empty() ? 1 : loads_of(*read, var, lanes, registers);
-    return std::max(loads, registers * operations_) / a_cycle;
+    double loads = 0, inserts = 0;
+    for (const Call* read : reads_) {
+      const double of_read = var.empty() ? 1 : loads_of(*read, var, lanes, registers);
+      loads += of_read;
+      if (!var.empty() && of_read >= gathered * lanes) inserts += of_read;
+    }
+    return std::max(loads, registers * operations_ + inserts) / a_cycle;
   }
 
  private:

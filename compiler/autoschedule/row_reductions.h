@@ -38,8 +38,9 @@ struct RowReduction {
 // nullopt: vectors of elements take about as long, or the update is neither a sum, product, minimum or maximum nor a
 // Tuple whose values may be combined in any order.
 // `lanes`: of a vector of elements.
-// Model: a gather loads each lane; a vector takes one load for each register. There are two loads and two operations a
-// cycle, and each register of partial results takes an operation every four cycles. Unknown extents count as long.
+// Model: a gather loads and inserts each lane; a vector takes one load for each register. There are two loads and two
+// operations a cycle, and each register of partial results takes an operation every four cycles. Unknown extents count
+// as long.
 std::optional<RowReduction> row_reduction(const FuncContents& f, const Definition& update,
                                           int lanes, const VectorUnit& unit,
                                           const SizeEstimate& sizes);

@@ -1,8 +1,10 @@
 // derivative.cpp -- binds propagate_adjoints, its options and its results.
 #include "autodiff/derivative.h"
 
+#include "autodiff/sweeps/residuals.h"
 #include "bind_all.h"
 #include "binding.h"
+#include "frontend/data/image_param.h"
 #include "unlocked.h"
 
 namespace retrograde::python {
@@ -162,6 +164,42 @@ void bind_propagation(py::module_& m) {
       arg("outputs"), arg("options") = AdjointOptions());
 }
 
+std::vector<graph::FuncPtr> contents_of(const std::vector<Func>& funcs) {
+  std::vector<graph::FuncPtr> result;
+  for (const Func& f : funcs) result.push_back(f.function());
+  return result;
+}
+
+// For operators of PyTorch: Funcs with their extents, and gradients that read images instead.
+void bind_residuals(py::module_& m) {
+  using Residuals = std::vector<std::pair<Func, std::vector<int64_t>>>;
+  m.def("_may_have_residuals", [](const std::vector<Func>& outputs) {
+    return unlocked([funcs = contents_of(outputs)](const Interruption&) {
+      return autodiff::may_have_residuals(funcs);
+    });
+  });
+  m.def("_residuals", [](const std::vector<Func>& outputs, const std::vector<Func>& gradients) {
+    return unlocked([=](const Interruption&) {
+      Residuals result;
+      for (const auto& [f, extents] :
+           autodiff::residuals_of(contents_of(outputs), contents_of(gradients)))
+        result.emplace_back(Func(f), extents);
+      return result;
+    });
+  });
+  m.def("_reading_residuals", [](const std::vector<Func>& gradients,
+                                 const std::vector<Func>& residuals,
+                                 const std::vector<ImageParam>& images) {
+    std::vector<std::shared_ptr<graph::ParameterContents>> parameters;
+    for (const ImageParam& image : images) parameters.push_back(image.parameter());
+    std::vector<Func> result;
+    for (const graph::FuncPtr& f :
+         autodiff::reading_residuals(contents_of(gradients), contents_of(residuals), parameters))
+      result.emplace_back(f);
+    return result;
+  });
+}
+
 }  // namespace
 
 void bind_derivative(py::module_& m) {
@@ -172,6 +210,7 @@ void bind_derivative(py::module_& m) {
   bind_options(m);
   bind_class(m);
   bind_propagation(m);
+  bind_residuals(m);
 }
 
 }  // namespace retrograde::python

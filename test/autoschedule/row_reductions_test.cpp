@@ -81,6 +81,18 @@ TEST(RowReductions, HaveTheResultsOfTheDeclaredOrder) {
   }
 }
 
+// Arithmetic does not hide what it takes to gather a column.
+TEST(RowReductions, PayWithMuchArithmetic) {
+  constexpr int width = 640;
+  const Buffer<float> in = matrix(width, width);
+  Func f("f");
+  const RDom r(0, width, "r");
+  f(y) = 0.0f;
+  f(y) += exp(in(r, y)) * exp(0.5f - in(r, y) * in(r, y));
+  f.bound(y, 0, width);
+  EXPECT_TRUE(runs_along_rows(scheduled(f)));
+}
+
 TEST(RowReductions, HaveTheSameBitsOnAnyNumberOfThreads) {
   Pipeline pipeline(reduction(sum_up, 5000));
   pipeline.auto_schedule(get_host_target());

@@ -132,8 +132,28 @@ TEST(LongSums, HaveBlocksOf32TermsAndShortOnesOf16) {
     return terms;
   };
   EXPECT_EQ(terms_of_a_block(1024, 256), 32);
-  EXPECT_EQ(terms_of_a_block(64, 1024), 16) << "a part has 128 terms";
+  EXPECT_EQ(terms_of_a_block(64, 128), 16) << "a part has 256 terms";
   EXPECT_EQ(terms_of_a_block(16, 64), 0) << "of which none is worth it";
+}
+
+// Sums of columns fill vectors with their elements; sums of rows fill them with terms, in lanes.
+TEST(LongSums, HaveLanesIfElementsAreStrided) {
+  const auto has_lanes = [](bool along_rows) {
+    constexpr int elements = 1000, terms = 5000;
+    Var x("x"), y("y");
+    Func out("out"), seed("seed");
+    Buffer<float> gain(elements);
+    Buffer<float> all =
+        along_rows ? Buffer<float>(terms, elements) : Buffer<float>(elements, terms);
+    out(x, y) = along_rows ? gain(y) * all(x, y) : gain(x) * all(x, y);
+    seed(x, y) = 1.0f;
+    const Derivative d = propagate_adjoints(out, seed, {{0, all.width()}, {0, all.height()}});
+    return std::ranges::any_of(
+        graph::topological_order({d(gain).function()}),
+        [](const graph::FuncPtr& f) { return f->made && f->made->lanes > 0; });
+  };
+  EXPECT_TRUE(has_lanes(true));
+  EXPECT_FALSE(has_lanes(false));
 }
 
 TEST(LongSums, UnderSchedulesByHand) {

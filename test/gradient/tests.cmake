@@ -17,6 +17,7 @@ retrograde_test(
   operation_count_test
   passed_reads_test
   phases_test
+  residuals_test
   second_derivatives_test
   several_outputs_test
   shared_adjoints_test

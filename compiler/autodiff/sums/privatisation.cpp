@@ -75,21 +75,16 @@ class PartSizes {
   }
   // Whether the reads are strided for neighbouring elements and contiguous for neighbouring terms.
   bool reads_across(const Iterations& update) const {
-    const std::string &row = target_.args[0], &term = update.rvars[0].var;
-    bool along = false, across = false;
-    const auto note = [&](const Expr& e) {
-      const auto* call = e.as<Call>();
-      if (!call || call->call_type == CallType::Operator || call->args.empty()) return true;
-      along |= uses_variable(call->args[0], row);
-      across |= uses_variable(call->args[0], term) &&
-                std::any_of(call->args.begin() + 1, call->args.end(),
-                            [&](const Expr& arg) { return uses_variable(arg, row); });
-      return true;
-    };
-    for (const Expr& sum : update.all.sums) {
-      if (sum.defined()) walk(sum, note);
-    }
-    return across && !along;
+    const RowReads reads = row_reads(update);
+    return reads.across && !reads.along;
+  }
+  // Whether vectors of elements are full, and contiguous in what they read.
+  bool reads_along(const Iterations& update) const {
+    const Gather& g = update.over;
+    if (g.pure.empty() || !g.pure[0] || target_.region.size() != g.pure.size()) return false;
+    const double extent = extent_of(target_.region[0]);
+    const RowReads reads = row_reads(update);
+    return extent >= lane_count && extent < unknown_elements && reads.along && !reads.across;
   }
   // The number of parts, a power of two; 1 means only lanes. Each part of a scatter holds every element that the
   // scatter may reach, so there are fewer parts if there are many elements for the iterations. If sizes are known at
@@ -129,10 +124,12 @@ class PartSizes {
     }
     return simplify(cast_to(Int(32), min(max(fit, make_one(Int(64))), cast_to(Int(64), most))));
   }
-  // Lanes let a gather add in vectors. In a scatter, neighbouring iterations often meet in one element and would wait
-  // for each other, so lanes get elements of their own if there are few.
-  bool has_lanes(const Gather& g) const {
-    if (!g.scatters) return true;
+  // Lanes let a gather add in vectors if its elements do not fill them, as the column sums of a matrix do. In a scatter,
+  // neighbouring iterations often meet in one element and would wait for each other, so lanes get elements of their own
+  // if there are few.
+  bool has_lanes(const Iterations& update) const {
+    const Gather& g = update.over;
+    if (!g.scatters) return !reads_along(update);
     if (target_.region.size() != g.pure.size()) return false;
     const double elements = elements_of_target() * lane_count;
     const double iterations = iterations_of(g, many_iterations) * elements_of(g);
@@ -150,6 +147,28 @@ class PartSizes {
   }
 
  private:
+  // Whether neighbouring elements are neighbours in some reads, and whether neighbouring terms are in reads in which
+  // elements lie in other rows.
+  struct RowReads {
+    bool along = false, across = false;
+  };
+  RowReads row_reads(const Iterations& update) const {
+    const std::string &row = target_.args[0], &term = update.rvars[0].var;
+    RowReads result;
+    const auto note = [&](const Expr& e) {
+      const auto* call = e.as<Call>();
+      if (!call || call->call_type == CallType::Operator || call->args.empty()) return true;
+      result.along |= uses_variable(call->args[0], row);
+      result.across |= uses_variable(call->args[0], term) &&
+                       std::any_of(call->args.begin() + 1, call->args.end(),
+                                   [&](const Expr& arg) { return uses_variable(arg, row); });
+      return true;
+    };
+    for (const Expr& sum : update.all.sums) {
+      if (sum.defined()) walk(sum, note);
+    }
+    return result;
+  }
   double elements_of_target() const {
     double elements = 1;
     for (const LoopVariable& v : target_.region) elements *= extent_of(v);
@@ -195,7 +214,9 @@ std::optional<PartPlan> plan_parts(const Iterations& update, const AdjointTarget
   if (!sizes.is_worth_splitting(update)) return std::nullopt;
   const Gather& g = update.over;
   const Expr count = sizes.part_count_of(g);
-  return PartPlan{sizes.parts_of(g) > 1, count, sizes.has_lanes(g), sizes.note(g, count)};
+  const bool has_parts = sizes.parts_of(g) > 1, has_lanes = sizes.has_lanes(update);
+  if (!has_parts && !has_lanes) return std::nullopt;
+  return PartPlan{has_parts, count, has_lanes, sizes.note(g, count)};
 }
 
 // The loop that is split into parts: the outermost with enough iterations to run in parallel, so that a part reads

@@ -1,4 +1,6 @@
 """Operator.explain(): the stages of an operator and of its gradients, in plain words (see retrograde.explain)."""
+import math
+
 import torch
 
 from .. import _explain
@@ -6,6 +8,7 @@ from .. import _retrograde as rg
 from .._errors import CompileError, Error, error
 from ._device import device_of
 from ._plan import GRADIENT, bits
+from ._training import training_of
 
 # The facts about a gradient that a reader needs, by the names of Explanation.Kind.
 _FACTS = {"Scattered": " is a sum at data-dependent indices", "Privatised": "", "Zero": " is zero", "Version": "",
@@ -29,11 +32,13 @@ def explain(operator, given):
         title = f"backward, gradients of {' and '.join(plan.names[i] for i in wanted)}: "
         try:
             step = GRADIENT, sum(1 << i for i in wanted), sum(1 << i for i in seeds)
-            gradient = plan.derived(step)
             place = kinds[0][2] if kinds else torch.device("cpu")
-            every = kinds + [(plan.result_dtypes[i], results[i], place) for i in seeds]
+            training = training_of(plan, step[1]) if place.type in ("cpu", "meta") else None
+            residuals = [(*kind, place) for kind in training.residual_kinds()] if training else []
+            gradient = training.backward if training else plan.derived(step)
+            every = kinds + residuals + [(plan.result_dtypes[i], results[i], place) for i in seeds]
             backward = _pipeline(gradient, every, [kinds[i][1] for i in wanted])
-            lines += [title + backward[1], *backward[2:]]
+            lines += [title + backward[1], *backward[2:], *_kept(training)]
             notes = _facts(gradient.facts(), {plan.names[i] for i in wanted})
         except Error as problem:
             lines.append(title + str(problem))
@@ -85,6 +90,16 @@ def _pipeline(plan, kinds, results):
                 *("  " + line for line in str(kernels).splitlines())]
     found = _explain.stages_of(pipeline, sizes, images)
     return [_explain.machine_line(found), f"{found['ms']:.3g} ms", *_explain.lines(found)]
+
+
+def _kept(training):
+    """A line about the values that the gradient does not recompute."""
+    if training is None:
+        return []
+    names = sorted({_explain.plain(f.name()) for f in training.residuals})
+    size = sum(math.prod(shape) * torch.finfo(dtype).bits // 8 for dtype, shape in training.residual_kinds())
+    shown = ", ".join(names[:_explain.MOST_STAGES])
+    return [f"  kept by the forward pass for the gradient, {_explain.size_of(size)}: {shown}"]
 
 
 def _facts(explanations, wanted):

@@ -64,6 +64,7 @@ class Calls:
 
     def __init__(self, operator, library, namespace, name):
         self.operator, self._last, self._functions = operator, {}, {}
+        self._trainings = {}  # by the inputs to differentiate by: types and shapes of the last call, its Training
         self.seen = {}  # by path: types and shapes of the last call, for explain()
         kernels = {"CPU": self.run, "CUDA": self.run_on_device, "Autograd": self.differentiate,
                    "AutocastCPU": self.cast, "AutocastCUDA": self.cast, "Batched": self.take_batch}
@@ -120,6 +121,33 @@ class Calls:
         self._last[path] = plan.expected
         self._see(path, tensors)
         return results
+
+    def run_keeping(self, tensors, wanted):
+        """Runs the operator for a gradient by the inputs at these positions. Returns the results, the Training that the
+        gradient belongs to, and the residuals for it; None if there are no residuals (_training.py)."""
+        kinds = [(t.dtype, t.shape) for t in tensors]
+        mask = _mask(wanted)
+        known, training = self._trainings.get(mask, (None, None))
+        if known != kinds:
+            training = self.operator.training_for(mask, tensors)
+            self._trainings[mask] = kinds, training
+            if training is not None:
+                self._see((), tensors)
+        results = None if training is None else training.run_forward(tensors)
+        if results is None:
+            return None
+        return results[:training.results], training, results[training.results:]
+
+    def gradient(self, path, step, training, tensors, residuals, seeds):
+        """The gradients for seeds; a gradient of gradients cannot follow from residuals."""
+        if training is not None and training.step == step and not torch.is_grad_enabled() \
+                and is_direct((*tensors, *residuals, *seeds)):
+            gradients = training.run_backward(tensors, residuals, seeds)
+            if gradients is not None:
+                if step not in self.seen:
+                    self._see(step, (*tensors, *seeds))
+                return gradients
+        return self((*path, *step), (*tensors, *seeds))
 
     def _see(self, path, tensors):
         self.seen.pop(path, None)  # the last one is the last of the dict
@@ -237,25 +265,38 @@ def _mask(places):
 
 def _function_of(calls, path):
     """The autograd.Function of one path. The path is not an argument of calls, because autograd inspects each one."""
+    def wanted_of(ctx, tensors):
+        return [i for i, t in enumerate(tensors) if ctx.needs_input_grad[i + 1] and t.dtype.is_floating_point]
+
     class Call(torch.autograd.Function):
         @staticmethod
         def forward(ctx, below, *tensors):
             ctx.set_materialize_grads(False)
-            ctx.save_for_backward(*tensors)
+            ctx.training, residuals = None, ()
+            kept = None
+            if not path and below == calls.run and calls.operator.knows_sizes:
+                kept = calls.run_keeping(tensors, wanted_of(ctx, tensors))
+            if kept is not None:
+                results, ctx.training, residuals = kept
+            else:
+                results = below(path, tensors)
+            ctx.save_for_backward(*tensors, *residuals)
             if forward_ad._current_level >= 0:
                 ctx.save_for_forward(*tensors)
-            return tuple(below(path, tensors))
+            return tuple(results)
 
         @staticmethod
         def backward(ctx, *seeds):
-            tensors = ctx.saved_tensors
-            wanted = [i for i, t in enumerate(tensors) if ctx.needs_input_grad[i + 1] and t.dtype.is_floating_point]
+            saved = ctx.saved_tensors
+            tensors, residuals = saved[:len(ctx.needs_input_grad) - 1], saved[len(ctx.needs_input_grad) - 1:]
+            wanted = wanted_of(ctx, tensors)
             given = [i for i, seed in enumerate(seeds) if seed is not None and seed.dtype.is_floating_point]
             results = [None] * len(tensors)
             if wanted and given:
                 step = GRADIENT, _mask(wanted), _mask(given)
                 # Dense seeds: autograd's seeds of sums have stride 0, for which pipelines would be recompiled.
-                gradients = calls((*path, *step), (*tensors, *(seeds[i].contiguous() for i in given)))
+                gradients = calls.gradient(path, step, ctx.training, tensors, residuals,
+                                           tuple(seeds[i].contiguous() for i in given))
                 for i, gradient in zip(wanted, gradients):
                     # Sums the gradient of a tensor that all items of the batch share.
                     shape = tensors[i].shape

@@ -14,6 +14,7 @@ from ._direct import is_compiling, is_direct
 from ._explaining import explain
 from ._pickling import Function, describe, described
 from ._plan import Plan, is_image
+from ._training import training_of
 
 _numbers = itertools.count()
 MOST_SIZES = 8  # maximum number of sizes for which an operator is compiled separately
@@ -211,6 +212,12 @@ class Operator:
                 plan = self._sized[key]
         return plan.derived(path) if path else plan
 
+    def training_for(self, wanted, tensors):
+        """The plans that share values for gradients by these inputs, a bit mask; None without such values, or for a
+        batch."""
+        plan = self.plan_for((), tensors)
+        return None if plan.sizes is None or plan.check(tensors) else training_of(plan, wanted)
+
     def plan(self, path, tensors):
         """The plan for tensors of these types and of any sizes."""
         dtype = tensors[self._by].dtype if self._by is not None else None
@@ -260,6 +267,11 @@ class Operator:
         The gradients are those of the tensors that require them; of shapes, all. Nothing runs: times are predictions of
         the cost model, to compare stages with each other."""
         return explain(self, inputs)
+
+    @property
+    def knows_sizes(self):
+        """Whether the definition is compiled for each set of sizes."""
+        return self._knows_sizes
 
     def made(self):
         """The paths of the derivatives that exist; see Plan.derived."""

@@ -63,6 +63,7 @@ class Plan:
         self._images = [is_image(parameter) for parameter in self.inputs]
         self._last_kinds, self.expected = None, None  # see _expect
         self._lock, self._callable, self._derived = threading.RLock(), None, {}
+        self.wanted, self.trainings = (), {}  # of a gradient: the inputs that it differentiates by; see _training.py
         self._on_devices = {}  # compiled, by target
         self._result_shapes, self._seeds = None, 0  # _seeds: number of seeds, which are the last inputs
         if sizes is not None:
@@ -263,7 +264,7 @@ class Plan:
         sizes = None if self.sizes is None else [*self.sizes, *(self._result_shapes[i] for i in given)]
         plan = Plan(f"{self.name}, gradient", gradients, self.inputs + seeds,
                     lambda tensors: [tuple(tensors[i].shape) for i in wanted], sizes)
-        plan._seeds, plan.facts = len(seeds), derivative.explanations
+        plan._seeds, plan.facts, plan.wanted = len(seeds), derivative.explanations, wanted
         return plan
 
     def _tangent(self, given, _):
@@ -273,8 +274,8 @@ class Plan:
             name = f"tangent_{next(_numbers)}_of_{plain(parameter.name())}"
             tangents.append(rg.ImageParam(parameter.type(), dimensions, name))
             directions.append(rg.Direction(parameter, rg.Func(tangents[-1])))
-        moved = [_as(f.type(), f.dimensions(), f"tangent_of_{plain(f.name())}",
-                     rg.propagate_tangents(f, directions)(f) if f.type().is_float() else None) for f in self.outputs]
+        moved = [func_as(f.type(), f.dimensions(), f"tangent_of_{plain(f.name())}",
+                         rg.propagate_tangents(f, directions)(f) if f.type().is_float() else None) for f in self.outputs]
         count = len(self.inputs)
         sizes = None if self.sizes is None else [*self.sizes, *(self.sizes[i] for i in given)]
         return Plan(f"{self.name}, tangent", moved, self.inputs + tangents,
@@ -308,10 +309,10 @@ def _set_bounds(buffer, size):
 def _as_gradient(adjoint, parameter):
     """An adjoint as a Func with the type of the parameter; the adjoint may be wider."""
     dimensions = parameter.dimensions() if is_image(parameter) else 0
-    return _as(parameter.type(), dimensions, f"gradient_of_{plain(parameter.name())}", adjoint)
+    return func_as(parameter.type(), dimensions, f"gradient_of_{plain(parameter.name())}", adjoint)
 
 
-def _as(type, dimensions, name, part):
+def func_as(type, dimensions, name, part):
     """A Func with the values of another one, if there is any, in a type."""
     result = rg.Func(name)
     at = tuple(rg.Var(f"d{d}") for d in range(dimensions))

@@ -1,0 +1,375 @@
+#include "autoschedule/row_hosts.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "autoschedule/cost_estimate.h"
+#include "autoschedule/inlined_reads.h"
+#include "autoschedule/new_loop.h"
+#include "autoschedule/only_reader.h"
+#include "autoschedule/read_estimate.h"
+#include "frontend/language/func.h"
+#include "frontend/schedule/loop_level.h"
+#include "frontend/schedule/stage.h"
+#include "graph/definitions/own_reads.h"
+#include "graph/directives/give_directive.h"
+#include "ir/build.h"
+#include "ir/lets.h"
+#include "ir/memory_reads.h"
+#include "ir/visit.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::autoschedule {
+
+namespace {
+
+constexpr double least_terms = 32;   // of a sum along a row
+constexpr double few_terms = 512;    // which may be added one by one
+constexpr int64_t least_row = 16;    // elements along the first dimension
+constexpr int64_t enough_rows = 16;  // on any number of threads: results may not depend on it
+
+bool has_many_terms(const FuncContents& f) {
+  return std::ranges::any_of(
+      f.updates, [](const Definition& update) { return terms_of(update, 0) >= least_terms; });
+}
+
+bool is_partial(const FuncContents& f) {
+  return f.made && (f.made->lanes > 0 || f.made->has_parts || f.made->blocks > 0);
+}
+
+bool is_moved(const Call& call, const Definition& update, size_t d) {
+  return std::ranges::any_of(
+      update.rvars, [&](const ReductionVariable& r) { return uses_variable(call.args[d], r.var); });
+}
+
+// Whether vectors of terms lie along rows of all that the update reads, so that it needs no other rows to be fast.
+bool runs_along_rows(const FuncContents& f, const Definition& update,
+                     const std::vector<FuncPtr>& stored) {
+  const double terms = terms_of(update, 0);
+  if (f.made && terms > 0 && terms <= few_terms) return true;
+  const Kind kind = without_lets(update.values[0]).kind();
+  if (kind != Kind::Add && kind != Kind::Sub && kind != Kind::Min && kind != Kind::Max)
+    return false;
+  bool result = terms >= least_terms;
+  const Expr first = simplify(update.rvars[0].extent);
+  result &= as_const_int(first).value_or(0) >= least_terms;
+  for (const Expr& root : roots_with_inlined(update, stored)) {
+    walk(root, [&](const Expr& e) {
+      const auto* call = e.as<Call>();
+      if (!call || call->call_type == CallType::Operator || call->name == f.name) return true;
+      const size_t row = innermost_dimension(*call);
+      for (size_t d = 0; d < call->args.size(); ++d) {
+        result &= !reads_memory(call->args[d], MemoryReads::Functions);
+        result &= d == row || !is_moved(*call, update, d) || is_moved(*call, update, row);
+      }
+      return true;
+    });
+  }
+  return result;
+}
+
+class HostFinder {
+ public:
+  HostFinder(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
+             const std::unordered_set<const Symbol*>& excluded, const SizeEstimate& sizes)
+      : order_(topological_order(outputs)),
+        stored_(stored),
+        excluded_(excluded),
+        sizes_(sizes),
+        reads_(outputs, stored) {
+    for (const FuncPtr& f : outputs) outputs_.insert(f.get());
+    for (const FuncPtr& f : stored) at_root_.insert(f.get());
+  }
+
+  std::optional<RowHost> find(const FuncPtr& f) {
+    if (!may_be_host(*f)) return std::nullopt;
+    RowHost host{f, {}, {}, {}, {}};
+    RowCoordinates& own = host.coordinates[f.get()];
+    own.resize(f->args.size());
+    for (size_t d = 1; d < own.size(); ++d) own[d] = RowCoordinate{d};
+    for (auto member = order_.rbegin(); member != order_.rend(); ++member) {  // consumers first
+      if (*member != f && may_be_member(**member)) add(*member, host);
+    }
+    return is_worth_while(host) ? std::optional(std::move(host)) : std::nullopt;
+  }
+
+  void exclude(const FuncPtr& f) { taken_.insert(f.get()); }
+
+ private:
+  const std::vector<FuncPtr> order_;
+  const std::vector<FuncPtr>& stored_;
+  const std::unordered_set<const Symbol*>& excluded_;
+  const SizeEstimate& sizes_;
+  const StoredReads reads_;
+  std::unordered_set<const Symbol*> outputs_, at_root_, taken_;
+
+  bool is_free(const FuncContents& f) const {
+    return !f.is_extern() && !has_directives(f) && !excluded_.contains(&f) && !taken_.contains(&f);
+  }
+
+  bool may_be_host(const FuncContents& f) const {
+    return f.is_pure() && is_free(f) && at_root_.contains(&f) && f.args.size() > 1 &&
+           sizes_.extent(f, 0).value_or(0) >= least_row &&
+           sizes_.bytes(f) >= sizes_.machine().passes_caches;
+  }
+
+  // The blocks of a sum are computed where they are added up.
+  bool may_be_member(const FuncContents& f) const {
+    const bool is_block = f.made && f.made->blocks > 0;
+    return is_free(f) && !outputs_.contains(&f) && (at_root_.contains(&f) || is_block) &&
+           !f.args.empty() && f.types.size() == 1;
+  }
+
+  // An output whose every element is that of the member.
+  bool is_copy(const StoredRead& read, const FuncContents& member) const {
+    const FuncContents& f = *read.reader;
+    if (!f.is_pure() || !outputs_.contains(&f) || !is_free(f) || f.pure->values.size() != 1)
+      return false;
+    const Expr value = without_lets(f.pure->values[0]);
+    const auto* call = value.as<Call>();
+    return call && call->symbol.raw() == &member && same_args(call->args, f.pure->args);
+  }
+
+  // Of an index in a definition of a Func with such coordinates.
+  static std::optional<RowCoordinate> coordinate(const Expr& any_index, const FuncContents& reader,
+                                                 const RowCoordinates& known) {
+    const auto moves = [&](const Expr& e) {
+      return std::ranges::any_of(reader.args,
+                                 [&](const std::string& arg) { return uses_variable(e, arg); });
+    };
+    const Expr index = unclamped(without_lets(any_index), moves);
+    if (const auto* quotient = index.as<Div>()) {
+      const auto divisor = as_const_int(quotient->b);
+      auto of = coordinate(quotient->a, reader, known);
+      if (!of || !divisor || *divisor < 1 || of->divisor > 1) return std::nullopt;
+      return RowCoordinate{of->dimension, *divisor};
+    }
+    const auto* variable = index.as<Variable>();
+    const auto arg = variable ? std::ranges::find(reader.args, variable->name) : reader.args.end();
+    return arg == reader.args.end() ? std::nullopt
+                                    : known[static_cast<size_t>(arg - reader.args.begin())];
+  }
+
+  void add(const FuncPtr& f, RowHost& host) {
+    if (reads_.is_hidden(f) || reads_.of(f).empty()) return;
+    std::optional<RowCoordinates> all;
+    std::vector<FuncPtr> copies;
+    for (const StoredRead& read : reads_.of(f)) {
+      if (is_copy(read, *f)) {
+        copies.push_back(read.reader);
+        continue;
+      }
+      const auto reader = host.coordinates.find(read.reader.get());
+      if (reader == host.coordinates.end()) return;
+      for (const Expr& e : read.calls) {
+        RowCoordinates found;
+        for (const Expr& index : e.as<Call>()->args)
+          found.push_back(coordinate(index, *read.reader, reader->second));
+        if (all.value_or(found) != found) return;
+        all = std::move(found);
+      }
+    }
+    if (!all || !stays_in_rows(*f, *all) || !is_same_row(*f, *all, host)) return;
+    host.members.push_back(f);
+    for (const FuncPtr& copy : copies) {
+      host.copies.push_back(copy);
+      host.coordinates[copy.get()] = *all;
+    }
+    host.coordinates[f.get()] = std::move(*all);
+  }
+
+  // All members have the coordinates of the first one.
+  static bool is_same_row(const FuncContents& f, const RowCoordinates& all, RowHost& host) {
+    std::vector<RowCoordinate> rows;
+    for (const auto& c : all) {
+      if (c) rows.push_back(*c);
+    }
+    if (rows.empty() || (rows.size() < all.size() && !is_partial(f))) return false;
+    std::ranges::sort(rows);
+    const auto same = [](const RowCoordinate& a, const RowCoordinate& b) {
+      return a.dimension == b.dimension;
+    };
+    if (std::ranges::adjacent_find(rows, same) != rows.end()) return false;
+    if (host.rows.empty()) host.rows = rows;
+    return host.rows == rows;
+  }
+
+  bool stays_in_rows(const FuncContents& f, const RowCoordinates& all) const {
+    for (int s = 0; s < f.stage_count(); ++s) {
+      const Definition& stage = f.stage(s);
+      if (read_elsewhere(f, stage).defined()) return false;
+      for (size_t d = 0; d < all.size(); ++d) {
+        if (all[d] && !is_pure_position(f, stage, d)) return false;
+      }
+      if (!stage.rvars.empty() && !is_partial(f) && !runs_along_rows(f, stage, stored_))
+        return false;
+    }
+    return true;
+  }
+
+  // Rows that lie together and stay in a cache near the core, of a Func that does not, and enough of them.
+  bool is_worth_while(const RowHost& host) const {
+    if (host.rows.empty() ||
+        host.rows.size() + host.rows.front().dimension < host.host->args.size())
+      return false;
+    int64_t rows = 1;
+    for (const auto& [dimension, divisor] : host.rows)
+      rows *= (sizes_.extent(*host.host, dimension).value_or(0) + divisor - 1) / divisor;
+    return rows >= enough_rows && sizes_.bytes(*host.host) / rows <= sizes_.machine().block_bytes &&
+           std::ranges::any_of(host.members, [](const FuncPtr& f) { return has_many_terms(*f); });
+  }
+};
+
+// The outermost loop over elements of each update.
+void run_in_parallel(const FuncPtr& f) {
+  if (f->schedule.compute_level.kind != graph::LoopLevel::Kind::Root) return;
+  for (int s = 1; s < f->stage_count(); ++s) {
+    const Dim& loop = f->stage(s).schedule.dims.back();
+    if (!loop.is_reduction && loop.runs == ForType::Serial) Stage(f, s).parallel(Var(loop.var));
+  }
+}
+
+// Gives the loops over rows of a host and moves the members into them.
+class HostMover {
+ public:
+  HostMover(const RowHost& host, const SizeEstimate& sizes) : host_(host), sizes_(sizes) {}
+
+  void move() {
+    cut_rows();
+    for (const FuncPtr& f : host_.members) {
+      if (f->schedule.compute_level.kind == graph::LoopLevel::Kind::At) continue;  // a block
+      autoschedule::run_serially(f);
+      Func(f).compute_at(retrograde::LoopLevel(Func(host_.host), Var(level()), 0));
+    }
+    for (const FuncPtr& copy : host_.copies) join(copy);
+  }
+
+ private:
+  const RowHost& host_;
+  const SizeEstimate& sizes_;
+  std::vector<std::string> loops_;  // over rows, as `rows`; the first is the innermost
+  size_t parallel_ = 0;             // number of them that run in parallel, outermost first
+
+  const std::string& level() const { return loops_[0]; }
+
+  void cut_rows() {
+    const FuncPtr& host = host_.host;
+    autoschedule::run_serially(host);
+    Stage stage(host, 0);
+    std::vector<VarOrRVar> order;
+    for (const Dim& loop : std::vector<Dim>(host->pure->schedule.dims)) {
+      const auto row = std::ranges::find_if(
+          host_.rows, [&](const RowCoordinate& c) { return host->args[c.dimension] == loop.var; });
+      if (row == host_.rows.end()) {
+        order.emplace_back(Var(loop.var));
+      } else if (row->divisor > 1) {
+        const Var all(loop.var), part(inner_loop(*host, 0, loop.var));
+        stage.split(all, all, part, static_cast<int>(row->divisor), TailStrategy::GuardWithIf);
+        order.emplace_back(part);
+      }
+    }
+    for (const RowCoordinate& row : host_.rows) {
+      const std::string name = name_of_row(), old = host->args[row.dimension];
+      stage.rename(Var(old), Var(name));
+      order.emplace_back(Var(name));
+      loops_.push_back(name);
+    }
+    stage.reorder(order);
+    count_tasks();
+    run_in_parallel(stage);
+  }
+
+  // Copies share the names of the loops.
+  std::string name_of_row() const {
+    std::string name = "row", last;
+    while (name != last) {
+      last = name;
+      name = new_loop(*host_.host, 0, name);
+      for (const FuncPtr& copy : host_.copies) name = new_loop(*copy, 0, name);
+    }
+    return name;
+  }
+
+  void count_tasks() {
+    int64_t tasks = 1;
+    for (auto row = host_.rows.rbegin(); row != host_.rows.rend(); ++row) {
+      if (tasks >= std::max(enough_rows, sizes_.machine().enough_tasks)) return;
+      tasks *= sizes_.extent(*host_.host, row->dimension).value_or(1) / row->divisor;
+      ++parallel_;
+    }
+  }
+
+  void run_in_parallel(Stage stage) const {
+    for (size_t i = 0; i < parallel_; ++i) stage.parallel(Var(loops_[loops_.size() - 1 - i]));
+  }
+
+  void join(const FuncPtr& copy) const {
+    Stage stage(copy, 0);
+    const RowCoordinates& all = host_.coordinates.at(copy.get());
+    std::vector<VarOrRVar> order;
+    for (size_t i = 0; i < host_.rows.size(); ++i) {
+      const auto arg = std::ranges::find(all, std::optional(host_.rows[i]));
+      stage.rename(Var(copy->args[static_cast<size_t>(arg - all.begin())]), Var(loops_[i]));
+      order.emplace_back(Var(loops_[i]));
+    }
+    stage.reorder(order);
+    run_in_parallel(stage);
+    stage.compute_with(Stage(host_.host, 0), Var(level()));
+  }
+};
+
+}  // namespace
+
+RowHosts::RowHosts(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
+                   const std::unordered_set<const Symbol*>& excluded, const SizeEstimate& sizes)
+    : sizes_(sizes) {
+  if (std::ranges::none_of(stored, [](const FuncPtr& f) { return has_many_terms(*f); })) return;
+  HostFinder finder(outputs, stored, excluded, sizes);
+  for (const FuncPtr& f : stored) {
+    auto host = finder.find(f);
+    if (!host) continue;
+    std::vector<FuncPtr> all{host->host};
+    all.insert(all.end(), host->members.begin(), host->members.end());
+    all.insert(all.end(), host->copies.begin(), host->copies.end());
+    for (const FuncPtr& each : all) {
+      role_[each.get()] = hosts_.size();
+      finder.exclude(each);
+    }
+    hosts_.push_back(std::move(*host));
+  }
+}
+
+std::unordered_set<const Symbol*> RowHosts::all() const {
+  std::unordered_set<const Symbol*> result;
+  for (const auto& [f, index] : role_) result.insert(f);
+  return result;
+}
+
+void RowHosts::give_loops(const FuncPtr& f, const GiveLoopsOfStage& give) const {
+  const RowHost& host = hosts_[role_.at(f.get())];
+  if (f == host.host) return give(f, 0, sizes_);
+  if (std::ranges::find(host.copies, f) != host.copies.end()) return;
+  SizeEstimate of_row = sizes_;
+  for (const FuncPtr& member : host.members) {
+    const RowCoordinates& all = host.coordinates.at(member.get());
+    for (size_t d = 0; d < all.size(); ++d) {
+      if (all[d]) of_row = of_row.with_extent(*member, d, 1);
+    }
+  }
+  for (int s = 1; s < f->stage_count(); ++s) give(f, s, of_row);
+  const RowCoordinates& own = host.coordinates.at(f.get());
+  if (std::ranges::any_of(own, [](const auto& c) { return !c; })) give(f, 0, of_row);
+}
+
+void RowHosts::move() const {
+  for (const RowHost& host : hosts_) {
+    if (has_plain_rows(*host.host)) {
+      HostMover(host, sizes_).move();
+    } else {  // its loops were chosen for other reasons, so that the members stay at root
+      for (const FuncPtr& f : host.members) run_in_parallel(f);
+    }
+  }
+}
+
+}  // namespace retrograde::autoschedule
