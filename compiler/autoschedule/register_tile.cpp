@@ -4,6 +4,7 @@
 #include <unordered_set>
 
 #include "autoschedule/cost_estimate.h"
+#include "autoschedule/phase_loops.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/vector_bytes.h"
@@ -28,6 +29,7 @@ struct Operand {
   std::vector<bool> depends_on;  // by dimension
   std::vector<bool> is_apart;    // by dimension: a step goes to what no iteration reads beside
   bool is_far = false;           // each iteration reads other rows
+  bool is_of_phase = false;      // one element for all lanes of a phase
 };
 
 // Whether what moves the read moves it from row to row, not along one.
@@ -49,7 +51,8 @@ bool moves_in(const Definition& stage, const Expr& index) {
 }
 
 // nullopt: the update reads other elements of its own.
-std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Definition& stage) {
+std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Definition& stage,
+                                                int64_t phases) {
   std::vector<Operand> operands;
   bool is_plain = true;
   std::unordered_set<const ExprNode*> seen;
@@ -70,6 +73,11 @@ std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Def
       operand.is_apart.push_back(std::ranges::any_of(
           call->args, [&](const Expr& index) { return moves(index) && !moves_in(stage, index); }));
     }
+    operand.is_of_phase = phases > 1 && operand.depends_on[0] &&
+                          std::ranges::all_of(call->args, [&](const Expr& index) {
+                            return growth_of_index(index, f.args[0], phases) == 0;
+                          });
+    if (operand.is_of_phase) operand.depends_on[0] = false;
     operands.push_back(std::move(operand));
     return true;
   };
@@ -78,7 +86,7 @@ std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Def
 }
 
 int64_t sums_of(const RegisterTile& tile) {
-  int64_t sums = tile.vectors;
+  int64_t sums = tile.vectors * tile.phases;
   for (const RegisterTile::Side& side : tile.sides) sums *= side.size;
   return sums;
 }
@@ -92,6 +100,7 @@ double loads_of(const RegisterTile& tile, const std::vector<Operand>& operands, 
     double count = operand.depends_on[0]
                        ? first + split_lines * (registers * static_cast<double>(tile.vectors) - 1)
                        : 1;
+    if (operand.depends_on[0] || operand.is_of_phase) count *= static_cast<double>(tile.phases);
     for (const RegisterTile::Side& side : tile.sides)
       count *= operand.depends_on[side.dimension] ? static_cast<double>(side.size) : 1;
     loads += count;
@@ -152,7 +161,7 @@ double iterations_an_element(const RegisterTile& tile, int lanes, const FuncCont
     const int64_t all = (*extent + size - 1) / size * size;
     return (all == *extent ? 1 : a_rest) * static_cast<double>(all) / static_cast<double>(*extent);
   };
-  double result = lost(0, tile.vectors * lanes);
+  double result = lost(0, tile.phases * tile.vectors * lanes);
   for (const RegisterTile::Side& side : tile.sides) result *= lost(side.dimension, side.size);
   return result;
 }
@@ -183,14 +192,14 @@ VectorUnit vector_unit_of(const Target& target) {
 
 std::optional<RegisterTile> register_tile(const FuncContents& f, const Definition& stage, int lanes,
                                           int64_t vectors, const VectorUnit& unit,
-                                          const SizeEstimate& sizes) {
+                                          const SizeEstimate& sizes, int64_t phases) {
   const auto moves = [&](const Expr& arg) {
     return std::any_of(stage.rvars.begin(), stage.rvars.end(),
                        [&](const ReductionVariable& r) { return uses_variable(arg, r.var); });
   };
   if (stage.rvars.empty() || std::any_of(stage.args.begin(), stage.args.end(), moves))
     return std::nullopt;
-  const auto operands = operands_of(f, stage);
+  const auto operands = operands_of(f, stage, phases);
   if (!operands || operands->empty()) return std::nullopt;
   int64_t bytes = 0;
   for (const Type& type : f.types) bytes += type.bytes() * lanes;
@@ -210,6 +219,7 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
   };
   double least = cost(best) * worth_while;
   const auto consider = [&](RegisterTile tile) {
+    tile.phases = phases;
     const double needed = cost(tile);
     // Of equals, fewer registers; of the same, those of one row.
     const bool is_better =
@@ -237,7 +247,7 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
 }
 
 int64_t RegisterTile::size_along(size_t dimension, int lanes) const {
-  if (dimension == 0) return vectors * lanes;
+  if (dimension == 0) return phases * vectors * lanes;
   for (const Side& side : sides) {
     if (side.dimension == dimension) return side.size;
   }

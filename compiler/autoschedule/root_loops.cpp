@@ -335,6 +335,10 @@ class LoopChooser {
     VectorUnit unit = request_.unit;
     unit.accumulator_bytes =
         static_cast<int64_t>(std::ldexp(unit.accumulator_bytes, request_.scales.register_tile));
+    const int64_t phases = phases_of_tile(f, reduction, lanes, sizes_);
+    if (phases > 1) {
+      if (auto tile = register_tile(f, reduction, lanes, 2, unit, sizes_, phases)) return tile;
+    }
     return register_tile(f, reduction, lanes, has_lanes ? 1 : 4, unit, sizes_);
   }
 
@@ -351,9 +355,14 @@ class LoopChooser {
       inner.push_back(part);
       outer.push_back(all);
     };
-    cut(0, tile.vectors * most_lanes());
+    cut(0, tile.phases * tile.vectors * most_lanes());
     for (const RegisterTile::Side& side : tile.sides) cut(side.dimension, side.size);
     std::vector<VarOrRVar> order = inner;
+    if (tile.phases > 1) {
+      const Var phase(new_loop(f_, index_, "phase"));
+      stage_.split(inner[0], inner[0], phase, static_cast<int>(tile.phases)).unroll(phase);
+      order.insert(order.begin() + 1, phase);
+    }
     for (size_t d : between) order.push_back(variable_of(d));
     for (const ReductionVariable& r : reduction_loops(f_, definition()))
       order.push_back(RVar(r.var));

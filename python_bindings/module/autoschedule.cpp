@@ -1,4 +1,5 @@
 // autoschedule.cpp -- binds auto_schedule, its options and results, and Python autoschedulers.
+#include "autoschedule/strided_terms.h"
 #include "bind_all.h"
 #include "binding.h"
 #include "callback.h"
@@ -145,16 +146,17 @@ void bind_schedulers(py::module_& m) {
   }));
 }
 
-// A copy of the pipeline with the schedule of auto_schedule() for the target. If the user gave directives and the
-// target has no GPU, the copy keeps those instead.
+// A copy of the pipeline with the schedule of auto_schedule() for the target, without sums of zeros between elements. If
+// the user gave directives and the target has no GPU, the copy keeps those instead.
 Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target) {
   const PipelineSpec spec = pipeline.spec();
-  std::vector<Func> outputs;
-  for (const graph::FuncPtr& f : graph::copy_graph(graph::apply_wrappers(spec.outputs)).outputs)
-    outputs.emplace_back(f);
-  Pipeline copy(outputs);
+  const auto funcs = graph::copy_graph(graph::apply_wrappers(spec.outputs)).outputs;
+  Pipeline copy(std::vector<Func>(funcs.begin(), funcs.end()));
   copy.set_autoschedule(spec.autoschedule);
-  if (target.has_gpu_feature() || copy.schedule_log().size() == 0) copy.auto_schedule(target);
+  if (target.has_gpu_feature() || copy.schedule_log().size() == 0) {
+    autoschedule::leave_out_zero_terms(funcs);
+    copy.auto_schedule(target);
+  }
   return copy;
 }
 
