@@ -23,6 +23,7 @@ constexpr double far_lines = 4;       // of a row of its own in each iteration: 
 constexpr double worth_while = 0.8;   // of the cycles without a tile
 constexpr double a_rest = 1.03;       // of the cycles
 constexpr double rows_apart = 1.1;    // of the cycles: vectors of several images, say
+constexpr double phases_apart = 1.3;  // the same of phases, which read a copy of rows several times
 
 // What an iteration of a reduction loads, by the dimensions that the place depends on.
 struct Operand {
@@ -215,7 +216,9 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
   RegisterTile best;
   const auto cost = [&](const RegisterTile& tile) {
     return cycles(tile, *operands, adds, registers) * iterations_an_element(tile, lanes, f, sizes) *
-           (reads_rows_apart(tile, *operands) ? rows_apart : 1);
+           (!reads_rows_apart(tile, *operands) ? 1
+            : phases > 1                       ? phases_apart
+                                               : rows_apart);
   };
   double least = cost(best) * worth_while;
   const auto consider = [&](RegisterTile tile) {

@@ -240,7 +240,7 @@ class LoopChooser {
     std::vector<VarOrRVar> loops = cut(*tile, {}, packed || rows);
     if (packed) loops = pack_inside(*packed, loops);
     if (rows) copy_rows_inside(*rows, loops);
-    run_in_parallel(loops, *tile);
+    run_in_parallel(loops, *tile, packed.has_value());
     return true;
   }
 
@@ -313,10 +313,13 @@ class LoopChooser {
   }
 
   // The outermost of them, and where that may be short the next one too: a loop in parallel inside of
-  // another is launched for each of its iterations.
-  void run_in_parallel(const std::vector<VarOrRVar>& loops, const RegisterTile& tile) {
+  // another is launched for each of its iterations. `has_copies`: each iteration of the innermost copies what many tiles
+  // read, so that it is work enough for a task.
+  void run_in_parallel(const std::vector<VarOrRVar>& loops, const RegisterTile& tile,
+                       bool has_copies = false) {
     stage_.parallel(loops.back());
-    if (loops.size() > 2 && iterations_of(loops.back(), tile) < sizes_.machine().enough_tasks)
+    if (loops.size() > (has_copies ? 1 : 2) &&
+        iterations_of(loops.back(), tile) < sizes_.machine().enough_tasks)
       stage_.parallel(loops[loops.size() - 2]);
   }
 
