@@ -22,6 +22,7 @@ constexpr double split_lines = 2;     // loads for a vector at any place: it cro
 constexpr double far_lines = 4;       // of a row of its own in each iteration: none is at hand yet
 constexpr double worth_while = 0.8;   // of the cycles without a tile
 constexpr double a_rest = 1.03;       // of the cycles
+constexpr int64_t most_parts = 4;     // of a vector that is loaded whole: then it is gathered
 constexpr double rows_apart = 1.1;    // of the cycles: vectors of several images, say
 constexpr double phases_apart = 1.3;  // the same of phases, which read a copy of rows several times
 
@@ -31,6 +32,7 @@ struct Operand {
   std::vector<bool> is_apart;    // by dimension: a step goes to what no iteration reads beside
   bool is_far = false;           // each iteration reads other rows
   bool is_of_phase = false;      // one element for all lanes of a phase
+  double parts = 1;              // that a vector is loaded in: its elements are so far apart
 };
 
 // Whether what moves the read moves it from row to row, not along one.
@@ -49,6 +51,12 @@ bool walks_afar(const Call& call, const Definition& stage) {
 bool moves_in(const Definition& stage, const Expr& index) {
   return std::ranges::any_of(
       stage.rvars, [&](const ReductionVariable& r) { return uses_variable(index, r.var); });
+}
+
+// The loads of a vector of a row whose elements are a few apart.
+double parts_of_vector(const Call& call, const std::string& lanes, int64_t phases) {
+  const auto stride = growth_of_index(call.args[0], lanes, phases);
+  return stride && *stride > 1 && *stride <= most_parts ? static_cast<double>(*stride) : 1;
 }
 
 // nullopt: the update reads other elements of its own.
@@ -79,6 +87,7 @@ std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Def
                             return growth_of_index(index, f.args[0], phases) == 0;
                           });
     if (operand.is_of_phase) operand.depends_on[0] = false;
+    if (operand.depends_on[0]) operand.parts = parts_of_vector(*call, f.args[0], phases);
     operands.push_back(std::move(operand));
     return true;
   };
@@ -98,9 +107,8 @@ double loads_of(const RegisterTile& tile, const std::vector<Operand>& operands, 
   double loads = 0;
   for (const Operand& operand : operands) {
     const double first = operand.is_far ? far_lines : split_lines;
-    double count = operand.depends_on[0]
-                       ? first + split_lines * (registers * static_cast<double>(tile.vectors) - 1)
-                       : 1;
+    const double vectors = registers * operand.parts * static_cast<double>(tile.vectors);
+    double count = operand.depends_on[0] ? first + split_lines * (vectors - 1) : 1;
     if (operand.depends_on[0] || operand.is_of_phase) count *= static_cast<double>(tile.phases);
     for (const RegisterTile::Side& side : tile.sides)
       count *= operand.depends_on[side.dimension] ? static_cast<double>(side.size) : 1;
