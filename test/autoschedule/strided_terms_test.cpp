@@ -24,7 +24,7 @@ using graph::FuncPtr;
 
 constexpr float infinite = std::numeric_limits<float>::infinity();
 
-// Of 12 bits: products are exact, as code may contract them with sums or not; sums are rounded.
+// Samples have 12 bits: products are exact, as code may contract them with sums or not; sums are rounded.
 float sample(int i) {
   const int bits = (i * 1237 + 911) % 4093 - 2000;
   return static_cast<float>(bits == 0 ? 1 : bits) * (i % 3 == 0 ? 0x1p-9f : 0x1p-6f);
