@@ -85,4 +85,10 @@ int64_t period_in(const Expr& e, const std::string& variable) {
   return period;
 }
 
+std::optional<int64_t> growth_over(const Expr& e, const std::string& variable, int64_t period) {
+  const auto found = growth(e, variable);
+  return found && period % found->period == 0 ? std::optional(step_over(*found, period))
+                                              : std::nullopt;
+}
+
 }  // namespace retrograde::analysis

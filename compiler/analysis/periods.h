@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "ir/expr.h"
@@ -17,5 +18,8 @@ inline constexpr int64_t longest_period = 4096;
 // The smallest period of all integer divisions and remainders in e that contain the variable; 1 if there are none, 0 if
 // one of them has no period.
 int64_t period_in(const Expr& e, const std::string& variable);
+
+// By how much e grows whenever the variable grows by `period`; nullopt if that differs from place to place.
+std::optional<int64_t> growth_over(const Expr& e, const std::string& variable, int64_t period);
 
 }  // namespace retrograde::analysis

@@ -29,6 +29,7 @@
 #include "autoschedule/slices.h"
 #include "autoschedule/start_in_tiles.h"
 #include "autoschedule/stored_funcs.h"
+#include "autoschedule/strided_terms.h"
 #include "autoschedule/strips.h"
 #include "autoschedule/sum_blocks.h"
 #include "autoschedule/task_sizes.h"
@@ -271,6 +272,10 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
     result = apply_wrappers(outputs);
     if (is_differentiated(result)) {
       result = with_invariant_factors(result);
+      if (has_strided_terms(result)) {
+        result = copy_graph(result).outputs;
+        leave_out_zero_terms(result);
+      }
       result = schedule_within_budget(result, request, Scheduling::Gradients).outputs;
     } else if (!stored_by_default(result).empty()) {
       result = copy_graph(result).outputs;

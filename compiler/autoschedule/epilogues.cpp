@@ -141,6 +141,10 @@ std::optional<PassedLoops> passed_loops(const FuncContents& f, int lanes) {
   }
   const auto row = held.find(0);
   if (row == held.end()) return std::nullopt;
+  if (const Split* phases = split_of_phases(f.updates[0], row->second->inner)) {
+    result.tile.phases = as_const_int(phases->factor).value_or(1);
+    result.tile.vectors /= result.tile.phases;
+  }
   result.is_whole = std::ranges::any_of(dims, [&](const Dim& loop) {
     return loop.var == row->second->inner && loop.runs == ForType::Vectorized;
   });

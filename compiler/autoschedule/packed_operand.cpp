@@ -27,6 +27,8 @@ constexpr double least_uses = 4;          // of an element of the copy
 constexpr int64_t least_block = 64;       // iterations: sums are fetched and put back for each
 constexpr int64_t most_rows = 8;          // of tiles that share a copy
 constexpr double worth_sharing = 0.75;    // of what is copied for each alone
+// Rows so many bytes apart, or a multiple of it, meet in a few sets of the second-level cache.
+constexpr int64_t few_sets = 32 << 10;
 constexpr double least_tiles = 8;  // that use one copy: with fewer, its rows stay in the cache
 constexpr int64_t most_of_whole = 1 << 18;  // elements of a copy of all, which a near cache holds
 constexpr double least_uses_of_whole = 64;  // of an element of such a copy
@@ -71,7 +73,7 @@ class Candidate {
   bool is_worth_packing() const {
     const auto lanes_along = lane_dimension();
     const auto elements = lanes_along ? elements_of_piece() : std::nullopt;
-    if (!elements || tiles(true) < sizes_.machine().enough_tasks) return false;
+    if (!elements || !has_tasks()) return false;
     // Lanes that run across rows are loaded one by one, wherever they lie.
     const bool is_near = *lanes_along == 0 && (rows() < many_rows || tiles(false) < least_tiles ||
                                                lies_together_already());
@@ -187,6 +189,15 @@ class Candidate {
     return rows;
   }
 
+  // Whether the loops that move the piece are tasks enough. Loops over tiles along rows are tasks only if there is no
+  // other, or if the rows drive each other out of the caches.
+  bool has_tasks() const {
+    const auto enough = static_cast<double>(sizes_.machine().enough_tasks);
+    const auto width = sizes_.extent(f_, 0);
+    const bool meet = width && *width * f_.types[0].bytes() % few_sets == 0;
+    return tiles(true) * (meet ? tiles_along(0) : 1) >= enough;
+  }
+
   // Of vectors.
   double loads_of_a_tile() const {
     double loads = static_cast<double>(tile_.vectors);
@@ -203,14 +214,17 @@ class Candidate {
     const bool is_alone = std::count(depends_on_.begin(), depends_on_.end(), true) == 1;
     double tiles = 1;
     for (size_t d = that_move && is_alone ? 0 : 1; d < f_.args.size(); ++d) {
-      const auto size = static_cast<double>(tile_.size_along(d, lanes_));
-      const double unknown =
-          that_move ? static_cast<double>(sizes_.machine().enough_tasks) * size : 1;
-      const auto extent = sizes_.extent(f_, d);
-      if (depends_on_[d] == that_move)
-        tiles *= std::ceil((extent ? static_cast<double>(*extent) : unknown) / size);
+      if (depends_on_[d] == that_move) tiles *= tiles_along(d);
     }
     return tiles;
+  }
+
+  double tiles_along(size_t d) const {
+    const auto size = static_cast<double>(tile_.size_along(d, lanes_));
+    const double unknown =
+        depends_on_[d] ? static_cast<double>(sizes_.machine().enough_tasks) * size : 1;
+    const auto extent = sizes_.extent(f_, d);
+    return std::ceil((extent ? static_cast<double>(*extent) : unknown) / size);
   }
 
   const FuncContents& f_;

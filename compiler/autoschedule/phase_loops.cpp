@@ -7,7 +7,9 @@
 #include "analysis/periods.h"
 #include "autoschedule/inlined_reads.h"
 #include "autoschedule/new_loop.h"
+#include "autoschedule/read_estimate.h"
 #include "ir/build.h"
+#include "ir/lets.h"
 #include "ir/visit.h"
 
 namespace retrograde::autoschedule {
@@ -16,6 +18,8 @@ namespace {
 
 // Vectors of sums that are kept in registers at once.
 constexpr int64_t most_phases = 6;
+// Of a tile, which has several sums for each.
+constexpr int64_t most_phases_of_tile = 4;
 
 }  // namespace
 
@@ -31,6 +35,29 @@ int64_t period_of_reads(const FuncContents& f, const Definition& stage, size_t d
     });
   }
   return period == 0 || period > longest_period ? 1 : period;
+}
+
+std::optional<int64_t> growth_of_index(const Expr& index, const std::string& variable,
+                                       int64_t period) {
+  const auto moves = [&](const Expr& e) { return uses_variable(e, variable); };
+  return growth_over(unclamped(without_lets(index), moves), variable, period);
+}
+
+int64_t phases_of_tile(const FuncContents& f, const Definition& stage, int lanes,
+                       const SizeEstimate& sizes) {
+  if (f.made || stage.rvars.empty()) return 1;
+  const int64_t period = period_of_reads(f, stage, 0);
+  if (period <= 1 || period > most_phases_of_tile || lanes % period != 0) return 1;
+  if (sizes.extent(f, 0).value_or(period * lanes) < period * lanes) return 1;
+  bool is_dense = true;
+  walk(stage, [&](const Call& call) {
+    if (call.call_type == CallType::Operator || call.name == f.name) return;
+    for (size_t d = 0; d < call.args.size(); ++d) {
+      const auto growth = growth_of_index(call.args[d], f.args[0], period);
+      is_dense &= growth == 0 || (d == 0 && growth == 1);
+    }
+  });
+  return is_dense ? period : 1;
 }
 
 bool has_odd_phases(const FuncContents& f, const Definition& stage, int lanes) {

@@ -14,6 +14,8 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <string>
 
 #include "autoschedule/size_estimate.h"
 #include "frontend/schedule/stage.h"
@@ -23,6 +25,17 @@ namespace retrograde::autoschedule {
 
 // The period of what a stage reads along a dimension, through Funcs that are computed inline too; 1: none.
 int64_t period_of_reads(const FuncContents& f, const Definition& stage, size_t dimension);
+
+// By how much an index, but for clamps, grows when the variable grows by the period; nullopt: not always by the same.
+std::optional<int64_t> growth_of_index(const Expr& index, const std::string& variable,
+                                       int64_t period);
+
+// The phases that a tile of sums has along its first dimension; 1: none. Vectors of one phase are dense in all that the
+// stage reads, or read one element. Lanes of elements that lie together would divide:
+//
+//   f(x, c) += in(x / 2 - r) * w(x % 2 + 2 * r, c)
+int64_t phases_of_tile(const FuncContents& f, const Definition& stage, int lanes,
+                       const SizeEstimate& sizes);
 
 // Whether vectors of `lanes` elements are no multiple of the period along the first dimension, if that is short.
 bool has_odd_phases(const FuncContents& f, const Definition& stage, int lanes);

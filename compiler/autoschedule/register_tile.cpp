@@ -6,6 +6,7 @@
 
 #include "analysis/linear.h"
 #include "autoschedule/cost_estimate.h"
+#include "autoschedule/phase_loops.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/vector_bytes.h"
@@ -25,12 +26,16 @@ constexpr double worth_while = 0.8;    // of the cycles without a tile
 constexpr double a_rest = 1.03;        // of the cycles
 constexpr double rows_apart = 1.1;     // of the cycles: vectors of several images, say
 constexpr int64_t line_elements = 16;  // of a cache line
+constexpr int64_t most_parts = 4;      // of a vector that is loaded whole: then it is gathered
+constexpr double phases_apart = 1.3;  // the same of phases, which read a copy of rows several times
 
 // What an iteration of a reduction loads, by the dimensions that the place depends on.
 struct Operand {
   std::vector<bool> depends_on;  // by dimension
   std::vector<bool> is_apart;    // by dimension: a step goes to what no iteration reads beside
   bool is_far = false;           // each iteration reads other rows
+  bool is_of_phase = false;      // one element for all lanes of a phase
+  double parts = 1;              // that a vector is loaded in: its elements are so far apart
 };
 
 // Whether an index grows by a cache line or more in each iteration of a loop, as the hop of overlapping windows.
@@ -60,8 +65,15 @@ bool moves_in(const Definition& stage, const Expr& index) {
       stage.rvars, [&](const ReductionVariable& r) { return uses_variable(index, r.var); });
 }
 
+// The loads of a vector of a row whose elements are a few apart.
+double parts_of_vector(const Call& call, const std::string& lanes, int64_t phases) {
+  const auto stride = growth_of_index(call.args[0], lanes, phases);
+  return stride && *stride > 1 && *stride <= most_parts ? static_cast<double>(*stride) : 1;
+}
+
 // nullopt: the update reads other elements of its own.
-std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Definition& stage) {
+std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Definition& stage,
+                                                int64_t phases) {
   std::vector<Operand> operands;
   bool is_plain = true;
   std::unordered_set<const ExprNode*> seen;
@@ -82,6 +94,12 @@ std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Def
       operand.is_apart.push_back(std::ranges::any_of(
           call->args, [&](const Expr& index) { return moves(index) && !moves_in(stage, index); }));
     }
+    operand.is_of_phase = phases > 1 && operand.depends_on[0] &&
+                          std::ranges::all_of(call->args, [&](const Expr& index) {
+                            return growth_of_index(index, f.args[0], phases) == 0;
+                          });
+    if (operand.is_of_phase) operand.depends_on[0] = false;
+    if (operand.depends_on[0]) operand.parts = parts_of_vector(*call, f.args[0], phases);
     operands.push_back(std::move(operand));
     return true;
   };
@@ -90,7 +108,7 @@ std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Def
 }
 
 int64_t sums_of(const RegisterTile& tile) {
-  int64_t sums = tile.vectors;
+  int64_t sums = tile.vectors * tile.phases;
   for (const RegisterTile::Side& side : tile.sides) sums *= side.size;
   return sums;
 }
@@ -101,9 +119,9 @@ double loads_of(const RegisterTile& tile, const std::vector<Operand>& operands, 
   double loads = 0;
   for (const Operand& operand : operands) {
     const double first = operand.is_far ? far_lines : split_lines;
-    double count = operand.depends_on[0]
-                       ? first + split_lines * (registers * static_cast<double>(tile.vectors) - 1)
-                       : 1;
+    const double vectors = registers * operand.parts * static_cast<double>(tile.vectors);
+    double count = operand.depends_on[0] ? first + split_lines * (vectors - 1) : 1;
+    if (operand.depends_on[0] || operand.is_of_phase) count *= static_cast<double>(tile.phases);
     for (const RegisterTile::Side& side : tile.sides)
       count *= operand.depends_on[side.dimension] ? static_cast<double>(side.size) : 1;
     loads += count;
@@ -164,7 +182,7 @@ double iterations_an_element(const RegisterTile& tile, int lanes, const FuncCont
     const int64_t all = (*extent + size - 1) / size * size;
     return (all == *extent ? 1 : a_rest) * static_cast<double>(all) / static_cast<double>(*extent);
   };
-  double result = lost(0, tile.vectors * lanes);
+  double result = lost(0, tile.phases * tile.vectors * lanes);
   for (const RegisterTile::Side& side : tile.sides) result *= lost(side.dimension, side.size);
   return result;
 }
@@ -195,14 +213,14 @@ VectorUnit vector_unit_of(const Target& target) {
 
 std::optional<RegisterTile> register_tile(const FuncContents& f, const Definition& stage, int lanes,
                                           int64_t vectors, const VectorUnit& unit,
-                                          const SizeEstimate& sizes) {
+                                          const SizeEstimate& sizes, int64_t phases) {
   const auto moves = [&](const Expr& arg) {
     return std::any_of(stage.rvars.begin(), stage.rvars.end(),
                        [&](const ReductionVariable& r) { return uses_variable(arg, r.var); });
   };
   if (stage.rvars.empty() || std::any_of(stage.args.begin(), stage.args.end(), moves))
     return std::nullopt;
-  const auto operands = operands_of(f, stage);
+  const auto operands = operands_of(f, stage, phases);
   if (!operands || operands->empty()) return std::nullopt;
   int64_t bytes = 0;
   for (const Type& type : f.types) bytes += type.bytes() * lanes;
@@ -218,10 +236,13 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
   RegisterTile best;
   const auto cost = [&](const RegisterTile& tile) {
     return cycles(tile, *operands, adds, registers) * iterations_an_element(tile, lanes, f, sizes) *
-           (reads_rows_apart(tile, *operands) ? rows_apart : 1);
+           (!reads_rows_apart(tile, *operands) ? 1
+            : phases > 1                       ? phases_apart
+                                               : rows_apart);
   };
   double least = cost(best) * worth_while;
   const auto consider = [&](RegisterTile tile) {
+    tile.phases = phases;
     const double needed = cost(tile);
     // Of equals, fewer registers; of the same, those of one row.
     const bool is_better =
@@ -249,7 +270,7 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
 }
 
 int64_t RegisterTile::size_along(size_t dimension, int lanes) const {
-  if (dimension == 0) return vectors * lanes;
+  if (dimension == 0) return phases * vectors * lanes;
   for (const Side& side : sides) {
     if (side.dimension == dimension) return side.size;
   }

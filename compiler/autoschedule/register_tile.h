@@ -28,6 +28,8 @@ struct RegisterTile {
     int64_t size;
   };
   std::vector<Side> sides;
+  // Phases of a stride along the first dimension (phase_loops.h): each has that many vectors.
+  int64_t phases = 1;
   // Elements along a dimension, of vectors of so many lanes along the first.
   int64_t size_along(size_t dimension, int lanes) const;
 };
@@ -39,10 +41,11 @@ struct RegisterTile {
 // Model: two loads and two multiply-adds a cycle, of which each sum takes one every four cycles; a
 // vector, whose place is any, counts as two loads (vector units of x86-64 since 2015), the first of a
 // row as four where each iteration reads another row. A vector of so many lanes is several registers
-// where these are smaller, each loaded alone; what all lanes share is loaded once. Functions in the
-// terms take what they take, so that a tile which only hides latency is none.
+// where these are smaller, each loaded alone; what all lanes share is loaded once. A vector of every
+// second element is picked from two. Functions in the terms take what they take, so that a tile which
+// only hides latency is none. `phases`: of the tile.
 std::optional<RegisterTile> register_tile(const FuncContents& f, const Definition& stage, int lanes,
                                           int64_t vectors, const VectorUnit& unit,
-                                          const SizeEstimate& sizes = {});
+                                          const SizeEstimate& sizes = {}, int64_t phases = 1);
 
 }  // namespace retrograde::autoschedule

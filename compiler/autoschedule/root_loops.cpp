@@ -245,7 +245,7 @@ class LoopChooser {
       loops = pack_inside(*packed, loops);
     if (rows) copy_rows_inside(*rows, loops);
     if (!packed && !rows && makes(Decision::LayoutStaging)) share_chunks(*tile, loops);
-    run_in_parallel(loops, *tile);
+    run_in_parallel(loops, *tile, packed.has_value());
     return true;
   }
 
@@ -349,10 +349,13 @@ class LoopChooser {
   }
 
   // The outermost of them, and where that may be short the next one too: a loop in parallel inside of
-  // another is launched for each of its iterations.
-  void run_in_parallel(const std::vector<VarOrRVar>& loops, const RegisterTile& tile) {
+  // another is launched for each of its iterations. `has_copies`: each iteration of the innermost copies what many tiles
+  // read, so that it is work enough for a task.
+  void run_in_parallel(const std::vector<VarOrRVar>& loops, const RegisterTile& tile,
+                       bool has_copies = false) {
     stage_.parallel(loops.back());
-    if (loops.size() > 2 && iterations_of(loops.back(), tile) < sizes_.machine().enough_tasks)
+    if (loops.size() > (has_copies ? 1 : 2) &&
+        iterations_of(loops.back(), tile) < sizes_.machine().enough_tasks)
       stage_.parallel(loops[loops.size() - 2]);
   }
 
@@ -371,6 +374,10 @@ class LoopChooser {
     VectorUnit unit = request_.unit;
     unit.accumulator_bytes =
         static_cast<int64_t>(std::ldexp(unit.accumulator_bytes, request_.scales.register_tile));
+    const int64_t phases = phases_of_tile(f, reduction, lanes, sizes_);
+    if (phases > 1) {
+      if (auto tile = register_tile(f, reduction, lanes, 2, unit, sizes_, phases)) return tile;
+    }
     return register_tile(f, reduction, lanes, has_lanes ? 1 : 4, unit, sizes_);
   }
 
@@ -387,9 +394,14 @@ class LoopChooser {
       inner.push_back(part);
       outer.push_back(all);
     };
-    cut(0, tile.vectors * most_lanes());
+    cut(0, tile.phases * tile.vectors * most_lanes());
     for (const RegisterTile::Side& side : tile.sides) cut(side.dimension, side.size);
     std::vector<VarOrRVar> order = inner;
+    if (tile.phases > 1) {
+      const Var phase(new_loop(f_, index_, "phase"));
+      stage_.split(inner[0], inner[0], phase, static_cast<int>(tile.phases)).unroll(phase);
+      order.insert(order.begin() + 1, phase);
+    }
     for (size_t d : between) order.push_back(variable_of(d));
     for (const ReductionVariable& r : reduction_loops(f_, definition()))
       order.push_back(RVar(r.var));

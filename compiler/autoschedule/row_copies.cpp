@@ -77,6 +77,28 @@ class InlinedCost {
   }
 };
 
+// By how much an index moves with each variable, a quotient by its share.
+using Steps = std::unordered_map<std::string, double>;
+
+// Adds those of an expression, times the factor; false: it is neither linear nor a sum with quotients.
+bool add_steps(const Expr& e, double factor, const std::vector<std::string>& names, Steps& steps) {
+  const Sum form = analysis::linear_form(e);
+  return form.valid && std::ranges::all_of(form.terms, [&](const Term& term) {
+           const double share = factor * static_cast<double>(term.factor);
+           const auto is_used = [&](const std::string& n) { return uses_variable(term.atom, n); };
+           if (const auto* v = term.atom.as<Variable>()) {
+             if (std::ranges::count(names, v->name) > 0) steps[v->name] += share;
+             return true;
+           }
+           if (std::ranges::none_of(names, is_used))
+             return !any_node(term.atom, [](const Call&) { return true; });
+           const auto* quotient = term.atom.as<Div>();
+           const auto divisor = quotient ? as_const_int(quotient->b) : std::nullopt;
+           return divisor && *divisor > 0 &&
+                  add_steps(quotient->a, share / static_cast<double>(*divisor), names, steps);
+         });
+}
+
 // How one read moves with the loops of the tiles.
 class ReadOfTiles {
  public:
@@ -99,19 +121,19 @@ class ReadOfTiles {
     double reads = 1;
     bool is_known = true;  // no extent was guessed
   };
-  // nullopt: an index is not linear, or rows are not those of the source.
+  // nullopt: an index has other terms than multiples and quotients, or rows are not those of the source.
   std::optional<Counts> counts(size_t row, int64_t rows) const {
     Counts counts;
     const Extents extents = extents_of(row, rows, counts.is_known);
     std::vector<std::string> names;
     for (const auto& [name, extent] : extents) names.push_back(name);
     for (const Expr& index : index_) {
-      const auto form = analysis::decompose(index, names);
-      if (!form || any_node(form->rest, [](const Call&) { return true; })) return std::nullopt;
+      Steps steps;
+      if (!add_steps(index, 1, names, steps)) return std::nullopt;
       double span = 1;
-      for (const auto& [name, step] : form->coefficients) {
+      for (const auto& [name, step] : steps) {
         if (name == f_.args[0] && step != 0 && &index != &index_[0]) return std::nullopt;
-        span += std::abs(static_cast<double>(step)) * (extents.at(name) - 1);
+        span += std::abs(step) * (extents.at(name) - 1);
       }
       counts.elements *= span;
     }

@@ -60,6 +60,19 @@ std::vector<TileLoop> tile_loops(const FuncContents& f, const Definition& stage)
   return result;
 }
 
+const Split* split_of_phases(const Definition& stage, const std::string& row) {
+  const auto is_unrolled = [&](const std::string& loop) {
+    return std::ranges::any_of(stage.schedule.dims, [&](const Dim& dim) {
+      return dim.var == loop && dim.runs == ForType::Unrolled && !dim.is_reduction;
+    });
+  };
+  const auto found = std::ranges::find_if(stage.schedule.splits, [&](const Split& made) {
+    return made.kind == Split::Kind::Split && made.old_var == row && made.outer == row &&
+           is_unrolled(made.inner);
+  });
+  return found == stage.schedule.splits.end() ? nullptr : &*found;
+}
+
 bool has_tiles(const FuncContents& f) {
   if (f.updates.empty() || f.updates[0].schedule.fuse_level.kind == graph::LoopLevel::Kind::At)
     return false;
@@ -96,6 +109,12 @@ void start_in_tiles(const FuncPtr& f, int lanes) {
   }
   const bool has_rows = inside.find(f->args[0]) == inside.end() || !inside[f->args[0]].empty();
   const std::vector<VarOrRVar> held = order;
+  const Split* phases = has_rows ? split_of_phases(f->updates[0], held.front().name()) : nullptr;
+  if (phases) {
+    const Var row(phases->old_var), phase(phases->inner);
+    start.split(row, row, phase, phases->factor, TailStrategy::GuardWithIf).unroll(phase);
+    order.insert(order.begin() + 1, phase);
+  }
   order.insert(order.end(), shared.begin(), shared.end());
   start.reorder(order);
   // As the update has them: then its sums start in registers.

@@ -22,6 +22,9 @@ struct TileLoop {
 // Of a stage, the outermost first, up to the first that is none.
 std::vector<TileLoop> tile_loops(const FuncContents& f, const Definition& stage);
 
+// The split of a loop over a row of the tile into vectors and phases (phase_loops.h); null: there is none.
+const Split* split_of_phases(const Definition& stage, const std::string& row);
+
 // Whether the first update of f has loops over tiles of the result outside of those of its
 // reduction, so that what comes before can share them.
 bool has_tiles(const FuncContents& f);

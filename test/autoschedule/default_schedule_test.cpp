@@ -5,6 +5,7 @@
 
 #include "autodiff/derivative.h"
 #include "autoschedule/loop_order.h"
+#include "autoschedule/packed_operand.h"
 #include "autoschedule/read_estimate.h"
 #include "autoschedule/register_tile.h"
 #include "frontend/language/boundary_conditions.h"
@@ -436,6 +437,42 @@ TEST_F(DefaultSchedule, WindowsAndTransposedRowsComeFromAfar) {
   const int64_t side_by_side = sums_of(line(x + 4 * k));
   EXPECT_GT(sums_of(line(x + 64 * k)), side_by_side);
   EXPECT_GT(sums_of(matrix(k, x)), side_by_side);
+}
+
+// A vector of every second element is picked from two loaded ones, so a tile uses it for more sums.
+TEST_F(DefaultSchedule, TilesUseStridedVectorsMoreOften) {
+  Buffer<float> signal(1024), taps(8, 64);
+  RDom k(0, 8);
+  const auto sums_of = [&](int stride) {
+    Func f("f");
+    f(x, y) += signal(stride * x + k) * taps(k, y);
+    f.set_estimates({{0, 256}, {0, 64}});
+    const auto tile = autoschedule::register_tile(*f.function(), f.function()->stage(1), 16, 4, {},
+                                                  autoschedule::SizeEstimate({f.function()}));
+    return tile && tile->sides.size() == 1 ? tile->vectors * tile->sides[0].size : 0;
+  };
+  EXPECT_GT(sums_of(1), 0);
+  EXPECT_GT(sums_of(2), sums_of(1));
+}
+
+// Rows a multiple of 32 KiB apart meet in a few sets of a cache. They are packed although there are few signals, whose
+// loop alone would not be tasks enough.
+TEST_F(DefaultSchedule, RowsThatMeetInACacheArePacked) {
+  const auto is_packed = [&](int samples) {
+    Buffer<float> signals(samples + 4, 32, 2), taps(5, 32, 64);
+    Var z("z");
+    Func f("f");
+    RDom k(0, 5, 0, 32);
+    f(x, y, z) += signals(x + k.x, k.y, z) * taps(k.x, k.y, y);
+    f.set_estimates({{0, samples}, {0, 64}, {0, 2}});
+    const graph::FuncContents& sums = *f.function();
+    const autoschedule::SizeEstimate sizes({f.function()});
+    const auto tile = autoschedule::register_tile(sums, sums.stage(1), 16, 4, {}, sizes);
+    return tile && autoschedule::packed_operand(sums, sums.stage(1), *tile, 16, sizes);
+  };
+  EXPECT_FALSE(is_packed(6144));
+  EXPECT_TRUE(is_packed(8192));
+  EXPECT_TRUE(is_packed(16384));
 }
 
 TEST_F(DefaultSchedule, TilesFitTheRegisters) {

@@ -18,6 +18,7 @@ retrograde_test(
   row_sweeps_test
   schedule_search_test
   step_loops_test
+  strided_terms_test
   sum_blocks_test
   LIBS retrograde_dep_halide_runtime)
 retrograde_test(auto_schedule_test OPTIMIZED)

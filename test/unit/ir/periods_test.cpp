@@ -66,5 +66,14 @@ TEST(Periods, AreNoSmallerThanTheyMustBe) {
   }
 }
 
+TEST(Periods, GrowthIsTheSameEverywhere) {
+  EXPECT_EQ(growth_over((x + 1) / 2 - 3, "x", 2), 1);
+  EXPECT_EQ(growth_over((x + 1) % 2 + 6, "x", 2), 0);
+  EXPECT_EQ(growth_over(3 * x, "x", 4), 12);
+  EXPECT_EQ(growth_over(x / 2, "x", 3), std::nullopt);
+  EXPECT_EQ(growth_over(x * x, "x", 2), std::nullopt);
+  EXPECT_EQ(growth_over(Expr(7), "x", 5), 0);
+}
+
 }  // namespace
 }  // namespace retrograde::analysis
