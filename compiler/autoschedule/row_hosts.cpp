@@ -24,14 +24,15 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr double least_terms = 32;   // of a sum along a row
-constexpr double few_terms = 512;    // which may be added one by one
-constexpr int64_t least_row = 16;    // elements along the first dimension
-constexpr int64_t enough_rows = 16;  // on any number of threads: results may not depend on it
+constexpr double least_terms_of_row = 32;  // of a sum along a row
+constexpr double few_terms = 512;          // which may be added one by one
+constexpr int64_t least_row = 16;          // elements along the first dimension
+constexpr int64_t enough_rows = 16;        // on any number of threads: results may not depend on it
 
 bool has_many_terms(const FuncContents& f) {
-  return std::ranges::any_of(
-      f.updates, [](const Definition& update) { return terms_of(update, 0) >= least_terms; });
+  return std::ranges::any_of(f.updates, [](const Definition& update) {
+    return terms_of(update, 0) >= least_terms_of_row;
+  });
 }
 
 bool is_partial(const FuncContents& f) {
@@ -51,9 +52,9 @@ bool runs_along_rows(const FuncContents& f, const Definition& update,
   const Kind kind = without_lets(update.values[0]).kind();
   if (kind != Kind::Add && kind != Kind::Sub && kind != Kind::Min && kind != Kind::Max)
     return false;
-  bool result = terms >= least_terms;
+  bool result = terms >= least_terms_of_row;
   const Expr first = simplify(update.rvars[0].extent);
-  result &= as_const_int(first).value_or(0) >= least_terms;
+  result &= as_const_int(first).value_or(0) >= least_terms_of_row;
   for (const Expr& root : roots_with_inlined(update, stored)) {
     walk(root, [&](const Expr& e) {
       const auto* call = e.as<Call>();
