@@ -422,6 +422,14 @@ TEST_F(DefaultSchedule, TilesUseWhatComesFromAfarMoreOften) {
   EXPECT_EQ(from_afar.vectors, 4);
 }
 
+// The clamps that keep the last lanes inside of a row are no part of an index, whatever its stride.
+TEST_F(DefaultSchedule, StridedIndicesHaveNoClamps) {
+  const Expr lane = ir::variable("x"), k = ir::variable("k");
+  const Expr found = autoschedule::unclamped(
+      min(lane, 55) * 2 + k, [](const Expr& e) { return ir::uses_variable(e, "x"); });
+  EXPECT_EQ(ir::print(found), ir::print(lane * 2 + k));
+}
+
 // A vector of every second element is picked from two loaded ones, so a tile uses it for more sums.
 TEST_F(DefaultSchedule, TilesUseStridedVectorsMoreOften) {
   Buffer<float> signal(1024), taps(8, 64);
