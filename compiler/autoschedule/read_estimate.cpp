@@ -143,7 +143,9 @@ Expr unclamped(const Expr& e, const std::function<bool(const Expr&)>& moves) {
   const auto* call = e.as<Call>();
   if (call && call->call_type == CallType::Operator && op_info(call->op).cls == OpClass::Marker)
     return unclamped(call->args[0], moves);
-  if (e.kind() == Kind::Add || e.kind() == Kind::Sub)
+  const auto* product = e.as<Mul>();
+  const bool is_multiple = product && (as_const_int(product->a) || as_const_int(product->b));
+  if (e.kind() == Kind::Add || e.kind() == Kind::Sub || is_multiple)
     return map_children(e, [&](const Expr& part) { return unclamped(part, moves); });
   if (e.kind() != Kind::Min && e.kind() != Kind::Max) return e;
   const auto* n = e.as<Binary>();
