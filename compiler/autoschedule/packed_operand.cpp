@@ -306,12 +306,10 @@ std::optional<PackedOperand> packed_piece(const Call& call, const FuncContents& 
   return result;
 }
 
-std::optional<PackedOperand> packed_read(const Call& call, const FuncContents& f,
-                                         const Definition& update, const RegisterTile& tile,
-                                         int lanes, const SizeEstimate& sizes,
-                                         const Extents& extents) {
-  auto piece = packed_piece(call, f, update, tile, lanes, sizes, extents);
-  if (piece) return piece;
+std::optional<PackedOperand> packed_at_once(const Call& call, const FuncContents& f,
+                                            const Definition& update, const RegisterTile& tile,
+                                            int lanes, const SizeEstimate& sizes,
+                                            const Extents& extents) {
   const Candidate candidate(call, f, update, tile, lanes, sizes, extents);
   if (!has_lanes_across_rows(call, f) || !candidate.is_worth_packing_whole()) return std::nullopt;
   PackedOperand whole;
@@ -329,8 +327,8 @@ std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definit
   const auto extents = extents_of(f, update, tile, lanes);
   if (!extents) return std::nullopt;
   std::unordered_map<std::string, int> reads;
-  std::optional<PackedOperand> result;
-  std::string packed;
+  std::optional<PackedOperand> piece, whole;
+  std::string packed, packed_whole;
   int across = 0;  // reads whose lanes are loaded one by one
   walk_definition(update, [&](const Expr& e) {
     const auto* call = e.as<Call>();
@@ -340,16 +338,21 @@ std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definit
     const auto image = image_of(*call, f);
     if (!source && !image) return;
     ++reads[call->name];
-    if (result) return;
-    result = packed_read(*call, f, update, tile, lanes, sizes, *extents);
-    if (!result) return;
-    result->source = source;
-    result->image = image;
-    packed = call->name;
+    const auto note = [&](std::optional<PackedOperand>& found, std::string& name,
+                          const auto& find) {
+      if (found) return;
+      found = find(*call, f, update, tile, lanes, sizes, *extents);
+      if (!found) return;
+      found->source = source;
+      found->image = image;
+      name = call->name;
+    };
+    note(piece, packed, packed_piece);
+    note(whole, packed_whole, packed_at_once);
   });
-  if (result && result->is_whole && across > 1) return std::nullopt;
   // Of several reads the copy would hold what lies between them.
-  return result && reads[packed] == 1 ? result : std::nullopt;
+  if (piece) return reads[packed] == 1 ? piece : std::nullopt;
+  return whole && across == 1 && reads[packed_whole] == 1 ? whole : std::nullopt;
 }
 
 void pack(const FuncPtr& f, const PackedOperand& operand, const retrograde::LoopLevel& loop,

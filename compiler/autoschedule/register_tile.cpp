@@ -44,17 +44,14 @@ bool steps_over_lines(const Expr& index, const std::string& loop) {
   return form && std::abs(form->coefficients[0].second) >= line_elements;
 }
 
-// Whether what moves the read moves it from row to row, not along one. Rows are what the lanes of a vector run along,
-// in the source or in its packed copy.
-bool walks_afar(const Call& call, const Definition& stage, const std::string& lane) {
-  size_t row = 0;
-  while (row < call.args.size() && !uses_variable(call.args[row], lane)) ++row;
+// Whether what moves the read moves it from row to row or by cache lines, not along one.
+bool walks_afar(const Call& call, const Definition& stage) {
   bool moves = false, is_far = true;
   for (const ReductionVariable& r : stage.rvars) {
     for (size_t d = call.args.size(); d-- > 0;) {
       if (!uses_variable(call.args[d], r.var)) continue;
       moves = true;
-      is_far &= d != row || steps_over_lines(call.args[d], r.var);
+      is_far &= d > 0 || steps_over_lines(call.args[d], r.var);
     }
   }
   return moves && is_far;
@@ -87,7 +84,7 @@ std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Def
       is_plain &= same_args(call->args, stage.args);
       return false;
     }
-    Operand operand{{}, {}, walks_afar(*call, stage, f.args[0])};
+    Operand operand{{}, {}, walks_afar(*call, stage)};
     for (const std::string& arg : f.args) {
       const auto moves = [&](const Expr& index) { return uses_variable(index, arg); };
       operand.depends_on.push_back(std::ranges::any_of(call->args, moves));
