@@ -18,7 +18,7 @@ namespace {
 
 // Vectors of sums that are kept in registers at once.
 constexpr int64_t most_phases = 6;
-// Of a tile, which has several sums for each.
+// A tile has several sums for each phase.
 constexpr int64_t most_phases_of_tile = 4;
 
 }  // namespace

@@ -34,7 +34,7 @@ struct ChunkOperand {
 
 using Iterations = std::unordered_map<std::string, int64_t>;  // by the loop
 
-// By all blocks of a chunk, or by the sums themselves.
+// What all blocks of a chunk read, or what the sums themselves read.
 class ChunkReads {
  public:
   // `iterations`: of a chunk, along arguments of the block and loops of its reduction; others run whole.

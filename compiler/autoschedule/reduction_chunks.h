@@ -44,7 +44,7 @@ struct TermChunk {
   size_t loop = 0;         // by reduction_loops(): those that follow are outside
   int64_t iterations = 0;  // of this one, of which the rest is outside; 0: all of it stays inside
 };
-// Of a sum whose first update has the tile. nullopt: the tiles read little again, or sizes are not known.
+// The chunk for a sum whose first update has the tile. nullopt: the tiles read little again, or sizes are not known.
 std::optional<TermChunk> chunk_of_terms(const FuncContents& sums, const RegisterTile& tile,
                                         int lanes, const SizeEstimate& sizes);
 

@@ -132,7 +132,7 @@ class HostFinder {
     return call && call->symbol.raw() == &member && same_args(call->args, f.pure->args);
   }
 
-  // Of an index in a definition of a Func with such coordinates.
+  // The coordinate that an index selects, in a definition of a Func with the coordinates `known`.
   static std::optional<RowCoordinate> coordinate(const Expr& any_index, const FuncContents& reader,
                                                  const RowCoordinates& known) {
     const auto moves = [&](const Expr& e) {
