@@ -13,9 +13,9 @@
 #include "autoschedule/strided_terms.h"
 #include "graph/copy_graph.h"
 #include "graph/graph.h"
-#include "ir/visit.h"
 #include "lower/lower.h"
 #include "simplify/simplify.h"
+#include "support/costly_vectors.h"
 
 namespace retrograde {
 namespace {
@@ -244,25 +244,9 @@ TEST(StridedTerms, VectorsDoNotDivide) {
   Pipeline(out).auto_schedule(get_host_target());
   const Stmt code =
       lower::lower("doubled", {out.function()}, lower::infer_arguments({out.function()}), {}).body;
-  int loops = 0, costly = 0;
-  const auto note = [&](const Expr& e) {
-    using ir::Kind;
-    const bool is_quotient = e.type().is_int() && (e.kind() == Kind::Div || e.kind() == Kind::Mod);
-    const bool is_costly = is_quotient || e.kind() == Kind::EQ || e.kind() == Kind::Shuffle;
-    costly += e.type().lanes() > 1 && is_costly ? 1 : 0;
-    return true;
-  };
-  ir::walk(
-      code, [](const Expr&) { return false; },
-      [&](const Stmt& part) {
-        const auto* loop = part.as<ir::For>();
-        if (!loop || loop->name.find(".s1.r") == std::string::npos) return true;
-        ++loops;
-        ir::walk(loop->body, note, [](const Stmt&) { return true; });
-        return false;
-      });
-  EXPECT_GT(loops, 0);
-  EXPECT_EQ(costly, 0);
+  const CostlyVectors found = costly_vectors(code, ".s1.r");
+  EXPECT_GT(found.loops, 0);
+  EXPECT_EQ(found.operations, 0);
 }
 
 // The gradient of a function of the sums computes them again.
