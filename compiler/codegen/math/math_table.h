@@ -1,7 +1,7 @@
 // The vector math functions: operator, name in SLEEF and limits. The largest error that we promise, over the whole
 // domain and for every width, is in the operator's row (ir/operators.def); the unit test holds every function to it.
 //
-// Float32 pow is inlined, and so are float32 exp, log and tanh on machines with FMA. All others come from SLEEF's families
+// Float32 pow is inlined, and so are float32 exp, log, tanh and erf on machines with FMA. All others come from SLEEF's families
 // whose bits do not depend on the width, so a scalar tail agrees with the vector body. Special values follow C99 Annex F. Code compiled ahead of time for
 // AArch64 calls the C library instead of SLEEF and has its errors (2 ULP with the GNU C library).
 //
