@@ -10,6 +10,7 @@
 #include "autoschedule/read_estimate.h"
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 #include "ir/visit.h"
@@ -174,14 +175,13 @@ std::vector<VarOrRVar> cut_tile(const FuncPtr& f, int index, const Var& row, int
   return {vector, in_row, in_side};
 }
 
-// Appends the Func's variables that the order lacks. Returns how many it had.
-size_t append_others(std::vector<VarOrRVar>& order, const FuncContents& f) {
-  const size_t count = order.size();
-  for (const std::string& arg : f.args) {
-    const auto is_it = [&](const VarOrRVar& loop) { return loop.name() == arg; };
-    if (std::ranges::none_of(order, is_it)) order.emplace_back(Var(arg));
+// Appends the loops over dimensions that the order lacks. An update has none over those whose places are fixed.
+void append_others(std::vector<VarOrRVar>& order, const FuncContents& f, int index) {
+  for (size_t d = 0; d < f.args.size(); ++d) {
+    const auto is_it = [&](const VarOrRVar& loop) { return loop.name() == f.args[d]; };
+    if (is_pure_position(f, f.stage(index), d) && std::ranges::none_of(order, is_it))
+      order.emplace_back(Var(f.args[d]));
   }
-  return count;
 }
 
 // The dimension of the update's Func along which rows lie of the turned lanes that it adds; nullopt: it adds none.
@@ -226,7 +226,7 @@ std::vector<VarOrRVar> give_turned_loops(const FuncPtr& sums, const FuncPtr& blo
     for (const ReductionVariable& r : reduction_loops(*block, block->stage(s)))
       order.emplace_back(RVar(r.var));
     order.emplace_back(lane);
-    append_others(order, *block);
+    append_others(order, *block, s);
     Stage(block, s).reorder(order);
   }
   Stage(block, 1).compute_with(Stage(block, 0), lane);  // sums start in registers
@@ -240,7 +240,7 @@ std::vector<VarOrRVar> give_turned_loops(const FuncPtr& sums, const FuncPtr& blo
   const size_t inside = order.size();
   order.emplace_back(row);
   order.emplace_back(side);
-  append_others(order, *sums);
+  append_others(order, *sums, 1);
   Stage(sums, 1).reorder(order);
   store_rows_along(sums, row.name());
   store_rows_along(block, row.name());
@@ -260,7 +260,7 @@ bool add_turned_lanes(const FuncPtr& f, int index, int lanes) {
   std::vector<VarOrRVar> order{vector};
   for (const ReductionVariable& r : f->stage(index).rvars) order.emplace_back(RVar(r.var));
   order.emplace_back(row);
-  append_others(order, *f);
+  append_others(order, *f, index);
   stage.reorder(order).parallel(order.back());
   return true;
 }

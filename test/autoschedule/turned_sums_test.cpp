@@ -19,11 +19,11 @@ const Var x("x"), y("y"), c("c");
 // out(x, y, c) = sum of in(stride * x + r.x, stride * y + r.y, r.z) * weights(r.x, r.y, r.z, c), or its transpose: the
 // output has zeros between the elements of the input.
 struct Layer {
-  Layer(int stride, int channels, int filters, bool is_transposed, int taps = 3)
+  Layer(int stride, int channels, int filters, bool is_transposed, int taps = 3, int rows = 3)
       : stride(stride), is_transposed(is_transposed) {
     const int size = is_transposed ? 70 : 70 * stride;
     in = gradient::random_image({size, size, channels}, -1, 1, 7);
-    weights = gradient::random_image({taps, taps, channels, filters}, -1, 1, 8);
+    weights = gradient::random_image({taps, rows, channels, filters}, -1, 1, 8);
     out_size = is_transposed ? 70 * stride : 70;
     seed = gradient::random_image({out_size, out_size, filters}, -1, 1, 9);
   }
@@ -104,6 +104,14 @@ TEST(TurnedSums, AreThoseOfTheDefinition) {
       }
       EXPECT_NEAR(found(i, 2, k, 15 - k), expected, 1e-4) << i << ", " << k;
     }
+  }
+}
+
+// One row of taps has a fixed place in the sums.
+TEST(TurnedSums, MayHaveOneRowOfTaps) {
+  for (const bool is_transposed : {false, true}) {
+    const Layer layer(2, 16, 16, is_transposed, 3, 1);
+    EXPECT_TRUE(gradient::same_bits(layer.result(), layer.result({Decision::LayoutStaging})));
   }
 }
 
