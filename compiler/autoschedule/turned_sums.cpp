@@ -19,9 +19,9 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-// A tile has up to so many vectors, and elements along its side: more of these if it has one vector.
-constexpr int64_t most_vectors_of_tile = 4, rows_of_tile = 4, rows_of_thin_tile = 8;
-constexpr double least_uses_of_copy = 8;  // of an element
+// Vectors of a tile, and elements along its side. Of fewer channels, vectors of strided terms are as fast.
+constexpr int64_t most_vectors_of_tile = 4, least_vectors_of_tile = 3, rows_of_tile = 4;
+constexpr double least_uses_of_copy = 64;  // of an element: products
 
 bool moves(const Call& call, const std::string& variable) {
   return std::ranges::any_of(call.args,
@@ -80,7 +80,7 @@ class Turner {
     if (!index || stride(*read) > 1) return std::nullopt;
     const auto side = longest_side(*read, d);
     auto operand = side ? whole_operand(*read, block_, *index) : std::nullopt;
-    if (!operand || uses(*read) < least_uses_of_copy) return std::nullopt;
+    if (!operand || uses(d) < least_uses_of_copy) return std::nullopt;
     TurnedSum result{d, *side, 1, 1, *std::move(operand)};
     return fit(result) ? std::optional(result) : std::nullopt;
   }
@@ -112,28 +112,24 @@ class Turner {
     return result;
   }
 
-  double uses(const Call& read) const {
+  // Products with an element of the copy: each term reads one for each element of the result along other dimensions.
+  double uses(size_t d) const {
     double result = 1;
-    for (size_t e = 1; e < dimensions_; ++e) {
-      if (!moves(read, block_.args[e]))
-        result *= static_cast<double>(sizes_.extent(block_, e).value_or(1));
-    }
+    for (size_t e = 1; e < dimensions_; ++e)
+      result *= e == d ? 1 : static_cast<double>(sizes_.extent(block_, e).value_or(1));
     return result;
   }
 
   // The most vectors that the dimension is a multiple of, in registers.
   bool fit(TurnedSum& turned) const {
     const int64_t extent = sizes_.extent(block_, turned.dimension).value_or(0);
-    const int64_t rows = sizes_.extent(block_, turned.side).value_or(0);
     const int64_t bytes = lanes_ * block_.types[0].bytes();
-    for (int64_t vectors = most_vectors_of_tile; vectors > 0 && extent > 0; --vectors) {
-      if (extent % (vectors * lanes_) != 0) continue;
-      for (const int64_t size : {vectors == 1 ? rows_of_thin_tile : rows_of_tile, rows_of_tile}) {
-        if (rows % size != 0 || vectors * size * bytes > unit_.accumulator_bytes) continue;
-        turned.vectors = vectors;
-        turned.side_size = size;
-        return true;
-      }
+    for (int64_t vectors = most_vectors_of_tile; vectors >= least_vectors_of_tile; --vectors) {
+      const bool fits = vectors * rows_of_tile * bytes <= unit_.accumulator_bytes;
+      if (extent <= 0 || extent % (vectors * lanes_) != 0 || !fits) continue;
+      turned.vectors = vectors;
+      turned.side_size = rows_of_tile;
+      return true;
     }
     return false;
   }

@@ -12,7 +12,8 @@
 // their stride. Each sum has the terms and the order that it has with lanes of terms, so results have the same bits.
 // The copy is transposed and dense. It is made once, before the sums.
 //
-// Not done: reads that are dense along the terms; sums whose operands all move along the same dimensions, as in a
+// Not done: fewer channels than fill three vectors, where strided terms are as fast; sums of few terms, which have no blocks;
+// reads that are dense along the terms; sums whose operands all move along the same dimensions, as in a
 // convolution of each channel alone; private parts.
 #pragma once
 

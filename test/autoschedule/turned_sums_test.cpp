@@ -66,22 +66,23 @@ struct Layer {
 
 // Vectors along the channels of what is read without a stride: the features of a transposed layer, the seed of another.
 TEST(TurnedSums, HaveRowsAlongChannels) {
-  EXPECT_TRUE(Layer(2, 32, 8, true).has_rows_along(2));
-  EXPECT_TRUE(Layer(2, 8, 32, false).has_rows_along(3));
+  if (!get_host_target().has_feature(Target::AVX512)) GTEST_SKIP() << "too few registers";
+  EXPECT_TRUE(Layer(2, 64, 8, true).has_rows_along(2));
+  EXPECT_TRUE(Layer(2, 8, 64, false).has_rows_along(3));
   EXPECT_TRUE(Layer(3, 8, 48, false, 5).has_rows_along(3));
 }
 
 TEST(TurnedSums, AreNotMadeOfDenseReads) {
-  for (const int d : {2, 3}) EXPECT_FALSE(Layer(1, 32, 32, false).has_rows_along(d));
+  for (const int d : {2, 3}) EXPECT_FALSE(Layer(1, 64, 64, false).has_rows_along(d));
 }
 
 TEST(TurnedSums, AreNotMadeOfFewChannels) {
-  for (const int d : {2, 3}) EXPECT_FALSE(Layer(2, 12, 12, false).has_rows_along(d));
+  for (const int d : {2, 3}) EXPECT_FALSE(Layer(2, 32, 32, false).has_rows_along(d));
 }
 
 TEST(TurnedSums, KeepEveryBit) {
   for (const Layer& layer :
-       {Layer(2, 16, 16, true), Layer(3, 48, 8, true), Layer(2, 4, 32, false)}) {
+       {Layer(2, 64, 8, true), Layer(3, 48, 8, true), Layer(2, 8, 48, false)}) {
     const Buffer<float> expected = layer.result({Decision::LayoutStaging});
     for (const int threads : {1, 2, 5})
       EXPECT_TRUE(gradient::same_bits(layer.result({}, threads), expected)) << threads;
@@ -89,7 +90,7 @@ TEST(TurnedSums, KeepEveryBit) {
 }
 
 TEST(TurnedSums, AreThoseOfTheDefinition) {
-  const Layer layer(2, 16, 16, false);
+  const Layer layer(2, 16, 48, false);
   const Buffer<float> found = layer.result();
   const auto padded = [&](int i, int j, int k) {
     const bool is_inside = i >= 0 && i < layer.in.width() && j >= 0 && j < layer.in.height();
@@ -110,14 +111,14 @@ TEST(TurnedSums, AreThoseOfTheDefinition) {
 // One row of taps has a fixed place in the sums.
 TEST(TurnedSums, MayHaveOneRowOfTaps) {
   for (const bool is_transposed : {false, true}) {
-    const Layer layer(2, 16, 16, is_transposed, 3, 1);
+    const Layer layer(2, 48, 48, is_transposed, 3, 1);
     EXPECT_TRUE(gradient::same_bits(layer.result(), layer.result({Decision::LayoutStaging})));
   }
 }
 
 // An adjoint of 0 gives 0 whatever it is multiplied with; NaN goes where it is read.
 TEST(TurnedSums, KeepStrongZeros) {
-  Layer layer(2, 16, 16, false);
+  Layer layer(2, 8, 48, false);
   layer.in(5, 9, 3) = std::numeric_limits<float>::infinity();
   layer.in(8, 9, 4) = std::nanf("");
   for (int a = 0; a < layer.out_size; ++a) layer.seed(a, 4, 2) = 0.0f;
@@ -130,7 +131,7 @@ TEST(TurnedSums, KeepStrongZeros) {
   });
   EXPECT_EQ(alike, all);
   EXPECT_LT(finite, all);
-  EXPECT_GT(finite, all - 200);
+  EXPECT_GT(finite, all / 2);
 }
 
 }  // namespace
