@@ -355,6 +355,16 @@ std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definit
   return whole && across == 1 && reads[packed_whole] == 1 ? whole : std::nullopt;
 }
 
+std::optional<PackedOperand> whole_operand(const Call& call, const FuncContents& f,
+                                           size_t lane_dimension) {
+  PackedOperand whole;
+  whole.source = source_of(call, f);
+  whole.image = image_of(call, f);
+  whole.lane_dimension = lane_dimension;
+  whole.is_whole = true;
+  return whole.source || whole.image ? std::optional(whole) : std::nullopt;
+}
+
 void pack(const FuncPtr& f, const PackedOperand& operand, const retrograde::LoopLevel& loop,
           int lanes) {
   Func copy = copy_for(f, operand);

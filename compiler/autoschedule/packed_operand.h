@@ -52,6 +52,9 @@ struct PackedOperand {
 std::optional<PackedOperand> packed_operand(const FuncContents& f, const Definition& update,
                                             const RegisterTile& tile, int lanes,
                                             const SizeEstimate& sizes);
+// What the call reads, to be copied at once with rows along the dimension of the source; nullopt: it cannot be copied.
+std::optional<PackedOperand> whole_operand(const Call& call, const FuncContents& f,
+                                           size_t lane_dimension);
 // For each iteration of a loop of f, inside of which only dimensions run that do not move it.
 void pack(const FuncPtr& f, const PackedOperand& operand, const retrograde::LoopLevel& loop,
           int lanes);

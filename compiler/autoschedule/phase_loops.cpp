@@ -47,7 +47,7 @@ int64_t phases_of_tile(const FuncContents& f, const Definition& stage, int lanes
                        const SizeEstimate& sizes) {
   if (f.made || stage.rvars.empty()) return 1;
   const int64_t period = period_of_reads(f, stage, 0);
-  if (period <= 1 || period > most_phases_of_tile || lanes % period != 0) return 1;
+  if (period <= 1 || period > most_phases_of_tile) return 1;
   if (sizes.extent(f, 0).value_or(period * lanes) < period * lanes) return 1;
   bool is_dense = true;
   walk(stage, [&](const Call& call) {

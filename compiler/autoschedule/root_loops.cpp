@@ -21,6 +21,7 @@
 #include "autoschedule/scatter_schedule.h"
 #include "autoschedule/short_rows.h"
 #include "autoschedule/step_loops.h"
+#include "autoschedule/turned_sums.h"
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
@@ -94,6 +95,7 @@ class LoopChooser {
     else if (may_scatter)
       unroll_taps(definition(), stage_);
     if (const FuncPtr block = block_of(definition())) return give_blocks(block);
+    if (makes(Decision::LayoutStaging) && add_turned_lanes(function_, index_, lanes)) return;
     const bool has_pure_rows = !pure_.empty() && pure_[0] == 0;
     if (!scatters && !has_pure_rows && schedule_steps(function_, index_, lanes_of_values(), sizes_))
       return;
@@ -105,8 +107,9 @@ class LoopChooser {
     if (stages && !scatters && schedule_look_ups(f_, index_, stage_, lanes_of_values(), sizes_))
       return;
     if (stages && schedule_short_rows(f_, index_, stage_, lanes_of_values(), sizes_)) return;
-    // Phases that a vector is no multiple of come first: in a tile its lanes would gather.
-    const bool has_phases = pure_[0] == 0 && !scatters && has_odd_phases(f_, definition(), lanes);
+    // Phases that a vector is no multiple of come first if a tile has none: there its lanes would gather.
+    const bool has_phases = pure_[0] == 0 && !scatters && has_odd_phases(f_, definition(), lanes) &&
+                            phases_of_tile(f_, definition(), lanes, sizes_) == 1;
     const bool may_be_tile =
         !scatters && !point_number(definition()) && pure_[0] == 0 && !has_phases;
     if (may_be_tile && tile_in_registers(row.has_value())) return;
@@ -459,6 +462,10 @@ class LoopChooser {
   // holds.
   void give_blocks(const FuncPtr& block) {
     if (pure_.empty() || pure_[0] != 0) return compute_block(block, {});
+    if (makes(Decision::LayoutStaging) && makes(Decision::RegisterTiles)) {
+      if (const auto turned = turned_sum(*block, lanes, request_.unit, sizes_))
+        return give_turned_blocks(block, *turned);
+    }
     const RegisterTile tile = tile_of(*block, block->updates[0]).value_or(RegisterTile());
     const RegisterTile own = renumbered(tile, *block);
     const std::vector<size_t> shifts = shifts_of(*block, own);
@@ -470,6 +477,15 @@ class LoopChooser {
     run_in_parallel(tiles, own);
     for (int s = 0; s < block->stage_count(); ++s)
       LoopChooser(block, s, request_, sizes_).cut(tile);
+  }
+
+  void give_turned_blocks(const FuncPtr& block, const TurnedSum& turned) {
+    const RegisterTile own = renumbered(turned.tile(lanes), *block);
+    const std::vector<size_t> shifts = shifts_of(*block, own);
+    compute_block(block, shifts);
+    std::vector<Var> between;
+    for (const size_t d : shifts) between.push_back(variable_of(d));
+    run_in_parallel(give_turned_loops(function_, block, turned, between, lanes), own);
   }
 
   // The loops over tiles stand inside of those over chunks of the reduction. The result: iterations of

@@ -43,6 +43,11 @@ bool has_reduction_inside(const Definition& stage, size_t shared) {
                      [](const Dim& loop) { return loop.is_reduction; });
 }
 
+// The dimensions in the order in which they lie in memory.
+const std::vector<std::string>& dimensions_in_memory(const FuncContents& f) {
+  return f.schedule.storage_dims.empty() ? f.args : f.schedule.storage_dims;
+}
+
 }  // namespace
 
 std::vector<TileLoop> tile_loops(const FuncContents& f, const Definition& stage) {
@@ -102,12 +107,14 @@ void start_in_tiles(const FuncPtr& f, int lanes) {
     }
   }
   std::vector<VarOrRVar> order;
-  for (const std::string& arg : f->args) {
+  const std::vector<std::string>& dimensions = dimensions_in_memory(*f);
+  for (const std::string& arg : dimensions) {
     const auto part = inside.find(arg);
     const std::string loop = part == inside.end() ? arg : part->second;
     if (!loop.empty()) order.emplace_back(Var(loop));
   }
-  const bool has_rows = inside.find(f->args[0]) == inside.end() || !inside[f->args[0]].empty();
+  const bool has_rows =
+      inside.find(dimensions[0]) == inside.end() || !inside[dimensions[0]].empty();
   const std::vector<VarOrRVar> held = order;
   const Split* phases = has_rows ? split_of_phases(f->updates[0], held.front().name()) : nullptr;
   if (phases) {

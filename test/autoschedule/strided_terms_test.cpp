@@ -238,6 +238,36 @@ TEST(StridedTerms, HaveTilesOfPhases) {
   }
 }
 
+// Vectors of one of three phases, which 16 lanes are no multiple of: several filters share what they read.
+TEST(StridedTerms, HaveTilesOfThreePhases) {
+  constexpr int channels = 16, filters = 8, width = 40, taps = 6;
+  const Buffer<float> sound = samples({width, channels}),
+                      weights = samples({taps, filters, channels});
+  Var t("t"), c("c");
+  const auto program = [&] {
+    const Func padded =
+        BoundaryConditions::constant_exterior(sound, 0.0f, {{0, width}, {Expr(), Expr()}});
+    Func spread("spread"), out("out");
+    const RDom r(0, taps, 0, channels, "r");
+    spread(t, c) = select(t % 3 == 0, padded(t / 3, c), 0.0f);
+    out(t, c) = 0.0f;
+    out(t, c) += spread(t + 1 - r.x, r.y) * weights(r.x, c, r.y);
+    return out.bound(t, 0, 3 * width + 1).bound(c, 0, filters);
+  };
+  Func out = without_zeros(program());
+  Pipeline(out).auto_schedule(get_host_target());
+  const auto& loops = out.function()->updates[0].schedule.dims;
+  const auto unrolled = std::count_if(loops.begin(), loops.end(), [](const graph::Dim& loop) {
+    return loop.runs == ForType::Unrolled;
+  });
+  EXPECT_GE(unrolled, 2);  // phases and filters
+  const Buffer<float> expected = program().realize({3 * width + 1, filters});
+  const Buffer<float> found = out.realize({3 * width + 1, filters});
+  expected.for_each_element([&](const int* at) {
+    EXPECT_NEAR(found(at), expected(at), 1e-3f * (1 + std::abs(expected(at))));
+  });
+}
+
 // No vector in a loop over terms divides, takes remainders or compares.
 TEST(StridedTerms, VectorsDoNotDivide) {
   Func out = without_zeros(Doubled().out);

@@ -1,0 +1,138 @@
+// Gradients by the weights of strided layers: vectors run along channels instead of along strided terms, with the same bits.
+#include <gtest/gtest.h>
+
+#include <retrograde/retrograde.h>
+
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string>
+
+#include "gradient/gradient_check.h"
+#include "support/schedule_log.h"
+
+namespace retrograde {
+namespace {
+
+const Var x("x"), y("y"), c("c");
+
+// out(x, y, c) = sum of in(stride * x + r.x, stride * y + r.y, r.z) * weights(r.x, r.y, r.z, c), or its transpose: the
+// output has zeros between the elements of the input.
+struct Layer {
+  Layer(int stride, int channels, int filters, bool is_transposed, int taps = 3, int rows = 3)
+      : stride(stride), is_transposed(is_transposed) {
+    const int size = is_transposed ? 70 : 70 * stride;
+    in = gradient::random_image({size, size, channels}, -1, 1, 7);
+    weights = gradient::random_image({taps, rows, channels, filters}, -1, 1, 8);
+    out_size = is_transposed ? 70 * stride : 70;
+    seed = gradient::random_image({out_size, out_size, filters}, -1, 1, 9);
+  }
+
+  Pipeline gradient() const {
+    const Func padded =
+        BoundaryConditions::constant_exterior(in, 0.0f, {{0, in.width()}, {0, in.height()}});
+    Func out("out"), spread("spread");
+    const RDom r(0, weights.width(), 0, weights.height(), 0, in.channels(), "r");
+    const Expr x0 = is_transposed ? x + 1 - r.x : stride * x + r.x - 1,
+               y0 = is_transposed ? y + 1 - r.y : stride * y + r.y - 1;
+    spread(x, y, c) =
+        select(x % stride == 0 && y % stride == 0, padded(x / stride, y / stride, c), 0.0f);
+    out(x, y, c) = 0.0f;
+    out(x, y, c) += (is_transposed ? spread : padded)(x0, y0, r.z) * weights(r.x, r.y, r.z, c);
+    return Pipeline(propagate_adjoints(out, seed)(weights));
+  }
+  // `without`: decisions that the schedule lacks.
+  Buffer<float> result(const std::set<Decision>& without = {}, int threads = 2) const {
+    Pipeline pipeline = gradient();
+    pipeline.set_autoschedule({.without = without});
+    pipeline.jit_handlers().thread_limit = threads;
+    return pipeline.realize(
+        {weights.width(), weights.height(), weights.dim(2).extent(), weights.dim(3).extent()});
+  }
+  // Whether the sums have rows along this dimension.
+  bool has_rows_along(int dimension) const {
+    Pipeline pipeline = gradient();
+    pipeline.auto_schedule(get_host_target());
+    const std::string row = "_" + std::to_string(dimension);
+    const ScheduleLog log = pipeline.schedule_log();
+    return any_directive<graph::ReorderStorage>(
+        log, [&](const auto&, const auto& d) { return d.dimensions.at(0) == row; });
+  }
+
+  int stride = 1, out_size = 0;
+  bool is_transposed = false;
+  Buffer<float> in, weights, seed;
+};
+
+// Vectors along the channels of what is read without a stride: the features of a transposed layer, the seed of another.
+TEST(TurnedSums, HaveRowsAlongChannels) {
+  if (!get_host_target().has_feature(Target::AVX512)) GTEST_SKIP() << "too few registers";
+  EXPECT_TRUE(Layer(2, 64, 8, true).has_rows_along(2));
+  EXPECT_TRUE(Layer(2, 8, 64, false).has_rows_along(3));
+  EXPECT_TRUE(Layer(3, 8, 48, false, 5).has_rows_along(3));
+}
+
+TEST(TurnedSums, AreNotMadeOfDenseReads) {
+  for (const int d : {2, 3}) EXPECT_FALSE(Layer(1, 64, 64, false).has_rows_along(d));
+}
+
+TEST(TurnedSums, AreNotMadeOfFewChannels) {
+  for (const int d : {2, 3}) EXPECT_FALSE(Layer(2, 32, 32, false).has_rows_along(d));
+}
+
+TEST(TurnedSums, KeepEveryBit) {
+  for (const Layer& layer :
+       {Layer(2, 64, 8, true), Layer(3, 48, 8, true), Layer(2, 8, 48, false)}) {
+    const Buffer<float> expected = layer.result({Decision::LayoutStaging});
+    for (const int threads : {1, 2, 5})
+      EXPECT_TRUE(gradient::same_bits(layer.result({}, threads), expected)) << threads;
+  }
+}
+
+TEST(TurnedSums, AreThoseOfTheDefinition) {
+  const Layer layer(2, 16, 48, false);
+  const Buffer<float> found = layer.result();
+  const auto padded = [&](int i, int j, int k) {
+    const bool is_inside = i >= 0 && i < layer.in.width() && j >= 0 && j < layer.in.height();
+    return is_inside ? double{layer.in(i, j, k)} : 0.0;
+  };
+  for (const int k : {0, 7, 15}) {
+    for (int i = 0; i < 3; ++i) {
+      double expected = 0;
+      for (int b = 0; b < layer.out_size; ++b) {
+        for (int a = 0; a < layer.out_size; ++a)
+          expected += double{layer.seed(a, b, 15 - k)} * padded(2 * a + i - 1, 2 * b + 1, k);
+      }
+      EXPECT_NEAR(found(i, 2, k, 15 - k), expected, 1e-4) << i << ", " << k;
+    }
+  }
+}
+
+// One row of taps has a fixed place in the sums.
+TEST(TurnedSums, MayHaveOneRowOfTaps) {
+  for (const bool is_transposed : {false, true}) {
+    const Layer layer(2, 48, 48, is_transposed, 3, 1);
+    EXPECT_TRUE(gradient::same_bits(layer.result(), layer.result({Decision::LayoutStaging})));
+  }
+}
+
+// An adjoint of 0 gives 0 whatever it is multiplied with; NaN goes where it is read.
+TEST(TurnedSums, KeepStrongZeros) {
+  Layer layer(2, 8, 48, false);
+  layer.in(5, 9, 3) = std::numeric_limits<float>::infinity();
+  layer.in(8, 9, 4) = std::nanf("");
+  for (int a = 0; a < layer.out_size; ++a) layer.seed(a, 4, 2) = 0.0f;
+  const Buffer<float> found = layer.result(), expected = layer.result({Decision::LayoutStaging});
+  int finite = 0, alike = 0, all = 0;
+  found.for_each_element([&](const int* at) {
+    ++all;
+    finite += std::isfinite(found(at));
+    alike += std::isnan(found(at)) ? std::isnan(expected(at)) : found(at) == expected(at);
+  });
+  EXPECT_EQ(alike, all);
+  EXPECT_LT(finite, all);
+  EXPECT_GT(finite, all / 2);
+}
+
+}  // namespace
+}  // namespace retrograde
