@@ -85,6 +85,16 @@ bool runs_along_row(const FuncContents& f, const Definition& update) {
          read_elsewhere(f, update).defined();
 }
 
+RowChains chains_of(const FuncContents& f, const Definition& update, std::optional<int64_t> extent,
+                    int64_t other_tasks) {
+  const double operations = operations_of_values(update.values, [](const Call&) { return 0.0; });
+  // Rows whose distance is a power of two share a few lines of the nearest cache: eight of them in all.
+  const int64_t streams = rows_read(f, update);
+  const int64_t most = operations >= rows_pay || streams == 1 ? most_rows : least_rows;
+  const int64_t rows = extent ? rows_of_task(*extent, most, other_tasks) : most;
+  return {0, static_cast<int>(rows), operations >= vectors_pay || streams > 1};
+}
+
 std::optional<RowChains> row_chains(const FuncContents& f, const Definition& update,
                                     const SizeEstimate& sizes) {
   if (!runs_along_row(f, update)) return std::nullopt;
@@ -95,13 +105,9 @@ std::optional<RowChains> row_chains(const FuncContents& f, const Definition& upd
     if (d != *dimension && is_pure_position(f, update, d))
       other_tasks *= std::min(sizes.extent(f, d).value_or(few_tasks), few_tasks);
   }
-  const double operations = operations_of_values(update.values, [](const Call&) { return 0.0; });
-  // Rows whose distance is a power of two share a few lines of the nearest cache: eight of them in all.
-  const int64_t streams = rows_read(f, update);
-  const int64_t most = operations >= rows_pay || streams == 1 ? most_rows : least_rows;
-  const auto extent = sizes.extent(f, *dimension);
-  const int64_t rows = extent ? rows_of_task(*extent, most, other_tasks) : most;
-  return RowChains{*dimension, static_cast<int>(rows), operations >= vectors_pay || streams > 1};
+  RowChains result = chains_of(f, update, sizes.extent(f, *dimension), other_tasks);
+  result.dimension = *dimension;
+  return result;
 }
 
 bool schedule_row_scan(const FuncPtr& f, int index, const SizeEstimate& sizes) {

@@ -13,6 +13,7 @@
 // The number of rows depends on the program alone, so that results have the same bits for every number of threads.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "autoschedule/size_estimate.h"
@@ -30,6 +31,10 @@ struct RowChains {
   bool in_vectors = false;
 };
 
+// How many rows of the update run at once, and how; `extent`: of them (nullopt: not known), `other_tasks`: of the loops
+// around them.
+RowChains chains_of(const FuncContents& f, const Definition& update, std::optional<int64_t> extent,
+                    int64_t other_tasks);
 // nullopt: the update does not run along rows of memory, its iterations are independent, or it has one row.
 std::optional<RowChains> row_chains(const FuncContents& f, const Definition& update,
                                     const SizeEstimate& sizes);

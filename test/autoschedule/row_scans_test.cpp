@@ -183,6 +183,22 @@ TEST_F(RowScans, OfUnknownSizeAreEqualToTheInterpreter) {
   }
 }
 
+// Rows that a reduction variable numbers.
+TEST_F(RowScans, OverAllOfAnImage) {
+  for (const int rows : {3, 17, 64}) {
+    SCOPED_TRACE(rows);
+    f = Func("f");
+    set_signals(40, rows);
+    f(x, y) = signals(x, y);
+    RDom r(2, 38, 0, rows, "r");
+    f(r.x, r.y) = f(r.x, r.y) + 0.5f * f(r.x - 1, r.y) - 0.25f * f(r.x - 2, r.y);
+    expect_results();
+    if (rows == 64) {
+      EXPECT_EQ(loops_of(*f.function()), "r.y r.x yi^");
+    }
+  }
+}
+
 // Dynamic programming over a square: both loops run inside of those over pairs.
 TEST_F(RowScans, InTwoDimensions) {
   Var n{"n"};

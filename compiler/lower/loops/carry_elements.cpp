@@ -20,14 +20,16 @@
 // Method: a serial loop over lets and invariant conditions, then over vectorized and unrolled loops of constant
 //         extents, around a single Store. Its index moves by a constant in each iteration. A load of the same buffer
 //         whose index is that of 1 ... most_carried iterations ago is carried. The loops over lanes are over pure
-//         variables, so that their iterations store to different elements. If the first iterations may not read what
-//         lies before the loop, because a load is in an arm of a select, they are a loop of their own that reads memory.
+//         variables, so that their iterations store to different elements; one may be over a reduction variable whose
+//         steps are longer than all iterations of the loop. If the first iterations may not read what lies before the
+//         loop, because a load is in an arm of a select, they are a loop of their own that reads memory.
 // Not done: chains alone in a loop, which LLVM carries; iterations further away than most_carried.
 // Source: scalar replacement (Callahan, Carr and Kennedy, PLDI 1990).
 // Tests: test/golden/lower/carry_elements/, test/autoschedule/row_scans_test.cpp.
 #include "lower/loops/carry_elements.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <map>
 #include <optional>
 #include <unordered_set>
@@ -104,8 +106,8 @@ class ScanFinder {
   bool enter(const For& loop) {
     const bool is_lane = loop.runs == ForType::Vectorized || loop.runs == ForType::Unrolled;
     scan_.lanes.push_back(&loop);
-    return is_lane && is_pure_(loop) && is_const(loop.min) &&
-           as_const_int(loop.extent).value_or(0) > 0;
+    if (!is_pure_(loop)) proven_.push_back(&loop);
+    return is_lane && is_const(loop.min) && as_const_int(loop.extent).value_or(0) > 0;
   }
 
   // Whether each iteration stores a constant distance further.
@@ -118,7 +120,17 @@ class ScanFinder {
       return any_node(e, [&](const Load& load) { return load.name == scan_.store->name; });
     };
     return step_ != 0 && std::none_of(around_.begin(), around_.end(), loads_own) &&
-           !loads_own(scan_.store->index);
+           !loads_own(scan_.store->index) && lanes_are_apart();
+  }
+
+  // Whether lanes store to different elements in all iterations. Of those over a reduction variable there may be one, which
+  // moves further than all iterations of the loop.
+  bool lanes_are_apart() const {
+    if (proven_.empty()) return true;
+    const auto iterations = as_const_int(scan_.loop->extent);
+    const auto form = analysis::decompose(scan_.index, {proven_[0]->name});
+    return proven_.size() == 1 && iterations && form && form->coefficients.size() == 1 &&
+           std::abs(form->coefficients[0].second) >= std::abs(step_) * *iterations;
   }
 
   bool find_loads() {
@@ -160,6 +172,8 @@ class ScanFinder {
   int64_t step_ = 0;  // elements
   Substitution lets_;
   std::vector<Expr> around_;  // lets and conditions
+  std::vector<const For*>
+      proven_;  // lanes that are not pure: whether they are apart is to be proven
   std::unordered_set<const ExprNode*> seen_;
 };
 
