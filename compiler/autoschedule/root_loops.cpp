@@ -18,6 +18,7 @@
 #include "autoschedule/reduction_chunks.h"
 #include "autoschedule/row_copies.h"
 #include "autoschedule/row_reductions.h"
+#include "autoschedule/row_scans.h"
 #include "autoschedule/scatter_schedule.h"
 #include "autoschedule/short_rows.h"
 #include "autoschedule/step_loops.h"
@@ -116,6 +117,8 @@ class LoopChooser {
     if (row) return reduce_rows(*row);
     if (pure_[0] == 0 && scans_rows()) return cut_scan();
     if (may_be_tile && sums_in_blocks()) return;
+    if (index_ > 0 && !scatters && pure_[0] != 0 && makes(Decision::LayoutStaging))
+      schedule_row_scan(function_, index_, sizes_);
     make_tasks();
     if (pure_[0] != 0) return;
     const bool reduces = !definition().rvars.empty();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "autoschedule/new_loop.h"
+#include "autoschedule/row_scans.h"
 #include "frontend/schedule/stage.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
@@ -87,7 +88,7 @@ bool has_tiles(const FuncContents& f) {
                                 [](const TileLoop& tile) { return tile.split != nullptr; });
   bool stays = !read_elsewhere(f, update).defined();
   for (size_t d = 0; d < f.args.size(); ++d) stays &= is_pure_position(f, update, d);
-  return cuts && stays && has_reduction_inside(update, tiles.size());
+  return cuts && (stays || runs_along_row(f, update)) && has_reduction_inside(update, tiles.size());
 }
 
 void start_in_tiles(const FuncPtr& f, int lanes) {

@@ -3,7 +3,8 @@
 //   f = 0 over all, then f += ... tile by tile   =>   for each tile: f = 0, f += ...
 //
 // The pass would write all of f to memory and the tiles read it again: of a sum of few terms, as of
-// a convolution's, that is a good part of its time.
+// a convolution's, that is a good part of its time. The same holds for scans along rows (row_scans.h), whose tiles are
+// blocks of whole rows.
 #pragma once
 
 #include <string>

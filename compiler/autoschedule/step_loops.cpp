@@ -8,6 +8,7 @@
 #include "analysis/linear.h"
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/new_loop.h"
+#include "autoschedule/row_scans.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
 #include "graph/definitions/own_reads.h"
@@ -156,7 +157,7 @@ class StepScheduler {
   void give(int most_lanes) {
     reorder(variables_.order());
     run_pure_loops_in_parallel();
-    if (!row().empty()) vectorize_row(most_lanes);
+    row().empty() ? run_several_rows() : vectorize_row(most_lanes);
     if (all_have_work_) run_in_parallel(variables_.apart);
     if (step_has_work_) run_in_parallel(variables_.points);
   }
@@ -219,6 +220,20 @@ class StepScheduler {
     if (loops.empty()) return;
     stage_.parallel(RVar(row()));
     tasks_ = sizes_.machine().enough_tasks;
+  }
+
+  // Scans along rows that a reduction variable numbers: several rows at once (row_scans.h).
+  void run_several_rows() {
+    const bool is_scan = !variables_.apart.empty() && variables_.points.empty() &&
+                         variables_.steps.empty() && runs_along_row(f_, update());
+    if (!is_scan) return;
+    const std::string all = variables_.apart.front();
+    const RowChains chains = chains_of(f_, update(), extent_of(update(), all), 1);
+    if (chains.rows < 2) return;
+    const RVar row(inner_loop(f_, index_, all));
+    stage_.split(RVar(all), RVar(all), row, chains.rows, TailStrategy::GuardWithIf);
+    reorder(joined({row.name()}, variables_.inside));
+    chains.in_vectors ? stage_.vectorize(row) : stage_.unroll(row);
   }
 
   void run_in_parallel(const Names& loops) {

@@ -22,6 +22,7 @@
 #include "lower/instrumentation/inject_tracing.h"
 #include "lower/instrumentation/loop_nest_text.h"
 #include "lower/instrumentation/write_debug_files.h"
+#include "lower/loops/carry_elements.h"
 #include "lower/loops/equal_nests.h"
 #include "lower/loops/flatten_storage.h"
 #include "lower/loops/fork_async.h"
@@ -117,6 +118,11 @@ Stmt run_keep_accumulators(const Lowering& lowering, const Stmt& s) {
       s, [&](const For& loop) { return is_pure_loop(lowering.program, loop.name); });
 }
 
+Stmt run_carry_elements(const Lowering& lowering, const Stmt& s) {
+  return carry_elements(s,
+                        [&](const For& loop) { return is_pure_loop(lowering.program, loop.name); });
+}
+
 Stmt run_add_argument_checks(const Lowering& lowering, const Stmt& s) {
   return add_argument_checks(s, lowering.args, lowering.program,
                              lowering.target.has_feature(Target::CUDA));
@@ -179,6 +185,7 @@ constexpr Pass passes[] = {
     {"partition_loops", Phase::FlatStorage, alone<partition_loops>},
     {"drop_guarded_clamps", Phase::FlatStorage, alone<drop_guarded_clamps>},
     {"trim_loops", Phase::FlatStorage, alone<trim_loops>},
+    {"carry_elements", Phase::FlatStorage, run_carry_elements},
     {"unroll_loops", Phase::FlatStorage, alone<unroll_loops>},
     {"join_indices", Phase::FlatStorage, alone<join_indices>},
     {"hoist_calls", Phase::FlatStorage, alone<hoist_calls>},

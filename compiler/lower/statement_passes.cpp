@@ -1,6 +1,7 @@
 #include "lower/statement_passes.h"
 
 #include "lower/instrumentation/check_accesses.h"
+#include "lower/loops/carry_elements.h"
 #include "lower/loops/equal_nests.h"
 #include "lower/loops/flatten_storage.h"
 #include "lower/loops/keep_accumulators.h"
@@ -15,6 +16,11 @@ const std::vector<StatementPass>& statement_passes() {
       {"accumulate_vectors", accumulate_vectors},
       {"blend_masked_stores", blend_masked_stores},
       {"bound_allocations", bound_allocations},
+      {"carry_elements",  // loops whose names lack "r$" count as loops over pure variables
+       [](const Stmt& s) {
+         return carry_elements(
+             s, [](const For& loop) { return loop.name.find(".r$") == std::string::npos; });
+       }},
       {"check_accesses",  // only for allocations: a statement does not list its buffers
        [](const Stmt& s) { return check_accesses(s, {}); }},
       {"check_promises", check_promises},

@@ -91,11 +91,13 @@ class StageExplainer {
     return stage == 0 ? "definition" : "update " + std::to_string(stage - 1);
   }
 
-  // An update that reads other elements of its own Func runs serially. Vectors of independent iterations hide the
-  // latency.
+  // An update that reads other elements of its own Func runs serially. Vectors of independent iterations, or several
+  // of them in turn, hide the latency.
   void find_chain() {
     for (const DefinitionLoops& loops : loops_) {
-      if (loops.stage == 0 || loops.is_vectorized || loops.serial_trips <= 1) continue;
+      if (loops.stage == 0 || loops.is_vectorized || loops.is_interleaved ||
+          loops.serial_trips <= 1)
+        continue;
       const Expr read = graph::read_elsewhere(*f_, f_->stage(loops.stage));
       if (!read.defined()) continue;
       std::ostringstream out;

@@ -143,6 +143,8 @@ class LoopReader {
       const bool is_own = loop.func == lower::original_name(func);
       if (is_own) {
         result.stage = std::stoi(loop.stage);
+        result.is_interleaved |=
+            loop.runs == ForType::Unrolled && !loop.is_reduction && loop.trips > 1;
         if (loop.runs == ForType::Serial && loop.is_reduction) result.serial_trips *= loop.trips;
       }
       if (loop.trips <= 1 && loop.runs != ForType::Vectorized) continue;

@@ -21,6 +21,7 @@ struct DefinitionLoops {
   std::string text;  // without the name of the definition
   // About the loops of the definition and those around it.
   bool is_parallel = false, is_vectorized = false;
+  bool is_interleaved = false;  // an unrolled loop runs over several elements
   double serial_trips =
       1;  // iterations of loops that run one after the other over reduction variables
 };

@@ -15,6 +15,7 @@ retrograde_test(
   memory_budget_test
   row_hosts_test
   row_reductions_test
+  row_scans_test
   row_sweeps_test
   schedule_search_test
   step_loops_test

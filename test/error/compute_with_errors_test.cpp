@@ -81,8 +81,9 @@ TEST_F(ComputeWithErrors, AStageThatIsNotTheOneBefore) {
 // rule: stages of one Func that share loops touch the same elements in each iteration
 TEST_F(ComputeWithErrors, AnUpdateThatReadsOrWritesElsewhere) {
   RDom r(1, 7, "r");
+  f(r, y) += 1;
   f(r, y) += f(r - 1, y);
-  f.update().compute_with(f, y);
+  f.update(1).compute_with(f.update(0), r);
   expect_refused({"touch the same elements in each iteration", "it writes to", "along \"x\""});
 }
 

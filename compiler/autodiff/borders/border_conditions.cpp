@@ -1,7 +1,10 @@
 #include "autodiff/borders/border_conditions.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <optional>
 
+#include "analysis/linear.h"
 #include "autodiff/sums/accumulation.h"
 #include "ir/build.h"
 #include "ir/visit.h"
@@ -52,6 +55,23 @@ Expr with_likely_parts(const Expr& predicate, const std::vector<ReductionVariabl
   if (const auto* both = predicate.as<And>())
     return with_likely_parts(both->a, rvars) && with_likely_parts(both->b, rvars);
   return fails_in_a_border(predicate, rvars) ? likely(predicate) : predicate;
+}
+
+bool holds_in_a_border(const Expr& predicate, const std::vector<LoopVariable>& region) {
+  std::vector<Expr> conditions;
+  add_conjuncts(predicate, conditions);
+  return std::ranges::any_of(region, [&](const LoopVariable& v) {
+    std::optional<int64_t> min, max;
+    for (const Expr& condition : conditions) {
+      const auto sum = analysis::nonnegative_where(condition);
+      const int64_t factor = sum && sum->terms.size() == 1 ? sum->factor_of(v.name) : 0;
+      if (factor == 1) min = std::max(min.value_or(INT64_MIN), -sum->constant);
+      if (factor == -1) max = std::min(max.value_or(INT64_MAX), sum->constant);
+    }
+    if (!min || !max || *max - *min + 1 > static_cast<int64_t>(stencil_reach)) return false;
+    const auto extent = constant_extent(v.range());
+    return !extent || *extent > 2 * (*max - *min + 1);
+  });
 }
 
 Expr masked(const Expr& predicate, const Expr& value) {

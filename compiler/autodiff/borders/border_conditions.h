@@ -14,6 +14,9 @@ bool is_range_condition(const Expr& e);
 // no further than a stencil does. Loops are split there. A condition on a longer reduction variable becomes the bounds
 // of that variable's loop instead (trim_loops).
 bool fails_in_a_border(const Expr& condition, const std::vector<ReductionVariable>& rvars);
+// Whether the condition restricts a variable of the region to a few of its values: it fails nearly everywhere, as that of
+// elements from which a recurrence starts.
+bool holds_in_a_border(const Expr& predicate, const std::vector<LoopVariable>& region);
 // Whether a gather sums a few terms, and its condition drops terms only at borders.
 bool has_borders(const Gather& g);
 

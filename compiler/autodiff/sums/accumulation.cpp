@@ -81,7 +81,7 @@ class Builder {
     }
     for (const Iterations& update : updates) {
       const auto parts = plan_parts(update, target_, types_);
-      parts ? add_privatised(update, *parts) : add_update(update);
+      parts ? add_privatised(with_rows_innermost(update), *parts) : add_update(update);
     }
     if (is_wide_) round_once();
     return std::move(result_);
@@ -146,7 +146,10 @@ class Builder {
     for (const Contribution& c : contributions) {
       if (!c.gather.is_pointwise()) continue;
       const auto k = static_cast<size_t>(c.component);
-      const Expr term = masked(c.gather.predicate, c.adjoint);
+      const Expr& where = c.gather.predicate;
+      const bool is_border = where.defined() && holds_in_a_border(where, target_.region);
+      const Expr term = is_border ? make_select(where, c.adjoint, make_zero(c.adjoint.type()))
+                                  : masked(where, c.adjoint);
       add_term(values[k], values[k].defined() ? cast_to(values[k].type(), term) : term);
     }
     for (size_t k = 0; k < values.size(); ++k) {

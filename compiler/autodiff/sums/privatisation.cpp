@@ -219,6 +219,31 @@ std::optional<PartPlan> plan_parts(const Iterations& update, const AdjointTarget
   return PartPlan{has_parts, count, has_lanes, sizes.note(g, count)};
 }
 
+// Whether the terms read Funcs or images along their rows when the variable steps.
+static bool moves_along_rows(const Iterations& update, const std::string& variable) {
+  const auto reads_along = [&](const Expr& e) {
+    const auto* call = e.as<Call>();
+    return call && call->call_type != CallType::Operator && !call->args.empty() &&
+           uses_variable(call->args[0], variable);
+  };
+  return std::ranges::any_of(update.all.sums, [&](const Expr& sum) {
+    return sum.defined() && any_node(sum, reads_along);
+  });
+}
+
+Iterations with_rows_innermost(Iterations update) {
+  const size_t count = update.rvars.size() - (update.has_taps ? 1 : 0);
+  if (update.over.scatters || count < 2 || moves_along_rows(update, update.rvars[0].var))
+    return update;
+  const auto end = update.rvars.begin() + static_cast<long>(count);
+  const auto row = std::find_if(update.rvars.begin() + 1, end, [&](const ReductionVariable& r) {
+    return as_const_int(r.extent).value_or(lane_count) >= lane_count &&
+           moves_along_rows(update, r.var);
+  });
+  if (row != end) std::rotate(update.rvars.begin(), row, row + 1);
+  return update;
+}
+
 // The loop that is split into parts: the outermost with enough iterations to run in parallel, so that a part reads
 // contiguous memory; else the longest loop.
 static size_t loop_in_parts(const Iterations& update) {

@@ -29,6 +29,10 @@ struct PartPlan {
 std::optional<PartPlan> plan_parts(const Iterations& update, const AdjointTarget& target,
                                    const std::vector<Type>& types);
 
+// The same sum with a reduction variable first that moves along the rows of what is read, if the first one moves from row
+// to row: lanes split the first, and would gather. In the domain of a recurrence along rows, pure dimensions come first.
+Iterations with_rows_innermost(Iterations update);
+
 // One slice of the reduction domain, for a fixed lane and part.
 struct Slice {
   std::vector<ReductionVariable> rvars;

@@ -182,11 +182,9 @@ Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest) {
   return is_const_true(inside) ? stmt : make_if(inside, stmt);
 }
 
-Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest,
-                             const ValueBounds& values) {
+static Requirements requirements_at(const LoopedFunc& f, int stage, const Scope<Interval>& point,
+                                    const ValueBounds& values) {
   const Definition& definition = f.stages[stage];
-  Scope<Interval> point;
-  for (const auto& [var, value] : nest.guarded_coordinate) point.push(var, Interval::point(value));
   Requirements uses;
   const auto add_all = [&](const std::function<Expr(const Expr&)>& here) {
     const Expr predicate = definition.predicate.defined() ? here(definition.predicate) : Expr();
@@ -241,10 +239,29 @@ bool tolerates_any_values(const Definition& definition, const ValueBounds& value
          !any_node(definition, [&](const Call& call) { return may_do_harm(call, values); });
 }
 
-Requirements read_inside(const LoopedFunc& f, const Domain& domain, const ValueBounds& values) {
+static Scope<Interval> points_of(const Domain& domain) {
   Scope<Interval> points;
   for (const auto& [var, range] : domain)
     points.push(var, {range.min, simplify(range.min + range.extent - 1)});
+  return points;
+}
+
+Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest,
+                             const ValueBounds& values) {
+  Scope<Interval> point;
+  for (const auto& [var, value] : nest.guarded_coordinate) point.push(var, Interval::point(value));
+  return requirements_at(f, stage, point, values);
+}
+
+std::optional<Box> own_elements(const LoopedFunc& f, int stage, const Domain& domain,
+                                const ValueBounds& values) {
+  Requirements uses = requirements_at(f, stage, points_of(domain), values);
+  const auto own = uses.find(f.name());
+  return own == uses.end() ? std::nullopt : std::optional(own->second.box);
+}
+
+Requirements read_inside(const LoopedFunc& f, const Domain& domain, const ValueBounds& values) {
+  const Scope<Interval> points = points_of(domain);
   Requirements uses;
   for (const Expr& value : f.stages[0].values)
     merge_footprints(uses, footprints(value, points, &values));

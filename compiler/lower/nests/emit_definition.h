@@ -22,6 +22,10 @@ Stmt emit_definition(const LoopedFunc& f, int stage, const StageNest& nest);
 Requirements requirements_of(const LoopedFunc& f, int stage, const StageNest& nest,
                              const ValueBounds& values);
 
+// The box of its own Func that an update reads and writes at the points of its domain; nullopt if none.
+std::optional<Box> own_elements(const LoopedFunc& f, int stage, const Domain& domain,
+                                const ValueBounds& values);
+
 // Whether garbage in the values that a first definition reads is harmless as long as its results are unused: they are
 // not used as unclamped coordinates and have no effects.
 bool tolerates_any_values(const Definition& definition, const ValueBounds& values);

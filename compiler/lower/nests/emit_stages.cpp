@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "diagnostics/error.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "lower/checks/nest_checks.h"
@@ -42,10 +43,22 @@ Domain bind_domain(const LoopedFunc& f, int s, Box& need, const std::vector<Slid
   return domain;
 }
 
-// The domain of a stage that shares loops with a later stage of its Func.
-Domain domain_of_earlier(const LoopedFunc& f, int s, const Domain& later, ComputePlace& site) {
+// The domain of a stage that shares loops with a later stage of its Func. Along dimensions in which that stage does not
+// stay in place, as in a scan, it also computes what that stage reads.
+Domain domain_of_earlier(const LoopedFunc& f, int s, int later_stage, const Domain& later,
+                         const ValueBounds& values, ComputePlace& site) {
   Domain domain;
-  for (const std::string& arg : f.func->args) domain[arg] = later.at(arg);
+  const auto own = own_elements(f, later_stage, later, values);
+  for (size_t d = 0; d < f.func->args.size(); d++) {
+    const std::string& arg = f.func->args[d];
+    const Range& range = later.at(arg);
+    const bool stays = !own || is_pure_position(*f.func, f.stages[later_stage], d);
+    domain[arg] = range;
+    if (stays) continue;
+    Interval all{range.min, simplify(range.min + range.extent - 1)};
+    all = hull(all, (*own)[d]);
+    domain[arg] = site.bind(stage_prefix(f.name(), s) + arg, all);
+  }
   bind_reductions(f, s, domain, site);
   return domain;
 }
@@ -108,7 +121,7 @@ Emitted NestEmitter::emit_members(const FusedGroup& group, std::vector<Member>& 
     // its loops run over the same region, with the same names.
     const std::vector<FusedStage>& fused = group.nests[n].stages;
     std::vector<NestStage> stages(fused.size());
-    std::map<int, Domain> bound;  // by Func
+    std::map<int, std::pair<int, Domain>> bound;  // by Func: a stage and its domain
     for (size_t i = fused.size(); i-- > 0;) {
       Member& member = member_of(fused[i]);
       const bool is_last = fused[i].stage + 1 == static_cast<int>(member.f->stages.size());
@@ -116,8 +129,9 @@ Emitted NestEmitter::emit_members(const FusedGroup& group, std::vector<Member>& 
       Domain domain = same == bound.end()
                           ? bind_domain(*member.f, fused[i].stage, member.need,
                                         is_last ? member.slides : std::vector<Slide>(), site)
-                          : domain_of_earlier(*member.f, fused[i].stage, same->second, site);
-      bound[fused[i].func] = domain;
+                          : domain_of_earlier(*member.f, fused[i].stage, same->second.first,
+                                              same->second.second, values_, site);
+      bound[fused[i].func] = {fused[i].stage, domain};
       stages[i] = {member.f, fused[i].stage, std::move(domain)};
     }
     Emitted code = stages[0].f->func->is_extern()

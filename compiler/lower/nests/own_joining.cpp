@@ -108,7 +108,23 @@ class OwnJoiningCheck {
                evidence, advice);
   }
 
+  // Whether the shared loops run along pure dimensions of the update. It accesses the elements of the iteration along
+  // these, since its own reads keep pure positions, and of all other dimensions the stage before computes the whole range
+  // in each iteration.
+  bool shares_pure_dimensions() const {
+    for (int d = 1; d <= depth_; d++) {
+      const auto part = part_along(own_.schedule, loop_at(own_, d));
+      const auto& args = f_.func->args;
+      const auto arg = part ? std::ranges::find(args, part->dimension) : args.end();
+      if (arg == args.end() ||
+          !graph::is_pure_position(*f_.func, own_, static_cast<size_t>(arg - args.begin())))
+        return false;
+    }
+    return true;
+  }
+
   void check_stays_in_place() const {
+    if (shares_pure_dimensions()) return;
     for (size_t d = 0; d < own_.args.size(); d++) {
       if (graph::is_pure_position(*f_.func, own_, d)) continue;
       refuse(text("it writes to ", own_.args[d], " along ", quoted(f_.func->args[d])),

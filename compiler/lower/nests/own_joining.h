@@ -5,7 +5,8 @@
 //
 // A tile of sums is then initialised while it is in the cache. In every iteration of the shared loops, the update must
 // access exactly the elements that the stage before has computed in that iteration: the loops are the same parts of the
-// same dimensions, the stage before computes no element twice, and the update of each element reads no other element.
+// same dimensions, and the stage before computes no element twice. If a shared loop is no pure dimension of the update,
+// the update of each element must also read no other element. A scan  f(r, y) += f(r - 1, y)  can share the loop over y.
 // Tests: test/unit/lower/compute_with_test.cpp, test/error/compute_with_errors_test.cpp.
 #pragma once
 

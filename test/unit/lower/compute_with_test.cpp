@@ -414,6 +414,20 @@ TEST_F(ComputeWith, TheFirstStageMayBeSpecialized) {
 
 // ---- an update fused with the stage before it ----
 
+TEST_F(ComputeWith, AScanStartsInItsBlockOfRows) {
+  expect_same([&](bool together) {
+    Func f("f"), out("out");
+    RDom r(1, width - 1, "r");
+    f(x, y) = x * y % 7;
+    f(r, y) += 3 * f(r - 1, y);
+    out(x, y) = f(x, y);
+    f.compute_root().split(y, y, yi, 4, TailStrategy::GuardWithIf);
+    f.update().split(y, y, yi, 4, TailStrategy::GuardWithIf).reorder(yi, r, y).unroll(yi);
+    if (together) f.update().compute_with(f, y);
+    return out;
+  });
+}
+
 TEST_F(ComputeWith, AnUpdateStartsInItsTile) {
   Func f("f"), out("out");
   RDom r(0, 3, "r");
