@@ -18,8 +18,9 @@ const Var x("x"), y("y"), c("c");
 
 // out(x, y, c) = sum of in(stride * x + r.x, stride * y + r.y, r.z) * weights(r.x, r.y, r.z, c), or its transpose: the
 // output has zeros between the elements of the input.
-struct Layer {
-  Layer(int stride, int channels, int filters, bool is_transposed, int taps = 3, int rows = 3)
+struct StridedLayer {
+  StridedLayer(int stride, int channels, int filters, bool is_transposed, int taps = 3,
+               int rows = 3)
       : stride(stride), is_transposed(is_transposed) {
     const int size = is_transposed ? 70 : 70 * stride;
     in = gradient::random_image({size, size, channels}, -1, 1, 7);
@@ -67,22 +68,22 @@ struct Layer {
 // Vectors along the channels of what is read without a stride: the features of a transposed layer, the seed of another.
 TEST(TurnedSums, HaveRowsAlongChannels) {
   if (!get_host_target().has_feature(Target::AVX512)) GTEST_SKIP() << "too few registers";
-  EXPECT_TRUE(Layer(2, 64, 8, true).has_rows_along(2));
-  EXPECT_TRUE(Layer(2, 8, 64, false).has_rows_along(3));
-  EXPECT_TRUE(Layer(3, 8, 48, false, 5).has_rows_along(3));
+  EXPECT_TRUE(StridedLayer(2, 64, 8, true).has_rows_along(2));
+  EXPECT_TRUE(StridedLayer(2, 8, 64, false).has_rows_along(3));
+  EXPECT_TRUE(StridedLayer(3, 8, 48, false, 5).has_rows_along(3));
 }
 
 TEST(TurnedSums, AreNotMadeOfDenseReads) {
-  for (const int d : {2, 3}) EXPECT_FALSE(Layer(1, 64, 64, false).has_rows_along(d));
+  for (const int d : {2, 3}) EXPECT_FALSE(StridedLayer(1, 64, 64, false).has_rows_along(d));
 }
 
 TEST(TurnedSums, AreNotMadeOfFewChannels) {
-  for (const int d : {2, 3}) EXPECT_FALSE(Layer(2, 32, 32, false).has_rows_along(d));
+  for (const int d : {2, 3}) EXPECT_FALSE(StridedLayer(2, 32, 32, false).has_rows_along(d));
 }
 
 TEST(TurnedSums, KeepEveryBit) {
-  for (const Layer& layer :
-       {Layer(2, 64, 8, true), Layer(3, 48, 8, true), Layer(2, 8, 48, false)}) {
+  for (const StridedLayer& layer : {StridedLayer(2, 64, 8, true), StridedLayer(3, 48, 8, true),
+                                    StridedLayer(2, 8, 48, false)}) {
     const Buffer<float> expected = layer.result({Decision::LayoutStaging});
     for (const int threads : {1, 2, 5})
       EXPECT_TRUE(gradient::same_bits(layer.result({}, threads), expected)) << threads;
@@ -90,7 +91,7 @@ TEST(TurnedSums, KeepEveryBit) {
 }
 
 TEST(TurnedSums, AreThoseOfTheDefinition) {
-  const Layer layer(2, 16, 48, false);
+  const StridedLayer layer(2, 16, 48, false);
   const Buffer<float> found = layer.result();
   const auto padded = [&](int i, int j, int k) {
     const bool is_inside = i >= 0 && i < layer.in.width() && j >= 0 && j < layer.in.height();
@@ -111,14 +112,14 @@ TEST(TurnedSums, AreThoseOfTheDefinition) {
 // One row of taps has a fixed place in the sums.
 TEST(TurnedSums, MayHaveOneRowOfTaps) {
   for (const bool is_transposed : {false, true}) {
-    const Layer layer(2, 48, 48, is_transposed, 3, 1);
+    const StridedLayer layer(2, 48, 48, is_transposed, 3, 1);
     EXPECT_TRUE(gradient::same_bits(layer.result(), layer.result({Decision::LayoutStaging})));
   }
 }
 
 // An adjoint of 0 gives 0 whatever it is multiplied with; NaN goes where it is read.
 TEST(TurnedSums, KeepStrongZeros) {
-  Layer layer(2, 8, 48, false);
+  StridedLayer layer(2, 8, 48, false);
   layer.in(5, 9, 3) = std::numeric_limits<float>::infinity();
   layer.in(8, 9, 4) = std::nanf("");
   for (int a = 0; a < layer.out_size; ++a) layer.seed(a, 4, 2) = 0.0f;
