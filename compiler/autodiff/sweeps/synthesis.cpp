@@ -7,6 +7,7 @@
 #include "autodiff/sums/distinct_nodes.h"
 #include "autodiff/sums/kept_values.h"
 #include "autodiff/sums/shared_adjoints.h"
+#include "autodiff/sums/shared_terms.h"
 #include "autodiff/sweeps/custom_rules.h"
 #include "autodiff/sweeps/input_shape.h"
 #include "autodiff/updates/update_context.h"
@@ -132,7 +133,7 @@ class Synthesis {
     if (contributions_.pass_on(*f)) return;
     contribute_stage(f, with_equal_nodes_shared(mapped(f->pure->values, without_lets)),
                      primal_.adjoints_at_write(*f, 0, adjoint.func), primal_.regions.domain(*f, 0),
-                     {}, false);
+                     {}, false, true);
   }
 
   void contribute_update(const FuncPtr& f, int stage, const UpdateAdjoint& update) {
@@ -212,29 +213,33 @@ class Synthesis {
 
   void contribute_stage(const FuncPtr& f, const std::vector<Expr>& values,
                         const std::vector<Expr>& seeds, const IterationDomain& domain,
-                        const SelfValues& self_values, bool keeps_steps) {
+                        const SelfValues& self_values, bool keeps_steps, bool is_pure = false) {
     SweepResult sweep = primal_.sweep(values, seeds, f.get());
     for (const std::string& note : sweep.notes)
       account_.add(Explanation::Kind::Zero, f->name, note);
     for (LeafAdjoint& leaf : sweep.leaves)
       leaf = with_kept_values(with_self_values(leaf, f, self_values), f, values);
-    if (keeps_steps) {
-      add_sharing(f, sweep.leaves, seeds, domain);
-    } else {
+    const std::string name = f->name + "_adj";
+    if (keeps_steps)
+      add_sharing(f, sweep.leaves,
+                  share_adjoints(name + "_inner", domain, sweep.leaves, seeds, primal_.regions),
+                  domain, "inner adjoint");
+    else if (is_pure)
+      add_sharing(f, sweep.leaves,
+                  share_terms(name + "_terms", domain, sweep.leaves, primal_.regions), domain,
+                  "term");
+    else
       for (const LeafAdjoint& leaf : sweep.leaves) contributions_.add(f, leaf, domain);
-    }
   }
-  // Computes common subexpressions of the contributions once for each iteration.
+  // Computes what the contributions have in common once for each iteration.
   void add_sharing(const FuncPtr& f, const std::vector<LeafAdjoint>& leaves,
-                   const std::vector<Expr>& seeds, const IterationDomain& domain) {
-    SharedAdjoints shared =
-        share_adjoints(f->name + "_adj_inner", domain, leaves, seeds, primal_.regions);
+                   const SharedAdjoints& shared, const IterationDomain& domain,
+                   const std::string& what) {
     if (shared.func) {
       const size_t kept = shared.func->types.size();
       result_.funcs.push_back(shared.func);
       account_.add(Explanation::Kind::Version, f->name,
-                   text(quoted(shared.func->name), " keeps ", kept,
-                        kept == 1 ? " inner adjoint" : " inner adjoints",
+                   text(quoted(shared.func->name), " keeps ", kept, " ", what, kept == 1 ? "" : "s",
                         " of each iteration, shared by ", leaves.size(), " contributions"));
     }
     for (size_t i = 0; i < leaves.size(); ++i)
