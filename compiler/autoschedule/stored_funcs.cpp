@@ -145,7 +145,7 @@ class StorageChooser {
 
   void count_reads(const FuncContents& f) {
     std::vector<size_t> copied;
-    if (fixed_) copied = chosen_dimensions(f, *fixed_, ChoicesOf::ItsOwn);
+    if (fixed_ && is_output(f)) copied = chosen_dimensions(f, *fixed_, ChoicesOf::ItsOwn);
     for (int s = 0; s < f.stage_count(); ++s) {
       SeenElements seen;
       walk_definition(f.stage(s), [&](const Expr& e) {
