@@ -163,7 +163,7 @@ class Counter {
     return result;
   }
 
-  // Of several values of an inlined Func at one element.
+  // The cost of several values of an inlined Func at one element.
   Operations cost_together(const FuncContents& f, const std::set<size_t>& components) const {
     const std::pair key(&f, components);
     const auto known = costs_together_.find(key);

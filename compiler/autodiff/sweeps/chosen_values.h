@@ -15,7 +15,7 @@
 
 namespace retrograde::autodiff {
 
-// What a definition computes at each point of its domain.
+// The values of a definition at each point of its domain.
 struct StageValues {
   IterationDomain domain;
   std::vector<Expr> values, seeds;  // and the adjoints of the values
