@@ -11,6 +11,7 @@
 #include "frontend/schedule/stage.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "ir/visit.h"
 
 namespace retrograde::autoschedule {
@@ -145,6 +146,9 @@ void compute_beside_choices(const Readers& readers, const std::vector<FuncPtr>& 
       continue;
     const auto reader = readers.only_reader(f);
     if (!reader || !runs_along_rows(*reader->func) || but.contains(reader->func.get())) continue;
+    // Both have vectors of the same elements.
+    if (!equal(f->pure->schedule.splits[0].factor, reader->func->pure->schedule.splits[0].factor))
+      continue;
     const auto& loops = reader->func->pure->schedule.dims;
     const bool has_copies = std::any_of(
         loops.begin(), loops.end(), [](const Dim& loop) { return loop.runs == ForType::Unrolled; });

@@ -24,6 +24,7 @@
 #include "autoschedule/row_hosts.h"
 #include "autoschedule/row_order.h"
 #include "autoschedule/row_sweeps.h"
+#include "autoschedule/row_tasks.h"
 #include "autoschedule/scatter_schedule.h"
 #include "autoschedule/scatter_slices.h"
 #include "autoschedule/slices.h"
@@ -258,6 +259,7 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   };
   move_and_join({outputs, stored, given, whole, before, sizes}, request, give_rows, give_tile);
   for (const FuncPtr& f : started) start_sums(f, request, sizes);
+  if (request.makes(Decision::TaskSizes)) run_rows_in_pieces(given, sizes);
   tasks.limit(outputs, request);
   name_inlined(outputs, order);
   return sizes;

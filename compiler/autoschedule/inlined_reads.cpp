@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <functional>
+#include <unordered_map>
+#include <utility>
 
+#include "graph/definitions/element_values.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 #include "ir/visit.h"
@@ -17,29 +20,32 @@ class Inliner {
  public:
   explicit Inliner(const std::vector<FuncPtr>& stored) : stored_(stored) {}
 
-  Expr operator()(const Expr& root) {
-    return rewrite(without_lets(root),
-                   [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
-                     const Expr mapped = map_children(e, recurse);
-                     const auto* call = mapped.as<Call>();
-                     const FuncPtr callee = call ? inlined(*call) : nullptr;
-                     return callee && room_-- > 0 ? (*this)(value_of(*callee, *call)) : mapped;
-                   });
-  }
+  Expr operator()(const Expr& root) { return inlined_(without_lets(root)); }
 
  private:
-  FuncPtr inlined(const Call& call) const {
-    const FuncPtr callee = call.call_type == CallType::Func ? func_of(call) : nullptr;
-    return callee && is_computed_inline(callee, stored_) ? callee : nullptr;
+  Expr inlined(const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
+    const Expr mapped = map_children(e, recurse);
+    const auto* call = mapped.as<Call>();
+    const FuncPtr callee = call && call->call_type == CallType::Func ? func_of(*call) : nullptr;
+    if (!callee || !is_computed_inline(callee, stored_) || room_ <= 0) return mapped;
+    if (seen_.is_first(mapped)) --room_;
+    return recurse(values_of(*callee).at(call->args, call->component));
   }
-  static Expr value_of(const FuncContents& callee, const Call& call) {
-    Substitution args;
-    for (size_t d = 0; d < call.args.size(); ++d) args[callee.args[d]] = call.args[d];
-    return substitute(without_lets(callee.pure->values[static_cast<size_t>(call.component)]), args);
+
+  ElementValues& values_of(const FuncContents& f) {
+    const auto found = values_.find(&f);
+    if (found != values_.end()) return found->second;
+    std::vector<Expr> values;
+    for (const Expr& value : f.pure->values) values.push_back(without_lets(value));
+    return values_.emplace(&f, ElementValues(f.args, std::move(values))).first->second;
   }
 
   const std::vector<FuncPtr>& stored_;
+  std::unordered_map<const FuncContents*, ElementValues> values_;
+  SeenElements seen_;
   int room_ = most_calls;
+  StepRewriter inlined_{
+      [this](const Expr& e, const auto& recurse) -> Expr { return inlined(e, recurse); }};
 };
 
 }  // namespace

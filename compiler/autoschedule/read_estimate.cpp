@@ -30,14 +30,15 @@ struct Loop {
   bool is_decided = false;  // by an index: the same for all iterations that read an element
 };
 
-std::vector<Loop> loops_of(const FuncContents& f, const Definition& stage) {
+std::vector<Loop> loops_of(const FuncContents& f, const Definition& stage,
+                           const std::vector<size_t>& copied) {
   std::vector<Loop> loops;
   for (const ReductionVariable& r : stage.rvars) {
     auto extent = as_const_int(simplify(r.extent));
     loops.push_back({r.var, extent ? std::max(1.0, static_cast<double>(*extent)) : several});
   }
   for (size_t d = 0; d < f.args.size(); ++d) {
-    if (!is_pure_position(f, stage, d)) continue;
+    if (!is_pure_position(f, stage, d) || std::ranges::find(copied, d) != copied.end()) continue;
     const bool is_lane = f.made && f.made->lanes > 0 && d == 0;
     const bool is_block = f.made && d + static_cast<size_t>(f.made->blocks) >= f.args.size();
     loops.push_back({f.args[d], is_lane ? f.made->lanes : several, !is_lane, is_block});
@@ -116,8 +117,9 @@ std::optional<double> iterations_a_value(const Expr& any_index, std::vector<Loop
 
 }  // namespace
 
-double reads_an_element(const Call& call, const FuncContents& reader, const Definition& stage) {
-  std::vector<Loop> loops = loops_of(reader, stage);
+double reads_an_element(const Call& call, const FuncContents& reader, const Definition& stage,
+                        const std::vector<size_t>& copied) {
+  std::vector<Loop> loops = loops_of(reader, stage, copied);
   std::vector<Expr> args;
   for (const Expr& arg : call.args) args.push_back(without_lets(arg));
   // Indices that decide a loop first.

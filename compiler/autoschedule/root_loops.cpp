@@ -23,6 +23,7 @@
 #include "autoschedule/short_rows.h"
 #include "autoschedule/step_loops.h"
 #include "autoschedule/turned_sums.h"
+#include "autoschedule/vector_chains.h"
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
@@ -123,7 +124,7 @@ class LoopChooser {
     if (pure_[0] != 0) return;
     const bool reduces = !definition().rvars.empty();
     if (scatters || !split_into_phases(f_, index_, stage_, lanes_of_values(), sizes_))
-      vectorize(stage_, variable_of(0), lanes_of_values(), TailStrategy::GuardWithIf);
+      vectorize(stage_, variable_of(0), lanes_of_body(), TailStrategy::GuardWithIf);
     if (pure_.size() == 1 && reduces) stage_.parallel(variable_of(0));  // of the vectors
   }
 
@@ -162,6 +163,13 @@ class LoopChooser {
   int lanes_of_values() const {
     if (most_lanes() < lanes) return most_lanes();
     return std::clamp(lanes * 32 / bits_of_values(definition().values), lanes, 4 * lanes);
+  }
+
+  // Of a long body several registers, where rows fill these many times.
+  int lanes_of_body() const {
+    const int own = lanes_of_values();
+    const auto row = sizes_.extent(f_, 0);
+    return own == lanes && row && *row >= 16 * lanes ? own * vectors_side_by_side(f_) : own;
   }
 
   // The outermost loop, and those inside of it while their iterations are few; not that of the

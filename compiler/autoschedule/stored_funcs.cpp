@@ -9,6 +9,7 @@
 #include "autoschedule/large_bodies.h"
 #include "autoschedule/read_estimate.h"
 #include "autoschedule/running_sums.h"
+#include "graph/definitions/element_values.h"
 #include "graph/definitions/own_reads.h"
 #include "graph/directives/give_directive.h"
 #include "ir/build.h"
@@ -143,12 +144,16 @@ class StorageChooser {
   }
 
   void count_reads(const FuncContents& f) {
+    std::vector<size_t> copied;
+    if (fixed_ && is_output(f)) copied = chosen_dimensions(f, *fixed_, ChoicesOf::ItsOwn);
     for (int s = 0; s < f.stage_count(); ++s) {
+      SeenElements seen;
       walk_definition(f.stage(s), [&](const Expr& e) {
         const auto* call = e.as<Call>();
-        if (call && call->call_type == CallType::Func && call->symbol.raw() != &f) {
+        if (call && call->call_type == CallType::Func && call->symbol.raw() != &f &&
+            seen.is_first(e)) {
           StorageUse& use = uses_[call->symbol.raw()];
-          const double reads = reads_an_element(*call, f, f.stage(s));
+          const double reads = reads_an_element(*call, f, f.stage(s), copied);
           use.reads += reads;
           if (fixed_) use.alternatives = std::max(use.alternatives, alternatives(*call, f));
           std::vector<Reader>& readers = readers_[call->symbol.raw()];  // f is the last, if any
@@ -199,7 +204,11 @@ class StorageChooser {
     return total;
   }
   double operations(const Definition& stage) const {
-    return operations_of_values(stage.values, [&](const Call& call) { return cost_of(call); });
+    SeenElements seen;
+    return operations_of_values(stage.values, [&](const Call& call) {
+      const double cost = cost_of(call);
+      return cost > 1 && !seen.is_first(Expr(&call)) ? 0 : cost;
+    });
   }
   double cost_of(const Call& call) const {
     if (call.call_type != CallType::Func) return 1;

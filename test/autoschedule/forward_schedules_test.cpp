@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "graph/graph.h"
+#include "ir/build.h"
 
 namespace retrograde {
 namespace {
@@ -397,6 +398,80 @@ TEST_F(RowCopies, NotOfWhatFewTilesRead) {
 }
 TEST_F(RowCopies, NotWhereTheirDecisionIsSwitchedOff) {
   EXPECT_FALSE(copies({.options = {.without = {Decision::LayoutStaging}}}));
+}
+
+// ---- long programs for each point ----
+
+const std::vector<graph::Split>& splits_of(const Func& f) {
+  return f.function()->pure->schedule.splits;
+}
+int64_t lanes_of(const Func& f) {
+  return splits_of(f).empty() ? 0 : *ir::as_const_int(splits_of(f)[0].factor);
+}
+bool runs_in_parallel(const Func& f) {
+  return std::any_of(loops_of(f).begin(), loops_of(f).end(),
+                     [](const graph::Dim& loop) { return loop.runs == ForType::Parallel; });
+}
+
+constexpr int points = 50000;
+
+// A chain of Tuples, each of which reads the five values of the one before at several places of its expressions.
+struct TupleChain {
+  explicit TupleChain(int steps) {
+    const Expr u = cast<float>(i % 97) * 0.01f;
+    chain.emplace_back("first");
+    chain[0](i) = {u, 1.0f - u, u * u, u + 2.0f, 0.5f * u};
+    for (int k = 0; k < steps; ++k) {
+      const Func last = chain.back();
+      const auto at = [&](int value) -> Expr { return last(i)[value]; };
+      chain.emplace_back("step");
+      const Expr length = sqrt(at(0) * at(0) + at(1) * at(1) + 1.0f);
+      chain.back()(i) = {at(1) / length, at(2) / length + at(0), at(3) / length, at(4) / length,
+                         at(0) / length + 0.1f};
+    }
+    out(i) = chain.back()(i)[0] + chain.back()(i)[4];
+    out.set_estimate(i, 0, points);
+  }
+  Var i{"i"};
+  std::vector<Func> chain;
+  Func out{"out"};
+};
+
+TEST(LongProgram, WhatOneStageReadsAtOneElementIsInlined) {
+  TupleChain program(10), plain(10);
+  Pipeline(program.out).auto_schedule(get_host_target());
+  for (const Func& f : program.chain)
+    EXPECT_NE(f.function()->schedule.compute_level.kind, graph::LoopLevel::Kind::Root) << f.name();
+  // Ten levels of five values would make ten million nodes if these did not share what they read.
+  for (Func& f : plain.chain) f.compute_root();
+  const Buffer<float> found = program.out.realize({points}), expected = plain.out.realize({points});
+  for (int k = 0; k < points; ++k) ASSERT_NEAR(found(k), expected(k), 1e-5f) << k;
+}
+
+TEST(LongProgram, TheOnlyLoopRunsInParallelPieces) {
+  TupleChain program(2);
+  Pipeline(program.out).auto_schedule(get_host_target());
+  EXPECT_TRUE(runs_in_parallel(program.out));
+  Func cheap("cheap");
+  cheap(program.i) = program.i + 1;
+  cheap.set_estimate(program.i, 0, 1000);
+  Pipeline(cheap).auto_schedule(get_host_target());
+  EXPECT_FALSE(runs_in_parallel(cheap));
+}
+
+TEST(LongProgram, LongChainsRunInSeveralVectorsAtOnce) {
+  const Var i("i");
+  const auto lanes_with = [&](int steps) {
+    Expr at = cast<float>(i);
+    for (int k = 0; k < steps; ++k) at = sqrt(at * at + 2.0f) / (at + 3.0f);
+    Func out("out");
+    out(i) = at;
+    out.set_estimate(i, 0, points);
+    Pipeline(out).auto_schedule(get_host_target());
+    return lanes_of(out);
+  };
+  EXPECT_EQ(lanes_with(2), 16) << "iterations overlap";
+  EXPECT_GT(lanes_with(40), 16);
 }
 
 }  // namespace

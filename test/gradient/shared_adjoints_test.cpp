@@ -4,6 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <utility>
+
 #include "autodiff/derivative.h"
 #include "autodiff/sums/generated_definitions.h"
 #include "gradient/gradient_check.h"
@@ -119,6 +122,101 @@ struct Guarded : ::testing::Test {
 
 TEST_F(Guarded, WhatIsReadInTheWholeDomainMayBeKept) { EXPECT_NE(share(3).func, nullptr); }
 TEST_F(Guarded, WhatIsNotThereInAllOfTheDomainIsNotRead) { EXPECT_EQ(share(0).func, nullptr); }
+
+// ---- terms of sums (shared_terms.h) ----
+
+const Var i("i"), c("c");
+
+Func with_name(const Derivative& d, const std::string& part) {
+  for (const Func& f : d.funcs()) {
+    if (f.name().find(part) != std::string::npos) return f;
+  }
+  return {};
+}
+
+// Many rays through a surface with three parameters, one after the other.
+struct Rays {
+  static constexpr int count = 5000;
+  Buffer<float> start{count}, bend{1}, gap{1}, index{1};
+  Func ray{"ray"}, loss{"loss"};
+  RDom r{0, count};
+
+  Rays() {
+    for (int k = 0; k < count; ++k) start(k) = 0.001f * static_cast<float>(k % 700) - 0.25f;
+    bend(0) = 0.25f, gap(0) = 1.5f, index(0) = 1.25f;
+  }
+  // The first values of a program of so many steps.
+  Expr after(int steps) {
+    const Expr zero = 0, b = bend(zero), g = gap(zero), n = index(zero);
+    Expr at = start(i);
+    for (int k = 0; k < steps; ++k) at = sqrt(at * at + g) / (n + b * at) + b * n;
+    return at;
+  }
+  void finish() {
+    loss() = 0.0f;
+    loss() += ray(r) * ray(r);
+  }
+  // By each input alone, which shares nothing.
+  float alone(const Buffer<float>& input) const {
+    AdjointOptions options;
+    options.wrt = {input};
+    const Derivative d = propagate_adjoints(loss, options);
+    EXPECT_FALSE(with_name(d, "_adj_terms").defined());
+    return Buffer<float>(d(input).realize({1}))(0);
+  }
+};
+
+TEST(SharedTerms, SumsOfALongProgramReadTheirTerms) {
+  Rays rays;
+  rays.ray(i) = rays.after(6);
+  rays.finish();
+  const Derivative d = propagate_adjoints(rays.loss);
+  const Func terms = with_name(d, "_adj_terms");
+  ASSERT_TRUE(terms.defined()) << d.explain(Detail::All);
+  EXPECT_EQ(terms.outputs(), 4);
+  expect_fact(d.explanations(), Fact::Version, rays.ray.name(),
+              "\"ray_adj_terms\" keeps 4 terms of each iteration, shared by 4 contributions");
+  for (const Buffer<float>& input : {rays.bend, rays.gap, rays.index}) {
+    const float expected = rays.alone(input);
+    EXPECT_NEAR(Buffer<float>(d(input).realize({1}))(0), expected, 1e-5f * std::abs(expected));
+    const autodiff::FuncOperations* sum = d.operations().gradient.find(d(input).function().get());
+    ASSERT_NE(sum, nullptr);
+    for (const autodiff::StageOperations& stage : sum->stages)
+      EXPECT_EQ(stage.each.nonlinear, 0) << input.name();
+  }
+}
+
+TEST(SharedTerms, ShortProgramsAreComputedAgain) {
+  Rays rays;
+  rays.ray(i) = rays.after(1);
+  rays.finish();
+  EXPECT_FALSE(with_name(propagate_adjoints(rays.loss), "_adj_terms").defined());
+}
+
+// ---- choices as values (sweeps/chosen_values.h) ----
+
+TEST(ChosenValues, AlternativesAreDifferentiatedInOneSweep) {
+  const auto cost_and_gradient = [](bool chooses) {
+    Rays rays;
+    const Expr at = rays.after(3);
+    Func pair("pair"), loss("loss");
+    if (chooses)
+      rays.ray(i, c) = select(c == 0, at * 2.0f, at * at);
+    else
+      pair(i) = {at * 2.0f, at * at}, rays.ray(i, c) = select(c == 0, pair(i)[0], pair(i)[1]);
+    RDom both(0, Rays::count, 0, 2);
+    loss() = 0.0f;
+    loss() += rays.ray(both.x, both.y) * cast<float>(both.x % 7 + both.y);
+    const Derivative d = propagate_adjoints(loss);
+    const float found = Buffer<float>(d(rays.bend).realize({1}))(0);
+    return std::pair(d.operations().gradient.operations().value().value_or(-1), found);
+  };
+  const auto [operations, found] = cost_and_gradient(true);
+  const auto [expected_operations, expected] = cost_and_gradient(false);
+  EXPECT_GT(operations, 0);
+  EXPECT_LE(operations, 1.1 * expected_operations);
+  EXPECT_NEAR(found, expected, 1e-5f * std::abs(expected));
+}
 
 }  // namespace
 }  // namespace retrograde::gradient

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 
 #include "autodiff/sums/distinct_nodes.h"
 #include "autodiff/sweeps/factored_program.h"
@@ -12,6 +15,7 @@
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/stored_funcs.h"
 #include "diagnostics/error.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
@@ -146,13 +150,46 @@ class Counter {
 
   Operations with_reads(const Body& body) const {
     Operations result = body.own;
-    for (const Call* call : body.reads) {
-      auto inlined = value_costs_.find(call->symbol.raw());
+    for (const ElementRead& read : elements_of(body)) {
+      auto inlined = value_costs_.find(read.call->symbol.raw());
       if (inlined == value_costs_.end()) {
-        result.moves += 1;
+        result.moves += static_cast<double>(read.components.size());
+      } else if (read.components.size() == 1) {
+        result += inlined->second.at(*read.components.begin());
       } else {
-        result += inlined->second.at(static_cast<size_t>(call->component));
+        result += cost_together(*func_of(*read.call), read.components);
       }
+    }
+    return result;
+  }
+
+  // The cost of several values of an inlined Func at one element.
+  Operations cost_together(const FuncContents& f, const std::set<size_t>& components) const {
+    const std::pair key(&f, components);
+    const auto known = costs_together_.find(key);
+    if (known != costs_together_.end()) return known->second;
+    std::vector<Expr> values;
+    for (const size_t k : components) values.push_back(f.pure->values[k]);
+    const Operations cost = with_reads(body_of(values));
+    costs_together_.emplace(key, cost);
+    return cost;
+  }
+
+  // The values that are read of one element, which share what they have in common.
+  struct ElementRead {
+    const Call* call;
+    std::set<size_t> components;
+  };
+  static std::vector<ElementRead> elements_of(const Body& body) {
+    std::vector<ElementRead> result;
+    for (const Call* call : body.reads) {
+      const auto found = std::ranges::find_if(result, [&](const ElementRead& read) {
+        return read.call->symbol.raw() == call->symbol.raw() &&
+               same_args(read.call->args, call->args);
+      });
+      ElementRead& read =
+          found == result.end() ? result.emplace_back(ElementRead{call, {}}) : *found;
+      read.components.insert(static_cast<size_t>(call->component));
     }
     return result;
   }
@@ -173,6 +210,7 @@ class Counter {
   Regions regions_;
   std::unordered_set<const FuncContents*> stored_by_default_;
   std::unordered_map<const Symbol*, std::vector<Operations>> value_costs_;  // of inlined Funcs
+  mutable std::map<std::pair<const FuncContents*, std::set<size_t>>, Operations> costs_together_;
   std::unordered_map<const Symbol*, std::vector<Body>> bodies_;  // one for each entry of stages
   std::unordered_map<const Symbol*, size_t> places_;
   OperationCount result_;

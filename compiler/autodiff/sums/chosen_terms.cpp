@@ -26,10 +26,6 @@ bool is_decided_by(const Expr& condition, const std::string& var) {
          });
 }
 
-bool chooses_by(const Expr& term, const std::string& var) {
-  return any_node(term, [&](const Select& choice) { return is_decided_by(choice.condition, var); });
-}
-
 // The number of the loop that can be written out.
 std::optional<size_t> chosen_loop(const Contribution& c) {
   const Gather& g = c.gather;
@@ -47,27 +43,6 @@ std::optional<size_t> chosen_loop(const Contribution& c) {
       return i;
   }
   return std::nullopt;
-}
-
-// The term for one value of the variable, without what it does not choose.
-Expr chosen_term(const Expr& term, const std::string& var, const Expr& value) {
-  return rewrite(term, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) -> Expr {
-    const auto* variable = e.as<Variable>();
-    if (variable) return variable->name == var ? value : e;
-    const auto* choice = e.as<Select>();
-    if (choice && is_decided_by(choice->condition, var)) {
-      const Expr condition = simplify(substitute(choice->condition, var, value));
-      if (is_const_true(condition)) return recurse(choice->when_true);
-      if (is_const_false(condition)) return recurse(choice->when_false);
-    }
-    const Expr mapped = map_children(e, recurse);
-    const auto* product = as_op(mapped, Op::strong_mul);
-    if (product && is_zero(product->args[0])) return make_zero(mapped.type());
-    const auto* sum = mapped.type().is_float() ? mapped.as<Add>() : nullptr;
-    if (sum && is_zero(sum->a)) return sum->b;
-    if (sum && is_zero(sum->b)) return sum->a;
-    return mapped;
-  });
 }
 
 Contribution written_out(const Contribution& c, size_t loop) {
@@ -96,6 +71,30 @@ Contribution written_out(const Contribution& c, size_t loop) {
 }
 
 }  // namespace
+
+bool chooses_by(const Expr& term, const std::string& var) {
+  return any_node(term, [&](const Select& choice) { return is_decided_by(choice.condition, var); });
+}
+
+Expr chosen_term(const Expr& term, const std::string& var, const Expr& value) {
+  return rewrite(term, [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) -> Expr {
+    const auto* variable = e.as<Variable>();
+    if (variable) return variable->name == var ? value : e;
+    const auto* choice = e.as<Select>();
+    if (choice && is_decided_by(choice->condition, var)) {
+      const Expr condition = simplify(substitute(choice->condition, var, value));
+      if (is_const_true(condition)) return recurse(choice->when_true);
+      if (is_const_false(condition)) return recurse(choice->when_false);
+    }
+    const Expr mapped = map_children(e, recurse);
+    const auto* product = as_op(mapped, Op::strong_mul);
+    if (product && is_zero(product->args[0])) return make_zero(mapped.type());
+    const auto* sum = mapped.type().is_float() ? mapped.as<Add>() : nullptr;
+    if (sum && is_zero(sum->a)) return sum->b;
+    if (sum && is_zero(sum->b)) return sum->a;
+    return mapped;
+  });
+}
 
 void write_out_choices(std::vector<Contribution>& contributions) {
   for (Contribution& c : contributions) {

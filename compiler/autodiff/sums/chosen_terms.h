@@ -9,11 +9,17 @@
 // In a loop every iteration computes all alternatives, and what they share again and again.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "autodiff/sums/accumulation.h"
 
 namespace retrograde::autodiff {
+
+// Whether the variable alone decides a choice in the term.
+bool chooses_by(const Expr& term, const std::string& var);
+// The term for one value of the variable, without what it does not choose.
+Expr chosen_term(const Expr& term, const std::string& var, const Expr& value);
 
 void write_out_choices(std::vector<Contribution>& contributions);
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <functional>
 
-#include "autodiff/sums/generated_definitions.h"
 #include "autoschedule/cost_estimate.h"
 #include "ir/build.h"
 #include "ir/visit.h"
@@ -20,13 +19,12 @@ bool is_dear(const Expr& value) {
 
 }  // namespace
 
-LeafAdjoint with_kept_values(const LeafAdjoint& leaf, const FuncPtr& f,
+LeafAdjoint with_kept_values(const LeafAdjoint& leaf, const std::vector<Expr>& reads,
                              const std::vector<Expr>& values) {
-  if (!f->is_pure() || std::ranges::none_of(values, is_dear)) return leaf;
-  const std::vector<Expr> kept = values_of(f, variables_of(f->args));
+  if (std::ranges::none_of(values, is_dear)) return leaf;
   const auto read = [&](const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
     for (size_t k = 0; k < values.size(); ++k) {
-      if (e.same_as(values[k]) && is_dear(e)) return kept[k];
+      if (e.same_as(values[k]) && is_dear(e)) return reads[k];
     }
     return map_children(e, recurse);
   };

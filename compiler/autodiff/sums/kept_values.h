@@ -14,8 +14,8 @@
 
 namespace retrograde::autodiff {
 
-// `values` are those of the Func's pure definition, from which the adjoint was derived.
-LeafAdjoint with_kept_values(const LeafAdjoint& leaf, const FuncPtr& f,
+// `values` are those of the pure definition of a Func, from which the adjoint was derived, and `reads` read them.
+LeafAdjoint with_kept_values(const LeafAdjoint& leaf, const std::vector<Expr>& reads,
                              const std::vector<Expr>& values);
 
 }  // namespace retrograde::autodiff

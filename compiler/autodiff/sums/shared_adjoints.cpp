@@ -166,8 +166,8 @@ bool is_inside(const Box& part, const Box& outer) {
   return std::ranges::equal(part, outer, can_prove_inside);
 }
 
-// Whether all elements that the values read over the outer domain exist. An access of the primal may be guarded by a
-// condition that does not hold there.
+}  // namespace
+
 bool reads_what_is_there(const std::vector<Expr>& values, const IterationDomain& domain,
                          const Regions& regions) {
   const Scope<Interval> scope = scope_of(domain.vars);
@@ -199,8 +199,6 @@ FuncPtr define_over(const IterationDomain& domain, const std::string& name,
   define_pure(f, args, mapped(values, [&](const Expr& e) { return substitute(e, names); }));
   return f;
 }
-
-}  // namespace
 
 SharedAdjoints share_adjoints(const std::string& name, const IterationDomain& domain,
                               const std::vector<LeafAdjoint>& leaves,

@@ -32,4 +32,13 @@ SharedAdjoints share_adjoints(const std::string& name, const IterationDomain& do
                               const std::vector<LeafAdjoint>& leaves,
                               const std::vector<Expr>& seeds, const Regions& regions);
 
+bool is_bounded_box(const IterationDomain& domain);
+// Whether all elements that the values read over the domain exist. An access of the primal may be guarded by a
+// condition that does not hold there.
+bool reads_what_is_there(const std::vector<Expr>& values, const IterationDomain& domain,
+                         const Regions& regions);
+// A Func with these values for each point of the domain.
+FuncPtr define_over(const IterationDomain& domain, const std::string& name,
+                    const std::vector<Expr>& values);
+
 }  // namespace retrograde::autodiff

@@ -5,8 +5,11 @@
 #include "autodiff/report/absent_gradients.h"
 #include "autodiff/sums/contributions.h"
 #include "autodiff/sums/distinct_nodes.h"
+#include "autodiff/sums/generated_definitions.h"
 #include "autodiff/sums/kept_values.h"
 #include "autodiff/sums/shared_adjoints.h"
+#include "autodiff/sums/shared_terms.h"
+#include "autodiff/sweeps/chosen_values.h"
 #include "autodiff/sweeps/custom_rules.h"
 #include "autodiff/sweeps/input_shape.h"
 #include "autodiff/updates/update_context.h"
@@ -130,9 +133,7 @@ class Synthesis {
       record(*f, s - 1, adjoint);
     }
     if (contributions_.pass_on(*f)) return;
-    contribute_stage(f, with_equal_nodes_shared(mapped(f->pure->values, without_lets)),
-                     primal_.adjoints_at_write(*f, 0, adjoint.func), primal_.regions.domain(*f, 0),
-                     {}, false);
+    contribute_definition(f, adjoint.func);
   }
 
   void contribute_update(const FuncPtr& f, int stage, const UpdateAdjoint& update) {
@@ -210,31 +211,50 @@ class Synthesis {
     result_.after_stage[{&f, stage}] = adjoint.func;
   }
 
+  // Adds the contributions of the pure definition.
+  void contribute_definition(const FuncPtr& f, const FuncPtr& adjoint) {
+    const StageValues stage = with_choices_as_values(
+        {primal_.regions.domain(*f, 0),
+         with_equal_nodes_shared(mapped(f->pure->values, without_lets)),
+         primal_.adjoints_at_write(*f, 0, adjoint), values_of(f, variables_of(f->args))},
+        [&](const Expr& leaf) { return primal_.active.contains(leaf); });
+    std::vector<LeafAdjoint> leaves = leaves_of(*f, stage.values, stage.seeds);
+    if (f->is_pure()) {
+      for (LeafAdjoint& leaf : leaves) leaf = with_kept_values(leaf, stage.reads, stage.values);
+    }
+    add_sharing(f, leaves,
+                share_terms(f->name + "_adj_terms", stage.domain, leaves, primal_.regions),
+                stage.domain, "term");
+  }
+
   void contribute_stage(const FuncPtr& f, const std::vector<Expr>& values,
                         const std::vector<Expr>& seeds, const IterationDomain& domain,
                         const SelfValues& self_values, bool keeps_steps) {
-    SweepResult sweep = primal_.sweep(values, seeds, f.get());
-    for (const std::string& note : sweep.notes)
-      account_.add(Explanation::Kind::Zero, f->name, note);
-    for (LeafAdjoint& leaf : sweep.leaves)
-      leaf = with_kept_values(with_self_values(leaf, f, self_values), f, values);
+    std::vector<LeafAdjoint> leaves = leaves_of(*f, values, seeds);
+    for (LeafAdjoint& leaf : leaves) leaf = with_self_values(leaf, f, self_values);
     if (keeps_steps) {
-      add_sharing(f, sweep.leaves, seeds, domain);
+      add_sharing(f, leaves,
+                  share_adjoints(f->name + "_adj_inner", domain, leaves, seeds, primal_.regions),
+                  domain, "inner adjoint");
     } else {
-      for (const LeafAdjoint& leaf : sweep.leaves) contributions_.add(f, leaf, domain);
+      for (const LeafAdjoint& leaf : leaves) contributions_.add(f, leaf, domain);
     }
   }
-  // Computes common subexpressions of the contributions once for each iteration.
+  std::vector<LeafAdjoint> leaves_of(const FuncContents& f, const std::vector<Expr>& values,
+                                     const std::vector<Expr>& seeds) {
+    SweepResult sweep = primal_.sweep(values, seeds, &f);
+    for (const std::string& note : sweep.notes) account_.add(Explanation::Kind::Zero, f.name, note);
+    return std::move(sweep.leaves);
+  }
+  // Computes what the contributions have in common once for each iteration.
   void add_sharing(const FuncPtr& f, const std::vector<LeafAdjoint>& leaves,
-                   const std::vector<Expr>& seeds, const IterationDomain& domain) {
-    SharedAdjoints shared =
-        share_adjoints(f->name + "_adj_inner", domain, leaves, seeds, primal_.regions);
+                   const SharedAdjoints& shared, const IterationDomain& domain,
+                   const std::string& what) {
     if (shared.func) {
       const size_t kept = shared.func->types.size();
       result_.funcs.push_back(shared.func);
       account_.add(Explanation::Kind::Version, f->name,
-                   text(quoted(shared.func->name), " keeps ", kept,
-                        kept == 1 ? " inner adjoint" : " inner adjoints",
+                   text(quoted(shared.func->name), " keeps ", kept, " ", what, kept == 1 ? "" : "s",
                         " of each iteration, shared by ", leaves.size(), " contributions"));
     }
     for (size_t i = 0; i < leaves.size(); ++i)

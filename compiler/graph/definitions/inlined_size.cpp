@@ -1,5 +1,6 @@
 #include "graph/definitions/inlined_size.h"
 
+#include "graph/definitions/element_values.h"
 #include "graph/definitions/own_reads.h"
 
 namespace retrograde::graph {
@@ -7,9 +8,10 @@ namespace retrograde::graph {
 std::unordered_map<const Symbol*, int> func_calls(const FuncContents& f) {
   std::unordered_map<const Symbol*, int> calls;
   for (int s = 0; s < f.stage_count(); ++s) {
+    SeenElements seen;
     walk_definition(f.stage(s), [&](const Expr& e) {
       const auto* call = e.as<Call>();
-      if (call && call->call_type == CallType::Func && call->symbol.raw() != &f)
+      if (call && call->call_type == CallType::Func && call->symbol.raw() != &f && seen.is_first(e))
         ++calls[call->symbol.raw()];
     });
   }

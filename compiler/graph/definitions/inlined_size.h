@@ -1,5 +1,5 @@
 // inlined_size.h -- estimates the size of Funcs after inlining: each distinct call node makes a
-// copy of the callee's body.
+// copy of the callee's body; calls of one element share a copy.
 #pragma once
 
 #include <unordered_map>
@@ -21,7 +21,7 @@ class InlinedSizes {
   std::unordered_map<const Symbol*, double> nodes_;
 };
 
-// The number of distinct nodes that call other Funcs, by callee.
+// The number of distinct nodes that call other Funcs, by callee. In a stage, calls of one element count once.
 std::unordered_map<const Symbol*, int> func_calls(const FuncContents& f);
 
 }  // namespace retrograde::graph

@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "diagnostics/error.h"
+#include "graph/definitions/element_values.h"
 #include "graph/definitions/inlined_size.h"
 #include "graph/directives/wrappers.h"
 #include "ir/visit.h"
@@ -19,18 +20,7 @@ namespace retrograde::lower {
 
 namespace {
 
-struct InlinedFunc {
-  std::vector<std::string> args;
-  std::vector<Expr> values;
-};
-using InlinedFuncs = std::unordered_map<const Symbol*, InlinedFunc>;
-
-Expr value_at(const InlinedFunc& f, const std::vector<Expr>& args, int component) {
-  RETROGRADE_ASSERT(args.size() == f.args.size(), "call with a wrong number of arguments");
-  Substitution at_point;
-  for (size_t i = 0; i < f.args.size(); i++) at_point[f.args[i]] = args[i];
-  return substitute(f.values[component], at_point);
-}
+using InlinedFuncs = std::unordered_map<const Symbol*, ElementValues>;
 
 bool is_inlined(const FuncContents& f, const FuncPlacement& schedule, bool is_output) {
   return !is_output && f.is_pure() && schedule.compute_level.kind == LoopLevel::Kind::Inlined;
@@ -88,8 +78,7 @@ Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
     if (!call || call->call_type != CallType::Func) return {};
     const Expr mapped = map_children(e, recurse);
     const auto it = inlined.find(call->symbol.raw());
-    return it == inlined.end() ? mapped
-                               : value_at(it->second, mapped.as<Call>()->args, call->component);
+    return it == inlined.end() ? mapped : it->second.at(mapped.as<Call>()->args, call->component);
   });
   InlinedSizes sizes;
   for (const FuncPtr& f : topological_order(outputs)) {
@@ -99,7 +88,7 @@ Program inline_functions(const std::vector<FuncPtr>& unwrapped) {
         f->stage_count(), [&](int i) { return map_exprs(f->stage(i), std::ref(inliner)); });
     if (is_inlined(*f, f->schedule, is_output)) {
       check_inlined(*f, f->schedule);
-      inlined[f.get()] = {f->args, stages[0].values};
+      inlined.emplace(f.get(), ElementValues(f->args, stages[0].values));
       sizes.inline_calls_of(*f, distinct_nodes(stages[0].values));
       continue;
     }
