@@ -206,7 +206,7 @@ class Builder {
     if (lane.defined()) parts->made->lanes = lane_count;
 
     parts->made->has_parts = part.defined();
-    Slice slice = slice_of(update, lane, part, plan.count, has_blocks(update));
+    Slice slice = slice_of(update, lane, part, plan, has_blocks(update));
     const auto& [place, sums] = update.all;
     if (update.predicate.defined()) {
       slice.conditions.push_back(
