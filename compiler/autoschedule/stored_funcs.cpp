@@ -144,7 +144,8 @@ class StorageChooser {
     return std::min(1.0, bytes / 4);
   }
 
-  // Equal reads of one stage count once: code generation computes what they read once.
+  // Equal reads of a pure definition count once: code generation computes what they read once. A sum may be cut into
+  // several Funcs, each with some of the reads.
   void count_reads(const FuncContents& f) {
     for (int s = 0; s < f.stage_count(); ++s) {
       std::unordered_map<const Symbol*, std::vector<Expr>> known;
@@ -152,7 +153,8 @@ class StorageChooser {
         const auto* call = e.as<Call>();
         if (call && call->call_type == CallType::Func && call->symbol.raw() != &f) {
           std::vector<Expr>& others = known[call->symbol.raw()];
-          if (std::ranges::any_of(others, [&](const Expr& other) { return equal(e, other); }))
+          if (s == 0 &&
+              std::ranges::any_of(others, [&](const Expr& other) { return equal(e, other); }))
             return;
           if (others.size() < most_compared) others.push_back(e);
           StorageUse& use = uses_[call->symbol.raw()];

@@ -13,6 +13,7 @@ retrograde_test(
   forward_schedules_test
   invariant_factors_test
   memory_budget_test
+  row_guests_test
   row_hosts_test
   row_reductions_test
   row_sweeps_test
