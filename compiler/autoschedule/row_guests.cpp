@@ -41,7 +41,7 @@ class GuestFinder {
     for (const Expr& root : roots_with_inlined(*host.host->pure, stored)) {
       walk(root, [&](const Expr& e) {
         const auto* call = e.as<Call>();
-        if (call && is_access(*call) && is_own_element(*call)) shared_.insert(call->name);
+        if (call && is_access(*call) && is_own_element(*call)) own_reads_.insert(call->name);
         return true;
       });
     }
@@ -49,7 +49,7 @@ class GuestFinder {
 
   void find() {
     for (const FuncPtr& f : stored_) add_guest(f);
-    for (const FuncPtr& f : stored_) add_inside(f);
+    for (const FuncPtr& f : stored_) add_shared(f);
   }
 
  private:
@@ -58,7 +58,7 @@ class GuestFinder {
   const StoredReads& reads_;
   const std::function<bool(const FuncPtr&)>& is_free_;
   const SizeEstimate& sizes_;
-  std::unordered_set<std::string> shared_;  // names of what the host reads at its own element
+  std::unordered_set<std::string> own_reads_;  // names of what the host reads at its own element
 
   // Clamps move nothing but places at the border.
   static Expr index_of(const Call& call, size_t d, const FuncContents& reader,
@@ -129,7 +129,7 @@ class GuestFinder {
     for (const Expr& root : roots_with_inlined(terms->updates[0], stored_)) {
       walk(root, [&](const Expr& e) {
         const auto* call = e.as<Call>();
-        if (!call || !is_access(*call) || !shared_.contains(call->name)) return true;
+        if (!call || !is_access(*call) || !own_reads_.contains(call->name)) return true;
         const auto found = rows_of(*call, *terms);
         is_known &= found && rows.value_or(*found) == *found;
         if (is_known) rows = found;
@@ -159,10 +159,10 @@ class GuestFinder {
     return rows;
   }
 
-  // ---- inside ----
+  // ---- shared ----
 
-  void add_inside(const FuncPtr& f) {
-    const bool may_move = f->is_pure() && f != host_.host && shared_.contains(f->name) &&
+  void add_shared(const FuncPtr& f) {
+    const bool may_move = f->is_pure() && f != host_.host && own_reads_.contains(f->name) &&
                           is_free_(f) && !host_.coordinates.contains(f.get()) &&
                           sizes_.bytes(*f) >= sizes_.machine().passes_caches &&
                           fits_beside_others(*f) && !reads_.is_hidden(f);
@@ -170,14 +170,16 @@ class GuestFinder {
     for (const StoredRead& read : reads_.of(f)) {
       if (!is_within_rows(read)) return;
     }
-    host_.inside.push_back(f);
+    host_.shared.push_back(f);
   }
 
   bool fits_beside_others(const FuncContents& f) const {
     int64_t rows = 1, bytes = sizes_.bytes(*host_.host) + sizes_.bytes(f);
     for (const auto& [dimension, divisor] : host_.rows)
       rows *= (sizes_.extent(*host_.host, dimension).value_or(1) + divisor - 1) / divisor;
-    for (const FuncPtr& other : host_.inside) bytes += sizes_.bytes(*other);
+    for (const auto* others : {&host_.inside, &host_.shared}) {
+      for (const FuncPtr& other : *others) bytes += sizes_.bytes(*other);
+    }
     return bytes / rows <= sizes_.machine().block_bytes;
   }
 

@@ -27,7 +27,8 @@ class HostMover {
       Func(f).compute_at(retrograde::LoopLevel(Func(host_.host), Var(level()), 0));
     }
     const bool has_guests = std::ranges::all_of(host_.guests, has_whole_rows);
-    if (has_guests) move_inside();
+    move_into_row(host_.inside);
+    if (has_guests) move_into_row(host_.shared);
     for (const FuncPtr& copy : host_.copies) join(copy);
     if (!has_guests) return;
     for (const RowGuest& guest : host_.guests) join(guest);
@@ -47,8 +48,8 @@ class HostMover {
     });
   }
 
-  void move_inside() const {
-    for (const FuncPtr& f : host_.inside) {
+  void move_into_row(const std::vector<FuncPtr>& funcs) const {
+    for (const FuncPtr& f : funcs) {
       autoschedule::run_serially(f);
       Func(f).compute_at(retrograde::LoopLevel(Func(host_.host), Var(level()), 0));
     }

@@ -91,7 +91,11 @@ class HostFinder {
     own.resize(f->args.size());
     for (size_t d = 1; d < own.size(); ++d) own[d] = RowCoordinate{d};
     for (auto member = order_.rbegin(); member != order_.rend(); ++member) {  // consumers first
-      if (*member != f && may_be_member(**member)) add(*member, host);
+      if (*member == f || !may_be_member(**member)) continue;
+      if (is_read_in_place(*member, host))
+        add_inside(*member, host);
+      else
+        add(*member, host);
     }
     return is_worth_while(host) ? std::optional(std::move(host)) : std::nullopt;
   }
@@ -187,6 +191,25 @@ class HostFinder {
     host.coordinates[f.get()] = std::move(*all);
   }
 
+  // Whether it is a Func of the host's elements, each of which the host, or what is inside, reads for its own.
+  bool is_read_in_place(const FuncPtr& f, const RowHost& host) const {
+    const std::vector<StoredRead>& all = reads_.of(f);
+    return f->is_pure() && f->args.size() == host.host->args.size() && !all.empty() &&
+           !reads_.is_hidden(f) && sizes_.bytes(*f) >= sizes_.machine().passes_caches &&
+           std::ranges::all_of(all, [&](const StoredRead& read) {
+             const bool is_own = read.reader == host.host ||
+                                 std::ranges::find(host.inside, read.reader) != host.inside.end();
+             return is_own && std::ranges::all_of(read.calls, [&](const Expr& e) {
+                      return same_args(e.as<Call>()->args, variables_of(read.reader->args));
+                    });
+           });
+  }
+
+  static void add_inside(const FuncPtr& f, RowHost& host) {
+    host.inside.push_back(f);
+    host.coordinates[f.get()] = host.coordinates.at(host.host.get());
+  }
+
   // All members have the coordinates of the first one.
   static bool is_same_row(const FuncContents& f, const RowCoordinates& all, RowHost& host) {
     std::vector<RowCoordinate> rows;
@@ -231,7 +254,9 @@ class HostFinder {
     int64_t rows = 1;
     for (const auto& [dimension, divisor] : host.rows)
       rows *= (sizes_.extent(*host.host, dimension).value_or(0) + divisor - 1) / divisor;
-    return rows >= enough_rows && sizes_.bytes(*host.host) / rows <= sizes_.machine().block_bytes &&
+    int64_t bytes = sizes_.bytes(*host.host);
+    for (const FuncPtr& f : host.inside) bytes += sizes_.bytes(*f);
+    return rows >= enough_rows && bytes / rows <= sizes_.machine().block_bytes &&
            std::ranges::any_of(host.members, [](const FuncPtr& f) { return has_many_terms(*f); });
   }
 };
@@ -252,14 +277,16 @@ RowHosts::RowHosts(const std::vector<FuncPtr>& outputs, const std::vector<FuncPt
     : sizes_(sizes) {
   if (std::ranges::none_of(stored, [](const FuncPtr& f) { return has_many_terms(*f); })) return;
   HostFinder finder(outputs, stored, excluded, sizes);
-  for (const FuncPtr& f : stored) {
-    auto host = finder.find(f);
+  for (auto f = stored.rbegin(); f != stored.rend();
+       ++f) {  // consumers first: they may take others inside
+    auto host = finder.find(*f);
     if (!host) continue;
     finder.add_guests(*host);
     std::vector<FuncPtr> all{host->host};
     all.insert(all.end(), host->members.begin(), host->members.end());
     all.insert(all.end(), host->copies.begin(), host->copies.end());
     all.insert(all.end(), host->inside.begin(), host->inside.end());
+    all.insert(all.end(), host->shared.begin(), host->shared.end());
     for (const RowGuest& guest : host->guests) all.push_back(guest.sums);
     for (const FuncPtr& each : all) {
       role_[each.get()] = hosts_.size();
@@ -277,9 +304,11 @@ std::unordered_set<const Symbol*> RowHosts::all() const {
 
 void RowHosts::give_loops(const FuncPtr& f, const GiveLoopsOfStage& give) const {
   const RowHost& host = hosts_[role_.at(f.get())];
-  if (f == host.host || std::ranges::find(host.inside, f) != host.inside.end())
-    return give(f, 0, sizes_);
-  if (std::ranges::find(host.copies, f) != host.copies.end()) return;
+  const auto is_one_of = [&](const std::vector<FuncPtr>& funcs) {
+    return std::ranges::find(funcs, f) != funcs.end();
+  };
+  if (f == host.host || is_one_of(host.inside) || is_one_of(host.shared)) return give(f, 0, sizes_);
+  if (is_one_of(host.copies)) return;
   const auto guest = std::ranges::find(host.guests, f, &RowGuest::sums);
   if (guest != host.guests.end()) return give_loops_of_guest(*guest, give, sizes_);
   SizeEstimate of_row = sizes_;

@@ -13,6 +13,8 @@
 // may read mean(c / 8). Outputs that only copy a member share the loop (compute_with), so that its values may leave the
 // pipeline.
 //
+// What is stored between the sums and the host, element by element, is computed in the loop, too, and may read members.
+//
 // A member is computed once for each row, so only the host and other members may read it, at the same row. A sum with
 // other dimensions than those of rows stays where it is, because register tiles need several rows; the private parts of
 // an adjoint do not. Sums for other elements that read the same rows join the loop (row_guests.h).
@@ -58,7 +60,8 @@ struct RowHost {
   std::vector<FuncPtr> members;     // consumers first
   std::vector<FuncPtr> copies;
   std::vector<RowGuest> guests;
-  std::vector<FuncPtr> inside;  // pure Funcs that host, members and guests alone read
+  std::vector<FuncPtr> inside;  // pure Funcs that the host alone reads, each element for its own
+  std::vector<FuncPtr> shared;  // pure Funcs that host, members and guests alone read
   std::unordered_map<const Symbol*, RowCoordinates> coordinates;  // of the host, members and copies
 };
 

@@ -12,7 +12,6 @@
 #include "graph/definitions/own_reads.h"
 #include "graph/directives/give_directive.h"
 #include "ir/build.h"
-#include "ir/equal.h"
 #include "ir/visit.h"
 
 namespace retrograde::autoschedule {
@@ -22,7 +21,6 @@ namespace {
 // Operations up to which a Func that the user left alone in a schedule by hand is inlined.
 constexpr double explosion = 500;
 constexpr int64_t unknown_iterations = 8;
-constexpr size_t most_compared = 64;  // reads of a Func by one stage
 
 // Beyond the first, each read computes the value again: more than a few operations, and all
 // together more than it takes to bring the value to memory and back.
@@ -144,19 +142,11 @@ class StorageChooser {
     return std::min(1.0, bytes / 4);
   }
 
-  // Equal reads of a pure definition count once: code generation computes what they read once. A sum may be cut into
-  // several Funcs, each with some of the reads.
   void count_reads(const FuncContents& f) {
     for (int s = 0; s < f.stage_count(); ++s) {
-      std::unordered_map<const Symbol*, std::vector<Expr>> known;
       walk_definition(f.stage(s), [&](const Expr& e) {
         const auto* call = e.as<Call>();
         if (call && call->call_type == CallType::Func && call->symbol.raw() != &f) {
-          std::vector<Expr>& others = known[call->symbol.raw()];
-          if (s == 0 &&
-              std::ranges::any_of(others, [&](const Expr& other) { return equal(e, other); }))
-            return;
-          if (others.size() < most_compared) others.push_back(e);
           StorageUse& use = uses_[call->symbol.raw()];
           const double reads = reads_an_element(*call, f, f.stage(s));
           use.reads += reads;

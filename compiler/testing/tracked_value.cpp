@@ -166,7 +166,7 @@ double own_error(Op op, Rounding rounding, const std::vector<Value>& args, const
   if (op == Op::strong_mul) {
     return rounding_residual(Kind::Mul, args[0].scalar, args[1].scalar, result);
   }
-  if (op == Op::strong_div && rounding == Rounding::Reordering) return 2 * ulp(result.type, r);
+  if (op == Op::strong_div) return 2 * ulp(result.type, r);  // vectors multiply with a reciprocal
   if (op == Op::absd && rounding == Rounding::Reordering) {
     return rounding_residual(Kind::Sub, args[0].scalar, args[1].scalar, result);
   }

@@ -1021,18 +1021,6 @@ TEST_F(DefaultSchedule, WhatManyCutSumsReadIsStored) {
   EXPECT_TRUE(is_stored(d(motion), d.adjoint(v)));
 }
 
-// Such an element is computed once for both.
-TEST_F(DefaultSchedule, EqualReadsOfAnElementCountOnce) {
-  for (const int distance : {0, 1}) {
-    Func wave("wave"), out("out");
-    wave(x, y) = sin(a(x, y)) * cos(a(x, y));
-    out(x, y) = wave(x, y) / (1.0f + exp(wave(x + distance, y)));
-    Pipeline(out).auto_schedule(get_host_target());
-    EXPECT_EQ(wave.function()->schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined,
-              distance > 0);
-  }
-}
-
 TEST_F(DefaultSchedule, StoresADivisionThatIsReadOften) {
   Func inverse("inverse"), shifted("shifted");
   inverse(x, y) = 1.0f / (a(x, y) + 2.0f);

@@ -1,5 +1,6 @@
 // The pure operators that take a few instructions: bit operations, shifts, absolute values, lerp, rounding,
 // classification.
+#include <llvm/Analysis/VectorUtils.h>
 #include <llvm/IR/Intrinsics.h>
 
 #include "codegen/emitter.h"
@@ -141,13 +142,38 @@ Value* classify(Emitter& e, Op op, Type type, Value* value) {
   return op == Op::is_inf ? e.b.CreateFCmpOEQ(size, infinity) : e.b.CreateFCmpOLT(size, infinity);
 }
 
+// ---- strong products and quotients ----
+
+// A vector of float32 numbers divided by one number: multiplied with its reciprocal, which takes a fifth of the time and
+// is wrong by 1.5 ulp at most. A power of two keeps the reciprocal of a denormal number finite, and that of a huge one
+// normal; it overflows or underflows with a number only where the quotient does.
+Value* divided_by_one(Emitter& e, Value* numbers, Value* divisor) {
+  const auto constant = [&](double value) { return float_constant(divisor, value); };
+  const auto splat = [&](Value* value) {
+    const auto* type = llvm::cast<llvm::FixedVectorType>(numbers->getType());
+    return e.b.CreateVectorSplat(type->getNumElements(), value);
+  };
+  Value* size = e.b.CreateUnaryIntrinsic(llvm::Intrinsic::fabs, divisor);
+  Value* is_small = e.b.CreateFCmpOLT(size, constant(0x1p-126));
+  Value* is_large = e.b.CreateFCmpOGT(size, constant(0x1p126));
+  Value* power = e.b.CreateSelect(is_small, constant(0x1p64),
+                                  e.b.CreateSelect(is_large, constant(0x1p-64), constant(1)));
+  Value* reciprocal = e.b.CreateFDiv(constant(1), e.b.CreateFMul(divisor, power));
+  return e.b.CreateFMul(e.b.CreateFMul(numbers, splat(power)), splat(reciprocal));
+}
+
+constexpr int least_lanes_by_reciprocal = 8;
+
 // Machine code implements a select of zero as a masked multiplication or division.
 Value* strong(Emitter& e, llvm::Instruction::BinaryOps op, Type type, Value* adjoint,
               Value* partial) {
   const Type wide = is_half(type) ? Float(32, type.lanes()) : type;
   Value* a = convert(e, wide, type, adjoint);
   Value* is_zero = e.b.CreateFCmpOEQ(a, float_constant(a, 0.0));
-  Value* result = e.b.CreateBinOp(op, a, convert(e, wide, type, partial));
+  Value* b = convert(e, wide, type, partial);
+  const bool is_wide = wide.bits() == 32 && wide.lanes() >= least_lanes_by_reciprocal;
+  Value* one = op == llvm::Instruction::FDiv && is_wide ? llvm::getSplatValue(b) : nullptr;
+  Value* result = one ? divided_by_one(e, a, one) : e.b.CreateBinOp(op, a, b);
   return convert(e, type, wide, e.b.CreateSelect(is_zero, float_constant(a, 0.0), result));
 }
 
