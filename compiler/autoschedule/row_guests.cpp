@@ -167,6 +167,8 @@ class GuestFinder {
                           sizes_.bytes(*f) >= sizes_.machine().passes_caches &&
                           fits_beside_others(*f) && !reads_.is_hidden(f);
     if (!may_move) return;
+    // What the host alone reads is for others to place, as running sums are.
+    if (reads_.of(f).size() < 2) return;
     for (const StoredRead& read : reads_.of(f)) {
       if (!is_within_rows(read)) return;
     }

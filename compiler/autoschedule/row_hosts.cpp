@@ -191,10 +191,11 @@ class HostFinder {
     host.coordinates[f.get()] = std::move(*all);
   }
 
-  // Whether it is a Func of the host's elements, each of which the host, or what is inside, reads for its own.
+  // Whether it is a Func of the host's elements, each of which the host, or what is inside, reads for its own. Running
+  // sums of adjoints are at root, so that what they read can go.
   bool is_read_in_place(const FuncPtr& f, const RowHost& host) const {
     const std::vector<StoredRead>& all = reads_.of(f);
-    return f->is_pure() && f->args.size() == host.host->args.size() && !all.empty() &&
+    return f->is_pure() && !f->made && f->args.size() == host.host->args.size() && !all.empty() &&
            !reads_.is_hidden(f) && sizes_.bytes(*f) >= sizes_.machine().passes_caches &&
            std::ranges::all_of(all, [&](const StoredRead& read) {
              const bool is_own = read.reader == host.host ||
