@@ -1,6 +1,6 @@
 # retrograde_test(<name>... [SOURCES <file>...] [LAYERS <layer>...] [LIBS <target>...] [LABELS <label>]
 #   [TIMEOUT <seconds>] [SHARDS <n>] [CACHED] [OPTIMIZED] [READS_FILES] [ALONE]
-#   [EXPORTS] [RUNTIME])
+#   [EXPORTS] [RUNTIME] [TOGETHER <program>])
 #
 # Declares GoogleTest programs that are alike. The source of each is <name>.cpp beside the list that calls this, unless
 # SOURCES names others, relative to CMAKE_CURRENT_SOURCE_DIR. ctest lists the tests of a program one by one; with
@@ -20,6 +20,8 @@
 # ALONE        The test measures time and runs beside no other.
 # EXPORTS      Compiled pipelines call C functions of the test program.
 # RUNTIME      The test includes headers of runtime/.
+# TOGETHER     With RETROGRADE_QUICK_TESTS these tests are one program, which units of several of its files make: what
+#              all of them include takes most of the compile time. The files share one namespace then.
 include(GoogleTest)
 
 # With RETROGRADE_QUICK_TESTS, the headers that nearly every test includes are compiled once for all of them.
@@ -39,10 +41,15 @@ function(retrograde_use_precompiled target name)
 endfunction()
 
 function(retrograde_test)
-  cmake_parse_arguments(PARSE_ARGV 0 arg "CACHED;OPTIMIZED;READS_FILES;ALONE;EXPORTS;RUNTIME" "TIMEOUT;SHARDS"
-    "SOURCES;LAYERS;LIBS;LABELS")
+  cmake_parse_arguments(PARSE_ARGV 0 arg "CACHED;OPTIMIZED;READS_FILES;ALONE;EXPORTS;RUNTIME"
+    "TIMEOUT;SHARDS;TOGETHER" "SOURCES;LAYERS;LIBS;LABELS")
   file(RELATIVE_PATH folder ${CMAKE_CURRENT_SOURCE_DIR} ${CMAKE_CURRENT_LIST_DIR})
-  foreach(name ${arg_UNPARSED_ARGUMENTS})
+  set(names ${arg_UNPARSED_ARGUMENTS})
+  if(arg_TOGETHER AND RETROGRADE_QUICK_TESTS)
+    retrograde_test_units(${names})
+    set(names ${arg_TOGETHER})
+  endif()
+  foreach(name ${names})
     set(sources ${arg_SOURCES})
     if(NOT sources)
       set(sources ${folder}/${name}.cpp)
@@ -56,6 +63,22 @@ function(retrograde_test)
     retrograde_compile_test(${name})
     retrograde_list_test(${name})
   endforeach()
+endfunction()
+
+# The units and shards of a program of several tests; a part of retrograde_test that sets its arguments.
+function(retrograde_test_units)
+  set(files ${ARGN})
+  list(TRANSFORM files APPEND .cpp)
+  set(retrograde_files_per_unit 4)
+  retrograde_units(${arg_TOGETHER}_units ${folder}/ ${files})
+  set(arg_SOURCES ${${arg_TOGETHER}_units} PARENT_SCOPE)
+  if(NOT arg_LABELS)
+    string(REGEX REPLACE "/.*" "" first_folder "${folder}")
+    set(arg_LABELS ${first_folder} PARENT_SCOPE)
+  endif()
+  list(LENGTH files count)
+  math(EXPR shards "(${count} + 3) / 4")
+  set(arg_SHARDS ${shards} PARENT_SCOPE)
 endfunction()
 
 # The flags and libraries of one program; a part of retrograde_test that reads its arguments.

@@ -98,10 +98,13 @@ Value* add_products_in_pairs(Emitter& e, Value* a, Value* b);
 Value* simple_operator(Emitter& e, ir::Op op, Type result, const std::vector<Type>& types,
                        const std::vector<Value*>& args);
 
-// ---- math.cpp, float_pow.cpp, fast_math.cpp ----
+// ---- math.cpp, float_pow.cpp, float_functions.cpp, fast_math.cpp ----
 bool is_math_operator(ir::Op op);
 Value* math_operator(Emitter& e, ir::Op op, Type type, const std::vector<Value*>& args);
 Value* float_pow(Emitter& e, Value* x, Value* y);  // float32, inlined
+// Functions of float32 that are inlined for this machine.
+bool is_inlined_for_floats(const Machine& machine, ir::Op op);
+Value* float_function(Emitter& e, ir::Op op, Value* x);
 bool is_fast_operator(ir::Op op);
 Value* fast_operator(Emitter& e, ir::Op op, Type type, const std::vector<Value*>& args);
 

@@ -50,7 +50,7 @@ std::string without_numbers(const std::string& source) {
   return std::regex_replace(source, std::regex("_[0-9][0-9]+"), "");
 }
 
-void expect_close(const Buffer<float>& a, const Buffer<float>& b) {
+void expect_agreement(const Buffer<float>& a, const Buffer<float>& b) {
   size_t wrong = 0;
   a.for_each_element([&](const int* at) {
     if (!(std::abs(a(at) - b(at)) <= 1e-4 * (1 + std::abs(a(at))))) ++wrong;
@@ -64,7 +64,7 @@ TEST(ChooseSchedule, AGradientIsCompiledAsTheSearchHasIt) {
   Pipeline pipeline = searched.pipeline();
   pipeline.set_autoschedule(searching());
   const auto found = searched.realized(pipeline);
-  for (size_t i = 0; i < found.size(); ++i) expect_close(expected[i], found[i]);
+  for (size_t i = 0; i < found.size(); ++i) expect_agreement(expected[i], found[i]);
   const SearchedSchedules search = pipeline.explain_schedule().search;
   EXPECT_GT(search.tried, 10u);
   EXPECT_LE(search.predicted_ms, search.rules_ms);
@@ -80,7 +80,7 @@ TEST(ChooseSchedule, APipelineGetsDirectivesOfTheBest) {
   const Smoothing by_rules;
   const auto expected = by_rules.realized(by_rules.pipeline());
   const auto found = program.realized(pipeline);
-  for (size_t i = 0; i < found.size(); ++i) expect_close(expected[i], found[i]);
+  for (size_t i = 0; i < found.size(); ++i) expect_agreement(expected[i], found[i]);
   // The log describes the chosen schedule: applied as user directives, it gives the same prediction.
   EXPECT_NEAR(pipeline.explain_schedule().predicted_ms, results.search.predicted_ms,
               1e-3 * results.search.predicted_ms);
@@ -118,14 +118,14 @@ TEST(ChooseSchedule, TheReportShowsTheRunnerUp) {
 // Nothing fails, but the report has the parts of an error.
 TEST(ChooseSchedule, WithoutSizesTheRulesAreKept) {
   ImageParam image(Float(32), 2, "unsized");
-  Func out("out");
+  Func out("of_unsized");
   Var x("x"), y("y");
   out(x, y) = exp(image(x, y)) + image(x + 1, y);
   const auto results = Pipeline(out).auto_schedule(get_host_target(), searching());
   EXPECT_EQ(results.search.tried, 0u);
   EXPECT_EQ(
       results.search.note,
-      "cannot search for a schedule of \"out\": sizes of images and outputs are known or "
+      "cannot search for a schedule of \"of_unsized\": sizes of images and outputs are known or "
       "estimated; the extent of dimension 0 of \"unsized\" is not known, so that what the rules "
       "choose is taken. Give set_estimates() or bind the image.");
   EXPECT_FALSE(results.schedule_source.empty());

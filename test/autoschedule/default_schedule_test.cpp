@@ -282,13 +282,13 @@ void expect_sums_in_lanes(int side, Type in) {
 }
 
 // A warp: in every channel, each pixel reads the four corners of a cell that a flow selects.
-struct Warp {
+struct CornerWarp {
   static constexpr int width = 37, height = 29;
   Buffer<float> image, flow{width, height, 2};
   Var x{"x"}, y{"y"}, c{"c"};
   Func warped{"warped"}, loss{"loss"};
 
-  explicit Warp(int channels) : image(width, height, channels) {
+  explicit CornerWarp(int channels) : image(width, height, channels) {
     int seed = 0;
     const auto fill = [&](float& v) { v = static_cast<float>(++seed * 7919 % 1009) / 127 - 4; };
     image.for_each_value(fill);
@@ -328,7 +328,7 @@ struct Warp {
 TEST_F(DefaultSchedule, CornersOfACellAreTapsOfOneScatter) {
   for (const int channels : {1, 3, 4, 17, 24, 70}) {
     SCOPED_TRACE(channels);
-    Warp warp(channels);
+    CornerWarp warp(channels);
     Derivative d = propagate_adjoints(warp.loss);
     Func adjoint = d(warp.image);
     size_t scatters = 0;
@@ -338,7 +338,7 @@ TEST_F(DefaultSchedule, CornersOfACellAreTapsOfOneScatter) {
     }
     EXPECT_EQ(scatters, 1u);
     const std::vector<double> expected = warp.expected();
-    Buffer<float> found = adjoint.realize({Warp::width, Warp::height, channels});
+    Buffer<float> found = adjoint.realize({CornerWarp::width, CornerWarp::height, channels});
     for (size_t i = 0; i < expected.size(); i++) {
       ASSERT_NEAR(found.data()[i], expected[i], 1e-4 * std::max(std::fabs(expected[i]), 100.0))
           << "element " << i;
@@ -1110,7 +1110,7 @@ TEST(PrivateParts, TakeNoMoreThanABudget) {
 TEST(PrivateParts, AreFewerForLargeTargets) {
   Var x("x"), y("y");
   const auto explained = [&](int side) {
-    ImageParam image(Float(32), 2, "image"), flow(Float(32), 3, "flow");
+    ImageParam image(Float(32), 2, "photograph"), flow(Float(32), 3, "flow");
     Func warped("warped"), total("total");
     warped(x, y) = image(clamp(cast<int>(flow(x, y, 0)), 0, side - 1),
                          clamp(cast<int>(flow(x, y, 1)), 0, side - 1));
@@ -1119,12 +1119,14 @@ TEST(PrivateParts, AreFewerForLargeTargets) {
     total() += warped(r.x, r.y) * warped(r.x, r.y);
     return propagate_adjoints(total, {.wrt = {image}}).explanations();
   };
-  expect_fact(explained(256), Fact::Performance, "image",
-              "\"image_adj\": accumulated in 32 privatised copies of 524288 bytes each, as many as "
-              "fit 67108864 bytes");
-  expect_fact(explained(1024), Fact::Performance, "image",
-              "\"image_adj\": accumulated in 8 privatised copies of 8388608 bytes each, as many as "
-              "fit 67108864 bytes");
+  expect_fact(
+      explained(256), Fact::Performance, "photograph",
+      "\"photograph_adj\": accumulated in 32 privatised copies of 524288 bytes each, as many as "
+      "fit 67108864 bytes");
+  expect_fact(
+      explained(1024), Fact::Performance, "photograph",
+      "\"photograph_adj\": accumulated in 8 privatised copies of 8388608 bytes each, as many as "
+      "fit 67108864 bytes");
 }
 
 // The number of copies that fit is known when the pipeline runs; bits are the same on any number of threads.

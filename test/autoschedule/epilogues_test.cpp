@@ -14,7 +14,7 @@
 namespace retrograde {
 namespace {
 
-struct Sizes {
+struct LayerSizes {
   int width = 70, height = 50, channels = 12, images = 3, kernel = 3;
 };
 
@@ -22,7 +22,7 @@ struct Sizes {
 struct Layer {
   using Reading = std::function<Expr(const Layer&)>;
 
-  explicit Layer(const Reading& read, const Sizes& sizes = {}) : of(sizes) {
+  explicit Layer(const Reading& read, const LayerSizes& sizes = {}) : of(sizes) {
     fill(image, 0.5f);
     fill(weights, 0.02f);
     fill(bias, 0.1f);
@@ -51,7 +51,7 @@ struct Layer {
   }
   Buffer<float> found(const std::vector<int>& sizes) { return result.realize(sizes); }
 
-  Sizes of;
+  LayerSizes of;
   Var x{"x"}, y{"y"}, c{"c"}, n{"n"};
   Buffer<float> image{of.width, of.height, of.channels, of.images};
   Buffer<float> weights{of.kernel, of.kernel, of.channels, of.channels}, bias{of.channels};
@@ -73,8 +73,9 @@ TEST(Epilogues, AreComputedWithTheirTiles) {
       {"smooth, of its place",
        [](const Layer& l) { return l.here() / (1.0f + exp(-l.here())) + l.x; }}};
   for (const auto& [name, read] : readings) {
-    // Sizes: all vectors full; tails in every dimension; rows shorter than a vector.
-    for (const Sizes& sizes : {Sizes{64, 48, 16, 2}, Sizes{70, 50, 11, 3}, Sizes{9, 50, 7, 5}}) {
+    // LayerSizes: all vectors full; tails in every dimension; rows shorter than a vector.
+    for (const LayerSizes& sizes :
+         {LayerSizes{64, 48, 16, 2}, LayerSizes{70, 50, 11, 3}, LayerSizes{9, 50, 7, 5}}) {
       Layer layer(read, sizes), plain(read, sizes);
       layer.schedule();
       EXPECT_TRUE(layer.is_in_tiles()) << name;
@@ -97,7 +98,7 @@ TEST(Epilogues, ArePartOfTheSchedulesText) {
 
 // The chain ends in the output, or in a Func that long sums read.
 TEST(Epilogues, OfASumOfFewTerms) {
-  const Sizes few{.width = 70, .height = 50, .channels = 3};
+  const LayerSizes few{.width = 70, .height = 50, .channels = 3};
   Layer layer(positive, few), plain(positive, few);
   layer.schedule();
   EXPECT_TRUE(layer.is_in_tiles());

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "frontend/include/retrograde/retrograde.h"
+#include "support/variables.h"
 
 namespace retrograde {
 namespace {
@@ -30,8 +31,6 @@ bool mentions(const std::vector<std::string>& texts, const std::string& part) {
   return std::ranges::any_of(
       texts, [&](const std::string& one) { return one.find(part) != std::string::npos; });
 }
-
-Var x("x"), y("y");
 
 TEST(ExplainStages, LoopsHaveTheNamesOfTheUsersVariables) {
   ImageParam in(Float(32), 2, "in");

@@ -306,7 +306,7 @@ Func zeros_around(const Func& f, const Region& box) {
   return BoundaryConditions::constant_exterior(f, 0.0f, box);
 }
 
-struct Layer {
+struct TiledLayer {
   Boundary boundary = zeros_around;
   int step = 1, apart = 1, taps = 3, outputs = 8;
   bool has_known_sizes = true;
@@ -318,7 +318,7 @@ class RowCopies : public ::testing::Test {
   static constexpr int planes = 6;
 
   // A layer over `image` and the weights, with sizes known at compile time or only at run time.
-  Func layer_of(const Layer& layer, ImageParam& image, ImageParam& weights) {
+  Func layer_of(const TiledLayer& layer, ImageParam& image, ImageParam& weights) {
     Var x("x"), y("y"), c("c");
     const Func source = lambda(x, y, c, image(x, y, c));
     const Func padded = layer.boundary(
@@ -336,7 +336,7 @@ class RowCopies : public ::testing::Test {
 
   // Returns the log of the layer's schedule, and checks its values against the unscheduled layer,
   // also for sizes with tails.
-  std::string log_of(const Layer& layer) {
+  std::string log_of(const TiledLayer& layer) {
     ImageParam image(Float(32), 3, "image"), weights(Float(32), 4, "weights");
     const Func plain = layer_of(layer, image, weights);
     Func scheduled = layer_of(layer, image, weights);
@@ -359,7 +359,9 @@ class RowCopies : public ::testing::Test {
     return pipeline.schedule_log().to_text();
   }
 
-  bool copies(const Layer& layer) { return log_of(layer).find("_in_layer") != std::string::npos; }
+  bool copies(const TiledLayer& layer) {
+    return log_of(layer).find("_in_layer") != std::string::npos;
+  }
 
  private:
   static Buffer<float> some_values(const std::vector<int>& sizes) {

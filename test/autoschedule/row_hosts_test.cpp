@@ -8,11 +8,12 @@
 
 #include "gradient/gradient_check.h"
 #include "graph/graph.h"
+#include "support/variables.h"
 
 namespace retrograde {
 namespace {
 
-const Var x("x"), y("y"), c("c"), n("n"), g("g");
+const Var n("n"), g("g");
 
 bool is_hosted_by(const Func& member, const Func& host) {
   const graph::LoopLevel& level = member.function()->schedule.compute_level;

@@ -10,13 +10,12 @@
 #include "gradient/gradient_check.h"
 #include "graph/graph.h"
 #include "support/schedule_log.h"
+#include "support/variables.h"
 
 namespace retrograde {
 namespace {
 
 constexpr int rows = 37;
-
-const Var x("x"), y("y"), z("z");
 
 Buffer<float> matrix(int width, int height = rows) {
   return gradient::random_image({width, height}, -1, 2, 5);

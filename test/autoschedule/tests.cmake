@@ -21,7 +21,7 @@ retrograde_test(
   step_loops_test
   strided_terms_test
   sum_blocks_test
-  LIBS retrograde_dep_halide_runtime)
+  TOGETHER autoschedule_tests LIBS retrograde_dep_halide_runtime)
 retrograde_test(auto_schedule_test OPTIMIZED)
 retrograde_test(gpu_auto_schedule_test SOURCES autoschedule/gpu_auto_schedule_test.cpp support/gpu_programs.cpp
   LIBS retrograde_simt retrograde_dep_halide_runtime)

@@ -8,11 +8,12 @@
 #include <algorithm>
 
 #include "gradient/programs_suite.h"
+#include "support/variables.h"
 
 namespace retrograde::gradient {
 namespace {
 
-Var x("x"), y("y"), c("c"), i("i");
+const Var i("i");
 
 // The Funcs with the sums of several places.
 std::vector<Func> shared_sums(const Derivative& d) {

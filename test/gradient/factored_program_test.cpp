@@ -7,13 +7,14 @@
 
 #include "gradient/gradient_check.h"
 #include "support/facts.h"
+#include "support/variables.h"
 
 namespace retrograde::gradient {
 namespace {
 
 constexpr int bins = 8, samples = 128, knots = 6;
 
-Var a("a"), b("b"), x("x");
+const Var a("a"), b("b");
 
 Expr closeness(const Expr& value, const Expr& bin) {
   const Expr apart = value * static_cast<float>(bins - 1) - cast<float>(bin);

@@ -6,11 +6,10 @@
 #include "frontend/language/inline_reductions.h"
 #include "support/errors.h"
 #include "support/facts.h"
+#include "support/variables.h"
 
 namespace retrograde {
 namespace {
-
-Var x("x"), y("y");
 
 struct Gradients : ::testing::Test {
   Buffer<float> a{8};

@@ -5,11 +5,10 @@
 #include "gradient/gradient_check.h"
 #include "support/errors.h"
 #include "support/facts.h"
+#include "support/variables.h"
 
 namespace retrograde {
 namespace {
-
-const Var x("x"), y("y");
 
 Buffer<float> ramp(int n) {
   Buffer<float> values(n);

@@ -14,13 +14,13 @@
 namespace retrograde::gradient {
 namespace {
 
-constexpr uint64_t first_program = 0, programs = many_or_few(200, 5);
+constexpr uint64_t first_program = 0, program_count = many_or_few(200, 5);
 
 // The budget of interpreter operations for one program.
 constexpr uint64_t operations = 20'000'000;
 
 // The largest difference, relative to the largest element.
-double difference(const Func& gradient, const Buffer<float>& found) {
+double largest_difference(const Func& gradient, const Buffer<float>& found) {
   const oracle::Region region = oracle::region_of(*found.raw_buffer());
   const oracle::Array expected = oracle::Interpreter({.widen = true, .max_operations = operations})
                                      .realize(gradient.function(), region)
@@ -56,7 +56,7 @@ std::string check(const fuzz::RandomProgram& program) {
     doing = "gradient by the scale";
     if (by_scale.defined()) by_scale.realize();
     doing = "interpreter";
-    const double off = difference(by_image, found);
+    const double off = largest_difference(by_image, found);
     return off <= 2e-3 ? "" : "gradient off by " + std::to_string(off);
   } catch (const std::exception& error) {
     const std::string what = error.what();
@@ -66,7 +66,7 @@ std::string check(const fuzz::RandomProgram& program) {
 }
 
 TEST(OddSizes, ValuesAndGradientsRunAndAreRight) {
-  for (uint64_t seed = first_program; seed < first_program + programs; ++seed) {
+  for (uint64_t seed = first_program; seed < first_program + program_count; ++seed) {
     fuzz::Choices choices(seed);
     const fuzz::RandomProgram program = fuzz::make_program(choices, fuzz::Style::pieces());
     const std::string text = fuzz::to_text(program);
@@ -103,9 +103,9 @@ TEST(OddSizes, WindowsOverImagesWithBoundariesReadNothingOutside) {
       loss() = 0.0f;
       loss() += f(all.x, all.y, all.z) * f(all.x, all.y, all.z);
       const Derivative d = propagate_adjoints(loss);
-      EXPECT_LE(difference(d(filter), d(filter).realize({5, 3})), 1e-4)
+      EXPECT_LE(largest_difference(d(filter), d(filter).realize({5, 3})), 1e-4)
           << name << " from " << begin;
-      EXPECT_LE(difference(d(image), d(image).realize({20, 33, 1})), 1e-4)
+      EXPECT_LE(largest_difference(d(image), d(image).realize({20, 33, 1})), 1e-4)
           << name << " from " << begin;
     }
   }

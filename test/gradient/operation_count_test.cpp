@@ -4,11 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "gradient/programs_suite.h"
+#include "support/variables.h"
 
 namespace retrograde::gradient {
 namespace {
-
-Var x("x"), y("y");
 
 autodiff::OperationCount count(const Func& f, int extent) {
   return autodiff::count_operations({{f.function(), {{Expr(0), Expr(extent - 1)}}}});

@@ -6,11 +6,10 @@
 
 #include "autodiff/derivative.h"
 #include "gradient/gradient_check.h"
+#include "support/variables.h"
 
 namespace retrograde::gradient {
 namespace {
-
-Var x("x"), y("y"), z("z");
 
 using Bound = Func (*)(const Func&, const Region&);
 
@@ -187,9 +186,8 @@ struct Transposed {
 
 bool reads(const Func& gradient, const std::string& name) {
   const auto order = graph::topological_order({gradient.function()});
-  return std::ranges::any_of(order, [&](const graph::FuncPtr& f) {
-    return f->name.substr(0, f->name.find('$')) == name;
-  });
+  return std::ranges::any_of(
+      order, [&](const graph::FuncPtr& f) { return f->name.substr(0, f->name.find('$')) == name; });
 }
 
 // Iterations of all updates of the adjoints that a gradient is computed from, for each element.

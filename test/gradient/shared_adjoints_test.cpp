@@ -11,11 +11,10 @@
 #include "graph/function.h"
 #include "ir/build.h"
 #include "support/facts.h"
+#include "support/variables.h"
 
 namespace retrograde::gradient {
 namespace {
-
-Var x("x"), t("t");
 
 struct Steps {
   Buffer<float> input{8}, weight{6}, bias{6};

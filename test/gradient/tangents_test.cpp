@@ -5,11 +5,11 @@
 #include "gradient/gradient_check.h"
 #include "support/errors.h"
 #include "support/facts.h"
+#include "support/variables.h"
 
 namespace retrograde::gradient {
 namespace {
 
-Var x("x"), y("y");
 constexpr int n = 8;
 
 class TangentsTest : public ::testing::Test {

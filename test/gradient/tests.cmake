@@ -30,7 +30,7 @@ retrograde_test(
   value_range_test
   version_budget_test
   zero_borders_test
-  LIBS retrograde_dep_halide_runtime)
+  TOGETHER gradient_tests LIBS retrograde_dep_halide_runtime)
 retrograde_test(access_inversion_test LAYERS autodiff OPTIMIZED)
 retrograde_test(access_table_test
   SOURCES gradient/access_table_test.cpp gradient/access_table/halide_side.cpp

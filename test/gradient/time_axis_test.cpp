@@ -3,11 +3,10 @@
 // bit by bit; the memory that the profiler reports.
 #include "gradient/programs_suite.h"
 #include "support/facts.h"
+#include "support/variables.h"
 
 namespace retrograde::gradient {
 namespace {
-
-Var x("x"), y("y"), t("t");
 
 Program at_own_place(int n) {
   Buffer<float> start = line(7), force = plane(7, n, 4);

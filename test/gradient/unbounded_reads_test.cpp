@@ -96,13 +96,14 @@ TEST_F(UnboundedReads, LeaveTheirFuncWithoutAnAdjoint) {
 }
 
 TEST_F(UnboundedReads, OfFuncsWithUpdatesAreNamedInTheError) {
-  Func counts("counts"), read("read");
+  Func counts("unbounded_counts"), read("read");
   RDom r(0, n, 0, n);
   counts(x) = 0.0f;
   counts(clamp(cast<int>(flow(r.x, r.y)), 0, 3)) += image(r.x, r.y);
   read(x, y) = counts(cast<int>(flow(x, y)));
   const Derivative d = propagate_adjoints(weighted_sum(read, {n, n}));
-  expect_error({"cannot compute the adjoint of \"counts\"", "where the program reads \"counts\""},
+  expect_error({"cannot compute the adjoint of \"unbounded_counts\"",
+                "where the program reads \"unbounded_counts\""},
                [&] {
                  d(image).realize({n, n});
                });

@@ -149,6 +149,8 @@ Value* math_operator(Emitter& e, Op op, Type type, const Args& args) {
     return float_to_half(e, type, math_operator(e, op, Float(32, type.lanes()), wide));
   }
   if (op == Op::pow && type.bits() == 32) return float_pow(e, args[0], args[1]);
+  if (type.bits() == 32 && is_inlined_for_floats(e.machine, op))
+    return float_function(e, op, args[0]);
   const MathFunction& function = *find_math_function(op);
   if (e.machine.is_device()) return on_device(e, function, type.bits(), args);
   Value* result = call_by_pieces(e, function, args);

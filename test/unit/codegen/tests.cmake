@@ -6,13 +6,13 @@ retrograde_test(
   codegen_statement_test
   equal_loops_test
   ptxas_test
-  LAYERS jit LIBS retrograde_dep_halide_runtime)
+  TOGETHER codegen_statement_tests LAYERS jit LIBS retrograde_dep_halide_runtime)
 retrograde_test(
   checked_accesses_test
   costly_arms_test
   vector_access_test
   vector_reduction_test
-  LIBS retrograde_dep_halide_runtime)
+  TOGETHER codegen_program_tests LIBS retrograde_dep_halide_runtime)
 retrograde_test(codegen_math_test OPTIMIZED LAYERS jit LIBS retrograde_dep_halide_runtime)
 retrograde_test(device_math_test OPTIMIZED READS_FILES LIBS retrograde_simt)
 retrograde_test(gpu_assembler_test LAYERS static_runtime simt)

@@ -8,11 +8,10 @@
 #include <vector>
 
 #include "ir/build.h"
+#include "support/variables.h"
 
 namespace retrograde {
 namespace {
-
-const Var x("x");
 
 struct Function {
   const char* name;

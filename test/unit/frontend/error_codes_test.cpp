@@ -9,11 +9,10 @@
 #include <gtest/gtest.h>
 
 #include "retrograde/retrograde.h"
+#include "support/variables.h"
 
 namespace retrograde {
 namespace {
-
-const Var x("x"), y("y");
 
 struct Answer {
   int code = 0;

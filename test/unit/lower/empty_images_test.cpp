@@ -4,10 +4,10 @@
 
 #include <vector>
 
+#include "support/variables.h"
+
 namespace retrograde {
 namespace {
-
-const Var x("x"), y("y");
 
 // f(x, y) = 2 im(x, y) through a stage at root.
 struct Doubled {

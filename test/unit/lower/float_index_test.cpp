@@ -7,11 +7,10 @@
 #include <vector>
 
 #include "retrograde/retrograde.h"
+#include "support/variables.h"
 
 namespace retrograde {
 namespace {
-
-Var x("x"), y("y");
 
 // Rounds each operation: volatile keeps the host compiler from fusing them.
 int strict_place(int at, float scale) {

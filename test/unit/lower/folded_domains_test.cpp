@@ -8,12 +8,11 @@
 
 #include "autodiff/derivative.h"
 #include "support/errors.h"
+#include "support/variables.h"
 #include "testing/interpreter.h"
 
 namespace retrograde {
 namespace {
-
-const Var x("x"), y("y");
 
 int value_of(const Func& f) {
   Func copy = f;

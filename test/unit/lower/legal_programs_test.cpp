@@ -10,11 +10,10 @@
 
 #include "retrograde/retrograde.h"
 #include "support/errors.h"
+#include "support/variables.h"
 
 namespace retrograde {
 namespace {
-
-const Var x("x"), y("y"), c("c");
 
 template <typename T = int>
 std::vector<T> line(const Buffer<T>& buffer) {

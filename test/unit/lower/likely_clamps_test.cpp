@@ -10,11 +10,10 @@
 #include "ir/visit.h"
 #include "lower/lower.h"
 #include "retrograde/retrograde.h"
+#include "support/variables.h"
 
 namespace retrograde {
 namespace {
-
-Var x("x"), y("y");
 
 // Vector loads of "in" in the code for f, with consecutive and with other indices.
 struct Loads {

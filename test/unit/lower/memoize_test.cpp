@@ -9,12 +9,12 @@
 #include "support/errors.h"
 
 namespace {
-std::atomic<int> calls{0};
+std::atomic<int> memoize_calls{0};
 }
 
 // Counts how often a Func is computed.
 extern "C" __attribute__((visibility("default"))) int count_memoize_calls(int value) {
-  calls++;
+  memoize_calls++;
   return value;
 }
 
@@ -36,7 +36,7 @@ class Memoize : public testing::Test {
   void SetUp() override {
     retrograde_memoization_cleanup();
     retrograde_memoization_set_size(0);
-    calls = 0;
+    memoize_calls = 0;
   }
 };
 
@@ -59,9 +59,9 @@ struct Scaled {
 TEST_F(Memoize, TheSecondCallComputesNothing) {
   Scaled program;
   program.expect(3, 10);
-  EXPECT_EQ(calls, 11);
+  EXPECT_EQ(memoize_calls, 11);
   program.expect(3, 10);
-  EXPECT_EQ(calls, 11);
+  EXPECT_EQ(memoize_calls, 11);
 }
 
 TEST_F(Memoize, AParameterIsPartOfTheKey) {
@@ -69,7 +69,7 @@ TEST_F(Memoize, AParameterIsPartOfTheKey) {
   for (int round = 0; round < 2; round++) {
     program.expect(3, 10);
     program.expect(4, 10);
-    EXPECT_EQ(calls, 22);
+    EXPECT_EQ(memoize_calls, 22);
   }
 }
 
@@ -78,7 +78,7 @@ TEST_F(Memoize, TheRegionIsPartOfTheKey) {
   for (int round = 0; round < 2; round++) {
     program.expect(3, 10);
     program.expect(3, 12);
-    EXPECT_EQ(calls, 11 + 13);
+    EXPECT_EQ(memoize_calls, 11 + 13);
   }
 }
 
@@ -86,7 +86,7 @@ TEST_F(Memoize, FuncsOfOneShapeDoNotShareResults) {
   Scaled a, b;
   a.expect(3, 10);
   b.expect(3, 10);
-  EXPECT_EQ(calls, 22);
+  EXPECT_EQ(memoize_calls, 22);
 }
 
 TEST_F(Memoize, TheCacheStaysWithinItsSizeAndForgetsTheOldest) {
@@ -95,11 +95,11 @@ TEST_F(Memoize, TheCacheStaysWithinItsSizeAndForgetsTheOldest) {
   for (int by = 0; by < 20; by++) program.expect(by, 200);
   EXPECT_LE(retrograde_memoization_bytes(), 5000);
   EXPECT_GT(retrograde_memoization_bytes(), 1000);
-  const int before = calls;
+  const int before = memoize_calls;
   program.expect(19, 200);
-  EXPECT_EQ(calls, before);
+  EXPECT_EQ(memoize_calls, before);
   program.expect(0, 200);
-  EXPECT_EQ(calls, before + 201);
+  EXPECT_EQ(memoize_calls, before + 201);
 }
 
 TEST_F(Memoize, AResultLargerThanTheCacheIsComputedAgain) {
@@ -107,7 +107,7 @@ TEST_F(Memoize, AResultLargerThanTheCacheIsComputedAgain) {
   Scaled program;
   program.expect(2, 200);
   program.expect(2, 200);
-  EXPECT_EQ(calls, 402);
+  EXPECT_EQ(memoize_calls, 402);
   EXPECT_EQ(retrograde_memoization_bytes(), 0);
 }
 
@@ -119,9 +119,9 @@ TEST_F(Memoize, EvictionForgetsWhatHasTheKey) {
   b.expect(3, 10);
   retrograde_memoization_evict(7);
   b.expect(3, 10);
-  EXPECT_EQ(calls, 22);
+  EXPECT_EQ(memoize_calls, 22);
   a.expect(3, 10);
-  EXPECT_EQ(calls, 33);
+  EXPECT_EQ(memoize_calls, 33);
 }
 
 TEST_F(Memoize, TuplesAreKeptWhole) {
@@ -134,7 +134,7 @@ TEST_F(Memoize, TuplesAreKeptWhole) {
     Buffer<int> result = out.realize({20});
     for (int i = 0; i < 20; i++) ASSERT_EQ(result(i), 3 * i);
   }
-  EXPECT_EQ(calls, 20);
+  EXPECT_EQ(memoize_calls, 20);
 }
 
 TEST_F(Memoize, UpdatesBelongToTheResult) {
@@ -149,7 +149,7 @@ TEST_F(Memoize, UpdatesBelongToTheResult) {
     Buffer<int> result = out.realize({8});
     for (int i = 0; i < 8; i++) ASSERT_EQ(result(i), i + 10);
   }
-  EXPECT_EQ(calls, 8);
+  EXPECT_EQ(memoize_calls, 8);
 }
 
 TEST_F(Memoize, ATagStandsForWhatAnImageHolds) {
@@ -171,7 +171,7 @@ TEST_F(Memoize, ATagStandsForWhatAnImageHolds) {
   EXPECT_EQ(run(4, 1), 4);
   EXPECT_EQ(run(5, 2), 5);
   EXPECT_EQ(run(4, 1), 4);
-  EXPECT_EQ(calls, 20);
+  EXPECT_EQ(memoize_calls, 20);
   EXPECT_EQ(run(6, 1), 4) << "the tag says that nothing changed";
 }
 
@@ -237,7 +237,7 @@ TEST_F(Memoize, StorageLargerThanWhatIsComputed) {
     Var x("x");
     Func f("f"), g("g");
     f(x) = counted(x * 2);
-    const int before = calls;
+    const int before = memoize_calls;
     g(x) = f(x) + 1;
     f.compute_root().memoize();
     if (how == 0) f.align_storage(x, 16);
@@ -247,7 +247,7 @@ TEST_F(Memoize, StorageLargerThanWhatIsComputed) {
       Buffer<int> result = g.realize({width});
       for (int i = 0; i < width; i++) ASSERT_EQ(result(i), 2 * i + 1) << how << " " << i;
     }
-    EXPECT_EQ(calls - before, 10 + 13 + 9) << how;
+    EXPECT_EQ(memoize_calls - before, 10 + 13 + 9) << how;
   }
 }
 
@@ -258,7 +258,7 @@ TEST_F(Memoize, StorageThatASplitRoundsUp) {
   Func source("source"), f("f"), g("g");
   source(x) = x * 3;
   f(x) = counted(source(x));
-  const int before = calls;
+  const int before = memoize_calls;
   g(x) = f(x) + 1;
   source.compute_root();
   f.compute_root().split(x, xo, xi, 16, TailStrategy::RoundUp).memoize();
@@ -266,7 +266,7 @@ TEST_F(Memoize, StorageThatASplitRoundsUp) {
     Buffer<int> result = g.realize({width});
     for (int i = 0; i < width; i++) ASSERT_EQ(result(i), 3 * i + 1) << width << " " << i;
   }
-  EXPECT_EQ(calls - before, 3 * 16);
+  EXPECT_EQ(memoize_calls - before, 3 * 16);
 }
 
 TEST_F(Memoize, BoundsThatAreAligned) {
@@ -277,13 +277,13 @@ TEST_F(Memoize, BoundsThatAreAligned) {
     g(x) = f(x) + 1;
     f.compute_root().memoize();
     extent_only ? f.align_extent(x, 8) : f.align_bounds(x, 8, 3);
-    const int before = calls;
+    const int before = memoize_calls;
     for (const int width : {9, 11, 17, 11}) {
       Buffer<int> result = g.realize({width});
       for (int i = 0; i < width; i++) ASSERT_EQ(result(i), 2 * i + 1) << extent_only << " " << i;
     }
     // 9 and 11 elements lie in one aligned region.
-    EXPECT_EQ(calls - before, 16 + 24) << extent_only;
+    EXPECT_EQ(memoize_calls - before, 16 + 24) << extent_only;
   }
 }
 
@@ -296,16 +296,16 @@ TEST_F(Memoize, StorageThatIsHoisted) {
     g.tile(x, y, xo, yo, xi, yi, 8, 4);
     f.compute_at(g, xo).hoist_storage_root().memoize();
     if (rules) f.align_storage(x, 16).bound_storage(y, 7);
-    const int before = calls;
+    const int before = memoize_calls;
     int after_first = 0;
     for (int round = 0; round < 2; round++) {
       Buffer<int> result = g.realize({21, 18});
       result.for_each_element(
           [&](int i, int j) { ASSERT_EQ(result(i, j), (i - 1) * 3 + j + i) << i << " " << j; });
-      if (round == 0) after_first = calls;
+      if (round == 0) after_first = memoize_calls;
     }
     EXPECT_GT(after_first, before);
-    EXPECT_EQ(calls, after_first);
+    EXPECT_EQ(memoize_calls, after_first);
   }
 }
 
@@ -323,7 +323,7 @@ TEST_F(Memoize, StorageThatWrapsAround) {
       for (int i = min; i < min + 20; i++) ASSERT_EQ(result(i), 4 * i + 2);
     }
   }
-  EXPECT_EQ(calls, 3 * 21);
+  EXPECT_EQ(memoize_calls, 3 * 21);
 }
 
 }  // namespace

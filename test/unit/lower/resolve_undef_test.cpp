@@ -2,11 +2,10 @@
 #include <gtest/gtest.h>
 
 #include "retrograde/retrograde.h"
+#include "support/variables.h"
 
 namespace retrograde {
 namespace {
-
-Var x("x");
 
 std::vector<int> values_of(const Buffer<int>& b) {
   std::vector<int> values;

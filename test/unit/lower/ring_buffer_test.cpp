@@ -9,12 +9,13 @@
 #include "lower/lower.h"
 #include "retrograde/retrograde.h"
 #include "support/errors.h"
+#include "support/variables.h"
 
 namespace retrograde {
 namespace {
 
 constexpr int width = 37, height = 22;
-const Var x("x"), y("y"), xo("xo"), yo("yo"), xi("xi"), yi("yi");
+const Var xo("xo"), yo("yo"), xi("xi"), yi("yi");
 
 void expect_values(Func f, const std::function<int(int, int)>& value) {
   const Buffer<int> found = f.realize({width, height});

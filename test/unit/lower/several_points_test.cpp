@@ -13,12 +13,13 @@
 #include "autodiff/tangents.h"
 #include "graph/graph.h"
 #include "support/errors.h"
+#include "support/variables.h"
 #include "testing/interpreter.h"
 
 namespace retrograde {
 namespace {
 
-const Var x("x"), y("y"), lane("lane");
+const Var lane("lane");
 
 std::vector<int> values_of(Func& f, int n) {
   const Buffer<int> result = f.realize({n});

@@ -5,10 +5,11 @@ retrograde_test(
   loop_nest_test
   loop_schedules_test
   lower_names_test
-  pass_observer_test
   resolve_undef_test
   specialize_test
-  value_bounds_test)
+  value_bounds_test
+  TOGETHER lower_loops_tests)
+retrograde_test(pass_observer_test)
 retrograde_test(
   debug_file_test
   empty_images_test
@@ -21,14 +22,14 @@ retrograde_test(
   several_points_test
   sliding_window_test
   tracing_test
-  LIBS retrograde_dep_halide_runtime)
+  TOGETHER lower_programs_tests LIBS retrograde_dep_halide_runtime)
 retrograde_test(
   async_test
   atomic_test
   extern_stage_test
   memoize_test
   skip_stages_test
-  EXPORTS RUNTIME LIBS retrograde_dep_halide_runtime)
+  TOGETHER lower_callback_tests EXPORTS RUNTIME LIBS retrograde_dep_halide_runtime)
 retrograde_test(profiler_test ALONE EXPORTS RUNTIME LIBS retrograde_dep_halide_runtime)
 retrograde_test(fork_test LAYERS runtime)
 

@@ -4,11 +4,10 @@
 #include "lower/definitions/inline_functions.h"
 #include "lower/definitions/value_bounds.h"
 #include "retrograde/retrograde.h"
+#include "support/variables.h"
 
 namespace retrograde {
 namespace {
-
-Var x("x");
 
 ir::Interval bounds_of_func(const Func& f) {
   analysis::ValueBounds bounds = lower::value_bounds(lower::inline_functions({f.function()}));
