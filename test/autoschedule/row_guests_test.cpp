@@ -120,7 +120,7 @@ TEST(RowGuests, JoinTheLoopOverChannelsOfAllImages) {
   check(other, plain);
 }
 
-// What another Func reads, too, stays at root; sums join all the same.
+// The adjoint stays at root if another Func reads it, too; sums join all the same.
 TEST(RowGuests, LeaveAnAdjointAtRootThatOthersRead) {
   Normalisation scheduled;
   Func turned("turned");

@@ -139,7 +139,7 @@ TEST(RowHosts, MayNameRowsByQuotients) {
   expect_near(mean, declared.mean.realize({6, 9}));
 }
 
-// What is stored because it is read several times, between the sums and the host.
+// The normalised values are stored because they are read several times.
 TEST(RowHosts, ComputeWhatLiesBetweenThemAndTheSums) {
   Groups scheduled, declared;
   const auto activated = [](const Func& normalised) {
