@@ -13,7 +13,6 @@ retrograde_test(
   forward_schedules_test
   invariant_factors_test
   memory_budget_test
-  row_guests_test
   row_hosts_test
   row_reductions_test
   row_sweeps_test
@@ -23,6 +22,7 @@ retrograde_test(
   sum_blocks_test
   TOGETHER autoschedule_tests LIBS retrograde_dep_halide_runtime)
 retrograde_test(auto_schedule_test OPTIMIZED)
+retrograde_test(row_guests_test LIBS retrograde_dep_halide_runtime)
 retrograde_test(gpu_auto_schedule_test SOURCES autoschedule/gpu_auto_schedule_test.cpp support/gpu_programs.cpp
   LIBS retrograde_simt retrograde_dep_halide_runtime)
 retrograde_test(gpu_auto_schedules_test OPTIMIZED LIBS retrograde_simt)
