@@ -6,11 +6,11 @@
 
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/inlined_reads.h"
-#include "autoschedule/new_loop.h"
+#include "autoschedule/loop_order.h"
 #include "autoschedule/only_reader.h"
 #include "autoschedule/read_estimate.h"
-#include "frontend/language/func.h"
-#include "frontend/schedule/loop_level.h"
+#include "autoschedule/row_guests.h"
+#include "autoschedule/row_host_loops.h"
 #include "frontend/schedule/stage.h"
 #include "graph/definitions/own_reads.h"
 #include "graph/directives/give_directive.h"
@@ -27,7 +27,7 @@ namespace {
 constexpr double least_terms_of_row = 32;  // of a sum along a row
 constexpr double few_terms = 512;          // which may be added one by one
 constexpr int64_t least_row = 16;          // elements along the first dimension
-constexpr int64_t enough_rows = 16;        // on any number of threads: results may not depend on it
+constexpr int64_t long_piece = 4096;       // bytes of a row, where it does not lie together
 
 bool has_many_terms(const FuncContents& f) {
   return std::ranges::any_of(f.updates, [](const Definition& update) {
@@ -85,14 +85,25 @@ class HostFinder {
 
   std::optional<RowHost> find(const FuncPtr& f) {
     if (!may_be_host(*f)) return std::nullopt;
-    RowHost host{f, {}, {}, {}, {}};
+    RowHost host;
+    host.host = f;
     RowCoordinates& own = host.coordinates[f.get()];
     own.resize(f->args.size());
     for (size_t d = 1; d < own.size(); ++d) own[d] = RowCoordinate{d};
     for (auto member = order_.rbegin(); member != order_.rend(); ++member) {  // consumers first
-      if (*member != f && may_be_member(**member)) add(*member, host);
+      if (*member == f || !may_be_member(**member)) continue;
+      if (is_read_in_place(*member, host))
+        add_inside(*member, host);
+      else
+        add(*member, host);
     }
     return is_worth_while(host) ? std::optional(std::move(host)) : std::nullopt;
+  }
+
+  void add_guests(RowHost& host) const {
+    add_row_guests(
+        host, stored_, reads_,
+        [&](const FuncPtr& f) { return is_free(*f) && !outputs_.contains(f.get()); }, sizes_);
   }
 
   void exclude(const FuncPtr& f) { taken_.insert(f.get()); }
@@ -180,6 +191,26 @@ class HostFinder {
     host.coordinates[f.get()] = std::move(*all);
   }
 
+  // Whether it is a Func of the host's elements, each of which the host, or what is inside, reads for its own. Running
+  // sums of adjoints are at root, so that what they read can go.
+  bool is_read_in_place(const FuncPtr& f, const RowHost& host) const {
+    const std::vector<StoredRead>& all = reads_.of(f);
+    return f->is_pure() && !f->made && f->args.size() == host.host->args.size() && !all.empty() &&
+           !reads_.is_hidden(f) && sizes_.bytes(*f) >= sizes_.machine().passes_caches &&
+           std::ranges::all_of(all, [&](const StoredRead& read) {
+             const bool is_own = read.reader == host.host ||
+                                 std::ranges::find(host.inside, read.reader) != host.inside.end();
+             return is_own && std::ranges::all_of(read.calls, [&](const Expr& e) {
+                      return same_args(e.as<Call>()->args, variables_of(read.reader->args));
+                    });
+           });
+  }
+
+  static void add_inside(const FuncPtr& f, RowHost& host) {
+    host.inside.push_back(f);
+    host.coordinates[f.get()] = host.coordinates.at(host.host.get());
+  }
+
   // All members have the coordinates of the first one.
   static bool is_same_row(const FuncContents& f, const RowCoordinates& all, RowHost& host) {
     std::vector<RowCoordinate> rows;
@@ -209,15 +240,24 @@ class HostFinder {
     return true;
   }
 
-  // Rows that lie together and stay in a cache near the core, of a Func that does not, and enough of them.
+  // Whether a row lies together in memory, or in long pieces.
+  bool is_together(const RowHost& host) const {
+    const size_t first = host.rows.front().dimension;
+    if (host.rows.size() + first >= host.host->args.size()) return true;
+    int64_t bytes = total_bytes(host.host->types);
+    for (size_t d = 0; d < first; ++d) bytes *= sizes_.extent(*host.host, d).value_or(0);
+    return bytes >= long_piece;
+  }
+
+  // Rows that stay in a cache near the core, of a Func that does not, and enough of them.
   bool is_worth_while(const RowHost& host) const {
-    if (host.rows.empty() ||
-        host.rows.size() + host.rows.front().dimension < host.host->args.size())
-      return false;
+    if (host.rows.empty() || !is_together(host)) return false;
     int64_t rows = 1;
     for (const auto& [dimension, divisor] : host.rows)
       rows *= (sizes_.extent(*host.host, dimension).value_or(0) + divisor - 1) / divisor;
-    return rows >= enough_rows && sizes_.bytes(*host.host) / rows <= sizes_.machine().block_bytes &&
+    int64_t bytes = sizes_.bytes(*host.host);
+    for (const FuncPtr& f : host.inside) bytes += sizes_.bytes(*f);
+    return rows >= enough_rows && bytes / rows <= sizes_.machine().block_bytes &&
            std::ranges::any_of(host.members, [](const FuncPtr& f) { return has_many_terms(*f); });
   }
 };
@@ -231,95 +271,6 @@ void run_in_parallel(const FuncPtr& f) {
   }
 }
 
-// Gives the loops over rows of a host and moves the members into them.
-class HostMover {
- public:
-  HostMover(const RowHost& host, const SizeEstimate& sizes) : host_(host), sizes_(sizes) {}
-
-  void move() {
-    cut_rows();
-    for (const FuncPtr& f : host_.members) {
-      if (f->schedule.compute_level.kind == graph::LoopLevel::Kind::At) continue;  // a block
-      autoschedule::run_serially(f);
-      Func(f).compute_at(retrograde::LoopLevel(Func(host_.host), Var(level()), 0));
-    }
-    for (const FuncPtr& copy : host_.copies) join(copy);
-  }
-
- private:
-  const RowHost& host_;
-  const SizeEstimate& sizes_;
-  std::vector<std::string> loops_;  // over rows, as `rows`; the first is the innermost
-  size_t parallel_ = 0;             // number of them that run in parallel, outermost first
-
-  const std::string& level() const { return loops_[0]; }
-
-  void cut_rows() {
-    const FuncPtr& host = host_.host;
-    autoschedule::run_serially(host);
-    Stage stage(host, 0);
-    std::vector<VarOrRVar> order;
-    for (const Dim& loop : std::vector<Dim>(host->pure->schedule.dims)) {
-      const auto row = std::ranges::find_if(
-          host_.rows, [&](const RowCoordinate& c) { return host->args[c.dimension] == loop.var; });
-      if (row == host_.rows.end()) {
-        order.emplace_back(Var(loop.var));
-      } else if (row->divisor > 1) {
-        const Var all(loop.var), part(inner_loop(*host, 0, loop.var));
-        stage.split(all, all, part, static_cast<int>(row->divisor), TailStrategy::GuardWithIf);
-        order.emplace_back(part);
-      }
-    }
-    for (const RowCoordinate& row : host_.rows) {
-      const std::string name = name_of_row(), old = host->args[row.dimension];
-      stage.rename(Var(old), Var(name));
-      order.emplace_back(Var(name));
-      loops_.push_back(name);
-    }
-    stage.reorder(order);
-    count_tasks();
-    run_in_parallel(stage);
-  }
-
-  // Copies share the names of the loops.
-  std::string name_of_row() const {
-    std::string name = "row", last;
-    while (name != last) {
-      last = name;
-      name = new_loop(*host_.host, 0, name);
-      for (const FuncPtr& copy : host_.copies) name = new_loop(*copy, 0, name);
-    }
-    return name;
-  }
-
-  void count_tasks() {
-    int64_t tasks = 1;
-    for (auto row = host_.rows.rbegin(); row != host_.rows.rend(); ++row) {
-      if (tasks >= std::max(enough_rows, sizes_.machine().enough_tasks)) return;
-      tasks *= sizes_.extent(*host_.host, row->dimension).value_or(1) / row->divisor;
-      ++parallel_;
-    }
-  }
-
-  void run_in_parallel(Stage stage) const {
-    for (size_t i = 0; i < parallel_; ++i) stage.parallel(Var(loops_[loops_.size() - 1 - i]));
-  }
-
-  void join(const FuncPtr& copy) const {
-    Stage stage(copy, 0);
-    const RowCoordinates& all = host_.coordinates.at(copy.get());
-    std::vector<VarOrRVar> order;
-    for (size_t i = 0; i < host_.rows.size(); ++i) {
-      const auto arg = std::ranges::find(all, std::optional(host_.rows[i]));
-      stage.rename(Var(copy->args[static_cast<size_t>(arg - all.begin())]), Var(loops_[i]));
-      order.emplace_back(Var(loops_[i]));
-    }
-    stage.reorder(order);
-    run_in_parallel(stage);
-    stage.compute_with(Stage(host_.host, 0), Var(level()));
-  }
-};
-
 }  // namespace
 
 RowHosts::RowHosts(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
@@ -327,12 +278,17 @@ RowHosts::RowHosts(const std::vector<FuncPtr>& outputs, const std::vector<FuncPt
     : sizes_(sizes) {
   if (std::ranges::none_of(stored, [](const FuncPtr& f) { return has_many_terms(*f); })) return;
   HostFinder finder(outputs, stored, excluded, sizes);
-  for (const FuncPtr& f : stored) {
-    auto host = finder.find(f);
+  for (auto f = stored.rbegin(); f != stored.rend();
+       ++f) {  // consumers first: they may take others inside
+    auto host = finder.find(*f);
     if (!host) continue;
+    finder.add_guests(*host);
     std::vector<FuncPtr> all{host->host};
     all.insert(all.end(), host->members.begin(), host->members.end());
     all.insert(all.end(), host->copies.begin(), host->copies.end());
+    all.insert(all.end(), host->inside.begin(), host->inside.end());
+    all.insert(all.end(), host->shared.begin(), host->shared.end());
+    for (const RowGuest& guest : host->guests) all.push_back(guest.sums);
     for (const FuncPtr& each : all) {
       role_[each.get()] = hosts_.size();
       finder.exclude(each);
@@ -349,8 +305,13 @@ std::unordered_set<const Symbol*> RowHosts::all() const {
 
 void RowHosts::give_loops(const FuncPtr& f, const GiveLoopsOfStage& give) const {
   const RowHost& host = hosts_[role_.at(f.get())];
-  if (f == host.host) return give(f, 0, sizes_);
-  if (std::ranges::find(host.copies, f) != host.copies.end()) return;
+  const auto is_one_of = [&](const std::vector<FuncPtr>& funcs) {
+    return std::ranges::find(funcs, f) != funcs.end();
+  };
+  if (f == host.host || is_one_of(host.inside) || is_one_of(host.shared)) return give(f, 0, sizes_);
+  if (is_one_of(host.copies)) return;
+  const auto guest = std::ranges::find(host.guests, f, &RowGuest::sums);
+  if (guest != host.guests.end()) return give_loops_of_guest(*guest, give, sizes_);
   SizeEstimate of_row = sizes_;
   for (const FuncPtr& member : host.members) {
     const RowCoordinates& all = host.coordinates.at(member.get());
@@ -366,7 +327,7 @@ void RowHosts::give_loops(const FuncPtr& f, const GiveLoopsOfStage& give) const 
 void RowHosts::move() const {
   for (const RowHost& host : hosts_) {
     if (has_plain_rows(*host.host)) {
-      HostMover(host, sizes_).move();
+      move_into_rows(host, sizes_);
     } else {  // its loops were chosen for other reasons, so that the members stay at root
       for (const FuncPtr& f : host.members) run_in_parallel(f);
     }

@@ -13,9 +13,11 @@
 // may read mean(c / 8). Outputs that only copy a member share the loop (compute_with), so that its values may leave the
 // pipeline.
 //
+// What is stored between the sums and the host, element by element, is computed in the loop, too, and may read members.
+//
 // A member is computed once for each row, so only the host and other members may read it, at the same row. A sum with
 // other dimensions than those of rows stays where it is, because register tiles need several rows; the private parts of
-// an adjoint do not.
+// an adjoint do not. Sums for other elements that read the same rows join the loop (row_guests.h).
 // Source: folklore; PyTorch's kernels of normalisation layers are written this way by hand.
 // Tests: test/autoschedule/row_hosts_test.cpp.
 #pragma once
@@ -45,11 +47,21 @@ struct RowCoordinate {
 // The coordinates by argument of a Func; nullopt: the argument does not move with rows.
 using RowCoordinates = std::vector<std::optional<RowCoordinate>>;
 
+// Sums for elements of their own that join the loop over rows (row_guests.h).
+struct RowGuest {
+  FuncPtr sums;                    // stage 1 of it joins
+  FuncPtr block;                   // that it adds up; null: it adds terms
+  std::vector<std::string> loops;  // its variables that name the row, as `RowHost::rows`
+};
+
 struct RowHost {
   FuncPtr host;
   std::vector<RowCoordinate> rows;  // in the order of dimensions
   std::vector<FuncPtr> members;     // consumers first
   std::vector<FuncPtr> copies;
+  std::vector<RowGuest> guests;
+  std::vector<FuncPtr> inside;  // pure Funcs that the host alone reads, each element for its own
+  std::vector<FuncPtr> shared;  // pure Funcs that host, members and guests alone read
   std::unordered_map<const Symbol*, RowCoordinates> coordinates;  // of the host, members and copies
 };
 

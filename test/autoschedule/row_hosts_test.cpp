@@ -139,6 +139,31 @@ TEST(RowHosts, MayNameRowsByQuotients) {
   expect_near(mean, declared.mean.realize({6, 9}));
 }
 
+// The normalised values are stored because they are read several times.
+TEST(RowHosts, ComputeWhatLiesBetweenThemAndTheSums) {
+  Groups scheduled, declared;
+  const auto activated = [](const Func& normalised) {
+    Func active("active");
+    const auto value = [&] { return normalised(x, y, c, n); };
+    active(x, y, c, n) = value() / (1.0f + exp(-value())) + 0.1f * value() * sin(value());
+    active.bound(x, 0, 70).bound(y, 0, 50).bound(c, 0, 24).bound(n, 0, 9);
+    return active;
+  };
+  const Func active = activated(scheduled.out);
+  Pipeline pipeline(active);
+  pipeline.auto_schedule(get_host_target());
+  EXPECT_TRUE(is_hosted_by(scheduled.out, active));
+  EXPECT_TRUE(is_hosted_by(scheduled.mean, active));
+  EXPECT_TRUE(is_hosted_by(scheduled.square, active));
+  declared.mean.compute_root();
+  declared.square.compute_root();
+  const Buffer<float> found = pipeline.realize({70, 50, 24, 9});
+  expect_near(found, activated(declared.out).realize({70, 50, 24, 9}));
+  pipeline.jit_handlers().thread_limit = 1;
+  const Buffer<float> other = pipeline.realize({70, 50, 24, 9});
+  EXPECT_TRUE(gradient::same_bits(found, other));
+}
+
 // The adjoint of the image needs two sums of each row; those by the scale go across all rows.
 TEST(RowHosts, HaveTheAdjointSumsOfTheirRows) {
   constexpr int width = 1000, height = 601;

@@ -10,6 +10,7 @@
 #include "frontend/language/func.h"
 #include "graph/copy_graph.h"
 #include "ir/build.h"
+#include "ir/visit.h"
 #include "support/facts.h"
 
 namespace retrograde {
@@ -360,6 +361,34 @@ TEST(LongSums, DifferentiateAgain) {
   slope() = first(p)(0);
   Buffer<float> second = propagate_adjoints(slope)(p).realize({1});
   EXPECT_NEAR(second(0), many * 0.1f * 0.1f, many * 0.01 * 1e-6);
+}
+
+// b_adj(y) += seed(x, y) / s(y): the division is the same for all terms of a row.
+TEST(LongSums, LeaveFactorsOfABlockToItsSum) {
+  constexpr int width = 200'000, height = 5;
+  Var x("x"), y("y");
+  Func out("out"), seed("seed");
+  Buffer<float> image(width, height), s(height), b(height);
+  image.fill(1);
+  b.fill(2);
+  for (int i = 0; i < height; ++i) s(i) = static_cast<float>(i);  // the first is 0
+  out(x, y) = (image(x, y) + b(y)) / s(y);
+  seed(x, y) = select(y == 0, 0.0f, cast<float>(x % 3) - 0.5f);
+  const Derivative d = propagate_adjoints(out, seed, {{0, width}, {0, height}});
+  int blocks = 0;
+  for (const graph::FuncPtr& f : graph::topological_order({d(b).function()})) {
+    if (!f->made || f->made->blocks == 0) continue;
+    ++blocks;
+    for (const Expr& value : f->updates[0].values)
+      EXPECT_FALSE(
+          ir::any_node(value, [](const ir::Call& call) { return call.is_op(ir::Op::strong_div); }));
+  }
+  EXPECT_EQ(blocks, 1);
+  const Buffer<float> found = d(b).realize({height});
+  double sum = 0;
+  for (int i = 0; i < width; ++i) sum += i % 3 - 0.5;
+  EXPECT_EQ(found(0), 0) << "a strong zero";
+  for (int i = 1; i < height; ++i) EXPECT_NEAR(found(i), sum / i, 1e-6 * 2 * width);
 }
 
 }  // namespace

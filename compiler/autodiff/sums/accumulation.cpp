@@ -80,8 +80,8 @@ class Builder {
       if (leaves_zeros(c)) result_.func->made->traits.masked = true;
     }
     for (const Iterations& update : updates) {
-      const auto parts = plan_parts(update, target_, types_);
-      parts ? add_privatised(with_rows_innermost(update), *parts) : add_update(update);
+      auto parts = plan_parts(update, target_, types_);
+      parts ? add_privatised(with_rows_innermost(update, *parts), *parts) : add_update(update);
     }
     if (is_wide_) round_once();
     return std::move(result_);
@@ -209,7 +209,7 @@ class Builder {
     if (lane.defined()) parts->made->lanes = lane_count;
 
     parts->made->has_parts = part.defined();
-    Slice slice = slice_of(update, lane, part, plan.count, has_blocks(update));
+    Slice slice = slice_of(update, lane, part, plan, has_blocks(update));
     const auto& [place, sums] = update.all;
     if (update.predicate.defined()) {
       slice.conditions.push_back(

@@ -109,6 +109,64 @@ class Cutter {
   int64_t terms_ = 1;
 };
 
+// A term without its outermost factors that no loop inside of a block moves.
+class Factored {
+ public:
+  Factored(Expr term, const std::vector<ReductionVariable>& inside)
+      : term_(std::move(term)), inside_(inside) {
+    while (take_factor()) {
+    }
+  }
+
+  const Expr& term() const { return term_; }
+  // The sum of a block with the factors, in terms of other variables.
+  Expr with_factors(Expr sum, const Substitution& place) const {
+    for (auto f = factors_.rbegin(); f != factors_.rend(); ++f) {
+      const Expr by = substitute(f->by, place);
+      const auto pair = f->is_first ? std::pair(by, sum) : std::pair(sum, by);
+      sum = f->op ? call_op(*f->op, {pair.first, pair.second})
+                  : binary(f->kind, pair.first, pair.second);
+    }
+    return sum;
+  }
+
+ private:
+  struct Factor {
+    std::optional<Op> op;  // none: `kind`
+    Kind kind = Kind::Mul;
+    Expr by;
+    bool is_first = false;  // of the two operands
+  };
+  Expr term_;
+  const std::vector<ReductionVariable>& inside_;
+  std::vector<Factor> factors_;  // the outermost first
+
+  bool is_moved(const Expr& e) const {
+    return std::ranges::any_of(inside_,
+                               [&](const ReductionVariable& r) { return uses_variable(e, r.var); });
+  }
+  bool take(const Expr& rest, Factor factor) {
+    if (is_moved(factor.by) || !is_moved(rest)) return false;
+    term_ = rest;
+    factors_.push_back(std::move(factor));
+    return true;
+  }
+  // Where a condition leaves a block without terms, a factor may be anything, so it is strong or a constant.
+  bool take_factor() {
+    const Expr whole = term_;  // keeps the operands
+    if (const auto* call = whole.as<Call>()) {
+      if (call->is_op(Op::strong_div))
+        return take(call->args[0], {Op::strong_div, {}, call->args[1]});
+      if (!call->is_op(Op::strong_mul)) return false;
+      return take(call->args[0], {Op::strong_mul, {}, call->args[1]}) ||
+             take(call->args[1], {Op::strong_mul, {}, call->args[0], true});
+    }
+    if (whole.kind() != Kind::Mul && whole.kind() != Kind::Div) return false;
+    const auto* n = whole.as<Binary>();
+    return is_const(n->b) && !is_zero(n->b) && take(n->a, {{}, n->kind, n->b});
+  }
+};
+
 }  // namespace
 
 Expr in_whole_blocks(const Expr& extent) {
@@ -135,11 +193,18 @@ std::optional<SumOfBlocks> sum_in_blocks(const std::string& name, const std::str
   const auto here = [&](const Expr& e) { return e.defined() ? substitute(e, cut.place()) : e; };
   std::vector<Expr> conditions = cut.conditions();
   if (predicate.defined()) conditions.push_back(here(predicate));
-  append_sums(block, args, mapped(terms, here), cut.inner(), conjunction(conditions));
   SumOfBlocks result{block, cut.outer(), values_of(block, place)};
+  Substitution outside;
+  for (size_t i = 0; i < cut.numbers().size(); ++i)
+    outside[cut.numbers()[i].as<Variable>()->name] = place[point.size() + i];
+  std::vector<Expr> summed(terms.size());
   for (size_t k = 0; k < terms.size(); ++k) {
-    if (!terms[k].defined()) result.values[k] = Expr();
+    const bool is_summed = terms[k].defined();
+    const Factored factored(is_summed ? here(terms[k]) : make_zero(Float(32)), cut.inner());
+    if (is_summed) summed[k] = factored.term();
+    result.values[k] = is_summed ? factored.with_factors(result.values[k], outside) : Expr();
   }
+  append_sums(block, args, summed, cut.inner(), conjunction(conditions));
   return result;
 }
 

@@ -12,6 +12,10 @@
 // terms would save another tenth of the time of a convolution's gradient by its weights, but lose up to 2e-6 of small
 // terms beside a large one.
 //
+// Factors of a term that no loop inside of a block moves are left to its sum: block(c, o) += strong_mul(adj(...), s(c))
+// becomes a sum of adj(...), of which the reader takes strong_mul(block(c, o), s(c)). Only the outermost factors: the
+// terms themselves are rounded, and overflow, as before.
+//
 // Loops of unknown extent may be short. They are not split; blocks are taken from the other loops.
 //
 // Source: the error of blocked summation is that of its blocks (Higham, The Accuracy of Floating Point Summation, SIAM

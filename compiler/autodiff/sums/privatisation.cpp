@@ -5,6 +5,7 @@
 #include "autodiff/sums/blocked_sums.h"
 #include "autoschedule/size_estimate.h"
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "ir/print.h"
 #include "simplify/simplify.h"
 
@@ -34,6 +35,9 @@ constexpr double one_tile = 64, few_elements = 1024, many_iterations = 4096;
 constexpr double terms_a_lane = 8;
 // Sums of at least this many iterations repay zeroing and summing the lanes.
 constexpr double lanes_pay = 16 * lane_count;
+// Planes of a sum that may be its parts: so many of each element, and of all elements together.
+constexpr int64_t most_planes = 64;
+constexpr double enough_planes = 64;
 
 class PartSizes {
  public:
@@ -111,6 +115,18 @@ class PartSizes {
     return parts;
   }
   double bytes_an_element() const { return total_bytes(types_); }
+  // Whether the outermost loop goes from plane to plane of what is read, each of which belongs to one element, and each
+  // element sums all of its planes: as the sum over pixels and images of a batch, for each channel. Then each plane is a
+  // part, so that what reads the same planes may run in the same loops (autoschedule/row_guests.h).
+  bool are_parts_planes(const Iterations& update) const {
+    const Gather& g = update.over;
+    const size_t count = update.rvars.size();
+    if (g.scatters || update.has_taps || count < 2) return false;
+    const auto planes = as_const_int(update.rvars[count - 1].extent);
+    return planes && *planes > 1 && *planes <= most_planes &&
+           elements_of(g) * static_cast<double>(*planes) >= enough_planes &&
+           reads_each_once(update);
+  }
   // `parts_of`, or at run time the number of parts that fit if that is smaller.
   Expr part_count_of(const Gather& g) const {
     const Expr most = make_const(Int(32), parts_of(g));
@@ -147,6 +163,33 @@ class PartSizes {
   }
 
  private:
+  // Whether all that the innermost loop moves is read by one element only, in an order in which the outermost loop comes
+  // after the elements.
+  bool reads_each_once(const Iterations& update) const {
+    const std::string &inner = update.rvars[0].var, &outer = update.rvars.back().var;
+    bool result = true, has_planes = false;
+    const auto note = [&](const Expr& e) {
+      const auto* call = e.as<Call>();
+      if (!call || call->call_type == CallType::Operator) return true;
+      const auto place_of = [&](const std::string& name) {
+        return std::ranges::find_if(call->args,
+                                    [&](const Expr& arg) { return uses_variable(arg, name); }) -
+               call->args.begin();
+      };
+      const auto none = static_cast<std::ptrdiff_t>(call->args.size());
+      if (place_of(inner) == none) return true;
+      for (size_t d = 0; d < update.over.pure.size(); ++d) {
+        const auto place = update.over.pure[d] ? place_of(target_.args[d]) : 0;
+        result &= place < none && place < place_of(outer);
+      }
+      has_planes |= place_of(inner) < place_of(outer);
+      return true;
+    };
+    for (const Expr& sum : update.all.sums) {
+      if (sum.defined()) walk(sum, note);
+    }
+    return result && has_planes;
+  }
   // Whether neighbouring elements are neighbours in some reads, and whether neighbouring terms are in reads in which
   // elements lie in other rows.
   struct RowReads {
@@ -208,17 +251,6 @@ bool sums_many_terms(const Gather& g, const AdjointTarget& target, const std::ve
   return PartSizes(target, types).sums_many_terms(g);
 }
 
-std::optional<PartPlan> plan_parts(const Iterations& update, const AdjointTarget& target,
-                                   const std::vector<Type>& types) {
-  const PartSizes sizes(target, types);
-  if (!sizes.is_worth_splitting(update)) return std::nullopt;
-  const Gather& g = update.over;
-  const Expr count = sizes.part_count_of(g);
-  const bool has_parts = sizes.parts_of(g) > 1, has_lanes = sizes.has_lanes(update);
-  if (!has_parts && !has_lanes) return std::nullopt;
-  return PartPlan{has_parts, count, has_lanes, sizes.note(g, count)};
-}
-
 // Whether the terms read Funcs or images along their rows when the variable steps.
 static bool moves_along_rows(const Iterations& update, const std::string& variable) {
   const auto reads_along = [&](const Expr& e) {
@@ -231,7 +263,7 @@ static bool moves_along_rows(const Iterations& update, const std::string& variab
   });
 }
 
-Iterations with_rows_innermost(Iterations update) {
+Iterations with_rows_innermost(Iterations update, PartPlan& plan) {
   const size_t count = update.rvars.size() - (update.has_taps ? 1 : 0);
   if (update.over.scatters || count < 2 || moves_along_rows(update, update.rvars[0].var))
     return update;
@@ -240,12 +272,16 @@ Iterations with_rows_innermost(Iterations update) {
     return as_const_int(r.extent).value_or(lane_count) >= lane_count &&
            moves_along_rows(update, r.var);
   });
-  if (row != end) std::rotate(update.rvars.begin(), row, row + 1);
+  if (row == end) return update;
+  const std::string in_parts = update.rvars[plan.loop].var;
+  std::rotate(update.rvars.begin(), row, row + 1);
+  const auto loop = std::ranges::find(update.rvars, in_parts, &ReductionVariable::var);
+  plan.loop = static_cast<size_t>(loop - update.rvars.begin());
   return update;
 }
 
-// The loop that is split into parts: the outermost with enough iterations to run in parallel, so that a part reads
-// contiguous memory; else the longest loop.
+// The loop that is split into parts if these are no planes: the outermost with enough iterations to run in parallel, so
+// that a part reads contiguous memory; else the longest loop.
 static size_t loop_in_parts(const Iterations& update) {
   const size_t count = update.rvars.size() - (update.has_taps ? 1 : 0);
   const auto extent = [&](size_t i) {
@@ -259,22 +295,41 @@ static size_t loop_in_parts(const Iterations& update) {
   return longest;
 }
 
+std::optional<PartPlan> plan_parts(const Iterations& update, const AdjointTarget& target,
+                                   const std::vector<Type>& types) {
+  const PartSizes sizes(target, types);
+  if (!sizes.is_worth_splitting(update)) return std::nullopt;
+  const Gather& g = update.over;
+  const bool has_parts = sizes.parts_of(g) > 1, has_lanes = sizes.has_lanes(update);
+  if (!has_parts && !has_lanes) return std::nullopt;
+  if (has_parts && sizes.are_parts_planes(update)) {
+    const size_t loop = update.rvars.size() - 1;
+    return PartPlan{true, loop, update.rvars[loop].extent, has_lanes, ""};
+  }
+  const size_t loop = loop_in_parts(update);
+  const Expr count = sizes.part_count_of(g), all = update.rvars[loop].extent;
+  const bool has_empty_parts =
+      !g.scatters && as_const_int(all).value_or(INT64_MAX) < as_const_int(count).value_or(0);
+  return PartPlan{has_parts, loop, has_empty_parts ? all : count, has_lanes, sizes.note(g, count)};
+}
+
 // If the variable in parts is also the innermost, x = (part * chunk + rho) * lanes + lane; else lanes split the
 // innermost variable. Indices beyond the end are clamped, because the elements that are read must exist even where the
 // condition is false. Loop partitioning removes clamp and condition from the steady state, whose accumulators stay in
-// registers.
-Slice slice_of(const Iterations& update, const Expr& lane, const Expr& part, const Expr& parts,
+// registers. Each plane of a sum is a part as it is.
+Slice slice_of(const Iterations& update, const Expr& lane, const Expr& part, const PartPlan& plan,
                bool in_blocks) {
   Slice slice;
-  slice.rvars = update.rvars;
   const DomainPtr rdom = make_domain();
-  const size_t cut = loop_in_parts(update);
-  for (size_t i = 0; i < slice.rvars.size(); ++i) {
-    ReductionVariable& r = slice.rvars[i];
-    std::string old = r.var;
-    Expr all = r.extent, min = r.min;
-    r = {unique_name(old), make_zero(Int(32)), all};
-    const bool in_parts = i == cut && part.defined(), in_lanes = i == 0 && lane.defined();
+  const Expr& parts = plan.count;
+  for (size_t i = 0; i < update.rvars.size(); ++i) {
+    const auto& [old, min, all, _] = update.rvars[i];
+    ReductionVariable r{unique_name(old), make_zero(Int(32)), all};
+    const bool in_parts = i == plan.loop && part.defined(), in_lanes = i == 0 && lane.defined();
+    if (in_parts && !in_lanes && equal(parts, all)) {
+      slice.place[old] = min + part;
+      continue;
+    }
     if (in_lanes) r.extent = simplify((r.extent + (lane_count - 1)) / lane_count);
     if (in_parts) r.extent = simplify((r.extent + (parts - 1)) / parts);
     if ((in_parts || in_lanes) && in_blocks) r.extent = in_whole_blocks(r.extent);
@@ -287,6 +342,7 @@ Slice slice_of(const Iterations& update, const Expr& lane, const Expr& part, con
       if (!as_const_int(all)) at = max(at, make_zero(Int(32)));  // the extent may be 0
     }
     slice.place[old] = min + at;
+    slice.rvars.push_back(r);
   }
   rdom->vars = slice.rvars;
   return slice;

@@ -21,7 +21,8 @@ bool sums_many_terms(const Gather& g, const AdjointTarget& target, const std::ve
 
 struct PartPlan {
   bool has_parts = false;
-  Expr count;  // number of parts that fit, evaluated at run time
+  size_t loop = 0;  // that is split into parts, among the reduction variables
+  Expr count;       // number of parts that fit, evaluated at run time
   bool has_lanes = false;
   std::string note;  // memory that the parts take; may be empty
 };
@@ -31,7 +32,8 @@ std::optional<PartPlan> plan_parts(const Iterations& update, const AdjointTarget
 
 // The same sum with a reduction variable first that moves along the rows of what is read, if the first one moves from row
 // to row: lanes split the first, and would gather. In the domain of a recurrence along rows, pure dimensions come first.
-Iterations with_rows_innermost(Iterations update);
+// The plan goes on to split the same variable into parts.
+Iterations with_rows_innermost(Iterations update, PartPlan& plan);
 
 // One slice of the reduction domain, for a fixed lane and part.
 struct Slice {
@@ -41,7 +43,7 @@ struct Slice {
 };
 // An undefined `lane` means no lanes, an undefined `part` no parts. With `in_blocks`, split loops run over whole blocks
 // of blocked_sums.h.
-Slice slice_of(const Iterations& update, const Expr& lane, const Expr& part, const Expr& parts,
+Slice slice_of(const Iterations& update, const Expr& lane, const Expr& part, const PartPlan& plan,
                bool in_blocks);
 
 // Coordinates of the Func that holds the parts: the lane, then the elements (those that a scatter reaches, or the pure

@@ -111,6 +111,8 @@ Expr pow(Expr x, Expr y) {
   if (y.type().is_int_or_uint()) {
     if (auto exponent = ir::as_const_int(y)) return integer_power(x, *exponent);
   }
+  // A square is exact but for one rounding, and takes a multiplication instead of a logarithm and an exponential.
+  if (x.type() == y.type() && ir::as_const_float(y) == 2.0) return integer_power(x, 2);
   return binary_float(Op::pow, std::move(x), std::move(y));
 }
 

@@ -77,6 +77,7 @@ TEST(Expressions, PowOfAnIntegerConstantMultiplies) {
   EXPECT_EQ(cube.kind(), ir::Kind::Mul);
   EXPECT_TRUE(is_op(pow(cast<float>(x), 2.5f), ir::Op::pow));
   EXPECT_EQ(pow(cast<float>(x), -1).kind(), ir::Kind::Div);
+  EXPECT_EQ(pow(cast<float>(x), 2.0f).kind(), ir::Kind::Mul) << "a square is as exact";
 }
 
 TEST(Expressions, SelectChoosesTheFirstThatHolds) {
