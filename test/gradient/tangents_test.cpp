@@ -211,7 +211,7 @@ TEST_F(TangentsTest, WhatDoesNotMoveIsZeroAndSaysSo) {
 }
 
 TEST_F(TangentsTest, ErrorsNameWhatIsWrong) {
-  Func f("f"), integer("integer"), wide("wide"), empty("empty"), pair("pair");
+  Func f("f"), integer("integer"), wide("wide_direction"), empty("empty"), pair("pair_direction");
   f(x) = a(x);
   integer(x) = cast<int>(a(x));
   wide(x, y) = 1.0f;
@@ -219,9 +219,15 @@ TEST_F(TangentsTest, ErrorsNameWhatIsWrong) {
   auto message = [](const auto& run) { return error_of(run); };
   expect_mentions(message([&] { propagate_tangents(f, {}); }), {"there is no direction"});
   expect_mentions(message([&] { propagate_tangents(integer, {{a, v}}); }), {"int32"});
-  expect_mentions(message([&] { propagate_tangents(f, {{a, wide}}); }), {"\"wide\" has 2"});
+  expect_mentions(message([&] {
+                    propagate_tangents(f, {{a, wide}});
+                  }),
+                  {"\"wide_direction\" has 2"});
   expect_mentions(message([&] { propagate_tangents(f, {{a, empty}}); }), {"no definition"});
-  expect_mentions(message([&] { propagate_tangents(f, {{a, pair}}); }), {"\"pair\" has 2"});
+  expect_mentions(message([&] {
+                    propagate_tangents(f, {{a, pair}});
+                  }),
+                  {"\"pair_direction\" has 2"});
   expect_mentions(message([&] { propagate_tangents(f, {{a, integer}}); }), {"has type int32"});
   expect_mentions(message([&] { propagate_tangents(f, {{a, v}, {a, v}}); }), {"there are two"});
   expect_mentions(message([&] { propagate_tangents(empty, {{a, v}}); }), {"no definition"});
