@@ -125,10 +125,10 @@ TEST_F(AotErrors, SourceCodeInC) {
 }
 
 TEST_F(AotErrors, WrappersForPyTorchOfWhatItHasNot) {
-  Func wide("wide");
+  Func wide("wide_unsigned");
   wide(x) = cast<uint16_t>(x);
   expect_error<Unsupported>(
-      {"PyTorch supports the types of all arguments", "\"wide\" holds uint16"}, [&] {
+      {"PyTorch supports the types of all arguments", "\"wide_unsigned\" holds uint16"}, [&] {
         wide.compile_to({{OutputFileType::pytorch_wrapper, path("a")}}, {}, "a", host);
       });
   expect_error<Unsupported>({"the function's name is a C name", "n::a"}, [&] {

@@ -344,16 +344,17 @@ TEST_P(Async, AMemoizedAsyncFuncWaitsForWhatItReads) {
 // The second call finds g in the cache, so nothing would consume f.
 TEST(AsyncErrors, LoopsOfAMemoizedFunc) {
   Var x("x"), y("y");
-  Func f("f"), g("g"), out("out");
+  Func f("async_of_memoized"), g("memoized"), out("out");
   f(x, y) = x + y;
   g(x, y) = f(x, y) * 2;
   out(x, y) = g(x, y) + 1;
   f.store_root().compute_at(g, y).async();
   g.compute_root().memoize();
-  expect_error<Unsupported>({"\"f\" async", "always run", "\"g\", which is memoized", "Store"},
-                            [&] {
-                              out.realize({8, 8});
-                            });
+  expect_error<Unsupported>(
+      {"\"async_of_memoized\" async", "always run", "\"memoized\", which is memoized", "Store"},
+      [&] {
+        out.realize({8, 8});
+      });
   f.store_at(g, y);
   for (int round = 0; round < 2; ++round) {
     Buffer<int> result = out.realize({8, 8});

@@ -76,13 +76,14 @@ TEST(DebugToFile, FormatsThatCannotBeWrittenAreRefused) {
 
 TEST(DebugToFile, TuplesAreRefused) {
   Var x("x");
-  Func pair("pair"), out("out");
+  Func pair("debugged_pair"), out("out");
   pair(x) = Tuple(x, 2 * x);
   out(x) = pair(x)[0] + pair(x)[1];
   pair.compute_root().debug_to_file("pair.npy");
-  expect_error<Unsupported>({"write \"pair\" to the file \"pair.npy\"", "one value of each point",
-                             "\"pair\" has 2", "one element of the Tuple"},
-                            [&] { out.realize({4}); });
+  expect_error<Unsupported>(
+      {"write \"debugged_pair\" to the file \"pair.npy\"", "one value of each point",
+       "\"debugged_pair\" has 2", "one element of the Tuple"},
+      [&] { out.realize({4}); });
 }
 
 TEST(DebugToFile, TypesThatTheFormatsLackAreRefused) {
