@@ -37,6 +37,7 @@
 #include "analysis/linear.h"
 #include "ir/build.h"
 #include "ir/visit.h"
+#include "lower/loops/kept_update.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
 
@@ -104,10 +105,9 @@ class ScanFinder {
   }
 
   bool enter(const For& loop) {
-    const bool is_lane = loop.runs == ForType::Vectorized || loop.runs == ForType::Unrolled;
     scan_.lanes.push_back(&loop);
     if (!is_pure_(loop)) proven_.push_back(&loop);
-    return is_lane && is_const(loop.min) && as_const_int(loop.extent).value_or(0) > 0;
+    return is_lane_loop(loop) && is_const(loop.min) && as_const_int(loop.extent).value_or(0) > 0;
   }
 
   // Whether each iteration stores a constant distance further.
@@ -245,12 +245,7 @@ class Carried : public Rewriter {
   }
 
   Stmt in_lanes(Stmt body) const {
-    if (!scan_.conditions.empty()) body = make_if(conjunction(scan_.conditions), body);
-    for (size_t i = scan_.lanes.size(); i-- > 0;) {
-      const For& lane = *scan_.lanes[i];
-      body = make_for(lane.name, lane.min, lane.extent, lane.runs, body, lane.partition);
-    }
-    return body;
+    return lower::in_lanes(scan_.lanes, scan_.conditions, std::move(body));
   }
 
   const Scan& scan_;

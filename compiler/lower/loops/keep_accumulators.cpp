@@ -96,12 +96,7 @@ class Kept : public Rewriter {
   }
 
   Stmt in_lanes(Stmt body) const {
-    if (!update_.conditions.empty()) body = make_if(conjunction(update_.conditions), body);
-    for (size_t i = update_.lanes.size(); i-- > 0;) {
-      const For& lane = *update_.lanes[i];
-      body = make_for(lane.name, lane.min, lane.extent, lane.runs, body, lane.partition);
-    }
-    return body;
+    return lower::in_lanes(update_.lanes, update_.conditions, std::move(body));
   }
 
   KeptUpdate update_;

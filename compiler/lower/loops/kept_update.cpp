@@ -99,6 +99,16 @@ class UpdateFinder {
 
 }  // namespace
 
+Stmt in_lanes(const std::vector<const For*>& lanes, const std::vector<Expr>& conditions,
+              Stmt body) {
+  if (!conditions.empty()) body = make_if(conjunction(conditions), body);
+  for (size_t i = lanes.size(); i-- > 0;) {
+    const For& lane = *lanes[i];
+    body = make_for(lane.name, lane.min, lane.extent, lane.runs, body, lane.partition);
+  }
+  return body;
+}
+
 std::optional<KeptUpdate> kept_update(const For& loop,
                                       const std::function<bool(const For&)>& is_pure) {
   return UpdateFinder(is_pure).update_in(loop);

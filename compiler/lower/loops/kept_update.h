@@ -17,6 +17,9 @@ inline bool is_lane_loop(const For& loop) {
   return loop.runs == ForType::Vectorized || loop.runs == ForType::Unrolled;
 }
 
+// `body` in loops over the lanes, the first one outermost, and in all of the conditions.
+Stmt in_lanes(const std::vector<const For*>& lanes, const std::vector<Expr>& conditions, Stmt body);
+
 // The loops and conditions from a serial loop down to the only Provide in it.
 struct KeptUpdate {
   std::vector<const For*> lanes;  // outermost first
