@@ -165,7 +165,7 @@ class LoopChooser {
     return std::clamp(lanes * 32 / bits_of_values(definition().values), lanes, 4 * lanes);
   }
 
-  // Of a long body several registers, where rows fill these many times.
+  // A long body gets vectors of several registers where rows fill these many times.
   int lanes_of_body() const {
     const int own = lanes_of_values();
     const auto row = sizes_.extent(f_, 0);

@@ -34,7 +34,7 @@ std::optional<int64_t> lanes_of_only_loop(const FuncContents& f, const Definitio
   return as_const_int(loops.splits[0].factor);
 }
 
-// Of an element of the only loop: all copies that are unrolled inside of it.
+// The operations of one element of the only loop, in all copies that are unrolled inside of it.
 double operations_of_row(const FuncContents& f, const Definition& stage,
                          const SizeEstimate& sizes) {
   double copies = 1;

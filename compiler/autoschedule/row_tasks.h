@@ -14,8 +14,8 @@
 
 namespace retrograde::autoschedule {
 
-// Of those of the Funcs, all of which this scheduler has given loops, that are at root and have work enough for
-// several threads. What is computed in their loops stays in the loop of the same name.
+// Gives parallel loops to those of the Funcs that are at root and have enough work for several threads. All of `funcs`
+// have loops from this scheduler. What is computed in their loops stays in the loop of the same name.
 void run_rows_in_pieces(const std::vector<FuncPtr>& funcs, const SizeEstimate& sizes);
 
 }  // namespace retrograde::autoschedule
