@@ -85,17 +85,26 @@ std::unordered_map<const Symbol*, std::set<std::string>> levels_read(
 
 }  // namespace
 
+std::unordered_set<const Symbol*> unbounded_funcs(const std::vector<FuncPtr>& order) {
+  std::unordered_set<const Symbol*> result;
+  const KnownRegions regions(order);
+  for (const FuncPtr& f : order) {
+    if (!regions.are_known(*f)) result.insert(f.get());
+  }
+  return result;
+}
+
 PlacementLimits placement_limits(const std::vector<FuncPtr>& order) {
   PlacementLimits limits;
   std::map<std::string, const Symbol*> by_name;
   for (const FuncPtr& f : order) by_name[f->name] = f.get();
-  const KnownRegions regions(order);
+  limits.stay = unbounded_funcs(order);
   const auto levels = levels_read(order);
   const auto note = [&](const graph::LoopLevel& level, std::unordered_set<const Symbol*>& where) {
     if (is_loop(level) && by_name.count(level.func)) where.insert(by_name[level.func]);
   };
   for (const FuncPtr& f : order) {
-    if (!regions.are_known(*f) || !levels.at(f.get()).empty()) limits.stay.insert(f.get());
+    if (!levels.at(f.get()).empty()) limits.stay.insert(f.get());
     for (const graph::LoopLevel& level :
          {f->schedule.compute_level, f->schedule.store_level, f->schedule.hoist_level})
       note(level, limits.levels);

@@ -17,7 +17,9 @@ struct PlacementLimits {
   // A schedule names a loop of theirs: they need that loop, where it is.
   std::unordered_set<const Symbol*> levels;
 };
-// `order`: producers before consumers.
+// The Funcs that are read at places without bounds: data or unclamped arithmetic decide which. `order`: producers before
+// consumers.
+std::unordered_set<const Symbol*> unbounded_funcs(const std::vector<FuncPtr>& order);
 PlacementLimits placement_limits(const std::vector<FuncPtr>& order);
 
 }  // namespace retrograde::autoschedule

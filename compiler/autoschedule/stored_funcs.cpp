@@ -1,6 +1,7 @@
 #include "autoschedule/stored_funcs.h"
 
 #include <algorithm>
+#include <optional>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -104,6 +105,8 @@ class StorageChooser {
         stored &= !limits_->stay.contains(f.get()) || is_output(*f);  // which is at root anyway
       }
       stored |= chosen_.store.contains(f.get());
+      if (stored && !limits_ && f->is_pure() && !is_output(*f))
+        stored = !unbounded().contains(f.get());
       stored &= !chosen_.inlined.contains(f.get()) && !chosen_.recomputed.contains(f.get());
       if (!stored || is_block_of_one(f)) continue;
       stored_.insert(f.get());
@@ -116,6 +119,12 @@ class StorageChooser {
  private:
   bool is_output(const FuncContents& f) const {
     return std::ranges::find(outputs_, &f, &FuncPtr::get) != outputs_.end();
+  }
+
+  // At root there would be no end to them.
+  const std::unordered_set<const Symbol*>& unbounded() {
+    if (!unbounded_) unbounded_ = unbounded_funcs(order_);
+    return *unbounded_;
   }
 
   // Whether more adjoints of those that are stored can go once it is there.
@@ -229,6 +238,7 @@ class StorageChooser {
   };
   std::unordered_map<const Symbol*, std::vector<Reader>> readers_;
   std::unordered_set<const FuncContents*> stored_;
+  std::optional<std::unordered_set<const Symbol*>> unbounded_;
 };
 
 std::vector<FuncPtr> with_large_bodies(const std::vector<FuncPtr>& outputs,

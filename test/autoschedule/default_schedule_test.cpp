@@ -1089,6 +1089,28 @@ TEST_F(DefaultSchedule, AScanIsNotComputedAgainForEachElement) {
               "updates would run again for each element");
 }
 
+// At root, a boundary condition has no end that places from data would ask for. Both directions read it, so storing it
+// would pay.
+TEST_F(DefaultSchedule, ABoundaryConditionReadWhereDataSayStaysInline) {
+  std::vector<int> places{-3, 0, 1, 7, 2, 2};
+  std::vector<float> values{0.25f, -0.5f, 1.0f};
+  Buffer<int> where(places.data(), 6);
+  Buffer<float> heights(values.data(), 3);
+  Func f("f"), padded("padded"), g("g"), sum("sum");
+  f(x) = exp(heights(x));
+  padded = BoundaryConditions::repeat_edge(f, {{0, 3}});
+  g(x) = sqrt(padded(where(x)) * padded(where(x)) + 0.25f);
+  RDom r(0, 6);
+  sum() = 0.0f;
+  sum() += g(r);
+  const Buffer<float> gradient = propagate_adjoints(sum)(heights).realize({3});
+  const std::vector<double> readers{2, 1, 3};  // of each height: those beyond the ends read the end
+  for (int i = 0; i < 3; ++i) {
+    const double value = std::exp(heights(i));
+    EXPECT_NEAR(gradient(i), readers[i] * value * value / std::sqrt(value * value + 0.25), 1e-5);
+  }
+}
+
 TEST_F(DefaultSchedule, AHandScheduleKeepsSmallReductionsThatAreReadOnceInline) {
   Func window("window"), squares("squares"), total("total");
   RDom r(0, 3), all(0, 30, 0, 30);
