@@ -12,7 +12,6 @@
 #include "autoschedule/cut_scatters.h"
 #include "autoschedule/epilogues.h"
 #include "autoschedule/gpu_schedule.h"
-#include "autoschedule/invariant_factors.h"
 #include "autoschedule/join_sweeps.h"
 #include "autoschedule/lane_dimension.h"
 #include "autoschedule/memory_budget.h"
@@ -30,9 +29,9 @@
 #include "autoschedule/slices.h"
 #include "autoschedule/start_in_tiles.h"
 #include "autoschedule/stored_funcs.h"
-#include "autoschedule/strided_terms.h"
 #include "autoschedule/strips.h"
 #include "autoschedule/sum_blocks.h"
+#include "autoschedule/sum_rewrites.h"
 #include "autoschedule/task_sizes.h"
 #include "autoschedule/tile_chains.h"
 #include "diagnostics/large_stack.h"
@@ -273,12 +272,8 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
   run_on_large_stack([&] {
     result = apply_wrappers(outputs);
     if (is_differentiated(result)) {
-      result = with_invariant_factors(result);
-      if (has_strided_terms(result)) {
-        result = copy_graph(result).outputs;
-        leave_out_zero_terms(result);
-      }
-      result = schedule_within_budget(result, request, Scheduling::Gradients).outputs;
+      result = schedule_within_budget(with_rewritten_sums(result), request, Scheduling::Gradients)
+                   .outputs;
     } else if (!stored_by_default(result).empty()) {
       result = copy_graph(result).outputs;
       compute_at_root(stored_by_default(result), request);

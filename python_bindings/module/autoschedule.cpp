@@ -1,6 +1,5 @@
 // autoschedule.cpp -- binds auto_schedule, its options and results, and Python autoschedulers.
-#include "autoschedule/invariant_factors.h"
-#include "autoschedule/strided_terms.h"
+#include "autoschedule/sum_rewrites.h"
 #include "bind_all.h"
 #include "binding.h"
 #include "callback.h"
@@ -155,9 +154,8 @@ Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target) {
   const PipelineSpec spec = pipeline.spec();
   std::vector<graph::FuncPtr> funcs = graph::apply_wrappers(spec.outputs);
   const bool schedules = target.has_gpu_feature() || graph::schedule_log(funcs).size() == 0;
-  if (schedules) funcs = autoschedule::with_invariant_factors(funcs);
+  if (schedules) funcs = autoschedule::with_rewritten_sums(funcs);
   funcs = graph::copy_graph(funcs).outputs;
-  if (schedules) autoschedule::leave_out_zero_terms(funcs);
   Pipeline copy(std::vector<Func>(funcs.begin(), funcs.end()));
   copy.set_autoschedule(spec.autoschedule);
   if (schedules) copy.auto_schedule(target);
