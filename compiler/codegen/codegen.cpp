@@ -53,6 +53,7 @@ void generate(const Program& program, const Machine& machine, Unit& unit) {
   for (const ir::LoweredFunction& function : program.functions)
     FunctionGenerator(emitter, function).generate();
   add_exports(emitter, program);
+  keep_sums_as_they_are(unit.module());
   cut_loops(unit.module());
   verify(unit.module());
   unit.times.generate_seconds = watch.lap();

@@ -85,6 +85,12 @@ Value* half_to_float(Emitter& e, Type half, Value* bits);
 Value* float_to_half(Emitter& e, Type half, Value* number);   // to nearest even; number: float
 Value* double_to_half(Emitter& e, Type half, Value* number);  // rounds once; number: double
 
+// ---- fused_sums.cpp: floats of at least 32 bits ----
+Value* add_floats(Emitter& e, Value* a, Value* b);
+Value* subtract_floats(Emitter& e, Value* a, Value* b);
+// Takes the right to fuse from all operations: what is to fuse has fused.
+void keep_sums_as_they_are(llvm::Module& module);
+
 // ---- arithmetic.cpp ----
 // Operands have type `type`; comparisons give i1 lanes. And and Or take only bool.
 Value* binary(Emitter& e, ir::Kind kind, Type type, Value* a, Value* b);

@@ -23,9 +23,9 @@ Value* float_mod(Emitter& e, Value* a, Value* b) {
 Value* float_binary(Emitter& e, Kind kind, Value* a, Value* b) {
   switch (kind) {
     case Kind::Add:
-      return e.b.CreateFAdd(a, b);
+      return add_floats(e, a, b);
     case Kind::Sub:
-      return e.b.CreateFSub(a, b);
+      return subtract_floats(e, a, b);
     case Kind::Mul:
       return e.b.CreateFMul(a, b);
     case Kind::Div:

@@ -66,8 +66,8 @@ Value* lerp_floats(Emitter& e, Type type, Type weight_type, Value* a, Value* b, 
   const Type wide = is_half(type) ? Float(32, type.lanes()) : type;
   Value* w = unit_weight(e, wide, weight_type, weight);
   Value* rest = e.b.CreateFSub(float_constant(w, 1.0), w);
-  Value* sum = e.b.CreateFAdd(e.b.CreateFMul(convert(e, wide, type, a), rest),
-                              e.b.CreateFMul(convert(e, wide, type, b), w));
+  Value* sum = add_floats(e, e.b.CreateFMul(convert(e, wide, type, a), rest),
+                          e.b.CreateFMul(convert(e, wide, type, b), w));
   return convert(e, type, wide, sum);
 }
 

@@ -10,6 +10,7 @@ retrograde_test(
 retrograde_test(
   checked_accesses_test
   costly_arms_test
+  fused_sums_test
   vector_access_test
   vector_reduction_test
   TOGETHER codegen_program_tests LIBS retrograde_dep_halide_runtime)
