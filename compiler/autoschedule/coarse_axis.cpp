@@ -15,10 +15,12 @@ namespace {
 // How many elements of the stage an element of the grid stands for, at least.
 constexpr double least_ratio = 3;
 
-bool depends_on_data(const Expr& e) {
+// Indices that depend on data. A remainder selects a phase, the weights of which are no grid.
+bool is_other_index(const Expr& e) {
   return any_node(e, [](const Expr& node) {
     const auto* v = node.as<Variable>();
-    return is_element_read(node) || (v && v->symbol.defined() && !domain_of(*v));
+    return is_element_read(node) || node.kind() == Kind::Mod ||
+           (v && v->symbol.defined() && !domain_of(*v));
   });
 }
 
@@ -50,7 +52,7 @@ bool CoarseAxis::is_index(const Expr& e) {
   if (e.type() != Int(32) || !uses_variable(e, variable_)) return false;
   const bool is_of_others = std::ranges::any_of(
       pure_, [&](const std::string& name) { return name != variable_ && uses_variable(e, name); });
-  if (is_of_others || depends_on_data(e)) return false;
+  if (is_of_others || is_other_index(e)) return false;
   const auto fine = extent_of(ranges_.at(variable_)), coarse = extent_of(range_of(e));
   return fine && coarse && *coarse * least_ratio <= *fine;
 }

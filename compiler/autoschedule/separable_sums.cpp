@@ -159,7 +159,7 @@ bool close_outer(std::vector<Factor>& factors, std::set<std::string>& outer) {
 
 Expr with_grouped_terms(const Expr& e, CoarseAxis& axis) {
   return rewrite(e, [&](const Expr& node, const auto&) -> Expr {
-    if (is_element_read(node)) return node;
+    if (is_element_read(node) || as_op(node, Op::if_then_else, Op::strict_float)) return node;
     if (!is_sum(node)) return {};
     std::vector<Term> terms;
     add_terms(node, false, terms);
