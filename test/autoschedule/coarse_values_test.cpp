@@ -216,7 +216,7 @@ TEST(CoarseValues, WithEffectsStay) {
     EXPECT_FALSE(any_node(*f->pure, [](const Call& call) { return !call.is_pure(); }));
 }
 
-// What an arm of a choice reads is read only where it is chosen.
+// An arm of a choice reads elements only where it is chosen.
 TEST(CoarseValues, ThatAreReadConditionallyStay) {
   Surface s;
   const Expr row = s.row(fraction(x), y / cell);

@@ -27,7 +27,7 @@ std::vector<std::string> rows_of(const Derivative& d) {
   return names;
 }
 
-// Of the whole gradient.
+// The operations of the whole gradient.
 double operations(const Derivative& d) {
   return d.operations().gradient.operations().value().value_or(-1);
 }

@@ -20,7 +20,7 @@ class LazyRegions {
   LazyRegions(const std::vector<FuncPtr>& outputs, std::map<const Symbol*, Box> regions)
       : outputs_(outputs), regions_(std::move(regions)) {}
 
-  // Of a variable of a stage; unbounded: not known, or the Func is never read.
+  // The range of a variable of a stage; unbounded: not known, or the Func is never read.
   Interval range(const FuncContents& f, int stage, const std::string& variable) {
     if (!all_) all_.emplace(topological_order(outputs_), regions_);
     if (all_->of(&f).size() != f.args.size()) return {};
