@@ -4,11 +4,11 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "autoschedule/coarse_values.h"
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/size_estimate.h"
 #include "graph/definitions/define.h"
 #include "graph/definitions/own_reads.h"
-#include "graph/directives/give_directive.h"
 #include "graph/names.h"
 #include "ir/build.h"
 #include "ir/equal.h"
@@ -60,10 +60,6 @@ bool has_candidates(const FuncContents& f, const Definition& update) {
     if (nodes > most_term_nodes) return false;
   }
   return operations_of_values(update.values, [](const Call&) { return 1.0; }) > cheap;
-}
-
-bool is_users(const FuncContents& f) {
-  return !f.made && !f.is_extern() && !f.custom_derivatives && !has_directives(f);
 }
 
 // How many values a variable of one stage takes.
@@ -251,113 +247,74 @@ FactorDefinition definition_of(const FuncContents& f, const Definition& update, 
   return result;
 }
 
-// Calls of factors, by the factor that each replaces.
-using FactorReads = std::unordered_map<const ExprNode*, Expr>;
+std::string words_for(const FuncPtr& factor) {
+  std::string variables;
+  for (const std::string& arg : factor->args) variables += (variables.empty() ? "" : ", ") + arg;
+  return text(quoted(factor->name), " keeps a factor of its terms, which depends on (", variables,
+              ") alone");
+}
 
 class Hoister {
  public:
   Hoister(const std::vector<FuncPtr>& outputs, ValuesOfVariable values)
-      : outputs_(outputs), order_(topological_order(outputs)), values_(values) {
-    for (const FuncPtr& f : order_) {
+      : graph_(outputs), values_(values) {
+    for (const FuncPtr& f : graph_.order()) {
       if (is_invariant_factor(*f)) known_.push_back(f);
     }
   }
 
   FactoredGraph run() {
-    for (const FuncPtr& f : order_) {
-      if (result_.copies.contains(f.get())) continue;
+    for (const FuncPtr& f : graph_.order()) {
+      if (graph_.is_copied(*f)) continue;
       FactorReads reads;
-      const std::vector<Definition> updates = with_factors_found(*f, reads);
-      if (!reads.empty() || reads_copies(*f)) copy(f, updates, reads);
+      const std::vector<Definition> stages = with_factors_found(*f, reads);
+      if (!reads.empty() || graph_.reads_copies(*f)) graph_.copy(f, stages, reads);
     }
-    for (const FuncPtr& f : outputs_) {
-      const auto* copied = find_or_null(result_.copies, f.get());
-      result_.outputs.push_back(copied ? *copied : f);
-    }
-    for (const auto& entry : result_.copies) redirect_prefetches(*entry.second, result_.copies);
-    return std::move(result_);
+    return graph_.finish();
   }
 
  private:
-  // The updates of f, and in `reads` the calls that replace factors of their terms.
+  // The stages of f, and in `reads` the calls that replace factors of their terms.
   std::vector<Definition> with_factors_found(const FuncContents& f, FactorReads& reads) {
-    std::vector<Definition> updates = f.updates;
-    if (!is_users(f)) return updates;
-    for (size_t u = 0; u < updates.size(); ++u) {
-      if (!has_candidates(f, f.updates[u])) continue;
+    std::vector<Definition> stages = stages_of(f);
+    if (!is_users(f)) return stages;
+    for (size_t s = 1; s < stages.size(); ++s) {
+      if (!has_candidates(f, stages[s])) continue;
       // A factor could not take the variables of lets along.
-      const Definition plain =
-          map_exprs(f.updates[u], [](const Expr& e) { return without_lets(e); });
+      const Definition plain = map_exprs(stages[s], [](const Expr& e) { return without_lets(e); });
       const auto values = [&](const std::string& variable) {
-        return values_(f, static_cast<int>(u) + 1, variable);
+        return values_(f, static_cast<int>(s), variable);
       };
       const std::vector<Expr> factors = Factors(f, plain, values).find();
       if (factors.empty()) continue;
-      updates[u] = plain;
+      stages[s] = plain;
       for (const Expr& factor : factors) reads[factor.get()] = read_of(f, plain, factor, values);
     }
-    return updates;
+    return stages;
   }
 
   // A call of the factor's Func, which is made unless the graph has it.
   Expr read_of(const FuncContents& f, const Definition& update, const Expr& factor,
                ValuesInStage values) {
-    const FactorDefinition definition = definition_of(f, update, redirected(factor, {}), values);
+    const FactorDefinition definition = definition_of(f, update, graph_.redirected(factor), values);
     const auto known =
         std::ranges::find_if(known_, [&](const FuncPtr& g) { return definition.is_of(*g); });
     FuncPtr g = known == known_.end() ? nullptr : *known;
-    if (g && reads_copies(*g)) {
-      if (!result_.copies.contains(g.get())) copy(g, g->updates, {});
-      g = result_.copies.at(g.get());
+    if (g && graph_.reads_copies(*g)) {
+      if (!graph_.is_copied(*g)) graph_.copy(g, stages_of(*g));
+      g = graph_.copy_of(*g);
     } else if (!g) {
       g = make_func(Role::SharedValue, f.name + "_factor", f.name);
       define_pure(g, variables_of(definition.args), {definition.value});
       known_.push_back(g);
-      result_.factors.push_back(g);
+      graph_.add_factor(g, words_for(g));
     }
     return call_func(g->name, factor.type(), definition.at, 0, SymbolRef(g));
   }
 
-  bool reads_copies(const FuncContents& f) const {
-    return !result_.copies.empty() && std::ranges::any_of(direct_callees(f), [&](const FuncPtr& g) {
-      return result_.copies.contains(g.get());
-    });
-  }
-
-  void copy(const FuncPtr& f, const std::vector<Definition>& updates, const FactorReads& reads) {
-    const FuncPtr copied = std::make_shared<FuncContents>(*f);
-    result_.copies[f.get()] = copied;
-    const auto map = [&](const Expr& e) { return redirected(e, reads); };
-    if (copied->pure) copied->pure = map_exprs(*f->pure, map);
-    for (size_t u = 0; u < updates.size(); ++u) copied->updates[u] = map_exprs(updates[u], map);
-    if (!copied->extern_definition) return;
-    for (ExternArgument& arg : copied->extern_definition->args) {
-      const auto* other = arg.func ? find_or_null(result_.copies, arg.func.get()) : nullptr;
-      if (other) arg.func = *other;
-    }
-  }
-
-  // Reads factors where they are found, and copies instead of what was copied.
-  Expr redirected(const Expr& e, const FactorReads& reads) const {
-    return rewrite(e, [&](const Expr& node, const auto& recurse) -> Expr {
-      if (const Expr* read = find_or_null(reads, node.get())) return *read;
-      const auto* call = node.as<Call>();
-      if (!call || call->call_type != CallType::Func) return {};
-      const FuncPtr* copied =
-          find_or_null(result_.copies, static_cast<const FuncContents*>(call->symbol.raw()));
-      if (!copied) return {};
-      const SymbolRef symbol =
-          call->symbol.is_weak() ? SymbolRef::weak(*copied) : SymbolRef(*copied);
-      return call_func(call->name, call->type, mapped(call->args, recurse), call->component,
-                       symbol);
-    });
-  }
-
-  const std::vector<FuncPtr>& outputs_;
-  const std::vector<FuncPtr> order_;
+  GraphFactoring graph_;
   const ValuesOfVariable values_;
   std::vector<FuncPtr> known_;  // factors, of this graph and new ones
-  FactoredGraph result_;
 };
 
 }  // namespace
@@ -371,18 +328,25 @@ FactoredGraph hoist_invariant_factors(const std::vector<FuncPtr>& outputs,
   return Hoister(outputs, values).run();
 }
 
-std::vector<FuncPtr> with_invariant_factors(const std::vector<FuncPtr>& outputs) {
+std::vector<FuncPtr> with_invariant_factors(const std::vector<FuncPtr>& outputs, SumOrder order) {
   std::optional<SizeEstimate> sizes;  // an analysis of the graph, which few programs need
+  const auto range = [&](const FuncContents& f, int, const std::string& variable) {
+    if (!sizes) sizes.emplace(outputs);
+    const auto arg = std::ranges::find(f.args, variable);
+    return sizes->range(f, static_cast<size_t>(arg - f.args.begin()));
+  };
+  const FactoredGraph coarse = hoist_coarse_values(outputs, range, order);
+  if (!coarse.factors.empty()) sizes.reset();
   const auto values = [&](const FuncContents& f, int stage,
                           const std::string& variable) -> std::optional<int64_t> {
     for (const ReductionVariable& r : f.stage(stage).rvars) {
       if (r.var == variable) return as_const_int(simplify(r.extent));
     }
-    if (!sizes) sizes.emplace(outputs);
+    if (!sizes) sizes.emplace(coarse.outputs);
     const auto arg = std::ranges::find(f.args, variable);
     return sizes->extent(f, static_cast<size_t>(arg - f.args.begin()));
   };
-  return hoist_invariant_factors(outputs, values).outputs;
+  return hoist_invariant_factors(coarse.outputs, values).outputs;
 }
 
 }  // namespace retrograde::autoschedule

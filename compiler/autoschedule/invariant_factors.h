@@ -30,7 +30,7 @@
 #include <string>
 #include <vector>
 
-#include "graph/copy_graph.h"
+#include "autoschedule/factored_graph.h"
 #include "graph/function.h"
 #include "ir/visit.h"
 
@@ -43,19 +43,12 @@ using ValuesOfVariable = FunctionRef<std::optional<int64_t>(const FuncContents& 
 // Whether a Func was made for such a factor.
 bool is_invariant_factor(const FuncContents& f);
 
-struct FactoredGraph {
-  std::vector<FuncPtr> outputs;
-  // Copies of the Funcs whose terms have factors, and of all that read these, by the original. The others are shared
-  // with the original graph, which stays as it is.
-  FuncCopies copies;
-  std::vector<FuncPtr> factors;
-};
-
 // `outputs`: of a graph whose wrappers have been applied. A factor that the graph has already is not made again.
 FactoredGraph hoist_invariant_factors(const std::vector<FuncPtr>& outputs, ValuesOfVariable values);
 
-// The outputs of the graph with its factors hoisted; sizes are those that the outputs and images are known or estimated
-// to have.
-std::vector<FuncPtr> with_invariant_factors(const std::vector<FuncPtr>& outputs);
+// The outputs of the graph with its factors hoisted, and its values that depend on coarse grids (coarse_values.h); sizes
+// are those that the outputs and images are known or estimated to have.
+std::vector<FuncPtr> with_invariant_factors(const std::vector<FuncPtr>& outputs,
+                                            SumOrder order = SumOrder::Kept);
 
 }  // namespace retrograde::autoschedule

@@ -6,8 +6,8 @@
 
 namespace retrograde::autoschedule {
 
-std::vector<FuncPtr> with_rewritten_sums(const std::vector<FuncPtr>& outputs) {
-  std::vector<FuncPtr> result = with_invariant_factors(outputs);
+std::vector<FuncPtr> with_rewritten_sums(const std::vector<FuncPtr>& outputs, SumOrder order) {
+  std::vector<FuncPtr> result = with_invariant_factors(outputs, order);
   if (!has_strided_terms(result)) return result;
   result = graph::copy_graph(result).outputs;
   leave_out_zero_terms(result);

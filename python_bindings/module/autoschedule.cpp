@@ -147,14 +147,14 @@ void bind_schedulers(py::module_& m) {
   }));
 }
 
-// A copy of the pipeline with the schedule of auto_schedule() for the target. In the copy, costly factors of sums are
-// Funcs of their own, and sums leave out zeros between elements. If the user gave directives and the target has no GPU,
-// the copy keeps those instead.
+// A copy of the pipeline with the schedule of auto_schedule() for the target. In the copy, costly factors of sums and
+// values of coarse grids are Funcs of their own, and sums leave out zeros between elements. If the user gave directives
+// and the target has no GPU, the copy keeps those instead.
 Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target) {
   const PipelineSpec spec = pipeline.spec();
   std::vector<graph::FuncPtr> funcs = graph::apply_wrappers(spec.outputs);
   const bool schedules = target.has_gpu_feature() || graph::schedule_log(funcs).size() == 0;
-  if (schedules) funcs = autoschedule::with_rewritten_sums(funcs);
+  if (schedules) funcs = autoschedule::with_rewritten_sums(funcs, autoschedule::SumOrder::Free);
   funcs = graph::copy_graph(funcs).outputs;
   Pipeline copy(std::vector<Func>(funcs.begin(), funcs.end()));
   copy.set_autoschedule(spec.autoschedule);

@@ -31,6 +31,7 @@ retrograde_test(
   version_budget_test
   zero_borders_test
   TOGETHER gradient_tests LIBS retrograde_dep_halide_runtime)
+retrograde_test(coarse_grids_test)
 retrograde_test(access_inversion_test LAYERS autodiff OPTIMIZED)
 retrograde_test(access_table_test
   SOURCES gradient/access_table_test.cpp gradient/access_table/halide_side.cpp

@@ -4,6 +4,8 @@
 #include <optional>
 #include <unordered_map>
 
+#include "autodiff/sweeps/regions.h"
+#include "autoschedule/coarse_values.h"
 #include "diagnostics/error.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
@@ -12,10 +14,36 @@ namespace retrograde::autodiff {
 
 namespace {
 
-std::optional<int64_t> values_of_loop(const std::vector<LoopVariable>& loops,
-                                      const std::string& name) {
-  const auto loop = std::ranges::find(loops, name, &LoopVariable::name);
-  return loop == loops.end() ? std::nullopt : constant_extent(loop->range());
+// An analysis of the graph, which few programs need.
+class LazyRegions {
+ public:
+  LazyRegions(const std::vector<FuncPtr>& outputs, std::map<const Symbol*, Box> regions)
+      : outputs_(outputs), regions_(std::move(regions)) {}
+
+  // The range of a variable of a stage; unbounded: not known, or the Func is never read.
+  Interval range(const FuncContents& f, int stage, const std::string& variable) {
+    if (!all_) all_.emplace(topological_order(outputs_), regions_);
+    if (all_->of(&f).size() != f.args.size()) return {};
+    const std::vector<LoopVariable> loops = all_->domain(f, stage).vars;
+    const auto loop = std::ranges::find(loops, variable, &LoopVariable::name);
+    return loop == loops.end() ? Interval() : loop->range();
+  }
+
+ private:
+  const std::vector<FuncPtr>& outputs_;
+  const std::map<const Symbol*, Box> regions_;
+  std::optional<Regions> all_;
+};
+
+// The regions of copied outputs.
+std::map<const Symbol*, Box> renamed(const std::map<const Symbol*, Box>& regions,
+                                     const FuncCopies& copies) {
+  std::map<const Symbol*, Box> result;
+  for (const auto& [symbol, box] : regions) {
+    const FuncPtr* copy = find_or_null(copies, static_cast<const FuncContents*>(symbol));
+    result[copy ? copy->get() : symbol] = box;
+  }
+  return result;
 }
 
 // Rules of users refer to the original Funcs.
@@ -83,25 +111,23 @@ void rename_adjoints(SynthesisResult& result, const Originals& originals) {
   result.after_stage = std::move(renamed);
 }
 
-std::string words_for(const FuncPtr& factor) {
-  std::string variables;
-  for (const std::string& arg : factor->args) variables += (variables.empty() ? "" : ", ") + arg;
-  return text(quoted(factor->name), " keeps a factor of its terms, which depends on (", variables,
-              ") alone");
-}
-
 }  // namespace
 
 FactoredGraph with_factors(const std::vector<FuncPtr>& outputs,
                            const std::map<const Symbol*, Box>& regions) {
-  std::optional<Regions> all;  // an analysis of the graph, which few programs need
-  const auto values = [&](const FuncContents& f, int stage,
-                          const std::string& variable) -> std::optional<int64_t> {
-    if (!all) all.emplace(topological_order(outputs), regions);
-    if (all->of(&f).size() != f.args.size()) return std::nullopt;  // never read
-    return values_of_loop(all->domain(f, stage).vars, variable);
+  LazyRegions all(outputs, regions);
+  const auto range = [&](const FuncContents& f, int stage, const std::string& variable) {
+    return all.range(f, stage, variable);
   };
-  return hoist_invariant_factors(outputs, values);
+  const FactoredGraph coarse =
+      autoschedule::hoist_coarse_values(outputs, range, autoschedule::SumOrder::Free);
+  LazyRegions of_coarse(coarse.outputs, renamed(regions, coarse.copies));
+  LazyRegions& current = coarse.factors.empty() ? all : of_coarse;
+  const auto values = [&](const FuncContents& f, int stage, const std::string& variable) {
+    return constant_extent(current.range(f, stage, variable));
+  };
+  FactoredGraph invariant = hoist_invariant_factors(coarse.outputs, values);
+  return autoschedule::in_turn(coarse, std::move(invariant));
 }
 
 SynthesisResult synthesize_factored(const Seeds& seeds, const SynthesisOptions& options,
@@ -123,9 +149,10 @@ SynthesisResult synthesize_factored(const Seeds& seeds, const SynthesisOptions& 
   for (const FuncPtr& f : generated(result, factored.factors)) redirection.apply(f);
   result.funcs.insert(result.funcs.begin(), factored.factors.begin(), factored.factors.end());
   for (size_t i = 0; i < seeds.size(); ++i) result.outputs[i].func = seeds[i].output;
-  for (const FuncPtr& factor : factored.factors)
+  for (size_t i = 0; i < factored.factors.size(); ++i) {
     result.explanations.push_back(
-        {Explanation::Kind::Version, factor->made->of, words_for(factor)});
+        {Explanation::Kind::Version, factored.factors[i]->made->of, factored.notes[i]});
+  }
   return result;
 }
 

@@ -3,7 +3,7 @@
 //   a * b + c = c + a * b  =>  fmuladd(a, b, c)          a * b - c  =>  fmuladd(a, b, -c)
 //                                                        c - a * b  =>  fmuladd(-a, b, c)
 //
-// Of two products, the first fuses. The decision is made here, from the expression alone, and LLVM makes none later: it
+// The first of two products fuses. The decision is made here, from the expression alone, and LLVM makes none later: it
 // would fuse products with one user only. Two copies of an expression in different Funcs would then round differently,
 // and adjoints that decide which side of a kink they are on would disagree. Hence a product with several users fuses
 // with each of its sums, a product that is the same in all lanes with sums that are not, and a quotient by a power of two
