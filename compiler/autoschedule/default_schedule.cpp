@@ -35,6 +35,7 @@
 #include "autoschedule/sum_blocks.h"
 #include "autoschedule/task_sizes.h"
 #include "autoschedule/tile_chains.h"
+#include "autoschedule/wavefronts.h"
 #include "diagnostics/large_stack.h"
 #include "frontend/language/func.h"
 #include "graph/copy_graph.h"
@@ -274,9 +275,10 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
     result = apply_wrappers(outputs);
     if (is_differentiated(result)) {
       result = with_invariant_factors(result);
-      if (has_strided_terms(result)) {
+      if (has_strided_terms(result) || has_wavefronts(result)) {
         result = copy_graph(result).outputs;
         leave_out_zero_terms(result);
+        run_in_wavefronts(result);
       }
       result = schedule_within_budget(result, request, Scheduling::Gradients).outputs;
     } else if (!stored_by_default(result).empty()) {

@@ -1,6 +1,7 @@
 // autoschedule.cpp -- binds auto_schedule, its options and results, and Python autoschedulers.
 #include "autoschedule/invariant_factors.h"
 #include "autoschedule/strided_terms.h"
+#include "autoschedule/wavefronts.h"
 #include "bind_all.h"
 #include "binding.h"
 #include "callback.h"
@@ -158,6 +159,7 @@ Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target) {
   if (schedules) funcs = autoschedule::with_invariant_factors(funcs);
   funcs = graph::copy_graph(funcs).outputs;
   if (schedules) autoschedule::leave_out_zero_terms(funcs);
+  if (schedules && !target.has_gpu_feature()) autoschedule::run_in_wavefronts(funcs);
   Pipeline copy(std::vector<Func>(funcs.begin(), funcs.end()));
   copy.set_autoschedule(spec.autoschedule);
   if (schedules) copy.auto_schedule(target);

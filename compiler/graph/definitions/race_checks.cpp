@@ -148,6 +148,31 @@ bool can_prove_same_order(const FuncContents& f, const Definition& update,
   return true;
 }
 
+bool can_prove_skewed_order(const FuncContents& f, const Definition& update,
+                            const std::string& inner, const std::string& outer, int slope) {
+  MeetingPoints points = points_of(update);
+  PointOrder later{{}, {outer}, {}};  // the second point runs later,
+  for (const ReductionVariable& r : update.rvars) {
+    if (r.var != inner && r.var != outer) later.same.insert(r.var);
+  }
+  const std::string sum = inner + "+" + outer;
+  points.variables.push_back({sum, {}, {}});
+  points.conditions.push_back(variable(sum) == variable(inner) + slope * variable(outer));
+  PointOrder equal = later, earlier = later;  // but its sum is equal or smaller
+  equal.same.insert(sum);
+  earlier.smaller.push_back(sum);
+  const Access write{update.args, {}};
+  std::vector<std::pair<Access, Access>> pairs{{write, write}};
+  for (const Access& read : OwnReads(f, update).find()) {
+    pairs.emplace_back(write, read);
+    pairs.emplace_back(read, write);
+  }
+  return std::ranges::all_of(pairs, [&](const auto& pair) {
+    return can_prove_never_meet(points, equal, pair.first, pair.second) &&
+           can_prove_never_meet(points, earlier, pair.first, pair.second);
+  });
+}
+
 bool can_prove_commutative(const FuncContents& f, const Definition& update) {
   const AssociativityProof proof = prove_associative(f, update);
   return proof.op && proof.op->commutative && !proof.op->breaks_ties;

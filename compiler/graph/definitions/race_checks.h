@@ -28,6 +28,15 @@ bool can_prove_same_order(const FuncContents& f, const Definition& update,
                           const std::vector<std::string>& before,
                           const std::vector<std::string>& after);
 
+// Whether the order of `inner + slope * outer` is that of a loop over `inner` inside of one over `outer` for every two
+// iterations that access one element, if one of them writes it and both agree in the other variables. Iterations with
+// equal sums then access different elements. False means unknown.
+//
+//   d(r.x, r.y) = f(d(r.x - 1, r.y), d(r.x, r.y - 1))       slope 1: diagonals
+//   d(r.x, r.y) = f(d(r.x - 1, r.y), d(r.x + 1, r.y - 1))   slope 2
+bool can_prove_skewed_order(const FuncContents& f, const Definition& update,
+                            const std::string& inner, const std::string& outer, int slope);
+
 // Whether all points of the update commute: it is f(same point) op e with an operator that is
 // proven associative and commutative, for ties too. Floats are included, although reordering
 // changes the rounding of their sums. False means unknown.
