@@ -15,6 +15,7 @@
 #include "graph/definitions/own_reads.h"
 #include "graph/definitions/race_checks.h"
 #include "ir/build.h"
+#include "ir/markers.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
@@ -245,8 +246,13 @@ class StepScheduler {
   bool run_front() {
     const Names loops = variables_.order();
     const std::string all = loops.front();
-    const auto moves = [&](const Expr& place) { return uses_variable(place, all); };
-    if (std::ranges::count_if(update().args, moves) < 2 ||
+    const auto is_diagonal = [&](const Expr& place) {
+      return std::any_of(loops.begin() + 1, loops.end(), [&](const std::string& other) {
+        const auto form = decompose(without_promises(place), {all, other});
+        return form && form->coefficients.size() == 2;
+      });
+    };
+    if (std::ranges::none_of(update().args, is_diagonal) ||
         !graph::can_prove_race_free(f_, update(), all, {loops.begin() + 1, loops.end()}))
       return false;
     const FrontLanes lanes = front_lanes(update());

@@ -6,6 +6,7 @@
 
 #include "analysis/linear.h"
 #include "autoschedule/cost_estimate.h"
+#include "autoschedule/hosted_funcs.h"
 #include "autoschedule/root_loops.h"
 #include "autoschedule/size_estimate.h"
 #include "autoschedule/step_loops.h"
@@ -41,55 +42,70 @@ bool is_to_schedule(const FuncContents& f, const Definition& update) {
          !point_number(update) && !has_effects(update);
 }
 
-// Whether the variable moves one dimension of the written element, by one element.
-bool moves_one_dimension(const Definition& update, const std::string& variable) {
+// How many dimensions of the written element the variable moves; -1: one of them by more than one element.
+int moved_dimensions(const Definition& update, const std::string& variable) {
   int moved = 0;
   for (const Expr& arg : update.args) {
     if (!uses_variable(arg, variable)) continue;
     const auto form = analysis::decompose(arg, {variable});
     if (!form || form->coefficients.size() != 1 || std::abs(form->coefficients[0].second) != 1)
-      return false;
+      return -1;
     ++moved;
   }
-  return moved == 1;
+  return moved;
 }
 
-// Whether the two variables move different dimensions.
-bool move_apart(const Definition& update, const std::string& a, const std::string& b) {
-  return moves_one_dimension(update, a) && moves_one_dimension(update, b) &&
+// Whether `inner` runs along one dimension, and `outer` along another one or again and again along the same.
+bool are_along_rows(const Definition& update, const std::string& inner, const std::string& outer) {
+  const int rows = moved_dimensions(update, outer);
+  return moved_dimensions(update, inner) == 1 && (rows == 0 || rows == 1) &&
          std::ranges::none_of(update.args, [&](const Expr& arg) {
-           return uses_variable(arg, a) && uses_variable(arg, b);
+           return uses_variable(arg, inner) && uses_variable(arg, outer);
          });
-}
-
-bool has_few_pure_elements(const FuncContents& f, const Definition& update,
-                           const SizeEstimate& sizes) {
-  int64_t elements = 1;
-  for (size_t d = 0; d < f.args.size(); ++d) {
-    if (is_pure_position(f, update, d))
-      elements *= sizes.extent(f, d).value_or(most_pure_elements + 1);
-  }
-  return elements <= most_pure_elements;
 }
 
 bool is_long(const ReductionVariable& r, int64_t least) {
   return as_const_int(simplify(r.extent)).value_or(least) >= least;
 }
 
-// The slope of the fronts; nullopt: there are none.
-std::optional<int> slope_of_fronts(const FuncContents& f, const Definition& update,
-                                   const SizeEstimate& sizes) {
-  if (!is_to_schedule(f, update) || !has_few_pure_elements(f, update, sizes)) return std::nullopt;
-  const ReductionVariable &inner = update.rvars[0], &outer = update.rvars[1];
-  const int rows = front_lanes(update).rows;
-  if (!is_long(inner, 2 * rows) || !is_long(outer, rows) ||
-      !move_apart(update, inner.var, outer.var) || step_variables(f, update).any_independent())
-    return std::nullopt;
-  for (int slope = 1; slope <= most_slope; ++slope) {
-    if (graph::can_prove_skewed_order(f, update, inner.var, outer.var, slope)) return slope;
+class WavefrontFinder {
+ public:
+  explicit WavefrontFinder(const std::vector<FuncPtr>& outputs)
+      : outputs_(outputs), hosted_(outputs) {}
+
+  // The slope of the fronts; nullopt: there are none.
+  std::optional<int> slope(const FuncContents& f, const Definition& update) {
+    if (!is_to_schedule(f, update) || hosted_.are_in(f)) return std::nullopt;
+    const ReductionVariable &inner = update.rvars[0], &outer = update.rvars[1];
+    const int rows = front_lanes(update).rows;
+    if (!is_long(inner, 2 * rows) || !is_long(outer, rows) ||
+        !are_along_rows(update, inner.var, outer.var) || !read_elsewhere(f, update).defined() ||
+        !has_few_pure_elements(f, update) || step_variables(f, update).any_independent())
+      return std::nullopt;
+    const auto is_legal = [&](int slope) {
+      return graph::can_prove_skewed_order(f, update, inner.var, outer.var, slope);
+    };
+    if (!is_legal(most_slope)) return std::nullopt;  // nor any smaller one
+    int slope = 1;
+    while (slope < most_slope && !is_legal(slope)) ++slope;
+    return slope;
   }
-  return std::nullopt;
-}
+
+ private:
+  bool has_few_pure_elements(const FuncContents& f, const Definition& update) {
+    int64_t elements = 1;
+    for (size_t d = 0; d < f.args.size(); ++d) {
+      if (!is_pure_position(f, update, d)) continue;
+      if (!sizes_) sizes_.emplace(outputs_);
+      elements *= sizes_->extent(f, d).value_or(most_pure_elements + 1);
+    }
+    return elements <= most_pure_elements;
+  }
+
+  const std::vector<FuncPtr>& outputs_;
+  const HostedFuncs hosted_;
+  std::optional<SizeEstimate> sizes_;  // computed when it is needed
+};
 
 // Replaces the two innermost loops of an update by three.
 class Skewer {
@@ -152,19 +168,18 @@ FrontLanes front_lanes(const Definition& update) {
 }
 
 bool has_wavefronts(const std::vector<FuncPtr>& outputs) {
-  const SizeEstimate sizes(outputs);
+  WavefrontFinder finder(outputs);
   return std::ranges::any_of(topological_order(outputs), [&](const FuncPtr& f) {
-    return std::ranges::any_of(f->updates, [&](const Definition& update) {
-      return slope_of_fronts(*f, update, sizes).has_value();
-    });
+    return std::ranges::any_of(
+        f->updates, [&](const Definition& update) { return finder.slope(*f, update).has_value(); });
   });
 }
 
 void run_in_wavefronts(const std::vector<FuncPtr>& outputs) {
-  const SizeEstimate sizes(outputs);
+  WavefrontFinder finder(outputs);
   for (const FuncPtr& f : topological_order(outputs)) {
     for (Definition& update : f->updates) {
-      if (const auto slope = slope_of_fronts(*f, update, sizes)) Skewer(*f, update, *slope).run();
+      if (const auto slope = finder.slope(*f, update)) Skewer(*f, update, *slope).run();
     }
   }
 }

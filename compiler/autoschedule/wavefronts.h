@@ -9,9 +9,11 @@
 // Points on one front are independent of each other, so costly values are computed in vectors, whose lanes lie on a
 // diagonal of the table; rows with cheap values are unrolled, since each hides the latency of the others.
 //
-// 1. The update is of a Func without directives, over reduction variables only or few pure elements besides, which
-//    would fill no vector. No reduction variable can be run in parallel or in vectors as it is (step_loops.h).
-// 2. The two innermost reduction variables each move one dimension of the written element, by one element.
+// 1. The update is of a Func without directives whose loops host no other Func. It is over reduction variables only, or
+//    few pure elements besides, which would fill no vector. No reduction variable can be run in parallel or in vectors
+//    as it is (step_loops.h).
+// 2. The two innermost reduction variables move one dimension each of the written element, by one element; the outer
+//    one may instead count sweeps over the same elements.
 // 3. With a slope of at most 4, every two iterations that access one element keep their order. This is proven over
 //    index sets (graph/definitions/race_checks.h), so reads may be clamped, lie further away, or be in arms of selects.
 //    Reads at data-dependent indices are not proven.
