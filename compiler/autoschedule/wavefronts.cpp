@@ -77,8 +77,10 @@ class WavefrontFinder {
   std::optional<int> slope(const FuncContents& f, const Definition& update) {
     if (!is_to_schedule(f, update) || hosted_.are_in(f)) return std::nullopt;
     const ReductionVariable &inner = update.rvars[0], &outer = update.rvars[1];
-    const int rows = front_lanes(update).rows;
-    if (!is_long(inner, 2 * rows) || !is_long(outer, rows) ||
+    const FrontLanes lanes = front_lanes(update);
+    // A block has slope * (rows - 1) fronts more than columns, on which rows wait for others.
+    const int waits = (lanes.in_vectors ? 1 : 2) * (lanes.rows - 1);
+    if (!is_long(inner, waits) || !is_long(outer, lanes.rows) ||
         !are_along_rows(update, inner.var, outer.var) || !read_elsewhere(f, update).defined() ||
         !has_few_pure_elements(f, update) || step_variables(f, update).any_independent())
       return std::nullopt;
@@ -88,7 +90,7 @@ class WavefrontFinder {
     if (!is_legal(most_slope)) return std::nullopt;  // nor any smaller one
     int slope = 1;
     while (slope < most_slope && !is_legal(slope)) ++slope;
-    return slope;
+    return is_long(inner, slope * waits) ? std::optional(slope) : std::nullopt;
   }
 
  private:

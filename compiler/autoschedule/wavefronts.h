@@ -17,7 +17,8 @@
 // 3. With a slope of at most 4, every two iterations that access one element keep their order. This is proven over
 //    index sets (graph/definitions/race_checks.h), so reads may be clamped, lie further away, or be in arms of selects.
 //    Reads at data-dependent indices are not proven.
-// 4. Both extents are known to be long enough for a block, or unknown.
+// 4. There are as many lines as a block has rows, and a block has at most twice as many fronts as columns, one and a
+//    half times as many if rows are unrolled. Extents may be unknown.
 //
 // Each value is computed by the same operations from the same values, so results keep their bits, but for functions
 // whose vector form rounds differently.

@@ -116,6 +116,12 @@ TEST_F(Wavefronts, OfSmallTablesAreNone) {
   EXPECT_EQ(loops_in_wavefronts(d), "r.y r.x");
   edit_distance(50, 6);
   EXPECT_EQ(loops_in_wavefronts(d), "r.y r.x");
+  begin(40, 40);
+  d(r.x, r.y) = d(r.x - 1, r.y) + d(r.x + 3, r.y - 1);
+  EXPECT_EQ(loops_in_wavefronts(d), "r.y r.x") << "the slope is 4";
+  begin(60, 40);
+  d(r.x, r.y) = d(r.x - 1, r.y) + d(r.x + 3, r.y - 1);
+  EXPECT_EQ(loops_in_wavefronts(d), "rows front row[]");
 }
 
 TEST_F(Wavefronts, OfManyTablesAreNone) {
@@ -302,7 +308,7 @@ std::vector<std::string> fronts_of_gradient(const Func& gradient) {
   return result;
 }
 
-// Of tables whose costs are those of a row, so that there are few differences to compute.
+// The costs of a table are those of a row, so that there are few differences to compute.
 struct GradientsOfWavefronts : Wavefronts {
   void begin_with_row(int width, int height) {
     image = random_image({width + 4}, 0.125, 1, 7);
