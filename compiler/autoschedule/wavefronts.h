@@ -20,8 +20,8 @@
 // 4. There are as many lines as a block has rows, and a block has at most twice as many fronts as columns, one and a
 //    half times as many if rows are unrolled. Extents may be unknown.
 //
-// Each value is computed by the same operations from the same values, so results keep their bits, but for functions
-// whose vector form rounds differently.
+// Each value is computed by the same operations from the same values: results keep their bits, but for products that are
+// contracted to FMA, and functions whose vector form rounds differently.
 //
 // Source: L. Lamport, The parallel execution of DO loops, CACM 1974 (the wavefront method); M. Wolfe, Loop skewing,
 // IJPP 1986. Not done: more than two skewed variables, such as several sweeps at once; fronts of blocks in parallel.
