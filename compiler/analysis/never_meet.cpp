@@ -50,6 +50,15 @@ class Conditions {
     if (a.valid && b.valid) choices_.push_back({a, b});
   }
 
+  // Whether the sum is certainly negative under the conditions so far, choices aside.
+  bool exclude(const Sum& sum) {
+    if (!sum.valid || numbers_.size() > most_unknowns) return false;
+    inequalities_.push_back(sum);
+    const bool result = are_empty();
+    inequalities_.pop_back();
+    return result;
+  }
+
   // Whether the conditions certainly have no solution. Choices are made one after the other, those of the last
   // coordinates first: they tell steps apart.
   bool contradict() {
@@ -195,7 +204,16 @@ class Point {
     return quotient;
   }
 
+  // Many clamps decide nothing, given the domain and the condition of the access: each choice that is left doubles the
+  // tests.
   Sum extreme(const Binary& op, Kind kind) {
+    for (const bool first : {true, false}) {
+      const Expr &taken = first ? op.a : op.b, &other = first ? op.b : op.a;
+      const Sum excess = plus(of(taken), of(other), -1);
+      // The other operand would have to be smaller in a minimum, larger in a maximum.
+      const Sum wins = kind == Kind::Min ? excess : plus(number(0), excess, -1);
+      if (conditions_.exclude(plus(wins, number(1), -1))) return of(taken);
+    }
     const Sum result = conditions_.unknown();
     for (const Expr& side : {op.a, op.b}) {
       conditions_.at_least_zero(kind == Kind::Min ? plus(of(side), result, -1)

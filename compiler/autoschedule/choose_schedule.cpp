@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <optional>
 
+#include "autoschedule/graph_rewrites.h"
 #include "autoschedule/keep_graph.h"
 #include "autoschedule/schedule_search.h"
 #include "autoschedule/stored_funcs.h"
-#include "autoschedule/sum_rewrites.h"
 #include "autoschedule/task_sizes.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
@@ -129,8 +129,8 @@ ChosenSchedule choose_schedule(const PipelineSpec& pipeline, const Target& targe
   run_on_large_stack([&] {
     const std::vector<FuncPtr> wrapped = apply_wrappers(pipeline.outputs);
     if (is_differentiated(wrapped)) {
-      result = choose_schedule(with_rewritten_sums(wrapped), request, Scheduling::Gradients, target,
-                               wants_runner_up);
+      result = choose_schedule(with_graph_rewrites(wrapped, /*on_gpu=*/false), request,
+                               Scheduling::Gradients, target, wants_runner_up);
       return;
     }
     result.graph.outputs = schedule_unscheduled(pipeline.outputs, request.unit, request.options);

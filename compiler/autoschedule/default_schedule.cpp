@@ -12,6 +12,7 @@
 #include "autoschedule/cut_scatters.h"
 #include "autoschedule/epilogues.h"
 #include "autoschedule/gpu_schedule.h"
+#include "autoschedule/graph_rewrites.h"
 #include "autoschedule/join_sweeps.h"
 #include "autoschedule/lane_dimension.h"
 #include "autoschedule/memory_budget.h"
@@ -31,7 +32,6 @@
 #include "autoschedule/stored_funcs.h"
 #include "autoschedule/strips.h"
 #include "autoschedule/sum_blocks.h"
-#include "autoschedule/sum_rewrites.h"
 #include "autoschedule/task_sizes.h"
 #include "autoschedule/tile_chains.h"
 #include "diagnostics/large_stack.h"
@@ -272,7 +272,8 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
   run_on_large_stack([&] {
     result = apply_wrappers(outputs);
     if (is_differentiated(result)) {
-      result = schedule_within_budget(with_rewritten_sums(result), request, Scheduling::Gradients)
+      result = schedule_within_budget(with_graph_rewrites(result, /*on_gpu=*/false), request,
+                                      Scheduling::Gradients)
                    .outputs;
     } else if (!stored_by_default(result).empty()) {
       result = copy_graph(result).outputs;

@@ -9,11 +9,13 @@
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/row_scans.h"
+#include "autoschedule/wavefronts.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
 #include "graph/definitions/own_reads.h"
 #include "graph/definitions/race_checks.h"
 #include "ir/build.h"
+#include "ir/markers.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
 
@@ -157,7 +159,10 @@ class StepScheduler {
   void give(int most_lanes) {
     reorder(variables_.order());
     run_pure_loops_in_parallel();
-    row().empty() ? run_several_rows() : vectorize_row(most_lanes);
+    if (!row().empty())
+      vectorize_row(most_lanes);
+    else if (!run_front())
+      run_several_rows();
     if (all_have_work_) run_in_parallel(variables_.apart);
     if (step_has_work_) run_in_parallel(variables_.points);
   }
@@ -234,6 +239,30 @@ class StepScheduler {
     stage_.split(RVar(all), RVar(all), row, chains.rows, TailStrategy::GuardWithIf);
     reorder(joined({row.name()}, variables_.inside));
     chains.in_vectors ? stage_.vectorize(row) : stage_.unroll(row);
+  }
+
+  // Whether the innermost points lie on a diagonal, so that they run in vectors with a stride, or unrolled
+  // (wavefronts.h).
+  bool run_front() {
+    const Names loops = variables_.order();
+    const std::string all = loops.front();
+    const auto is_diagonal = [&](const Expr& place) {
+      return std::any_of(loops.begin() + 1, loops.end(), [&](const std::string& other) {
+        const auto form = decompose(without_promises(place), {all, other});
+        return form && form->coefficients.size() == 2;
+      });
+    };
+    if (std::ranges::none_of(update().args, is_diagonal) ||
+        !graph::can_prove_race_free(f_, update(), all, {loops.begin() + 1, loops.end()}))
+      return false;
+    const FrontLanes lanes = front_lanes(update());
+    RVar point(all);
+    if (extent_of(update(), all) != lanes.rows) {
+      point = RVar(inner_loop(f_, index_, all));
+      stage_.split(RVar(all), RVar(all), point, lanes.rows, TailStrategy::GuardWithIf);
+    }
+    lanes.in_vectors ? stage_.vectorize(point) : stage_.unroll(point);
+    return true;
   }
 
   void run_in_parallel(const Names& loops) {

@@ -1,5 +1,5 @@
 // autoschedule.cpp -- binds auto_schedule, its options and results, and Python autoschedulers.
-#include "autoschedule/sum_rewrites.h"
+#include "autoschedule/graph_rewrites.h"
 #include "bind_all.h"
 #include "binding.h"
 #include "callback.h"
@@ -154,7 +154,9 @@ Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target) {
   const PipelineSpec spec = pipeline.spec();
   std::vector<graph::FuncPtr> funcs = graph::apply_wrappers(spec.outputs);
   const bool schedules = target.has_gpu_feature() || graph::schedule_log(funcs).size() == 0;
-  if (schedules) funcs = autoschedule::with_rewritten_sums(funcs, autoschedule::SumOrder::Free);
+  if (schedules)
+    funcs = autoschedule::with_graph_rewrites(funcs, target.has_gpu_feature(),
+                                              autoschedule::SumOrder::Free);
   funcs = graph::copy_graph(funcs).outputs;
   Pipeline copy(std::vector<Func>(funcs.begin(), funcs.end()));
   copy.set_autoschedule(spec.autoschedule);

@@ -170,6 +170,29 @@ TEST_F(StepLoops, InPlaceInTwoColours) {
   expect_results(p, {42, 42});
 }
 
+TEST_F(StepLoops, InPlaceInTwoColoursByChoice) {
+  Func p("p");
+  p(x, y) = cast<float>(x * 3 % 5 + y);
+  RDom r(1, 40, 1, 40, 0, 5, "r");
+  const Expr next = p(r.x - 1, r.y) + p(r.x + 1, r.y) + p(r.x, r.y - 1) + p(r.x, r.y + 1);
+  p(r.x, r.y) = select((r.x + r.y + r.z) % 2 == 0, 0.25f * next, p(r.x, r.y));
+  EXPECT_EQ(scheduled_loops(p), "r.z r.y r.x xi<>");
+  expect_results(p, {42, 42});
+}
+
+// The size is unknown, so rows are parallel.
+TEST_F(StepLoops, InPlaceOfOneColourByChoiceAreParallel) {
+  Func p("p");
+  Param<int> n("n");
+  n.set(40);
+  p(x, y) = cast<float>(x * 3 % 5 + y);
+  RDom r(1, n, 1, n, "r");
+  const Expr next = p(r.x - 1, r.y) + p(r.x + 1, r.y) + p(r.x, r.y - 1) + p(r.x, r.y + 1);
+  p(r.x, r.y) = select((r.x + r.y) % 2 != 1, 0.25f * next, p(r.x, r.y));
+  EXPECT_EQ(scheduled_loops(p), "r.y|| r.x xi<>");
+  expect_results(p, {42, 42});
+}
+
 // Rows that never meet are the outermost tasks, and the steps run inside of them.
 TEST_F(StepLoops, AreInsideOfWhatIsApart) {
   u(x, y, t) = cast<float>(x * y % 5);
@@ -281,6 +304,18 @@ TEST_F(GradientsOfStepLoops, OfAWave) {
   wave(11, 4);
   take_last(5);
   gradient::expect_gradient(gradient::weighted_sum(last, {11, 11}), image);
+}
+
+TEST_F(GradientsOfStepLoops, InPlaceInTwoColoursByChoice) {
+  image = random_image({11, 9}, -1, 1, 3);
+  Func p("p");
+  p(x, y) = image(x, y);
+  RDom r(1, 9, 1, 7, 0, 3, "r");
+  const Expr next = p(r.x - 1, r.y) + p(r.x + 1, r.y) + p(r.x, r.y - 1) + p(r.x, r.y + 1);
+  p(r.x, r.y) = select((r.x + r.y + r.z) % 2 == 0, 0.25f * next, p(r.x, r.y));
+  const Func loss = gradient::weighted_sum(p, {11, 9});
+  gradient::expect_gradient(loss, image);
+  EXPECT_EQ(loops_of_recurrence(propagate_adjoints(loss)(image)), "reverse reverse reverse reversei<>");
 }
 
 TEST_F(GradientsOfStepLoops, OfNoStep) {

@@ -7,6 +7,7 @@
 #include "graph/definitions/associative_update.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "ir/lets.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
@@ -40,6 +41,22 @@ bool is_never_written(const Call& call, const Definition& update) {
     if (can_prove(read.max < written.min) || can_prove(read.min > written.max)) return true;
   }
   return false;
+}
+
+bool is_parity(const Expr& e) {
+  const auto constant = as_const_int(e);
+  const auto* remainder = e.as<Mod>();
+  return remainder ? as_const_int(remainder->b) == 2
+                   : constant && (*constant == 0 || *constant == 1);
+}
+
+// Parities that differ: one is 1 minus the other. Proofs use equations, not their negations.
+Expr as_equation(const Expr& condition) {
+  const auto* negated = condition.as<Not>();
+  const Binary* sides = condition.as<NE>();
+  if (negated) sides = negated->a.as<EQ>();
+  if (!sides || !is_parity(sides->a) || !is_parity(sides->b)) return condition;
+  return sides->a == 1 - sides->b;
 }
 
 // The reads of a Func by its own update, each with the condition under which its value matters: both
@@ -85,8 +102,8 @@ class OwnReads {
   void choose(const Expr& condition, const Expr& if_true, const Expr& if_false, const Expr& where) {
     const auto with = [&](const Expr& more) { return where.defined() ? where && more : more; };
     visit(condition, where);
-    visit(if_true, with(condition));
-    visit(if_false, with(logical_not(condition)));
+    visit(if_true, with(as_equation(condition)));
+    visit(if_false, with(as_equation(logical_not(condition))));
   }
 
   const FuncContents& f_;
@@ -95,6 +112,26 @@ class OwnReads {
   int visits_ = 0;
   std::vector<Access> reads_;
 };
+
+// The condition under which an update changes the element that it writes: c in f(p) = select(c, value, f(p)).
+// Undefined: always.
+Expr changes_where(const FuncContents& f, const Definition& update) {
+  Expr condition;
+  for (size_t k = 0; k < update.values.size(); ++k) {
+    const Expr value = without_lets(update.values[k]);
+    const auto* choice = value.as<Select>();
+    if (!choice || !choice->condition.type().is_scalar()) return {};
+    const auto keeps = [&](const Expr& arm) {
+      return is_old_value(arm, f, update, static_cast<int>(k));
+    };
+    if (!keeps(choice->when_true) && !keeps(choice->when_false)) return {};
+    const Expr& asked = choice->condition;
+    const Expr here = as_equation(keeps(choice->when_false) ? asked : logical_not(asked));
+    if (condition.defined() && !equal(condition, here)) return {};
+    condition = here;
+  }
+  return condition;
+}
 
 // Those behind position `i`: the variables of the loops around that of position `i`.
 std::unordered_set<std::string> names_after(const std::vector<std::string>& loops, size_t i) {
@@ -111,12 +148,13 @@ Expr read_of_other_element(const FuncContents& f, const Definition& update) {
 }
 
 bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar,
-                         const std::unordered_set<std::string>& around) {
+                         const std::unordered_set<std::string>& around, bool may_store_old_values) {
   const MeetingPoints points = points_of(update);
   const Access write{update.args, {}};
   if (!can_prove_never_meet(points, rvar, write, write, around)) return false;
+  const Access change{update.args, may_store_old_values ? changes_where(f, update) : Expr()};
   return std::ranges::all_of(OwnReads(f, update).find(), [&](const Access& read) {
-    return can_prove_never_meet(points, rvar, write, read, around);
+    return can_prove_never_meet(points, rvar, change, read, around);
   });
 }
 
@@ -125,13 +163,13 @@ bool can_prove_same_order(const FuncContents& f, const Definition& update,
                           const std::vector<std::string>& after) {
   if (before == after) return true;
   const MeetingPoints points = points_of(update);
-  const Access write{update.args, {}};
+  const Access write{update.args, {}}, change{update.args, changes_where(f, update)};
   const std::vector<Access> reads = OwnReads(f, update).find();
   const auto never_meet = [&](const PointOrder& order) {
     return can_prove_never_meet(points, order, write, write) &&
            std::ranges::all_of(reads, [&](const Access& read) {
-             return can_prove_never_meet(points, order, write, read) &&
-                    can_prove_never_meet(points, order, read, write);
+             return can_prove_never_meet(points, order, change, read) &&
+                    can_prove_never_meet(points, order, read, change);
            });
   };
   // The first point runs earlier in the order `before`, which the outermost variable in which the
@@ -146,6 +184,31 @@ bool can_prove_same_order(const FuncContents& f, const Definition& update,
     }
   }
   return true;
+}
+
+bool can_prove_skewed_order(const FuncContents& f, const Definition& update,
+                            const std::string& inner, const std::string& outer, int slope) {
+  MeetingPoints points = points_of(update);
+  PointOrder later{{}, {outer}, {}};  // the second point runs later,
+  for (const ReductionVariable& r : update.rvars) {
+    if (r.var != inner && r.var != outer) later.same.insert(r.var);
+  }
+  const std::string sum = inner + "+" + outer;
+  points.variables.push_back({sum, {}, {}});
+  points.conditions.push_back(variable(sum) == variable(inner) + slope * variable(outer));
+  PointOrder equal = later, earlier = later;  // but its sum is equal or smaller
+  equal.same.insert(sum);
+  earlier.smaller.push_back(sum);
+  const Access write{update.args, {}}, change{update.args, changes_where(f, update)};
+  std::vector<std::pair<Access, Access>> pairs{{write, write}};
+  for (const Access& read : OwnReads(f, update).find()) {
+    pairs.emplace_back(change, read);
+    pairs.emplace_back(read, change);
+  }
+  return std::ranges::all_of(pairs, [&](const auto& pair) {
+    return can_prove_never_meet(points, equal, pair.first, pair.second) &&
+           can_prove_never_meet(points, earlier, pair.first, pair.second);
+  });
 }
 
 bool can_prove_commutative(const FuncContents& f, const Definition& update) {

@@ -18,8 +18,13 @@ namespace retrograde::graph {
 //   u(r.x, r.t) = u(r.x - 1, r.t - 1) + u(r.x + 1, r.t - 1)     r.x: not race free, since (x, t) reads what
 //                                                               (x + 1, t - 1) writes; inside of a loop over
 //                                                               r.t: race free
+//
+// An iteration may store again the value that an element had, while others read that element, as in two colours:
+//   u(r.x, r.y) = select((r.x + r.y + r.t) % 2 == 0, u(r.x - 1, r.y) + u(r.x + 1, r.y), u(r.x, r.y))
+// Unless `may_store_old_values` is set, such stores count as changes: threads of a kernel promise nothing about them.
 bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar,
-                         const std::unordered_set<std::string>& around = {});
+                         const std::unordered_set<std::string>& around = {},
+                         bool may_store_old_values = true);
 
 // Whether loops over the reduction variables in the order `after`, instead of `before`, run every two
 // iterations that access one element in the same order, if one of them writes it. Both lists hold all
@@ -27,6 +32,15 @@ bool can_prove_race_free(const FuncContents& f, const Definition& update, const 
 bool can_prove_same_order(const FuncContents& f, const Definition& update,
                           const std::vector<std::string>& before,
                           const std::vector<std::string>& after);
+
+// Whether the order of `inner + slope * outer` is that of a loop over `inner` inside of one over `outer` for every two
+// iterations that access one element, if one of them writes it and both agree in the other variables. Iterations with
+// equal sums then access different elements. False means unknown.
+//
+//   d(r.x, r.y) = f(d(r.x - 1, r.y), d(r.x, r.y - 1))       slope 1: diagonals
+//   d(r.x, r.y) = f(d(r.x - 1, r.y), d(r.x + 1, r.y - 1))   slope 2
+bool can_prove_skewed_order(const FuncContents& f, const Definition& update,
+                            const std::string& inner, const std::string& outer, int slope);
 
 // Whether all points of the update commute: it is f(same point) op e with an operator that is
 // proven associative and commutative, for ties too. Floats are included, although reordering

@@ -113,6 +113,7 @@ struct ConcurrentLoop {
   std::string name;
   bool is_vectorized = false;
   std::unordered_set<std::string> around;  // reduction variables in which these iterations agree
+  bool is_in_kernel = false;
 };
 
 void check_concurrent(const SchedulePlace& at, const ConcurrentLoop& loop, const std::string& asked,
@@ -121,7 +122,7 @@ void check_concurrent(const SchedulePlace& at, const ConcurrentLoop& loop, const
   const StageLoops& now = at.schedule();
   if (now.allow_races) return;
   for (const std::string& root : reduction_roots(stage, now, loop.name)) {
-    if (can_prove_race_free(*at.f, stage, root, loop.around)) continue;
+    if (can_prove_race_free(*at.f, stage, root, loop.around, !loop.is_in_kernel)) continue;
     if (now.atomic) {
       if (now.override_associativity && loop.is_vectorized) continue;
       if (stores_one_value(*at.f, stage)) continue;
@@ -201,7 +202,7 @@ void check_reduction_order(const SchedulePlace& at, const std::vector<Dim>& dims
 void check_race_free(const SchedulePlace& at, const std::string& loop, ForType runs,
                      const std::string& asked) {
   const std::vector<Dim>& dims = at.schedule().dims;
-  ConcurrentLoop concurrent{loop, runs == ForType::Vectorized, {}};
+  ConcurrentLoop concurrent{loop, runs == ForType::Vectorized, {}, is_gpu(runs)};
   const auto found = std::ranges::find(dims, loop, &Dim::var);
   if (found != dims.end() && !is_gpu(runs)) {
     concurrent.around = variables_around(at.definition(), at.schedule(), dims,
@@ -216,7 +217,7 @@ void check_fused_race(const SchedulePlace& at, size_t inner, size_t outer,
   for (const size_t i : {inner, outer}) {
     const Dim& concurrent = dims[i];
     if (!has_concurrent_iterations(concurrent)) continue;
-    ConcurrentLoop fused{"", concurrent.runs == ForType::Vectorized, {}};
+    ConcurrentLoop fused{"", concurrent.runs == ForType::Vectorized, {}, is_gpu(concurrent.runs)};
     if (outer == inner + 1 && !is_gpu(concurrent.runs))
       fused.around = variables_around(at.definition(), at.schedule(), dims, outer);
     for (const size_t part : {inner, outer}) {

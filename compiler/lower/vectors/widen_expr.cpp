@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "diagnostics/error.h"
+#include "simplify/simplify.h"
 
 namespace retrograde::lower {
 
@@ -43,7 +44,7 @@ Expr combine_ramps(Kind kind, const Expr& a, const Expr& b) {
   if (kind == Kind::Add || kind == Kind::Mul) return combine_ramps(kind, b, a);
   Expr part = repeated_part(a, rb->lanes);
   if (kind != Kind::Sub || !part.defined()) return {};
-  Expr falling = binary(Kind::Sub, make_zero(rb->stride.type()), rb->stride);
+  const Expr falling = simplify(binary(Kind::Sub, make_zero(rb->stride.type()), rb->stride));
   return make_ramp(binary(Kind::Sub, part, rb->base), falling, rb->lanes);
 }
 
@@ -270,6 +271,9 @@ Expr Widener::widen_call(const Expr& e, const Call& n) {
   if (n.call_type == CallType::Extern) return widen_extern(n);
   RETROGRADE_ASSERT(n.call_type == CallType::Operator, "a call of ", n.name,
                     " in the phase FlatStorage");
+  // Bounds are known by now, and a ramp says more about the lanes of an index than a promise does.
+  const bool promises = n.is_op(Op::promise_clamped, Op::unsafe_promise_clamped);
+  if (promises && (*this)(n.args[0]).kind() == Kind::Ramp) return (*this)(n.args[0]);
   std::vector<Expr> args = mapped(n.args, [&](const Expr& arg) { return spread(arg); });
   return call_op(n.op, n.type.with_lanes(n.type.lanes() * iterations_), std::move(args));
 }

@@ -30,6 +30,13 @@ struct RaceChecks : ::testing::Test {
     for (const int j : around) names.insert(name(j));
     return can_prove_race_free(*u.function(), update(), name(i), names);
   }
+  // The least slope of fronts over variables 0 and 1; 0: none up to 4.
+  int slope() const {
+    for (int slope = 1; slope <= 4; ++slope) {
+      if (can_prove_skewed_order(*u.function(), update(), name(0), name(1), slope)) return slope;
+    }
+    return 0;
+  }
   bool keeps_order(const std::vector<int>& after) const {
     Names from, to;
     for (size_t i = 0; i < after.size(); ++i) from.push_back(name(static_cast<int>(i)));
@@ -93,6 +100,38 @@ TEST_F(RaceChecks, RedAndBlackPoints) {
   EXPECT_FALSE(keeps_order({0, 1, 3, 2})) << "all sweeps of the red points first";
 }
 
+// The other points store the value that they have.
+TEST_F(RaceChecks, RedAndBlackPointsByChoice) {
+  const Expr here = u(r.x, r.y, 0);
+  const Expr next = u(r.x - 1, r.y, 0) + u(r.x + 1, r.y, 0) + u(r.x, r.y - 1, 0);
+  define({r.x, r.y, 0}, select((r.x + r.y + r.z) % 2 == 0, next, here));
+  EXPECT_TRUE(is_free(0, {2}));
+  EXPECT_TRUE(is_free(1, {2}));
+  EXPECT_FALSE(is_free(0, {}));
+  EXPECT_FALSE(can_prove_race_free(*u.function(), update(), name(0), {name(2)}, false));
+  EXPECT_TRUE(keeps_order({1, 0, 2}));
+  EXPECT_FALSE(keeps_order({2, 0, 1}));
+}
+
+TEST_F(RaceChecks, TheFirstArmMayKeepTheValue) {
+  const Expr here = u(r.x, r.y, 0);
+  define({r.x, r.y, 0}, select((r.x + r.y) % 2 == r.z % 2, here, u(r.x - 1, r.y, 0)));
+  EXPECT_TRUE(is_free(0, {2}));
+  EXPECT_FALSE(is_free(0, {}));
+}
+
+TEST_F(RaceChecks, AChoiceThatChangesBothColours) {
+  const Expr next = u(r.x - 1, r.y, 0) + u(r.x + 1, r.y, 0);
+  define({r.x, r.y, 0}, select((r.x + r.y + r.z) % 2 == 0, next, 2 * u(r.x, r.y, 0)));
+  EXPECT_FALSE(is_free(0, {2}));
+}
+
+// An iteration that stores the old value would undo what another one stores there.
+TEST_F(RaceChecks, AnElementOfWhichOneIterationKeepsTheValue) {
+  define({r.y, r.z, 0}, select(r.x == 3, u(r.y, r.z, 0) + 1, u(r.y, r.z, 0)));
+  EXPECT_FALSE(is_free(0, {1, 2}));
+}
+
 TEST_F(RaceChecks, PointsInPlaceOfOneColour) {
   RDom s(1, 8, 1, 6, 0, 2, 0, 4, "s");
   s.where((s.x + s.y) % 2 == s.z);
@@ -109,6 +148,42 @@ TEST_F(RaceChecks, Wavefronts) {
   EXPECT_TRUE(is_free(0, {1}));
   EXPECT_FALSE(is_free(0, {}));
   EXPECT_TRUE(keeps_order({1, 0})) << "column by column";
+}
+
+TEST_F(RaceChecks, FrontsOfATable) {
+  define({r.x, r.y, 0}, u(r.x - 1, r.y, 0) + u(r.x, r.y - 1, 0) + u(r.x - 1, r.y - 1, 0));
+  EXPECT_EQ(slope(), 1);
+}
+
+TEST_F(RaceChecks, FrontsAreSteeperIfTheRowBeforeIsReadAhead) {
+  define({r.x, r.y, 0}, u(r.x - 1, r.y, 0) + u(r.x + 2, r.y - 1, 0));
+  EXPECT_EQ(slope(), 3);
+}
+
+TEST_F(RaceChecks, FrontsAreSteeperIfARowIsReadThatIsYetToBeWritten) {
+  define({r.x, r.y, 0}, u(r.x - 1, r.y, 0) + u(r.x - 1, r.y + 1, 0));
+  EXPECT_EQ(slope(), 2);
+}
+
+TEST_F(RaceChecks, FrontsOfRowsThatAreReadFurtherAway) {
+  define({r.x, r.y, 0}, u(r.x - 3, r.y, 0) + u(r.x + 2, r.y - 3, 0));
+  EXPECT_EQ(slope(), 1);
+}
+
+TEST_F(RaceChecks, NoFrontsOfARowThatIsReadAsAWhole) {
+  define({r.x, r.y, 0}, u(r.x - 1, r.y, 0) + u(8, r.y - 1, 0));
+  EXPECT_EQ(slope(), 0);
+}
+
+// The next row overwrites an element that this one reads a step later.
+TEST_F(RaceChecks, FrontsOfARowInPlace) {
+  define({r.x, 0, 0}, u(r.x - 1, 0, 0) + r.y);
+  EXPECT_EQ(slope(), 2);
+}
+
+TEST_F(RaceChecks, FrontsOfReadsThatAreClamped) {
+  define({r.x, r.y, 0}, u(max(r.x - 1, 0), r.y, 0) + u(r.x, max(r.y - 1, 1), 0));
+  EXPECT_EQ(slope(), 1);
 }
 
 TEST_F(RaceChecks, PlacesThatDataDecide) {
@@ -174,6 +249,7 @@ struct RandomUpdate {
     for (int n = 1 + pick(2); n > 0; --n)
       reads.push_back(pick(3) ? shifted(write) : some_access(3));
     parity = pick(3) == 0 ? 1 + pick(2) : 0;
+    chooses = parity && pick(2);
   }
 
   int pick(int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); }
@@ -192,7 +268,8 @@ struct RandomUpdate {
     for (Point& row : access.rows) row.back() += pick(3) - 1;
     return access;
   }
-  bool holds(const Point& p) const { return !parity || (p[0] + p[1]) % (parity + 1) == 0; }
+  bool changes(const Point& p) const { return !parity || (p[0] + p[1]) % (parity + 1) == 0; }
+  bool holds(const Point& p) const { return chooses || changes(p); }
 
   std::vector<Point> iterations() const {  // in their order
     std::vector<Point> all{Point(extents.size())};
@@ -208,21 +285,23 @@ struct RandomUpdate {
   }
   bool conflict(const Point& p, const Point& q) const {
     if (write.at(p) == write.at(q)) return true;
-    return std::ranges::any_of(reads, [&](const Access& read) {
-      return write.at(p) == read.at(q) || write.at(q) == read.at(p);
-    });
+    return changes(p) && changes(q) && std::ranges::any_of(reads, [&](const Access& read) {
+             return write.at(p) == read.at(q) || write.at(q) == read.at(p);
+           });
   }
   Func func() const {
     std::vector<Range> ranges;
     for (const int extent : extents) ranges.push_back({0, extent});
     RDom r(ranges);
-    if (parity) r.where((r[0] + r[1]) % (parity + 1) == 0);
+    const Expr changes = parity ? (r[0] + r[1]) % (parity + 1) == 0 : const_true();
+    if (parity && !chooses) r.where(changes);
     Var x("x"), y("y");
     Func u("u");
     u(x, y) = 0;
     Expr sum = 1;
     for (const Access& read : reads) sum = sum + u(read.exprs(r));
-    u(write.exprs(r)) = sum + r[0];
+    const std::vector<Expr> place = write.exprs(r);
+    u(place) = chooses ? select(changes, sum + r[0], u(place)) : sum + r[0];
     return u;
   }
 
@@ -231,6 +310,8 @@ struct RandomUpdate {
   Access write;
   std::vector<Access> reads;
   int parity = 0;
+  bool chooses =
+      false;  // between a new value and the old one by the parity, instead of skipping iterations
 };
 
 // Whether some pair of iterations that conflict has the property.
@@ -303,19 +384,41 @@ void check_orders(const RandomUpdate& program, const FuncContents& f, Score& sco
   } while (std::ranges::next_permutation(after).found);
 }
 
+void check_skews(const RandomUpdate& program, const FuncContents& f, Score& score) {
+  const Definition& update = f.updates.at(0);
+  const size_t rank = program.extents.size();
+  if (update.rvars.size() != rank) return;
+  std::vector<size_t> order;
+  for (size_t i = 0; i < rank; ++i) order.push_back(i);
+  for (int slope = 1; slope <= 3; ++slope) {
+    const auto front = [&](const Point& p) { return p[0] + slope * p[1]; };
+    const bool changes = any_conflict(program, [&](const Point& p, const Point& q) {
+      const bool is_pair = rank < 3 || p[2] == q[2];
+      return is_pair && runs_before(p, q, order) && front(p) >= front(q);
+    });
+    const bool proven =
+        can_prove_skewed_order(f, update, update.rvars[0].var, update.rvars[1].var, slope);
+    EXPECT_FALSE(proven && changes);
+    score.proven += proven;
+    score.possible += !changes;
+  }
+}
+
 TEST(RaceChecksOfRandomUpdates, AreSoundAndRarelyUnsure) {
-  Score loops, orders;
+  Score loops, orders, skews;
   for (unsigned seed = 0; seed < 400; ++seed) {
     SCOPED_TRACE(text("seed ", seed));
     const RandomUpdate program(seed);
     const Func u = program.func();
     check_loops(program, *u.function(), loops);
     check_orders(program, *u.function(), orders);
+    check_skews(program, *u.function(), skews);
     if (::testing::Test::HasFailure()) return;
   }
   EXPECT_GT(loops.possible, 1000);
   EXPECT_GT(loops.proven, loops.possible * 9 / 10) << loops.possible;
   EXPECT_GT(orders.proven, orders.possible * 9 / 10) << orders.possible;
+  EXPECT_GT(skews.proven, skews.possible * 9 / 10) << skews.possible;
 }
 
 }  // namespace
