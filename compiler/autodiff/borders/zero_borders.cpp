@@ -189,6 +189,7 @@ void leave_zeros_to_adjoints(std::vector<Contribution>& contributions,
     const Gather& g = c.gather;
     if (!g.rdom || g.scatters || !g.predicate.defined()) continue;
     std::vector<Expr> conditions, kept;
+    std::vector<DroppedClamp> all_dropped;
     add_conjuncts(g.predicate, conditions);
     for (const Expr& condition : conditions) {
       const bool may_go =
@@ -200,8 +201,10 @@ void leave_zeros_to_adjoints(std::vector<Contribution>& contributions,
         kept.push_back(condition);
         continue;
       }
-      c.adjoint = without_clamps(term, dropped, g);
+      c.adjoint = term;
+      append(all_dropped, dropped);
     }
+    c.adjoint = without_clamps(c.adjoint, all_dropped, g);
     if (kept.size() < conditions.size())
       c.gather.predicate = kept.empty() ? Expr() : conjunction(kept);
   }
