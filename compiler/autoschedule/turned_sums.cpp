@@ -21,6 +21,7 @@ namespace {
 // Vectors of a tile, and elements along its side. Of fewer channels, vectors of strided terms are as fast.
 constexpr int64_t most_vectors_of_tile = 4, least_vectors_of_tile = 3, rows_of_tile = 4;
 constexpr double least_uses_of_copy = 64;  // of an element: products
+constexpr double few_uses = 16;            // that pay where vectors would be nearly empty
 constexpr int64_t most_rows = 8;           // of a side, without private lanes
 constexpr int64_t least_terms = 63,
                   least_terms_of_block = 15;  // more are added without private lanes
@@ -277,7 +278,7 @@ class SumTurner {
     const auto index = read ? index_along(*read, operands_.name(d)) : std::nullopt;
     if (!index || operands_.extent(d) < lanes_ || !operands_.is_alone(*read)) return;
     auto copy = whole_operand(*read, sums_, *index);
-    if (!copy || operands_.uses(*read) < least_uses_of_copy) return;
+    if (!copy || operands_.uses(*read) < few_uses) return;
     std::vector<size_t> sides;
     for (size_t e = 0; e < operands_.dimensions(); ++e) {
       const bool is_moved = e == d || moves(*read, operands_.name(e));
@@ -346,8 +347,7 @@ class SumTurner {
   // Operands of which single elements are read, with what a tile reads at once next to each other.
   void add_copies() {
     for (const Call* call : operands_.reads()) {
-      if (call == read_ || !operands_.is_alone(*call) || operands_.uses(*call) < least_uses_of_copy)
-        continue;
+      if (call == read_ || !operands_.is_alone(*call) || operands_.uses(*call) < few_uses) continue;
       size_t row = 0;
       for (const RegisterTile::Side& side : best_->sides) {
         if (const auto index = index_along(*call, operands_.name(side.dimension))) row = *index;

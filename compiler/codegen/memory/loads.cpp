@@ -85,7 +85,7 @@ Value* load_scalar(FunctionContext& c, const Storage& from, Type type, Value* in
   return from_memory(c.e, type, predicate ? c.value_if(predicate, load) : load());
 }
 
-// Of consecutive elements from `start` on, those of active lanes, which are s apart.
+// Marks, among consecutive elements from `start` on, those of active lanes, which are s apart.
 Value* mask_of_part(FunctionContext& c, Value* predicate, int start, int s) {
   const int n =
       static_cast<int>(llvm::cast<llvm::FixedVectorType>(predicate->getType())->getNumElements());
