@@ -376,7 +376,10 @@ void pack_whole(const FuncPtr& f, const PackedOperand& operand, int lanes) {
   Func copy = copy_for(f, operand);
   copy.compute_root();
   schedule_copy(copy, operand.lane_dimension, lanes);
-  copy.parallel(copy.args().back());
+  const std::vector<Var> args = copy.args();
+  copy.parallel(args.back());
+  if (operand.lane_dimension + 1 < args.size() && args.size() > 2)  // vectors are no loop around others
+    copy.parallel(args[args.size() - 2]);
 }
 
 }  // namespace retrograde::autoschedule

@@ -22,6 +22,7 @@
 #include "autoschedule/scatter_schedule.h"
 #include "autoschedule/short_rows.h"
 #include "autoschedule/step_loops.h"
+#include "autoschedule/turned_loops.h"
 #include "autoschedule/turned_sums.h"
 #include "autoschedule/vector_chains.h"
 #include "frontend/language/func.h"
@@ -98,6 +99,7 @@ class LoopChooser {
       unroll_taps(definition(), stage_);
     if (const FuncPtr block = block_of(definition())) return give_blocks(block);
     if (makes(Decision::LayoutStaging) && add_turned_lanes(function_, index_, lanes)) return;
+    if (!scatters && turn_sum()) return;
     const bool has_pure_rows = !pure_.empty() && pure_[0] == 0;
     if (!scatters && !has_pure_rows && schedule_steps(function_, index_, lanes_of_values(), sizes_))
       return;
@@ -472,11 +474,13 @@ class LoopChooser {
   // The sums of a tile: a block of each after the other, in registers, is added to what memory
   // holds.
   void give_blocks(const FuncPtr& block) {
-    if (pure_.empty() || pure_[0] != 0) return compute_block(block, {});
-    if (makes(Decision::LayoutStaging) && makes(Decision::RegisterTiles)) {
-      if (const auto turned = turned_sum(*block, lanes, request_.unit, sizes_))
-        return give_turned_blocks(block, *turned);
+    if (makes_turned_tiles()) {
+      auto turned = turned_lanes(*block, lanes, request_.unit, sizes_);
+      if (!turned && has_idle_rows() && block->updates.size() == 1)
+        turned = turned_sum(*block, block->updates[0], lanes, request_.unit, sizes_);
+      if (turned) return give_turned_blocks(block, *turned);
     }
+    if (pure_.empty() || pure_[0] != 0) return compute_block(block, {});
     const RegisterTile tile = tile_of(*block, block->updates[0]).value_or(RegisterTile());
     const RegisterTile own = renumbered(tile, *block);
     const std::vector<size_t> shifts = shifts_of(*block, own);
@@ -488,6 +492,33 @@ class LoopChooser {
     run_in_parallel(tiles, own);
     for (int s = 0; s < block->stage_count(); ++s)
       LoopChooser(block, s, request_, sizes_).cut(tile);
+  }
+
+  bool makes_turned_tiles() const {
+    return makes(Decision::LayoutStaging) && makes(Decision::RegisterTiles);
+  }
+  // Whether vectors along the first dimension would be nearly empty.
+  bool has_idle_rows() const {
+    if (pure_.empty() || f_.args.size() < 2) return false;
+    return pure_[0] != 0 || 2 * sizes_.extent(f_, 0).value_or(lanes) <= lanes;
+  }
+  // Adds up the terms in a Func of its own, whose rows lie along another dimension; the update adds its sums. Returns
+  // false if other loops are as good.
+  bool turn_sum() {
+    if (index_ == 0 || !makes_turned_tiles() || !has_idle_rows()) return false;
+    const auto turned = turned_sum(f_, definition(), lanes, request_.unit, sizes_);
+    if (!turned) return false;
+    std::vector<RVar> terms;
+    for (const ReductionVariable& r : reduction_loops(f_, definition())) terms.emplace_back(r.var);
+    const FuncPtr sums = stage_.rfactor(std::vector<std::pair<RVar, Var>>()).function();
+    Func(sums).compute_root();
+    const std::vector<VarOrRVar> tiles = give_turned_loops(sums, *turned, terms, lanes);
+    for (int s = 0; s < sums->stage_count(); ++s) {
+      for (size_t i = tiles.size(); i-- > 0 && i + 2 >= tiles.size();)
+        Stage(sums, s).parallel(tiles[i]);
+    }
+    add_turned_sums(function_, index_, turned->dimension, lanes);
+    return true;
   }
 
   void give_turned_blocks(const FuncPtr& block, const TurnedSum& turned) {

@@ -21,6 +21,13 @@ namespace {
 // At least; rows alone are too little work for an allocation.
 constexpr size_t slice_dimensions = 2;
 
+// Whether the loop is a part of that over another of the Func's dimensions.
+bool is_part_of_another(const Definition& stage, const Dim& loop, const std::string& dimension) {
+  return std::ranges::any_of(stage.schedule.splits, [&](const Split& made) {
+    return made.inner == loop.var && made.old_var != dimension;
+  });
+}
+
 class Slicer {
  public:
   explicit Slicer(const SizeEstimate& sizes) : sizes_(sizes) {}
@@ -71,6 +78,16 @@ class Slicer {
   std::unordered_map<const Symbol*, std::vector<std::pair<FuncPtr, Reader>>> inside_;
 };
 
+// Whether an update adds what lies in rows along another dimension, in vectors along these.
+bool adds_across_rows(const FuncContents& f) {
+  return std::ranges::any_of(f.updates, [&](const Definition& update) {
+    return update.rvars.empty() && std::ranges::any_of(update.schedule.dims, [&](const Dim& loop) {
+             return loop.runs == ForType::Vectorized && !f.args.empty() &&
+                    is_part_of_another(update, loop, f.args[0]);
+           });
+  });
+}
+
 }  // namespace
 
 std::optional<size_t> sliced_by(const FuncContents& f, const Reader& reader,
@@ -100,7 +117,7 @@ void compute_in_slices(const Readers& readers, const std::vector<FuncPtr>& store
   const auto may_have_slices = [&](const FuncPtr& f) {
     const bool is_partial = f->made && (f->made->lanes > 0 || f->made->has_parts);
     return f->args.size() > slice_dimensions && !f->is_extern() && !is_partial &&
-           !but.contains(f.get());
+           !adds_across_rows(*f) && !but.contains(f.get());
   };
   Slicer slicer(sizes);
   for (const FuncPtr& f : stored) {

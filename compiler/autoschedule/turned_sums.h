@@ -1,4 +1,5 @@
-// turned_sums.h -- blocks of long sums in vectors along a dimension of the result, where vectors of terms would be strided.
+// turned_sums.h -- sums in vectors along a dimension of the result that is not its first, where vectors along the first
+// would be nearly empty, or vectors of terms strided.
 //
 //   block(lane, k, c, f) += seed(2 * (16 * r + lane) + k, f) * features(16 * r + lane, c)           a gradient by weights
 //
@@ -12,9 +13,16 @@
 // their stride. Each sum has the terms and the order that it has with lanes of terms, so results have the same bits.
 // The copy is transposed and dense. It is made once, before the sums.
 //
-// Not done: fewer channels than fill three vectors, where strided terms are as fast; sums of few terms, which have no blocks;
-// reads that are dense along the terms; sums whose operands all move along the same dimensions, as in a
-// convolution of each channel alone; private parts.
+// Sums without private lanes are turned, too, if their first dimension is short, as the taps of a filter are:
+//
+//   weights(k, c, f) += seed(r, f) * features(r + k, c)       vectors along f, tiles of f and c, all taps k inside of them
+//
+// There the other operand is copied as well if its elements are used often: borders are then no part of the loop, and
+// elements for a tile lie together.
+//
+// Not done: private lanes of fewer channels than fill three vectors, where strided terms are as fast; private lanes of dense
+// terms; sums whose operands all move along the same dimensions, as in a convolution of each channel alone; private parts;
+// conditions on the terms of sums without lanes.
 #pragma once
 
 #include <optional>
@@ -23,31 +31,27 @@
 #include "autoschedule/packed_operand.h"
 #include "autoschedule/register_tile.h"
 #include "autoschedule/size_estimate.h"
-#include "frontend/schedule/stage.h"
 #include "graph/function.h"
 
 namespace retrograde::autoschedule {
 
 struct TurnedSum {
-  size_t dimension = 0;  // of the block, along which vectors run
-  size_t side = 0;       // of the block: the elements of the tile along it share the vectors
-  int64_t vectors = 1, side_size = 1;
-  PackedOperand operand;  // what the vectors read
+  size_t dimension = 0;  // of the sums, along which vectors run
+  int64_t vectors = 1;
+  std::vector<RegisterTile::Side> sides;  // elements of the tile along these share the vectors
+  std::vector<PackedOperand> copies;      // of what the vectors read, and of other operands
+  // Dimensions by their loops outside of a tile, the innermost first: of sums without private lanes.
+  std::vector<size_t> outside;
 
   RegisterTile tile(int lanes) const;
 };
 
 // `block` has one private sum for each of so many lanes of terms. nullopt: these are as good.
-std::optional<TurnedSum> turned_sum(const FuncContents& block, int lanes, const VectorUnit& unit,
-                                    const SizeEstimate& sizes);
-
-// Loops of the stages of the block, which is computed in loops of `sums`, and of the update of `sums`, which adds blocks in
-// double. `between`: loops that stand just inside of those of the reduction. Returns the loops over tiles.
-std::vector<VarOrRVar> give_turned_loops(const FuncPtr& sums, const FuncPtr& block,
-                                         const TurnedSum& turned, const std::vector<Var>& between,
-                                         int lanes);
-
-// Loops of an update that adds lanes of such sums, along the rows that these have; false: it adds something else.
-bool add_turned_lanes(const FuncPtr& f, int index, int lanes);
+std::optional<TurnedSum> turned_lanes(const FuncContents& block, int lanes, const VectorUnit& unit,
+                                      const SizeEstimate& sizes);
+// Of an update without private lanes, of blocks or of all terms; nullopt: other loops are as good. Whoever asks knows that
+// vectors along the first dimension of the result would be nearly empty.
+std::optional<TurnedSum> turned_sum(const FuncContents& sums, const Definition& update, int lanes,
+                                    const VectorUnit& unit, const SizeEstimate& sizes);
 
 }  // namespace retrograde::autoschedule

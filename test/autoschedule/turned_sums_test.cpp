@@ -20,12 +20,12 @@ const Var x("x"), y("y"), c("c");
 // output has zeros between the elements of the input.
 struct StridedLayer {
   StridedLayer(int stride, int channels, int filters, bool is_transposed, int taps = 3,
-               int rows = 3)
+               int rows = 3, int terms_of_row = 70)
       : stride(stride), is_transposed(is_transposed) {
-    const int size = is_transposed ? 70 : 70 * stride;
+    const int size = is_transposed ? terms_of_row : terms_of_row * stride;
     in = gradient::random_image({size, size, channels}, -1, 1, 7);
     weights = gradient::random_image({taps, rows, channels, filters}, -1, 1, 8);
-    out_size = is_transposed ? 70 * stride : 70;
+    out_size = is_transposed ? terms_of_row * stride : terms_of_row;
     seed = gradient::random_image({out_size, out_size, filters}, -1, 1, 9);
   }
 
@@ -49,6 +49,28 @@ struct StridedLayer {
     pipeline.jit_handlers().thread_limit = threads;
     return pipeline.realize(
         {weights.width(), weights.height(), weights.dim(2).extent(), weights.dim(3).extent()});
+  }
+  // The largest error of the gradient of a layer that is not transposed, at some of its elements.
+  double error_of(const Buffer<float>& found) const {
+    const auto padded = [&](int i, int j, int k) {
+      const bool is_inside = i >= 0 && i < in.width() && j >= 0 && j < in.height();
+      return is_inside ? double{in(i, j, k)} : 0.0;
+    };
+    double error = 0;
+    for (int f = 0; f < weights.dim(3).extent(); f += 5) {
+      const int k = f % in.channels();
+      for (int j = 0; j < weights.height(); ++j) {
+        for (int i = 0; i < weights.width(); ++i) {
+          double expected = 0;
+          for (int b = 0; b < out_size; ++b) {
+            for (int a = 0; a < out_size; ++a)
+              expected += double{seed(a, b, f)} * padded(stride * a + i - 1, stride * b + j - 1, k);
+          }
+          error = std::max(error, std::abs(found(i, j, k, f) - expected));
+        }
+      }
+    }
+    return error;
   }
   // Whether the sums have rows along this dimension.
   bool has_rows_along(int dimension) const {
@@ -109,6 +131,44 @@ TEST(TurnedSums, AreThoseOfTheDefinition) {
   }
 }
 
+// Sums of few terms have no private lanes, and vectors along three taps would be nearly empty.
+TEST(TurnedSums, HaveRowsAlongChannelsWithoutLanes) {
+  if (!get_host_target().has_feature(Target::AVX512)) GTEST_SKIP() << "too few registers";
+  EXPECT_TRUE(StridedLayer(1, 40, 48, false, 3, 3, 20).has_rows_along(3));
+  EXPECT_TRUE(StridedLayer(2, 40, 48, false, 3, 3, 20).has_rows_along(3));
+  EXPECT_TRUE(StridedLayer(3, 16, 32, false, 6, 6, 12).has_rows_along(3));
+  const StridedLayer of_many_terms(1, 40, 48, false, 1, 1, 70);  // in blocks
+  EXPECT_TRUE(of_many_terms.has_rows_along(2) || of_many_terms.has_rows_along(3));
+}
+
+TEST(TurnedSums, AreNotMadeOfFewProducts) {
+  EXPECT_FALSE(StridedLayer(1, 4, 16, false, 3, 3, 10).has_rows_along(3));
+}
+
+TEST(TurnedSums, AreThoseOfTheDefinitionWithoutLanes) {
+  for (const StridedLayer& layer :
+       {StridedLayer(2, 40, 48, false, 3, 3, 20), StridedLayer(1, 96, 72, false, 3, 1, 31),
+        StridedLayer(2, 44, 72, false, 1, 1, 70)}) {
+    const Buffer<float> found = layer.result({}, 5);
+    EXPECT_LT(layer.error_of(found), 2e-4);
+    EXPECT_TRUE(gradient::same_bits(layer.result({}, 1), found));
+  }
+}
+
+// The output of a transposed layer ends where taps begin: conditions on terms and taps stay outside of tiles.
+TEST(TurnedSums, OfTransposedLayersWithoutLanes) {
+  for (const StridedLayer& layer :
+       {StridedLayer(2, 64, 32, true, 4, 4, 20), StridedLayer(3, 32, 24, true, 5, 5, 12)}) {
+    EXPECT_TRUE(layer.has_rows_along(2) || layer.has_rows_along(3));
+    const Buffer<float> found = layer.result(), expected = layer.result({Decision::RegisterTiles});
+    double error = 0;
+    found.for_each_element([&](const int* at) {
+      error = std::max(error, std::abs(double{found(at)} - double{expected(at)}));
+    });
+    EXPECT_LT(error, 1e-4);
+  }
+}
+
 // One row of taps has a fixed place in the sums.
 TEST(TurnedSums, MayHaveOneRowOfTaps) {
   for (const bool is_transposed : {false, true}) {
@@ -119,20 +179,23 @@ TEST(TurnedSums, MayHaveOneRowOfTaps) {
 
 // An adjoint of 0 gives 0 whatever it is multiplied with; NaN goes where it is read.
 TEST(TurnedSums, KeepStrongZeros) {
-  StridedLayer layer(2, 8, 48, false);
-  layer.in(5, 9, 3) = std::numeric_limits<float>::infinity();
-  layer.in(8, 9, 4) = std::nanf("");
-  for (int a = 0; a < layer.out_size; ++a) layer.seed(a, 4, 2) = 0.0f;
-  const Buffer<float> found = layer.result(), expected = layer.result({Decision::LayoutStaging});
-  int finite = 0, alike = 0, all = 0;
-  found.for_each_element([&](const int* at) {
-    ++all;
-    finite += std::isfinite(found(at));
-    alike += std::isnan(found(at)) ? std::isnan(expected(at)) : found(at) == expected(at);
-  });
-  EXPECT_EQ(alike, all);
-  EXPECT_LT(finite, all);
-  EXPECT_GT(finite, all / 2);
+  for (const bool has_lanes : {true, false}) {
+    StridedLayer layer(2, has_lanes ? 16 : 48, 48, false, 3, 3, has_lanes ? 70 : 20);
+    layer.in(5, 9, 3) = std::numeric_limits<float>::infinity();
+    layer.in(8, 9, 4) = std::nanf("");
+    for (int a = 0; a < layer.out_size; ++a) layer.seed(a, 4, 2) = 0.0f;
+    const Buffer<float> found = layer.result(), expected = layer.result({Decision::LayoutStaging});
+    int finite = 0, alike = 0, all = 0;
+    found.for_each_element([&](const int* at) {
+      ++all;
+      finite += std::isfinite(found(at));
+      alike += std::isfinite(found(at)) ? std::abs(found(at) - expected(at)) < 1e-4
+                                        : std::isnan(found(at)) == std::isnan(expected(at));
+    });
+    EXPECT_EQ(alike, all);
+    EXPECT_LT(finite, all);
+    EXPECT_GT(finite, all / 2);
+  }
 }
 
 }  // namespace

@@ -115,5 +115,82 @@ TEST(ZeroBorders, ReadOtherFactorsInsideOfTheirImages) {
   }
 }
 
+// up(x) = sum of image((x + 2) / 4 - tap) * weights((x + 2) % 4 + 4 * tap): a transposed convolution of stride 4. In
+// planes: the same along x and y.
+struct Upsampled {
+  static constexpr int width = 61, stride = 4, taps = 2;
+  Upsampled() {
+    for (int i = 0; i < width; i++) image(i) = static_cast<float>((i * 7) % 5) - 2.0f;
+    for (int i = 0; i < stride * taps; i++) weights(i) = static_cast<float>((i * 3) % 4) - 1.5f;
+    for (int i = 0; i < stride * width; i++) seed(i) = static_cast<float>((i * 5) % 7) - 3.0f;
+    const Func padded = BoundaryConditions::constant_exterior(image, 0.0f, {{0, width}});
+    const RDom r(0, taps, "r");
+    up(x) = 0.0f;
+    up(x) += padded((x + 2) / stride - r) * weights((x + 2) % stride + stride * r);
+  }
+  Func gradient() { return propagate_adjoints(up, Func(seed), {{0, stride * width}})(image); }
+  Func gradient_of_plane() {
+    plane.fill(1.0f);
+    const Func padded =
+        BoundaryConditions::constant_exterior(plane, 0.0f, {{0, width}, {0, width}});
+    const RDom r(0, taps, 0, taps, "r");
+    Func of_plane("of_plane"), seeds("seeds");
+    of_plane(x, y) = 0.0f;
+    of_plane(x, y) += padded((x + 2) / stride - r.x, (y + 2) / stride - r.y) *
+                      weights((x + 2) % stride + stride * r.x) *
+                      weights((y + 2) % stride + stride * r.y);
+    seeds(x, y) = seed(clamp(x, 0, seed.width() - 1)) * seed(clamp(y, 0, seed.width() - 1));
+    return propagate_adjoints(of_plane, seeds, {{0, stride * width}, {0, stride * width}})(plane);
+  }
+  float expected(int i) const {
+    float sum = 0;
+    for (int k = 0; k < stride; k++) {
+      for (int tap = 0; tap < taps; tap++) {
+        const int at = stride * (i + tap) + k - 2;
+        if (at >= 0 && at < stride * width) sum += seed(at) * weights(k + stride * tap);
+      }
+    }
+    return sum;
+  }
+  Var x{"x"}, y{"y"};
+  Buffer<float> plane{width, width};
+  Buffer<float> image{width}, weights{stride * taps}, seed{stride * width};
+  Func up{"up"};
+};
+
+// A clamped place would have other remainders in the lanes at a border.
+TEST(ZeroBorders, LeaveNoRemainders) {
+  Upsampled sum;
+  for (const Func& gradient : {sum.gradient(), sum.gradient_of_plane()}) {
+    for (const graph::FuncPtr& f : graph::topological_order({gradient.function()})) {
+      for (const graph::Definition& update : f->updates) {
+        for (const Expr& value : update.values) {
+          EXPECT_FALSE(any_node(value, [](const ir::Mod&) { return true; })) << value;
+          EXPECT_FALSE(any_node(value, [](const ir::Select&) { return true; })) << value;
+        }
+      }
+    }
+  }
+}
+
+TEST(ZeroBorders, LeaveTheGradientOfStridesAsItIs) {
+  for (const bool is_scheduled : {false, true}) {
+    Upsampled sum;
+    Func gradient = sum.gradient();
+    if (is_scheduled) {
+      gradient.set_estimates({{0, Upsampled::width}});
+      Pipeline(gradient).auto_schedule(get_host_target());
+    }
+    const Buffer<float> found = gradient.realize({Upsampled::width});
+    for (int i = 0; i < Upsampled::width; i++) EXPECT_FLOAT_EQ(found(i), sum.expected(i)) << i;
+    const Buffer<float> plane =
+        sum.gradient_of_plane().realize({Upsampled::width, Upsampled::width});
+    for (const int j : {0, 1, 30, 60}) {
+      for (int i = 0; i < Upsampled::width; i++)
+        EXPECT_NEAR(plane(i, j), sum.expected(i) * sum.expected(j), 1e-2) << i << ", " << j;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace retrograde

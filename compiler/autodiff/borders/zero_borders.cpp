@@ -6,6 +6,7 @@
 #include "autodiff/rules/derivative_rules.h"
 #include "graph/function.h"
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "ir/markers.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
@@ -41,9 +42,34 @@ Expr before_clamps(const Expr& index) {
   return as_op(index, Op::likely) ? without_likely(index) : index;
 }
 
+// A place that was clamped into a domain, beyond which the term is zero now.
+struct DroppedClamp {
+  Expr clamped, place;
+};
+
+// Replaces clamped places where that moves no read, because the term is zero where they differ: in numerators of
+// remainders, and in what is not part of an index. Then all lanes of a vector have the same remainder, also at a border.
+Expr with_places_in_remainders(const Expr& e, const DroppedClamp& dropped);
+Expr with_places(const Expr& e, const DroppedClamp& dropped) {
+  return rewrite(e, [&](const Expr& node, const auto&) -> Expr {
+    if (equal(node, dropped.clamped)) return dropped.place;
+    const auto* call = node.as<Call>();
+    const bool may_read =
+        call && (call->call_type != CallType::Operator || call->is_op(Op::if_then_else));
+    return may_read ? with_places_in_remainders(node, dropped) : Expr();
+  });
+}
+Expr with_places_in_remainders(const Expr& e, const DroppedClamp& dropped) {
+  return rewrite(e, [&](const Expr& node, const auto&) -> Expr {
+    const auto* n = node.as<Mod>();
+    const bool has_period = n && as_const_int(n->b).value_or(0) > 0;
+    return has_period ? with_places(n->a, dropped) % n->b : Expr();
+  });
+}
+
 // Returns the call without the clamp of its index, if the callee is an adjoint that is zero where the condition is
-// false; else an undefined Expr.
-Expr unclamped_read(const Expr& e, const Expr& condition) {
+// false; else an undefined Expr. Notes the clamp.
+Expr unclamped_read(const Expr& e, const Expr& condition, std::vector<DroppedClamp>& dropped) {
   const auto* call = e.as<Call>();
   const FuncPtr f = call && call->call_type == CallType::Func ? func_of(*call) : nullptr;
   if (!f || !f->made || !f->is_pure() || f->is_extern() || f->pure->values.size() != 1) return {};
@@ -58,6 +84,7 @@ Expr unclamped_read(const Expr& e, const Expr& condition) {
       const Expr here = substitute(inside, {{f->args[d], place}});
       if (!implies(here, condition)) continue;
       std::vector<Expr> args = call->args;
+      if (!place.same_as(args[d])) dropped.push_back({args[d], place});
       args[d] = place;
       return call_func(call->name, call->type, args, call->component, call->symbol);
     }
@@ -66,8 +93,8 @@ Expr unclamped_read(const Expr& e, const Expr& condition) {
 }
 
 // The term where the condition holds, and zero elsewhere; undefined if it cannot be written without the condition.
-Expr zero_without(const Expr& term, const Expr& condition) {
-  const auto in = [&](const Expr& e) { return zero_without(e, condition); };
+Expr zero_without(const Expr& term, const Expr& condition, std::vector<DroppedClamp>& dropped) {
+  const auto in = [&](const Expr& e) { return zero_without(e, condition, dropped); };
   const auto both = [&](const Expr& a, const Expr& b, auto make) -> Expr {
     const Expr first = is_zero(a) ? a : in(a);
     const Expr second = !first.defined() || is_zero(b) ? b : in(b);
@@ -90,7 +117,47 @@ Expr zero_without(const Expr& term, const Expr& condition) {
     return both(n->when_true, n->when_false,
                 [&](const Expr& a, const Expr& b) { return make_select(n->condition, a, b); });
   }
-  return unclamped_read(term, condition);
+  return unclamped_read(term, condition, dropped);
+}
+
+// Intervals of variables between constants, by comparisons with these.
+void add_range(simplification::BoundsMap& bounds, const Expr& condition) {
+  const auto limit = [&](const Expr& variable, const Expr& end, int64_t distance, bool is_low) {
+    const auto* v = variable.as<Variable>();
+    const auto value = as_const_int(end);
+    if (!v || !value || variable.type() != Int(32)) return;
+    Interval& range = bounds[v->name];
+    (is_low ? range.min : range.max) = make_const(Int(32), *value + distance);
+  };
+  if (const auto* n = condition.as<LT>()) {
+    limit(n->b, n->a, 1, true);
+    limit(n->a, n->b, -1, false);
+  } else if (const auto* m = condition.as<LE>()) {
+    limit(m->b, m->a, 0, true);
+    limit(m->a, m->b, 0, false);
+  }
+}
+
+// The term with unclamped places, in which conditions and remainders are as simple as they were in the primal.
+// Conditions may use where the gather runs; indices may not, since bounds inference does not see its predicate.
+Expr without_clamps(const Expr& term, const std::vector<DroppedClamp>& dropped, const Gather& g) {
+  Expr result = term;
+  for (const DroppedClamp& clamp : dropped) result = with_places(result, clamp);
+  if (result.same_as(term)) return term;
+  simplification::BoundsMap loops;
+  for (const ReductionVariable& r : g.rdom->vars)
+    loops[r.var] = {r.min, simplify(r.min + r.extent - 1)};
+  simplification::BoundsMap all = loops;
+  std::vector<Expr> conditions;
+  add_conjuncts(without_likely(g.predicate), conditions);
+  for (const Expr& condition : conditions) add_range(all, condition);
+  result = rewrite(result, [&](const Expr& node, const auto& recurse) -> Expr {
+    const auto* n = node.as<Select>();
+    return n ? make_select(simplify(n->condition, all), recurse(n->when_true),
+                           recurse(n->when_false))
+             : Expr();
+  });
+  return simplify(result, loops);
 }
 
 // Whether the condition belongs to a border between taps that is thin compared with the target's extent. If there are
@@ -122,16 +189,22 @@ void leave_zeros_to_adjoints(std::vector<Contribution>& contributions,
     const Gather& g = c.gather;
     if (!g.rdom || g.scatters || !g.predicate.defined()) continue;
     std::vector<Expr> conditions, kept;
+    std::vector<DroppedClamp> all_dropped;
     add_conjuncts(g.predicate, conditions);
     for (const Expr& condition : conditions) {
       const bool may_go =
           fails_in_a_border(condition, g.rdom->vars) && is_thin(condition, g, target);
-      const Expr term = may_go ? zero_without(c.adjoint, without_likely(condition)) : Expr();
-      if (term.defined())
-        c.adjoint = term;
-      else
+      std::vector<DroppedClamp> dropped;
+      const Expr term =
+          may_go ? zero_without(c.adjoint, without_likely(condition), dropped) : Expr();
+      if (!term.defined()) {
         kept.push_back(condition);
+        continue;
+      }
+      c.adjoint = term;
+      append(all_dropped, dropped);
     }
+    c.adjoint = without_clamps(c.adjoint, all_dropped, g);
     if (kept.size() < conditions.size())
       c.gather.predicate = kept.empty() ? Expr() : conjunction(kept);
   }

@@ -7,6 +7,12 @@
 // then form a stencil over a Func with zero padding, as a user would write the adjoint by hand. Loops are not split at
 // its borders, and rows may be packed with their zeros for register tiling (autoschedule/row_copies.h). Products are
 // strong (graph: strong_mul), so a zero stays zero beside infinity.
+//
+// Other factors may have the clamped place in remainders and conditions, as those of a transposed convolution do:
+//
+//   a(clamp(4 * x + r, 0, n - 1)) * w(clamp(4 * x + r, 0, n - 1) % 4)   =>   a(4 * x + r) * w(r)      r < 4
+//
+// Beyond the border the term is zero with any factor, and a remainder stays in its range.
 #pragma once
 
 #include <vector>

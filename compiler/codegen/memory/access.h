@@ -1,7 +1,8 @@
 // Code for loads and stores, chosen by the form of the index vector:
 //
 //   dense       base + i                  a vector load or store; base - i: the same, reversed
-//   strided     base + s i, 2 <= |s| <= 4 loads: the vectors that cover the lanes, and shuffles
+//   strided     base + s i, 2 <= |s| <= 4 loads: the vectors that cover the lanes, and shuffles; under a predicate masked
+//                                         vectors if the machine has them
 //   apart       base + s i                scalars at equal distances, s any scalar
 //   pieces      a ramp of vectors         one access for each piece
 //   broadcast   base                      one scalar

@@ -85,16 +85,27 @@ Value* load_scalar(FunctionContext& c, const Storage& from, Type type, Value* in
   return from_memory(c.e, type, predicate ? c.value_if(predicate, load) : load());
 }
 
+// Marks, among consecutive elements from `start` on, those of active lanes, which are s apart.
+Value* mask_of_part(FunctionContext& c, Value* predicate, int start, int s) {
+  const int n =
+      static_cast<int>(llvm::cast<llvm::FixedVectorType>(predicate->getType())->getNumElements());
+  std::vector<int> picks;
+  for (int i = 0; i < n; i++) picks.push_back((start + i) % s == 0 ? (start + i) / s : n);
+  return shuffle(c.e, predicate, llvm::Constant::getNullValue(predicate->getType()), picks);
+}
+
 // n lanes with stride s: s dense loads of n lanes, the last one shifted back so that it ends at the last lane. Shuffles
-// pick each lane from the load that contains it, overlaying later loads on earlier ones.
+// pick each lane from the load that contains it, overlaying later loads on earlier ones. With a predicate, loads touch only
+// the elements of active lanes: their masks do not change in a loop that ends a row of vectors.
 Value* load_strided(FunctionContext& c, const Storage& from, Type type, Value* first,
-                    int64_t stride) {
+                    int64_t stride, Value* predicate) {
   const int n = type.lanes(), s = static_cast<int>(stride), last_start = (n - 1) * s - (n - 1);
   Value* result = nullptr;
   for (int part = 0; part < s; part++) {
     const int start = std::min(part * n, last_start);
     Value* index = c.b.CreateAdd(first, c.int64(start));
-    Value* loaded = load_dense(c, from, type, index, nullptr);
+    Value* mask = predicate ? mask_of_part(c, predicate, start, s) : nullptr;
+    Value* loaded = load_dense(c, from, type, index, mask);
     std::vector<int> picks;
     for (int i = 0; i < n; i++) {
       const int offset = i * s - start;
@@ -237,14 +248,15 @@ Value* load_linear(Values& values, const Storage& from, Type type, const LinearI
     return splat(c.e, load_scalar(c, from, type.element_of(), first, any), lanes);
   }
   if (stride == 1) return load_dense(c, from, type, first, predicate);
-  if (stride < 0 && stride >= -4 && (!predicate || stride == -1)) {
+  const bool may_be_strided = !predicate || (c.e.machine.gathers(type) && !c.e.machine.is_device());
+  if (stride < 0 && stride >= -4 && (may_be_strided || stride == -1)) {
     Value* lowest = c.b.CreateAdd(first, c.int64(last));
-    Value* upward = stride == -1 ? load_dense(c, from, type, lowest,
-                                              predicate ? reverse(c.e, predicate) : nullptr)
-                                 : load_strided(c, from, type, lowest, -stride);
+    Value* active = predicate ? reverse(c.e, predicate) : nullptr;
+    Value* upward = stride == -1 ? load_dense(c, from, type, lowest, active)
+                                 : load_strided(c, from, type, lowest, -stride, active);
     return reverse(c.e, upward);
   }
-  if (predicate) {
+  if (predicate && (stride < 0 || stride > 4 || !may_be_strided)) {
     // A scalar base and small constant offsets: 32-bit lane offsets if they fit, because gathers with those are wider.
     const bool is_short = std::abs(stride) < (INT32_MAX / lanes);
     llvm::Type* distance = is_short ? c.b.getInt32Ty() : c.b.getInt64Ty();
@@ -254,7 +266,7 @@ Value* load_linear(Values& values, const Storage& from, Type type, const LinearI
     return gather(c, shifted, type,
                   c.b.CreateMul(iota(c.e, distance, lanes), splat(c.e, step, lanes)), predicate);
   }
-  return stride > 0 && stride <= 4 ? load_strided(c, from, type, first, stride)
+  return stride > 0 && stride <= 4 ? load_strided(c, from, type, first, stride, predicate)
                                    : load_apart(c, from, type, first, c.int64(stride));
 }
 

@@ -66,6 +66,21 @@ TEST(CodegenIdioms, NeighbouringStridedLoadsAreShuffles) {
   EXPECT_GE(count(code, "vshufps"), 2u);
 }
 
+// So does the end of a row: masked loads of all that lies between the lanes.
+TEST(CodegenIdioms, StridedLoadsUnderAMaskAreShuffles) {
+  for (const int stride : {2, 3, -4}) {
+    ImageParam in(Float(32), 1, "in");
+    Var x("x");
+    Func f("f");
+    f(x) = in(stride * x) * 0.5f;
+    f.vectorize(x, 16, TailStrategy::GuardWithIf);
+    const auto code = assembly(f, avx512);
+    EXPECT_EQ(count(code, "gather"), 0u) << stride;
+    EXPECT_EQ(count(code, "vinsertps"), 0u) << stride;
+    EXPECT_GE(count(code, "vperm"), 1u) << stride;
+  }
+}
+
 // The name of a constant that only code generation can evaluate.
 TEST(CodegenIdioms, MathOfConstantsCallsNothing) {
   if (get_host_target().arch != Target::X86) GTEST_SKIP() << "the functions of x86 do not run here";
