@@ -26,7 +26,9 @@
 #include <optional>
 
 #include "ir/build.h"
+#include "ir/lets.h"
 #include "ir/visit.h"
+#include "lower/loops/join_steps.h"
 #include "lower/loops/time_steps.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/statement_rewriter.h"
@@ -75,30 +77,10 @@ class SliceStarter {
 
   Stmt start_of(const EarlierStage& stage, const Expr& time, bool is_any_slice) const {
     if (!stage.over_time) return make_if(simplify(time == stage.offset), stage.nest);
-    bool becomes_parallel = stage.over_time->runs == ForType::Parallel &&
-                            has_loops(steps_.loop->body, ForType::Parallel) &&
-                            !has_other_tasks(stage);
-    return rewrite_statements(stage.nest, [&](const Stmt& s, auto& all) {
-      const auto* loop = s.as<For>();
-      if (loop == stage.over_time && loop) {
-        const Expr value = simplify((time - stage.offset) * stage.sign), v = variable(loop->name);
-        Stmt body = all(loop->body);
-        if (!is_any_slice) body = make_if(v >= loop->min && v < loop->min + loop->extent, body);
-        return make_let(loop->name, value, body);
-      }
-      if (loop && becomes_parallel && loop->runs == ForType::Serial && rules_.is_pure(*loop)) {
-        becomes_parallel = false;
-        return make_for(loop->name, loop->min, loop->extent, ForType::Parallel, all(loop->body),
-                        loop->partition);
-      }
-      return all.children(s);
-    });
-  }
-
-  static bool has_other_tasks(const EarlierStage& stage) {
-    return any_node(stage.nest, [&](const For& loop) {
-      return loop.runs == ForType::Parallel && &loop != stage.over_time;
-    });
+    const Expr value = simplify((time - stage.offset) * stage.sign);
+    const bool in_tasks = has_loops(steps_.loop->body, ForType::Parallel);
+    return run_iteration(stage.nest, {stage.over_time, value, !is_any_slice, in_tasks},
+                         rules_.is_pure);
   }
 };
 
@@ -109,7 +91,7 @@ class FoldSteps : public StatementRewriter {
  protected:
   Stmt rewrite(const Stmt& s) override {
     if (const auto* let = s.as<LetStmt>()) {
-      lets_[let->name] = expanded_value(*let, lets_);
+      lets_[let->name] = substitute(ir::without_lets(let->value), lets_);
       return children(s);
     }
     if (!s.as<Realize>()) return children(s);
@@ -119,8 +101,12 @@ class FoldSteps : public StatementRewriter {
     if (has_folds || !rules_.may_fold(f.name)) return inside;
     const auto steps = find_time_steps(f, lets_);
     if (!steps) return inside;
-    const Slices slices = slices_of(f, *steps);
+    const SliceSizes slices = slices_of(f, *steps);
     if (is_worth_folding(slices, *steps)) return folded(f, *steps);
+    if (is_worth_joining(slices, *steps)) {
+      const Stmt joined = with_consumers(f, *steps);
+      if (joined.defined()) return joined;
+    }
     return is_worth_moving(slices, *steps) ? moved(f, *steps, slices) : inside;
   }
 
@@ -129,13 +115,13 @@ class FoldSteps : public StatementRewriter {
   FreshNames fresh_;
   Substitution lets_;  // with expanded values
 
-  struct Slices {
+  struct SliceSizes {
     Range range;                             // of the time
     std::optional<int64_t> count, of_steps;  // all; those that steps store
     std::optional<int64_t> bytes;            // of all
   };
 
-  Slices slices_of(const Realize& f, const TimeSteps& steps) const {
+  SliceSizes slices_of(const Realize& f, const TimeSteps& steps) const {
     std::vector<Range> bounds;
     for (const Range& range : f.bounds) {
       bounds.push_back(
@@ -148,7 +134,7 @@ class FoldSteps : public StatementRewriter {
 
   // ---- few slices ----
 
-  static bool is_worth_folding(const Slices& slices, const TimeSteps& steps) {
+  static bool is_worth_folding(const SliceSizes& slices, const TimeSteps& steps) {
     return steps.slots > 0 && slices.count.value_or(steps.slots + 1) > steps.slots &&
            slices.bytes.value_or(small_bytes) >= small_bytes;
   }
@@ -185,9 +171,26 @@ class FoldSteps : public StatementRewriter {
     });
   }
 
+  // ---- few slices, if the consumers run in the steps ----
+
+  static bool is_worth_joining(const SliceSizes& slices, const TimeSteps& steps) {
+    const auto [range, count, of_steps, bytes] = slices;
+    return steps.slots == 0 && count && *count > 0 && bytes && *bytes >= large_bytes &&
+           *bytes / *count <= most_slice_bytes;
+  }
+
+  Stmt with_consumers(const Realize& f, const TimeSteps& steps) {
+    const auto consumers = find_step_consumers(f, steps, lets_, rules_.may_fold);
+    if (!consumers) return {};
+    const Stmt joined = join_steps(f, steps, *consumers, rules_.is_pure);
+    const auto& all = *joined.as<Realize>();
+    const auto found = find_time_steps(all, lets_);
+    return found && is_worth_folding(slices_of(all, *found), *found) ? folded(all, *found) : Stmt();
+  }
+
   // ---- all slices ----
 
-  bool is_worth_moving(const Slices& slices, const TimeSteps& steps) const {
+  bool is_worth_moving(const SliceSizes& slices, const TimeSteps& steps) const {
     const auto [range, count, of_steps, bytes] = slices;
     return !steps.earlier.empty() && count && of_steps && bytes && *bytes >= large_bytes &&
            *bytes / *count <= most_slice_bytes && *of_steps < *count &&
@@ -202,7 +205,7 @@ class FoldSteps : public StatementRewriter {
     return is_zero(simplify(substitute(last, lets_) - end));
   }
 
-  Stmt moved(const Realize& f, const TimeSteps& steps, const Slices& slices) {
+  Stmt moved(const Realize& f, const TimeSteps& steps, const SliceSizes& slices) {
     const SliceStarter starter(steps, rules_, fresh_);
     const For& loop = *steps.loop;
     const int64_t others = *slices.count - *slices.of_steps;

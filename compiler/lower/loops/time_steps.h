@@ -20,6 +20,8 @@
 
 namespace retrograde::lower {
 
+inline constexpr int64_t most_step_slots = 16;  // slices that are kept at most
+
 // A stage before the steps. It stores to the slice sign * over_time + offset in each iteration of that loop, or, if
 // there is no such loop, to the slice `offset`.
 struct EarlierStage {
@@ -46,9 +48,6 @@ struct TimeSteps {
   SliceStart start = SliceStart::EveryStep;
   int64_t slots = 0;  // how many consecutive slices are alive at once; 0: unknown
 };
-
-// The value of a let without the names of the lets around it, which have the values `lets`.
-Expr expanded_value(const LetStmt& let, const Substitution& lets);
 
 // `lets`: the names around the Realize with their expanded values. nullopt if its Func has no such steps.
 std::optional<TimeSteps> find_time_steps(const Realize& f, const Substitution& lets);
