@@ -29,6 +29,7 @@
 #include "autoschedule/scatter_slices.h"
 #include "autoschedule/slices.h"
 #include "autoschedule/start_in_tiles.h"
+#include "autoschedule/step_sums.h"
 #include "autoschedule/stored_funcs.h"
 #include "autoschedule/strips.h"
 #include "autoschedule/sum_blocks.h"
@@ -203,6 +204,7 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
     return sizes;
   }
   SizeEstimate sizes(outputs, limits_of(request));
+  whole.merge(step_sums(outputs, sizes));
   cut_sums(outputs, stored, whole, chosen, request, sizes);
   const bool slices_scatters =
       request.makes(Decision::ScatterStrategy) && request.makes(Decision::Slices);

@@ -25,6 +25,7 @@
 #include "lower/loops/carry_elements.h"
 #include "lower/loops/equal_nests.h"
 #include "lower/loops/flatten_storage.h"
+#include "lower/loops/fold_steps.h"
 #include "lower/loops/fork_async.h"
 #include "lower/loops/insert_prefetches.h"
 #include "lower/loops/keep_accumulators.h"
@@ -113,6 +114,15 @@ Stmt run_skip_stages(const Lowering& lowering, const Stmt& s) {
   });
 }
 
+Stmt run_fold_steps(const Lowering& lowering, const Stmt& s) {
+  const auto may_fold = [&](const std::string& name) {
+    const LoopedFunc* f = lowering.program.find(name);
+    return f && !f->schedule.async && !f->schedule.memoized;
+  };
+  return fold_steps(
+      s, {may_fold, [&](const For& loop) { return is_pure_loop(lowering.program, loop.name); }});
+}
+
 Stmt run_keep_accumulators(const Lowering& lowering, const Stmt& s) {
   return keep_accumulators(
       s, [&](const For& loop) { return is_pure_loop(lowering.program, loop.name); });
@@ -168,6 +178,7 @@ constexpr Pass passes[] = {
     {"check_promises", Phase::Loops, wanted<Target::CheckUnsafePromises, check_promises>},
     {"write_debug_files", Phase::Loops, with_program<write_debug_files>},
     {"skip_stages", Phase::Loops, run_skip_stages},
+    {"fold_steps", Phase::Loops, run_fold_steps},
     {"insert_prefetches", Phase::Loops, with_program<insert_prefetches>},
     {"lower_prefetches", Phase::Loops, with_program<lower_prefetches>},
     {"fork_async", Phase::Loops, with_program<fork_async>},

@@ -4,6 +4,7 @@
 #include "lower/loops/carry_elements.h"
 #include "lower/loops/equal_nests.h"
 #include "lower/loops/flatten_storage.h"
+#include "lower/loops/fold_steps.h"
 #include "lower/loops/keep_accumulators.h"
 #include "lower/loops/skip_stages.h"
 #include "lower/vectors/vectorize_inner_loops.h"
@@ -34,6 +35,12 @@ const std::vector<StatementPass>& statement_passes() {
        }},
       {"expand_equal_nests", expand_equal_nests},
       {"flatten_storage", [](const Stmt& s) { return flatten_storage(s); }},
+      {"fold_steps",  // every Func may be folded; loops whose names lack "r$" count as loops over pure variables
+       [](const Stmt& s) {
+         return fold_steps(
+             s, {[](const std::string&) { return true; },
+                 [](const For& loop) { return loop.name.find(".r$") == std::string::npos; }});
+       }},
       {"free_early", free_early},
       {"fuzz_float_stores", fuzz_float_stores},
       {"hoist_calls", hoist_calls},

@@ -10,6 +10,7 @@ retrograde_test(
   value_bounds_test
   TOGETHER lower_loops_tests)
 retrograde_test(pass_observer_test)
+retrograde_test(fold_steps_test LIBS retrograde_dep_halide_runtime)
 retrograde_test(
   debug_file_test
   empty_images_test
