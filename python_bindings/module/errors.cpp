@@ -55,15 +55,18 @@ class ShortNames {
 };
 
 void raise(const char* type, const Error& error, const py::dict& more) {
-  const py::object cls = py::module_::import("retrograde._errors").attr(type);
-  const std::string words = error.what();
-  const ShortNames shown(words);
-  const py::object exception = cls(shown(words));
+  const py::object errors = py::module_::import("retrograde._errors");
+  const py::object cls = errors.attr(type);
   const Message& message = error.message();
+  const ShortNames shown(error.what());
+  const auto [words, instead] =
+      errors.attr("in_python")(shown(error.what()), shown(message.instead))
+          .cast<std::pair<std::string, std::string>>();
+  const py::object exception = cls(words);
   exception.attr("asked") = shown(message.asked);
   exception.attr("rule") = shown(message.rule);
   exception.attr("evidence") = shown(message.evidence);
-  exception.attr("instead") = shown(message.instead);
+  exception.attr("instead") = instead;
   for (const auto& [name, value] : more) py::setattr(exception, name, value);
   PyErr_SetObject(cls.ptr(), exception.ptr());
 }

@@ -24,7 +24,7 @@ if _util.find_spec("retrograde._retrograde") is None:
 else:
     from . import _retrograde
     from ._retrograde import *
-    from . import _display
+    from . import _display, _refusals
     from ._command_line import main
     from ._explain import explain
     from ._generator import *

@@ -155,6 +155,8 @@ class Writer:
             self.member(cls, member, value, indent + "    ")
 
     def member(self, cls, name, value, indent):
+        if name == "__iter__" and inspect.isfunction(value):  # retrograde/_refusals.py
+            return self.lines.append(f"{indent}__iter__: None\n")
         if name.startswith("__") and name not in ("__init__", "__call__", "__getitem__", "__setitem__", "__len__",
                                                   "__enter__", "__exit__", "__iter__", "__bool__"):
             return self.operator(name, indent)

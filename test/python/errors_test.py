@@ -1,5 +1,6 @@
 """Errors are exceptions of Python with the four parts of their messages."""
 import builtins
+import math
 import pickle
 import unittest
 
@@ -88,6 +89,82 @@ class Classes(unittest.TestCase):
         except rg.Error as error:
             again = pickle.loads(pickle.dumps(error))
             self.assertEqual((type(again), str(again), again.rule), (type(error), str(error), error.rule))
+
+
+class WhatHasNoEnd(unittest.TestCase):
+    """Funcs and images have elements at all coordinates, so there is no end to iterate to."""
+
+    def test_iteration_is_refused(self):
+        image, f = rg.ImageParam("float32", 1, "image"), rg.Func("f")
+        f[x] = image[x]
+        for thing, name in ((image, 'ImageParam "image"'), (f, 'Func "f')):
+            for use in (list, sum, max, iter, lambda thing: (lambda a, b: a)(*thing)):
+                with self.assertRaisesRegex(TypeError, "cannot iterate over the " + name) as caught:
+                    use(thing)
+                self.assertTrue("RDom" in caught.exception.instead and caught.exception.rule)
+            with self.assertRaisesRegex(TypeError, "cannot search the " + name):
+                1 in thing
+
+    def test_what_has_an_end_is_iterated_over(self):
+        f, r, buffer = rg.Func("f"), rg.RDom([(0, 3), (0, 2)]), rg.Buffer(np.arange(3, dtype="int32"))
+        f[x] = (x, 2 * x)
+        first, second = f[x]
+        self.assertEqual((first.index(), second.index()), (0, 1))
+        self.assertEqual((len(list(r)), list(buffer), 2 in buffer), (2, [0, 1, 2], True))
+        with self.assertRaises(rg.CompileError):
+            list(rg.Buffer(np.zeros((2, 3), "float32")))
+
+
+class FunctionsOfOtherLibraries(unittest.TestCase):
+    """They take values; the error names the function to write."""
+
+    def test_are_refused(self):
+        f = rg.Func("f")
+        f[x] = rg.f32(x)
+        for e in (f[x], rg.f32(x), rg.Param("float32", "gain")):
+            for use, words in ((math.sqrt, r"rg\.sqrt"), (np.exp, r"rg\.exp"), (np.log1p, "of this package"),
+                               (np.arctan2, r"rg\.atan2")):
+                with self.assertRaisesRegex(TypeError, words):
+                    use(e, 1) if use is np.arctan2 else use(e)
+            with self.assertRaisesRegex(TypeError, r"rg\.max"):
+                np.maximum(e, 0)
+
+    def test_operators_of_numpy_work(self):
+        f, r = rg.Func("f"), rg.RDom([(0, 3)], "r")
+        f[x] = rg.f32(x)
+        for e in (f[x], r, rg.f32(x)):
+            self.assertIsInstance(np.float64(0.5) * e, rg.Expr)
+            self.assertIsInstance(np.abs(e), rg.Expr)
+            both = np.array([1.0, 2.0]) * e
+            self.assertEqual((both.shape, type(both[1])), ((2,), rg.Expr))
+
+
+class Advice(unittest.TestCase):
+    """Advice is in Python's syntax."""
+
+    def test_of_errors(self):
+        f, image = rg.Func("f"), rg.ImageParam("float32", 1, "image")
+        for use, words in (
+                (lambda: rg.RDom([(0, 8 / 2)]), "integers with //.*rg.i32"),
+                (lambda: image[rg.floor(x / 2.0)], r"rg\.i32\(rg\.floor\(e\)\) or rg\.i32\(rg\.round\(e\)\)"),
+                (lambda: f.__setitem__((), image[rg.RDom([(0, 8)])]), r"f\[x\] \+= \.\.\., .*rg\.sum\(")):
+            with self.assertRaisesRegex(rg.CompileError, words) as caught:
+                use()
+            self.assertRegex(caught.exception.instead, words)
+            self.assertNotRegex(str(caught.exception), "cast<")
+
+    def test_of_texts(self):
+        from retrograde._errors import in_python
+        for theirs, ours in (
+                ("Define it first, as in f(x) = 0", "Define it first, as in f[x] = 0"),
+                ("Sum them, as in loss() += f(r.x, r.y)", "Sum them, as in loss[()] += f[r.x, r.y]"),
+                ("Write f(scatter(a, b)) = gather(u, v)", "Write f[rg.scatter(a, b)] = rg.gather(u, v)"),
+                ("Use AdjointOptions{.overwritten = Overwritten::Store}",
+                 "Use rg.AdjointOptions(overwritten=rg.Overwritten.Store)"),
+                ("Name Target::CUDA", "Name rg.Target.CUDA"),
+                ("Convert them: cast<int>(...)", "Convert them: rg.i32(...)"),
+                ("Give 0 or more", "Give 0 or more")):
+            self.assertEqual(in_python(f"cannot do: no; so. {theirs}.", theirs), (f"cannot do: no; so. {ours}.", ours))
 
 
 class OnTheWayIn(unittest.TestCase):

@@ -12,8 +12,9 @@ from .._errors import CompileError, error
 from . import _library
 from ._direct import is_compiling, is_direct
 from ._explaining import explain
-from ._pickling import Function, describe, described
+from ._pickling import Function, describe, described, restored_outputs, stored_outputs
 from ._plan import Plan, is_image
+from ._sizes import Sizes
 from ._training import training_of
 
 _numbers = itertools.count()
@@ -24,15 +25,16 @@ def operator(name, pipeline=None, inputs=None, outputs=None, *, sizes=None):
     """Creates the operator "ns::name". It takes tensors for ImageParams, and tensors or numbers for Params, in the
     order of `inputs`. It returns a tensor for a Func, and a tuple of tensors for a list of Funcs or a Pipeline.
 
-    `outputs` (or `sizes`) gives the sizes of the result, innermost first, or a list of these for several results. It
-    may also be a function that computes them from the tensors. None means the sizes of the first image. Under torch.compile
-    with dynamic shapes the function should read t.shape rather than len(t), which is a constant of a single call.
+    `outputs` (or `sizes`) gives the sizes of the result, innermost first, or a list of these for several results. A
+    size is a number or an expression, such as image.dim(0).extent() - 2. `outputs` may also be a function that computes
+    the sizes from the tensors. None means the sizes of the first image. Under torch.compile with dynamic shapes the
+    function should read t.shape rather than len(t), which is a constant of a single call.
 
     Without a name, operator(pipeline, inputs, outputs) generates one.
 
     `pipeline` may also be a function of an element type such as "float32" that returns (pipeline, inputs) or
-    (pipeline, inputs, outputs). Then one definition serves tensors of all floating-point types. The first input that is
-    float32 in the definition for "float32" determines the type of a call.
+    (pipeline, inputs, outputs); `sizes` may be given to operator() instead. Then one definition serves tensors of all
+    floating-point types. The first input that is float32 in the definition for "float32" determines the type of a call.
     A function of two arguments, (type, shapes), also receives the shapes of the tensors, in PyTorch's order. Its result
     is compiled for these shapes only, which is faster than general code. It is also called with None: once when the
     operator is created, and after MOST_SIZES different shapes for all others. Sizes are then expressions, such as
@@ -59,12 +61,12 @@ def _registered(operator):
     return operator
 
 
-def _restored(name, mark, signature, definition, description):
+def _restored(name, mark, signature, definition, description, outputs=None):
     """Restores an operator from the contents of a pickle."""
     with _registering:
         known = _by_mark.get(mark) or (name and _by_name.get(name))
         if known is None:
-            parts = (definition.function, None, None) if definition else described(*description)
+            parts = (definition.function, None, restored_outputs(outputs)) if definition else described(*description)
             known = Operator(name, *parts)
             known._mark, known._is_restored = mark, True
             _registered(known)
@@ -81,27 +83,40 @@ def _shown(signature):
     return f"takes {', '.join(f'{name}: {kind}' for name, kind, _ in inputs)} and gives {', '.join(results)}"
 
 
-def _funcs(pipeline):
+def _funcs(name, pipeline):
+    """The Funcs of a pipeline, and whether it is a single Func."""
     if isinstance(pipeline, rg.Func):
         return [pipeline], True
-    return (pipeline.outputs() if isinstance(pipeline, rg.Pipeline) else list(pipeline)), False
+    if isinstance(pipeline, rg.Pipeline):
+        return pipeline.outputs(), False
+    funcs = list(pipeline) if isinstance(pipeline, (list, tuple)) else [pipeline]
+    for one in funcs:
+        if not isinstance(one, rg.Func):
+            raise error(TypeError, f'make the operator "{name}"', "a result is a Func", f"one is {_named(one)}",
+                        "Define a Func of it, as in f[x] = image[x]" if isinstance(one, rg.ImageParam) else
+                        "Give a Func, a list of Funcs or a Pipeline")
+    return funcs, False
 
 
-def _shapes(outputs, inputs, count):
-    """The shapes of the results as a function of the tensors, from the user's argument `outputs`."""
-    if outputs is None:
-        first = next((i for i, parameter in enumerate(inputs) if is_image(parameter)), None)
-        if first is None:
-            raise error(CompileError, "make an operator without images", "the sizes of its results are known",
-                        "there is no image whose sizes they could have", "Give `outputs`: their sizes")
-        return lambda tensors: [tuple(tensors[first].shape)] * count
+def _named(thing):
+    kind = type(thing).__name__
+    return f'the {kind} "{thing.name()}"' if isinstance(thing, rg.ImageParam) else f"an object of type {kind}"
 
-    def shapes(tensors):
-        given = outputs(*tensors) if callable(outputs) else outputs
-        each = given if given and isinstance(given[0], (list, tuple)) else [given] * count
-        return [tuple(reversed(one)) for one in each]
 
-    return shapes
+def _parts(name, definition):
+    """A definition as a tuple (pipeline, inputs, outputs)."""
+    if not isinstance(definition, (list, tuple)) or len(definition) not in (2, 3):
+        raise error(TypeError, f'make the operator "{name}"', "a definition returns (pipeline, inputs) or (pipeline, "
+                    "inputs, outputs)", f"it returned {_named(definition)}" if not isinstance(definition, tuple) else
+                    f"it returned {len(definition)} values", "Return the Func and the list of its inputs")
+    return (*definition, None)[:3]
+
+
+def _check_is_alone(name, inputs):
+    """Refuses inputs beside a function, which returns its own."""
+    if inputs is not None:
+        raise error(TypeError, f'make the operator "{name}"', "a function that defines a pipeline returns its inputs",
+                    "inputs are given too", "Leave them out; `sizes` may be given")
 
 
 def _identifiers(names):
@@ -114,6 +129,15 @@ def _identifiers(names):
     return made
 
 
+def _is_in_range(t, dtype):
+    """Whether the integer in a tensor is a value of an integer type. In a trace, which has no values, all of the
+    tensor's type must be."""
+    held, wanted = torch.iinfo(t.dtype) if t.dtype != torch.bool else None, torch.iinfo(dtype)
+    if held is None or (wanted.min <= held.min and held.max <= wanted.max):
+        return True
+    return not is_compiling() and is_direct((t,)) and wanted.min <= t.item() <= wanted.max
+
+
 class Operator:
     """An operator of PyTorch; see `operator`. `overload` and `derivative` are those of torch.library."""
 
@@ -122,14 +146,16 @@ class Operator:
     def __init__(self, name, pipeline, inputs, outputs):
         self._define, self._knows_sizes = None, False
         self.name = name or "without a name"  # until its Funcs are known
-        if callable(pipeline) and not isinstance(pipeline, (rg.Func, rg.Pipeline)):
+        self._outputs = outputs  # used where a definition returns none
+        if callable(pipeline) and not isinstance(pipeline, (rg.Func, rg.Pipeline, rg.ImageParam)):
+            _check_is_alone(self.name, inputs)
             self._define, self._knows_sizes = pipeline, len(inspect.signature(pipeline).parameters) > 1
             definition = self._defined(torch.float32)
         else:
             definition = (pipeline, inputs, outputs)
         self._plans, self._sized, self._lock = {}, {}, threading.Lock()
-        funcs, self.single = _funcs(definition[0])
-        self._definition = None if self._define else (funcs, self.single, list(definition[1]), definition[2])
+        funcs, self.single = _funcs(self.name, definition[0])
+        self._definition = None if self._define else (funcs, self.single, list(definition[1]), outputs)
         self._has_name, self._mark, self._is_restored = bool(name), uuid.uuid4().hex, False
         self.name = name or f"retrograde::{re.sub(r'[^A-Za-z0-9]', '_', funcs[0].name())}_{next(_numbers)}"
         if not re.fullmatch(r"[A-Za-z]\w*::[A-Za-z]\w*", self.name):
@@ -141,6 +167,7 @@ class Operator:
         self._by = next((i for i, d in enumerate(plan.dtypes) if d == torch.float32), None) if self._define else None
         self._plans[torch.float32 if self._by is not None else None] = plan
         self._parameters = plan
+        self._numbers = [(i, plan.dtypes[i]) for i, parameter in enumerate(plan.inputs) if not is_image(parameter)]
 
     def _register(self):
         self._calls = _library.register(self)
@@ -162,26 +189,37 @@ class Operator:
     def __reduce__(self):
         return _restored, (self.name if self._has_name else None, self._mark, self._signature(),
                            Function(self._define) if self._define else None,
-                           None if self._define else describe(*self._definition))
+                           None if self._define else describe(*self._definition),
+                           stored_outputs(self._outputs) if self._define else None)
 
     def _defined(self, dtype):
         """The definition for sizes that are not known."""
         kind = str(dtype)[6:]
         if not self._knows_sizes:
-            return self._define(kind)
+            return _parts(self.name, self._define(kind))
         try:
-            return self._define(kind, None)
+            return _parts(self.name, self._define(kind, None))
         except (AttributeError, IndexError, TypeError, ValueError) as problem:
-            raise error(CompileError, f'define the operator "{self.name}" for sizes that are not known',
-                        "a definition is also called with shapes=None, for the names and types of its inputs and for "
-                        f"tensors beyond the first {MOST_SIZES} shapes",
-                        f"it raised {type(problem).__name__}: {problem}",
-                        "Where shapes is None, take the sizes from the images: image.dim(0).extent()") from problem
+            if "NoneType" not in str(problem):
+                raise  # sizes play no part
+            cause = f"the definition raised {type(problem).__name__}: {problem}"
+            rule = ("it is also called with shapes=None, for the names and types of its inputs and for tensors beyond "
+                    f"the first {MOST_SIZES} shapes")
+            # The cause comes first, because the rule is long.
+            made = error(CompileError, f'define the operator "{self.name}" for sizes that are not known', cause, rule,
+                         "Where shapes is None, take the sizes from the images: image.dim(0).extent()")
+            made.rule, made.evidence = rule, cause
+            raise made from problem
 
     def _plan_of(self, definition, sizes=None):
-        pipeline, inputs, outputs = (*definition, None)[:3]
-        funcs, _ = _funcs(pipeline)
-        return Plan(self.name, funcs, inputs, _shapes(outputs, list(inputs), len(funcs)), sizes)
+        pipeline, inputs, outputs = _parts(self.name, definition)
+        if outputs is None:
+            outputs = self._outputs
+        elif outputs is not self._outputs and self._outputs is not None:
+            raise error(TypeError, f'make the operator "{self.name}"', "the sizes of its results are given once",
+                        "the definition returns them, and operator() was given them", "Leave out one of the two")
+        funcs, _ = _funcs(self.name, pipeline)
+        return Plan(self.name, funcs, inputs, Sizes(self.name, outputs, inputs, len(funcs)), sizes)
 
     def plan_for(self, path, tensors):
         """The plan for tensors of these types and, if the definition uses them, sizes."""
@@ -233,6 +271,10 @@ class Operator:
 
     def __call__(self, *tensors):
         if len(tensors) == len(self.argument_names):
+            for i, dtype in self._numbers:  # PyTorch takes an integer wherever it takes a number
+                held = getattr(tensors[i], "dtype", dtype)
+                if held is not dtype and not (dtype.is_floating_point and getattr(held, "is_floating_point", False)):
+                    tensors = self._with_numbers(tensors)
             if not is_compiling() and is_direct(tensors):
                 results = self._calls.direct((), tensors)
                 return results[0] if self.single else tuple(results)
@@ -252,9 +294,28 @@ class Operator:
                 if is_image(parameter):
                     raise error(TypeError, f'call the operator "{self.name}"', f"{parameter.name()} is a tensor",
                                 f"given is a {type(tensor).__name__}", "Make one of it with torch.tensor")
-                follows = self._define and dtype == torch.float32 and of
-                tensor = torch.tensor(tensor, dtype=of if follows else dtype)
+                if isinstance(tensor, float) and not dtype.is_floating_point and not tensor.is_integer():
+                    raise error(TypeError, f'call the operator "{self.name}"', f"{parameter.name()} is an integer",
+                                f"given is {tensor}", "Round it with int() or round()")
+                tensor = torch.tensor(tensor, dtype=self._number_type(dtype, of))
             made.append(tensor)
+        return tuple(made)
+
+    def _number_type(self, dtype, of):
+        """The type of a number for a Param: `of`, the type of the call, if the definition is a function of it."""
+        return of if self._define and dtype == torch.float32 and of else dtype
+
+    def _with_numbers(self, tensors):
+        """Converts tensors of one integer to the types of their Params, as PyTorch does: any integer to a floating-point
+        type, and to another integer type if it is in its range."""
+        of = next((t.dtype for t in tensors if isinstance(t, torch.Tensor) and t.dtype.is_floating_point), None)
+        made = list(tensors)
+        for i, dtype in self._numbers:
+            t, dtype = made[i], self._number_type(dtype, of)
+            if not isinstance(t, torch.Tensor) or t.dim() or t.dtype.is_floating_point or t.dtype.is_complex:
+                continue
+            if dtype.is_floating_point or (dtype != torch.bool and _is_in_range(t, dtype)):
+                made[i] = t.to(dtype)
         return tuple(made)
 
     def explain(self, *inputs):

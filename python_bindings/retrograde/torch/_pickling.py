@@ -90,7 +90,16 @@ def describe(funcs, single, inputs, outputs):
     text, buffers = rg._describe_pipeline(rg.Pipeline(funcs))
     kinds = [(parameter.name(), str(parameter.type()),
               parameter.dimensions() if isinstance(parameter, rg.ImageParam) else None) for parameter in inputs]
-    return text, buffers, single, kinds, Function(outputs) if callable(outputs) else outputs
+    return text, buffers, single, kinds, stored_outputs(outputs)
+
+
+def stored_outputs(outputs):
+    """The argument `outputs` of operator() in a form that can be pickled."""
+    return Function(outputs) if callable(outputs) else outputs
+
+
+def restored_outputs(outputs):
+    return outputs.function if isinstance(outputs, Function) else outputs
 
 
 def described(text, buffers, single, kinds, outputs):
@@ -102,4 +111,4 @@ def described(text, buffers, single, kinds, outputs):
         if made is None:
             made = rg.Param(kind, name) if dimensions is None else rg.ImageParam(kind, dimensions, name)
         inputs.append(made)
-    return (funcs[0] if single else funcs), inputs, outputs.function if isinstance(outputs, Function) else outputs
+    return (funcs[0] if single else funcs), inputs, restored_outputs(outputs)

@@ -14,6 +14,7 @@ from .. import _retrograde as rg
 from .._errors import CompileError, error
 from .._explain import plain
 from ._device import device_of
+from ._outside import naming_tensors
 
 DTYPES = {torch.float16: rg.Float(16), torch.bfloat16: rg.BFloat(16), torch.float32: rg.Float(32),
           torch.float64: rg.Float(64), torch.uint8: rg.UInt(8), torch.int8: rg.Int(8), torch.int16: rg.Int(16),
@@ -196,7 +197,8 @@ class Plan:
             with self._lock:
                 if self._callable is None:
                     self._callable = self._compile_for(rg.get_jit_target_from_environment())
-        self._callable._call_tensors((*tensors, *results))
+        with naming_tensors(self, tensors, results):
+            self._callable._call_tensors((*tensors, *results))
 
     def _call_on(self, device, tensors, results):
         found = self._on_devices.get(device.target)
@@ -205,7 +207,8 @@ class Plan:
                 if device.target not in self._on_devices:
                     self._on_devices[device.target] = self._compile_for(rg.Target(device.target))
                 found = self._on_devices[device.target]
-        found._call_tensors_on_device((*tensors, *results), device.stream())
+        with naming_tensors(self, tensors, results):
+            found._call_tensors_on_device((*tensors, *results), device.stream())
 
     def _compile_for(self, target):
         """Compiles a copy with an automatic schedule for the target, unless the user gave directives."""
