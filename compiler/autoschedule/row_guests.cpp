@@ -8,6 +8,7 @@
 #include "analysis/interval.h"
 #include "autoschedule/inlined_reads.h"
 #include "autoschedule/read_estimate.h"
+#include "autoschedule/row_groups.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/lets.h"
@@ -90,11 +91,14 @@ class GuestFinder {
     for (const RowGuest& other : host_.guests) {
       if (is_made_from(f, other.sums) || is_made_from(other.sums, f)) return;
     }
-    host_.guests.push_back(std::move(*guest));
+    if (!host_.guests.empty() && host_.groups != guest->groups) return;
+    host_.guests.push_back(std::move(guest->guest));
+    host_.groups = std::move(guest->groups);
+    host_.parallel_groups = guest->parallel;
   }
 
   // Private parts of an adjoint, of one kind, that add up one block or terms.
-  std::optional<RowGuest> guest_of(const FuncPtr& f) const {
+  std::optional<GuestOfGroups> guest_of(const FuncPtr& f) const {
     const bool is_partial = f->made && (f->made->lanes > 0 || f->made->has_parts);
     if (!is_partial || f->made->blocks > 0 || f->stage_count() != 2 || f->types.size() != 1 ||
         host_.coordinates.contains(f.get()) || !is_free_(f))
@@ -103,11 +107,14 @@ class GuestFinder {
       if (!is_pure_position(*f, f->updates[0], d)) return std::nullopt;
     }
     const auto added = block_read(*f);
-    if (!added) return guest_at(f, nullptr, variables_of(f->args));
+    if (!added) return guest_of_rows(f, nullptr, variables_of(f->args));
     const FuncPtr block = func_of(*added->as<Call>());
     const bool is_plain = block->stage_count() == 2 && reads_.of(block).size() == 1 &&
                           reads_.of(block)[0].calls.size() <= 2 && is_free_(block);
-    return is_plain ? guest_at(f, block, added->as<Call>()->args) : std::nullopt;
+    if (!is_plain) return std::nullopt;
+    const std::vector<Expr>& place = added->as<Call>()->args;
+    auto guest = guest_of_rows(f, block, place);
+    return guest ? std::move(guest) : guest_of_groups(f, block, place);
   }
 
   static std::optional<Expr> block_read(const FuncContents& f) {
@@ -120,43 +127,63 @@ class GuestFinder {
     return result;
   }
 
-  // `place`: of what has the terms, in terms of the variables of the sums.
-  std::optional<RowGuest> guest_at(const FuncPtr& sums, const FuncPtr& block,
-                                   const std::vector<Expr>& place) const {
-    const FuncPtr& terms = block ? block : sums;
-    std::optional<std::vector<std::string>> rows;
-    bool is_known = true;
-    for (const Expr& root : roots_with_inlined(terms->updates[0], stored_)) {
+  // The reads of what the host reads in its row: their index along each coordinate of rows.
+  std::vector<std::vector<Expr>> row_indices(const FuncContents& terms) const {
+    std::vector<std::vector<Expr>> result;
+    for (const Expr& root : roots_with_inlined(terms.updates[0], stored_)) {
       walk(root, [&](const Expr& e) {
         const auto* call = e.as<Call>();
         if (!call || !is_access(*call) || !own_reads_.contains(call->name)) return true;
-        const auto found = rows_of(*call, *terms);
-        is_known &= found && rows.value_or(*found) == *found;
-        if (is_known) rows = found;
+        std::vector<Expr>& indices = result.emplace_back();
+        for (const RowCoordinate& row : host_.rows)
+          indices.push_back(index_of(*call, row.dimension, terms, terms.updates[0]));
         return true;
       });
     }
-    if (!rows || !is_known) return std::nullopt;
-    RowGuest guest{sums, block, {}};
-    for (const std::string& row : *rows) {
-      const auto arg = std::ranges::find(terms->args, row) - terms->args.begin();
-      const auto* v = place[static_cast<size_t>(arg)].as<Variable>();
-      if (!v || std::ranges::find(sums->args, v->name) == sums->args.end()) return std::nullopt;
-      guest.loops.push_back(v->name);
-    }
-    return guest;
+    return result;
   }
 
-  // The variables of a Func that name the row which a call of it reads.
-  std::optional<std::vector<std::string>> rows_of(const Call& call, const FuncContents& f) const {
-    std::vector<std::string> rows;
-    for (const RowCoordinate& row : host_.rows) {
-      const Expr index = index_of(call, row.dimension, f, f.updates[0]);
+  // `place`: of what has the terms, in terms of the variables of the sums.
+  std::optional<GuestOfGroups> guest_of_rows(const FuncPtr& sums, const FuncPtr& block,
+                                             const std::vector<Expr>& place) const {
+    const FuncContents& terms = block ? *block : *sums;
+    std::optional<std::vector<std::string>> rows;
+    for (const std::vector<Expr>& indices : row_indices(terms)) {
+      const auto found = names_of(indices, terms);
+      if (!found || rows.value_or(*found) != *found) return std::nullopt;
+      rows = found;
+    }
+    if (!rows) return std::nullopt;
+    GuestOfGroups result{{sums, block, {}}, {}, 0};
+    for (const std::string& row : *rows) {
+      const auto arg = std::ranges::find(terms.args, row) - terms.args.begin();
+      const auto* v = place[static_cast<size_t>(arg)].as<Variable>();
+      if (!v || std::ranges::find(sums->args, v->name) == sums->args.end()) return std::nullopt;
+      result.guest.loops.push_back(v->name);
+    }
+    return result;
+  }
+
+  // The variables of a Func that are these indices.
+  static std::optional<std::vector<std::string>> names_of(const std::vector<Expr>& indices,
+                                                          const FuncContents& f) {
+    std::vector<std::string> result;
+    for (const Expr& index : indices) {
       const auto* v = index.as<Variable>();
       if (!v || std::ranges::find(f.args, v->name) == f.args.end()) return std::nullopt;
-      rows.push_back(v->name);
+      result.push_back(v->name);
     }
-    return rows;
+    return result;
+  }
+
+  std::optional<GuestOfGroups> guest_of_groups(const FuncPtr& sums, const FuncPtr& block,
+                                               const std::vector<Expr>& place) const {
+    auto result =
+        autoschedule::guest_of_groups(host_, sums, block, place, row_indices(*block), sizes_);
+    if (!result) return std::nullopt;
+    const int64_t rows = rows_of_group(host_, result->groups, sizes_);
+    return rows * bytes_of_row(*host_.host) <= sizes_.machine().block_bytes ? std::move(result)
+                                                                            : std::nullopt;
   }
 
   // ---- shared ----
@@ -176,13 +203,20 @@ class GuestFinder {
   }
 
   bool fits_beside_others(const FuncContents& f) const {
-    int64_t rows = 1, bytes = sizes_.bytes(*host_.host) + sizes_.bytes(f);
+    int64_t bytes = bytes_of_row(*host_.host) + bytes_of_row(f);
+    for (const auto* others : {&host_.inside, &host_.shared}) {
+      for (const FuncPtr& other : *others) bytes += bytes_of_row(*other);
+    }
+    const int64_t rows = host_.groups.empty() ? 1 : rows_of_group(host_, host_.groups, sizes_);
+    return rows * bytes <= sizes_.machine().block_bytes;
+  }
+
+  // Of a Func with as many rows as the host.
+  int64_t bytes_of_row(const FuncContents& f) const {
+    int64_t rows = 1;
     for (const auto& [dimension, divisor] : host_.rows)
       rows *= (sizes_.extent(*host_.host, dimension).value_or(1) + divisor - 1) / divisor;
-    for (const auto* others : {&host_.inside, &host_.shared}) {
-      for (const FuncPtr& other : *others) bytes += sizes_.bytes(*other);
-    }
-    return bytes / rows <= sizes_.machine().block_bytes;
+    return sizes_.bytes(f) / rows;
   }
 
   bool is_within_rows(const StoredRead& read) const {

@@ -15,32 +15,41 @@ namespace retrograde::autoschedule {
 
 namespace {
 
+using Level = retrograde::LoopLevel;
+
 class HostMover {
  public:
-  HostMover(const RowHost& host, const SizeEstimate& sizes) : host_(host), sizes_(sizes) {}
+  HostMover(const RowHost& host, const SizeEstimate& sizes)
+      : host_(host),
+        sizes_(sizes),
+        has_guests_(std::ranges::all_of(host.guests, has_whole_rows)),
+        groups_(has_guests_ ? host.groups : std::vector<RowGroup>()) {}
 
   void move() {
+    name_loops();
     cut_rows();
-    for (const FuncPtr& f : host_.members) {
-      if (f->schedule.compute_level.kind == graph::LoopLevel::Kind::At) continue;  // a block
-      autoschedule::run_serially(f);
-      Func(f).compute_at(retrograde::LoopLevel(Func(host_.host), Var(level()), 0));
-    }
-    const bool has_guests = std::ranges::all_of(host_.guests, has_whole_rows);
-    move_into_row(host_.inside);
-    if (has_guests) move_into_row(host_.shared);
+    move_members();
+    move_into(row_level(), host_.inside);
     for (const FuncPtr& copy : host_.copies) join(copy);
-    if (!has_guests) return;
-    for (const RowGuest& guest : host_.guests) join(guest);
+    if (!has_guests_) return;
+    move_into(shared_level(), host_.shared);
+    for (const RowGuest& guest : host_.guests) {
+      if (groups_.empty())
+        join_rows(guest);
+      else
+        join_groups(guest);
+    }
   }
 
  private:
   const RowHost& host_;
   const SizeEstimate& sizes_;
-  std::vector<std::string> loops_;  // over rows, as `rows`; the first is the innermost
-  size_t parallel_ = 0;             // number of them that run in parallel, outermost first
-
-  const std::string& level() const { return loops_[0]; }
+  const bool has_guests_;
+  const std::vector<RowGroup> groups_;
+  std::vector<std::string>
+      rows_;  // loops over rows, by `RowHost::rows`; the first is the innermost
+  std::vector<std::string> outer_;  // loops over groups, around these, as `groups_`
+  size_t parallel_ = 0;             // number of all these that run in parallel, outermost first
 
   static bool has_whole_rows(const RowGuest& guest) {
     return std::ranges::none_of(guest.loops, [&](const std::string& loop) {
@@ -48,10 +57,63 @@ class HostMover {
     });
   }
 
-  void move_into_row(const std::vector<FuncPtr>& funcs) const {
-    for (const FuncPtr& f : funcs) {
-      autoschedule::run_serially(f);
-      Func(f).compute_at(retrograde::LoopLevel(Func(host_.host), Var(level()), 0));
+  // ---- loops ----
+
+  void name_loops() {
+    for (size_t i = 0; i < host_.rows.size(); ++i) rows_.push_back(new_name("row"));
+    for (size_t i = 0; i < groups_.size(); ++i) outer_.push_back(new_name("group"));
+  }
+
+  // Copies and guests share the names of the loops.
+  std::string new_name(const std::string& wanted) const {
+    std::string name = wanted, last;
+    while (name != last) {
+      last = name;
+      name = new_loop(*host_.host, 0, name);
+      for (const FuncPtr& copy : host_.copies) name = new_loop(*copy, 0, name);
+      for (const RowGuest& guest : host_.guests) name = new_loop(*guest.sums, 1, name);
+      for (const auto* names : {&rows_, &outer_}) {
+        if (std::ranges::find(*names, name) != names->end()) name += "_";
+      }
+    }
+    return name;
+  }
+
+  // Whether one row of this coordinate is a group, so that the loop over groups is the one over rows.
+  bool is_group(size_t row) const {
+    return std::ranges::find(groups_, RowGroup{row, 1}) != groups_.end();
+  }
+
+  // Outermost last.
+  std::vector<std::string> loops() const {
+    std::vector<std::string> result;
+    for (size_t i = 0; i < rows_.size(); ++i) {
+      if (!is_group(i)) result.push_back(rows_[i]);
+    }
+    result.insert(result.end(), outer_.begin(), outer_.end());
+    return result;
+  }
+
+  Level level(const std::string& loop) const { return {Func(host_.host), Var(loop), 0}; }
+  Level row_level() const { return level(loops()[0]); }
+  Level shared_level() const { return groups_.empty() ? row_level() : level(outer_[0]); }
+
+  void run_in_parallel(Stage stage) const {
+    const std::vector<std::string> all = loops();
+    for (size_t i = 0; i < parallel_; ++i) stage.parallel(Var(all[all.size() - 1 - i]));
+  }
+
+  // Makes the loop `old` over the rows of a coordinate those over its rows and groups.
+  void cut_row(Stage& stage, const std::string& old, size_t row) const {
+    const Var rows(rows_[row]);
+    stage.rename(Var(old), rows);
+    for (size_t i = groups_.size(); i-- > 0;) {  // outermost first
+      if (groups_[i].row != row) continue;
+      if (groups_[i].step == 1)
+        stage.rename(rows, Var(outer_[i]));
+      else
+        stage.split(rows, Var(outer_[i]), rows, static_cast<int>(groups_[i].step),
+                    TailStrategy::GuardWithIf);
     }
   }
 
@@ -71,58 +133,61 @@ class HostMover {
         order.emplace_back(part);
       }
     }
-    for (const RowCoordinate& row : host_.rows) {
-      const std::string name = name_of_row(), old = host->args[row.dimension];
-      stage.rename(Var(old), Var(name));
-      order.emplace_back(Var(name));
-      loops_.push_back(name);
-    }
+    for (size_t i = 0; i < rows_.size(); ++i)
+      cut_row(stage, host->args[host_.rows[i].dimension], i);
+    for (const std::string& loop : loops()) order.emplace_back(Var(loop));
     stage.reorder(order);
-    count_tasks();
+    parallel_ = groups_.empty() ? tasks() : host_.parallel_groups;
     run_in_parallel(stage);
   }
 
-  // Copies and guests share the names of the loops.
-  std::string name_of_row() const {
-    std::string name = "row", last;
-    while (name != last) {
-      last = name;
-      name = new_loop(*host_.host, 0, name);
-      for (const FuncPtr& copy : host_.copies) name = new_loop(*copy, 0, name);
-      for (const RowGuest& guest : host_.guests) name = new_loop(*guest.sums, 1, name);
-    }
-    return name;
-  }
-
-  void count_tasks() {
+  // Loops over rows that make enough tasks.
+  size_t tasks() const {
     int64_t tasks = 1;
+    size_t result = 0;
     for (auto row = host_.rows.rbegin(); row != host_.rows.rend(); ++row) {
-      if (tasks >= std::max(enough_rows, sizes_.machine().enough_tasks)) return;
+      if (tasks >= std::max(enough_rows, sizes_.machine().enough_tasks)) break;
       tasks *= sizes_.extent(*host_.host, row->dimension).value_or(1) / row->divisor;
-      ++parallel_;
+      ++result;
+    }
+    return result;
+  }
+
+  // ---- what is computed in them ----
+
+  void move_members() const {
+    for (const FuncPtr& f : host_.members) {
+      if (f->schedule.compute_level.kind == graph::LoopLevel::Kind::At) continue;  // a block
+      autoschedule::run_serially(f);
+      Func(f).compute_at(row_level());
     }
   }
 
-  void run_in_parallel(Stage stage) const {
-    for (size_t i = 0; i < parallel_; ++i) stage.parallel(Var(loops_[loops_.size() - 1 - i]));
+  static void move_into(const Level& level, const std::vector<FuncPtr>& funcs) {
+    for (const FuncPtr& f : funcs) {
+      autoschedule::run_serially(f);
+      Func(f).compute_at(level);
+    }
   }
+
+  // ---- what shares them ----
 
   void join(const FuncPtr& copy) const {
     Stage stage(copy, 0);
     const RowCoordinates& all = host_.coordinates.at(copy.get());
-    std::vector<VarOrRVar> order;
     for (size_t i = 0; i < host_.rows.size(); ++i) {
       const auto arg = std::ranges::find(all, std::optional(host_.rows[i]));
-      stage.rename(Var(copy->args[static_cast<size_t>(arg - all.begin())]), Var(loops_[i]));
-      order.emplace_back(Var(loops_[i]));
+      cut_row(stage, copy->args[static_cast<size_t>(arg - all.begin())], i);
     }
+    std::vector<VarOrRVar> order;
+    for (const std::string& loop : loops()) order.emplace_back(Var(loop));
     stage.reorder(order);
     run_in_parallel(stage);
-    stage.compute_with(Stage(host_.host, 0), Var(level()));
+    stage.compute_with(Stage(host_.host, 0), Var(loops()[0]));
   }
 
   // A guest may have several elements in a row.
-  void join(const RowGuest& guest) const {
+  void join_rows(const RowGuest& guest) const {
     autoschedule::run_serially(guest.sums);
     Stage stage(guest.sums, 1);
     std::vector<VarOrRVar> order;
@@ -138,13 +203,32 @@ class HostMover {
       stage.split(all, all, part, static_cast<int>(divisor), TailStrategy::GuardWithIf);
       order.emplace_back(part);
     }
-    for (size_t i = 0; i < host_.rows.size(); ++i) {
-      stage.rename(Var(guest.loops[i]), Var(loops_[i]));
-      order.emplace_back(Var(loops_[i]));
+    for (size_t i = 0; i < rows_.size(); ++i) {
+      stage.rename(Var(guest.loops[i]), Var(rows_[i]));
+      order.emplace_back(Var(rows_[i]));
     }
     stage.reorder(order);
     run_in_parallel(stage);
-    stage.compute_with(Stage(host_.host, 0), Var(level()));
+    stage.compute_with(Stage(host_.host, 0), Var(rows_[0]));
+  }
+
+  void join_groups(const RowGuest& guest) const {
+    autoschedule::run_serially(guest.sums);
+    Stage stage(guest.sums, 1);
+    std::vector<VarOrRVar> order, shared;
+    for (const Dim& loop : std::vector<Dim>(guest.sums->updates[0].schedule.dims)) {
+      if (std::ranges::find(guest.loops, loop.var) == guest.loops.end())
+        order.emplace_back(loop.var, loop.is_reduction);
+    }
+    for (size_t i = 0; i < outer_.size(); ++i) {
+      const bool is_added_up = i < outer_.size() - parallel_;
+      stage.rename(VarOrRVar(guest.loops[i], is_added_up), VarOrRVar(outer_[i], is_added_up));
+      order.emplace_back(outer_[i], is_added_up);
+    }
+    stage.reorder(order);
+    run_in_parallel(stage);
+    Func(guest.block).compute_at(shared_level());
+    stage.compute_with(Stage(host_.host, 0), Var(outer_[0]));
   }
 };
 

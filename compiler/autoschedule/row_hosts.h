@@ -47,11 +47,19 @@ struct RowCoordinate {
 // The coordinates by argument of a Func; nullopt: the argument does not move with rows.
 using RowCoordinates = std::vector<std::optional<RowCoordinate>>;
 
-// Sums for elements of their own that join the loop over rows (row_guests.h).
+// A loop over groups of rows: every so many rows along one coordinate start a group.
+struct RowGroup {
+  size_t row = 0;  // index into RowHost::rows
+  int64_t step = 1;
+  friend bool operator==(const RowGroup&, const RowGroup&) = default;
+};
+
+// Sums that join the loop over rows (row_guests.h), or over groups of rows (row_groups.h).
 struct RowGuest {
-  FuncPtr sums;                    // stage 1 of it joins
-  FuncPtr block;                   // that it adds up; null: it adds terms
-  std::vector<std::string> loops;  // its variables that name the row, as `RowHost::rows`
+  FuncPtr sums;   // stage 1 of it joins
+  FuncPtr block;  // that it adds up; null: it adds terms
+  // Its variables that name the row, as `RowHost::rows`, or the group, as `RowHost::groups`.
+  std::vector<std::string> loops;
 };
 
 struct RowHost {
@@ -60,8 +68,10 @@ struct RowHost {
   std::vector<FuncPtr> members;     // consumers first
   std::vector<FuncPtr> copies;
   std::vector<RowGuest> guests;
-  std::vector<FuncPtr> inside;  // pure Funcs that the host alone reads, each element for its own
-  std::vector<FuncPtr> shared;  // pure Funcs that host, members and guests alone read
+  std::vector<RowGroup> groups;  // that all guests share, innermost first; empty: they share rows
+  size_t parallel_groups = 0;    // of these, outermost first
+  std::vector<FuncPtr> inside;   // pure Funcs that the host alone reads, each element for its own
+  std::vector<FuncPtr> shared;   // pure Funcs that host, members and guests alone read
   std::unordered_map<const Symbol*, RowCoordinates> coordinates;  // of the host, members and copies
 };
 

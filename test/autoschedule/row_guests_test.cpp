@@ -84,12 +84,72 @@ struct Normalisation {
   }
 };
 
+// The gradients of an activation of normalised rows, by the rows and by a scale and a shift for each column: sums over
+// rows, with 4096 terms or more.
+struct LayerNormalisation {
+  int width = 48, rows = 4224;
+  Buffer<float> image, scale, shift;
+  Func normalised{"normalised"}, by_image{"by_image"}, by_scale{"by_scale"}, by_shift{"by_shift"};
+  Func adjoint{"adjoint"};  // of what is normalised
+
+  explicit LayerNormalisation(int number_of_rows = 4224, int sets = 0) : rows(number_of_rows) {
+    // With `sets`, rows have two coordinates.
+    std::vector<int> sizes{width, rows};
+    std::vector<Var> row{y};
+    if (sets > 0) {
+      sizes.push_back(sets);
+      row.push_back(n);
+    }
+    const auto at = [&](const Expr& column) {
+      std::vector<Expr> place{column};
+      place.insert(place.end(), row.begin(), row.end());
+      return place;
+    };
+    const std::vector<Expr> this_row(row.begin(), row.end());
+    image = gradient::random_image(sizes, -1, 2, 5);
+    scale = gradient::random_image({width}, 0.5f, 2, 7);
+    shift = gradient::random_image({width}, -1, 1, 9);
+    RDom r(0, width);
+    Func mu("mu"), square("square"), active("active"), seed("seed");
+    mu(row) = 0.0f;
+    mu(row) += image(at(r)) / static_cast<float>(width);
+    square(row) = 0.0f;
+    square(row) += image(at(r)) * image(at(r)) / static_cast<float>(width);
+    std::vector<Var> all{x};
+    all.insert(all.end(), row.begin(), row.end());
+    const Expr spread = sqrt(square(this_row) - mu(this_row) * mu(this_row) + 1e-3f);
+    normalised(all) = scale(x) * (image(at(x)) - mu(this_row)) / spread + shift(x);
+    active(all) = normalised(all) / (1.0f + exp(-normalised(all)));
+    Expr sum = x;
+    for (const Var& v : row) sum = sum + 3 * v;
+    seed(all) = cast<float>(sum % 11) - 5.0f;
+    Region region;
+    for (const int size : sizes) region.push_back({0, size});
+    const Derivative d = propagate_adjoints(active, seed, region);
+    adjoint = d.adjoint(normalised);
+    by_image(all) = Func(d(image))(std::vector<Expr>(all.begin(), all.end()));
+    by_scale(x) = d(scale)(x);
+    by_shift(x) = d(shift)(x);
+    for (size_t k = 0; k < all.size(); ++k) by_image.bound(all[k], 0, sizes[k]);
+    by_scale.bound(x, 0, width);
+    by_shift.bound(x, 0, width);
+  }
+
+  std::vector<Func> outputs() const { return {by_image, by_scale, by_shift}; }
+  std::vector<Buffer<float>> results() const {
+    std::vector<int> sizes;
+    for (int d = 0; d < image.dimensions(); ++d) sizes.push_back(image.dim(d).extent());
+    return {Buffer<float>(sizes), Buffer<float>(width), Buffer<float>(width)};
+  }
+};
+
 void run(Pipeline& pipeline, const std::vector<Buffer<float>>& results) {
   pipeline.realize(Realization(std::vector<Buffer<>>(results.begin(), results.end())));
 }
 
 // Against each sum in loops of its own; with the same bits for other numbers of threads.
-void check(const Normalisation& scheduled, const Normalisation& plain) {
+template <typename Program>
+void check(const Program& scheduled, const Program& plain) {
   Pipeline pipeline(scheduled.outputs()), reference(plain.outputs());
   reference.set_autoschedule({.without = {Decision::Slices}});
   const std::vector<Buffer<float>> found = scheduled.results(), expected = plain.results();
@@ -145,6 +205,27 @@ TEST(RowGuests, HavePlanesAsParts) {
       }
     }
   }
+}
+
+void expect_groups(const std::vector<Func>& outputs, const LayerNormalisation& program) {
+  Pipeline(outputs).auto_schedule(get_host_target());
+  EXPECT_EQ(guests_of(outputs, program.by_image), 2);
+  EXPECT_TRUE(is_hosted_by(program.adjoint, program.by_image));
+}
+
+TEST(RowGuests, JoinTheLoopOverGroupsOfRows) {
+  for (const int rows : {4224, 5003}) {  // the second is a multiple of no group
+    SCOPED_TRACE(rows);
+    LayerNormalisation scheduled(rows), other(rows), plain(rows);
+    expect_groups(scheduled.outputs(), scheduled);
+    check(other, plain);
+  }
+}
+
+TEST(RowGuests, JoinTheLoopOverGroupsOfRowsWithTwoCoordinates) {
+  LayerNormalisation scheduled(384, 16), other(384, 16), plain(384, 16);
+  expect_groups(scheduled.outputs(), scheduled);
+  check(other, plain);
 }
 
 }  // namespace

@@ -144,7 +144,9 @@ class JoiningCheck {
   }
 
   void check_loop(const Dim& own, const Dim& other, const std::string& loops) const {
-    if (own.is_reduction != other.is_reduction || (own.var != other.var && !own.is_reduction)) {
+    const bool is_alike = own.is_reduction ? other.is_reduction || own.var == other.var
+                                           : !other.is_reduction && own.var == other.var;
+    if (!is_alike) {
       user_error(asked_, "both stages have the same loops down to the level",
                  text(loops, "; ", quoted(own.var), " would run with ", quoted(other.var)),
                  "Split and reorder both alike, or name a loop further out");

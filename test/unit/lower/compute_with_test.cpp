@@ -74,6 +74,24 @@ TEST_F(ComputeWith, SharesLoopsDownToTheLevel) {
   EXPECT_EQ(nest_of(h), nest_of_sum(sharing_y));
 }
 
+// A reduction loop runs with a pure one of its name, whose range is another.
+TEST_F(ComputeWith, ReductionLoopsRunWithPureOnes) {
+  for (const int terms : {5, height, 30}) {
+    expect_same([&](bool fused) {
+      Func f("f"), g("g"), h("h");
+      RDom r(0, terms, "r");
+      f(x, y) = x + y;
+      g(x) = x;
+      g(x) += (x + 2) * r;
+      h(x, y) = f(x, y) - g(x);
+      f.compute_root();
+      g.compute_root();
+      if (fused) g.update().rename(r, RVar("y")).reorder(x, RVar("y")).compute_with(f, y);
+      return h;
+    });
+  }
+}
+
 TEST_F(ComputeWith, ChainsShareEachWhatTheySay) {
   Func f("f"), g("g"), h("h"), out("out");
   f(x, y) = x + y;
