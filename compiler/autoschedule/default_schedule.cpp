@@ -103,7 +103,7 @@ void cut_sums(const std::vector<FuncPtr>& outputs, std::vector<FuncPtr>& stored,
   std::unordered_set<const Symbol*> kept = whole;  // at root
   kept.insert(chosen.store.begin(), chosen.store.end());
   if (request.makes(Decision::JoinSweeps)) sweep_rows(outputs, stored, kept, sizes);
-  cut_reductions(outputs, sizes, whole);
+  cut_reductions(outputs, sizes, request.unit, whole);
   if (request.makes(Decision::ScatterStrategy)) cut_scatters(outputs, sizes, whole);
 }
 
