@@ -11,6 +11,7 @@
 
 #include "gradient/gradient_check.h"
 #include "graph/graph.h"
+#include "ir/build.h"
 #include "support/schedule_log.h"
 
 namespace retrograde {
@@ -54,16 +55,16 @@ bool is_inside(const Func& f, const Func& host) {
 
 // Points blended from the transformations of bones.
 struct Skinning {
-  Skinning() {
-    points = gradient::random_image({3, many}, -1, 1, 3);
-    weights = gradient::random_image({bones, many}, 0.1, 1, 4);
+  explicit Skinning(int count = many) {
+    points = gradient::random_image({3, count}, -1, 1, 3);
+    weights = gradient::random_image({bones, count}, 0.1, 1, 4);
     matrices = gradient::random_image({4, 3, bones}, -1, 1, 5);
     const RDom r(0, bones, "r");
     blended(j, k, i) = 0.0f;
     blended(j, k, i) += weights(r, i) * matrices(j, k, r);
     moved(k, i) = blended(0, k, i) * points(0, i) + blended(1, k, i) * points(1, i) +
                   blended(2, k, i) * points(2, i) + blended(3, k, i);
-    moved.bound(k, 0, 3).bound(i, 0, many);
+    moved.bound(k, 0, 3).bound(i, 0, count);
   }
   Buffer<float> points, weights, matrices;
   Func blended{"blended"}, moved{"moved"};
@@ -189,13 +190,68 @@ TEST(PointLoops, MayUpdateSingleNumbers) {
   gradient::expect_machine_code_agrees(scheduled(program(f, in)), {{0, 0}, {3, many}});
 }
 
+// Which loops over numbers a stage of a Func, whose name contains this, has unrolled.
+int count_unrolled_loops(const ScheduleLog& log, const std::string& name, int stage) {
+  return static_cast<int>(std::ranges::count_if(log.entries, [&](const ScheduleLog::Entry& entry) {
+    const auto* run = std::get_if<graph::RunLoop>(&entry.directive);
+    return run && run->kind == ForType::Unrolled && entry.stage == stage &&
+           entry.func.find(name) != std::string::npos;
+  }));
+}
+
+// A 3x3 matrix of sums over all points: each point is read once.
+TEST(PointLoops, OfLongSumsAddAllElementsTogether) {
+  constexpr int terms = 5003;
+  const auto program = [&] {
+    const Buffer<float> p = gradient::random_image({3, terms}, -1, 1, 3);
+    const Buffer<float> q = gradient::random_image({3, terms}, -1, 1, 4);
+    Func covariance("covariance");
+    const RDom r(0, terms, "r");
+    covariance(j, k) = 0.0f;
+    covariance(j, k) += p(k, r) * q(j, r);
+    covariance.bound(j, 0, 3).bound(k, 0, 3);
+    return covariance;
+  };
+  Pipeline pipeline(program());
+  pipeline.auto_schedule(get_host_target());
+  if (get_host_target().has_feature(Target::AVX512)) {
+    EXPECT_EQ(count_unrolled_loops(pipeline.schedule_log(), "covariance_intm", 1), 2)
+        << pipeline.schedule_log().to_text();
+  }
+  pipeline.jit_handlers().thread_limit = 1;
+  const Buffer<float> found = pipeline.realize({3, 3}), expected = program().realize({3, 3});
+  expected.for_each_element([&](const int* at) { EXPECT_NEAR(found(at), expected(at), 0.01); });
+  for (const int threads : {2, 5}) {
+    pipeline.jit_handlers().thread_limit = threads;
+    EXPECT_TRUE(gradient::same_bits(pipeline.realize({3, 3}), found)) << threads;
+  }
+}
+
+// Terms of a sum over points are gathered from the weights: the tile has all numbers, so that each is gathered once.
+TEST(PointLoops, OfSumsOverPointsGatherEachTermOnce) {
+  if (!get_host_target().has_feature(Target::AVX512)) GTEST_SKIP() << "too few registers";
+  Skinning s(3000);
+  Pipeline pipeline(
+      propagate_adjoints(s.moved, gradient::random_image({3, 3000}, -1, 1, 6))(s.matrices));
+  pipeline.auto_schedule(get_host_target());
+  const ScheduleLog log = pipeline.schedule_log();
+  const auto has_side = [&](const std::string& loop, int size) {
+    return any_directive<graph::SplitLoop>(log, [&](const auto& entry, const auto& split) {
+      return entry.func.find("_adj") != std::string::npos && entry.stage == 1 && split.old == loop &&
+             ir::as_const_int(split.factor) == size;
+    });
+  };
+  EXPECT_TRUE(has_side("_0", 4) && has_side("_1", 3)) << log.to_text();
+}
+
 // The schedule is made of directives: another build of the program takes them from the log.
 TEST(PointLoops, AreInTheLog) {
   Skinning s, again;
   Pipeline pipeline(s.moved);
   pipeline.auto_schedule(get_host_target());
-  EXPECT_TRUE(has_entry(pipeline.schedule_log(), "blended.reorder_storage(i, j, k)") ||
-              any_directive<graph::ReorderStorage>(pipeline.schedule_log()));
+  Pipeline(again.moved).apply_schedule(pipeline.schedule_log());
+  EXPECT_EQ(innermost_in_memory(again.blended), "i");
+  EXPECT_TRUE(has_vectors_along(again.blended, 1, i));
 }
 
 }  // namespace
