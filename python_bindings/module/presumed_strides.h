@@ -22,7 +22,7 @@ class PresumedStrides {
   using Parameter = std::shared_ptr<graph::ParameterContents>;
   static constexpr int64_t most_elements = 16;
 
-  // Of arguments and outputs, in the order of calls; null for scalars.
+  // `parameters`: arguments and outputs in the order of calls; null for scalars.
   explicit PresumedStrides(std::vector<Parameter> parameters)
       : parameters_(std::move(parameters)), dropped_(parameters_.size()) {}
 

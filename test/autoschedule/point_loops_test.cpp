@@ -152,7 +152,7 @@ TEST(PointLoops, NeedFewNumbersAndManyPoints) {
   }
 }
 
-// What another Func reads at data-dependent points keeps the numbers of a point together.
+// If a consumer gathers points by data-dependent indices, the numbers of a point stay together.
 TEST(PointLoops, KeepNumbersTogetherThatAreGathered) {
   const auto at = gradient::random_image({many}, 0, 1, 3);
   const Buffer<float> points = gradient::random_image({3, many}, -1, 1, 4);
