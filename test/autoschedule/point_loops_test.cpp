@@ -237,8 +237,8 @@ TEST(PointLoops, OfSumsOverPointsGatherEachTermOnce) {
   const ScheduleLog log = pipeline.schedule_log();
   const auto has_side = [&](const std::string& loop, int size) {
     return any_directive<graph::SplitLoop>(log, [&](const auto& entry, const auto& split) {
-      return entry.func.find("_adj") != std::string::npos && entry.stage == 1 && split.old == loop &&
-             ir::as_const_int(split.factor) == size;
+      return entry.func.find("_adj") != std::string::npos && entry.stage == 1 &&
+             split.old == loop && ir::as_const_int(split.factor) == size;
     });
   };
   EXPECT_TRUE(has_side("_0", 4) && has_side("_1", 3)) << log.to_text();
