@@ -118,6 +118,33 @@ FuncPtr cut(const FuncPtr& f, int stage) {
   return sums;
 }
 
+// Elements of a vector or a small matrix are added up together, in registers: they share what their terms read.
+//
+//   for k, j: for r: parts(k, j) += w(r) * p(k, r) * q(j, r)   =>   for r: for k, j, unrolled: parts(k, j) += ...
+void add_elements_together(const FuncPtr& sums, const FuncContents& f, const VectorUnit& unit,
+                           const SizeEstimate& sizes) {
+  Stage update(sums, 1);
+  const std::vector<Dim> loops = sums->updates.at(0).schedule.dims;
+  std::vector<VarOrRVar> copies;
+  int64_t bytes = lanes_of_a_sum * graph::total_bytes(f.types);
+  for (size_t d = 0; d < f.args.size(); ++d) {
+    const Var all(f.args[d]);
+    const auto extent = sizes.extent(f, d);
+    const bool is_loop =
+        std::ranges::any_of(loops, [&](const Dim& loop) { return loop.var == all.name(); });
+    if (!is_loop || !extent || *extent < 2 || bytes * *extent > unit.accumulator_bytes) continue;
+    bytes *= *extent;
+    const Var copy(inner_loop(*sums, 1, all.name()));
+    update.split(all, all, copy, static_cast<int>(*extent), TailStrategy::GuardWithIf).unroll(copy);
+    copies.emplace_back(copy);
+  }
+  if (copies.empty()) return;
+  std::vector<VarOrRVar> order{VarOrRVar(loops[0].var, loops[0].is_reduction)};
+  order.insert(order.end(), copies.begin(), copies.end());
+  for (size_t i = 1; i < loops.size(); ++i) order.emplace_back(loops[i].var, loops[i].is_reduction);
+  update.reorder(order);
+}
+
 }  // namespace
 
 std::optional<std::string> rows_of_sum(const FuncPtr& f, int stage, const SizeEstimate& sizes) {
@@ -131,11 +158,11 @@ std::optional<std::string> rows_of_sum(const FuncPtr& f, int stage, const SizeEs
 FuncPtr sum_rows(const FuncPtr& f, int stage) { return cut(f, stage); }
 
 void cut_reductions(const std::vector<FuncPtr>& outputs, const SizeEstimate& sizes,
-                    const std::unordered_set<const Symbol*>& but) {
+                    const VectorUnit& unit, const std::unordered_set<const Symbol*>& but) {
   for (const FuncPtr& f : topological_order(outputs)) {
     if (has_directives(*f) || f->is_extern() || but.contains(f.get())) continue;
     for (int s = 1; s < f->stage_count(); ++s) {
-      if (is_long_sum(*f, f->stage(s), sizes)) cut(f, s);
+      if (is_long_sum(*f, f->stage(s), sizes)) add_elements_together(cut(f, s), *f, unit, sizes);
     }
   }
 }

@@ -15,15 +15,16 @@
 #include <unordered_set>
 #include <vector>
 
+#include "autoschedule/register_tile.h"
 #include "autoschedule/size_estimate.h"
 #include "graph/function.h"
 
 namespace retrograde::autoschedule {
 
 // Factors long associative updates of one element, or of a number that is known to be small
-// (rfactor.h), of Funcs of this graph that nobody scheduled. `but`: not of these.
+// (rfactor.h), of Funcs of this graph that nobody scheduled. `unit` holds sums of several elements. `but`: not of these.
 void cut_reductions(const std::vector<FuncPtr>& outputs, const SizeEstimate& sizes,
-                    const std::unordered_set<const Symbol*>& but = {});
+                    const VectorUnit& unit, const std::unordered_set<const Symbol*>& but = {});
 
 // The reduction variable of a long sum that is cut into rows, each a task; nullopt: it is no such
 // sum, or has a single loop.

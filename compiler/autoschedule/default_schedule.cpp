@@ -19,6 +19,8 @@
 #include "autoschedule/new_loop.h"
 #include "autoschedule/only_reader.h"
 #include "autoschedule/placement_limits.h"
+#include "autoschedule/point_funcs.h"
+#include "autoschedule/point_loops.h"
 #include "autoschedule/reduction_slices.h"
 #include "autoschedule/root_loops.h"
 #include "autoschedule/row_hosts.h"
@@ -101,7 +103,7 @@ void cut_sums(const std::vector<FuncPtr>& outputs, std::vector<FuncPtr>& stored,
   std::unordered_set<const Symbol*> kept = whole;  // at root
   kept.insert(chosen.store.begin(), chosen.store.end());
   if (request.makes(Decision::JoinSweeps)) sweep_rows(outputs, stored, kept, sizes);
-  cut_reductions(outputs, sizes, whole);
+  cut_reductions(outputs, sizes, request.unit, whole);
   if (request.makes(Decision::ScatterStrategy)) cut_scatters(outputs, sizes, whole);
 }
 
@@ -154,6 +156,28 @@ RowHosts find_row_hosts(const std::vector<FuncPtr>& outputs, const std::vector<F
     if (slices.of_scatter(*f) || slices.of_reader(*f) || along.of(*f) > 0) excluded.insert(f.get());
   }
   return RowHosts(outputs, stored, excluded, sizes);
+}
+
+// `rows`, `slices`: what gets other loops.
+PointFuncs find_point_funcs(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& stored,
+                            std::unordered_set<const Symbol*> excluded, const RowHosts& rows,
+                            const SlicedScatters& slices, const SizeEstimate& sizes) {
+  excluded.merge(rows.all());
+  for (const FuncPtr& f : stored) {
+    if (slices.of_scatter(*f) || slices.of_reader(*f) || layout_of_parts(*f))
+      excluded.insert(f.get());
+  }
+  return PointFuncs(outputs, stored, excluded, lanes, sizes);
+}
+
+// Moves what has loops over points, when all have loops. Nothing else moves it.
+void move_point_funcs(const std::vector<FuncPtr>& funcs, const PointFuncs& points,
+                      const Readers& readers, const ChosenPlaces& chosen,
+                      std::unordered_set<const Symbol*>& whole, const ScheduleRequest& request) {
+  std::unordered_set<const Symbol*> excluded = whole;
+  excluded.insert(chosen.store.begin(), chosen.store.end());
+  if (request.makes(Decision::Slices)) compute_at_points(funcs, points, readers, excluded);
+  for (const FuncPtr& f : funcs) whole.insert(f.get());
 }
 
 // So that the log tells of every Func.
@@ -216,9 +240,13 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   const RowHosts rows =
       find_row_hosts(outputs, request.makes(Decision::Slices) ? stored : std::vector<FuncPtr>(),
                      whole, chosen, slices, along, sizes);
+  const PointFuncs points = find_point_funcs(
+      outputs, request.makes(Decision::LayoutStaging) ? stored : std::vector<FuncPtr>(), whole,
+      rows, slices, sizes);
   const AtomicScatters atomic(outputs, stored, whole, request, sizes);
   const Readers before(outputs, stored);
-  std::vector<FuncPtr> given;    // loops, at root
+  std::vector<FuncPtr> given;  // loops, at root
+  std::vector<FuncPtr> at_points;
   std::vector<FuncPtr> started;  // sums of these, in their tiles
   for (const FuncPtr& f : stored) {
     if (has_directives(*f)) continue;
@@ -230,6 +258,11 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
       continue;
     }
     if (f->is_extern() || limits.levels.contains(f.get()) || atomic.schedule(f)) continue;
+    if (points.points_of(*f)) {
+      give_point_loops(f, points, lanes, request.unit, sizes);
+      at_points.push_back(f);
+      continue;
+    }
     if (request.makes(Decision::ScatterStrategy) && schedule_scatter(f, slices, sizes)) {
       if (atomic.is_part(*f)) run_serially(f);
       continue;
@@ -245,6 +278,7 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   }
   rows.move();
   whole.merge(rows.all());
+  move_point_funcs(at_points, points, before, chosen, whole, request);
   if (may_choose) unroll_choices(given, fixed, sizes);
   const auto give_rows = [&](const FuncPtr& sum, const std::vector<size_t>& dimensions) {
     std::erase(started, sum);

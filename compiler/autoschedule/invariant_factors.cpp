@@ -30,6 +30,12 @@ bool reads_element(const Expr& e) {
   return call && (call->call_type == CallType::Func || call->call_type == CallType::Image);
 }
 bool is_addition(const Expr& e) { return e.kind() == Kind::Add || e.kind() == Kind::Sub; }
+// A quotient by something that has an adjoint: each of its two operands gets a sum of as many terms, with divisions.
+bool is_quotient(const Expr& e) {
+  const auto* quotient = e.as<Binary>();
+  return quotient && e.kind() == Kind::Div &&
+         any_node(quotient->b, [](const Expr& part) { return reads_element(part); });
+}
 bool is_product(const Expr& e) {
   const auto* cast = e.as<Cast>();
   return cast ? is_product(cast->value) : e.kind() == Kind::Mul;
@@ -84,6 +90,7 @@ class Factors {
   }
 
  private:
+  static constexpr double many_terms = 256;       // for each element of a quotient
   static constexpr double clear_gain = 2;         // of the way to memory, for each element
   static constexpr double least_saved = 1 << 16;  // operations: less is no time
   static constexpr double sums_in_tile = 16;      // they share what is not a function
@@ -156,10 +163,13 @@ class Factors {
   bool is_worth_storing(const Expr& e, LoopSet loops) {
     const LoopSet all =
         names_.size() == most_loops ? ~LoopSet{0} : (LoopSet{1} << names_.size()) - 1;
-    if (!e.type().is_float() || reads_element(e) || loops == all || (loops & reductions_) == 0)
-      return false;
+    if (!e.type().is_float() || reads_element(e) || loops == all) return false;
     const double again = repeats(loops) - 1, operations = operations_over(e, loops);
-    if (operations <= cheap || again * operations < clear_gain * way_to_memory) return false;
+    const bool leaves_its_loops = (loops & reductions_) == 0;
+    if (leaves_its_loops && !(is_quotient(e) && again >= many_terms)) return false;
+    if (operations <= (is_quotient(e) ? 0 : cheap) ||
+        again * operations < clear_gain * way_to_memory)
+      return false;
     const auto elements = iterations(loops);
     if (!elements || *elements * again * operations < least_saved) return false;
     const double bytes = *elements * e.type().bytes();
@@ -239,6 +249,7 @@ FactorDefinition definition_of(const FuncContents& f, const Definition& update, 
       update.rvars, [&](const ReductionVariable& r) { return used.contains(r.var); });
   const bool has_short_rows = !f.args.empty() && !used.contains(f.args[0]) &&
                               values(f.args[0]).value_or(short_row + 1) <= short_row &&
+                              first != update.rvars.end() &&
                               values(first->var).value_or(0) >= two_vectors;
   if (!has_short_rows) add_pure();
   for (const ReductionVariable& r : update.rvars) add(r.var);

@@ -11,11 +11,13 @@
 // 1. The stage is an update f(x, ...) = f(x, ...) + term, or - term, over pure variables x, ... and reduction
 //    variables, without a predicate. Its Func is the user's and has no directives.
 // 2. The factor depends on some of the reduction variables, but not on all variables of the stage. What depends on pure
-//    variables alone leaves the loops of the reduction in code generation.
+//    variables alone leaves the loops of the reduction in code generation; it is a factor only if it is a quotient of many
+//    terms, such as a mean: otherwise the adjoints of both of its operands are sums over all terms.
 // 3. It has no effect, and calls no C function that may have one. It does not lie in an arm of an if_then_else, which
 //    moves as a whole or stays: over all values of its variables it reads what the term reads, and no more.
 // 4. The sizes of its dimensions are known, and all factors of a Func take at most 64 MB.
-// 5. The operations saved cost clearly more than writing and reading the factor.
+// 5. The operations saved cost clearly more than writing and reading the factor. Cheap ones are no factors, but quotients
+//    are.
 //
 // Values keep their bits: the factor is the same expression in the same type, and no sum changes its order. A product
 // that is added stays where it is, because code generation contracts it with the addition.

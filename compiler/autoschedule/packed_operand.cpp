@@ -65,7 +65,13 @@ class Candidate {
  public:
   Candidate(const Call& call, const FuncContents& f, const Definition& update,
             const RegisterTile& tile, int lanes, const SizeEstimate& sizes, const Extents& extents)
-      : f_(f), update_(update), tile_(tile), lanes_(lanes), sizes_(sizes), extents_(extents) {
+      : f_(f),
+        update_(update),
+        tile_(tile),
+        lanes_(lanes),
+        sizes_(sizes),
+        extents_(extents),
+        row_(innermost_dimension(call)) {
     for (const Expr& arg : call.args) index_.push_back(place(arg));
     for (const std::string& arg : f.args) depends_on_.push_back(moves(arg));
   }
@@ -75,8 +81,9 @@ class Candidate {
     const auto elements = lanes_along ? elements_of_piece() : std::nullopt;
     if (!elements || !has_tasks()) return false;
     // Lanes that run across rows are loaded one by one, wherever they lie.
-    const bool is_near = *lanes_along == 0 && (rows() < many_rows || tiles(false) < least_tiles ||
-                                               lies_together_already());
+    const bool is_near =
+        *lanes_along == row_ &&
+        (rows() < many_rows || tiles(false) < least_tiles || lies_together_already());
     return !is_near &&
            loads_of_a_tile() * tiles(false) * lanes_ >= least_uses * static_cast<double>(*elements);
   }
@@ -84,7 +91,8 @@ class Candidate {
   // Whether lanes across rows are worth a transposed copy of all that is read, if tiles that move it are few tasks.
   bool is_worth_packing_whole() const {
     const auto along = lane_dimension();
-    if (!along || *along == 0 || tiles(true) >= static_cast<double>(sizes_.machine().enough_tasks))
+    if (!along || *along == row_ ||
+        tiles(true) >= static_cast<double>(sizes_.machine().enough_tasks))
       return false;
     Extents all = extents_;
     double uses = 1;
@@ -142,6 +150,7 @@ class Candidate {
         lanes_(other.lanes_),
         sizes_(other.sizes_),
         extents_(extents),
+        row_(other.row_),
         index_(other.index_),
         depends_on_(other.depends_on_) {}
 
@@ -174,7 +183,7 @@ class Candidate {
       return std::any_of(update_.rvars.begin(), update_.rvars.end(),
                          [&](const ReductionVariable& r) { return uses_variable(index, r.var); });
     };
-    return width && *width <= tile_.size_along(0, lanes_) && index_.size() > 1 &&
+    return width && *width <= tile_.size_along(0, lanes_) && index_.size() > 1 && row_ == 0 &&
            !is_moved(index_[0]) && std::none_of(index_.begin() + 2, index_.end(), is_moved);
   }
 
@@ -182,8 +191,9 @@ class Candidate {
   int64_t rows() const {
     int64_t rows = 1;
     for (const ReductionVariable& r : update_.rvars) {
-      const bool is_row = std::any_of(index_.begin() + 1, index_.end(),
-                                      [&](const Expr& e) { return uses_variable(e, r.var); });
+      bool is_row = false;
+      for (size_t d = 0; d < index_.size(); ++d)
+        is_row |= d != row_ && uses_variable(index_[d], r.var);
       if (is_row) rows *= extents_.at(r.var);
     }
     return rows;
@@ -233,6 +243,7 @@ class Candidate {
   const int lanes_;
   const SizeEstimate& sizes_;
   const Extents& extents_;
+  const size_t row_;  // the index along which the source's rows lie in memory
   std::vector<Expr> index_;
   std::vector<bool> depends_on_;
 };

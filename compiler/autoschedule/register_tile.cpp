@@ -6,6 +6,8 @@
 
 #include "analysis/linear.h"
 #include "autoschedule/cost_estimate.h"
+#include "autoschedule/inlined_reads.h"
+#include "autoschedule/loop_order.h"
 #include "autoschedule/phase_loops.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
@@ -68,6 +70,32 @@ double parts_of_vector(const Call& call, const std::string& lanes, int64_t phase
   return stride && *stride > 1 && *stride <= most_parts ? static_cast<double>(*stride) : 1;
 }
 
+// Whether a vector along these variables loads its lanes from different rows. What is computed inline loads for itself.
+bool gathers_along(const Call& call, const std::vector<std::string>& variables) {
+  const auto moves = [&](const Expr& index) {
+    return std::ranges::any_of(variables,
+                               [&](const std::string& name) { return uses_variable(index, name); });
+  };
+  if (std::ranges::none_of(call.args, moves)) return false;
+  const FuncPtr callee = call.call_type == CallType::Func ? func_of(call) : nullptr;
+  if (!callee || !is_computed_inline(callee, {}))
+    return !moves(call.args[innermost_dimension(call)]);
+  std::vector<std::string> inside;
+  for (size_t d = 0; d < call.args.size(); ++d) {
+    if (moves(call.args[d])) inside.push_back(callee->args[d]);
+  }
+  bool result = false;
+  walk_definition(*callee->pure, [&](const Expr& e) {
+    const auto* read = e.as<Call>();
+    result |= read && read->call_type != CallType::Operator && gathers_along(*read, inside);
+  });
+  return result;
+}
+// Lanes of private sums are terms, which nothing packs.
+bool gathers_terms(const FuncContents& f, const Call& call) {
+  return f.made && f.made->lanes > 0 && gathers_along(call, {f.args[0]});
+}
+
 // nullopt: the update reads other elements of its own.
 std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Definition& stage,
                                                 int64_t phases) {
@@ -96,7 +124,9 @@ std::optional<std::vector<Operand>> operands_of(const FuncContents& f, const Def
                             return growth_of_index(index, f.args[0], phases) == 0;
                           });
     if (operand.is_of_phase) operand.depends_on[0] = false;
-    if (operand.depends_on[0]) operand.parts = parts_of_vector(*call, f.args[0], phases);
+    if (operand.depends_on[0])
+      operand.parts =
+          gathers_terms(f, *call) ? f.made->lanes : parts_of_vector(*call, f.args[0], phases);
     operands.push_back(std::move(operand));
     return true;
   };

@@ -25,7 +25,7 @@ namespace retrograde::autoschedule {
 namespace {
 
 constexpr int64_t copy_bytes = 192 << 10;  // a part of a cache near a core
-constexpr int64_t most_rows = 8;           // that share a copy
+constexpr int64_t most_sharing_rows = 8;   // that share a copy
 constexpr int64_t least_full_copies = 4;   // for one that holds fewer at the end
 // Of loops whose extents are not known: elements of a row, channels and the like.
 constexpr double unknown_row = 256, unknown_planes = 16;
@@ -267,7 +267,7 @@ std::optional<RowCopy> copy_for(const Call& call, const FuncPtr& source, const F
   for (const Type& type : source->types) bytes += type.bytes();
   const auto extent = sizes.extent(f, *row);
   const bool may_share = loops.inside.empty() && tile.size_along(*row, lanes) == 1;
-  for (int64_t rows = may_share ? most_rows : 1; rows >= 1; rows /= 2) {
+  for (int64_t rows = may_share ? most_sharing_rows : 1; rows >= 1; rows /= 2) {
     const auto counts = read.counts(*row, rows);
     if (!counts) return std::nullopt;
     const bool fits =

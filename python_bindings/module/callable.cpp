@@ -11,6 +11,7 @@
 #include "buffer_memory.h"
 #include "func_class.h"
 #include "numbers.h"
+#include "presumed_strides.h"
 #include "runnable.h"
 #include "tensor_memory.h"
 #include "unlocked.h"
@@ -52,7 +53,8 @@ struct OnStream : JITUserContext {
   void* stream;
 };
 
-// The compiled pipeline. An array whose innermost axis is not dense makes it recompile once (any_stride.h).
+// The compiled pipeline. An array whose innermost axis is not dense makes it recompile once (any_stride.h), and so does
+// one that is not dense although its first axes are short (presumed_strides.h).
 class Bound {
  public:
   using Compile = std::function<Callable()>;
@@ -61,7 +63,8 @@ class Bound {
       : compile_(std::move(compile)),
         args_(std::move(args)),
         parameters_(std::move(parameters)),
-        outputs_(std::move(outputs)) {
+        outputs_(std::move(outputs)),
+        strides_(std::make_shared<PresumedStrides>(all_parameters())) {
     compile_again();
     for (const Argument& arg : args_) {
       counts_ |= arg.is_scalar() && !arg.type.is_float();
@@ -89,7 +92,7 @@ class Bound {
       lift(i, buffers[i]);
       values[i] = DynamicCall::value_of(buffers[i]);
     }
-    if (count_lifted() != lifted_) compile_again();
+    if (is_stale()) compile_again();
     unlocked([callable = callable_, buffers, values](const Interruption&) {
       DynamicCall::call(callable, values);
     });
@@ -177,12 +180,11 @@ class Bound {
       const Parameter& parameter = parameter_of_argument(i);
       Runtime::Buffer<>& buffer = tensors.buffers[i];
       buffer = buffer_of_tensor(arguments[i], i < args_.size() ? args_[i].type : parameter->type);
-      if (parameter && buffer.dimensions() > 0)
-        allow_stride(*parameter, buffer.dim(0).stride(), buffer.dim(0).extent());
+      if (parameter && buffer.dimensions() > 0) lift(i, *parameter, buffer);
       elements += static_cast<int64_t>(buffer.number_of_elements());
       tensors.values[i] = DynamicCall::value_of(buffer);
     }
-    if (count_lifted() != lifted_) compile_again();
+    if (is_stale()) compile_again();
     return {std::move(tensors), elements};
   }
 
@@ -228,17 +230,34 @@ class Bound {
 
   void compile_again() {
     const size_t lifted = count_lifted();
-    callable_ = unlocked([compile = compile_](const Interruption&) { return compile(); });
+    callable_ = unlocked([compile = compile_, strides = strides_](const Interruption&) {
+      return strides->compile(compile);
+    });
     lifted_ = lifted;
+    are_strides_wrong_ = false;
+  }
+  bool is_stale() const { return are_strides_wrong_ || count_lifted() != lifted_; }
+
+  std::vector<Parameter> all_parameters() const {
+    std::vector<Parameter> result = parameters_;
+    result.insert(result.end(), outputs_.begin(), outputs_.end());
+    return result;
   }
 
   const Parameter& parameter_of_argument(size_t i) const {
     return i < args_.size() ? parameters_[i] : outputs_[i - args_.size()];
   }
 
-  void lift(size_t i, const Buffer<>& buffer) const {
-    if (i >= args_.size() + outputs_.size()) return;
-    if (const Parameter& parameter = parameter_of_argument(i)) allow_stride_of(*parameter, buffer);
+  // Notes what an array lacks of what the compiled code relies on.
+  template <class AnyBuffer>
+  void lift(size_t i, graph::ParameterContents& parameter, const AnyBuffer& buffer) {
+    allow_stride(parameter, buffer.dim(0).stride(), buffer.dim(0).extent());
+    are_strides_wrong_ |= !strides_->fit(i, buffer);
+  }
+  void lift(size_t i, const Buffer<>& buffer) {
+    if (i >= args_.size() + outputs_.size() || !buffer.defined() || buffer.dimensions() == 0)
+      return;
+    if (const Parameter& parameter = parameter_of_argument(i)) lift(i, *parameter, buffer);
   }
 
   // Number of parameters whose dimension 0 need not be dense; another Callable with the same parameters may have
@@ -261,9 +280,11 @@ class Bound {
   std::vector<Parameter> parameters_, outputs_;  // null for scalars
   std::vector<std::string> names_;               // names of arguments, then outputs
   Callable callable_;
-  size_t lifted_ = 0;            // count_lifted() at the last compilation
-  int64_t short_elements_ = -1;  // largest number of elements whose call was short
-  bool counts_ = false;          // whether an argument is a whole number
+  std::shared_ptr<PresumedStrides> strides_;
+  bool are_strides_wrong_ = false;  // for some array of the last call
+  size_t lifted_ = 0;               // count_lifted() at the last compilation
+  int64_t short_elements_ = -1;     // largest number of elements whose call was short
+  bool counts_ = false;             // whether an argument is a whole number
 };
 
 // A call on tensors of known element types and sizes, in a single Python call, because each further Python call would

@@ -229,6 +229,41 @@ TEST(InvariantFactors, OfPureVariablesAloneStay) {
   EXPECT_TRUE(factors_of(h.loss()).empty());
 }
 
+// Weights of rows that add up to 1, in the blends of a few numbers.
+TEST(InvariantFactors, MayBeQuotients) {
+  constexpr int rows = 400;
+  const auto factors_with = [&](int numbers) {
+    Buffer<float> weights(24, rows), values(numbers, 24), totals(rows);
+    Func blended("blended"), loss("loss");
+    const RDom r(0, 24, "r"), all(0, numbers, 0, rows, "all");
+    blended(a, b) = 0.0f;
+    blended(a, b) += weights(r, b) / totals(b) * values(a, r);
+    loss() = 0.0f;
+    loss() += blended(all.x, all.y);
+    return factors_of(loss);
+  };
+  ASSERT_EQ(factors_with(12).size(), 1u);
+  EXPECT_EQ(factors_with(12)[0]->args.size(), 2u);
+  EXPECT_TRUE(factors_with(4).empty()) << "so few divisions cost less than memory";
+}
+
+// A mean that each of many terms is compared with.
+TEST(InvariantFactors, MayBeQuotientsOfPureVariables) {
+  const auto factors_with = [](int terms) {
+    const Buffer<float> points(3, terms), sums(3), counts(4);
+    Func spread("spread");
+    const RDom r(0, terms, "r");
+    spread(a) = 0.0f;
+    spread(a) += points(a, r) * (points(a, r) - sums(a) / counts(Expr(0)));
+    spread.bound(a, 0, 3);
+    return factors_of(spread);
+  };
+  const std::vector<FuncPtr> factors = factors_with(20000);
+  ASSERT_EQ(factors.size(), 1u);
+  EXPECT_EQ(factors[0]->args, std::vector<std::string>{"a"});
+  EXPECT_TRUE(factors_with(64).empty());
+}
+
 TEST(InvariantFactors, OfFewTermsStay) {
   Histogram few(16), none(0);
   few.counts(a, b) += few.near_first() * few.near_second();

@@ -27,6 +27,7 @@ retrograde_test(
 retrograde_test(auto_schedule_test OPTIMIZED)
 retrograde_test(coarse_values_test)
 retrograde_test(row_guests_test LIBS retrograde_dep_halide_runtime)
+retrograde_test(point_loops_test LIBS retrograde_dep_halide_runtime)
 retrograde_test(gpu_auto_schedule_test SOURCES autoschedule/gpu_auto_schedule_test.cpp support/gpu_programs.cpp
   LIBS retrograde_simt retrograde_dep_halide_runtime)
 retrograde_test(gpu_auto_schedules_test OPTIMIZED LIBS retrograde_simt)

@@ -46,6 +46,24 @@ class Callables(unittest.TestCase):
         call(a[:2, ::2], 2, out.T)
         np.testing.assert_array_equal(out.T, 2 * a[:2, ::2])
 
+    def test_strides_of_short_rows(self):
+        points, f = rg.ImageParam("float32", 2, "points"), rg.Func("f")
+        f[x, y] = 2 * points[x, y]
+        for buffer in (points, f.output_buffer()):
+            buffer.dim(0).set_bounds(0, 3)
+        call, again = (rg.Pipeline(f).compile_to_callable([points]) for _ in range(2))
+        a = np.arange(40 * 5, dtype=np.float32).reshape(40, 5)
+        for given, result in ((a[:, :3].copy(), np.zeros((40, 3), np.float32)), (a[:, :3], np.zeros((40, 3), np.float32)),
+                              (a[::2, 1:4].copy(), np.zeros((20, 7), np.float32)[:, 2:5]),
+                              (a[:, :3].copy(), np.zeros((40, 3), np.float32))):
+            for either in (call, again):
+                result[:] = 0
+                either(given, result)
+                np.testing.assert_array_equal(result, 2 * given)
+        points.dim(1).set_stride(3)  # the user's own promise
+        with self.assertRaisesRegex(rg.RuntimeError, "stride"):
+            rg.Pipeline(f).compile_to_callable([points])(a[:, :3], np.zeros((40, 3), np.float32))
+
     def test_refusals(self):
         call = self.f.compile_to_callable([self.image, self.gain])
         a = np.zeros((2, 3), np.float32)

@@ -78,6 +78,27 @@ class Operators(unittest.TestCase):
         op(given.expand(3, 5)).sum().backward()
         self.assertEqual(given.grad.item(), 15)
 
+    def test_any_strides_of_points(self):
+        def define(kind, shapes):
+            m, p, f = rg.ImageParam(kind, 2, "m"), rg.ImageParam(kind, 2, "p"), rg.Func("f")
+            r = rg.RDom([(0, 3)])
+            f[x, y] = 0.0
+            f[x, y] += m[r, x] * p[r, y]
+            return f, [m, p], [3, shapes[1][0] if shapes else p.dim(1).extent()]
+
+        op = operator(define)
+        wide = torch.arange(500.0).reshape(100, 5)
+        for given in (wide[:, :3].clone(), wide[:, 1:4], wide[:, :3].T.contiguous().T, wide[:, :3].clone()):
+            given, matrix = given.detach().requires_grad_(), torch.arange(9.0).reshape(3, 3).requires_grad_()
+            moved = op(matrix, given)
+            self.assertTrue(torch.equal(moved, given @ matrix.T))
+            (moved * moved).sum().backward()
+            ours = [t.grad for t in (matrix, given)]
+            matrix.grad = given.grad = None
+            ((given @ matrix.T)**2).sum().backward()
+            for found, exact in zip(ours, (matrix.grad, given.grad)):
+                self.assertTrue(torch.allclose(found, exact, rtol=1e-5))
+
     def test_types(self):
         for kind in (torch.uint8, torch.int8, torch.int16, torch.int32, torch.int64, torch.float16, torch.bfloat16):
             from retrograde.torch import DTYPES
