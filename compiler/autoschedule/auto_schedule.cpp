@@ -8,6 +8,7 @@
 #include "frontend/run/pipeline.h"
 #include "frontend/schedule/autoscheduler.h"
 #include "graph/copy_graph.h"
+#include "graph/definitions/first_reads.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/directives/wrappers.h"
 
@@ -27,6 +28,7 @@ void schedule_all(const Pipeline& pipeline, const Target& target, const MachineP
   const PipelineSpec spec = pipeline.spec();
   const std::vector<FuncPtr>& outputs = spec.outputs;
   run_on_large_stack([&] {
+    const FirstReadsMemo memo;
     keep_graph(spec.name, outputs);
     const std::vector<FuncPtr> wrapped = apply_wrappers(outputs);
     const auto given = static_cast<std::ptrdiff_t>(schedule_log(wrapped).size());

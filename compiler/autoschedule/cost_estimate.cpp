@@ -1,10 +1,9 @@
 #include "autoschedule/cost_estimate.h"
 
 #include <algorithm>
-#include <unordered_set>
 
 #include "ir/build.h"
-#include "ir/visit.h"
+#include "ir/walk_once.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::autoschedule {
@@ -55,19 +54,17 @@ double integer_operations(const Expr& node) {
 double operations_of_values(const std::vector<Expr>& values,
                             FunctionRef<double(const Call&)> of_call) {
   double total = 0;
-  std::unordered_set<const ExprNode*> seen;
+  NodeSet seen;
   const auto count_index = [&](const Expr& e) {
-    if (!seen.insert(e.get()).second) return false;
     total += is_read(e) ? of_call(*e.as<Call>()) : operations_of(e);
     return true;
   };
   for (const Expr& value : values) {
     const bool counts_integers = !value.type().is_float();
-    walk(value, [&](const Expr& e) {
-      if (!seen.insert(e.get()).second) return false;
+    walk_once(value, seen, [&](const Expr& e) {
       if (is_read(e)) {
         total += of_call(*e.as<Call>());
-        for (const Expr& index : e.as<Call>()->args) walk(index, count_index);
+        for (const Expr& index : e.as<Call>()->args) walk_once(index, seen, count_index);
         return false;
       }
       const bool is_integer = !e.type().is_float();
@@ -89,9 +86,10 @@ double terms_of(const Definition& stage, double of_unknown) {
 
 int bits_of_values(const std::vector<Expr>& values) {
   int bits = 1;
+  NodeSet visited;
   for (const Expr& value : values) {
     bits = std::max(bits, value.type().bits());
-    walk(value, [&](const Expr& e) {
+    walk_once(value, visited, [&](const Expr& e) {
       if (!is_const(e)) bits = std::max(bits, e.type().bits());
       return !is_read(e);
     });

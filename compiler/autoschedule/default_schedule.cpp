@@ -40,6 +40,7 @@
 #include "diagnostics/large_stack.h"
 #include "frontend/language/func.h"
 #include "graph/copy_graph.h"
+#include "graph/definitions/first_reads.h"
 #include "graph/definitions/own_reads.h"
 #include "graph/directives/give_directive.h"
 #include "graph/directives/wrappers.h"
@@ -300,17 +301,24 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   return sizes;
 }
 
+// As after auto_schedule(). Then nothing is left to decide.
+static bool is_scheduled(const std::vector<FuncPtr>& outputs) {
+  return std::ranges::all_of(topological_order(outputs),
+                             [](const FuncPtr& f) { return has_directives(*f); });
+}
+
 std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
                                           const VectorUnit& unit,
                                           const AutoscheduleOptions& options) {
   const ScheduleRequest request{unit, options, {}};
   std::vector<FuncPtr> result;
   run_on_large_stack([&] {
+    const graph::FirstReadsMemo memo;
     result = apply_wrappers(outputs);
     if (is_differentiated(result)) {
-      result = schedule_within_budget(with_graph_rewrites(result, /*on_gpu=*/false), request,
-                                      Scheduling::Gradients)
-                   .outputs;
+      result = with_graph_rewrites(result, /*on_gpu=*/false);
+      if (!is_scheduled(result))
+        result = schedule_within_budget(result, request, Scheduling::Gradients).outputs;
     } else if (!stored_by_default(result).empty()) {
       result = copy_graph(result).outputs;
       compute_at_root(stored_by_default(result), request);

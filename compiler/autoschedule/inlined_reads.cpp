@@ -8,7 +8,7 @@
 #include "graph/definitions/element_values.h"
 #include "ir/build.h"
 #include "ir/lets.h"
-#include "ir/visit.h"
+#include "ir/walk_once.h"
 
 namespace retrograde::autoschedule {
 
@@ -20,14 +20,35 @@ class Inliner {
  public:
   explicit Inliner(const std::vector<FuncPtr>& stored) : stored_(stored) {}
 
-  Expr operator()(const Expr& root) { return inlined_(without_lets(root)); }
+  // Returns the same handles if nothing changes, as in most stages.
+  std::vector<Expr> operator()(const std::vector<Expr>& roots) {
+    bool has_lets = false, has_calls = false;
+    NodeSet visited;
+    for (const Expr& root : roots) {
+      walk_once(root, visited, [&](const Expr& e) {
+        const auto* call = e.as<Call>();
+        has_lets |= e.kind() == Kind::Let;
+        has_calls |= call && inlined_callee(*call);
+        return !has_lets || !has_calls;
+      });
+    }
+    const auto plain = [&](const Expr& root) { return has_lets ? without_lets(root) : root; };
+    return has_calls ? mapped(roots, [&](const Expr& root) { return inlined_(plain(root)); })
+                     : mapped(roots, plain);
+  }
 
  private:
+  // Null: it stays a call.
+  FuncPtr inlined_callee(const Call& call) const {
+    const FuncPtr callee = call.call_type == CallType::Func ? func_of(call) : nullptr;
+    return callee && is_computed_inline(callee, stored_) ? callee : nullptr;
+  }
+
   Expr inlined(const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
     const Expr mapped = map_children(e, recurse);
     const auto* call = mapped.as<Call>();
-    const FuncPtr callee = call && call->call_type == CallType::Func ? func_of(*call) : nullptr;
-    if (!callee || !is_computed_inline(callee, stored_) || room_ <= 0) return mapped;
+    const FuncPtr callee = call ? inlined_callee(*call) : nullptr;
+    if (!callee || room_ <= 0) return mapped;
     if (seen_.is_first(mapped)) --room_;
     return recurse(values_of(*callee).at(call->args, call->component));
   }
@@ -57,10 +78,9 @@ bool is_computed_inline(const FuncPtr& f, const std::vector<FuncPtr>& stored) {
 }
 
 std::vector<Expr> roots_with_inlined(const Definition& stage, const std::vector<FuncPtr>& stored) {
-  Inliner inliner(stored);
   std::vector<Expr> roots;
-  for_each_expr(stage, [&](const Expr& root) { roots.push_back(inliner(root)); });
-  return roots;
+  for_each_expr(stage, [&](const Expr& root) { roots.push_back(root); });
+  return Inliner(stored)(roots);
 }
 
 }  // namespace retrograde::autoschedule

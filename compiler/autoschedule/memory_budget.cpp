@@ -15,6 +15,7 @@
 #include "autoschedule/stored_funcs.h"
 #include "autoschedule/task_sizes.h"
 #include "graph/copy_graph.h"
+#include "graph/definitions/first_reads.h"
 #include "graph/definitions/parameter_contents.h"
 #include "graph/directives/give_directive.h"
 #include "ir/build.h"
@@ -196,6 +197,7 @@ class BudgetedSchedule {
 
 ScheduledGraph schedule_within_budget(const std::vector<FuncPtr>& outputs,
                                       const ScheduleRequest& request, Scheduling what) {
+  const graph::FirstReadsMemo memo;
   return BudgetedSchedule(outputs, request, what).choose();
 }
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "autoschedule/inlined_reads.h"
-#include "ir/visit.h"
+#include "ir/walk_once.h"
 
 namespace retrograde::autoschedule {
 
@@ -23,10 +23,10 @@ const std::vector<StoredRead>& StoredReads::of(const FuncPtr& f) const {
 }
 
 void StoredReads::note(const FuncPtr& f, int stage, const std::vector<FuncPtr>& stored) {
-  std::unordered_set<const ExprNode*> seen;
-  for (const Expr& root : roots_with_inlined(f->stage(stage), stored)) {
-    walk(root, [&](const Expr& e) {
-      if (!seen.insert(e.get()).second) return false;
+  NodeSet visited;
+  const std::vector<Expr> roots = roots_with_inlined(f->stage(stage), stored);
+  for (const Expr& root : roots) {
+    walk_once(root, visited, [&](const Expr& e) {
       const auto* call = e.as<Call>();
       const FuncPtr callee = call && call->call_type == CallType::Func ? func_of(*call) : nullptr;
       if (!callee || callee == f) return true;

@@ -5,24 +5,16 @@
 #include <unordered_set>
 
 #include "diagnostics/error.h"
-#include "graph/definitions/own_reads.h"
+#include "graph/definitions/first_reads.h"
 #include "graph/directives/wrappers.h"
 #include "graph/names.h"
 #include "ir/build.h"
 #include "ir/print.h"
+#include "ir/walk_once.h"
 
 namespace retrograde::graph {
 
 namespace {
-
-void add_callees(const Definition& definition, const FuncContents* self,
-                 std::vector<FuncPtr>& callees, std::unordered_set<const Symbol*>& seen) {
-  walk_definition(definition, [&](const Expr& e) {
-    const Call* call = e.as<Call>();
-    if (!call || call->call_type != CallType::Func || call->symbol.raw() == self) return;
-    if (seen.insert(call->symbol.raw()).second) callees.push_back(func_of(*call));
-  });
-}
 
 // Depth-first search without recursion: chains of thousands of Funcs are legal.
 class Sorter {
@@ -144,7 +136,11 @@ std::vector<FuncPtr> topological_order(const std::vector<FuncPtr>& outputs) {
 std::vector<FuncPtr> direct_callees(const FuncContents& f) {
   std::vector<FuncPtr> callees;
   std::unordered_set<const Symbol*> seen;
-  for (int i = 0; i < f.stage_count(); i++) add_callees(f.stage(i), &f, callees, seen);
+  for (const Call* call : first_reads(f)) {
+    if (call->call_type != CallType::Func || call->symbol.raw() == &f) continue;
+    seen.insert(call->symbol.raw());
+    callees.push_back(func_of(*call));
+  }
   if (f.extern_definition) {
     for (const ExternArgument& arg : f.extern_definition->args) {
       if (arg.kind == ExternArgument::Kind::Func && seen.insert(arg.func.get()).second)
@@ -205,8 +201,7 @@ class ParameterCollector {
  public:
   void add_expr(const Expr& root) {
     if (!root.defined()) return;
-    walk(root, [&](const Expr& e) {
-      if (!seen_exprs_.insert(e.get()).second) return false;
+    walk_once(root, seen_exprs_, [&](const Expr& e) {
       if (const Variable* v = e.as<Variable>()) add_symbol(v->symbol);
       if (const Call* call = e.as<Call>(); call && call->call_type == CallType::Image)
         add_symbol(call->symbol);
@@ -240,7 +235,7 @@ class ParameterCollector {
  private:
   std::vector<ParameterPtr> found_;
   std::unordered_set<const Symbol*> seen_, excluded_;
-  std::unordered_set<const ExprNode*> seen_exprs_;
+  NodeSet seen_exprs_;
 
   void add_stage(const StageLoops& schedule) {
     for (const Split& split : schedule.splits) add_expr(split.factor);

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <unordered_set>
 
+#include "ir/build.h"
+#include "ir/shifted_renaming.h"
 #include "ir/visit.h"
 
 namespace retrograde::ir {
@@ -35,11 +37,26 @@ class NamePairs {
   Renaming forward_, backward_;
 };
 
+using Shifts = std::unordered_map<std::string, Shift>;
+
+// An integer expression as a part and a constant; the part of a constant is undefined.
+std::pair<Expr, int64_t> split_constant(const Expr& e) {
+  if (const auto* constant = e.as<IntImm>()) return {Expr(), constant->value};
+  const auto* sum = e.as<Binary>();
+  const bool subtracts = sum && sum->kind == Kind::Sub;
+  const auto* constant =
+      sum && (sum->kind == Kind::Add || subtracts) ? sum->b.as<IntImm>() : nullptr;
+  if (!constant) return {e, 0};
+  const auto [part, more] = split_constant(sum->a);
+  return {part, subtracts ? more - constant->value : more + constant->value};
+}
+
 // Compares two trees and remembers the pairs of expressions found equal, so the cost is linear in
 // the number of distinct pairs. With `names`, only decides whether the trees are equal up to names.
 class Comparer {
  public:
-  explicit Comparer(NamePairs* names = nullptr) : names_(names) {}
+  explicit Comparer(NamePairs* names = nullptr, Shifts* shifts = nullptr)
+      : names_(names), shifts_(shifts) {}
 
   int compare(const Expr& a, const Expr& b) {
     if (!names_ && a.same_as(b)) return 0;
@@ -64,6 +81,9 @@ class Comparer {
   template <class Handle>
   int compare_nodes(const Handle& a, const Handle& b) {
     return match(a, [&]<class N>(const N& n) {
+      if constexpr (std::is_same_v<N, Load> || std::is_same_v<N, Store>) {
+        if (shifts_) return compare_accesses(n, *static_cast<const N*>(b.get()));
+      }
       if constexpr (requires { n.fields(); }) {
         return std::apply(
             [&](const auto&... of_a) {
@@ -80,6 +100,38 @@ class Comparer {
         return 0;
       }
     });
+  }
+
+  static Type element_of(const Load& n) { return n.type.element_of(); }
+  static Type element_of(const Store& n) { return n.value.type().element_of(); }
+  int compare_values(const Load&, const Load&) { return 0; }
+  int compare_values(const Store& a, const Store& b) { return compare(a.value, b.value); }
+
+  template <class N>
+  int compare_accesses(const N& a, const N& b) {
+    if (const int result = compare(a.name, b.name)) return result;
+    if (const int result = compare_values(a, b)) return result;
+    if (const int result = compare(a.predicate, b.predicate)) return result;
+    int64_t distance = 0;
+    if (const int result = compare_indices(a.index, b.index, distance)) return result;
+    const auto known = shifts_->try_emplace(a.name, Shift{distance, element_of(a)}).first;
+    return order(known->second.elements, distance);
+  }
+  // 0 if b is a + distance.
+  int compare_indices(const Expr& a, const Expr& b, int64_t& distance) {
+    if (a.type() != b.type()) return 1;
+    const auto *ramp = a.as<Ramp>(), *other = b.as<Ramp>();
+    if (ramp && other && ramp->lanes == other->lanes) {
+      const int result = compare(ramp->stride, other->stride);
+      return result ? result : compare_indices(ramp->base, other->base, distance);
+    }
+    const auto *all = a.as<Broadcast>(), *other_all = b.as<Broadcast>();
+    if (all && other_all && all->lanes == other_all->lanes)
+      return compare_indices(all->value, other_all->value, distance);
+    const auto [part, constant] = split_constant(a);
+    const auto [other_part, other_constant] = split_constant(b);
+    distance = other_constant - constant;
+    return compare(part, other_part);
   }
 
   // Texts, and names of operators and functions, are no names that a renaming changes.
@@ -127,6 +179,7 @@ class Comparer {
   };
   std::unordered_set<std::pair<const Node*, const Node*>, PairHash> equal_pairs_;
   NamePairs* names_;
+  Shifts* shifts_;  // null: indices are equal
 };
 
 // ---- hash ----
@@ -192,6 +245,24 @@ std::optional<Renaming> renaming(const Stmt& a, const Stmt& b, const Renaming& k
   NamePairs names(known);
   if (Comparer(&names).compare(a, b) != 0) return std::nullopt;
   return names.take();
+}
+
+std::optional<ShiftedRenaming> shifted_renaming(const Stmt& a, const Stmt& b,
+                                                const Renaming& known) {
+  NamePairs names(known);
+  ShiftedRenaming result;
+  if (Comparer(&names, &result.shifts).compare(a, b) != 0) return std::nullopt;
+  result.names = names.take();
+  std::erase_if(result.shifts, [](const auto& one) { return one.second.elements == 0; });
+  return result;
+}
+
+Expr shifted_index(const Expr& index, int64_t elements) {
+  if (const auto* ramp = index.as<Ramp>())
+    return make_ramp(shifted_index(ramp->base, elements), ramp->stride, ramp->lanes);
+  if (const auto* all = index.as<Broadcast>())
+    return make_broadcast(shifted_index(all->value, elements), all->lanes);
+  return binary(Kind::Add, index, make_const(index.type(), elements));
 }
 
 }  // namespace retrograde::ir

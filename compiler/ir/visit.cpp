@@ -1,12 +1,10 @@
-// Children, walks, rewriting and substitution.
+// Children, rewriting and substitution.
 #include "ir/visit.h"
 
-#include <algorithm>
 #include <atomic>
 
 #include "diagnostics/error.h"
 #include "ir/build.h"
-#include "ir/node_set.h"
 
 namespace retrograde::ir {
 
@@ -230,95 +228,6 @@ Expr map_children(const Expr& e, ExprMap map, NameMap names) {
 }
 Stmt map_children(const Stmt& s, ExprMap map, StmtMap map_stmt, NameMap names) {
   return map_children(s, ChildMap{map, map_stmt, &names});
-}
-
-// ---- walks: with an explicit stack, so that the C++ stack does not limit their depth ----
-
-namespace {
-
-class Walker {
- public:
-  Walker(FunctionRef<bool(const Expr&)> enter_expr, FunctionRef<bool(const Stmt&)> enter_stmt)
-      : enter_expr_(enter_expr), enter_stmt_(enter_stmt) {}
-  void run(const Expr& e) {
-    push(e);
-    drain();
-  }
-  void run(const Stmt& s) {
-    push(s);
-    drain();
-  }
-
- private:
-  // Handles, not pointers: a lambda may drop the root. Only one of the two is defined.
-  struct Item {
-    Expr expr;
-    Stmt stmt;
-  };
-  void push(const Expr& e) {
-    if (e.defined()) stack_.push_back({e, {}});
-  }
-  void push(const Stmt& s) {
-    if (s.defined()) stack_.push_back({{}, s});
-  }
-  void drain() {
-    while (!stack_.empty()) {
-      const Item item = std::move(stack_.back());
-      stack_.pop_back();
-      const size_t first = stack_.size();
-      if (item.expr.defined()) {
-        if (!visited_.insert(item.expr.get()) || !enter_expr_(item.expr)) continue;
-        for_each_child(item.expr, [&](const Expr& child) { push(child); });
-      } else {
-        if (!visited_.insert(item.stmt.get()) || !enter_stmt_(item.stmt)) continue;
-        for_each_child(
-            item.stmt, [&](const Expr& child) { push(child); },
-            [&](const Stmt& child) { push(child); });
-      }
-      std::reverse(stack_.begin() + first, stack_.end());
-    }
-  }
-
-  FunctionRef<bool(const Expr&)> enter_expr_;
-  FunctionRef<bool(const Stmt&)> enter_stmt_;
-  std::vector<Item> stack_;
-  NodeSet visited_;
-};
-
-}  // namespace
-
-void walk(const Expr& e, FunctionRef<bool(const Expr&)> enter) {
-  const auto no_stmts = [](const Stmt&) { return false; };
-  Walker(enter, no_stmts).run(e);
-}
-
-void walk(const Stmt& s, FunctionRef<bool(const Expr&)> enter_expr,
-          FunctionRef<bool(const Stmt&)> enter_stmt) {
-  Walker(enter_expr, enter_stmt).run(s);
-}
-
-bool any_node(const Expr& e, FunctionRef<bool(const Expr&)> holds) {
-  bool found = false;
-  if (e.defined()) walk(e, [&](const Expr& node) { return !(found = found || holds(node)); });
-  return found;
-}
-
-bool any_node(const Stmt& s, FunctionRef<bool(const Expr&)> expr_holds,
-              FunctionRef<bool(const Stmt&)> stmt_holds) {
-  bool found = false;
-  if (!s.defined()) return false;
-  walk(
-      s, [&](const Expr& node) { return !(found = found || expr_holds(node)); },
-      [&](const Stmt& node) { return !(found = found || stmt_holds(node)); });
-  return found;
-}
-
-bool any_stmt(const Stmt& s, FunctionRef<bool(const Stmt&)> holds) {
-  bool found = false;
-  const auto no_exprs = [](const Expr&) { return false; };
-  if (s.defined())
-    walk(s, no_exprs, [&](const Stmt& node) { return !(found = found || holds(node)); });
-  return found;
 }
 
 // ---- rewriting ----

@@ -196,6 +196,7 @@ constexpr Pass passes[] = {
     {"partition_loops", Phase::FlatStorage, alone<partition_loops>},
     {"drop_guarded_clamps", Phase::FlatStorage, alone<drop_guarded_clamps>},
     {"trim_loops", Phase::FlatStorage, alone<trim_loops>},
+    {"merge_equal_loops", Phase::FlatStorage, alone<merge_equal_loops>},
     {"carry_elements", Phase::FlatStorage, run_carry_elements},
     {"unroll_loops", Phase::FlatStorage, alone<unroll_loops>},
     {"join_indices", Phase::FlatStorage, alone<join_indices>},

@@ -56,6 +56,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"skip_empty_tiles", skip_empty_tiles},
       {"drop_guarded_clamps", drop_guarded_clamps},
       {"trim_loops", trim_loops},
+      {"merge_equal_loops", merge_equal_loops},
       {"try_plain_products", try_plain_products},
       {"unroll_loops", unroll_loops},
       {"vectorize_inner_loops",  // every loop counts as a loop over a pure variable

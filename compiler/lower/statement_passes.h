@@ -24,6 +24,8 @@ Stmt drop_guarded_clamps(const Stmt& s);
 Stmt skip_empty_tiles(const Stmt& s);
 // Turns conditions on a loop's variable into bounds of the loop. Also for Loops.
 Stmt trim_loops(const Stmt& s);
+// Turns a condition between loops that only differ in their extents into a part of the extent.
+Stmt merge_equal_loops(const Stmt& s);
 // Copies the body of every Unrolled loop once per iteration. For any phase. UserError if the extent of such a loop has
 // no constant upper bound.
 Stmt unroll_loops(const Stmt& s);

@@ -52,6 +52,15 @@ TEST_F(DefaultSchedule, LeavesPipelinesWithoutAdjointsAlone) {
   EXPECT_EQ(autoschedule::schedule_unscheduled({loss.function()})[0], loss.function());
 }
 
+// Deciding takes a good part of the time to compile a long program, so that it happens once.
+TEST_F(DefaultSchedule, NothingIsDecidedAgainAfterAutoSchedule) {
+  const Func gradient = propagate_adjoints(loss)(a);
+  const std::vector<graph::FuncPtr> outputs{loss.function(), gradient.function()};
+  EXPECT_NE(autoschedule::schedule_unscheduled(outputs), outputs) << "a copy with directives";
+  Pipeline({loss, gradient}).auto_schedule(get_jit_target_from_environment());
+  EXPECT_EQ(autoschedule::schedule_unscheduled(outputs), outputs);
+}
+
 // A pyramid whose levels each have half the width and height of the one before, put together again. Inlined, f3 would
 // be copied 27 times into f0 through the levels in between, and so on.
 std::vector<Func> pyramid_of(const Func& image, int levels) {

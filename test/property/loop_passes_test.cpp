@@ -409,6 +409,7 @@ TEST_P(LoopPasses, KeepWhatProgramsCompute) {
     programs.expect_same("trim_loops", trimmed, Phase::FlatStorage);
     changed += !trimmed.same_as(guarded);
     programs.expect_same("trim_loops alone", trim_loops(program), Phase::FlatStorage);
+    programs.expect_same("merge_equal_loops", merge_equal_loops(trimmed), Phase::FlatStorage);
     Stmt unrolled = unroll_loops(trimmed);
     programs.expect_same("unroll_loops", unrolled, Phase::FlatStorage);
     programs.expect_same("join_indices", join_indices(unrolled), Phase::FlatStorage);

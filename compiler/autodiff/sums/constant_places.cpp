@@ -156,18 +156,25 @@ bool is_worth_sharing(const Group& group, const AdjointTarget& target) {
   const auto elements = elements_along(target, group.fixed);
   const auto count = static_cast<double>(places);
   const bool is_pointwise = group.terms[0].gather.is_pointwise();
-  double apart = 0;
-  if (is_pointwise && elements && *elements <= few_places) {
-    apart = *elements *
-            together;  // one definition computes all terms for each element (gather_places.h)
-  } else {
-    for (const std::vector<Expr>& terms : by_place) apart += operations(terms);
-  }
   // Elements of the sums are stored, loaded and chosen from.
   const double loads = are_chosen(group.fixed, places, target) ? 2 * *elements : 2;
   const double cost = is_pointwise ? autoschedule::way_to_memory * count : count * (1 + loads);
-  const double saved = apart - together;
-  return saved >= least_share * apart && saved * terms_an_element(group, target) > cost;
+  const double iterations = terms_an_element(group, target);
+  const auto is_worth = [&](double apart) {
+    const double saved = apart - together;
+    return saved >= least_share * apart && saved * iterations > cost;
+  };
+  if (is_pointwise && elements && *elements <= few_places)
+    return is_worth(
+        *elements *
+        together);  // one definition computes all terms for each element (gather_places.h)
+  // Each place walks the shared program, so this stops at the first places that suffice.
+  double apart = 0;
+  for (const std::vector<Expr>& terms : by_place) {
+    apart += operations(terms);
+    if (is_worth(apart)) return true;
+  }
+  return false;
 }
 
 // One sum for `places`, a few of those of the group.

@@ -196,7 +196,12 @@ FuncPtr define_over(const IterationDomain& domain, const std::string& name,
     names[v.name] = args.back();
   }
   note_traits(f, values);
-  define_pure(f, args, mapped(values, [&](const Expr& e) { return substitute(e, names); }));
+  // One rewriter for all values: they share most of their nodes.
+  StepRewriter renamed([&](const Expr& e, const auto&) {
+    const auto* v = e.as<Variable>();
+    return v ? value_or(names, v->name, {}) : Expr();
+  });
+  define_pure(f, args, mapped(values, renamed));
   return f;
 }
 

@@ -17,7 +17,7 @@ namespace retrograde::autodiff {
 namespace {
 
 // The largest number of terms stored for each iteration.
-constexpr size_t most_shared_terms = 32;
+constexpr size_t most_shared_terms = 128;
 // Terms are shared if that saves this share of the operations, memory round trips included.
 constexpr double least_saved_share = 0.2;
 

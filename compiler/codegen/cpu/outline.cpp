@@ -5,14 +5,14 @@
 //
 //   int32 task(context, x, closure): a = closure->a ...; body
 //
-// Statements that are equal up to names share one function, with a closure each: steps of an unrolled loop are compiled
-// once. The alias tags of such a function are those of its first statement, so it is not inlined into code that uses
+// Statements that are equal up to names, and to constant distances in memory, share one function, with a closure each:
+// steps of an unrolled loop are compiled once. The alias tags of such a function are those of its first statement, so it is not inlined into code that uses
 // other tags for the same memory.
 #include <algorithm>
 #include <set>
 
 #include "codegen/function_generator.h"
-#include "ir/equal.h"
+#include "ir/shifted_renaming.h"
 #include "ir/visit.h"
 
 namespace retrograde::codegen {
@@ -38,6 +38,14 @@ Names names_in(const Stmt& s) {
 
 std::vector<std::string> renamed(const std::vector<std::string>& names, const Renaming& others) {
   return ir::mapped(names, [&](const std::string& name) { return others.at(name); });
+}
+
+// The function's own memory has one address in all calls.
+bool are_among(const std::unordered_map<std::string, Shift>& shifts,
+               const std::vector<std::string>& storages) {
+  return std::ranges::all_of(shifts, [&](const auto& one) {
+    return std::ranges::find(storages, one.first) != storages.end();
+  });
 }
 
 }  // namespace
@@ -96,18 +104,26 @@ std::optional<FunctionGenerator::Task> FunctionGenerator::shared_task(const Stmt
     if (task.index.empty() != index.empty()) continue;
     Renaming known;
     if (!index.empty()) known[task.index] = index;
-    const std::optional<Renaming> names = renaming(task.body, body, known);
-    if (!names) continue;
-    const Captures captures{renamed(task.captures.variables, *names),
-                            renamed(task.captures.storages, *names),
-                            renamed(task.captures.blocks, *names)};
-    const auto values = values_of(captures);
+    const auto equal = shifted_renaming(task.body, body, known);
+    if (!equal || !are_among(equal->shifts, task.captures.storages)) continue;
+    const Captures captures{renamed(task.captures.variables, equal->names),
+                            renamed(task.captures.storages, equal->names),
+                            renamed(task.captures.blocks, equal->names)};
+    auto values = values_of(captures);
     const auto has_type = [](const Value* value, const llvm::Type* field) {
       return value->getType() == field;
     };
     if (!values || !std::ranges::equal(*values, task.closure->elements(), has_type) ||
         aliases_of(captures) != task.aliases)
       continue;
+    for (size_t i = 0; i < captures.storages.size(); ++i) {
+      const auto* shift = find_or_null(equal->shifts, task.captures.storages[i]);
+      Value*& base = (*values)[captures.variables.size() + i];
+      if (shift)
+        base = b_.CreateGEP(b_.getInt8Ty(), base,
+                            b_.getInt64(static_cast<uint64_t>(shift->elements) *
+                                        static_cast<uint64_t>(shift->type.bytes())));
+    }
     task.function->addFnAttr(llvm::Attribute::NoInline);
     return Task{task.function, make_closure(task.closure, *values, name)};
   }

@@ -10,7 +10,7 @@
 #include "ir/literal.h"
 #include "ir/overflow.h"
 #include "ir/print.h"
-#include "ir/visit.h"
+#include "ir/walk_once.h"
 
 namespace retrograde::graph {
 
@@ -86,13 +86,12 @@ std::string advice_on_type(const FuncContents& f, size_t i, Type first, Type giv
 
 NamesInDefinition names_in(const FuncContents& f, const std::vector<Expr>& roots) {
   NamesInDefinition names;
-  std::unordered_set<const ExprNode*> seen;
+  NodeSet visited;
   std::unordered_set<std::string> bound;
   std::unordered_set<const Symbol*> called;
   for (const Expr& root : roots) {
     if (!root.defined()) continue;
-    walk(root, [&](const Expr& e) {
-      if (!seen.insert(e.get()).second) return false;
+    walk_once(root, visited, [&](const Expr& e) {
       if (const Variable* v = e.as<Variable>()) names.free.push_back(v);
       if (const Let* let = e.as<Let>()) bound.insert(let->name);
       const Call* call = e.as<Call>();

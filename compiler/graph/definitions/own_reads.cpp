@@ -1,9 +1,9 @@
 #include "graph/definitions/own_reads.h"
 
 #include <algorithm>
-#include <unordered_set>
 
 #include "ir/equal.h"
+#include "ir/walk_once.h"
 
 namespace retrograde::graph {
 
@@ -37,10 +37,9 @@ bool same_args(const std::vector<Expr>& a, const std::vector<Expr>& b) {
 }
 
 void walk_definition(const Definition& definition, FunctionRef<void(const Expr&)> visit) {
-  std::unordered_set<const ExprNode*> seen;
+  NodeSet visited;
   for_each_expr(definition, [&](const Expr& root) {
-    walk(root, [&](const Expr& e) {
-      if (!seen.insert(e.get()).second) return false;
+    walk_once(root, visited, [&](const Expr& e) {
       visit(e);
       return true;
     });

@@ -7,7 +7,7 @@
 #include "diagnostics/error.h"
 #include "graph/copy_graph.h"
 #include "graph/definitions/define.h"
-#include "graph/definitions/own_reads.h"
+#include "graph/definitions/first_reads.h"
 #include "graph/directives/give_directive.h"
 #include "graph/names.h"
 #include "ir/build.h"
@@ -130,13 +130,10 @@ class Wrapping {
 // The Funcs that f reads instead of images.
 std::vector<FuncPtr> image_readers(const FuncContents& f) {
   std::vector<FuncPtr> readers;
-  for (int s = 0; s < f.stage_count(); s++) {
-    walk_definition(f.stage(s), [&](const Expr& e) {
-      const Call* call = e.as<Call>();
-      if (!call || call->call_type != CallType::Image) return;
-      const FuncPtr reader = reader_of_image(*call, f);
-      if (reader && std::ranges::find(readers, reader) == readers.end()) readers.push_back(reader);
-    });
+  for (const Call* call : first_reads(f)) {
+    if (call->call_type != CallType::Image) continue;
+    const FuncPtr reader = reader_of_image(*call, f);
+    if (reader && std::ranges::find(readers, reader) == readers.end()) readers.push_back(reader);
   }
   return readers;
 }

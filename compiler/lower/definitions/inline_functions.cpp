@@ -8,7 +8,7 @@
 #include "graph/definitions/element_values.h"
 #include "graph/definitions/inlined_size.h"
 #include "graph/directives/wrappers.h"
-#include "ir/visit.h"
+#include "ir/walk_once.h"
 #include "lower/checks/refuse_unsupported.h"
 #include "lower/definitions/likely_clamps.h"
 #include "lower/definitions/resolve_undef.h"
@@ -30,10 +30,11 @@ bool is_inlined(const FuncContents& f, const FuncPlacement& schedule, bool is_ou
 constexpr double most_nodes = 200000;
 
 double distinct_nodes(const std::vector<Expr>& values) {
-  std::unordered_set<const ExprNode*> seen;
+  double nodes = 0;
+  NodeSet visited;
   for (const Expr& value : values)
-    walk(value, [&](const Expr& e) { return seen.insert(e.get()).second; });
-  return static_cast<double>(seen.size());
+    walk_once(value, visited, [&](const Expr&) { return ++nodes, true; });
+  return nodes;
 }
 
 void check_size(const FuncContents& f, const InlinedSizes& sizes) {

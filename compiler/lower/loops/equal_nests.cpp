@@ -9,6 +9,7 @@
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/node_count.h"
+#include "ir/shifted_renaming.h"
 #include "ir/visit.h"
 #include "lower/nests/copy_statement.h"
 #include "lower/runtime_call.h"
@@ -88,9 +89,12 @@ class Sharing : public StatementRewriter {
   // The memory that the later nest uses in place of the earlier one's, as arguments of the call.
   std::optional<Stmt> stand_in_for(const Nest& later, const Nest& earlier) const {
     if (earlier.conditions != later.conditions) return std::nullopt;
-    const auto names = renaming(earlier.body, later.body);
-    if (!names) return std::nullopt;
-    const std::map<std::string, std::string> sorted(names->begin(), names->end());
+    const auto equal = shifted_renaming(earlier.body, later.body);
+    if (!equal) return std::nullopt;
+    for (const auto& [name, shift] : equal->shifts) {
+      if (earlier.bound.contains(name) || allocations_.contains(name)) return std::nullopt;
+    }
+    const std::map<std::string, std::string> sorted(equal->names.begin(), equal->names.end());
     std::vector<Expr> args{Expr(stand_in), Expr(earlier.name)};
     std::unordered_set<std::string> used;  // scalars, which must stay bound
     for (const auto& [from, to] : sorted) {
@@ -99,9 +103,11 @@ class Sharing : public StatementRewriter {
       if (from != to && (a == allocations_.end() || b == allocations_.end() ||
                          !are_alike(*a->second, *b->second)))
         return std::nullopt;
-      if (from == to && a == allocations_.end()) continue;
+      const Shift* shift = find_or_null(equal->shifts, from);
+      if (from == to && a == allocations_.end() && !shift) continue;
       args.push_back(Expr(from));
-      args.push_back(make_load(b->second->type, to, 0));
+      args.push_back(make_load(shift ? shift->type : b->second->type, to, 0));
+      if (shift) args.push_back(make_const(Int(64), shift->elements));
     }
     walk(later.body, [&](const Variable& v) {
       if (!later.bound.contains(v.name) && used.insert(v.name).second) args.push_back(Expr(&v));
@@ -124,22 +130,33 @@ const Call* as_stand_in(const Stmt& s) {
   return name && name->value == stand_in ? call : nullptr;
 }
 
-// Replaces the names of memory.
+// Replaces the names of memory, and adds constants to indices.
 class Renamer : public Rewriter {
  public:
-  explicit Renamer(const Renaming& names) : names_(names) {}
+  using Shifts = std::unordered_map<std::string, int64_t>;
+  Renamer(const Renaming& names, const Shifts& shifts) : names_(names), shifts_(shifts) {}
 
  protected:
   Expr rewrite(const Expr& e) override {
-    return map_children(
+    const Expr result = map_children(
         e, [this](const Expr& child) { return (*this)(child); },
         [this](Kind kind, const std::string& name) { return name_of(kind, name); });
+    const auto *before = e.as<Load>(), *n = result.as<Load>();
+    const int64_t shift = before ? value_or(shifts_, before->name, 0) : 0;
+    return shift == 0 ? result
+                      : make_load(n->type, n->name, shifted_index(n->index, shift), n->predicate,
+                                  n->symbol);
   }
   Stmt rewrite(const Stmt& s) override {
-    return map_children(
+    const Stmt result = map_children(
         s, [this](const Expr& child) { return (*this)(child); },
         [this](const Stmt& child) { return (*this)(child); },
         [this](Kind kind, const std::string& name) { return name_of(kind, name); });
+    const auto *before = s.as<Store>(), *n = result.as<Store>();
+    const int64_t shift = before ? value_or(shifts_, before->name, 0) : 0;
+    return shift == 0 ? result
+                      : make_store(n->name, n->value, shifted_index(n->index, shift), n->predicate,
+                                   n->symbol);
   }
 
  private:
@@ -147,6 +164,7 @@ class Renamer : public Rewriter {
     return kind == Kind::ProducerConsumer ? name : value_or(names_, name, name);
   }
   const Renaming& names_;
+  const Shifts& shifts_;
 };
 
 class Expansion : public StatementRewriter {
@@ -164,9 +182,16 @@ class Expansion : public StatementRewriter {
     const auto found = nests_.find(call->args[1].as<StringImm>()->value);
     internal_assert(found != nests_.end());
     Renaming memory;
-    for (size_t i = 2; i + 1 < call->args.size() && call->args[i].as<StringImm>(); i += 2)
-      memory[call->args[i].as<StringImm>()->value] = call->args[i + 1].as<Load>()->name;
-    return Renamer(memory)(copy_statement(found->second, fresh_));
+    Renamer::Shifts shifts;
+    for (size_t i = 2; i + 1 < call->args.size() && call->args[i].as<StringImm>();) {
+      const std::string& name = call->args[i].as<StringImm>()->value;
+      memory[name] = call->args[i + 1].as<Load>()->name;
+      i += 2;
+      const auto* shift = i < call->args.size() ? call->args[i].as<IntImm>() : nullptr;
+      if (shift) shifts[name] = shift->value;
+      i += shift ? 1 : 0;
+    }
+    return Renamer(memory, shifts)(copy_statement(found->second, fresh_));
   }
 
  private:

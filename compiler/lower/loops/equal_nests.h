@@ -8,7 +8,8 @@
 // Steps of an unrolled loop over time, and their adjoints, take the compile time of one step this way.
 //
 // A nest must be at root, under the same conditions as the earlier one: what passes know at the earlier one also holds
-// at the later one. Names of scalars must be equal. Memory must be the same, or two allocations of one type and size.
+// at the later one. Names of scalars must be equal. Memory must be the same, or two allocations of one type and size. A
+// buffer of the caller may be accessed at a constant distance: parameters or samples by the number of a step.
 #pragma once
 
 #include "ir/expr.h"

@@ -1,6 +1,7 @@
 // Loops that are equal up to names share one function of machine code.
 #include "codegen/codegen.h"
 #include "ir/equal.h"
+#include "ir/shifted_renaming.h"
 #include "unit/codegen/codegen_testing.h"
 
 namespace retrograde::testing_codegen {
@@ -69,6 +70,48 @@ TEST(EqualLoops, WithOtherConstantsHaveTheirOwn) {
   expect_computes(steps(5, factor), 5, [](int s) { return s + 1; });
 }
 
+// Step s reads element s of a table of parameters, and writes row s of a history.
+TEST(EqualLoops, AtConstantDistancesShareAFunction) {
+  const auto program = [](int count) {
+    LoweredFunction f;
+    f.name = "distances";
+    f.args = {input("table", Int(32)), output("out", Int(32))};
+    std::vector<Stmt> loops;
+    for (int k = 0; k < count; ++k) {
+      const Expr x = variable(number("x", k));
+      const Expr value = make_load(Int(32), "table", k) * x + make_load(Int(32), "table", k + 1);
+      loops.push_back(
+          make_for(number("x", k), 0, n, ForType::Parallel, make_store("out", value, x + k * n)));
+    }
+    f.body = make_block(std::move(loops));
+    return f;
+  };
+  EXPECT_EQ(tasks_of(program(2)), 1);
+  EXPECT_EQ(tasks_of(program(7)), 1);
+  constexpr int count = 7;
+  Array table(Int(32), count + 1), out(Int(32), count * n);
+  for (int k = 0; k <= count; ++k) table.data<int32_t>()[k] = 10 * k + 3;
+  void* args[] = {table.raw(), out.raw()};
+  ASSERT_EQ(compile_test(program(count))->call(nullptr, args), 0);
+  for (int i = 0; i < count * n; ++i) {
+    const int k = i / n;
+    EXPECT_EQ(out.data<int32_t>()[i], (10 * k + 3) * (i % n) + 10 * (k + 1) + 3) << i;
+  }
+}
+
+TEST(EqualLoops, AtOtherDistancesOfOneMemoryHaveTheirOwn) {
+  LoweredFunction f;
+  f.name = "strides";
+  f.args = {input("table", Int(32)), output("out", Int(32))};
+  const auto loop = [](int k) {
+    const Expr x = variable(number("x", k));
+    const Expr value = make_load(Int(32), "table", k) + make_load(Int(32), "table", 2 * k + 1);
+    return make_for(number("x", k), 0, 4, ForType::Parallel, make_store("out", value, x + 4 * k));
+  };
+  f.body = make_block({loop(0), loop(1)});
+  EXPECT_EQ(tasks_of(f), 2);
+}
+
 TEST(EqualLoops, OverOtherTypesHaveTheirOwn) {
   LoweredFunction f;
   f.name = "types";
@@ -132,6 +175,26 @@ TEST(Renaming, PairsNamesBothWays) {
   EXPECT_TRUE(renaming(copy("a", "b"), copy("b", "a")));
   EXPECT_FALSE(renaming(copy("a", "b"), copy("c", "d"), {{"a", "d"}}));
   EXPECT_FALSE(renaming(make_evaluate(Expr("a text")), make_evaluate(Expr("another"))));
+}
+
+TEST(ShiftedRenaming, FindsTheDistanceOfEachMemory) {
+  const auto copy = [](const char* to, const Expr& at, const Expr& from) {
+    return make_store(to, make_load(Int(32), "table", from), at);
+  };
+  const Expr i = variable("i"), j = variable("j");
+  const auto found = shifted_renaming(copy("a", i, i * 2), copy("b", j + 5, j * 2 - 3));
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->names.at("a"), "b");
+  ASSERT_EQ(found->shifts.size(), 2u);
+  EXPECT_EQ(found->shifts.at("a").elements, 5);
+  EXPECT_EQ(found->shifts.at("table").elements, -3);
+  EXPECT_EQ(found->shifts.at("table").type, Int(32));
+  EXPECT_TRUE(shifted_renaming(copy("a", i, 0), copy("a", j, 0))->shifts.empty());
+  EXPECT_FALSE(shifted_renaming(copy("a", i, 0), copy("a", j, j)));
+  EXPECT_FALSE(shifted_renaming(copy("table", i, i), copy("table", i + 1, i + 2)));
+  const Expr vector = make_ramp(i, 2, 8);
+  EXPECT_TRUE(equal(shifted_index(vector, 3), make_ramp(i + 3, 2, 8)));
+  EXPECT_EQ(shifted_renaming(copy("a", i, 0), copy("a", i, 4))->shifts.at("table").elements, 4);
 }
 
 }  // namespace
