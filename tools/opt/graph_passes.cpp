@@ -25,7 +25,7 @@ std::vector<FuncPtr> with_adjoints(const std::vector<FuncPtr>& outputs) {
 
 std::vector<FuncPtr> with_cut_reductions(const std::vector<FuncPtr>& outputs) {
   const std::vector<FuncPtr> copy = copy_graph(outputs).outputs;
-  cut_reductions(copy, SizeEstimate(copy));
+  cut_reductions(copy, SizeEstimate(copy), {});
   return copy;
 }
 
