@@ -389,7 +389,8 @@ void pack_whole(const FuncPtr& f, const PackedOperand& operand, int lanes) {
   schedule_copy(copy, operand.lane_dimension, lanes);
   const std::vector<Var> args = copy.args();
   copy.parallel(args.back());
-  if (operand.lane_dimension + 1 < args.size() && args.size() > 2)  // vectors are no loop around others
+  if (operand.lane_dimension + 1 < args.size() &&
+      args.size() > 2)  // vectors are no loop around others
     copy.parallel(args[args.size() - 2]);
 }
 

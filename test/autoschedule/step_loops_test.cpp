@@ -315,7 +315,8 @@ TEST_F(GradientsOfStepLoops, InPlaceInTwoColoursByChoice) {
   p(r.x, r.y) = select((r.x + r.y + r.z) % 2 == 0, 0.25f * next, p(r.x, r.y));
   const Func loss = gradient::weighted_sum(p, {11, 9});
   gradient::expect_gradient(loss, image);
-  EXPECT_EQ(loops_of_recurrence(propagate_adjoints(loss)(image)), "reverse reverse reverse reversei<>");
+  EXPECT_EQ(loops_of_recurrence(propagate_adjoints(loss)(image)),
+            "reverse reverse reverse reversei<>");
 }
 
 TEST_F(GradientsOfStepLoops, OfNoStep) {
