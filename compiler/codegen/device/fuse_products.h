@@ -6,8 +6,8 @@
 
 namespace retrograde::codegen {
 
-// Fuses a product that has one user with the sum that uses it into llvm.fma, if both may contract. Every llvm.fmuladd
-// becomes llvm.fma too. Afterwards nothing may contract, so LLVM's back ends have no choice left, and neither has
+// Every llvm.fmuladd becomes llvm.fma: those that values/fused_sums.cpp made, and those of libclc's functions. What may
+// still contract there is a product with one user, which fuses with the sum that uses it. Afterwards nothing may contract, so LLVM's back ends have no choice left, and neither has
 // ptxas, which fuses operations that PTX leaves without a rounding mode.
 void fuse_products(llvm::Function& function);
 
