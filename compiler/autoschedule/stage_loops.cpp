@@ -49,7 +49,7 @@ class LoopFinder {
   StageLoop of_reduction(const std::string& name) const {
     const auto leaf = std::ranges::find(leaves_.all, name, &graph::Leaf::loop);
     const bool is_independent =
-        graph::can_prove_race_free(f_, definition_, variable_of(name), {}, false);
+        graph::can_prove_race_free(f_, definition_, variable_of(name), {}, true);
     return {RVar(name), as_const_int(simplify(leaf->extent)), is_independent,
             first_dimension(leaf->name)};
   }

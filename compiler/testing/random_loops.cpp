@@ -282,7 +282,7 @@ Loops loops_of(const graph::FuncContents& f, int stage) {
     if (dim.is_reduction) {
       const Origin& origin = origins[dim.var];
       loop.extent = origin.extent;
-      loop.is_independent = graph::can_prove_race_free(f, definition, origin.variable, {}, false);
+      loop.is_independent = graph::can_prove_race_free(f, definition, origin.variable, {}, true);
     } else {
       loop.dimension = static_cast<int>(std::ranges::find(f.args, dim.var) - f.args.begin());
     }

@@ -135,7 +135,8 @@ const std::vector<Directive>& place_directives() {
     DIRECTIVE("compute_with",
               "Fuses the loops of a stage with those of another stage, from the outermost loop\n"
               "down to the named one. If the ranges of the two stages differ, the fused loops\n"
-              "cover both ranges, and each stage runs within its own range only.",
+              "cover both ranges, and each stage runs within its own range only. A reduction loop\n"
+              "of the stage may run with a pure loop of the other that has its name.",
               Loops,
               (Func f("f"), g("g"), h("h"); g(x, y) = 3 * x - y; h(x, y) = max(x, y);
                g.compute_root(); h.compute_root(); f(x, y) = select(x < y, g(x, y), h(x, y))),

@@ -54,6 +54,18 @@
 
 namespace retrograde::codegen {
 
+// A product and its sum count as two, fused or not, so that machines with FMA unroll as others do.
+static unsigned operations_of(const llvm::Instruction& one) {
+  const auto* call = llvm::dyn_cast<llvm::IntrinsicInst>(&one);
+  return call && call->getIntrinsicID() == llvm::Intrinsic::fmuladd ? 2 : 1;
+}
+
+static size_t operations_of(const llvm::BasicBlock& block) {
+  size_t count = 0;
+  for (const llvm::Instruction& one : block) count += operations_of(one);
+  return count;
+}
+
 // Approximate number of machine instructions of a block. Addresses and index conversions fold into their users. A
 // vector wider than a register counts once per register.
 static unsigned cost_of(const llvm::BasicBlock& block) {
@@ -64,7 +76,7 @@ static unsigned cost_of(const llvm::BasicBlock& block) {
     const auto* store = llvm::dyn_cast<llvm::StoreInst>(&one);
     const llvm::Type* type = store ? store->getValueOperand()->getType() : one.getType();
     const auto bits = static_cast<unsigned>(type->getPrimitiveSizeInBits().getFixedValue());
-    cost += std::max(1u, bits / register_bits);
+    cost += std::max(1u, bits / register_bits) * operations_of(one);
   }
   return cost;
 }
@@ -136,7 +148,7 @@ static unsigned unroll_count(const llvm::Loop& loop, llvm::ScalarEvolution& evol
   const unsigned most = evolution.getSmallConstantMaxTripCount(&loop);  // 0: unknown
   if (most > 0 && most < least_iterations) return 1;
   const llvm::BasicBlock& body = *loop.getHeader();
-  if (body.size() <= during_a_sum && adds_up_floats(body)) return 1;
+  if (operations_of(body) <= during_a_sum && adds_up_floats(body)) return 1;
   const bool calls = std::any_of(body.begin(), body.end(), [](const llvm::Instruction& one) {
     return llvm::isa<llvm::CallBase>(one) && !llvm::isa<llvm::IntrinsicInst>(one);
   });

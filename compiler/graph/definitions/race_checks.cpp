@@ -60,10 +60,11 @@ Expr as_equation(const Expr& condition) {
 }
 
 // The reads of a Func by its own update, each with the condition under which its value matters: both
-// arms of a select may be evaluated, but only one is taken.
+// arms of a select may be evaluated, but only one is taken. In a kernel, all that is evaluated matters.
 class OwnReads {
  public:
-  OwnReads(const FuncContents& f, const Definition& update) : f_(f), update_(update) {}
+  OwnReads(const FuncContents& f, const Definition& update, bool in_kernel = false)
+      : f_(f), update_(update), in_kernel_(in_kernel) {}
 
   std::vector<Access> find() {
     const std::vector<Expr> values = mapped(update_.values, without_lets);  // alive while visited
@@ -91,7 +92,7 @@ class OwnReads {
     if (as_call_of(e, &f_)) add(e, where);
     const auto* select = e.as<Select>();
     const Call* lazy = as_op(e, Op::if_then_else);
-    if (select) {
+    if (select && !in_kernel_) {
       choose(select->condition, select->when_true, select->when_false, where);
     } else if (lazy) {
       choose(lazy->args[0], lazy->args[1], lazy->args[2], where);
@@ -108,6 +109,7 @@ class OwnReads {
 
   const FuncContents& f_;
   const Definition& update_;
+  const bool in_kernel_;
   std::unordered_set<const ExprNode*> always_;  // nodes that are evaluated at every point
   int visits_ = 0;
   std::vector<Access> reads_;
@@ -148,12 +150,12 @@ Expr read_of_other_element(const FuncContents& f, const Definition& update) {
 }
 
 bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar,
-                         const std::unordered_set<std::string>& around, bool may_store_old_values) {
+                         const std::unordered_set<std::string>& around, bool in_kernel) {
   const MeetingPoints points = points_of(update);
   const Access write{update.args, {}};
   if (!can_prove_never_meet(points, rvar, write, write, around)) return false;
-  const Access change{update.args, may_store_old_values ? changes_where(f, update) : Expr()};
-  return std::ranges::all_of(OwnReads(f, update).find(), [&](const Access& read) {
+  const Access change{update.args, in_kernel ? Expr() : changes_where(f, update)};
+  return std::ranges::all_of(OwnReads(f, update, in_kernel).find(), [&](const Access& read) {
     return can_prove_never_meet(points, rvar, change, read, around);
   });
 }

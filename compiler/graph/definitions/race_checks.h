@@ -21,10 +21,11 @@ namespace retrograde::graph {
 //
 // An iteration may store again the value that an element had, while others read that element, as in two colours:
 //   u(r.x, r.y) = select((r.x + r.y + r.t) % 2 == 0, u(r.x - 1, r.y) + u(r.x + 1, r.y), u(r.x, r.y))
-// Unless `may_store_old_values` is set, such stores count as changes: threads of a kernel promise nothing about them.
+// In a kernel, such stores count as changes, and reads for an arm of a select that is not taken as reads: its threads
+// promise nothing about either.
 bool can_prove_race_free(const FuncContents& f, const Definition& update, const std::string& rvar,
                          const std::unordered_set<std::string>& around = {},
-                         bool may_store_old_values = true);
+                         bool in_kernel = false);
 
 // Whether loops over the reduction variables in the order `after`, instead of `before`, run every two
 // iterations that access one element in the same order, if one of them writes it. Both lists hold all

@@ -122,7 +122,7 @@ void check_concurrent(const SchedulePlace& at, const ConcurrentLoop& loop, const
   const StageLoops& now = at.schedule();
   if (now.allow_races) return;
   for (const std::string& root : reduction_roots(stage, now, loop.name)) {
-    if (can_prove_race_free(*at.f, stage, root, loop.around, !loop.is_in_kernel)) continue;
+    if (can_prove_race_free(*at.f, stage, root, loop.around, loop.is_in_kernel)) continue;
     if (now.atomic) {
       if (now.override_associativity && loop.is_vectorized) continue;
       if (stores_one_value(*at.f, stage)) continue;

@@ -108,7 +108,7 @@ TEST_F(RaceChecks, RedAndBlackPointsByChoice) {
   EXPECT_TRUE(is_free(0, {2}));
   EXPECT_TRUE(is_free(1, {2}));
   EXPECT_FALSE(is_free(0, {}));
-  EXPECT_FALSE(can_prove_race_free(*u.function(), update(), name(0), {name(2)}, false));
+  EXPECT_FALSE(can_prove_race_free(*u.function(), update(), name(0), {name(2)}, true));
   EXPECT_TRUE(keeps_order({1, 0, 2}));
   EXPECT_FALSE(keeps_order({2, 0, 1}));
 }
