@@ -43,6 +43,7 @@
 #include <unordered_set>
 
 #include "ir/build.h"
+#include "ir/markers.h"
 #include "ir/visit.h"
 #include "lower/loops/steady_state.h"
 #include "lower/nests/copy_statement.h"
@@ -144,6 +145,7 @@ class Partitioner : public StatementRewriter {
 
   struct Ends {
     Expr begin, end;  // of the steady state; undefined where they coincide with those of the loop
+    Expr needed;      // a further condition for the steady state; undefined: none
   };
 
   static Ends find_ends(const For& loop, const SteadyState& steady) {
@@ -155,19 +157,23 @@ class Partitioner : public StatementRewriter {
       ends.end = simplify(binary(Kind::Add, range.max, make_one(range.max.type())));
     if (ends.begin.defined() && can_prove(ends.begin <= loop.min)) ends.begin = {};
     if (ends.end.defined() && can_prove(ends.end >= loop_end)) ends.end = {};
+    ends.needed = steady.needed;
+    // They are computed before the loop, outside of guards inside it that make promises true.
+    for (Expr* e : {&ends.begin, &ends.end, &ends.needed})
+      if (e->defined()) *e = without_promises(*e);
     return ends;
   }
 
   Stmt assemble(const For& loop, const Stmt& steady_body, const Stmt& rest,
                 const SteadyState& steady) {
     Ends ends = find_ends(loop, steady);
-    if (!ends.begin.defined() && !ends.end.defined() && !steady.needed.defined()) {
+    if (!ends.begin.defined() && !ends.end.defined() && !ends.needed.defined()) {
       return make_for(loop.name, loop.min, loop.extent, loop.runs, steady_body);
     }
     const bool stays_one = runs_at_once(loop.runs) || steady.has_thick_border ||
                            has_costly_borders_in_order(loop, rest, ends);
-    return stays_one ? branch_inside(loop, steady_body, rest, ends, steady.needed)
-                     : three_loops(loop, steady_body, rest, ends, steady.needed);
+    return stays_one ? branch_inside(loop, steady_body, rest, ends)
+                     : three_loops(loop, steady_body, rest, ends);
   }
 
   // If the borders must run in order, they would be two copies of the body; a branch costs little beside a large body.
@@ -176,8 +182,7 @@ class Partitioner : public StatementRewriter {
            node_count(rest) > costly_border && !runs_in_any_order(loop);
   }
 
-  Stmt branch_inside(const For& loop, const Stmt& steady_body, const Stmt& rest, const Ends& ends,
-                     const Expr& needed) {
+  Stmt branch_inside(const For& loop, const Stmt& steady_body, const Stmt& rest, const Ends& ends) {
     Expr var = variable(loop.name, loop.min.type());
     std::vector<Expr> conditions;
     Lets lets;
@@ -188,21 +193,20 @@ class Partitioner : public StatementRewriter {
     };
     if (ends.begin.defined()) conditions.push_back(var >= bind(".begin", ends.begin));
     if (ends.end.defined()) conditions.push_back(var < bind(".end", ends.end));
-    if (needed.defined()) conditions.push_back(bind(".steady", needed));
+    if (ends.needed.defined()) conditions.push_back(bind(".steady", ends.needed));
     Stmt body = make_if(conjunction(conditions), steady_body, copy_statement(rest, fresh_));
     return make_lets(lets, make_for(loop.name, loop.min, loop.extent, loop.runs, body));
   }
 
   // Ensures loop.min <= begin <= end <= loop_end for every extent of the loop.
-  Stmt three_loops(const For& loop, const Stmt& steady_body, const Stmt& rest, const Ends& ends,
-                   const Expr& needed) {
+  Stmt three_loops(const For& loop, const Stmt& steady_body, const Stmt& rest, const Ends& ends) {
     Expr loop_end = simplify(binary(Kind::Add, loop.min, loop.extent));
     std::string begin_name = fresh_(loop.name + ".begin"), end_name = fresh_(loop.name + ".end");
     bool has_prologue = ends.begin.defined();
     Expr begin = has_prologue ? variable(begin_name, loop.min.type()) : loop.min;
     Expr end = ends.end.defined() ? simplify(min(ends.end, loop_end)) : loop_end;
-    if (needed.defined()) end = make_select(needed, end, begin);
-    bool has_epilogue = ends.end.defined() || needed.defined();
+    if (ends.needed.defined()) end = make_select(ends.needed, end, begin);
+    bool has_epilogue = ends.end.defined() || ends.needed.defined();
     Expr end_value = simplify(max(end, begin));
     if (has_epilogue) end = variable(end_name, loop.min.type());
 
