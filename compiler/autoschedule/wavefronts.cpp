@@ -6,14 +6,11 @@
 
 #include "analysis/linear.h"
 #include "autoschedule/cost_estimate.h"
-#include "autoschedule/hosted_funcs.h"
+#include "autoschedule/rewritable_updates.h"
 #include "autoschedule/root_loops.h"
-#include "autoschedule/size_estimate.h"
 #include "autoschedule/step_loops.h"
-#include "graph/definitions/own_reads.h"
 #include "graph/definitions/race_checks.h"
 #include "graph/definitions/reduction_domain.h"
-#include "graph/directives/give_directive.h"
 #include "graph/names.h"
 #include "ir/build.h"
 #include "ir/visit.h"
@@ -28,19 +25,6 @@ constexpr int unrolled_rows = 8;  // hide the latency of two operations
 constexpr int64_t most_pure_elements = 4;
 // Operations of a value from which a vector saves more than loads and stores with a stride cost.
 constexpr double vectors_pay = 8;
-
-bool has_effects(const Definition& update) {
-  return any_node(update, [](const Call& call) {
-    return call.call_type == CallType::Extern ||
-           (call.call_type == CallType::Operator && op_info(call.op).cls == OpClass::Effect);
-  });
-}
-
-bool is_to_schedule(const FuncContents& f, const Definition& update) {
-  const bool is_part = f.made && (f.made->lanes > 0 || f.made->has_parts || f.made->blocks > 0);
-  return !is_part && !f.is_extern() && !has_directives(f) && update.rvars.size() >= 2 &&
-         !point_number(update) && !has_effects(update);
-}
 
 // How many dimensions of the written element the variable moves; -1: one of them by more than one element.
 int moved_dimensions(const Definition& update, const std::string& variable) {
@@ -64,25 +48,21 @@ bool are_along_rows(const Definition& update, const std::string& inner, const st
          });
 }
 
-bool is_long(const ReductionVariable& r, int64_t least) {
-  return as_const_int(simplify(r.extent)).value_or(least) >= least;
-}
-
 class WavefrontFinder {
  public:
-  explicit WavefrontFinder(const std::vector<FuncPtr>& outputs)
-      : outputs_(outputs), hosted_(outputs) {}
+  explicit WavefrontFinder(const std::vector<FuncPtr>& outputs) : rewritable_(outputs) {}
 
   // The slope of the fronts; nullopt: there are none.
   std::optional<int> slope(const FuncContents& f, const Definition& update) {
-    if (!is_to_schedule(f, update) || hosted_.are_in(f)) return std::nullopt;
+    if (update.rvars.size() < 2) return std::nullopt;
     const ReductionVariable &inner = update.rvars[0], &outer = update.rvars[1];
     const FrontLanes lanes = front_lanes(update);
     // A block has slope * (rows - 1) fronts more than columns, on which rows wait for others.
     const int waits = (lanes.in_vectors ? 1 : 2) * (lanes.rows - 1);
-    if (!is_long(inner, waits) || !is_long(outer, lanes.rows) ||
-        !are_along_rows(update, inner.var, outer.var) || !read_elsewhere(f, update).defined() ||
-        !has_few_pure_elements(f, update) || step_variables(f, update).any_independent())
+    if (!is_long(inner.extent, waits) || !is_long(outer.extent, lanes.rows) ||
+        !are_along_rows(update, inner.var, outer.var) ||
+        !rewritable_.contain(f, update, most_pure_elements) ||
+        step_variables(f, update).any_independent())
       return std::nullopt;
     const auto is_legal = [&](int slope) {
       return graph::can_prove_skewed_order(f, update, inner.var, outer.var, slope);
@@ -90,23 +70,11 @@ class WavefrontFinder {
     if (!is_legal(most_slope)) return std::nullopt;  // nor any smaller one
     int slope = 1;
     while (slope < most_slope && !is_legal(slope)) ++slope;
-    return is_long(inner, slope * waits) ? std::optional(slope) : std::nullopt;
+    return is_long(inner.extent, slope * waits) ? std::optional(slope) : std::nullopt;
   }
 
  private:
-  bool has_few_pure_elements(const FuncContents& f, const Definition& update) {
-    int64_t elements = 1;
-    for (size_t d = 0; d < f.args.size(); ++d) {
-      if (!is_pure_position(f, update, d)) continue;
-      if (!sizes_) sizes_.emplace(outputs_);
-      elements *= sizes_->extent(f, d).value_or(most_pure_elements + 1);
-    }
-    return elements <= most_pure_elements;
-  }
-
-  const std::vector<FuncPtr>& outputs_;
-  const HostedFuncs hosted_;
-  std::optional<SizeEstimate> sizes_;  // computed when it is needed
+  RewritableUpdates rewritable_;
 };
 
 // Replaces the two innermost loops of an update by three.

@@ -22,6 +22,7 @@ retrograde_test(
   strided_terms_test
   sum_blocks_test
   turned_sums_test
+  blocked_recurrences_test
   wavefronts_test
   TOGETHER autoschedule_tests LIBS retrograde_dep_halide_runtime)
 retrograde_test(auto_schedule_test OPTIMIZED)

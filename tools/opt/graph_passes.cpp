@@ -5,6 +5,7 @@
 #include "autodiff/derivative.h"
 #include "autoschedule/cut_reductions.h"
 #include "autoschedule/default_schedule.h"
+#include "autoschedule/graph_rewrites.h"
 #include "graph/copy_graph.h"
 #include "graph/directives/wrappers.h"
 
@@ -36,6 +37,10 @@ const std::vector<GraphPass>& graph_passes() {
       {"propagate_adjoints", with_adjoints},
       {"apply_wrappers", apply_wrappers},
       {"cut_reductions", with_cut_reductions},
+      {"graph_rewrites",
+       [](const std::vector<FuncPtr>& outputs) {
+         return with_graph_rewrites(outputs, /*on_gpu=*/false, SumOrder::Free);
+       }},
       {"schedule_unscheduled",
        [](const std::vector<FuncPtr>& outputs) { return schedule_unscheduled(outputs); }}};
   return passes;
