@@ -211,7 +211,7 @@ TEST_F(BlockedRecurrences, OfAnyLength) {
   }
 }
 
-// Of the last element alone, from an image that is exactly as long as the recurrence.
+// Reads the last element alone, from an image that is exactly as long as the recurrence.
 TEST_F(BlockedRecurrences, ReadNothingOutsideOfImages) {
   ImageParam in(Float(32), 1, "in");
   Func f("f"), last("last");

@@ -82,6 +82,22 @@ class Expressions(unittest.TestCase):
         with self.assertRaisesRegex(rg.Unsupported, "sizes of its images.*elsewhere"):
             operator(f, [image, count], [rg.ImageParam("float32", 1, "elsewhere").dim(0).extent()])(torch.rand(3), 1)
 
+    def test_take_shapes_if_they_can(self):
+        def made(kind, shapes, factor=1):
+            given_shapes.append(shapes)
+            return without_sizes(kind, shapes)
+
+        sizes = lambda image, taps: [image.shape[1] - taps.shape[0] + 1, image.shape[0]]
+        for i, (define, takes) in enumerate((
+                (lambda *both: made(*both), True), (lambda kind, *rest: made(kind, *rest), True),
+                (lambda kind, shapes=None: made(kind, shapes), True), (lambda kind: made(kind, None), False),
+                (lambda kind, factor=2: made(kind, None, factor), False), (lambda kind, *, n=2: made(kind, None), False))):
+            given_shapes = []
+            image, taps = given(4, 20)
+            op = operator(f"definitions::takes_{i}", define, sizes=sizes)
+            torch.testing.assert_close(op(image, taps), want(image, taps))
+            self.assertEqual(((4, 20), (3,)) in [tuple(map(tuple, s)) for s in given_shapes if s], takes)
+
     def test_sizes_that_are_none(self):
         halves = operator("definitions::halves", lambda kind, shapes: (
             *without_sizes(kind, shapes), [shapes[0][1] / 2, 1] if shapes else [1, 1]))

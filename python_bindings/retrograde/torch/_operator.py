@@ -35,8 +35,9 @@ def operator(name, pipeline=None, inputs=None, outputs=None, *, sizes=None):
     `pipeline` may also be a function of an element type such as "float32" that returns (pipeline, inputs) or
     (pipeline, inputs, outputs); `sizes` may be given to operator() instead. Then one definition serves tensors of all
     floating-point types. The first input that is float32 in the definition for "float32" determines the type of a call.
-    A function of two arguments, (type, shapes), also receives the shapes of the tensors, in PyTorch's order. Its result
-    is compiled for these shapes only, which is faster than general code. It is also called with None: once when the
+    A function of two arguments, (type, shapes), also receives the shapes of the tensors, in PyTorch's order. So does one
+    of any number of arguments, (*both), but none whose second argument has a default other than None. Its result is
+    compiled for these shapes only, which is faster than general code. It is also called with None: once when the
     operator is created, and after MOST_SIZES different shapes for all others. Sizes are then expressions, such as
     image.dim(0).extent(). They work in an RDom and in arithmetic; `//` divides both kinds alike, while `/` of two
     Python integers is a float. Python's range() and int() need numbers."""
@@ -112,6 +113,15 @@ def _parts(name, definition):
     return (*definition, None)[:3]
 
 
+def _takes_shapes(define):
+    """Whether a definition takes shapes after the element type. A parameter with a value of its own does not count."""
+    parameters = list(inspect.signature(define).parameters.values())
+    if any(p.kind is p.VAR_POSITIONAL for p in parameters[:2]):
+        return True
+    placed = [p for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
+    return len(placed) > 1 and placed[1].default in (None, inspect.Parameter.empty)
+
+
 def _check_is_alone(name, inputs):
     """Refuses inputs beside a function, which returns its own."""
     if inputs is not None:
@@ -149,7 +159,7 @@ class Operator:
         self._outputs = outputs  # used where a definition returns none
         if callable(pipeline) and not isinstance(pipeline, (rg.Func, rg.Pipeline, rg.ImageParam)):
             _check_is_alone(self.name, inputs)
-            self._define, self._knows_sizes = pipeline, len(inspect.signature(pipeline).parameters) > 1
+            self._define, self._knows_sizes = pipeline, _takes_shapes(pipeline)
             definition = self._defined(torch.float32)
         else:
             definition = (pipeline, inputs, outputs)
