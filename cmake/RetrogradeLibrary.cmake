@@ -88,6 +88,7 @@ configure_file(${PROJECT_SOURCE_DIR}/cmake/retrograde-runtime.pc.in
 install(FILES ${CMAKE_BINARY_DIR}/retrograde.pc ${CMAKE_BINARY_DIR}/retrograde-halide.pc
   ${CMAKE_BINARY_DIR}/retrograde-runtime.pc
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+install(FILES ${PROJECT_SOURCE_DIR}/compiler/layer_namespaces.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/retrograde)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/compiler/frontend/include/
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/compiler/frontend/compat/

@@ -63,7 +63,7 @@ void check_inputs(const std::string& asked, const Func& func,
 }
 
 CustomDerivatives rules_of(const Func& func) {
-  const auto& now = func.function()->custom_derivatives;
+  const auto now = custom_rules_of(*func.function());
   return now ? *now : CustomDerivatives();
 }
 

@@ -22,9 +22,9 @@ constexpr int block = 256;  // points
 constexpr int64_t least_length = 16 * block;
 constexpr int64_t most_signals = 4;
 
-class BlockFinder {
+class RecurrenceBlockFinder {
  public:
-  BlockFinder(const std::vector<FuncPtr>& outputs, SumOrder order)
+  RecurrenceBlockFinder(const std::vector<FuncPtr>& outputs, SumOrder order)
       : rewritable_(outputs), order_(order) {}
 
   std::optional<LinearRecurrence> recurrence(const FuncContents& f, const Definition& update) {
@@ -194,7 +194,7 @@ class Blocker {
 }  // namespace
 
 bool has_blocked_recurrences(const std::vector<FuncPtr>& outputs, SumOrder order) {
-  BlockFinder finder(outputs, order);
+  RecurrenceBlockFinder finder(outputs, order);
   return std::ranges::any_of(topological_order(outputs), [&](const FuncPtr& f) {
     return std::ranges::any_of(f->updates, [&](const Definition& update) {
       return finder.recurrence(*f, update).has_value();
@@ -203,7 +203,7 @@ bool has_blocked_recurrences(const std::vector<FuncPtr>& outputs, SumOrder order
 }
 
 void run_in_blocks(const std::vector<FuncPtr>& outputs, SumOrder order) {
-  BlockFinder finder(outputs, order);
+  RecurrenceBlockFinder finder(outputs, order);
   for (const FuncPtr& f : topological_order(outputs)) {
     std::vector<Definition> updates;
     for (const Definition& update : f->updates) {

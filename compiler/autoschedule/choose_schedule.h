@@ -10,10 +10,12 @@
 // predicts is right within some percent at best, so that a gain of less is none.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "autoschedule/memory_budget.h"
-#include "frontend/run/compiler_interface.h"
+#include "autoschedule/schedule_search.h"
+#include "frontend/run/schedule_report.h"
 
 namespace retrograde::autoschedule {
 
@@ -22,13 +24,14 @@ struct ChosenSchedule {
   SearchedSchedules search;
 };
 
-// `outputs`: of a graph whose wrappers have been applied, which stays as it is. `wants_runner_up`:
-// searches without being asked to take what it finds, too.
+// `outputs`: of a graph whose wrappers have been applied, which stays as it is. `cost`: for a search.
+// `wants_runner_up`: searches without being asked to take what it finds, too.
 ChosenSchedule choose_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
-                               Scheduling what, const Target& target, bool wants_runner_up = false);
-
-// What lowering is given of a pipeline: schedule_unscheduled, or what a search found.
-ChosenSchedule choose_schedule(const PipelineSpec& pipeline, const Target& target,
+                               Scheduling what, const ScheduleCost& cost,
                                bool wants_runner_up = false);
+
+// Why a search that was asked for did not run, as SearchedSchedules::note tells it.
+std::string note_against_search(const std::vector<FuncPtr>& outputs, const std::string& rule,
+                                const std::string& evidence, const std::string& instead);
 
 }  // namespace retrograde::autoschedule

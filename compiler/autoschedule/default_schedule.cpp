@@ -12,10 +12,8 @@
 #include "autoschedule/cut_scatters.h"
 #include "autoschedule/epilogues.h"
 #include "autoschedule/gpu_schedule.h"
-#include "autoschedule/graph_rewrites.h"
 #include "autoschedule/join_sweeps.h"
 #include "autoschedule/lane_dimension.h"
-#include "autoschedule/memory_budget.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/only_reader.h"
 #include "autoschedule/placement_limits.h"
@@ -37,13 +35,10 @@
 #include "autoschedule/sum_blocks.h"
 #include "autoschedule/task_sizes.h"
 #include "autoschedule/tile_chains.h"
-#include "diagnostics/large_stack.h"
 #include "frontend/language/func.h"
 #include "graph/copy_graph.h"
-#include "graph/definitions/first_reads.h"
 #include "graph/definitions/own_reads.h"
 #include "graph/directives/give_directive.h"
-#include "graph/directives/wrappers.h"
 
 namespace retrograde::autoschedule {
 
@@ -301,29 +296,11 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   return sizes;
 }
 
-// As after auto_schedule(). Then nothing is left to decide.
-static bool is_scheduled(const std::vector<FuncPtr>& outputs) {
-  return std::ranges::all_of(topological_order(outputs),
-                             [](const FuncPtr& f) { return has_directives(*f); });
-}
-
-std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
-                                          const VectorUnit& unit,
-                                          const AutoscheduleOptions& options) {
-  const ScheduleRequest request{unit, options, {}};
-  std::vector<FuncPtr> result;
-  run_on_large_stack([&] {
-    const graph::FirstReadsMemo memo;
-    result = apply_wrappers(outputs);
-    if (is_differentiated(result)) {
-      result = with_graph_rewrites(result, /*on_gpu=*/false);
-      if (!is_scheduled(result))
-        result = schedule_within_budget(result, request, Scheduling::Gradients).outputs;
-    } else if (!stored_by_default(result).empty()) {
-      result = copy_graph(result).outputs;
-      compute_at_root(stored_by_default(result), request);
-    }
-  });
+std::vector<FuncPtr> with_large_funcs_at_root(const std::vector<FuncPtr>& outputs,
+                                              const ScheduleRequest& request) {
+  if (stored_by_default(outputs).empty()) return outputs;
+  const std::vector<FuncPtr> result = copy_graph(outputs).outputs;
+  compute_at_root(stored_by_default(result), request);
   return result;
 }
 

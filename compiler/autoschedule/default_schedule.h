@@ -27,10 +27,9 @@ enum class Scheduling : uint8_t { Gradients, Everything };
 SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
                                    const ScheduleRequest& request, Scheduling what);
 
-// The pass: the outputs with their wrappers applied, or, where there are adjoints, those of a copy
-// of the graph that has its schedule. What lowering is given.
-std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
-                                          const VectorUnit& unit = {},
-                                          const AutoscheduleOptions& options = {});
+// Pipelines without adjoints that are compiled unscheduled: the outputs of this graph, whose wrappers have been applied,
+// or, where inlining would repeat large bodies, those of a copy that computes them at root.
+std::vector<FuncPtr> with_large_funcs_at_root(const std::vector<FuncPtr>& outputs,
+                                              const ScheduleRequest& request);
 
 }  // namespace retrograde::autoschedule

@@ -244,7 +244,7 @@ bool GeneratorBase::emit_cpp_stub(const std::string& path) {
   for (const GeneratorParamBase* param : members_.params) writer.add(*param);
   for (const GeneratorInputBase* input : members_.inputs) writer.add(*input);
   for (const GeneratorOutputBase* output : members_.outputs) writer.add(*output);
-  module_compiler().write_text(path, writer.text());
+  default_compiler().write_text(path, writer.text());
   return true;
 }
 

@@ -276,7 +276,7 @@ void GeneratorBase::emit_schedule(const std::string& path, const std::string& fu
   Pipeline pipeline = get_pipeline();
   auto_schedule_pipeline(pipeline);
   const std::string function = as_identifier(function_name.empty() ? name_ : function_name);
-  const ScheduleLog log = module_compiler().schedule(pipeline.spec(), get_target());
+  const ScheduleLog log = default_compiler().schedule(pipeline.spec(), get_target());
   const std::string guard = "RETROGRADE_SCHEDULE_" + function;
   const std::string header =
       text("// The schedule of the generator ", quoted(name_), " for ", get_target().to_string(),
@@ -285,7 +285,7 @@ void GeneratorBase::emit_schedule(const std::string& path, const std::string& fu
            "(::retrograde::Pipeline pipeline, ::retrograde::Target) {\n",
            "  pipeline.apply_schedule(::retrograde::ScheduleLog::parse(",
            quoted_lines(log.to_text()), "));\n}\n\n#endif\n");
-  module_compiler().write_text(path, header);
+  default_compiler().write_text(path, header);
 }
 
 }  // namespace retrograde::internal

@@ -13,8 +13,8 @@
 // come first if that keeps far fewer Funcs alive. For example, one output may need the forward
 // values of all steps of an iteration and another only the adjoints.
 //
-// Lowering follows this order; the estimate of memory uses it, too. Not done: an order by bytes,
-// which lowering does not know. Finding the best order is NP-hard (Sethi, Complete Register
+// Loop nests and the estimate of memory both follow this order. Not done: an order by bytes, which
+// are unknown when loops are built. Finding the best order is NP-hard (Sethi, Complete Register
 // Allocation Problems, SIAM J. Computing 1975).
 #pragma once
 

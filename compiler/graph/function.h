@@ -1,6 +1,5 @@
-// function.h -- the contents of a Func, as plain data. The front end fills them in; analysis,
-// autodiff, lowering and the interpreter read them. The classes of the public API (Func, Stage,
-// RDom, Param, ImageParam) are handles to these.
+// function.h -- the contents of a Func, as plain data: its definitions, schedule, provenance and constraints. The classes
+// of the public API (Func, Stage, RDom, Param, ImageParam) are handles to these.
 #pragma once
 
 #include <functional>
@@ -18,12 +17,6 @@
 #include "ir/visit.h"
 
 namespace retrograde {
-
-// The user's derivative rules that replace differentiation of the definitions
-// (autodiff/custom_derivative.h).
-namespace autodiff {
-struct CustomDerivatives;
-}
 
 // Name mangling of an extern stage's symbol. Default follows the target: C, unless it has
 // c_plus_plus_name_mangling.
@@ -69,6 +62,12 @@ struct Requirement {
   std::vector<Expr> message;  // parts, concatenated
 };
 
+// The user's derivative rules for a Func, which replace its definitions when it is differentiated. A graph only keeps
+// them; the code that runs them derives its own type.
+struct DerivativeRules {
+  virtual ~DerivativeRules() = default;
+};
+
 // The contents of a Func: the Symbol behind each Call to it.
 struct FuncContents : Symbol, std::enable_shared_from_this<FuncContents> {
   std::string name;                // unique in the process
@@ -90,7 +89,7 @@ struct FuncContents : Symbol, std::enable_shared_from_this<FuncContents> {
   // When set, `pure` has args but no values and no loops, and there are no updates.
   std::optional<ExternDefinition> extern_definition;
   // Null when there are none; clones share it.
-  std::shared_ptr<const autodiff::CustomDerivatives> custom_derivatives;
+  std::shared_ptr<const DerivativeRules> custom_derivatives;
   // Func::in and clone_in: consumers named here read the wrapper instead; "" stands for all others.
   std::map<std::string, std::shared_ptr<FuncContents>> wrappers;
   // Func::copy_input: images named here are read through these Funcs.

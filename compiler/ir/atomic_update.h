@@ -1,5 +1,5 @@
 // atomic_update.h -- recognises stores that combine an element with a value by one operation.
-// Lowering keeps such stores as vectors; code generation emits an atomic instruction for them.
+// Such stores stay vectors, and one atomic instruction does them.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// The result of lowering and the input of code generation: one function with a flat body.
+// A function in the last phase of the IR: its arguments and one flat body, ready to become machine code.
 #pragma once
 
 #include <functional>
@@ -15,7 +15,7 @@ struct LoweredArgument {
   Kind kind = Kind::Scalar;
   Type type;           // of the scalar, or of the buffer's elements
   int dimensions = 0;  // of the buffer
-  SymbolRef symbol;    // the parameter or buffer that a JIT call binds here; may be undefined
+  SymbolRef symbol;    // the parameter or buffer that a call in process binds here; may be undefined
   bool is_buffer() const { return kind != Kind::Scalar; }
 };
 

@@ -1,5 +1,5 @@
-// Scalar values, and the only definition of each operation on them. The constant folder, the
-// interpreter and the tests of the code generator all use this.
+// Scalar values, and the only definition of each operation on them: the constant folder and every oracle of the tests
+// use it.
 #pragma once
 
 #include <optional>

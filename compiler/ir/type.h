@@ -6,7 +6,7 @@
 #include <string>
 #include <type_traits>
 
-#include "ir/namespaces.h"
+#include "layer_namespaces.h"
 
 struct halide_type_t;
 enum halide_type_code_t : uint8_t;

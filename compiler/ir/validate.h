@@ -1,4 +1,4 @@
-// Checks the invariants of each lowering phase; runs after every pass in tests and debug builds.
+// Checks the invariants of each phase of the IR; runs after every pass in tests and debug builds.
 #pragma once
 
 #include <string>

@@ -4,13 +4,11 @@
 #include <functional>
 #include <tuple>
 
-#include "autoschedule/choose_schedule.h"
 #include "diagnostics/error.h"
 #include "graph/definitions/parameter_contents.h"
 #include "ir/build.h"
 #include "ir/print.h"
 #include "ir/visit.h"
-#include "lower/lower.h"
 
 namespace retrograde::jit {
 namespace {
@@ -24,36 +22,6 @@ const graph::ParameterContents* parameter_of(const LoweredArgument& arg) {
 bool is_literal(const LoweredArgument& arg) {
   const auto* parameter = parameter_of(arg);
   return parameter && parameter->is_literal;
-}
-
-// Sorts images first, then Params, then literal Buffers, each by name.
-std::vector<LoweredArgument> in_order(std::vector<LoweredArgument> args) {
-  const auto key = [](const LoweredArgument& arg) {
-    return std::make_tuple(is_literal(arg), !arg.is_buffer(), arg.name);
-  };
-  std::ranges::sort(args, {}, key);
-  LoweredArgument user_context{"__user_context", LoweredArgument::Kind::Scalar, Handle(), 0, {}};
-  args.insert(args.begin(), std::move(user_context));
-  return args;
-}
-
-ExternPipeline compile_one(const std::string& name, const PipelineSpec& pipeline,
-                           const Target& target) {
-  lower::LowerOptions options;
-  options.target = pipeline.traced(target);
-  ir::LoweredFunction function =
-      lower::lower(name, autoschedule::choose_schedule(pipeline, target).graph.outputs,
-                   in_order(lower::infer_arguments(pipeline.outputs)), options);
-  ExternPipeline result;
-  result.called = compile_extern_pipelines(pipeline, target);
-  function.body = call_pipelines(function.body, result.called);
-  Options code_options;
-  code_options.externs = pipeline.externs;
-  for (const auto& [called, one] : result.called)
-    code_options.externs[called] = one.code->address();
-  result.code = compile(function, target, code_options);
-  result.arguments = std::move(function.args);
-  return result;
 }
 
 class CallRewriter : public ir::Rewriter {
@@ -126,15 +94,29 @@ class CallRewriter : public ir::Rewriter {
 
 }  // namespace
 
-ExternPipelines compile_extern_pipelines(const PipelineSpec& caller, const Target& target) {
-  ExternPipelines result;
-  for (const auto& [name, pipeline] : caller.pipelines)
-    result[name] = compile_one(name, *pipeline, target);
+ExternPipeline compile_with_pipelines(ir::LoweredFunction function, ExternPipelines called,
+                                      const std::map<std::string, void*>& externs,
+                                      const Target& target) {
+  if (!called.empty()) function.body = CallRewriter(called)(function.body);
+  Options options;
+  options.externs = externs;
+  for (const auto& [name, one] : called) options.externs[name] = one.code->address();
+  ExternPipeline result;
+  result.code = compile(function, target, options);
+  result.arguments = std::move(function.args);
+  result.called = std::move(called);
   return result;
 }
 
-Stmt call_pipelines(const Stmt& body, const ExternPipelines& pipelines) {
-  return pipelines.empty() ? body : CallRewriter(pipelines)(body);
+// Sorts images first, then Params, then literal Buffers, each by name.
+std::vector<LoweredArgument> in_order_of_calls(std::vector<LoweredArgument> args) {
+  const auto key = [](const LoweredArgument& arg) {
+    return std::make_tuple(is_literal(arg), !arg.is_buffer(), arg.name);
+  };
+  std::ranges::sort(args, {}, key);
+  LoweredArgument user_context{"__user_context", LoweredArgument::Kind::Scalar, Handle(), 0, {}};
+  args.insert(args.begin(), std::move(user_context));
+  return args;
 }
 
 }  // namespace retrograde::jit

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/run/compiler_interface.h"
+#include "ir/lowered_function.h"
 #include "jit/jit.h"
 
 namespace retrograde::jit {
@@ -25,9 +25,14 @@ struct ExternPipeline {
 };
 using ExternPipelines = std::map<std::string, ExternPipeline>;
 
-ExternPipelines compile_extern_pipelines(const PipelineSpec& caller, const Target& target);
-
+// Compiles a lowered pipeline whose extern stages call the pipelines `called` by their names, and C functions of
+// `externs` before those of the process.
 // Requires: a call of a pipeline passes all its arguments.
-Stmt call_pipelines(const Stmt& body, const ExternPipelines& pipelines);
+ExternPipeline compile_with_pipelines(ir::LoweredFunction function, ExternPipelines called,
+                                      const std::map<std::string, void*>& externs,
+                                      const Target& target);
+
+// The arguments of a called pipeline in the order in which its callers pass them.
+std::vector<ir::LoweredArgument> in_order_of_calls(std::vector<ir::LoweredArgument> args);
 
 }  // namespace retrograde::jit

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/run/compiler_interface.h"
+#include "frontend/run/compiled_pipeline.h"
 #include "jit/jit.h"
 #include "retrograde_runtime.h"
 

@@ -5,7 +5,6 @@
 #include <iomanip>
 #include <sstream>
 
-#include "autoschedule/choose_schedule.h"
 #include "diagnostics/error.h"
 #include "graph/definitions/own_reads.h"
 #include "graph/names.h"
@@ -223,11 +222,10 @@ std::string func_of_stage(std::string stage, const std::vector<std::string>& fun
   return stage;
 }
 
-ExplainedPipeline explain_stages(const PipelineSpec& pipeline, const Target& target,
+ExplainedPipeline explain_stages(const PipelineSpec& pipeline,
+                                 const std::vector<FuncPtr>& scheduled, const Target& target,
                                  const std::vector<std::vector<int>>& output_sizes,
                                  const std::map<std::string, std::vector<int>>& input_sizes) {
-  const autoschedule::ChosenSchedule chosen = autoschedule::choose_schedule(pipeline, target);
-  const std::vector<FuncPtr>& scheduled = chosen.graph.outputs;
   lower::LowerOptions lowering;
   lowering.target = target;
   Stmt nests;

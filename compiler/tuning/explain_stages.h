@@ -1,7 +1,7 @@
 // explain_stages.h -- the stages of a scheduled pipeline in plain words: their loops, what bounds their time, what is
 // stored or recomputed, and what a user can change.
 //
-//   explain_stages(pipeline.spec(), target, {{200, 100}}, {{"image", {202, 100}}})
+//   explain_stages(pipeline.spec(), scheduled, target, {{200, 100}}, {{"image", {202, 100}}})
 //
 // `retrograde.torch` shows the result as op.explain(). Pipeline::explain_schedule gives the numbers alone.
 #pragma once
@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/run/compiler_interface.h"
+#include "frontend/run/compiled_pipeline.h"
 
 namespace retrograde::tuning {
 
@@ -36,10 +36,11 @@ struct ExplainedPipeline {
   std::vector<std::string> recomputed;  // Funcs that are inlined into their consumers
 };
 
-// `output_sizes`: one list for each output, dimension 0 first. `input_sizes`: by the names of images; images that are
+// `scheduled`: the pipeline's outputs with the schedule that was chosen. `output_sizes`: one list for each output, dimension 0 first. `input_sizes`: by the names of images; images that are
 // left out have the sizes that are bound, promised or estimated.
 // Requires: sizes are given once for all outputs, or for each, one for each dimension.
-ExplainedPipeline explain_stages(const PipelineSpec& pipeline, const Target& target,
+ExplainedPipeline explain_stages(const PipelineSpec& pipeline,
+                                 const std::vector<graph::FuncPtr>& scheduled, const Target& target,
                                  const std::vector<std::vector<int>>& output_sizes,
                                  const std::map<std::string, std::vector<int>>& input_sizes);
 

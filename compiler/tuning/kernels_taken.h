@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/run/compiler_interface.h"
+#include "frontend/run/compiled_pipeline.h"
 #include "frontend/run/kernel_report.h"
 #include "graph/function.h"
 #include "ir/lowered_function.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/run/compiler_interface.h"
+#include "frontend/run/compiled_pipeline.h"
 #include "frontend/run/schedule_report.h"
 
 namespace retrograde::tuning {

@@ -1,12 +1,9 @@
 // autoschedule.cpp -- binds auto_schedule, its options and results, and Python autoschedulers.
-#include "autoschedule/graph_rewrites.h"
 #include "bind_all.h"
 #include "binding.h"
 #include "callback.h"
+#include "driver/schedule.h"
 #include "func_class.h"
-#include "graph/copy_graph.h"
-#include "graph/directives/schedule_log.h"
-#include "graph/directives/wrappers.h"
 #include "runnable.h"
 
 namespace retrograde::python {
@@ -147,23 +144,6 @@ void bind_schedulers(py::module_& m) {
   }));
 }
 
-// A copy of the pipeline with the schedule of auto_schedule() for the target. In the copy, costly factors of sums and
-// values of coarse grids are Funcs of their own, and sums leave out zeros between elements. If the user gave directives
-// and the target has no GPU, the copy keeps those instead.
-Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target) {
-  const PipelineSpec spec = pipeline.spec();
-  std::vector<graph::FuncPtr> funcs = graph::apply_wrappers(spec.outputs);
-  const bool schedules = target.has_gpu_feature() || graph::schedule_log(funcs).size() == 0;
-  if (schedules)
-    funcs = autoschedule::with_graph_rewrites(funcs, target.has_gpu_feature(),
-                                              autoschedule::SumOrder::Free);
-  funcs = graph::copy_graph(funcs).outputs;
-  Pipeline copy(std::vector<Func>(funcs.begin(), funcs.end()));
-  copy.set_autoschedule(spec.autoschedule);
-  if (schedules) copy.auto_schedule(target);
-  return copy;
-}
-
 // Values may be numbers, which become text.
 void bind_params(py::module_& m) {
   Class<AutoschedulerParams>(m, "AutoschedulerParams")
@@ -216,7 +196,7 @@ void bind_scheduling(py::module_& m) {
       .def(
           "_scheduled_copy",
           [](const Pipeline& p, const Target& target) {
-            return unlocked([=](const Interruption&) { return scheduled_copy(p, target); });
+            return unlocked([=](const Interruption&) { return driver::scheduled_copy(p, target); });
           },
           arg("target"))
       .def("set_autoschedule", &Pipeline::set_autoschedule, arg("options"))

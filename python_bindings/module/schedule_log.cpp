@@ -1,10 +1,10 @@
 // schedule_log.cpp -- binds ScheduleLog and the reports of schedules' costs.
 #include "bind_all.h"
 #include "binding.h"
+#include "driver/reports.h"
 #include "frontend/run/kernel_report.h"
 #include "func_class.h"
 #include "runnable.h"
-#include "tuning/explain_stages.h"
 
 namespace retrograde::python {
 
@@ -124,7 +124,7 @@ void bind_schedule_log(py::module_& m) {
       [](const Pipeline& pipeline, const Target& target, const std::vector<std::vector<int>>& sizes,
          const std::map<std::string, std::vector<int>>& input_sizes) {
         return as_dict(unlocked([=](const Interruption&) {
-          return tuning::explain_stages(pipeline.spec(), target, sizes, input_sizes);
+          return driver::explain_stages(pipeline.spec(), target, sizes, input_sizes);
         }));
       },
       arg("pipeline"), arg("target"), arg("output_sizes"), arg("input_sizes"));

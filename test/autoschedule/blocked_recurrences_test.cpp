@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "autoschedule/default_schedule.h"
+#include "driver/schedule.h"
 #include "frontend/data/image_param.h"
 #include "frontend/run/pipeline.h"
 #include "gradient/gradient_check.h"
@@ -256,7 +256,7 @@ TEST_F(BlockedRecurrences, KeepNaN) {
 std::vector<std::string> funcs_in_blocks(const Func& gradient) {
   std::vector<std::string> result;
   for (const FuncPtr& f :
-       graph::topological_order(autoschedule::schedule_unscheduled({gradient.function()}))) {
+       graph::topological_order(driver::schedule_unscheduled({gradient.function()}))) {
     if (f->made && f->made->role == graph::Role::SharedValue) result.push_back(f->made->of);
   }
   return result;

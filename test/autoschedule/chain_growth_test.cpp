@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "autodiff/derivative.h"
-#include "autoschedule/default_schedule.h"
+#include "driver/schedule.h"
 #include "frontend/run/pipeline.h"
 #include "ir/visit.h"
 #include "lower/lower.h"
@@ -51,7 +51,7 @@ class Laps {
 Stmt lower_gradients(const std::vector<Func>& funcs, Laps& laps) {
   std::vector<graph::FuncPtr> outputs;
   for (const Func& f : funcs) outputs.push_back(f.function());
-  outputs = autoschedule::schedule_unscheduled(outputs);
+  outputs = driver::schedule_unscheduled(outputs);
   laps.end("schedule_unscheduled");
   lower::LowerOptions options;
   options.observe = [&](const std::string& pass, double, const Stmt&) { laps.end(pass); };

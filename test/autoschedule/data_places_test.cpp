@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "autodiff/derivative.h"
-#include "autoschedule/default_schedule.h"
+#include "driver/schedule.h"
 #include "frontend/language/func.h"
 #include "frontend/run/pipeline.h"
 #include "gradient/gradient_check.h"
@@ -62,7 +62,7 @@ struct Warp {
 ScheduleLog log_of(const std::vector<Func>& outputs) {
   std::vector<graph::FuncPtr> funcs;
   for (const Func& f : outputs) funcs.push_back(f.function());
-  return without_numbers(graph::schedule_log(autoschedule::schedule_unscheduled(funcs)));
+  return without_numbers(graph::schedule_log(driver::schedule_unscheduled(funcs)));
 }
 
 // The Funcs that are computed in a loop of another.
@@ -198,7 +198,7 @@ TEST(SumsOfParts, LieAsTheParts) {
   adjoint.set_estimates({{0, cells}, {0, cells}, {0, 8}, {0, 12}});
   std::vector<std::string> layouts;
   for (const graph::FuncPtr& f :
-       graph::topological_order(autoschedule::schedule_unscheduled({adjoint.function()})))
+       graph::topological_order(driver::schedule_unscheduled({adjoint.function()})))
     if (!f->schedule.storage_dims.empty() && f->schedule.storage_dims[0] != f->args[0])
       layouts.push_back(f->name);
   ASSERT_EQ(layouts.size(), 2u) << log_of({adjoint}).to_text();
@@ -220,7 +220,7 @@ TEST(TransposedReads, AreSeenThroughWhatIsInline) {
   sum() = 0.0f;
   sum() += scaled(r.x, r.y) * other(r.x, r.y);
   const Derivative d = propagate_adjoints(sum);
-  const graph::FuncPtr adjoint = autoschedule::schedule_unscheduled({d(image).function()})[0];
+  const graph::FuncPtr adjoint = driver::schedule_unscheduled({d(image).function()})[0];
   ASSERT_EQ(adjoint->pure->schedule.dims.size(), 4u) << log_of({d(image)}).to_text();
 }
 

@@ -1,5 +1,5 @@
 // Tests the default schedule of adjoints without directives, and its interaction with users' directives.
-#include "autoschedule/default_schedule.h"
+#include "driver/schedule.h"
 
 #include <gtest/gtest.h>
 
@@ -33,8 +33,7 @@ struct DefaultSchedule : ::testing::Test {
   }
   // `f` as it is compiled in the pipeline of `output`.
   static graph::FuncContents scheduled(const Func& output, const Func& f) {
-    const auto funcs =
-        graph::topological_order(autoschedule::schedule_unscheduled({output.function()}));
+    const auto funcs = graph::topological_order(driver::schedule_unscheduled({output.function()}));
     const auto found = std::find_if(funcs.begin(), funcs.end(),
                                     [&](const graph::FuncPtr& g) { return g->name == f.name(); });
     return found == funcs.end() ? graph::FuncContents() : **found;
@@ -49,16 +48,16 @@ struct DefaultSchedule : ::testing::Test {
 };
 
 TEST_F(DefaultSchedule, LeavesPipelinesWithoutAdjointsAlone) {
-  EXPECT_EQ(autoschedule::schedule_unscheduled({loss.function()})[0], loss.function());
+  EXPECT_EQ(driver::schedule_unscheduled({loss.function()})[0], loss.function());
 }
 
 // Deciding takes a good part of the time to compile a long program, so that it happens once.
 TEST_F(DefaultSchedule, NothingIsDecidedAgainAfterAutoSchedule) {
   const Func gradient = propagate_adjoints(loss)(a);
   const std::vector<graph::FuncPtr> outputs{loss.function(), gradient.function()};
-  EXPECT_NE(autoschedule::schedule_unscheduled(outputs), outputs) << "a copy with directives";
+  EXPECT_NE(driver::schedule_unscheduled(outputs), outputs) << "a copy with directives";
   Pipeline({loss, gradient}).auto_schedule(get_jit_target_from_environment());
-  EXPECT_EQ(autoschedule::schedule_unscheduled(outputs), outputs);
+  EXPECT_EQ(driver::schedule_unscheduled(outputs), outputs);
 }
 
 // A pyramid whose levels each have half the width and height of the one before, put together again. Inlined, f3 would
@@ -91,7 +90,7 @@ struct UnscheduledPyramid : DefaultSchedule {
   }
   size_t stored() const {
     const auto all =
-        graph::topological_order(autoschedule::schedule_unscheduled({funcs.back().function()}));
+        graph::topological_order(driver::schedule_unscheduled({funcs.back().function()}));
     return std::count_if(all.begin(), all.end(), [](const graph::FuncPtr& f) {
       return f->schedule.compute_level.kind == graph::LoopLevel::Kind::Root;
     });
@@ -170,8 +169,8 @@ TEST_F(DefaultSchedule, ALossThatIsCutLeavesTheRestOfThePrimalToTheSchedule) {
   sum() = 0.0f;
   sum() += costly(r.x, r.y) * costly(r.x + 1, r.y);
   Derivative d = propagate_adjoints(sum);
-  const auto funcs = graph::topological_order(
-      autoschedule::schedule_unscheduled({sum.function(), d(wide).function()}));
+  const auto funcs =
+      graph::topological_order(driver::schedule_unscheduled({sum.function(), d(wide).function()}));
   const auto found = std::find_if(funcs.begin(), funcs.end(), [&](const graph::FuncPtr& g) {
     return g->name == costly.name();
   });
@@ -1032,7 +1031,7 @@ TEST_F(DefaultSchedule, WhatManyCutSumsReadIsStored) {
   std::vector<graph::FuncPtr> gradients;
   for (const ImageParam& m : motion) gradients.push_back(d(m).function());
   for (const graph::FuncPtr& f :
-       graph::topological_order(autoschedule::schedule_unscheduled(gradients))) {
+       graph::topological_order(driver::schedule_unscheduled(gradients))) {
     const bool is_position = f->name == d.adjoint(u).name() || f->name == d.adjoint(v).name();
     if (is_position) {
       EXPECT_EQ(f->schedule.compute_level.kind, graph::LoopLevel::Kind::Root);

@@ -1,5 +1,5 @@
 // The stages of a pipeline in plain words: their loops, what bounds them, storage and hints.
-#include "tuning/explain_stages.h"
+#include "driver/reports.h"
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ const Target avx512("x86-64-linux-avx512_skylake");
 
 ExplainedPipeline explained(const Func& f, const Sizes& sizes,
                             const std::map<std::string, Sizes>& input_sizes = {}) {
-  return tuning::explain_stages(Pipeline(f).spec(), avx512, {sizes}, input_sizes);
+  return driver::explain_stages(Pipeline(f).spec(), avx512, {sizes}, input_sizes);
 }
 
 ExplainedStage stage_of(const ExplainedPipeline& all, const std::string& name) {

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "autoschedule/default_schedule.h"
+#include "driver/schedule.h"
 #include "frontend/run/pipeline.h"
 #include "gradient/gradient_check.h"
 #include "graph/definitions/own_reads.h"
@@ -220,8 +220,7 @@ TEST_F(RowScans, InTwoDimensions) {
 TEST_F(RowScans, RunBackwardInGradients) {
   filter(100, 64);
   const Func gradient = propagate_adjoints(gradient::weighted_sum(f, {100, 64}))(signals);
-  const auto funcs =
-      graph::topological_order(autoschedule::schedule_unscheduled({gradient.function()}));
+  const auto funcs = graph::topological_order(driver::schedule_unscheduled({gradient.function()}));
   std::string loops;
   for (const graph::FuncPtr& g : funcs) {
     if (!g->made || g->updates.empty()) continue;

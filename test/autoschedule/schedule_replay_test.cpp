@@ -8,7 +8,7 @@
 #include <iterator>
 
 #include "autodiff/derivative.h"
-#include "autoschedule/default_schedule.h"
+#include "driver/schedule.h"
 #include "frontend/language/boundary_conditions.h"
 #include "frontend/language/func.h"
 #include "frontend/run/pipeline.h"
@@ -91,7 +91,7 @@ TEST_P(ScheduleReplay, GivesTheSameLoopNests) {
   const Program program = GetParam().build(), again = GetParam().build();
   // The vector unit of the machine for which the loop nests are compiled.
   const auto unit = autoschedule::vector_unit_of(get_jit_target_from_environment());
-  const auto scheduled = autoschedule::schedule_unscheduled(functions(program), unit);
+  const auto scheduled = driver::schedule_unscheduled(functions(program), unit);
   const ScheduleLog log = graph::schedule_log(scheduled);
   EXPECT_GT(log.size(), 5u);
   EXPECT_EQ(ScheduleLog::parse(log.to_text()), log);
@@ -103,7 +103,7 @@ TEST_P(ScheduleReplay, GivesTheSameLoopNests) {
   EXPECT_EQ(same_numbers(graph::to_text(graph::graph_of(functions(again)))), text);
   const auto compiled = graph::apply_wrappers(scheduled);
   EXPECT_EQ(same_numbers(graph::to_text(
-                graph::graph_of(autoschedule::schedule_unscheduled(functions(again), unit)))),
+                graph::graph_of(driver::schedule_unscheduled(functions(again), unit)))),
             same_numbers(graph::to_text(graph::graph_of(compiled))))
       << "and nothing is left to schedule";
   EXPECT_EQ(same_numbers(pipeline.loop_nest()), same_numbers(Pipeline(program).loop_nest()));
@@ -113,7 +113,7 @@ TEST_P(ScheduleReplay, GivesTheSameLoopNests) {
 TEST(ScheduleOfAGradient, IsStatements) {
   const std::string file = std::string(RETROGRADE_TEST_DIR) + "/golden/schedule_log/gradient.inc";
   const Program first = conv_layer(), program = conv_layer();
-  const auto scheduled = autoschedule::schedule_unscheduled(functions(first));
+  const auto scheduled = driver::schedule_unscheduled(functions(first));
   const ScheduleLog log = graph::schedule_log(scheduled);
   const std::string statements = same_numbers(log.to_cpp());
   if (std::getenv("RETROGRADE_UPDATE_GOLDEN")) std::ofstream(file) << statements;

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "autoschedule/default_schedule.h"
+#include "driver/schedule.h"
 #include "frontend/run/pipeline.h"
 #include "gradient/gradient_check.h"
 #include "graph/names.h"
@@ -269,8 +269,7 @@ TEST_F(StepLoops, ThreadsOfAKernelDoNotWaitForEachOther) {
 
 // The loops of the adjoint that runs backward over the steps.
 std::string loops_of_recurrence(const Func& gradient) {
-  const auto funcs =
-      graph::topological_order(autoschedule::schedule_unscheduled({gradient.function()}));
+  const auto funcs = graph::topological_order(driver::schedule_unscheduled({gradient.function()}));
   for (const graph::FuncPtr& f : funcs) {
     if (!f->made || f->updates.empty()) continue;
     const std::string loops = loops_of(*f);

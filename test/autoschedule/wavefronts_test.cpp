@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "autoschedule/default_schedule.h"
 #include "autoschedule/step_loops.h"
+#include "driver/schedule.h"
 #include "frontend/data/image_param.h"
 #include "frontend/run/pipeline.h"
 #include "gradient/gradient_check.h"
@@ -301,7 +301,7 @@ TEST_F(Wavefronts, ReadNothingOutsideOfImages) {
 std::vector<std::string> fronts_of_gradient(const Func& gradient) {
   std::vector<std::string> result;
   for (const FuncPtr& f :
-       graph::topological_order(autoschedule::schedule_unscheduled({gradient.function()}))) {
+       graph::topological_order(driver::schedule_unscheduled({gradient.function()}))) {
     if (f->updates.size() == 1 && loops_in_order(*f).find("front") != std::string::npos)
       result.push_back(loops_in_order(*f));
   }

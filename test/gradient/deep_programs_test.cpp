@@ -109,7 +109,7 @@ TEST(DeepPrograms, LoopNestsAndStatementsAreShort) {
 
 TEST(DeepPrograms, ObjectsAndMachineCodeTakeSeconds) {
   const double start = seconds();
-  module_compiler().object(module_of(interpolation(3)));
+  default_compiler().object(module_of(interpolation(3)));
   Pipeline jit = interpolation(3);
   jit.compile_jit();
   EXPECT_LT(seconds() - start, 40);

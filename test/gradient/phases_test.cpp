@@ -4,7 +4,7 @@
 
 #include <retrograde/retrograde.h>
 
-#include "autoschedule/default_schedule.h"
+#include "driver/schedule.h"
 #include "graph/graph.h"
 #include "ir/build.h"
 #include "lower/lower.h"
@@ -182,8 +182,7 @@ TEST(Phases, TwoDimensionsAreRight) {
 
 // The code of the gradient under the schedule that the compiler chooses.
 Stmt lowered(const Func& gradient) {
-  const std::vector<graph::FuncPtr> scheduled =
-      autoschedule::schedule_unscheduled({gradient.function()});
+  const std::vector<graph::FuncPtr> scheduled = driver::schedule_unscheduled({gradient.function()});
   return lower::lower("gradient", scheduled, lower::infer_arguments(scheduled), {}).body;
 }
 

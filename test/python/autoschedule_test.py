@@ -1,5 +1,7 @@
 """Schedules that nobody writes, schedules as values, and what they cost."""
+import re
 import unittest
+from pathlib import Path
 
 import numpy as np
 import retrograde as rg
@@ -95,6 +97,22 @@ class Autoschedules(unittest.TestCase):
         rg.set_default_autoscheduler_name("")
         self.assertEqual(rg.default_autoscheduler_name(), rg.built_in_autoscheduler)
         self.assertEqual(rg.MachineParams("3,1048576,40"), rg.MachineParams(3, 1 << 20, 40))
+
+
+class Driver(unittest.TestCase):
+    def test_an_unscheduled_gradient_has_the_schedule_that_other_callers_get(self):
+        """driver_test.cpp builds the same gradient."""
+        image, taps = rg.ImageParam("float32", 2, "image"), rg.ImageParam("float32", 2, "taps")
+        filtered, loss = rg.Func("filtered"), rg.Func("loss")
+        near, everywhere = rg.RDom([(0, 3), (0, 3)], "near"), rg.RDom([(0, 640), (0, 480)], "all")
+        filtered[x, y] += image[x + near.x, y + near.y] * taps[near.x, near.y]
+        loss[()] += filtered[everywhere.x, everywhere.y] * filtered[everywhere.x, everywhere.y]
+        gradient = rg.propagate_adjoints(loss)(taps)
+        image.set_estimates([(0, 642), (0, 482)])
+        gradient.set_estimates([(0, 3), (0, 3)])
+        report = gradient.explain_schedule(rg.Target("x86-64-linux-avx-avx2-f16c-fma-sse41"))
+        golden = Path(__file__).resolve().parent.parent / "golden/driver/unscheduled_gradient.schedule"
+        self.assertEqual(re.sub("([A-Za-z])([$_][0-9]+)+", r"\1", report.schedule), golden.read_text())
 
 
 class Logs(unittest.TestCase):

@@ -4,8 +4,8 @@
 
 #include "autodiff/derivative.h"
 #include "autoschedule/cut_reductions.h"
-#include "autoschedule/default_schedule.h"
 #include "autoschedule/graph_rewrites.h"
+#include "driver/schedule.h"
 #include "graph/copy_graph.h"
 #include "graph/directives/wrappers.h"
 
@@ -42,7 +42,7 @@ const std::vector<GraphPass>& graph_passes() {
          return with_graph_rewrites(outputs, /*on_gpu=*/false, SumOrder::Free);
        }},
       {"schedule_unscheduled",
-       [](const std::vector<FuncPtr>& outputs) { return schedule_unscheduled(outputs); }}};
+       [](const std::vector<FuncPtr>& outputs) { return driver::schedule_unscheduled(outputs); }}};
   return passes;
 }
 

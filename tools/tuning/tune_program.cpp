@@ -15,7 +15,7 @@
 #include "autoschedule/schedule_search.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
-#include "frontend/run/compiler_interface.h"
+#include "driver/schedule.h"
 #include "graph/directives/wrappers.h"
 #include "graph/graph.h"
 #include "tuning/machine.h"
@@ -48,7 +48,7 @@ class Candidates {
     autoschedule::ScheduleRequest request{autoschedule::vector_unit_of(target), {}, {}};
     request.options.threads = threads;
     const auto cost = [&](const std::vector<FuncPtr>& scheduled) {
-      const double seconds = predicted_seconds(scheduled, target, threads);
+      const double seconds = driver::predicted_seconds(scheduled, target, threads);
       add(scheduled, seconds);
       return seconds;
     };

@@ -49,7 +49,8 @@ bool ActiveSymbols::contains(const Expr& leaf) const {
 bool ActiveSymbols::passes_on(const FuncContents& f) const {
   const auto is_active = [&](const auto& symbol) { return contains(symbol.get()); };
   if (has_custom_adjoint(f)) {
-    for (const AdjointInput& input : f.custom_derivatives->adjoint_inputs) {
+    const auto rules = custom_rules_of(f);
+    for (const AdjointInput& input : rules->adjoint_inputs) {
       if (is_active(input.symbol())) return true;
     }
   }

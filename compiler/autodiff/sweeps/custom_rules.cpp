@@ -76,7 +76,7 @@ std::vector<FuncPtr> check_covered(const FuncContents& f,
                                    FunctionRef<bool(const Symbol*)> is_wanted,
                                    FunctionRef<bool(const Symbol*)> is_requested) {
   std::vector<FuncPtr> covered;
-  for (const Inside& inside : inside_of(f, f.custom_derivatives->adjoint_inputs)) {
+  for (const Inside& inside : inside_of(f, custom_rules_of(f)->adjoint_inputs)) {
     if (!is_wanted(inside.symbol.get())) continue;
     auto func = std::dynamic_pointer_cast<FuncContents>(inside.symbol);
     if (!func || is_requested(func.get())) {
@@ -95,7 +95,7 @@ std::vector<FuncPtr> check_covered(const FuncContents& f,
 // Checks that each wanted input has one contribution of the right shape.
 void check_contributions(const FuncContents& f, const std::vector<AdjointContribution>& returned,
                          FunctionRef<bool(const Symbol*)> is_wanted) {
-  const std::vector<AdjointInput>& inputs = f.custom_derivatives->adjoint_inputs;
+  const std::vector<AdjointInput> inputs = custom_rules_of(f)->adjoint_inputs;
   std::unordered_set<const Symbol*> seen;
   for (const AdjointContribution& c : returned) {
     InputShape shape = shape_of(c.input.symbol().get());
@@ -135,11 +135,14 @@ FuncPtr as_adjoint(const std::string& name, const FuncPtr& returned) {
 
 }  // namespace
 
+std::shared_ptr<const CustomDerivatives> custom_rules_of(const FuncContents& f) {
+  return std::static_pointer_cast<const CustomDerivatives>(f.custom_derivatives);
+}
 bool has_custom_adjoint(const FuncContents& f) {
-  return f.custom_derivatives && f.custom_derivatives->adjoint;
+  return f.custom_derivatives && custom_rules_of(f)->adjoint;
 }
 bool has_custom_tangent(const FuncContents& f) {
-  return f.custom_derivatives && f.custom_derivatives->tangent;
+  return f.custom_derivatives && custom_rules_of(f)->tangent;
 }
 
 std::vector<std::shared_ptr<Symbol>> read_by(const FuncContents& f) { return Readers(f).take(); }
@@ -163,9 +166,9 @@ std::vector<Inside> inside_of(const FuncContents& f, const std::vector<AdjointIn
 Box extern_reads(const FuncContents& f, const std::shared_ptr<Symbol>& argument, int dimensions,
                  const Box& of_func) {
   Box box(static_cast<size_t>(dimensions));
-  const ExternReads* reads = has_custom_adjoint(f) ? &f.custom_derivatives->reads : nullptr;
-  if (!reads || !*reads) return box;
-  Region region = (*reads)(AdjointInput(argument), region_of(of_func));
+  const ExternReads reads = has_custom_adjoint(f) ? custom_rules_of(f)->reads : ExternReads();
+  if (!reads) return box;
+  Region region = reads(AdjointInput(argument), region_of(of_func));
   if (region.empty()) return box;
   if (region.size() != box.size()) {
     user_error(asked_through(f), "a region has min and extent in each dimension of the argument",
@@ -189,13 +192,13 @@ CustomAdjointResult run_custom_adjoint(const FuncPtr& f, const FuncPtr& adjoint,
   CustomAdjointResult result;
   result.covered = check_covered(*f, is_wanted, is_requested);
   std::vector<AdjointContext::Wanted> wanted;
-  for (const AdjointInput& input : f->custom_derivatives->adjoint_inputs) {
+  // Holds the rules, because another thread may replace them while the rule runs.
+  const std::shared_ptr<const CustomDerivatives> rules = custom_rules_of(*f);
+  for (const AdjointInput& input : rules->adjoint_inputs) {
     const Symbol* symbol = input.symbol().get();
     if (is_wanted(symbol)) wanted.push_back({symbol, region_of(regions.of(symbol))});
   }
   if (wanted.empty()) return result;
-  // Holds the rules, because another thread may replace them while the rule runs.
-  std::shared_ptr<const CustomDerivatives> rules = f->custom_derivatives;
   std::vector<AdjointContribution> returned = rules->adjoint(
       AdjointContext(Func(f), Func(adjoint), region_of(regions.of(f.get())), wanted));
   check_contributions(*f, returned, is_wanted);
@@ -217,7 +220,7 @@ FuncPtr run_custom_tangent(const FuncPtr& f, FunctionRef<FuncPtr(const Symbol*)>
   std::string asked = "propagate tangents through " + quoted(f->name);
   bool moves = false;
   for (const auto& symbol : read_by(*f)) moves |= tangent_of(symbol.get()) != nullptr;
-  std::shared_ptr<const CustomDerivatives> rules = f->custom_derivatives;
+  const std::shared_ptr<const CustomDerivatives> rules = custom_rules_of(*f);
   TangentContext::Moving moving;
   for (const AdjointInput& input : rules->tangent_inputs) {
     if (FuncPtr t = tangent_of(input.symbol().get()))

@@ -11,13 +11,15 @@
 namespace retrograde::autodiff {
 
 // The contents of FuncContents::custom_derivatives; immutable.
-struct CustomDerivatives {
+struct CustomDerivatives : DerivativeRules {
   std::vector<AdjointInput> adjoint_inputs, tangent_inputs;
   CustomAdjoint adjoint;  // null: none
   CustomTangent tangent;
   ExternReads reads;
 };
 
+// The rules of a Func; null: it has none.
+std::shared_ptr<const CustomDerivatives> custom_rules_of(const FuncContents& f);
 bool has_custom_adjoint(const FuncContents& f);
 bool has_custom_tangent(const FuncContents& f);
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "frontend/run/compiler_interface.h"
+#include "frontend/run/compiled_pipeline.h"
 #include "frontend/run/param_map.h"
 #include "ir/visit.h"
 

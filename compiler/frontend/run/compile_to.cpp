@@ -5,6 +5,7 @@
 
 #include "diagnostics/error.h"
 #include "frontend/language/func.h"
+#include "frontend/run/compiler_interface.h"
 #include "frontend/run/pipeline.h"
 #include "frontend/run/warnings.h"
 
@@ -163,7 +164,7 @@ Module Pipeline::module(const std::vector<Argument>& args, const std::string& fu
   function.name = name;
   function.linkage = linkage;
   function.lowered =
-      module_compiler().lower({name, pipeline.outputs}, inputs.inputs, pipeline.traced(target));
+      default_compiler().lower({name, pipeline.outputs}, inputs.inputs, pipeline.traced(target));
   if (target.has_feature(Target::UserContext)) function.args.push_back(user_context_argument());
   function.args.insert(function.args.end(), args.begin(), args.end());
   for (const ir::LoweredArgument& argument : function.lowered.args) {

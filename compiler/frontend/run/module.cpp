@@ -96,11 +96,11 @@ void Module::append(const Module& module) {
 }
 
 void Module::compile(const std::map<OutputFileType, std::string>& output_files) const {
-  module_compiler().write(*this, output_files);
+  default_compiler().write(*this, output_files);
 }
 
 Buffer<uint8_t> Module::compile_to_buffer() const {
-  const std::vector<uint8_t> object = module_compiler().object(*this);
+  const std::vector<uint8_t> object = default_compiler().object(*this);
   Buffer<uint8_t> buffer({static_cast<int>(object.size())}, name());
   std::copy(object.begin(), object.end(), buffer.data());
   return buffer;
@@ -143,7 +143,7 @@ std::map<OutputFileType, std::string> compile_standalone_runtime(
     const auto found = output_files.find(type);
     if (found != output_files.end()) written.insert(*found);
   }
-  module_compiler().write_runtime(written, target);
+  default_compiler().write_runtime(written, target);
   return written;
 }
 
@@ -211,7 +211,7 @@ void compile_multitarget(const std::string& function_name,
     const graph::RandomSequence same_numbers;
     modules.push_back(module_factory(name, targets[i]));
   }
-  module_compiler().write_multitarget(function_name, modules, endings, output_files);
+  default_compiler().write_multitarget(function_name, modules, endings, output_files);
 }
 
 }  // namespace retrograde

@@ -6,6 +6,7 @@
 #include <unordered_set>
 
 #include "frontend/language/func.h"
+#include "frontend/run/compiler_interface.h"
 #include "frontend/run/pipeline_contents.h"
 #include "frontend/run/warnings.h"
 #include "graph/directives/give_directive.h"
@@ -147,17 +148,21 @@ ScheduleReport Pipeline::explain_schedule(const Target& target, const std::vecto
   std::vector<Buffer<>> buffers;
   if (!sizes.empty()) buffers = make_outputs(sizes, options.measure);
   const RealizationArg outputs(buffers);
-  return retrograde::explain_schedule(
+  return default_compiler().explain_schedule(
       spec(), outputs.buffers(), target.has_unknowns() ? get_jit_target_from_environment() : target,
       options, contents_->handlers);
 }
 
 ScheduleReport Pipeline::explain_schedule(const RealizationArg& outputs, const Target& target,
                                           const ExplainOptions& options) const {
-  return retrograde::explain_schedule(
+  return default_compiler().explain_schedule(
       spec(), checked_outputs(outputs, options.measure),
       target.has_unknowns() ? get_jit_target_from_environment() : target, options,
       contents_->handlers);
+}
+
+KernelReport explain_kernels(const Pipeline& pipeline, const Target& target) {
+  return default_compiler().explain_kernels(pipeline.spec(), target);
 }
 
 }  // namespace retrograde

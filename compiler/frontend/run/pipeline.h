@@ -7,7 +7,7 @@
 
 #include "frontend/data/argument.h"
 #include "frontend/data/realization.h"
-#include "frontend/run/compiler_interface.h"
+#include "frontend/run/compiled_pipeline.h"
 #include "frontend/run/jit_handlers.h"
 #include "frontend/run/module.h"
 #include "frontend/run/param_map.h"

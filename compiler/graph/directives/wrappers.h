@@ -4,7 +4,7 @@
 //
 // The user's definitions never change. `f` records its wrappers by the names of their consumers,
 // and compilation starts from a copy of the graph with all references redirected. Wrappers do not
-// change values, so the interpreter and differentiation may ignore them.
+// change values, so whoever only needs values may ignore them.
 //
 // Programs share images, so images record no wrappers. Each consumer records by their names the
 // Funcs that it reads instead of images (copied_inputs).

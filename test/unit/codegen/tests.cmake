@@ -6,7 +6,7 @@ retrograde_test(
   codegen_statement_test
   equal_loops_test
   ptxas_test
-  TOGETHER codegen_statement_tests LAYERS jit LIBS retrograde_dep_halide_runtime)
+  TOGETHER codegen_statement_tests LAYERS jit lower LIBS retrograde_dep_halide_runtime)
 retrograde_test(
   checked_accesses_test
   costly_arms_test
@@ -14,7 +14,7 @@ retrograde_test(
   vector_access_test
   vector_reduction_test
   TOGETHER codegen_program_tests LIBS retrograde_dep_halide_runtime)
-retrograde_test(codegen_math_test OPTIMIZED LAYERS jit LIBS retrograde_dep_halide_runtime)
+retrograde_test(codegen_math_test OPTIMIZED LAYERS jit lower LIBS retrograde_dep_halide_runtime)
 retrograde_test(device_math_test OPTIMIZED READS_FILES LIBS retrograde_simt)
 retrograde_test(gpu_assembler_test LAYERS static_runtime simt)
 retrograde_test(kernel_text_test SOURCES unit/codegen/kernel_text_test.cpp support/gpu_programs.cpp

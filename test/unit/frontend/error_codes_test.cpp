@@ -8,6 +8,7 @@
 #include <HalideRuntime.h>
 #include <gtest/gtest.h>
 
+#include "frontend/run/compiler_interface.h"
 #include "retrograde/retrograde.h"
 #include "support/variables.h"
 

@@ -4,6 +4,8 @@
 #include <retrograde/retrograde.h>
 
 #include <cstring>
+
+#include "frontend/run/compiler_interface.h"
 #include "support/errors.h"
 
 using namespace retrograde;

@@ -9,7 +9,7 @@ MORE_HEADERS = [
 INTERNAL_HEADERS = {
     "checks/arrays.h", "checks/complex_step.h", "checks/culprit.h", "checks/json_number.h",
     "checks/slopes.h", "checks/timed.h", "checks/widen.h", "frontend/data/argument.h", "frontend/data/buffer_contents.h",
-    "frontend/language/operand_checks.h", "frontend/run/call.h", "frontend/run/pipeline_contents.h", "frontend/run/compiler_interface.h",
+    "frontend/language/operand_checks.h", "frontend/run/call.h", "frontend/run/pipeline_contents.h", "frontend/run/compiled_pipeline.h", "frontend/run/compiler_interface.h",
     "generator/command_line.h", "generator/cpp_stub.h", "generator/members.h",
     "graph/definitions/associative_update.h", "graph/text/binder.h", "graph/copy_graph.h", "graph/definitions/define.h",
     "graph/directives/directive.h", "graph/directives/directive_choices.h", "graph/directives/directive_fields.h", "graph/directives/directive_text.h",

@@ -1,6 +1,6 @@
 """Public names and requirements: what headers declare, and what their comments say about it.
 
-Names are declarations in namespace retrograde outside of the namespaces of `ir/namespaces.h` and `detail`. A name is
+Names are declarations in namespace retrograde outside of the namespaces of `layer_namespaces.h` and `detail`. A name is
 explained by the comment above or behind it, else by the one above its group of lines, else by the header's title.
 Requirements follow "Requires:" in comments. Rules are separated by semicolons; the kind of the error is in
 parentheses unless it is CompileError:

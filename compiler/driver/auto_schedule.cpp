@@ -1,22 +1,22 @@
 // auto_schedule.cpp -- the scheduler of Pipeline::auto_schedule() where no plugin was asked for.
 //
-// It gives a schedule (choose_schedule.h) to a copy of the graph. What the log of the copy holds beyond
-// that of the pipeline is then given to the pipeline, and is the source.
+// It gives a schedule (choose_schedule.h) to a copy of the graph. The directives that the log of the copy has beyond
+// that of the pipeline are then given to the pipeline, and are the source.
 #include "autoschedule/choose_schedule.h"
 #include "autoschedule/keep_graph.h"
 #include "diagnostics/large_stack.h"
+#include "driver/schedule.h"
 #include "frontend/run/pipeline.h"
 #include "frontend/schedule/autoscheduler.h"
-#include "graph/copy_graph.h"
 #include "graph/definitions/first_reads.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/directives/wrappers.h"
 
-namespace retrograde::autoschedule {
+namespace retrograde::driver {
 
 namespace {
 
-// What tells of each load, store, region or broken promise runs on the host.
+// Code that reports each load, store, region or broken promise runs on the host.
 bool is_for_gpu(const Target& target) {
   return target.has_feature(Target::CUDA) &&
          !target.features_any_of({Target::TraceLoads, Target::TraceStores,
@@ -29,13 +29,15 @@ void schedule_all(const Pipeline& pipeline, const Target& target, const MachineP
   const std::vector<FuncPtr>& outputs = spec.outputs;
   run_on_large_stack([&] {
     const FirstReadsMemo memo;
-    keep_graph(spec.name, outputs);
+    autoschedule::keep_graph(spec.name, outputs);
     const std::vector<FuncPtr> wrapped = apply_wrappers(outputs);
     const auto given = static_cast<std::ptrdiff_t>(schedule_log(wrapped).size());
-    ScheduleRequest request{vector_unit_of(target), spec.autoschedule, machine};
+    autoschedule::ScheduleRequest request{autoschedule::vector_unit_of(target), spec.autoschedule,
+                                          machine};
     request.on_gpu = is_for_gpu(target);
-    ChosenSchedule chosen = choose_schedule(wrapped, request, Scheduling::Everything, target);
-    const ScheduledGraph& scheduled = chosen.graph;
+    ChosenSchedule chosen = autoschedule::choose_schedule(
+        wrapped, request, autoschedule::Scheduling::Everything, search_cost(request, target));
+    const autoschedule::ScheduledGraph& scheduled = chosen.graph;
     ScheduleLog log = schedule_log(scheduled.outputs);
     log.entries.erase(log.entries.begin(), log.entries.begin() + given);
     apply_log(log, outputs);
@@ -53,4 +55,4 @@ void schedule_all(const Pipeline& pipeline, const Target& target, const MachineP
 
 }  // namespace
 
-}  // namespace retrograde::autoschedule
+}  // namespace retrograde::driver

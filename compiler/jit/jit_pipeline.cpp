@@ -1,28 +1,25 @@
-// default_compiler.cpp -- implements the front end's realize(): lowers the pipeline and compiles it in this process.
+#include "jit/jit_pipeline.h"
+
 #include <HalideRuntime.h>
 
-#include "autoschedule/choose_schedule.h"
-#include "frontend/run/compiler_interface.h"
-#include "frontend/run/warnings.h"
-#include "jit/extern_pipelines.h"
-#include "jit/jit.h"
-#include "lower/lower.h"
 #include "retrograde_runtime.h"
 
-namespace retrograde {
+namespace retrograde::jit {
 namespace {
 
 // The state of a call. The runtime's handlers get the context, which is its first member, and find the rest from it.
-struct CallState {
+struct HandledCall {
   retrograde_context context = {};
   CallContext* caller = nullptr;
 };
 
-CallState& state_of(retrograde_context* context) { return *reinterpret_cast<CallState*>(context); }
-CallContext& caller_of(retrograde_context* context) { return *state_of(context).caller; }
+HandledCall& handled_call(retrograde_context* context) {
+  return *reinterpret_cast<HandledCall*>(context);
+}
+CallContext& caller_of(retrograde_context* context) { return *handled_call(context).caller; }
 
 // Keeps a call's first error: it causes the others.
-void keep_error(retrograde_context* context, int, const char* message) {
+void keep_first_error(retrograde_context* context, int, const char* message) {
   if (std::string& error = caller_of(context).error; error.empty()) error = message;
 }
 
@@ -99,7 +96,7 @@ retrograde_gpu_handlers gpu_handlers_for(const JITHandlers& handlers) {
 retrograde_context context_for(const CallContext& caller) {
   const JITHandlers& handlers = caller.handlers;
   retrograde_context context = {};
-  context.error_handler = keep_error;
+  context.error_handler = keep_first_error;
   context.print_handler = hand_on_print;
   context.thread_limit = caller.thread_limit;
   context.user_data = caller.user_context;
@@ -113,22 +110,18 @@ retrograde_context context_for(const CallContext& caller) {
 
 class JitPipeline : public CompiledPipeline {
  public:
-  JitPipeline(std::vector<ir::LoweredArgument> arguments,
-              std::shared_ptr<const jit::CompiledFunction> code, jit::ExternPipelines called,
-              const Target& target)
-      : arguments_(std::move(arguments)),
-        called_(std::move(called)),
-        code_(std::move(code)),
+  JitPipeline(ExternPipeline compiled, const Target& target)
+      : compiled_(std::move(compiled)),
         is_profiled_(target.has_feature(Target::Profile)),
         writes_on_host_(!target.has_gpu_feature()) {}
 
-  const std::vector<ir::LoweredArgument>& arguments() const override { return arguments_; }
+  const std::vector<ir::LoweredArgument>& arguments() const override { return compiled_.arguments; }
 
   int run(void* const* argv, CallContext& caller) const override {
-    CallState state{context_for(caller), &caller};
+    HandledCall state{context_for(caller), &caller};
     const retrograde_gpu_handlers gpu_handlers = gpu_handlers_for(caller.handlers);
     state.context.gpu_handlers = &gpu_handlers;
-    const int code = code_->call(&state.context, const_cast<void**>(argv));
+    const int code = compiled_.code->call(&state.context, const_cast<void**>(argv));
     if (code == 0 && writes_on_host_) mark_written(argv);
     if (is_profiled_) {
       retrograde_profiler_report(&state.context);
@@ -140,50 +133,22 @@ class JitPipeline : public CompiledPipeline {
  private:
   // Marks the host copies of outputs as dirty, so that a later use on a device copies them.
   void mark_written(void* const* argv) const {
-    for (size_t i = 0; i < arguments_.size(); i++) {
-      if (arguments_[i].kind != ir::LoweredArgument::Kind::OutputBuffer) continue;
+    for (size_t i = 0; i < arguments().size(); i++) {
+      if (arguments()[i].kind != ir::LoweredArgument::Kind::OutputBuffer) continue;
       auto* buffer = static_cast<halide_buffer_t*>(argv[i]);
       if (buffer->host) buffer->set_host_dirty();
     }
   }
 
-  const std::vector<ir::LoweredArgument> arguments_;
-  const jit::ExternPipelines called_;  // called by the code
-  const std::shared_ptr<const jit::CompiledFunction> code_;
+  const ExternPipeline compiled_;
   const bool is_profiled_;  // if set, every call reports its profile
   const bool writes_on_host_;
 };
 
-class JitCompiler : public Compiler {
- public:
-  std::shared_ptr<CompiledPipeline> compile(const PipelineSpec& pipeline,
-                                            const Target& target) override {
-    lower::LowerOptions options;
-    options.target = pipeline.traced(target);
-    ir::LoweredFunction function =
-        lower::lower(pipeline.name, autoschedule::choose_schedule(pipeline, target).graph.outputs,
-                     lower::infer_arguments(pipeline.outputs), options);
-    jit::Options code_options;
-    code_options.externs = pipeline.externs;
-    jit::ExternPipelines called = jit::compile_extern_pipelines(pipeline, target);
-    function.body = jit::call_pipelines(function.body, called);
-    for (const auto& [name, one] : called) code_options.externs[name] = one.code->address();
-    auto code = jit::compile(function, target, code_options);
-    for (const std::string& note : code->notes()) frontend::tell_warning(note);
-    return std::make_shared<JitPipeline>(std::move(function.args), std::move(code),
-                                         std::move(called), target);
-  }
-
-  std::string loop_nest(const PipelineSpec& pipeline, const Target& target) override {
-    return lower::loop_nest_text(autoschedule::choose_schedule(pipeline, target).graph.outputs);
-  }
-};
-
 }  // namespace
 
-Compiler& default_compiler() {
-  static JitCompiler compiler;
-  return compiler;
+std::shared_ptr<CompiledPipeline> make_pipeline(ExternPipeline compiled, const Target& target) {
+  return std::make_shared<JitPipeline>(std::move(compiled), target);
 }
 
-}  // namespace retrograde
+}  // namespace retrograde::jit

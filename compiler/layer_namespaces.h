@@ -1,4 +1,4 @@
-// namespaces.h -- the namespaces of the compiler's folders, bottom up.
+// layer_namespaces.h -- the namespaces of the compiler's folders, bottom up. The table belongs to no layer.
 //
 // Each folder has a namespace of its own name and imports the namespaces of the layers below it (docs/architecture.md),
 // so that code refers to their names without a prefix. `simplify` is a function, so its folder's namespace is
@@ -17,4 +17,5 @@ namespace retrograde::autodiff { using namespace autoschedule; }
 namespace retrograde::lower { using namespace graph; }
 namespace retrograde::checks { using namespace graph; }
 namespace retrograde::tuning { using namespace graph; }
+namespace retrograde::driver { using namespace graph; }
 // clang-format on

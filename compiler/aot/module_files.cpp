@@ -1,5 +1,5 @@
-// module_compiler.cpp -- compiles the front end's Modules to files. All outputs are generated first; then all files are
-// written together.
+#include "aot/module_files.h"
+
 #include <algorithm>
 #include <chrono>
 #include <sstream>
@@ -14,24 +14,19 @@
 #include "aot/python_extension.h"
 #include "aot/pytorch_wrapper.h"
 #include "aot/runtime_object.h"
-#include "autoschedule/choose_schedule.h"
 #include "codegen/device/kernel_code.h"
 #include "codegen/llvm/archive.h"
 #include "codegen/llvm/machine.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
 #include "diagnostics/pass_observer.h"
-#include "frontend/run/compiler_interface.h"
-#include "frontend/run/module.h"
 #include "frontend/run/warnings.h"
 #include "ir/print.h"
-#include "lower/lower.h"
 
-namespace retrograde {
+namespace retrograde::aot {
 namespace {
 
 using codegen::Format;
-using Files = std::map<OutputFileType, std::string>;
 
 codegen::Options options_for(const Target& target) {
   codegen::Options options;
@@ -64,7 +59,7 @@ void check_type(OutputFileType type, const std::string& module) {
 std::string statement_text(const Module& module) {
   std::ostringstream out;
   run_on_large_stack([&] {
-    for (const internal::LoweredFunc& function : aot::exported_functions(module)) {
+    for (const internal::LoweredFunc& function : exported_functions(module)) {
       out << "// " << function.name << " for " << module.target().to_string() << "\n"
           << function.lowered.body << "\n";
     }
@@ -72,29 +67,29 @@ std::string statement_text(const Module& module) {
   return out.str();
 }
 
-std::vector<aot::DeclaredFunction> declared_functions(const Module& module) {
-  return ir::mapped(aot::exported_functions(module), [&](const internal::LoweredFunc& function) {
-    return aot::DeclaredFunction{function.name, aot::signature_of(function, module)};
+std::vector<DeclaredFunction> declared_functions(const Module& module) {
+  return ir::mapped(exported_functions(module), [&](const internal::LoweredFunc& function) {
+    return DeclaredFunction{function.name, signature_of(function, module)};
   });
 }
 
 std::string page_text(const Module& module, const std::string& assembly) {
-  std::vector<aot::PageFunction> functions;
+  std::vector<PageFunction> functions;
   run_on_large_stack([&] {
-    for (const internal::LoweredFunc& function : aot::exported_functions(module)) {
+    for (const internal::LoweredFunc& function : exported_functions(module)) {
       std::ostringstream statement;
       statement << function.lowered.body;
       functions.push_back({function.name, function.lowered.loop_nest(), statement.str()});
     }
   });
-  return aot::html_page(module.name() + " for " + module.target().to_string(), functions, assembly);
+  return html_page(module.name() + " for " + module.target().to_string(), functions, assembly);
 }
 
 bool has_runtime(const Target& target) { return !target.has_feature(Target::NoRuntime); }
 
 // An archive of these objects, and of the runtime unless the target has no_runtime.
 std::string library_of(std::vector<codegen::Member> members, const Target& target) {
-  if (has_runtime(target)) members.push_back({"retrograde_runtime.o", aot::runtime_object(target)});
+  if (has_runtime(target)) members.push_back({"retrograde_runtime.o", runtime_object(target)});
   return codegen::archive(members);
 }
 
@@ -115,9 +110,9 @@ class Outputs {
         wanted.count(OutputFileType::object) || wanted.count(OutputFileType::static_library);
     if (formats.empty() && !needs_object) return;
     const auto start = std::chrono::steady_clock::now();
-    const codegen::Program program = aot::program_of(module);
+    const codegen::Program program = program_of(module);
     const codegen::Options options = options_for(module.target());
-    if (needs_object) object_ = aot::join_parts(codegen::compile_parts(program, options));
+    if (needs_object) object_ = join_parts(codegen::compile_parts(program, options));
     if (!formats.empty()) texts_ = codegen::compile_texts(program, options, formats);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     tell_pass_observers({module.name(), "llvm", seconds.count(), {}});
@@ -130,8 +125,7 @@ class Outputs {
       case OutputFileType::object:
         return object_with_runtime();
       case OutputFileType::static_library:
-        return library_of({{aot::name_parts(module_.name()).back() + ".o", object()}},
-                          module_.target());
+        return library_of({{name_parts(module_.name()).back() + ".o", object()}}, module_.target());
       case OutputFileType::assembly:
         return texts_.at(Format::Assembly);
       case OutputFileType::llvm_assembly:
@@ -143,18 +137,15 @@ class Outputs {
       case OutputFileType::stmt_html:
         return page_text(module_, texts_.at(Format::Assembly));
       case OutputFileType::c_header:
-        return aot::header_text(module_.name(), module_.target(), declared_functions(module_));
+        return header_text(module_.name(), module_.target(), declared_functions(module_));
       case OutputFileType::function_info_header:
-        return aot::function_info_text(module_.name(), module_.target(),
-                                       declared_functions(module_));
+        return function_info_text(module_.name(), module_.target(), declared_functions(module_));
       case OutputFileType::registration:
-        return aot::registration_text(declared_functions(module_), module_.target());
+        return registration_text(declared_functions(module_), module_.target());
       case OutputFileType::python_extension:
-        return aot::python_extension_text(module_.name(), module_.target(),
-                                          declared_functions(module_));
+        return python_extension_text(module_.name(), module_.target(), declared_functions(module_));
       case OutputFileType::pytorch_wrapper:
-        return aot::pytorch_wrapper_text(module_.name(), module_.target(),
-                                         declared_functions(module_));
+        return pytorch_wrapper_text(module_.name(), module_.target(), declared_functions(module_));
       default:
         internal_error("no writer for an output that was checked");
     }
@@ -167,9 +158,8 @@ class Outputs {
 
   // If this build has no runtime for the target, the object's user has to link one.
   std::string object_with_runtime() const {
-    if (!has_runtime(module_.target()) || !aot::has_runtime_object(module_.target()))
-      return object();
-    return aot::merge_objects(object(), aot::runtime_object(module_.target()));
+    if (!has_runtime(module_.target()) || !has_runtime_object(module_.target())) return object();
+    return merge_objects(object(), runtime_object(module_.target()));
   }
 };
 
@@ -189,8 +179,8 @@ class MultitargetOutputs {
                      const std::vector<std::string>& suffixes)
       : name_(function_name), modules_(modules), suffixes_(suffixes) {}
 
-  std::vector<aot::File> files(const Files& wanted) {
-    std::vector<aot::File> result;
+  std::vector<File> files(const Files& wanted) {
+    std::vector<File> result;
     const auto info = internal::get_output_info(baseline().target());
     Files multi;
     for (const auto& [type, path] : wanted) {
@@ -215,7 +205,7 @@ class MultitargetOutputs {
 
   void add_variants(const Files& multi,
                     const std::map<OutputFileType, const internal::OutputInfo>& info,
-                    bool wants_library, std::vector<aot::File>& result) {
+                    bool wants_library, std::vector<File>& result) {
     for (size_t i = 0; i < modules_.size(); i++) {
       Files wanted = multi;
       if (wants_library) wanted[OutputFileType::object];
@@ -232,113 +222,83 @@ class MultitargetOutputs {
   }
 
   std::string wrapper_object() const {
-    return aot::join_parts(
-        codegen::compile_parts(aot::dispatcher(name_, modules_), options_for(baseline().target())));
+    return join_parts(
+        codegen::compile_parts(dispatcher(name_, modules_), options_for(baseline().target())));
   }
 
   void add_objects(const std::string& path, const std::string& extension,
-                   std::vector<aot::File>& result) {
+                   std::vector<File>& result) {
     result.push_back({with_suffix(path, "_wrapper", extension), wrapper_object()});
     if (has_runtime(baseline().target())) {
       result.push_back(
-          {with_suffix(path, "_runtime", extension), aot::runtime_object(baseline().target())});
+          {with_suffix(path, "_runtime", extension), runtime_object(baseline().target())});
     }
   }
 
   std::string shared(OutputFileType type) {
-    const std::vector<aot::DeclaredFunction> functions = {
-        {name_, aot::dispatcher_signature(name_, baseline())}};
-    if (type == OutputFileType::c_header)
-      return aot::header_text(name_, baseline().target(), functions);
+    const std::vector<DeclaredFunction> functions = {
+        {name_, dispatcher_signature(name_, baseline())}};
+    if (type == OutputFileType::c_header) return header_text(name_, baseline().target(), functions);
     if (type == OutputFileType::function_info_header)
-      return aot::function_info_text(name_, baseline().target(), functions);
+      return function_info_text(name_, baseline().target(), functions);
     if (type == OutputFileType::registration)
-      return aot::registration_text(functions, baseline().target());
+      return registration_text(functions, baseline().target());
     if (type == OutputFileType::python_extension)
-      return aot::python_extension_text(name_, baseline().target(), functions);
+      return python_extension_text(name_, baseline().target(), functions);
     if (type == OutputFileType::pytorch_wrapper)
-      return aot::pytorch_wrapper_text(name_, baseline().target(), functions);
+      return pytorch_wrapper_text(name_, baseline().target(), functions);
     RETROGRADE_ASSERT(type == OutputFileType::static_library, "an output without a writer");
     std::vector<codegen::Member> members = members_;
-    members.push_back({aot::name_parts(name_).back() + "_wrapper.o", wrapper_object()});
+    members.push_back({name_parts(name_).back() + "_wrapper.o", wrapper_object()});
     return library_of(std::move(members), baseline().target());
   }
 };
 
-void tell_notes(const ir::LoweredFunction& function, const Target& target) {
+}  // namespace
+
+void check_target(const Target& target) { codegen::machine_for(target, false); }
+
+void tell_kernel_notes(const ir::LoweredFunction& function, const Target& target) {
+  if (!frontend::has_warning_scope()) return;
   for (const auto& kernel : codegen::compile_kernels(function, options_for(target)).kernels) {
     if (kernel.local_bytes > 0)
       frontend::tell_warning(codegen::local_memory_note(kernel.name, kernel.local_bytes));
   }
 }
 
-class AheadOfTime : public ModuleCompiler {
- public:
-  ir::LoweredFunction lower(const PipelineSpec& pipeline,
-                            const std::vector<ir::LoweredArgument>& inputs,
-                            const Target& target) override {
-    codegen::machine_for(target, false);  // throws for unsupported targets before any work
-    lower::LowerOptions options;
-    options.target = pipeline.traced(target);
-    ir::LoweredFunction function = lower::lower(
-        pipeline.name, autoschedule::choose_schedule(pipeline, options.target).graph.outputs,
-        inputs, options);
-    if (frontend::has_warning_scope()) tell_notes(function, target);
-    return function;
-  }
-
-  ScheduleLog schedule(const PipelineSpec& pipeline, const Target& target) override {
-    return graph::schedule_log(
-        autoschedule::choose_schedule(pipeline, pipeline.traced(target)).graph.outputs);
-  }
-
-  std::vector<uint8_t> object(const Module& module) override {
-    const std::string bytes = Outputs(module, {{OutputFileType::object, ""}}).object();
-    return {bytes.begin(), bytes.end()};
-  }
-
-  void write(const Module& module, const Files& output_files) override {
-    for (const auto& [type, path] : output_files) check_type(type, module.name());
-    const Outputs outputs(module, output_files);
-    std::vector<aot::File> files;
-    for (const auto& [type, path] : output_files) files.push_back({path, outputs.contents(type)});
-    aot::write_files(files);
-  }
-
-  void write_multitarget(const std::string& function_name, const std::vector<Module>& modules,
-                         const std::vector<std::string>& suffixes,
-                         const Files& output_files) override {
-    for (const auto& [type, path] : output_files) check_type(type, function_name);
-    aot::write_files(MultitargetOutputs(function_name, modules, suffixes).files(output_files));
-  }
-
-  void write_text(const std::string& path, const std::string& contents) override {
-    aot::write_files({{path, contents}});
-  }
-
-  void write_runtime(const Files& output_files, const Target& target) override {
-    const std::string object = aot::runtime_object(target);
-    std::vector<aot::File> files;
-    for (const auto& [type, path] : output_files) {
-      const bool is_library = type == OutputFileType::static_library;
-      if (type == OutputFileType::python_extension) {
-        const std::string file = path.substr(path.rfind('/') + 1);
-        files.push_back(
-            {path, aot::python_extension_text(file.substr(0, file.find('.')), target, {})});
-        continue;
-      }
-      files.push_back(
-          {path, is_library ? codegen::archive({{"retrograde_runtime.o", object}}) : object});
-    }
-    aot::write_files(files);
-  }
-};
-
-}  // namespace
-
-ModuleCompiler& module_compiler() {
-  static AheadOfTime compiler;
-  return compiler;
+std::vector<uint8_t> object_of(const Module& module) {
+  const std::string bytes = Outputs(module, {{OutputFileType::object, ""}}).object();
+  return {bytes.begin(), bytes.end()};
 }
 
-}  // namespace retrograde
+void write_module(const Module& module, const Files& output_files) {
+  for (const auto& [type, path] : output_files) check_type(type, module.name());
+  const Outputs outputs(module, output_files);
+  std::vector<File> files;
+  for (const auto& [type, path] : output_files) files.push_back({path, outputs.contents(type)});
+  write_files(files);
+}
+
+void write_multitarget(const std::string& function_name, const std::vector<Module>& modules,
+                       const std::vector<std::string>& suffixes, const Files& output_files) {
+  for (const auto& [type, path] : output_files) check_type(type, function_name);
+  write_files(MultitargetOutputs(function_name, modules, suffixes).files(output_files));
+}
+
+void write_runtime(const Files& output_files, const Target& target) {
+  const std::string object = runtime_object(target);
+  std::vector<File> files;
+  for (const auto& [type, path] : output_files) {
+    const bool is_library = type == OutputFileType::static_library;
+    if (type == OutputFileType::python_extension) {
+      const std::string file = path.substr(path.rfind('/') + 1);
+      files.push_back({path, python_extension_text(file.substr(0, file.find('.')), target, {})});
+      continue;
+    }
+    files.push_back(
+        {path, is_library ? codegen::archive({{"retrograde_runtime.o", object}}) : object});
+  }
+  write_files(files);
+}
+
+}  // namespace retrograde::aot

@@ -1,0 +1,2 @@
+# The way from Funcs to code.
+retrograde_test(driver_test READS_FILES)
