@@ -163,8 +163,9 @@ Module Pipeline::module(const std::vector<Argument>& args, const std::string& fu
   internal::LoweredFunc function;
   function.name = name;
   function.linkage = linkage;
-  function.lowered =
-      default_compiler().lower({name, pipeline.outputs}, inputs.inputs, pipeline.traced(target));
+  PipelineSpec compiled{name, pipeline.outputs};
+  compiled.autoschedule = pipeline.autoschedule;
+  function.lowered = default_compiler().lower(compiled, inputs.inputs, pipeline.traced(target));
   if (target.has_feature(Target::UserContext)) function.args.push_back(user_context_argument());
   function.args.insert(function.args.end(), args.begin(), args.end());
   for (const ir::LoweredArgument& argument : function.lowered.args) {

@@ -60,6 +60,23 @@ TEST(Driver, InProcessAndAheadOfTimeHaveTheSameLoops) {
   EXPECT_EQ(in_process, ahead_of_time);
 }
 
+TEST(Driver, OptionsApplyAheadOfTime) {
+  const FilterGradient program;
+  const Target target = get_host_target();
+  const auto ahead_of_time = [&](const AutoscheduleOptions& options) {
+    Pipeline pipeline = program.pipeline();
+    pipeline.set_autoschedule(options);
+    return loops_of([&] {
+      pipeline.compile_to_module({program.image, program.taps}, "gradient", target);
+    });
+  };
+  Pipeline on_one_thread = program.pipeline();
+  on_one_thread.set_autoschedule({.threads = 1});
+  const std::string in_process = loops_of([&] { on_one_thread.compile_jit(target); });
+  EXPECT_EQ(ahead_of_time({.threads = 1}), in_process);
+  EXPECT_NE(ahead_of_time({}), in_process);
+}
+
 TEST(Driver, EveryCallerGetsTheSameSchedule) {
   FilterGradient program;
   program.gradient.set_estimates({{0, 3}, {0, 3}});
