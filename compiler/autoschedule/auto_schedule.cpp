@@ -32,7 +32,7 @@ void schedule_all(const Pipeline& pipeline, const Target& target, const MachineP
     keep_graph(spec.name, outputs);
     const std::vector<FuncPtr> wrapped = apply_wrappers(outputs);
     const auto given = static_cast<std::ptrdiff_t>(schedule_log(wrapped).size());
-    ScheduleRequest request{vector_unit_of(target), spec.autoschedule, machine};
+    ScheduleRequest request = request_for(target, spec.autoschedule, machine);
     request.on_gpu = is_for_gpu(target);
     ChosenSchedule chosen = choose_schedule(wrapped, request, Scheduling::Everything, target);
     const ScheduledGraph& scheduled = chosen.graph;

@@ -119,11 +119,11 @@ ChosenSchedule choose_schedule(const std::vector<FuncPtr>& outputs, const Schedu
 
 ChosenSchedule choose_schedule(const PipelineSpec& pipeline, const Target& target,
                                bool wants_runner_up) {
-  const ScheduleRequest request{vector_unit_of(target), pipeline.autoschedule, {}};
+  const ScheduleRequest request = request_for(target, pipeline.autoschedule);
   keep_graph(pipeline.name, pipeline.outputs);
   ChosenSchedule result;
   if (!request.options.search && !wants_runner_up) {
-    result.graph.outputs = schedule_unscheduled(pipeline.outputs, request.unit, request.options);
+    result.graph.outputs = schedule_unscheduled(pipeline.outputs, request.machine, request.options);
     return result;
   }
   run_on_large_stack([&] {
@@ -133,7 +133,7 @@ ChosenSchedule choose_schedule(const PipelineSpec& pipeline, const Target& targe
                                Scheduling::Gradients, target, wants_runner_up);
       return;
     }
-    result.graph.outputs = schedule_unscheduled(pipeline.outputs, request.unit, request.options);
+    result.graph.outputs = schedule_unscheduled(pipeline.outputs, request.machine, request.options);
     result.search.note =
         note_of(wrapped, "compiling searches schedules of gradients", "none of its Funcs is one",
                 "Call auto_schedule() with these options");

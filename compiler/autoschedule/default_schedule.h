@@ -30,7 +30,7 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
 // The pass: the outputs with their wrappers applied, or, where there are adjoints, those of a copy
 // of the graph that has its schedule. What lowering is given.
 std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
-                                          const VectorUnit& unit = {},
+                                          const planning::Machine& machine = {},
                                           const AutoscheduleOptions& options = {});
 
 }  // namespace retrograde::autoschedule

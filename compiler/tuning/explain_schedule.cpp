@@ -7,12 +7,12 @@
 #include <sstream>
 
 #include "autoschedule/choose_schedule.h"
+#include "autoschedule/machine/kept_machine.h"
 #include "frontend/data/buffer.h"
 #include "frontend/run/compiler_interface.h"
 #include "graph/directives/schedule_log.h"
 #include "tuning/explain_stages.h"
 #include "tuning/kernels_taken.h"
-#include "tuning/machine.h"
 #include "tuning/measure_stages.h"
 #include "tuning/predict.h"
 
@@ -98,7 +98,7 @@ ScheduleReport explain_schedule(const PipelineSpec& pipeline,
   if (shapes.empty()) shapes = tuning::output_shapes(scheduled);
   const tuning::LoweredForReport lowered = tuning::lower_for_report(pipeline, scheduled, target);
   const ir::LoweredFunction& function = lowered.function;
-  const tuning::Machine machine = tuning::machine_for(target);
+  const planning::Machine machine = planning::machine_for(target);
   const int threads = options.threads > 0 ? options.threads : handlers.thread_limit;
   ScheduleReport report;
   report.schedule = graph::schedule_log(scheduled).to_cpp();

@@ -1,7 +1,7 @@
 // schedule_cost.cpp -- the predicted time of a graph with its schedule, for those who search one.
+#include "autoschedule/machine/kept_machine.h"
 #include "frontend/run/compiler_interface.h"
 #include "lower/lower.h"
-#include "tuning/machine.h"
 #include "tuning/predict.h"
 
 namespace retrograde {
@@ -14,7 +14,7 @@ double predicted_seconds(const std::vector<graph::FuncPtr>& scheduled, const Tar
       lower::lower("searched", scheduled, lower::infer_arguments(scheduled), lowering);
   return tuning::predicted_seconds(
       function, tuning::program_sizes(function, tuning::output_shapes(scheduled)),
-      tuning::machine_for(target), threads);
+      planning::machine_for(target), threads);
 }
 
 }  // namespace retrograde
