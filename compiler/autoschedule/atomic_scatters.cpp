@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/only_reader.h"
 #include "autoschedule/scatter_schedule.h"
@@ -17,16 +18,16 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int lanes_of_adds = 16;
-constexpr int vectors_of_a_task = 256;       // along a loop that is cut into tasks
-constexpr int64_t least_elements = 1 << 14;  // of a sum: threads seldom meet in one line of a cache
-constexpr int64_t least_adds = 1 << 16;
+constexpr int vectors_of_a_task = 256;  // along a loop that is cut into tasks
+// Of a sum to which threads add at once.
+constexpr int64_t least_elements = planning::uncontended_lines * planning::line_elements;
+constexpr double least_adds = planning::launch_operations / planning::atomic_add_operations;
 
 // The first definition: rows in vectors.
 void schedule_rows(const FuncPtr& f) {
   Stage rows(f, 0);
   if (f->args.size() > 1) rows.parallel(Var(f->args.back()));
-  vectorize(rows, Var(f->args[0]), lanes_of_adds, TailStrategy::GuardWithIf);
+  vectorize(rows, Var(f->args[0]), planning::schedule_lanes, TailStrategy::GuardWithIf);
 }
 
 // Each part is added as soon as it is full, its elements in vectors.
@@ -38,7 +39,7 @@ void add_parts(const FuncPtr& sum, const FuncPtr& parts) {
   order.emplace_back(part);
   Stage update(sum, 1);
   update.reorder(order).atomic().parallel(part);
-  vectorize(update, Var(sum->args[0]), lanes_of_adds, TailStrategy::GuardWithIf);
+  vectorize(update, Var(sum->args[0]), planning::schedule_lanes, TailStrategy::GuardWithIf);
   Func(parts).compute_at(Func(sum), part);
 }
 
@@ -50,7 +51,7 @@ void add_at_places(const FuncPtr& f, int index) {
   std::vector<VarOrRVar> order;
   const RVar all(loops[0].name()), lane(inner_loop(*f, index, all.name()));
   RVar tasks(loops.back().name());
-  stage.atomic().split(all, all, lane, lanes_of_adds, TailStrategy::GuardWithIf);
+  stage.atomic().split(all, all, lane, planning::schedule_lanes, TailStrategy::GuardWithIf);
   order.emplace_back(lane);
   order.insert(order.end(), taps.begin(), taps.end());
   order.insert(order.end(), loops.begin(), loops.end());
@@ -81,7 +82,7 @@ AtomicScatters::AtomicScatters(const std::vector<FuncPtr>& outputs,
     if (!is_free(sum) || sum->is_extern() || sum->updates.size() != 1 || sum->args.empty())
       continue;
     const FuncPtr parts = parts_of_sum(*sum, sum->updates[0]);
-    if (!parts || !is_free(parts) || sizes.bytes(*parts) <= sizes.machine().more_than_caches)
+    if (!parts || !is_free(parts) || sizes.bytes(*parts) <= sizes.machine().last_cache_bytes())
       continue;
     const auto reader = readers.only_reader(parts);
     if (!reader || reader->func != sum || reader->stage != 1) continue;

@@ -68,7 +68,7 @@ void unroll(const FuncPtr& f, const std::vector<size_t>& chosen, const FixedDime
   stage.reorder(order);
   for (const VarOrRVar& copy : copies) stage.unroll(copy);
   int64_t tasks = 1;
-  const int64_t enough = sizes.machine().enough_tasks;
+  const int64_t enough = sizes.machine().enough_tasks();
   for (size_t i = others.size(); i-- > 1 && tasks < enough;) {
     const auto arg = std::find(f->args.begin() + 1, f->args.end(), others[i].name());
     if (arg == f->args.end()) break;  // that of the vectors

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/slices.h"
 #include "frontend/language/func.h"
@@ -16,8 +17,8 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int64_t columns = 64;             // of a block: four lines of a cache in each row
-constexpr int64_t block_bytes = 512 << 10;  // at most, of a cache near a core
+constexpr int64_t columns = 4 * planning::line_elements;           // of a block, in each row
+constexpr int64_t block_bytes = planning::second_cache_bytes / 2;  // at most
 
 // A sum keeps its tile in registers, and has no use for a block of its own.
 bool is_scan(const FuncContents& f) {
@@ -39,7 +40,7 @@ class BlockFinder {
   std::optional<Blocks> find() const {
     Blocks result;
     int64_t bytes = sizes_.bytes(f_), tasks = 1;
-    if (bytes < sizes_.machine().more_than_caches / 4) return std::nullopt;
+    if (bytes < sizes_.machine().last_cache_bytes() / 4) return std::nullopt;
     for (const std::string& var : g_.args) {
       const auto d = sliced_by(f_, reader_, var);
       const auto extent = d ? sizes_.extent(f_, *d) : std::nullopt;
@@ -58,7 +59,7 @@ class BlockFinder {
       }
     }
     const bool pays =
-        !result.column.empty() && tasks >= sizes_.machine().enough_tasks && bytes <= block_bytes;
+        !result.column.empty() && tasks >= sizes_.machine().enough_tasks() && bytes <= block_bytes;
     return pays ? std::optional(result) : std::nullopt;
   }
 

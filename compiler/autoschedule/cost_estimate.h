@@ -12,9 +12,6 @@ namespace retrograde::autoschedule {
 
 // Operations up to which a value is computed again rather than stored.
 inline constexpr double cheap = 6;
-// What it takes to store a value and to load it again, in operations of a vectorized loop: 12 bytes
-// at the bandwidth of a core, against an operation a lane and cycle.
-inline constexpr double way_to_memory = 24;
 
 // Of the node itself, without what it reads; what operators take is in their table
 // (ir/operators.def). Integers are indices and borders, mostly simplified away: only where floats

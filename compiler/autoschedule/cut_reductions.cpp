@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/stored_funcs.h"
 #include "frontend/language/func.h"
@@ -18,12 +19,12 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int lanes_of_a_sum = 16;
-constexpr int terms = 256;            // that a lane adds up, where there is one dimension
-constexpr int groups = 32;            // of rows, summed apart before all are
-constexpr int64_t long_sum = 4096;    // iterations
-constexpr int64_t short_loop = 8;     // iterations that make no tasks
-constexpr int64_t few_elements = 16;  // fewer than fill the lanes and the threads of a machine
+constexpr int terms = 256;  // that a lane adds up, where there is one dimension
+constexpr int groups = planning::privatised_copies;        // of rows, summed apart before all are
+constexpr int64_t long_sum = 4096;                         // iterations
+constexpr int64_t short_loop = planning::reference_tasks;  // fewer iterations make no tasks
+constexpr int64_t few_elements =
+    planning::schedule_lanes;  // fewer than fill the lanes and the threads of a machine
 constexpr int64_t unknown_extent = 1024;
 
 int64_t extent_of(const ReductionVariable& r) {
@@ -72,9 +73,9 @@ FuncPtr factor(Stage update, const RVar& lane, const RVar& row) {
   parts.compute_root().parallel(v);
   parts.reorder(std::vector<VarOrRVar>(layout.begin(), layout.end()));
   if (layout.size() > 2) parts.reorder_storage(layout);
-  vectorize(Stage(parts.function(), 0), u, lanes_of_a_sum, TailStrategy::Auto);
+  vectorize(Stage(parts.function(), 0), u, planning::schedule_lanes, TailStrategy::Auto);
   parts.update().reorder(order).parallel(v);
-  vectorize(parts.update(), u, lanes_of_a_sum, TailStrategy::GuardWithIf);
+  vectorize(parts.update(), u, planning::schedule_lanes, TailStrategy::GuardWithIf);
   return parts.function();
 }
 
@@ -86,7 +87,8 @@ struct Cut {
 
 Cut cut_of(const std::vector<ReductionVariable>& rvars) {
   Cut cut;
-  while (cut.lanes + 1 < rvars.size() && extent_of(rvars[cut.lanes]) < lanes_of_a_sum) ++cut.lanes;
+  while (cut.lanes + 1 < rvars.size() && extent_of(rvars[cut.lanes]) < planning::schedule_lanes)
+    ++cut.lanes;
   cut.rows = cut.lanes;
   for (size_t i = 0; i < rvars.size(); ++i) {
     const bool is_longer =
@@ -106,10 +108,10 @@ FuncPtr cut(const FuncPtr& f, int stage) {
   RVar row(rvars[rows].var);
   if (rows == lanes) {
     row = RVar(new_loop(*f, stage, "block"));
-    update.split(all, row, all, lanes_of_a_sum * terms, TailStrategy::GuardWithIf);
-    update.split(all, all, lane, lanes_of_a_sum);
+    update.split(all, row, all, planning::schedule_lanes * terms, TailStrategy::GuardWithIf);
+    update.split(all, all, lane, planning::schedule_lanes);
   } else {
-    update.split(all, all, lane, lanes_of_a_sum, TailStrategy::GuardWithIf);
+    update.split(all, all, lane, planning::schedule_lanes, TailStrategy::GuardWithIf);
   }
   const FuncPtr sums = factor(update, lane, row);
   update.split(row, row, group, groups, TailStrategy::GuardWithIf);
@@ -121,18 +123,19 @@ FuncPtr cut(const FuncPtr& f, int stage) {
 // Elements of a vector or a small matrix are added up together, in registers: they share what their terms read.
 //
 //   for k, j: for r: parts(k, j) += w(r) * p(k, r) * q(j, r)   =>   for r: for k, j, unrolled: parts(k, j) += ...
-void add_elements_together(const FuncPtr& sums, const FuncContents& f, const VectorUnit& unit,
-                           const SizeEstimate& sizes) {
+void add_elements_together(const FuncPtr& sums, const FuncContents& f,
+                           const planning::Machine& machine, const SizeEstimate& sizes) {
   Stage update(sums, 1);
   const std::vector<Dim> loops = sums->updates.at(0).schedule.dims;
   std::vector<VarOrRVar> copies;
-  int64_t bytes = lanes_of_a_sum * graph::total_bytes(f.types);
+  int64_t bytes = planning::schedule_lanes * graph::total_bytes(f.types);
   for (size_t d = 0; d < f.args.size(); ++d) {
     const Var all(f.args[d]);
     const auto extent = sizes.extent(f, d);
     const bool is_loop =
         std::ranges::any_of(loops, [&](const Dim& loop) { return loop.var == all.name(); });
-    if (!is_loop || !extent || *extent < 2 || bytes * *extent > unit.accumulator_bytes) continue;
+    if (!is_loop || !extent || *extent < 2 || bytes * *extent > machine.accumulator_bytes())
+      continue;
     bytes *= *extent;
     const Var copy(inner_loop(*sums, 1, all.name()));
     update.split(all, all, copy, static_cast<int>(*extent), TailStrategy::GuardWithIf).unroll(copy);
@@ -158,11 +161,12 @@ std::optional<std::string> rows_of_sum(const FuncPtr& f, int stage, const SizeEs
 FuncPtr sum_rows(const FuncPtr& f, int stage) { return cut(f, stage); }
 
 void cut_reductions(const std::vector<FuncPtr>& outputs, const SizeEstimate& sizes,
-                    const VectorUnit& unit, const std::unordered_set<const Symbol*>& but) {
+                    const planning::Machine& machine,
+                    const std::unordered_set<const Symbol*>& but) {
   for (const FuncPtr& f : topological_order(outputs)) {
     if (has_directives(*f) || f->is_extern() || but.contains(f.get())) continue;
     for (int s = 1; s < f->stage_count(); ++s) {
-      if (is_long_sum(*f, f->stage(s), sizes)) add_elements_together(cut(f, s), *f, unit, sizes);
+      if (is_long_sum(*f, f->stage(s), sizes)) add_elements_together(cut(f, s), *f, machine, sizes);
     }
   }
 }

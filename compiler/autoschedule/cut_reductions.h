@@ -22,9 +22,10 @@
 namespace retrograde::autoschedule {
 
 // Factors long associative updates of one element, or of a number that is known to be small
-// (rfactor.h), of Funcs of this graph that nobody scheduled. `unit` holds sums of several elements. `but`: not of these.
+// (rfactor.h), of Funcs of this graph that nobody scheduled. The registers of the `machine` hold sums of several elements. `but`: not of these.
 void cut_reductions(const std::vector<FuncPtr>& outputs, const SizeEstimate& sizes,
-                    const VectorUnit& unit, const std::unordered_set<const Symbol*>& but = {});
+                    const planning::Machine& machine,
+                    const std::unordered_set<const Symbol*>& but = {});
 
 // The reduction variable of a long sum that is cut into rows, each a task; nullopt: it is no such
 // sum, or has a single loop.

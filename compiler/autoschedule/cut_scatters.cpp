@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/scatter_schedule.h"
 #include "frontend/language/func.h"
@@ -16,10 +17,8 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int private_parts = 32;
-constexpr int64_t near_bytes = 16 << 10;  // of a part: half of the nearest cache
-constexpr double least_additions = 16;    // to an element of a part
-constexpr int merging_lanes = 16;
+constexpr int64_t near_bytes = planning::first_cache_bytes / 2;  // of a part
+constexpr double least_additions = 16;                           // to an element of a part
 
 int64_t known_extent(const ReductionVariable& r) {
   return as_const_int(simplify(r.extent)).value_or(0);
@@ -30,7 +29,8 @@ const ReductionVariable* rows_in_parts(const Definition& update) {
   const ReductionVariable* rows = nullptr;
   for (size_t i = 1; i < update.rvars.size(); ++i) {
     const ReductionVariable& r = update.rvars[i];
-    if (known_extent(r) >= private_parts && (!rows || known_extent(r) > known_extent(*rows)))
+    if (known_extent(r) >= planning::privatised_copies &&
+        (!rows || known_extent(r) > known_extent(*rows)))
       rows = &r;
   }
   return rows;
@@ -41,13 +41,14 @@ bool is_worth_parts(const FuncContents& f, const SizeEstimate& sizes) {
   const Definition& update = f.updates[0];
   if (!scatters_in_order(f, update) || !rows_in_parts(update)) return false;
   const auto row = as_const_int(update.rvars[0].extent);
-  if (row && *row < merging_lanes) return false;
+  if (row && *row < planning::schedule_lanes) return false;
   double iterations = 1;
   for (const ReductionVariable& r : update.rvars)
     iterations *= static_cast<double>(known_extent(r));
   const int64_t bytes = sizes.bytes(f);
   const double elements = static_cast<double>(bytes) / f.types[0].bytes();
-  if (bytes == 0 || bytes > near_bytes || iterations < private_parts * elements * least_additions)
+  if (bytes == 0 || bytes > near_bytes ||
+      iterations < planning::privatised_copies * elements * least_additions)
     return false;
   const AssociativityProof proof = prove_associative(f, update);
   return proof.op && proof.op->commutative && !proof.op->breaks_ties;
@@ -56,10 +57,10 @@ bool is_worth_parts(const FuncContents& f, const SizeEstimate& sizes) {
 void merge(const FuncPtr& f, const RVar& part) {
   Func(f).compute_root();
   const Var lane(f->args[0]);
-  vectorize(Stage(f, 0), lane, merging_lanes, TailStrategy::GuardWithIf);
+  vectorize(Stage(f, 0), lane, planning::schedule_lanes, TailStrategy::GuardWithIf);
   Stage sum(f, 1);
   sum.reorder({lane, part});
-  vectorize(sum, lane, merging_lanes, TailStrategy::GuardWithIf);
+  vectorize(sum, lane, planning::schedule_lanes, TailStrategy::GuardWithIf);
 }
 
 // A vector of iterations, whose elements are added in order, by those of a part.
@@ -70,17 +71,18 @@ void count_in_lanes(Stage sums, const Var& part) {
   }
   order.push_back(part);
   sums.allow_race_conditions().reorder(order).parallel(part);
-  vectorize(sums, order[0], merging_lanes, TailStrategy::GuardWithIf);
+  vectorize(sums, order[0], planning::schedule_lanes, TailStrategy::GuardWithIf);
 }
 
 void cut_rows(const FuncPtr& f) {
   const RVar rows(rows_in_parts(f->updates[0])->var), part(new_loop(*f, 1, "part"));
   const Var own(new_loop(*f, 1, "parts"));
   Stage update(f, 1);
-  update.split(rows, rows, part, private_parts, TailStrategy::GuardWithIf);
+  update.split(rows, rows, part, planning::privatised_copies, TailStrategy::GuardWithIf);
   Func parts = update.rfactor(part, own);
   parts.compute_root().parallel(own);
-  vectorize(Stage(parts.function(), 0), Var(f->args[0]), merging_lanes, TailStrategy::GuardWithIf);
+  vectorize(Stage(parts.function(), 0), Var(f->args[0]), planning::schedule_lanes,
+            TailStrategy::GuardWithIf);
   count_in_lanes(Stage(parts.function(), 1), own);
   merge(f, part);
 }

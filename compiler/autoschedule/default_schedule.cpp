@@ -1,6 +1,7 @@
 #include "autoschedule/default_schedule.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <unordered_set>
 
@@ -56,7 +57,7 @@ void give_loops(const FuncPtr& f, const ScheduleRequest& request, const SizeEsti
 }
 
 void start_sums(const FuncPtr& f, const ScheduleRequest& request, const SizeEstimate& sizes) {
-  if (has_tiles(*f)) return start_in_tiles(f, lanes);
+  if (has_tiles(*f)) return start_in_tiles(f, schedule_lanes);
   give_root_loops(f, 0, request, sizes);
   if (!is_at_root(*f)) run_serially(f);
 }
@@ -99,7 +100,7 @@ void cut_sums(const std::vector<FuncPtr>& outputs, std::vector<FuncPtr>& stored,
   std::unordered_set<const Symbol*> kept = whole;  // at root
   kept.insert(chosen.store.begin(), chosen.store.end());
   if (request.makes(Decision::JoinSweeps)) sweep_rows(outputs, stored, kept, sizes);
-  cut_reductions(outputs, sizes, request.unit, whole);
+  cut_reductions(outputs, sizes, request.machine, whole);
   if (request.makes(Decision::ScatterStrategy)) cut_scatters(outputs, sizes, whole);
 }
 
@@ -123,7 +124,8 @@ void move_and_join(Movable funcs, const ScheduleRequest& request, const GiveLoop
   std::unordered_set<const Symbol*> together = whole;  // what is to share loops does not move
   if (slices && joins) together.merge(sweeps_that_join(outputs, given, sizes));
   if (slices) {
-    for (const FuncPtr& f : compute_epilogues(outputs, before, given, together, lanes, give_tile)) {
+    for (const FuncPtr& f :
+         compute_epilogues(outputs, before, given, together, schedule_lanes, give_tile)) {
       std::erase(stored, f);
       std::erase(given, f);
     }
@@ -134,7 +136,10 @@ void move_and_join(Movable funcs, const ScheduleRequest& request, const GiveLoop
   if (slices) compute_in_tiles(outputs, readers, given, whole, sizes);
   // Of chains of stencils, before these are put into strips of their own.
   if (slices) compute_in_reductions(outputs, readers, pure_primal(stored), whole, sizes);
-  if (request.makes(Decision::Strips)) compute_in_strips(outputs, given, whole, sizes, give_rows);
+  if (request.makes(Decision::Strips)) {
+    const double row_scale = std::ldexp(1.0, request.scales.strip_rows);
+    compute_in_strips(outputs, given, whole, sizes, row_scale, give_rows);
+  }
   if (slices) compute_sums_in_blocks(outputs, before, given, together, sizes);
   if (slices) compute_in_slices(readers, stored, whole, sizes);
   if (slices) compute_in_reductions(outputs, readers, stored, whole, sizes);
@@ -163,7 +168,7 @@ PointFuncs find_point_funcs(const std::vector<FuncPtr>& outputs, const std::vect
     if (slices.of_scatter(*f) || slices.of_reader(*f) || layout_of_parts(*f))
       excluded.insert(f.get());
   }
-  return PointFuncs(outputs, stored, excluded, lanes, sizes);
+  return PointFuncs(outputs, stored, excluded, schedule_lanes, sizes);
 }
 
 // Moves what has loops over points, when all have loops. Nothing else moves it.
@@ -223,7 +228,7 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
     name_inlined(outputs, order);
     return sizes;
   }
-  SizeEstimate sizes(outputs, limits_of(request));
+  SizeEstimate sizes(outputs, machine_of(request));
   whole.merge(step_sums(outputs, sizes));
   cut_sums(outputs, stored, whole, chosen, request, sizes);
   const bool slices_scatters =
@@ -231,8 +236,8 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
   const SlicedScatters slices(outputs, slices_scatters ? stored : std::vector<FuncPtr>(), whole,
                               sizes);
   const LaneDimensions along(
-      outputs, request.makes(Decision::LayoutStaging) ? stored : std::vector<FuncPtr>(), lanes,
-      sizes);
+      outputs, request.makes(Decision::LayoutStaging) ? stored : std::vector<FuncPtr>(),
+      schedule_lanes, sizes);
   const RowHosts rows =
       find_row_hosts(outputs, request.makes(Decision::Slices) ? stored : std::vector<FuncPtr>(),
                      whole, chosen, slices, along, sizes);
@@ -255,7 +260,7 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
     }
     if (f->is_extern() || limits.levels.contains(f.get()) || atomic.schedule(f)) continue;
     if (points.points_of(*f)) {
-      give_point_loops(f, points, lanes, request.unit, sizes);
+      give_point_loops(f, points, schedule_lanes, request.machine, sizes);
       at_points.push_back(f);
       continue;
     }

@@ -19,33 +19,30 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int64_t few_threads = 1 << 12;        // fewer than the threads that a device runs at once
-constexpr int64_t enough_threads = 1 << 15;     // to keep it busy
-constexpr int64_t terms_of_long_sum = 1 << 10;  // terms that are worth another kernel
-constexpr int64_t terms_of_part = 16;           // of a partial sum, for each of its elements
+constexpr int64_t terms_of_part = 16;  // of a partial sum, for each of its elements
 constexpr int64_t least_parts = 8;
-constexpr int64_t many_parts = 1 << 10;  // whose sum is cut again
-constexpr int parts_of_parts = 128;
 constexpr int64_t unknown_terms = 1 << 14;  // of a loop
 constexpr int64_t most_terms = 1 << 30;     // that one loop counts
 
 class SumCutter {
  public:
-  SumCutter(const FuncPtr& f, int stage, std::vector<StageLoop> loops, const SizeEstimate& sizes)
+  SumCutter(const FuncPtr& f, int stage, std::vector<StageLoop> loops, const SizeEstimate& sizes,
+            const planning::Device& device)
       : f_(f),
         index_(stage),
         sizes_(sizes),
+        device_(device),
         loops_(std::move(loops)),
         commutes_(graph::can_prove_commutative(*f, f->stage(stage))) {}
 
   // 0: it is no such sum.
   int64_t parts() const {
     const int64_t alone = independent_elements(), terms = this->terms();
-    if (alone == 0 || alone >= few_threads || terms < terms_of_long_sum) return 0;
+    if (alone == 0 || alone >= device_.few_threads() || terms < device_.launch_terms) return 0;
     const int64_t elements = elements_that_meet();
     if (elements == 0) return 0;
-    const int64_t most =
-        std::min({enough_threads / alone, terms / (terms_of_part * elements), terms_in_parts()});
+    const int64_t most = std::min(
+        {device_.enough_threads() / alone, terms / (terms_of_part * elements), terms_in_parts()});
     if (most < least_parts || (!commutes_ && !keeps_order())) return 0;
     return static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(most)));
   }
@@ -63,8 +60,8 @@ class SumCutter {
     if (has_rows()) return cut_rows(stage, all, RVar(summed()[one.size()].loop.name()), count);
     const RVar part = split(stage, all, "part", terms(), count);
     std::vector<FuncPtr> made{factor(stage, {part})};
-    if (count >= many_parts)
-      made.push_back(factor(stage, {split(stage, part, "group", count, parts_of_parts)}));
+    if (count >= device_.launch_terms)
+      made.push_back(factor(stage, {split(stage, part, "group", count, device_.block_threads())}));
     return made;
   }
 
@@ -123,7 +120,7 @@ class SumCutter {
       if (!loop.is_independent) continue;
       if (!loop.extent) return 0;
       elements *= *loop.extent;
-      if (elements >= few_threads) return 0;
+      if (elements >= device_.few_threads()) return 0;
     }
     return elements;
   }
@@ -135,7 +132,7 @@ class SumCutter {
       const Expr& place = update().args[d];
       if (is_const(place) || is_pure_position(*f_, update(), d)) continue;
       elements *= sizes_.extent(*f_, d).value_or(0);
-      if (elements == 0 || elements > enough_threads * terms_of_part) return 0;
+      if (elements == 0 || elements > device_.enough_threads() * terms_of_part) return 0;
     }
     return elements;
   }
@@ -143,7 +140,7 @@ class SumCutter {
   // Sums of every so many points of every so many rows, and then of all rows.
   std::vector<FuncPtr> cut_rows(Stage& stage, const RVar& all, const RVar& rows,
                                 int64_t count) const {
-    const int64_t points = std::min<int64_t>(count, parts_of_parts);
+    const int64_t points = std::min<int64_t>(count, device_.block_threads());
     const RVar part = split(stage, all, "part", unknown_terms, points);
     if (count == points) return {factor(stage, {part})};
     const RVar row = split(stage, rows, "row", unknown_terms, count / points);
@@ -184,6 +181,7 @@ class SumCutter {
   const FuncPtr f_;
   const int index_;
   const SizeEstimate& sizes_;
+  const planning::Device& device_;
   const std::vector<StageLoop> loops_;
   const bool commutes_;
 };
@@ -203,7 +201,7 @@ std::vector<FuncPtr> cut_sums_for_device(const std::vector<FuncPtr>& funcs,
       const Decision decision = scatters ? Decision::ScatterStrategy : Decision::CutReductions;
       if (!request.makes(decision)) continue;
       if (scatters && may_be_atomic(*f, s, request)) continue;
-      const SumCutter cutter(f, s, loops, sizes);
+      const SumCutter cutter(f, s, loops, sizes, request.device);
       if (const int64_t parts = cutter.parts(); parts > 0) {
         const std::vector<FuncPtr> more = cutter.cut(parts);
         made.insert(made.end(), more.begin(), more.end());

@@ -18,12 +18,7 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int64_t warp = 32;
-constexpr int64_t threads_of_block = 128;
-constexpr size_t most_dimensions = 3;  // of a grid, and of a block
-// Of the dimensions of a grid but the first, which has 2^31 - 1. What is run may be larger than what
-// was estimated.
-constexpr int64_t most_blocks = 65535;
+// What is run may be larger than what was estimated.
 constexpr int64_t times_the_estimate = 16;
 
 // A loop over blocks, and that over the threads of each, if there is one.
@@ -76,14 +71,16 @@ class KernelChooser {
   }
 
   // Threads for what lies together in memory; short loops leave more of them to the next one.
-  static std::vector<Tile> tiles_of(const std::vector<StageLoop>& grid, bool is_long) {
+  std::vector<Tile> tiles_of(const std::vector<StageLoop>& grid, bool is_long) const {
+    const planning::Device& device = request_.device;
     std::vector<Tile> tiles;
-    const int64_t along_one = grid.size() > 1 || is_long ? warp : threads_of_block;
-    int64_t left = threads_of_block;
+    const int64_t along_one =
+        grid.size() > 1 || is_long ? device.warp_size : device.block_threads();
+    int64_t left = device.block_threads();
     for (const StageLoop& loop : grid) {
       const auto wanted = static_cast<int64_t>(
           std::bit_ceil(static_cast<uint64_t>(std::max<int64_t>(loop.extent.value_or(left), 1))));
-      const bool has_threads = tiles.size() < most_dimensions;
+      const bool has_threads = tiles.size() < device.grid_dimensions;
       tiles.push_back({loop, has_threads ? std::min({wanted, along_one, left}) : 1});
       left /= tiles.back().threads;
     }
@@ -110,10 +107,11 @@ class KernelChooser {
     for (const VarOrRVar& thread : threads) stage_.gpu_threads(thread);
   }
 
-  static bool fits_grid(const std::vector<Tile>& tiles) {
-    return tiles.size() <= most_dimensions &&
-           std::all_of(tiles.begin() + 1, tiles.end(), [](const Tile& tile) {
-             return tile.blocks() && *tile.blocks() <= most_blocks / times_the_estimate;
+  bool fits_grid(const std::vector<Tile>& tiles) const {
+    const planning::Device& device = request_.device;
+    return tiles.size() <= device.grid_dimensions &&
+           std::all_of(tiles.begin() + 1, tiles.end(), [&](const Tile& tile) {
+             return tile.blocks() && *tile.blocks() <= device.grid_blocks / times_the_estimate;
            });
   }
 
@@ -146,9 +144,9 @@ GpuSchedule schedule_on_gpu(const std::vector<FuncPtr>& outputs, const std::vect
   for (const FuncPtr& f : free) Func(f).compute_root();
   std::erase_if(free, [&](const FuncPtr& f) { return f->is_extern() || but.contains(f.get()); });
   const std::vector<FuncPtr> made =
-      cut_sums_for_device(free, stored, request, SizeEstimate(outputs, limits_of(request)));
+      cut_sums_for_device(free, stored, request, SizeEstimate(outputs, machine_of(request)));
   free.insert(free.end(), made.begin(), made.end());
-  GpuSchedule result{{}, SizeEstimate(outputs, limits_of(request))};
+  GpuSchedule result{{}, SizeEstimate(outputs, machine_of(request))};
   for (const FuncPtr& f : free) {
     for (int s = 0; s < f->stage_count(); ++s) {
       if (can_be_kernel(f, s, stored))

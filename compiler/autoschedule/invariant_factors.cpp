@@ -6,6 +6,7 @@
 
 #include "autoschedule/coarse_values.h"
 #include "autoschedule/cost_estimate.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/size_estimate.h"
 #include "graph/definitions/define.h"
 #include "graph/definitions/own_reads.h"
@@ -20,8 +21,8 @@ namespace retrograde::autoschedule {
 namespace {
 
 constexpr size_t most_term_nodes = 4096;
-constexpr size_t most_loops = 64;                    // which are the bits of a mask
-constexpr int64_t short_row = 64, two_vectors = 32;  // elements
+constexpr size_t most_loops = 64;  // which are the bits of a mask
+constexpr int64_t short_row = 64, two_vectors = 2 * planning::schedule_lanes;  // elements
 
 using LoopSet = uint64_t;
 
@@ -90,11 +91,12 @@ class Factors {
   }
 
  private:
-  static constexpr double many_terms = 256;       // for each element of a quotient
-  static constexpr double clear_gain = 2;         // of the way to memory, for each element
-  static constexpr double least_saved = 1 << 16;  // operations: less is no time
-  static constexpr double sums_in_tile = 16;      // they share what is not a function
-  static constexpr double most_bytes = 64 << 20;  // of all factors of a Func
+  static constexpr double many_terms = 256;  // for each element of a quotient
+  static constexpr double clear_gain = 2;    // of the way to memory, for each element
+  static constexpr double least_saved =
+      planning::launch_operations / 8;        // operations: less is no time
+  static constexpr double sums_in_tile = 16;  // they share what is not a function
+  static constexpr double most_bytes = 4 * planning::third_cache_bytes;  // of all factors of a Func
 
   void add_loop(const std::string& name, std::optional<int64_t> extent) {
     bits_[name] = LoopSet{1} << names_.size();
@@ -168,7 +170,7 @@ class Factors {
     const bool leaves_its_loops = (loops & reductions_) == 0;
     if (leaves_its_loops && !(is_quotient(e) && again >= many_terms)) return false;
     if (operations <= (is_quotient(e) ? 0 : cheap) ||
-        again * operations < clear_gain * way_to_memory)
+        again * operations < clear_gain * planning::memory_trip_operations)
       return false;
     const auto elements = iterations(loops);
     if (!elements || *elements * again * operations < least_saved) return false;

@@ -36,7 +36,7 @@ struct Sweep {
 // lane, or from memory.
 bool is_dear(const Call& call, const SizeEstimate& sizes) {
   const FuncPtr callee = call.call_type == CallType::Func ? func_of(call) : nullptr;
-  return (callee && sizes.bytes(*callee) >= sizes.machine().more_than_caches) ||
+  return (callee && sizes.bytes(*callee) >= sizes.machine().last_cache_bytes()) ||
          std::any_of(call.args.begin(), call.args.end(),
                      [](const Expr& place) { return reads_memory(place, MemoryReads::Functions); });
 }

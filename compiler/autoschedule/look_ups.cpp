@@ -118,8 +118,8 @@ class PlaneLoops {
     for (const std::string& arg : f_.args) order.push_back(Var(arg));
     stage_.reorder(order);
     int64_t iterations = 1;
-    for (size_t d = f_.args.size(); d-- > 1 && iterations < sizes.machine().enough_tasks;) {
-      const int64_t extent = sizes.extent(f_, d).value_or(sizes.machine().enough_tasks);
+    for (size_t d = f_.args.size(); d-- > 1 && iterations < sizes.machine().enough_tasks();) {
+      const int64_t extent = sizes.extent(f_, d).value_or(sizes.machine().enough_tasks());
       iterations *= f_.args[d] == planes.loop.name() ? extent / at_once(planes) : extent;
       stage_.parallel(Var(f_.args[d]));
     }
@@ -176,7 +176,7 @@ bool schedule_look_ups(const FuncContents& f, int index, Stage& stage, int lanes
   if (!planes || !rows) return false;
   PlaneLoops(f, index, stage, lanes)
       .give_terms(*planes,
-                  std::clamp<int64_t>(*rows / sizes.machine().enough_tasks, 1, rows_of_a_block));
+                  std::clamp<int64_t>(*rows / sizes.machine().enough_tasks(), 1, rows_of_a_block));
   return true;
 }
 

@@ -10,6 +10,7 @@
 
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/invariant_factors.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/memory_estimate.h"
 #include "autoschedule/placement_limits.h"
 #include "autoschedule/stored_funcs.h"
@@ -120,7 +121,7 @@ class BudgetedSchedule {
 
   int64_t threads() const {
     const int said = threads_of(request_);
-    return said > 0 ? said : MachineLimits().enough_tasks / tasks_a_thread;
+    return said > 0 ? said : planning::reference_threads;
   }
 
   int64_t budget(const std::vector<FuncPtr>& outputs, int64_t callers,
@@ -130,7 +131,7 @@ class BudgetedSchedule {
     for (const FuncPtr& f : topological_order(outputs)) {
       if (!f->made && !is_among(f, outputs)) largest = std::max(largest, sizes.bytes(*f));
     }
-    return callers + std::max(allowed_times * largest, sizes.machine().more_than_caches);
+    return callers + std::max(allowed_times * largest, sizes.machine().last_cache_bytes());
   }
 
   // What brings a schedule down to the budget, if that is enough; none that was refused. One after the other: what is
@@ -153,8 +154,8 @@ class BudgetedSchedule {
         const StorageUse& use = uses.at(found->second.get());
         const double again = std::max(0.0, use.reads_in_all - 1) * use.operations;
         const double for_a_byte = again / std::max(1, total_bytes(part.func->types));
-        const bool is_allowed =
-            request_.options.memory_budget > 0 || again <= worth_ways * way_to_memory;
+        const bool is_allowed = request_.options.memory_budget > 0 ||
+                                again <= worth_ways * planning::memory_trip_operations;
         if (!is_allowed || for_a_byte >= least) continue;
         least = for_a_byte;
         best = &part;

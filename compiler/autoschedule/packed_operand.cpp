@@ -6,6 +6,7 @@
 
 #include "analysis/linear.h"
 #include "autoschedule/loop_order.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/read_estimate.h"
 #include "autoschedule/reduction_chunks.h"
@@ -21,17 +22,15 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int64_t most_elements = 16384;  // of a copy: half of a second-level cache, at the most
-constexpr int64_t many_rows = 16;         // more than a set of the first-level cache holds lines
-constexpr double least_uses = 4;          // of an element of the copy
-constexpr int64_t least_block = 64;       // iterations: sums are fetched and put back for each
-constexpr int64_t most_rows = 8;          // of tiles that share a copy
-constexpr double worth_sharing = 0.75;    // of what is copied for each alone
-// Rows so many bytes apart, or a multiple of it, meet in a few sets of the second-level cache.
-constexpr int64_t few_sets = 32 << 10;
-constexpr double least_tiles = 8;  // that use one copy: with fewer, its rows stay in the cache
-constexpr int64_t most_of_whole = 1 << 18;  // elements of a copy of all, which a near cache holds
-constexpr double least_uses_of_whole = 64;  // of an element of such a copy
+constexpr int64_t most_elements = planning::second_cache_bytes / 64;  // of a copy
+constexpr int64_t many_rows = planning::first_cache_ways;
+constexpr double least_uses = 4;        // of an element of the copy
+constexpr int64_t least_block = 64;     // iterations: sums are fetched and put back for each
+constexpr int64_t most_rows = 8;        // of tiles that share a copy
+constexpr double worth_sharing = 0.75;  // of what is copied for each alone
+constexpr double least_tiles = 8;       // that use one copy: with fewer, its rows stay in the cache
+constexpr int64_t most_of_whole = planning::second_cache_bytes / 4;  // elements of a copy of all
+constexpr double least_uses_of_whole = 64;                           // of an element of such a copy
 
 // How far each loop of a tile runs.
 using Extents = std::unordered_map<std::string, int64_t>;
@@ -92,7 +91,7 @@ class Candidate {
   bool is_worth_packing_whole() const {
     const auto along = lane_dimension();
     if (!along || *along == row_ ||
-        tiles(true) >= static_cast<double>(sizes_.machine().enough_tasks))
+        tiles(true) >= static_cast<double>(sizes_.machine().enough_tasks()))
       return false;
     Extents all = extents_;
     double uses = 1;
@@ -120,7 +119,7 @@ class Candidate {
             elements ? static_cast<double>(*elements) / static_cast<double>(count) : least;
         const bool is_small = elements && *elements <= most_elements / 2;
         const bool leaves_tasks =
-            tiles(true) >= static_cast<double>(count * sizes_.machine().enough_tasks);
+            tiles(true) >= static_cast<double>(count * sizes_.machine().enough_tasks());
         if (!is_small || !leaves_tasks || each >= least) continue;
         best = PackedOperand::Rows{d, count};
         least = each;
@@ -202,9 +201,10 @@ class Candidate {
   // Whether the loops that move the piece are tasks enough. Loops over tiles along rows are tasks only if there is no
   // other, or if the rows drive each other out of the caches.
   bool has_tasks() const {
-    const auto enough = static_cast<double>(sizes_.machine().enough_tasks);
+    const auto enough = static_cast<double>(sizes_.machine().enough_tasks());
     const auto width = sizes_.extent(f_, 0);
-    const bool meet = width && *width * f_.types[0].bytes() % few_sets == 0;
+    const bool meet =
+        width && *width * f_.types[0].bytes() % planning::second_cache_set_stride == 0;
     return tiles(true) * (meet ? tiles_along(0) : 1) >= enough;
   }
 
@@ -232,7 +232,7 @@ class Candidate {
   double tiles_along(size_t d) const {
     const auto size = static_cast<double>(tile_.size_along(d, lanes_));
     const double unknown =
-        depends_on_[d] ? static_cast<double>(sizes_.machine().enough_tasks) * size : 1;
+        depends_on_[d] ? static_cast<double>(sizes_.machine().enough_tasks()) * size : 1;
     const auto extent = sizes_.extent(f_, d);
     return std::ceil((extent ? static_cast<double>(*extent) : unknown) / size);
   }

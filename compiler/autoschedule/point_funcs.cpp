@@ -7,6 +7,7 @@
 #include "autoschedule/inlined_reads.h"
 #include "autoschedule/long_sums.h"
 #include "autoschedule/loop_order.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/scatter_schedule.h"
 #include "autoschedule/stored_reads.h"
 #include "graph/definitions/own_reads.h"
@@ -23,7 +24,6 @@ constexpr int64_t vectors_of_points = 4;  // at least
 constexpr double worth_turning = 0.7;     // of the time of vectors along the first dimension
 constexpr double unknown_terms = 16;
 constexpr int64_t small_stride = 4;
-constexpr double gathers_by_data = 2;  // accesses for each lane, with the index
 
 bool is_result_of(const std::vector<FuncPtr>& outputs, const FuncContents& f) {
   return std::ranges::any_of(outputs, [&](const FuncPtr& o) { return o.get() == &f; });
@@ -141,7 +141,7 @@ class PointCosts {
     std::optional<size_t> moved;  // the first index that moves with the points
     for (size_t d = call.args.size(); d-- > 0;) {
       if (!uses_variable(call.args[d], f_.args[points_])) continue;
-      if (has_load(call.args[d])) return gathers_by_data * lanes_;
+      if (has_load(call.args[d])) return planning::core.gather_lane_operations * lanes_;
       moved = d;
     }
     if (!moved) return 1;

@@ -16,9 +16,9 @@ namespace {
 
 class PointLoops {
  public:
-  PointLoops(const FuncPtr& f, size_t points, int lanes, const VectorUnit& unit,
+  PointLoops(const FuncPtr& f, size_t points, int lanes, const planning::Machine& machine,
              const SizeEstimate& sizes)
-      : function_(f), f_(*f), points_(points), lanes_(lanes), unit_(unit), sizes_(sizes) {}
+      : function_(f), f_(*f), points_(points), lanes_(lanes), machine_(machine), sizes_(sizes) {}
 
   void give(int index) const {
     Stage stage(function_, index);
@@ -53,13 +53,13 @@ class PointLoops {
  private:
   // Whether so many sums of a vector are kept in registers.
   bool fit(int64_t sums) const {
-    return sums * lanes_ * graph::total_bytes(f_.types) <= unit_.accumulator_bytes;
+    return sums * lanes_ * graph::total_bytes(f_.types) <= machine_.accumulator_bytes();
   }
 
   // `loops`: over vectors of points, then over dimensions beyond.
   void make_tasks(Stage& stage, const std::vector<VarOrRVar>& loops) const {
     int64_t tasks = 1;
-    for (size_t i = loops.size(); i-- > 0 && tasks < sizes_.machine().enough_tasks;) {
+    for (size_t i = loops.size(); i-- > 0 && tasks < sizes_.machine().enough_tasks();) {
       stage.parallel(loops[i]);
       tasks *= sizes_.extent(f_, points_ + i).value_or(lanes_);
     }
@@ -69,7 +69,7 @@ class PointLoops {
   const FuncContents& f_;
   const size_t points_;
   const int lanes_;
-  const VectorUnit& unit_;
+  const planning::Machine& machine_;
   const SizeEstimate& sizes_;
 };
 
@@ -86,10 +86,10 @@ bool reads_own_points(const FuncContents& f, size_t points, const Reader& reader
 
 }  // namespace
 
-void give_point_loops(const FuncPtr& f, const PointFuncs& points, int lanes, const VectorUnit& unit,
-                      const SizeEstimate& sizes) {
+void give_point_loops(const FuncPtr& f, const PointFuncs& points, int lanes,
+                      const planning::Machine& machine, const SizeEstimate& sizes) {
   const size_t along = *points.points_of(*f);
-  const PointLoops loops(f, along, lanes, unit, sizes);
+  const PointLoops loops(f, along, lanes, machine, sizes);
   for (int s = 0; s < f->stage_count(); ++s) loops.give(s);
   if (!points.is_stored_along_points(*f)) return;
   std::vector<Var> order{Var(f->args[along])};

@@ -20,8 +20,8 @@
 namespace retrograde::autoschedule {
 
 // Of a Func that is computed at root.
-void give_point_loops(const FuncPtr& f, const PointFuncs& points, int lanes, const VectorUnit& unit,
-                      const SizeEstimate& sizes);
+void give_point_loops(const FuncPtr& f, const PointFuncs& points, int lanes,
+                      const planning::Machine& machine, const SizeEstimate& sizes);
 
 // Moves those of the Funcs that one stage of another reads at its own points. `excluded`: none of these.
 void compute_at_points(const std::vector<FuncPtr>& funcs, const PointFuncs& points,

@@ -9,6 +9,7 @@
 
 #include "analysis/linear.h"
 #include "autoschedule/loop_order.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/read_estimate.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
@@ -21,7 +22,7 @@ namespace retrograde::autoschedule {
 namespace {
 
 // For all tiles, as much as a second-level cache holds: those that a thread is at read a part of it.
-constexpr double chunk_bytes = 1 << 20;
+constexpr double chunk_bytes = planning::second_cache_bytes;
 constexpr double worth_a_chunk = 3;  // times as many bytes without: sums are read and written
 constexpr double near_bytes = chunk_bytes / 2;  // of a chunk that stays there beside the sums
 constexpr int64_t least_terms = 64;             // of a chunk: its tiles load and store their sums

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "analysis/linear.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/only_reader.h"
 #include "autoschedule/read_estimate.h"
@@ -24,10 +25,10 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int64_t enough_slices = 8;
+constexpr int64_t enough_slices = planning::reference_tasks;
 constexpr int64_t strip_rows = 32, least_rows = 8;
-constexpr int64_t enough_strips = 16;   // each is a task
-constexpr size_t image_dimensions = 2;  // of a slice, at least
+constexpr int64_t enough_strips = 2 * planning::reference_tasks;  // each is a task
+constexpr size_t image_dimensions = 2;                            // of a slice, at least
 
 // How a Func moves into the loops of its reader.
 struct Move {
@@ -52,7 +53,7 @@ class ReductionSlicer {
       slices *= *extent;
     }
     if (slices < enough_slices || f_.args.size() < move.slices.size() + image_dimensions ||
-        sizes_.bytes(f_) < sizes_.machine().more_than_caches || !has_plain_loops())
+        sizes_.bytes(f_) < sizes_.machine().last_cache_bytes() || !has_plain_loops())
       return std::nullopt;
     move.along = stage_.schedule.dims.back().var;
     const auto along = std::find(reader_.func->args.begin(), reader_.func->args.end(), move.along);
@@ -241,7 +242,7 @@ class ReductionMover {
     const bool is_partial = f->made && (f->made->lanes > 0 || f->made->has_parts);
     return f->args.size() > image_dimensions && !f->is_extern() && !is_partial &&
            !but_.contains(f.get()) && is_at_root(*f) && readers_.is_inside(f) &&
-           !readers_.is_output(f) && sizes_.bytes(*f) >= sizes_.machine().more_than_caches;
+           !readers_.is_output(f) && sizes_.bytes(*f) >= sizes_.machine().last_cache_bytes();
   }
 
  private:

@@ -8,27 +8,25 @@
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/inlined_reads.h"
 #include "autoschedule/loop_order.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/phase_loops.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
-#include "ir/vector_bytes.h"
 #include "ir/visit.h"
 
 namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int64_t most_values = 4;  // of a long dimension, or an unknown one: rests run slower
-constexpr int64_t small_side = 16;  // a dimension that may lie in registers whole
-constexpr double loads_a_cycle = 2, products_a_cycle = 2, latency = 4;
-constexpr int64_t most_of_known = 8;   // of a dimension that it divides: there are no rests
-constexpr double split_lines = 2;      // loads for a vector at any place: it crosses cache lines
-constexpr double far_lines = 4;        // of a row of its own in each iteration: none is at hand yet
-constexpr double worth_while = 0.8;    // of the cycles without a tile
-constexpr double a_rest = 1.03;        // of the cycles
-constexpr double rows_apart = 1.1;     // of the cycles: vectors of several images, say
-constexpr int64_t line_elements = 16;  // of a cache line
-constexpr int64_t most_parts = 4;      // of a vector that is loaded whole: then it is gathered
+using planning::core;
+
+constexpr int64_t most_values = 4;    // of a long dimension, or an unknown one: rests run slower
+constexpr int64_t small_side = 16;    // a dimension that may lie in registers whole
+constexpr int64_t most_of_known = 8;  // of a dimension that it divides: there are no rests
+constexpr double worth_while = 0.8;   // of the cycles without a tile
+constexpr double a_rest = 1.03;       // of the cycles
+constexpr double rows_apart = 1.1;    // of the cycles: vectors of several images, say
+constexpr int64_t most_parts = 4;     // of a vector that is loaded whole: then it is gathered
 constexpr double phases_apart = 1.3;  // the same of phases, which read a copy of rows several times
 
 // What an iteration of a reduction loads, by the dimensions that the place depends on.
@@ -43,7 +41,7 @@ struct Operand {
 // Whether an index grows by a cache line or more in each iteration of a loop, as the hop of overlapping windows.
 bool steps_over_lines(const Expr& index, const std::string& loop) {
   const auto form = analysis::decompose(index, {loop});
-  return form && std::abs(form->coefficients[0].second) >= line_elements;
+  return form && std::abs(form->coefficients[0].second) >= planning::line_elements;
 }
 
 // Whether what moves the read moves it from row to row or by cache lines, not along one.
@@ -145,9 +143,9 @@ int64_t sums_of(const RegisterTile& tile) {
 double loads_of(const RegisterTile& tile, const std::vector<Operand>& operands, double registers) {
   double loads = 0;
   for (const Operand& operand : operands) {
-    const double first = operand.is_far ? far_lines : split_lines;
+    const double first = operand.is_far ? core.far_row_loads : core.unaligned_loads;
     const double vectors = registers * operand.parts * static_cast<double>(tile.vectors);
-    double count = operand.depends_on[0] ? first + split_lines * (vectors - 1) : 1;
+    double count = operand.depends_on[0] ? first + core.unaligned_loads * (vectors - 1) : 1;
     if (operand.depends_on[0] || operand.is_of_phase) count *= static_cast<double>(tile.phases);
     for (const RegisterTile::Side& side : tile.sides)
       count *= operand.depends_on[side.dimension] ? static_cast<double>(side.size) : 1;
@@ -196,8 +194,8 @@ double adds_of_functions(const Definition& stage) {
 double cycles(const RegisterTile& tile, const std::vector<Operand>& operands, double adds,
               double registers) {
   const double sums = registers * static_cast<double>(sums_of(tile));
-  return std::max({loads_of(tile, operands, registers) / sums / loads_a_cycle,
-                   (1 + adds) / products_a_cycle, latency / sums});
+  return std::max({loads_of(tile, operands, registers) / sums / core.loads_per_cycle,
+                   (1 + adds) / core.products_per_cycle, core.float_latency / sums});
 }
 
 // Iterations of the tile for each that has an element; a rest has its own loops.
@@ -231,15 +229,8 @@ std::vector<int64_t> sizes_of_side(const FuncContents& f, size_t dimension,
 
 }  // namespace
 
-VectorUnit vector_unit_of(const Target& target) {
-  const bool has_many = target.arch == Target::ARM || target.has_feature(Target::AVX512);
-  const int64_t registers = has_many ? 32 : 16;
-  const int64_t bytes = ir::vector_bytes(target);
-  return {registers * bytes * 3 / 4, bytes};
-}
-
 std::optional<RegisterTile> register_tile(const FuncContents& f, const Definition& stage, int lanes,
-                                          int64_t vectors, const VectorUnit& unit,
+                                          int64_t vectors, const planning::Machine& machine,
                                           const SizeEstimate& sizes, int64_t phases) {
   const auto moves = [&](const Expr& arg) {
     return std::any_of(stage.rvars.begin(), stage.rvars.end(),
@@ -259,7 +250,7 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
   const double adds = adds_of_functions(stage);
   const int64_t vector_bytes = lanes * f.types[0].bytes();
   const double registers =
-      std::max(1.0, static_cast<double>(vector_bytes) / static_cast<double>(unit.register_bytes));
+      std::max(1.0, static_cast<double>(vector_bytes) / static_cast<double>(machine.vector_bytes));
   RegisterTile best;
   const auto cost = [&](const RegisterTile& tile) {
     return cycles(tile, *operands, adds, registers) * iterations_an_element(tile, lanes, f, sizes) *
@@ -276,7 +267,7 @@ std::optional<RegisterTile> register_tile(const FuncContents& f, const Definitio
         needed < least ||
         (needed == least && (sums_of(tile) < sums_of(best) ||
                              (sums_of(tile) == sums_of(best) && tile.vectors > best.vectors)));
-    if (sums_of(tile) * bytes > unit.accumulator_bytes || !is_better ||
+    if (sums_of(tile) * bytes > machine.accumulator_bytes() || !is_better ||
         !shares_loads(tile, *operands))
       return;
     best = std::move(tile);

@@ -5,18 +5,11 @@
 #include <optional>
 #include <vector>
 
+#include "autoschedule/machine/machine.h"
 #include "autoschedule/size_estimate.h"
 #include "graph/function.h"
-#include "ir/target.h"
 
 namespace retrograde::autoschedule {
-
-// What the machine's vector unit has. Default: 32 registers of 64 bytes.
-struct VectorUnit {
-  int64_t accumulator_bytes = 1536;  // of the registers that hold sums; the others hold operands
-  int64_t register_bytes = 64;
-};
-VectorUnit vector_unit_of(const Target& target);
 
 // Of a stage  f(x, ..., c, ...) = f(x, ..., c, ...) op e  over a reduction domain: so many vectors
 // of the first dimension, and so many values of others, whose sums are kept while the reduction
@@ -45,7 +38,7 @@ struct RegisterTile {
 // second element is picked from two. Functions in the terms take what they take, so that a tile which
 // only hides latency is none. `phases`: of the tile.
 std::optional<RegisterTile> register_tile(const FuncContents& f, const Definition& stage, int lanes,
-                                          int64_t vectors, const VectorUnit& unit,
+                                          int64_t vectors, const planning::Machine& machine,
                                           const SizeEstimate& sizes = {}, int64_t phases = 1);
 
 }  // namespace retrograde::autoschedule

@@ -98,7 +98,8 @@ class LoopChooser {
     else if (may_scatter)
       unroll_taps(definition(), stage_);
     if (const FuncPtr block = block_of(definition())) return give_blocks(block);
-    if (makes(Decision::LayoutStaging) && add_turned_lanes(function_, index_, lanes)) return;
+    if (makes(Decision::LayoutStaging) && add_turned_lanes(function_, index_, schedule_lanes))
+      return;
     if (!scatters && turn_sum()) return;
     const bool has_pure_rows = !pure_.empty() && pure_[0] == 0;
     if (!scatters && !has_pure_rows && schedule_steps(function_, index_, lanes_of_values(), sizes_))
@@ -112,8 +113,9 @@ class LoopChooser {
       return;
     if (stages && schedule_short_rows(f_, index_, stage_, lanes_of_values(), sizes_)) return;
     // Phases that a vector is no multiple of come first if a tile has none: there its lanes would gather.
-    const bool has_phases = pure_[0] == 0 && !scatters && has_odd_phases(f_, definition(), lanes) &&
-                            phases_of_tile(f_, definition(), lanes, sizes_) == 1;
+    const bool has_phases = pure_[0] == 0 && !scatters &&
+                            has_odd_phases(f_, definition(), schedule_lanes) &&
+                            phases_of_tile(f_, definition(), schedule_lanes, sizes_) == 1;
     const bool may_be_tile =
         !scatters && !point_number(definition()) && pure_[0] == 0 && !has_phases;
     if (may_be_tile && tile_in_registers(row.has_value())) return;
@@ -143,10 +145,10 @@ class LoopChooser {
     Func(function_).reorder_storage(order);
     stage_.reorder(std::vector<VarOrRVar>(order.begin(), order.end()));
     int64_t tasks = 1;
-    for (size_t d = f_.args.size(); d-- > 0 && tasks < sizes_.machine().enough_tasks;) {
+    for (size_t d = f_.args.size(); d-- > 0 && tasks < sizes_.machine().enough_tasks();) {
       if (d == dimension) continue;
       stage_.parallel(variable_of(d));
-      tasks *= sizes_.extent(f_, d).value_or(sizes_.machine().enough_tasks);
+      tasks *= sizes_.extent(f_, d).value_or(sizes_.machine().enough_tasks());
     }
     vectorize(stage_, order[0], lanes_of_values(), TailStrategy::GuardWithIf);
   }
@@ -159,28 +161,32 @@ class LoopChooser {
 
   // Private sums may be of fewer lanes.
   int most_lanes() const {
-    return f_.made && f_.made->lanes > 0 ? std::min(lanes, f_.made->lanes) : lanes;
+    return f_.made && f_.made->lanes > 0 ? std::min(schedule_lanes, f_.made->lanes)
+                                         : schedule_lanes;
   }
   // A register of narrow numbers holds more of them.
   int lanes_of_values() const {
-    if (most_lanes() < lanes) return most_lanes();
-    return std::clamp(lanes * 32 / bits_of_values(definition().values), lanes, 4 * lanes);
+    if (most_lanes() < schedule_lanes) return most_lanes();
+    return std::clamp(schedule_lanes * 32 / bits_of_values(definition().values), schedule_lanes,
+                      4 * schedule_lanes);
   }
 
   // A long body gets vectors of several registers where rows fill these many times.
   int lanes_of_body() const {
     const int own = lanes_of_values();
     const auto row = sizes_.extent(f_, 0);
-    return own == lanes && row && *row >= 16 * lanes ? own * vectors_side_by_side(f_) : own;
+    return own == schedule_lanes && row && *row >= 16 * schedule_lanes
+               ? own * vectors_side_by_side(f_)
+               : own;
   }
 
   // The outermost loop, and those inside of it while their iterations are few; not that of the
   // vectors, if elements are their lanes. How many private parts there are may be known at run time
   // only: few, where the target is large.
   void make_tasks(bool elements_are_lanes = true) {
-    const int64_t unknown = f_.made && f_.made->has_parts ? 1 : sizes_.machine().enough_tasks;
+    const int64_t unknown = f_.made && f_.made->has_parts ? 1 : sizes_.machine().enough_tasks();
     int64_t tasks = 1;
-    for (size_t i = pure_.size(); i-- > 0 && tasks < sizes_.machine().enough_tasks;) {
+    for (size_t i = pure_.size(); i-- > 0 && tasks < sizes_.machine().enough_tasks();) {
       if (pure_[i] == 0 && elements_are_lanes) break;
       stage_.parallel(variable_of(pure_[i]));
       tasks *= sizes_.extent(f_, pure_[i]).value_or(unknown);
@@ -221,8 +227,8 @@ class LoopChooser {
   void cut_scan() {
     const Var x = variable_of(0), vectors = inside(x);
     const Var lane(new_loop(f_, index_, "lane"));
-    stage_.split(x, x, vectors, scan_vectors * lanes, TailStrategy::GuardWithIf);
-    stage_.split(vectors, vectors, lane, lanes, TailStrategy::GuardWithIf).vectorize(lane);
+    stage_.split(x, x, vectors, scan_vectors * schedule_lanes, TailStrategy::GuardWithIf);
+    stage_.split(vectors, vectors, lane, schedule_lanes, TailStrategy::GuardWithIf).vectorize(lane);
     std::vector<VarOrRVar> order{lane, vectors};
     for (const ReductionVariable& r : definition().rvars) order.push_back(RVar(r.var));
     order.push_back(x);
@@ -235,7 +241,7 @@ class LoopChooser {
 
   std::optional<RowReduction> row_to_reduce() const {
     if (index_ == 0 || !makes(Decision::LayoutStaging)) return std::nullopt;
-    return row_reduction(f_, definition(), lanes_of_values(), request_.unit, sizes_);
+    return row_reduction(f_, definition(), lanes_of_values(), request_.machine, sizes_);
   }
 
   // Rows are the tasks.
@@ -249,14 +255,14 @@ class LoopChooser {
     const auto tile = tile_of(f_, definition());
     if (!tile) return false;
     const auto packed = makes(Decision::LayoutStaging)
-                            ? packed_operand(f_, definition(), *tile, lanes, sizes_)
+                            ? packed_operand(f_, definition(), *tile, schedule_lanes, sizes_)
                             : std::nullopt;
     const auto rows = packed ? std::nullopt : copied_rows(*tile);
     if (in_rows && !packed && !rows) return false;
     const bool packs_whole = packed && packed->is_whole;
     std::vector<VarOrRVar> loops = cut(*tile, {}, rows || (packed && !packs_whole));
     if (packs_whole)
-      pack_whole(sums_of_terms(*tile, in_rows), *packed, lanes);
+      pack_whole(sums_of_terms(*tile, in_rows), *packed, schedule_lanes);
     else if (packed)
       loops = pack_inside(*packed, loops);
     if (rows) copy_rows_inside(*rows, loops);
@@ -280,7 +286,7 @@ class LoopChooser {
   void share_chunks(const RegisterTile& tile, const std::vector<VarOrRVar>& tiles) {
     const bool is_own = f_.made && (f_.made->lanes > 0 || f_.made->has_parts);
     const auto chunk =
-        index_ == 1 && !is_own ? chunk_of_terms(f_, tile, lanes, sizes_) : std::nullopt;
+        index_ == 1 && !is_own ? chunk_of_terms(f_, tile, schedule_lanes, sizes_) : std::nullopt;
     if (!chunk) return;
     const std::vector<ReductionVariable> loops = reduction_loops(f_, definition());
     std::vector<VarOrRVar> order;
@@ -315,7 +321,7 @@ class LoopChooser {
       level = *order.insert(first, blocks);
     }
     stage_.reorder(order);
-    pack(function_, operand, retrograde::LoopLevel(Func(function_), level), lanes);
+    pack(function_, operand, retrograde::LoopLevel(Func(function_), level), schedule_lanes);
     return outside;
   }
 
@@ -326,7 +332,7 @@ class LoopChooser {
     stage_.split(rows, rows, row, static_cast<int>(operand.rows->count), TailStrategy::GuardWithIf);
     order.insert(order.end() - static_cast<long>(outside.size()), row);
     stage_.reorder(order);
-    pack(function_, operand, retrograde::LoopLevel(Func(function_), outside[0]), lanes);
+    pack(function_, operand, retrograde::LoopLevel(Func(function_), outside[0]), schedule_lanes);
     return outside;
   }
 
@@ -339,7 +345,7 @@ class LoopChooser {
     for (const size_t d : pure_) {
       if (std::find(order.begin(), order.end(), d) == order.end()) order.push_back(d);
     }
-    const auto copy = row_copy(f_, tile, lanes, {order, {}}, sizes_);
+    const auto copy = row_copy(f_, tile, schedule_lanes, {order, {}}, sizes_);
     return copy && !is_to_be_inlined(*copy->source) ? copy : std::nullopt;
   }
   bool is_to_be_inlined(const FuncContents& f) const {
@@ -361,7 +367,7 @@ class LoopChooser {
       }
       stage_.reorder(order);
     }
-    copy_rows(function_, copy, retrograde::LoopLevel(Func(function_), rows), lanes);
+    copy_rows(function_, copy, retrograde::LoopLevel(Func(function_), rows), schedule_lanes);
   }
 
   // The outermost of them, and where that may be short the next one too: a loop in parallel inside of
@@ -371,7 +377,7 @@ class LoopChooser {
                        bool has_copies = false) {
     stage_.parallel(loops.back());
     if (loops.size() > (has_copies ? 1 : 2) &&
-        iterations_of(loops.back(), tile) < sizes_.machine().enough_tasks)
+        iterations_of(loops.back(), tile) < sizes_.machine().enough_tasks())
       stage_.parallel(loops[loops.size() - 2]);
   }
 
@@ -380,21 +386,22 @@ class LoopChooser {
     const auto arg = std::find(f_.args.begin(), f_.args.end(), loop.name());
     if (arg == f_.args.end()) return 0;
     const auto dimension = static_cast<size_t>(arg - f_.args.begin());
-    const int64_t size = tile.size_along(dimension, lanes);
+    const int64_t size = tile.size_along(dimension, schedule_lanes);
     return (sizes_.extent(f_, dimension).value_or(0) + size - 1) / size;
   }
 
   std::optional<RegisterTile> tile_of(const FuncContents& f, const Definition& reduction) const {
     if (!makes(Decision::RegisterTiles)) return std::nullopt;
     const bool has_lanes = f.made && f.made->lanes > 0;
-    VectorUnit unit = request_.unit;
-    unit.accumulator_bytes =
-        static_cast<int64_t>(std::ldexp(unit.accumulator_bytes, request_.scales.register_tile));
-    const int64_t phases = phases_of_tile(f, reduction, lanes, sizes_);
+    planning::Machine machine = request_.machine;
+    machine.accumulator_share =
+        std::ldexp(machine.accumulator_share, request_.scales.register_tile);
+    const int64_t phases = phases_of_tile(f, reduction, schedule_lanes, sizes_);
     if (phases > 1) {
-      if (auto tile = register_tile(f, reduction, lanes, 2, unit, sizes_, phases)) return tile;
+      if (auto tile = register_tile(f, reduction, schedule_lanes, 2, machine, sizes_, phases))
+        return tile;
     }
-    return register_tile(f, reduction, lanes, has_lanes ? 1 : 4, unit, sizes_);
+    return register_tile(f, reduction, schedule_lanes, has_lanes ? 1 : 4, machine, sizes_);
   }
 
   // Its loops stand inside of those of the reduction; those over tiles outside, of the sides first,
@@ -432,7 +439,7 @@ class LoopChooser {
     stage_.reorder(order);
     if (tile.vectors > 1 && !is_whole) {
       const Var vector(new_loop(f_, index_, "vector"));
-      stage_.split(inner[0], inner[0], vector, lanes).vectorize(vector).unroll(inner[0]);
+      stage_.split(inner[0], inner[0], vector, schedule_lanes).vectorize(vector).unroll(inner[0]);
     } else {
       stage_.vectorize(inner[0]);
     }
@@ -456,10 +463,10 @@ class LoopChooser {
     std::vector<size_t> shifts;
     int64_t tasks = 1;
     for (size_t d : pure_) {
-      const int64_t size = tile.size_along(d, lanes);
+      const int64_t size = tile.size_along(d, schedule_lanes);
       const auto arg = std::find(block.args.begin(), block.args.end(), f_.args[d]);
       const auto in_block = static_cast<size_t>(arg - block.args.begin());
-      const int64_t extent = sizes_.extent(f_, d).value_or(sizes_.machine().enough_tasks * size);
+      const int64_t extent = sizes_.extent(f_, d).value_or(sizes_.machine().enough_tasks() * size);
       const bool is_shift = size == 1 && extent <= small_shift && sizes_.extent(f_, d) &&
                             arg != block.args.end() &&
                             shifts_reads(block, block.updates[0], in_block);
@@ -468,16 +475,16 @@ class LoopChooser {
       else
         tasks *= (extent + size - 1) / size;
     }
-    return tasks >= sizes_.machine().enough_tasks ? shifts : std::vector<size_t>();
+    return tasks >= sizes_.machine().enough_tasks() ? shifts : std::vector<size_t>();
   }
 
   // The sums of a tile: a block of each after the other, in registers, is added to what memory
   // holds.
   void give_blocks(const FuncPtr& block) {
     if (makes_turned_tiles()) {
-      auto turned = turned_lanes(*block, lanes, request_.unit, sizes_);
+      auto turned = turned_lanes(*block, schedule_lanes, request_.machine, sizes_);
       if (!turned && has_idle_rows() && block->updates.size() == 1)
-        turned = turned_sum(*block, block->updates[0], lanes, request_.unit, sizes_);
+        turned = turned_sum(*block, block->updates[0], schedule_lanes, request_.machine, sizes_);
       if (turned) return give_turned_blocks(block, *turned);
     }
     if (pure_.empty() || pure_[0] != 0) return compute_block(block, {});
@@ -500,34 +507,34 @@ class LoopChooser {
   // Whether vectors along the first dimension would be nearly empty.
   bool has_idle_rows() const {
     if (pure_.empty() || f_.args.size() < 2) return false;
-    return pure_[0] != 0 || 2 * sizes_.extent(f_, 0).value_or(lanes) <= lanes;
+    return pure_[0] != 0 || 2 * sizes_.extent(f_, 0).value_or(schedule_lanes) <= schedule_lanes;
   }
   // Adds up the terms in a Func of its own, whose rows lie along another dimension; the update adds its sums. Returns
   // false if other loops are as good.
   bool turn_sum() {
     if (index_ == 0 || !makes_turned_tiles() || !has_idle_rows()) return false;
-    const auto turned = turned_sum(f_, definition(), lanes, request_.unit, sizes_);
+    const auto turned = turned_sum(f_, definition(), schedule_lanes, request_.machine, sizes_);
     if (!turned) return false;
     std::vector<RVar> terms;
     for (const ReductionVariable& r : reduction_loops(f_, definition())) terms.emplace_back(r.var);
     const FuncPtr sums = stage_.rfactor(std::vector<std::pair<RVar, Var>>()).function();
     Func(sums).compute_root();
-    const std::vector<VarOrRVar> tiles = give_turned_loops(sums, *turned, terms, lanes);
+    const std::vector<VarOrRVar> tiles = give_turned_loops(sums, *turned, terms, schedule_lanes);
     for (int s = 0; s < sums->stage_count(); ++s) {
       for (size_t i = tiles.size(); i-- > 0 && i + 2 >= tiles.size();)
         Stage(sums, s).parallel(tiles[i]);
     }
-    add_turned_sums(function_, index_, turned->dimension, lanes);
+    add_turned_sums(function_, index_, turned->dimension, schedule_lanes);
     return true;
   }
 
   void give_turned_blocks(const FuncPtr& block, const TurnedSum& turned) {
-    const RegisterTile own = renumbered(turned.tile(lanes), *block);
+    const RegisterTile own = renumbered(turned.tile(schedule_lanes), *block);
     const std::vector<size_t> shifts = shifts_of(*block, own);
     compute_block(block, shifts);
     std::vector<Var> between;
     for (const size_t d : shifts) between.push_back(variable_of(d));
-    run_in_parallel(give_turned_loops(function_, block, turned, between, lanes), own);
+    run_in_parallel(give_turned_loops(function_, block, turned, between, schedule_lanes), own);
   }
 
   // The loops over tiles stand inside of those over chunks of the reduction. The result: iterations of
@@ -536,7 +543,7 @@ class LoopChooser {
                                          const std::vector<VarOrRVar>& tiles,
                                          const RegisterTile& tile) {
     const std::vector<ReductionVariable> loops = reduction_loops(f_, definition());
-    const auto chunk = reduction_chunk(f_, block, loops[0], tile, lanes, sizes_);
+    const auto chunk = reduction_chunk(f_, block, loops[0], tile, schedule_lanes, sizes_);
     if (!chunk) return std::nullopt;
     const RVar iteration(loops[0].var), chunks(new_loop(f_, index_, "chunks"));
     stage_.split(iteration, chunks, iteration, static_cast<int>(*chunk));
@@ -563,10 +570,10 @@ class LoopChooser {
     if (!number || std::ranges::count(loops.tiles, block->args.size()) > 0) return;
     loops.inside.push_back(*number);
     const auto copy =
-        row_copy(*block, tile, lanes, loops, sizes_.with_extent(*block, *number, chunk));
+        row_copy(*block, tile, schedule_lanes, loops, sizes_.with_extent(*block, *number, chunk));
     if (!copy || is_to_be_inlined(*copy->source)) return;
     const Var rows(block->args[copy->dimension]);
-    copy_rows(block, *copy, retrograde::LoopLevel(Func(function_), rows), lanes);
+    copy_rows(block, *copy, retrograde::LoopLevel(Func(function_), rows), schedule_lanes);
   }
 
   // For each iteration of the innermost loop outside of the tile.
@@ -583,9 +590,9 @@ class LoopChooser {
   // other.
   void tile(size_t dimension) {
     const Var x = variable_of(0), y = variable_of(dimension), xi = inside(x);
-    stage_.split(x, x, xi, lanes, TailStrategy::GuardWithIf);
+    stage_.split(x, x, xi, schedule_lanes, TailStrategy::GuardWithIf);
     const Var yi = inside(y);
-    stage_.split(y, y, yi, lanes, TailStrategy::GuardWithIf);
+    stage_.split(y, y, yi, schedule_lanes, TailStrategy::GuardWithIf);
     std::vector<VarOrRVar> order{xi, yi};
     for (const size_t d : pure_) order.push_back(variable_of(d));
     stage_.reorder(order).vectorize(xi);

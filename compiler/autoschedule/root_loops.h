@@ -4,6 +4,7 @@
 // columns; all others in vectors along their first dimension.
 #pragma once
 
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/register_tile.h"
 #include "autoschedule/schedule_request.h"
 #include "autoschedule/size_estimate.h"
@@ -11,9 +12,7 @@
 
 namespace retrograde::autoschedule {
 
-// In the vectors of a schedule, of numbers of 32 bits: a register of 64 bytes. On machines with smaller
-// ones code generation takes several for each.
-inline constexpr int lanes = 16;
+using planning::schedule_lanes;
 
 void give_root_loops(const FuncPtr& f, int stage, const ScheduleRequest& request,
                      const SizeEstimate& sizes);

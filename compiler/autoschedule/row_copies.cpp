@@ -9,6 +9,7 @@
 
 #include "analysis/linear.h"
 #include "autoschedule/cost_estimate.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/read_estimate.h"
 #include "frontend/language/func.h"
@@ -24,14 +25,12 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int64_t copy_bytes = 192 << 10;  // a part of a cache near a core
-constexpr int64_t most_sharing_rows = 8;   // that share a copy
-constexpr int64_t least_full_copies = 4;   // for one that holds fewer at the end
+constexpr int64_t copy_bytes = planning::second_cache_bytes / 16 * 3;
+constexpr int64_t most_sharing_rows = 8;  // that share a copy
+constexpr int64_t least_full_copies = 4;  // for one that holds fewer at the end
 // Of loops whose extents are not known: elements of a row, channels and the like.
 constexpr double unknown_row = 256, unknown_planes = 16;
 constexpr double least_uses = 4;  // of an element of the copy
-// In operations: a store and a load that wait for no memory.
-constexpr double way_to_near_cache = 10;
 
 // Operations of an inlined value beside the load that a copy needs, too.
 class InlinedCost {
@@ -252,7 +251,7 @@ bool is_inside(const Call& call, const FuncContents& source, const FuncContents&
 
 bool pays(const ReadOfTiles::Counts& counts, double operations) {
   const double uses = counts.reads / counts.elements;
-  return uses >= least_uses && uses * operations >= way_to_near_cache;
+  return uses >= least_uses && uses * operations >= planning::cache_trip_operations;
 }
 
 std::optional<RowCopy> copy_for(const Call& call, const FuncPtr& source, const FuncContents& f,
@@ -273,7 +272,7 @@ std::optional<RowCopy> copy_for(const Call& call, const FuncPtr& source, const F
     const bool fits =
         counts->is_known && extent && (*extent % rows == 0 || *extent >= least_full_copies * rows);
     const bool leaves_tasks =
-        read.copies(*row, rows) >= static_cast<double>(sizes.machine().enough_tasks);
+        read.copies(*row, rows) >= static_cast<double>(sizes.machine().enough_tasks());
     if (rows > 1 && (!fits || !leaves_tasks || counts->elements * bytes > copy_bytes)) continue;
     const bool is_small =
         counts->is_known ? counts->elements * bytes <= 2 * copy_bytes : read.is_a_window(*row);

@@ -139,7 +139,7 @@ class GroupFinder {
       if (arg == sums_.args.end()) return false;
       parts *= sizes_.extent(sums_, static_cast<size_t>(arg - sums_.args.begin())).value_or(1);
     }
-    return parts >= sizes_.machine().enough_tasks;
+    return parts >= sizes_.machine().enough_tasks();
   }
 };
 

@@ -182,8 +182,8 @@ class GuestFinder {
         autoschedule::guest_of_groups(host_, sums, block, place, row_indices(*block), sizes_);
     if (!result) return std::nullopt;
     const int64_t rows = rows_of_group(host_, result->groups, sizes_);
-    return rows * bytes_of_row(*host_.host) <= sizes_.machine().block_bytes ? std::move(result)
-                                                                            : std::nullopt;
+    return rows * bytes_of_row(*host_.host) <= sizes_.machine().task_bytes() ? std::move(result)
+                                                                             : std::nullopt;
   }
 
   // ---- shared ----
@@ -191,7 +191,7 @@ class GuestFinder {
   void add_shared(const FuncPtr& f) {
     const bool may_move = f->is_pure() && f != host_.host && own_reads_.contains(f->name) &&
                           is_free_(f) && !host_.coordinates.contains(f.get()) &&
-                          sizes_.bytes(*f) >= sizes_.machine().passes_caches &&
+                          sizes_.bytes(*f) >= sizes_.machine().near_cache_bytes() &&
                           fits_beside_others(*f) && !reads_.is_hidden(f);
     if (!may_move) return;
     // What the host alone reads is for others to place, as running sums are.
@@ -208,7 +208,7 @@ class GuestFinder {
       for (const FuncPtr& other : *others) bytes += bytes_of_row(*other);
     }
     const int64_t rows = host_.groups.empty() ? 1 : rows_of_group(host_, host_.groups, sizes_);
-    return rows * bytes <= sizes_.machine().block_bytes;
+    return rows * bytes <= sizes_.machine().task_bytes();
   }
 
   // Of a Func with as many rows as the host.

@@ -146,7 +146,7 @@ class HostMover {
     int64_t tasks = 1;
     size_t result = 0;
     for (auto row = host_.rows.rbegin(); row != host_.rows.rend(); ++row) {
-      if (tasks >= std::max(enough_rows, sizes_.machine().enough_tasks)) break;
+      if (tasks >= std::max(enough_rows, sizes_.machine().enough_tasks())) break;
       tasks *= sizes_.extent(*host_.host, row->dimension).value_or(1) / row->divisor;
       ++result;
     }

@@ -7,6 +7,7 @@
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/inlined_reads.h"
 #include "autoschedule/loop_order.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/only_reader.h"
 #include "autoschedule/read_estimate.h"
 #include "autoschedule/row_guests.h"
@@ -24,10 +25,11 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr double least_terms_of_row = 32;  // of a sum along a row
-constexpr double few_terms = 512;          // which may be added one by one
-constexpr int64_t least_row = 16;          // elements along the first dimension
-constexpr int64_t long_piece = 4096;       // bytes of a row, where it does not lie together
+constexpr double least_terms_of_row = 32;                // of a sum along a row
+constexpr double few_terms = 512;                        // which may be added one by one
+constexpr int64_t least_row = planning::schedule_lanes;  // elements along the first dimension
+constexpr int64_t long_piece =
+    planning::page_bytes;  // bytes of a row, where it does not lie together
 
 bool has_many_terms(const FuncContents& f) {
   return std::ranges::any_of(f.updates, [](const Definition& update) {
@@ -123,7 +125,7 @@ class HostFinder {
   bool may_be_host(const FuncContents& f) const {
     return f.is_pure() && is_free(f) && at_root_.contains(&f) && f.args.size() > 1 &&
            sizes_.extent(f, 0).value_or(0) >= least_row &&
-           sizes_.bytes(f) >= sizes_.machine().passes_caches;
+           sizes_.bytes(f) >= sizes_.machine().near_cache_bytes();
   }
 
   // The blocks of a sum are computed where they are added up.
@@ -196,7 +198,7 @@ class HostFinder {
   bool is_read_in_place(const FuncPtr& f, const RowHost& host) const {
     const std::vector<StoredRead>& all = reads_.of(f);
     return f->is_pure() && !f->made && f->args.size() == host.host->args.size() && !all.empty() &&
-           !reads_.is_hidden(f) && sizes_.bytes(*f) >= sizes_.machine().passes_caches &&
+           !reads_.is_hidden(f) && sizes_.bytes(*f) >= sizes_.machine().near_cache_bytes() &&
            std::ranges::all_of(all, [&](const StoredRead& read) {
              const bool is_own = read.reader == host.host ||
                                  std::ranges::find(host.inside, read.reader) != host.inside.end();
@@ -257,7 +259,7 @@ class HostFinder {
       rows *= (sizes_.extent(*host.host, dimension).value_or(0) + divisor - 1) / divisor;
     int64_t bytes = sizes_.bytes(*host.host);
     for (const FuncPtr& f : host.inside) bytes += sizes_.bytes(*f);
-    return rows >= enough_rows && bytes / rows <= sizes_.machine().block_bytes &&
+    return rows >= enough_rows && bytes / rows <= sizes_.machine().task_bytes() &&
            std::ranges::any_of(host.members, [](const FuncPtr& f) { return has_many_terms(*f); });
   }
 };

@@ -5,6 +5,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/only_reader.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
@@ -17,15 +18,13 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int64_t many_streams = 32;  // as are fetched ahead of their use at once, or a few more
-
 // Which Funcs are loaded from memory, by themselves or by what is inlined into them.
 class MemoryLoads {
  public:
   explicit MemoryLoads(const SizeEstimate& sizes) : sizes_(sizes) {}
 
   bool come_from_memory(const FuncPtr& f) {
-    if (sizes_.bytes(*f) < sizes_.machine().more_than_caches) return false;
+    if (sizes_.bytes(*f) < sizes_.machine().last_cache_bytes()) return false;
     if (f->schedule.compute_level.kind != graph::LoopLevel::Kind::Inlined) return true;
     const auto [known, is_new] = by_inlining_.try_emplace(f.get(), false);
     if (!is_new) return known->second;
@@ -96,7 +95,8 @@ void run_along_rows(const std::vector<FuncPtr>& funcs, const SizeEstimate& sizes
     if (!is_at_root(*f)) continue;
     for (int s = 1; s < f->stage_count(); ++s) {
       const auto planes = planes_of(*f, f->stage(s), memory);
-      if (iterations_of(f->stage(s), planes) >= many_streams && runs_row_by_row(*f, f->stage(s)))
+      if (iterations_of(f->stage(s), planes) >= planning::prefetched_streams &&
+          runs_row_by_row(*f, f->stage(s)))
         move_out(f, s, planes);
     }
   }

@@ -11,6 +11,7 @@
 #include "autoschedule/inlined_reads.h"
 #include "autoschedule/long_sums.h"
 #include "autoschedule/loop_order.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/read_estimate.h"
 #include "frontend/language/func.h"
@@ -28,14 +29,10 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr double a_cycle = 2;       // loads, and operations
-constexpr double gathered = 2;      // loads that a lane takes, and operations that insert it
-constexpr double add_latency = 4;   // cycles from one operation of a partial result to the next
 constexpr double of_an_end = 16;    // cycles that combine the lanes of a partial result
 constexpr double of_a_tuple = 5;    // cycles that combine one lane with the others
 constexpr double worth_rows = 0.7;  // of the cycles of vectors of elements
 constexpr double as_good = 1.05;    // of the cycles: fewer lanes are preferred
-constexpr double worth_threads = 20000;  // cycles
 constexpr double unknown_extent = 1024;
 constexpr int most_vectors = 4;  // of a row
 
@@ -88,13 +85,13 @@ double loads_of(const Call& call, const std::string& var, double lanes, double w
   const auto moves = [&](const Expr& e) { return uses_variable(e, var); };
   const size_t row = innermost_dimension(call);
   for (size_t d = 0; d < call.args.size(); ++d) {
-    if (d != row && moves(call.args[d])) return gathered * lanes;
+    if (d != row && moves(call.args[d])) return planning::core.gather_lane_operations * lanes;
   }
   if (call.args.empty() || !moves(call.args[row])) return 1;
   const auto form = analysis::decompose(unclamped(call.args[row], moves), {var});
-  if (!form) return gathered * lanes;
+  if (!form) return planning::core.gather_lane_operations * lanes;
   const auto step = static_cast<double>(std::abs(form->coefficients[0].second));
-  return std::min(gathered * lanes, whole * std::max(step, 1.0));
+  return std::min(planning::core.gather_lane_operations * lanes, whole * std::max(step, 1.0));
 }
 
 // What an iteration of an update takes, with what is inlined into it.
@@ -119,9 +116,10 @@ class Iteration {
     for (const Call* read : reads_) {
       const double of_read = var.empty() ? 1 : loads_of(*read, var, lanes, registers);
       loads += of_read;
-      if (!var.empty() && of_read >= gathered * lanes) inserts += of_read;
+      if (!var.empty() && of_read >= planning::core.gather_lane_operations * lanes)
+        inserts += of_read;
     }
-    return std::max(loads, registers * operations_ + inserts) / a_cycle;
+    return std::max(loads, registers * operations_ + inserts) / planning::core.loads_per_cycle;
   }
 
  private:
@@ -141,26 +139,27 @@ class Iteration {
 // Cycles of one element of the result.
 class RowCosts {
  public:
-  RowCosts(const FuncContents& f, const Definition& update, int lanes, const VectorUnit& unit,
-           const SizeEstimate& sizes)
+  RowCosts(const FuncContents& f, const Definition& update, int lanes,
+           const planning::Machine& machine, const SizeEstimate& sizes)
       : f_(f), update_(update), iteration_(f, update), lanes_(lanes), sizes_(sizes) {
     const double bytes = static_cast<double>(lanes) * bits_of_values(update.values) / 8.0;
-    registers_ = std::max(1.0, bytes / static_cast<double>(unit.register_bytes));
+    registers_ = std::max(1.0, bytes / static_cast<double>(machine.vector_bytes));
     for (const ReductionVariable& r : update.rvars) terms_ *= extent_of(r);
   }
 
   double of_elements() const {
     if (f_.args.empty() || !is_pure_position(f_, update_, 0))
-      return terms_ * std::max(add_latency, iteration_.cycles("", 1, 1));
+      return terms_ * std::max(planning::core.float_latency, iteration_.cycles("", 1, 1));
     const double a_vector =
-        std::max(add_latency, iteration_.cycles(f_.args[0], lanes_, registers_));
+        std::max(planning::core.float_latency, iteration_.cycles(f_.args[0], lanes_, registers_));
     const double extent = static_cast<double>(sizes_.extent(f_, 0).value_or(lanes_));
     return terms_ * a_vector / std::clamp<double>(extent, 1, lanes_);
   }
 
   double of_row(const ReductionVariable& r, int lanes, bool is_tuple) const {
     const double extent = std::max(extent_of(r), 1.0), registers = registers_ * lanes / lanes_;
-    const double a_vector = std::max(add_latency, iteration_.cycles(r.var, lanes, registers));
+    const double a_vector =
+        std::max(planning::core.float_latency, iteration_.cycles(r.var, lanes, registers));
     const double end = is_tuple ? of_a_tuple * lanes : of_an_end + registers;
     return terms_ / extent * std::ceil(extent / lanes) * a_vector + end;
   }
@@ -202,11 +201,11 @@ void factor_lanes(const FuncPtr& f, int index, const RVar& lane, int lanes) {
 }  // namespace
 
 std::optional<RowReduction> row_reduction(const FuncContents& f, const Definition& update,
-                                          int lanes, const VectorUnit& unit,
+                                          int lanes, const planning::Machine& machine,
                                           const SizeEstimate& sizes) {
   if (!stays_in_place(f, update)) return std::nullopt;
   const bool is_tuple = update.values.size() > 1;
-  const RowCosts costs(f, update, lanes, unit, sizes);
+  const RowCosts costs(f, update, lanes, machine, sizes);
   const double elements = elements_of(f, update, sizes);
   std::optional<RowReduction> best;
   double least = costs.of_elements() * worth_rows * as_good;
@@ -215,7 +214,7 @@ std::optional<RowReduction> row_reduction(const FuncContents& f, const Definitio
       const double cycles = costs.of_row(r, n, is_tuple);
       if (cycles * as_good >= least) continue;
       least = cycles;
-      best = RowReduction{r.var, n, cycles * elements < worth_threads};
+      best = RowReduction{r.var, n, cycles * elements < planning::launch_cycles};
     }
   }
   const bool is_legal =

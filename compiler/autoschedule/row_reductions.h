@@ -42,7 +42,7 @@ struct RowReduction {
 // operations a cycle, and each register of partial results takes an operation every four cycles. Unknown extents count
 // as long.
 std::optional<RowReduction> row_reduction(const FuncContents& f, const Definition& update,
-                                          int lanes, const VectorUnit& unit,
+                                          int lanes, const planning::Machine& machine,
                                           const SizeEstimate& sizes);
 
 // Vectorizes the loop along rows, and moves the loops of the reduction inside of those over elements. Blocks become a

@@ -9,6 +9,7 @@
 #include "analysis/linear.h"
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/inlined_reads.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
@@ -22,7 +23,6 @@ namespace {
 
 // Rows that hide the latency of a multiplication and an addition, and fill a vector of functions.
 constexpr int64_t most_rows = 8, least_rows = 4;
-constexpr int64_t few_tasks = 8;
 // Operations of an element from which a vector saves more than loads and stores with a stride cost, and from which the
 // operations of more rows weigh more than their places in a cache.
 constexpr double vectors_pay = 6, rows_pay = 16;
@@ -71,7 +71,8 @@ std::optional<size_t> dimension_of_rows(const FuncContents& f, const Definition&
 
 // Fewer rows at once where there would be few tasks.
 int64_t rows_of_task(int64_t extent, int64_t most, int64_t other_tasks) {
-  while (most > least_rows && (extent + most - 1) / most * other_tasks < few_tasks) most /= 2;
+  while (most > least_rows && (extent + most - 1) / most * other_tasks < planning::reference_tasks)
+    most /= 2;
   return std::min(extent, most);
 }
 
@@ -103,7 +104,8 @@ std::optional<RowChains> row_chains(const FuncContents& f, const Definition& upd
   int64_t other_tasks = 1;
   for (size_t d = 0; d < f.args.size(); ++d) {
     if (d != *dimension && is_pure_position(f, update, d))
-      other_tasks *= std::min(sizes.extent(f, d).value_or(few_tasks), few_tasks);
+      other_tasks *= std::min(sizes.extent(f, d).value_or(planning::reference_tasks),
+                              planning::reference_tasks);
   }
   RowChains result = chains_of(f, update, sizes.extent(f, *dimension), other_tasks);
   result.dimension = *dimension;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "autoschedule/cut_reductions.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/row_readers.h"
 #include "frontend/language/func.h"
@@ -17,8 +18,7 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int sweep_lanes = 16;
-constexpr int64_t most_of_a_row = 512 << 10;  // bytes, that stay in the cache of a core
+constexpr int64_t most_of_a_row = planning::second_cache_bytes / 2;  // bytes
 
 // Stages in one loop, and what is computed in it for them, consumers first.
 struct RowSweep {
@@ -42,7 +42,7 @@ bool needs(const FuncPtr& f, const FuncPtr& other) {
 // The longest dimension but that of vectors.
 std::optional<size_t> row_dimension(const FuncContents& f, const SizeEstimate& sizes) {
   std::optional<size_t> row;
-  int64_t most = sizes.machine().enough_tasks - 1;
+  int64_t most = sizes.machine().enough_tasks() - 1;
   for (size_t d = 1; d < f.args.size(); ++d) {
     const int64_t extent = sizes.extent(f, d).value_or(0);
     if (extent <= most) continue;
@@ -80,7 +80,7 @@ class SweepFinder {
   bool may_move(const FuncPtr& f) const {
     const bool is_output = std::find(outputs_.begin(), outputs_.end(), f) != outputs_.end();
     return !is_output && f->is_pure() && !f->is_extern() && may_schedule(f) &&
-           sizes_.bytes(*f) >= sizes_.machine().more_than_caches;
+           sizes_.bytes(*f) >= sizes_.machine().last_cache_bytes();
   }
 
   // What is computed in the loops of another is no reader of its own.
@@ -153,7 +153,7 @@ class SweepScheduler {
     for (size_t i = 1; i < stages.size(); ++i) stages[i].compute_with(host, Var(row_));
     for (const FuncPtr& f : sweep_.inside) {
       Func(f).compute_at(retrograde::LoopLevel(Func(host.function()), Var(row_), host.index()));
-      vectorize(Stage(f, 0), Var(f->args[0]), sweep_lanes, TailStrategy::GuardWithIf);
+      vectorize(Stage(f, 0), Var(f->args[0]), planning::schedule_lanes, TailStrategy::GuardWithIf);
     }
   }
 
@@ -200,7 +200,7 @@ class SweepScheduler {
     order.push_back(Var(r.row));
     Func(r.func).compute_root();
     stage.reorder(order).rename(Var(r.row), Var(row_)).parallel(Var(row_));
-    vectorize(stage, Var(r.func->args[0]), sweep_lanes, TailStrategy::GuardWithIf);
+    vectorize(stage, Var(r.func->args[0]), planning::schedule_lanes, TailStrategy::GuardWithIf);
     return stage;
   }
 
@@ -216,10 +216,10 @@ class SweepScheduler {
         order.push_back(VarOrRVar(loop.var, loop.is_reduction));
     }
     rows.compute_root().parallel(Var(rows.args().back()));
-    vectorize(Stage(rows.function(), 0), lane, sweep_lanes, TailStrategy::Auto);
+    vectorize(Stage(rows.function(), 0), lane, planning::schedule_lanes, TailStrategy::Auto);
     order.push_back(Var(row_));
     rows.update().fuse(step, part, Var(row_)).reorder(order).parallel(Var(row_));
-    vectorize(rows.update(), lane, sweep_lanes, TailStrategy::GuardWithIf);
+    vectorize(rows.update(), lane, planning::schedule_lanes, TailStrategy::GuardWithIf);
     compute_blocks(r.block, rows.function(), order[1]);
     add_rows(r.func, lane, part);
     return Stage(rows.function(), 1);
@@ -231,14 +231,14 @@ class SweepScheduler {
     const Var lane(block->args[0]);
     std::vector<VarOrRVar> order{lane};
     for (const ReductionVariable& r : block->updates[0].rvars) order.push_back(RVar(r.var));
-    vectorize(Stage(block, 0), lane, sweep_lanes, TailStrategy::GuardWithIf);
+    vectorize(Stage(block, 0), lane, planning::schedule_lanes, TailStrategy::GuardWithIf);
     Stage(block, 1).reorder(order);
-    vectorize(Stage(block, 1), lane, sweep_lanes, TailStrategy::GuardWithIf);
+    vectorize(Stage(block, 1), lane, planning::schedule_lanes, TailStrategy::GuardWithIf);
   }
 
   static void add_rows(const FuncPtr& parts, const Var& lane, const Var& part) {
     Func(parts).compute_root().parallel(part);
-    vectorize(Stage(parts, 0), lane, sweep_lanes, TailStrategy::Auto);
+    vectorize(Stage(parts, 0), lane, planning::schedule_lanes, TailStrategy::Auto);
     Stage sum(parts, 1);
     std::vector<VarOrRVar> order{lane};
     for (const Dim& loop : parts->updates[0].schedule.dims) {
@@ -248,7 +248,7 @@ class SweepScheduler {
       if (arg != lane.name()) order.push_back(Var(arg));
     }
     sum.reorder(order).parallel(part);
-    vectorize(sum, lane, sweep_lanes, TailStrategy::GuardWithIf);
+    vectorize(sum, lane, planning::schedule_lanes, TailStrategy::GuardWithIf);
   }
 };
 
@@ -257,7 +257,7 @@ class SweepScheduler {
 void sweep_rows(const std::vector<FuncPtr>& outputs, std::vector<FuncPtr>& stored,
                 const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes) {
   const bool has_large = std::any_of(stored.begin(), stored.end(), [&](const FuncPtr& f) {
-    return f->is_pure() && sizes.bytes(*f) >= sizes.machine().more_than_caches;
+    return f->is_pure() && sizes.bytes(*f) >= sizes.machine().last_cache_bytes();
   });
   if (!has_large) return;
   for (const RowSweep& sweep : SweepFinder(outputs, stored, but, sizes).find())

@@ -5,6 +5,7 @@
 
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/inlined_reads.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/only_reader.h"
 #include "frontend/language/func.h"
@@ -16,8 +17,6 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-// Below this number of operations of elements, waking other threads takes as long as the loop.
-constexpr double least_operations = 1 << 19;
 constexpr int64_t least_piece = 64, most_piece = 512;  // vectors
 
 // The lanes of the vectors of a stage whose only loop runs over these.
@@ -48,9 +47,10 @@ void run_in_pieces(const FuncPtr& f, int stage, const SizeEstimate& sizes) {
   const auto lanes = lanes_of_only_loop(*f, definition);
   const auto extent = lanes ? sizes.extent(*f, 0) : std::nullopt;
   if (!extent || read_elsewhere(*f, definition).defined()) return;
-  const int64_t tasks = sizes.machine().enough_tasks, vectors = (*extent + *lanes - 1) / *lanes;
+  const int64_t tasks = sizes.machine().enough_tasks(), vectors = (*extent + *lanes - 1) / *lanes;
   if (vectors < 2 * least_piece ||
-      static_cast<double>(*extent) * operations_of_row(*f, definition, sizes) < least_operations)
+      static_cast<double>(*extent) * operations_of_row(*f, definition, sizes) <
+          planning::launch_operations)
     return;
   const int64_t each = std::clamp((vectors + tasks - 1) / tasks, least_piece, most_piece);
   const Var row(f->args[0]), pieces(new_loop(*f, stage, "pieces"));

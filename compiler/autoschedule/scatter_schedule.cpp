@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "frontend/language/func.h"
 #include "frontend/language/rdom.h"
@@ -16,13 +17,12 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int most_lanes = 16;
 constexpr int64_t least_lanes = 4;  // of a dimension that is worth vectors
 constexpr int64_t few_values = 4;   // iterations that are unrolled
 
 // Of a dimension of so many elements.
 int lanes_for(int64_t extent) {
-  int width = most_lanes;
+  int width = planning::schedule_lanes;
   while (width > std::max<int64_t>(extent, 1)) width /= 2;
   return width;
 }
@@ -235,7 +235,7 @@ void schedule_sum_of_parts(const FuncPtr& f, const std::vector<size_t>& layout,
                            const SizeEstimate& sizes) {
   std::vector<Var> dims;
   for (const size_t d : layout) dims.push_back(Var(f->args[d]));
-  const int width = lanes_for(sizes.extent(*f, layout[0]).value_or(most_lanes));
+  const int width = lanes_for(sizes.extent(*f, layout[0]).value_or(planning::schedule_lanes));
   Func(f).reorder_storage(dims);
   for (int s = 0; s < f->stage_count(); ++s) {
     Stage stage(f, s);
@@ -256,7 +256,7 @@ const ReductionVariable* loop_of_lanes(const Definition& update) {
   for (const ReductionVariable& r : update.rvars) {
     if (r.numbers_points || is_tap(update, r)) continue;
     const auto extent = as_const_int(r.extent);
-    if (!extent || *extent >= most_lanes) return inside <= few_values ? &r : nullptr;
+    if (!extent || *extent >= planning::schedule_lanes) return inside <= few_values ? &r : nullptr;
     inside *= std::max<int64_t>(*extent, 1);
   }
   return nullptr;
@@ -281,7 +281,7 @@ void schedule_scatter_in_order(const FuncContents& f, int index, Stage& stage) {
   append(order, inside);
   append(order, outside);
   stage.allow_race_conditions()
-      .split(all, all, lane, most_lanes, TailStrategy::GuardWithIf)
+      .split(all, all, lane, planning::schedule_lanes, TailStrategy::GuardWithIf)
       .reorder(order)
       .vectorize(lane);
   for (const VarOrRVar& loop : inside) stage.unroll(loop);

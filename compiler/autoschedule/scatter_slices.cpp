@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "autoschedule/inlined_reads.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/read_estimate.h"
 #include "frontend/language/func.h"
@@ -18,10 +19,9 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int row_lanes = 16;             // of the reader's vectors
-constexpr int narrowest = 4;              // lanes over which the cost of a place is spread
-constexpr int64_t least_slices = 8;       // iterations of loops that run in parallel
-constexpr int64_t slice_bytes = 1 << 20;  // what a near cache holds
+constexpr int narrowest = 4;  // lanes over which the cost of a place is spread
+constexpr int64_t least_slices =
+    planning::reference_tasks;  // iterations of loops that run in parallel
 
 // Who reads what, through what is computed inline: all reads of each Func that is not.
 class Reads {
@@ -85,7 +85,7 @@ std::optional<ScatterSlices> slices_of(const FuncPtr& scatter, ScatterLanes lane
                                        const std::vector<Reads::Read>& reads,
                                        const SizeEstimate& sizes) {
   const int64_t bytes = sizes.bytes(*scatter);
-  if (bytes < sizes.machine().more_than_caches || reads.empty()) return std::nullopt;
+  if (bytes < sizes.machine().last_cache_bytes() || reads.empty()) return std::nullopt;
   const FuncPtr& reader = reads[0].reader;
   const bool is_only = std::all_of(reads.begin(), reads.end(),
                                    [&](const Reads::Read& r) { return r.reader == reader; });
@@ -103,7 +103,8 @@ std::optional<ScatterSlices> slices_of(const FuncPtr& scatter, ScatterLanes lane
   if (!k || *k == 0) return std::nullopt;
   slices.dimension = *k;
   int& width = slices.lanes.width;
-  while (width > narrowest && bytes / apart_slices / extent * width > slice_bytes) width /= 2;
+  while (width > narrowest && bytes / apart_slices / extent * width > planning::second_cache_bytes)
+    width /= 2;
   const int64_t count = (extent + width - 1) / width * apart_slices;
   return count >= least_slices ? std::optional(std::move(slices)) : std::nullopt;
 }
@@ -140,7 +141,7 @@ void schedule_slices(const ScatterSlices& slices) {
   Stage stage(f, 0);
   const Var x(f->args[0]), lanes(f->args[slices.dimension]);
   const Var in_row(inner_loop(*f, 0, x.name()));
-  stage.split(x, x, in_row, row_lanes, TailStrategy::GuardWithIf);
+  stage.split(x, x, in_row, planning::schedule_lanes, TailStrategy::GuardWithIf);
   const Var in_slice(inner_loop(*f, 0, lanes.name()));
   stage.split(lanes, lanes, in_slice, slices.lanes.width, TailStrategy::GuardWithIf);
   std::vector<VarOrRVar> order{in_row, in_slice};

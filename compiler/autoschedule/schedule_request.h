@@ -4,7 +4,8 @@
 #include <set>
 #include <string>
 
-#include "autoschedule/register_tile.h"
+#include "autoschedule/machine/device.h"
+#include "autoschedule/machine/machine.h"
 #include "frontend/schedule/autoschedule_options.h"
 #include "frontend/schedule/autoscheduler.h"
 
@@ -20,9 +21,9 @@ struct ScheduleScales {
 };
 
 struct ScheduleRequest {
-  VectorUnit unit = {};
+  planning::Machine machine = {};
   AutoscheduleOptions options = {};
-  MachineParams machine = {};
+  planning::Device device = {};
   // What a search or a budget (memory_budget.h) wants computed where it is read, and what stored,
   // where that can be.
   std::set<std::string> recomputed = {}, stored = {};
@@ -35,5 +36,13 @@ struct ScheduleRequest {
 
   bool makes(Decision decision) const { return !options.without.contains(decision); }
 };
+
+// The request of a user: constants for the target, with the last cache of `params`. Their threads count unless they are
+// the generic ones or the options have some.
+ScheduleRequest request_for(const Target& target, const AutoscheduleOptions& options,
+                            const MachineParams& params = {});
+
+// The machine with the threads of the options and the scales of a search: what sizes are weighed against.
+planning::Machine machine_of(const ScheduleRequest& request);
 
 }  // namespace retrograde::autoschedule

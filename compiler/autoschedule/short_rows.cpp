@@ -7,6 +7,7 @@
 
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/inlined_reads.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/visit.h"
@@ -14,8 +15,6 @@
 namespace retrograde::autoschedule {
 
 namespace {
-
-constexpr double operations_of_a_strided_access = 2;  // for each lane
 
 // The first dimension beyond the rows that fills vectors.
 std::optional<size_t> long_dimension(const FuncContents& f, int lanes, const SizeEstimate& sizes) {
@@ -56,7 +55,7 @@ RowWork work_along(const FuncContents& f, const Definition& stage) {
 bool is_worth_turning(const RowWork& work, double extent, double lanes) {
   const double along = lanes * work.operations;
   const double across =
-      extent * (work.operations + lanes * operations_of_a_strided_access * work.accesses);
+      extent * (work.operations + lanes * planning::strided_access_operations * work.accesses);
   return across * 2 < along;
 }
 
@@ -83,7 +82,7 @@ bool schedule_short_rows(const FuncContents& f, int index, Stage& stage, int lan
   }
   stage.reorder(order);
   int64_t tasks = 1;
-  for (size_t i = order.size(); i-- > 3 && tasks < sizes.machine().enough_tasks;) {
+  for (size_t i = order.size(); i-- > 3 && tasks < sizes.machine().enough_tasks();) {
     const auto arg = std::ranges::find(f.args, order[i].name()) - f.args.begin();
     const int64_t count = sizes.extent(f, static_cast<size_t>(arg)).value_or(lanes);
     stage.parallel(order[i]);

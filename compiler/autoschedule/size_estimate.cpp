@@ -98,7 +98,7 @@ Scope<Interval> scope_of(const FuncContents& f, const Definition& stage, const B
 
 }  // namespace
 
-SizeEstimate::SizeEstimate(const std::vector<FuncPtr>& outputs, const MachineLimits& machine)
+SizeEstimate::SizeEstimate(const std::vector<FuncPtr>& outputs, const planning::Machine& machine)
     : machine_(machine) {
   const Scope<Interval> parameters = parameter_scope(outputs);
   const std::vector<FuncPtr> order = topological_order(outputs);

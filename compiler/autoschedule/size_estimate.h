@@ -9,23 +9,10 @@
 #include <vector>
 
 #include "analysis/interval.h"
+#include "autoschedule/machine/machine.h"
 #include "graph/function.h"
 
 namespace retrograde::autoschedule {
-
-// What sizes are weighed against.
-struct MachineLimits {
-  // Iterations of loops that run in parallel: no thread of a few waits long for the others.
-  int64_t enough_tasks = 8;
-  // More bytes than stay in the caches near a core.
-  int64_t more_than_caches = 16 << 20;
-  // Less stays in the caches on its way from one loop to the next.
-  int64_t passes_caches = 1 << 20;
-  // What one task may hold of what it computes: half of a cache near a core.
-  int64_t block_bytes = 384 << 10;
-  // Of the rows of a strip, beside those that the rules choose.
-  double strip_rows = 1;
-};
 
 // The ends that are constants.
 Interval constant_ends(const Interval& i);
@@ -33,7 +20,7 @@ Interval constant_ends(const Interval& i);
 class SizeEstimate {
  public:
   SizeEstimate() = default;  // nothing is known
-  explicit SizeEstimate(const std::vector<FuncPtr>& outputs, const MachineLimits& machine = {});
+  explicit SizeEstimate(const std::vector<FuncPtr>& outputs, const planning::Machine& machine = {});
   // Elements of a dimension that are computed; nullopt: not known.
   std::optional<int64_t> extent(const FuncContents& f, size_t dimension) const;
   // Between which elements these lie; unbounded: not known.
@@ -42,10 +29,11 @@ class SizeEstimate {
   SizeEstimate with_extent(const FuncContents& f, size_t dimension, int64_t extent) const;
   // Of all that is computed; 0 where some extent is not known.
   int64_t bytes(const FuncContents& f) const;
-  const MachineLimits& machine() const { return machine_; }
+  // What sizes are weighed against.
+  const planning::Machine& machine() const { return machine_; }
 
  private:
-  MachineLimits machine_;
+  planning::Machine machine_;
   std::unordered_map<const Symbol*, Box> boxes_;  // with constant ends; undefined: not known
 };
 

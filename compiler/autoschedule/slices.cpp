@@ -41,7 +41,7 @@ class Slicer {
     size_t left = f->args.size();
     for (auto dim = loops.dims.rbegin(); dim != loops.dims.rend(); ++dim) {
       const auto extent = extent_of(reader, *dim);
-      const bool is_enough = extent && *extent >= (result ? 2 : sizes_.machine().enough_tasks);
+      const bool is_enough = extent && *extent >= (result ? 2 : sizes_.machine().enough_tasks());
       if (!is_enough || left <= slice_dimensions || !slices_all(*f, reader, dim->var)) break;
       result = dim->var;
       --left;

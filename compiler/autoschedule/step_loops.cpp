@@ -7,6 +7,7 @@
 
 #include "analysis/linear.h"
 #include "autoschedule/cost_estimate.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/row_scans.h"
 #include "autoschedule/wavefronts.h"
@@ -29,8 +30,6 @@ constexpr size_t most_variables = 5;
 constexpr size_t most_clamps = 5;  // of an access: with more, proofs take long and seldom succeed
 constexpr int64_t least_row = 4;
 constexpr int chunk_of_row = 2048;  // elements that are a task, if a step is a single row
-// Operations that are worth the launch of a parallel loop, which takes about 10 microseconds.
-constexpr double enough_operations = 1 << 19;
 
 Names joined(Names a, const Names& b) {
   a.insert(a.end(), b.begin(), b.end());
@@ -170,7 +169,7 @@ class StepScheduler {
  private:
   const Definition& update() const { return f_.stage(index_); }
   const std::string& row() const { return variables_.along_row; }
-  bool wants_tasks() const { return tasks_ < sizes_.machine().enough_tasks; }
+  bool wants_tasks() const { return tasks_ < sizes_.machine().enough_tasks(); }
 
   void reorder(const Names& loops) {
     std::vector<VarOrRVar> order;
@@ -182,9 +181,9 @@ class StepScheduler {
     double operations = operations_of_values(update().values, [](const Call&) { return 1.0; });
     for (const std::string& loop : loops) {
       const auto extent = extent_of(update(), loop);
-      operations *= extent ? static_cast<double>(*extent) : enough_operations;
+      operations *= extent ? static_cast<double>(*extent) : planning::launch_operations;
     }
-    return operations >= enough_operations;
+    return operations >= planning::launch_operations;
   }
 
   // The outermost, until these are enough tasks.
@@ -195,7 +194,7 @@ class StepScheduler {
       const auto arg = std::ranges::find(f_.args, loop->var);
       const auto extent = sizes_.extent(f_, static_cast<size_t>(arg - f_.args.begin()));
       stage_.parallel(Var(loop->var));
-      tasks_ *= extent.value_or(sizes_.machine().enough_tasks);
+      tasks_ *= extent.value_or(sizes_.machine().enough_tasks());
     }
   }
 
@@ -224,7 +223,7 @@ class StepScheduler {
     stage_.vectorize(RVar(vector));
     if (loops.empty()) return;
     stage_.parallel(RVar(row()));
-    tasks_ = sizes_.machine().enough_tasks;
+    tasks_ = sizes_.machine().enough_tasks();
   }
 
   // Scans along rows that a reduction variable numbers: several rows at once (row_scans.h).
@@ -269,7 +268,7 @@ class StepScheduler {
     for (auto loop = loops.rbegin(); loop != loops.rend() && wants_tasks(); ++loop) {
       if (*loop == row()) continue;
       stage_.parallel(RVar(*loop));
-      tasks_ *= extent_of(update(), *loop).value_or(sizes_.machine().enough_tasks);
+      tasks_ *= extent_of(update(), *loop).value_or(sizes_.machine().enough_tasks());
     }
   }
 

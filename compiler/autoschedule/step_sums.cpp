@@ -3,6 +3,7 @@
 #include <optional>
 #include <unordered_map>
 
+#include "autoschedule/machine/reference.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/equal.h"
 #include "ir/visit.h"
@@ -11,9 +12,9 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int64_t large_bytes = int64_t{1}
-                                << 23;  // of all steps; those of lower/loops/fold_steps.cpp
-constexpr int64_t most_step_bytes = int64_t{1} << 21;  // of one step
+// Of all steps, and of one: as in lower/loops/fold_steps.cpp.
+constexpr int64_t large_bytes = planning::many_step_bytes;
+constexpr int64_t most_step_bytes = planning::largest_second_cache_bytes;
 
 // The dimension along which the last update of a Func steps: it reads other elements of it than it stores.
 std::optional<size_t> step_dimension(const FuncContents& f) {

@@ -8,6 +8,7 @@
 #include "autoschedule/choices.h"
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/large_bodies.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/read_estimate.h"
 #include "autoschedule/running_sums.h"
 #include "graph/definitions/element_values.h"
@@ -28,7 +29,7 @@ constexpr int64_t unknown_iterations = 8;
 // together more than it takes to bring the value to memory and back.
 bool is_worth_storing(const StorageUse& use, double free_operations) {
   return use.reads > 1.5 && use.operations > free_operations &&
-         (use.reads - 1) * use.operations > way_to_memory * use.share_of_way;
+         (use.reads - 1) * use.operations > planning::memory_trip_operations * use.share_of_way;
 }
 
 // Each read would compute all that it chooses from.

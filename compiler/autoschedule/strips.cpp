@@ -10,6 +10,7 @@
 
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/inlined_reads.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/new_loop.h"
 #include "autoschedule/only_reader.h"
 #include "autoschedule/read_window.h"
@@ -27,8 +28,8 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr int64_t unknown_extent = 1024;  // of rows and columns of an image
-constexpr int64_t enough_strips = 16;     // each is a task
+constexpr int64_t unknown_extent = 1024;                          // of rows and columns of an image
+constexpr int64_t enough_strips = 2 * planning::reference_tasks;  // each is a task
 constexpr size_t most_members = 8;
 // What several of a group read, as a sum reads all steps of a chain, and a part of such a sum. If it did not join, no Func behind
 // it would either, and the images of all would be held until the group has run: so it may have more
@@ -36,7 +37,7 @@ constexpr size_t most_members = 8;
 // So may a group with sums: what these read of many planes, a strip at a time, stays in such a cache at
 // least.
 constexpr size_t most_with_shared = 32;
-constexpr double shared_window_bytes = 4 << 20;
+constexpr double shared_window_bytes = planning::third_cache_bytes / 4;
 constexpr double least_rows = 8, rows_a_halo = 8;
 // More take longer than the way to memory: matrix products and convolutions over many channels live
 // by their tiles over rows.
@@ -128,7 +129,8 @@ double operations_of_all_stages(const FuncContents& f) {
 
 class Group {
  public:
-  Group(FuncPtr last, const SizeEstimate& sizes) : last_(std::move(last)), sizes_(sizes) {
+  Group(FuncPtr last, const SizeEstimate& sizes, double row_scale)
+      : last_(std::move(last)), sizes_(sizes), row_scale_(row_scale) {
     for (size_t d = 0; d < last_->args.size(); ++d) own_.push_back({d, 1, 0, 0, 0, {}});
   }
 
@@ -150,7 +152,7 @@ class Group {
     windows_[f.get()] = *windows;
     members_.push_back(f);
     const auto loops = loops_of_all(is_large ? shared_window_bytes
-                                             : static_cast<double>(sizes_.machine().block_bytes));
+                                             : static_cast<double>(sizes_.machine().task_bytes()));
     if (loops && pays(*f, *windows, *loops) &&
         reads_shared_along(*f, cut_dimensions(*windows, *loops)) <= most_shared_reads) {
       loops_ = loops;
@@ -305,10 +307,10 @@ class Group {
       halo = std::max(halo, (along->high - along->low) / along->scale);
     }
     const double all = static_cast<double>(sizes_.extent(*last_, row).value_or(unknown_extent));
-    const int64_t strips = has_sums() ? sizes_.machine().enough_tasks : enough_strips;
+    const int64_t strips = has_sums() ? sizes_.machine().enough_tasks() : enough_strips;
     const double most = std::max(least_rows, all * static_cast<double>(tasks) / strips);
     const double rows = has_sums() ? most : std::clamp(halo * rows_a_halo, least_rows, most);
-    return static_cast<int64_t>(std::ceil(rows * sizes_.machine().strip_rows));
+    return static_cast<int64_t>(std::ceil(rows * row_scale_));
   }
 
   double bytes_of_windows(const StripLoops& loops) const {
@@ -333,11 +335,12 @@ class Group {
   // What is computed twice at borders, beside the way to memory.
   bool pays(const FuncContents& f, const Windows& windows, const StripLoops& loops) const {
     const int64_t bytes = sizes_.bytes(f);
-    if (bytes > 0 && bytes < sizes_.machine().passes_caches) return false;
+    if (bytes > 0 && bytes < sizes_.machine().near_cache_bytes()) return false;
     const Along& row = *moved_by(windows, loops.row);
     const double own = static_cast<double>(loops.rows) * row.scale;
     const double twice = std::max(0.0, row.size() - row.scale) / own;
-    return operations_of_all_stages(f) * twice < way_to_memory * (1 + planes_behind(f));
+    return operations_of_all_stages(f) * twice <
+           planning::memory_trip_operations * (1 + planes_behind(f));
   }
 
   // A sum is not the last of a group: if it did not join, what it reads would go to memory, too. For
@@ -365,6 +368,7 @@ class Group {
 
   const FuncPtr last_;
   const SizeEstimate& sizes_;
+  const double row_scale_;
   Windows own_;
   std::vector<FuncPtr> members_;
   std::unordered_map<const Symbol*, Windows> windows_;
@@ -407,8 +411,14 @@ class Grouping {
  public:
   // `but`: none of these, as the last of a group neither.
   Grouping(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& given,
-           const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes)
-      : given_(given), readers_(outputs), hosts_(outputs, given), but_(but), sizes_(sizes) {}
+           const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes,
+           double row_scale)
+      : given_(given),
+        readers_(outputs),
+        hosts_(outputs, given),
+        but_(but),
+        sizes_(sizes),
+        row_scale_(row_scale) {}
 
   // `apart`: Funcs that join no others.
   std::vector<std::unique_ptr<Group>> groups(const std::unordered_set<const Symbol*>& apart) {
@@ -422,7 +432,7 @@ class Grouping {
       Group* group = is_alone ? nullptr : group_that_reads(reads);
       if (!group || !group->join(f, reads)) {
         if (!f->is_pure()) continue;
-        groups.push_back(std::make_unique<Group>(f, sizes_));
+        groups.push_back(std::make_unique<Group>(f, sizes_, row_scale_));
         group = groups.back().get();
       }
       group_of_[f.get()] = group;
@@ -468,6 +478,7 @@ class Grouping {
   const Readers hosts_;
   const std::unordered_set<const Symbol*>& but_;
   const SizeEstimate& sizes_;
+  const double row_scale_;
   std::unordered_map<const Symbol*, Group*> group_of_;
 };
 
@@ -475,8 +486,8 @@ class Grouping {
 
 void compute_in_strips(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& given,
                        const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes,
-                       const GiveLoopsOfRows& give_rows) {
-  Grouping grouping(outputs, given, but, sizes);
+                       double row_scale, const GiveLoopsOfRows& give_rows) {
+  Grouping grouping(outputs, given, but, sizes, row_scale);
   auto groups = grouping.groups({});
   const auto apart = grouping.that_keep_others(groups);
   if (!apart.empty()) groups = grouping.groups(apart);

@@ -50,7 +50,7 @@ std::optional<std::vector<BlockLoop>> block_loops(const FuncContents& f, const R
                                                   const SizeEstimate& sizes) {
   const FuncContents& by = *reader.func;
   int64_t block_bytes = sizes.bytes(f), tasks = 1;
-  if (block_bytes < sizes.machine().passes_caches) return std::nullopt;
+  if (block_bytes < sizes.machine().near_cache_bytes()) return std::nullopt;
   std::vector<BlockLoop> result;
   for (const TileLoop& loop : tile_loops(f, f.updates[0])) {
     const bool is_part = loop.loop.var != loop.dimension;
@@ -70,7 +70,7 @@ std::optional<std::vector<BlockLoop>> block_loops(const FuncContents& f, const R
     tasks *= blocks;
     block_bytes /= std::max<int64_t>(1, blocks);
     result.push_back(block);
-    if (block_bytes <= sizes.machine().block_bytes && tasks >= sizes.machine().enough_tasks)
+    if (block_bytes <= sizes.machine().task_bytes() && tasks >= sizes.machine().enough_tasks())
       return result;
     if (hosted.are_in(f, block.var)) return std::nullopt;
   }

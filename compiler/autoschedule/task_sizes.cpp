@@ -1,7 +1,6 @@
 #include "autoschedule/task_sizes.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "frontend/language/rdom.h"
 #include "frontend/schedule/stage.h"
@@ -21,25 +20,7 @@ void keep_parallel(const FuncPtr& f, int stage, int kept) {
 
 }  // namespace
 
-int threads_of(const ScheduleRequest& request) {
-  if (request.options.threads > 0) return request.options.threads;
-  return request.machine == MachineParams::generic() ? 0 : std::max(request.machine.parallelism, 0);
-}
-
-MachineLimits limits_of(const ScheduleRequest& request) {
-  MachineLimits limits;
-  limits.enough_tasks = std::max(limits.enough_tasks, tasks_a_thread * threads_of(request));
-  const auto scaled = [](int64_t number, int doublings) {
-    return std::max<int64_t>(static_cast<int64_t>(std::ldexp(number, doublings)), 1);
-  };
-  const ScheduleScales& scales = request.scales;
-  limits.enough_tasks = scaled(limits.enough_tasks, scales.tasks);
-  limits.more_than_caches =
-      static_cast<int64_t>(std::min<uint64_t>(request.machine.last_level_cache_size, INT64_MAX));
-  if (scales.caches != 0) limits.more_than_caches = scaled(limits.more_than_caches, scales.caches);
-  limits.strip_rows = std::ldexp(1.0, scales.strip_rows);
-  return limits;
-}
+int threads_of(const ScheduleRequest& request) { return std::max(request.options.threads, 0); }
 
 TaskSizes::TaskSizes(const std::vector<FuncPtr>& order) {
   for (const FuncPtr& f : order) {

@@ -14,10 +14,8 @@
 
 namespace retrograde::autoschedule {
 
-inline constexpr int64_t tasks_a_thread = 4;
 // 0: not said.
 int threads_of(const ScheduleRequest& request);
-MachineLimits limits_of(const ScheduleRequest& request);
 
 class TaskSizes {
  public:

@@ -59,8 +59,9 @@ class Chain {
     if (!moved_by) return;
     if (is_at_root(*f)) {
       const int64_t all = sizes_.bytes(*f), block = bytes_of_block(*f, *moved_by);
-      const MachineLimits& machine = sizes_.machine();
-      if (!may_move || all < machine.passes_caches || bytes_ + block > machine.block_bytes) return;
+      const planning::Machine& machine = sizes_.machine();
+      if (!may_move || all < machine.near_cache_bytes() || bytes_ + block > machine.task_bytes())
+        return;
       bytes_ += block;
       members_.push_back(f);
     }
@@ -68,7 +69,7 @@ class Chain {
   }
 
   void give() const {
-    if (members_.empty() || tasks() < sizes_.machine().enough_tasks) return;
+    if (members_.empty() || tasks() < sizes_.machine().enough_tasks()) return;
     const auto loop = [&](size_t d) { return Var(last_->args[d]); };
     run_serially(last_);
     for (const size_t d : loops_.dimensions) Stage(last_, 0).parallel(loop(d));

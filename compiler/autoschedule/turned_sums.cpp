@@ -6,6 +6,7 @@
 
 #include "analysis/linear.h"
 #include "autoschedule/long_sums.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/phase_loops.h"
 #include "autoschedule/read_estimate.h"
 #include "graph/definitions/own_reads.h"
@@ -25,8 +26,8 @@ constexpr double few_uses = 16;            // that pay where vectors would be ne
 constexpr int64_t most_rows = 8;           // of a side, without private lanes
 constexpr int64_t least_terms = 63,
                   least_terms_of_block = 15;  // more are added without private lanes
-constexpr double least_products = 1 << 20;    // of all of these sums: copies are loops of their own
-constexpr double loads_a_cycle = 2, products_a_cycle = 2, latency = 4;
+constexpr double least_products =
+    2 * planning::launch_operations;   // of all of these sums: copies are loops of their own
 constexpr double far_loads = 2;        // for a vector that comes from a far cache
 constexpr double worth_turning = 1;    // cycles for a product of a register
 constexpr double least_filled = 0.75;  // of the elements of tiles
@@ -144,9 +145,12 @@ class Operands {
 // Of private sums in lanes of strided terms.
 class LaneTurner {
  public:
-  LaneTurner(const FuncContents& block, int lanes, const VectorUnit& unit,
+  LaneTurner(const FuncContents& block, int lanes, const planning::Machine& machine,
              const SizeEstimate& sizes)
-      : block_(block), lanes_(lanes), unit_(unit), operands_(block, block.updates[0], sizes) {}
+      : block_(block),
+        lanes_(lanes),
+        machine_(machine),
+        operands_(block, block.updates[0], sizes) {}
 
   std::optional<TurnedSum> find() const {
     std::optional<TurnedSum> best;
@@ -204,7 +208,7 @@ class LaneTurner {
     const int64_t extent = operands_.extent(turned.dimension);
     const int64_t bytes = lanes_ * block_.types[0].bytes();
     for (int64_t vectors = most_vectors_of_tile; vectors >= least_vectors_of_tile; --vectors) {
-      const bool fits = vectors * rows_of_tile * bytes <= unit_.accumulator_bytes;
+      const bool fits = vectors * rows_of_tile * bytes <= machine_.accumulator_bytes();
       if (extent <= 0 || extent % (vectors * lanes_) != 0 || !fits) continue;
       turned.vectors = vectors;
       turned.sides[0].size = rows_of_tile;
@@ -215,19 +219,23 @@ class LaneTurner {
 
   const FuncContents& block_;
   const int lanes_;
-  const VectorUnit& unit_;
+  const planning::Machine& machine_;
   const Operands operands_;
 };
 
 // Of sums without private lanes: the dimension and tile with the fewest cycles for each product.
 class SumTurner {
  public:
-  SumTurner(const FuncContents& sums, const Definition& update, int lanes, const VectorUnit& unit,
-            const SizeEstimate& sizes)
-      : sums_(sums), update_(update), lanes_(lanes), unit_(unit), operands_(sums, update, sizes) {
+  SumTurner(const FuncContents& sums, const Definition& update, int lanes,
+            const planning::Machine& machine, const SizeEstimate& sizes)
+      : sums_(sums),
+        update_(update),
+        lanes_(lanes),
+        machine_(machine),
+        operands_(sums, update, sizes) {
     const auto bytes = static_cast<double>(lanes * sums.types[0].bytes());
     find_bound_dimensions();
-    registers_ = std::max(1.0, bytes / static_cast<double>(unit.register_bytes));
+    registers_ = std::max(1.0, bytes / static_cast<double>(machine.vector_bytes));
   }
 
   // Whether there are many products, under conditions that load nothing.
@@ -306,7 +314,7 @@ class SumTurner {
       filled *= share_of_tiles(side.dimension, side.size);
     }
     const int64_t bytes = sums * lanes_ * sums_.types[0].bytes();
-    if (bytes > unit_.accumulator_bytes || filled < least_filled) return;
+    if (bytes > machine_.accumulator_bytes() || filled < least_filled) return;
     const double products = static_cast<double>(sums) * registers_;
     double loads = far_loads * static_cast<double>(tile.vectors) * registers_;
     for (const Call* other : operands_.reads()) {
@@ -319,7 +327,8 @@ class SumTurner {
       loads += elements;
     }
     const Cost cost{
-        std::max({loads / products / loads_a_cycle, 1 / products_a_cycle, latency / products}) /
+        std::max({loads / products / planning::core.loads_per_cycle,
+                  1 / planning::core.products_per_cycle, planning::core.float_latency / products}) /
             filled,
         loads / products};
     if (cost.cycles > worth_turning || (best_ && !(cost < least_))) return;
@@ -359,7 +368,7 @@ class SumTurner {
   const FuncContents& sums_;
   const Definition& update_;
   const int lanes_;
-  const VectorUnit& unit_;
+  const planning::Machine& machine_;
   const Operands operands_;
   std::vector<bool> is_bound_;  // by dimension
   double registers_ = 1;        // of a vector
@@ -376,21 +385,21 @@ RegisterTile TurnedSum::tile(int lanes) const {
   return result;
 }
 
-std::optional<TurnedSum> turned_lanes(const FuncContents& block, int lanes, const VectorUnit& unit,
-                                      const SizeEstimate& sizes) {
+std::optional<TurnedSum> turned_lanes(const FuncContents& block, int lanes,
+                                      const planning::Machine& machine, const SizeEstimate& sizes) {
   const bool has_lanes = block.made && block.made->lanes == lanes && !block.made->has_parts;
   if (!has_lanes || block.updates.size() != 1 || block.types.size() != 1) return std::nullopt;
-  return LaneTurner(block, lanes, unit, sizes).find();
+  return LaneTurner(block, lanes, machine, sizes).find();
 }
 
 std::optional<TurnedSum> turned_sum(const FuncContents& sums, const Definition& update, int lanes,
-                                    const VectorUnit& unit, const SizeEstimate& sizes) {
+                                    const planning::Machine& machine, const SizeEstimate& sizes) {
   const bool is_block = sums.made && sums.made->blocks > 0;
   const bool is_plain = !sums.made || (sums.made->lanes == 0 && !sums.made->has_parts);
   if (!is_plain || sums.types.size() != 1 || sums.types[0] != Float(32) ||
       !is_long_sum(sums, update, update.rvars, 1, is_block ? least_terms_of_block : least_terms))
     return std::nullopt;
-  SumTurner turner(sums, update, lanes, unit, sizes);
+  SumTurner turner(sums, update, lanes, machine, sizes);
   return turner.is_worth_copying() ? turner.find() : std::nullopt;
 }
 

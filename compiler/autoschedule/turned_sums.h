@@ -47,11 +47,11 @@ struct TurnedSum {
 };
 
 // `block` has one private sum for each of so many lanes of terms. nullopt: these are as good.
-std::optional<TurnedSum> turned_lanes(const FuncContents& block, int lanes, const VectorUnit& unit,
-                                      const SizeEstimate& sizes);
+std::optional<TurnedSum> turned_lanes(const FuncContents& block, int lanes,
+                                      const planning::Machine& machine, const SizeEstimate& sizes);
 // Of an update without private lanes, of blocks or of all terms; nullopt: other loops are as good. Whoever asks knows that
 // vectors along the first dimension of the result would be nearly empty.
 std::optional<TurnedSum> turned_sum(const FuncContents& sums, const Definition& update, int lanes,
-                                    const VectorUnit& unit, const SizeEstimate& sizes);
+                                    const planning::Machine& machine, const SizeEstimate& sizes);
 
 }  // namespace retrograde::autoschedule

@@ -5,6 +5,7 @@
 
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/inlined_reads.h"
+#include "autoschedule/machine/reference.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 
@@ -12,13 +13,8 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-// Cycles from operands to result, and from one operation to the next, of vectors that fill a register.
-constexpr double load_latency = 6, float_latency = 4;
-constexpr double division_latency = 13, division_cycles = 7;
-constexpr double root_latency = 19, root_cycles = 10;
-constexpr double function_latency = 2;  // for each of its additions
-// Instructions that run ahead of the oldest unfinished one.
-constexpr double looked_ahead = 256;
+using planning::core;
+
 // Chains are never as dense as the estimate: so many fill their gaps.
 constexpr double gaps = 1.5;
 constexpr double least_wanted = 0.38;  // for each vector
@@ -56,7 +52,7 @@ class Body {
       const bool is_product = is_sum && child.kind() == Kind::Mul && operand.varies;
       is_fused |= is_product;
       node.varies |= operand.varies;
-      node.ready = std::max(node.ready, operand.ready - (is_product ? float_latency : 0));
+      node.ready = std::max(node.ready, operand.ready - (is_product ? core.float_latency : 0));
     });
     if (node.varies) add_operation(e, node, is_fused);
     known_.emplace(e.get(), node);
@@ -67,16 +63,16 @@ class Body {
     const auto* call = e.as<Call>();
     const bool is_read = call && call->call_type != CallType::Operator;
     const double operations = operations_of(e), function = work_of(e).function_adds;
-    double latency = is_read          ? load_latency
-                     : operations > 0 ? float_latency
+    double latency = is_read          ? core.load_latency
+                     : operations > 0 ? core.float_latency
                                       : 0,
            cycles = operations;
     if (e.kind() == Kind::Div && e.type().is_float())
-      latency = division_latency, cycles = division_cycles;
+      latency = core.divide_latency, cycles = core.divide_cycles;
     else if (call && call->is_op(Op::sqrt))
-      latency = root_latency, cycles = root_cycles;
+      latency = core.sqrt_latency, cycles = core.sqrt_cycles;
     else if (function > 0)
-      latency = function_latency * function;
+      latency = core.function_latency * function;
     node.ready += latency;
     cycles_ += is_fused ? 0 : cycles;
     instructions_ += is_fused ? 0 : function > 0 ? operations : std::min(operations, 1.0);
@@ -98,7 +94,7 @@ int vectors_side_by_side(const FuncContents& f) {
   for (const Expr& root : roots) body.add(root);
   if (body.instructions() < least_instructions) return 1;
   const double wanted = gaps * body.longest_chain() / std::max(body.cycles(), 1.0) -
-                        looked_ahead / body.instructions();
+                        core.reorder_window / body.instructions();
   for (const int vectors : {4, 2}) {
     if (wanted > least_wanted * vectors && body.instructions() * vectors <= most_instructions)
       return vectors;

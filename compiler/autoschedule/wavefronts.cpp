@@ -134,7 +134,7 @@ class Skewer {
 FrontLanes front_lanes(const Definition& update) {
   const double operations = operations_of_values(update.values, [](const Call&) { return 0.0; });
   const bool in_vectors = operations >= vectors_pay;
-  return {in_vectors ? lanes : unrolled_rows, in_vectors};
+  return {in_vectors ? schedule_lanes : unrolled_rows, in_vectors};
 }
 
 bool has_wavefronts(const std::vector<FuncPtr>& outputs) {

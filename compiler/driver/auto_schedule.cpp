@@ -32,8 +32,8 @@ void schedule_all(const Pipeline& pipeline, const Target& target, const MachineP
     autoschedule::keep_graph(spec.name, outputs);
     const std::vector<FuncPtr> wrapped = apply_wrappers(outputs);
     const auto given = static_cast<std::ptrdiff_t>(schedule_log(wrapped).size());
-    autoschedule::ScheduleRequest request{autoschedule::vector_unit_of(target), spec.autoschedule,
-                                          machine};
+    autoschedule::ScheduleRequest request =
+        autoschedule::request_for(target, spec.autoschedule, machine);
     request.on_gpu = is_for_gpu(target);
     ChosenSchedule chosen = autoschedule::choose_schedule(
         wrapped, request, autoschedule::Scheduling::Everything, search_cost(request, target));

@@ -5,6 +5,7 @@
 #include "autoschedule/default_schedule.h"
 #include "autoschedule/graph_rewrites.h"
 #include "autoschedule/keep_graph.h"
+#include "autoschedule/machine/kept_machine.h"
 #include "autoschedule/stored_funcs.h"
 #include "autoschedule/task_sizes.h"
 #include "diagnostics/large_stack.h"
@@ -15,7 +16,6 @@
 #include "graph/directives/schedule_log.h"
 #include "graph/directives/wrappers.h"
 #include "lower/lower.h"
-#include "tuning/machine.h"
 #include "tuning/predict.h"
 
 namespace retrograde::driver {
@@ -55,7 +55,7 @@ ChosenSchedule schedule_graph(const std::vector<FuncPtr>& outputs, const Schedul
 }  // namespace
 
 ChosenSchedule schedule(const PipelineSpec& pipeline, const Target& target, bool wants_runner_up) {
-  const ScheduleRequest request{autoschedule::vector_unit_of(target), pipeline.autoschedule, {}};
+  const ScheduleRequest request = autoschedule::request_for(target, pipeline.autoschedule);
   autoschedule::keep_graph(pipeline.name, pipeline.outputs);
   ChosenSchedule result;
   run_on_large_stack([&] {
@@ -67,9 +67,9 @@ ChosenSchedule schedule(const PipelineSpec& pipeline, const Target& target, bool
 }
 
 std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
-                                          const autoschedule::VectorUnit& unit,
+                                          const planning::Machine& machine,
                                           const AutoscheduleOptions& options) {
-  ScheduleRequest request{unit, options, {}};
+  ScheduleRequest request{machine, options};
   request.options.search = false;
   std::vector<FuncPtr> result;
   run_on_large_stack([&] {
@@ -101,7 +101,7 @@ double predicted_seconds(const std::vector<FuncPtr>& scheduled, const Target& ta
       lower::lower("searched", scheduled, lower::infer_arguments(scheduled), lowering);
   return tuning::predicted_seconds(
       function, tuning::program_sizes(function, tuning::output_shapes(scheduled)),
-      tuning::machine_for(target), threads);
+      planning::machine_for(target), threads);
 }
 
 autoschedule::ScheduleCost search_cost(const ScheduleRequest& request, const Target& target) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "autoschedule/choose_schedule.h"
+#include "autoschedule/machine/machine.h"
 #include "frontend/run/compiled_pipeline.h"
 #include "frontend/run/pipeline.h"
 
@@ -24,7 +25,7 @@ ChosenSchedule schedule(const PipelineSpec& pipeline, const Target& target,
 
 // The same without a search.
 std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
-                                          const autoschedule::VectorUnit& unit = {},
+                                          const planning::Machine& machine = {},
                                           const AutoscheduleOptions& options = {});
 
 // A copy of the pipeline with the schedule of auto_schedule() for the target. In the copy, costly factors of sums and

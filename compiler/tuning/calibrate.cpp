@@ -14,6 +14,7 @@
 #include <functional>
 #include <limits>
 
+#include "autoschedule/machine/kept_machine.h"
 #include "frontend/data/buffer.h"
 #include "frontend/language/expr_ops.h"
 #include "frontend/language/func.h"
@@ -175,7 +176,7 @@ class Operations {
   }
 };
 
-void measure_operations(Machine& m, const Target& target) {
+void measure_operations(planning::Machine& m, const Target& target) {
   const Operations operations(target);
   const Type f32 = Float(32), f64 = Float(64);
   m.operation_ns = operations.step_ns(
@@ -254,13 +255,14 @@ class Triad {
   const int threads_;
 };
 
-void measure_memory(Machine& m, const Target& target) {
-  const double l1 = cache_bytes(_SC_LEVEL1_DCACHE_SIZE, 32 << 10);
-  const double l2 = cache_bytes(_SC_LEVEL2_CACHE_SIZE, 1 << 20);
+void measure_memory(planning::Machine& m, const Target& target) {
+  const double l1 = cache_bytes(_SC_LEVEL1_DCACHE_SIZE, planning::first_cache_bytes);
+  const double l2 = cache_bytes(_SC_LEVEL2_CACHE_SIZE, planning::second_cache_bytes);
   const double most = 384 << 20;
   Triad triad(most, target, m.threads);
   const auto level = [&](const char* name, double bytes, double at) {
-    return Machine::Level{name, bytes, triad.rate(at, false), triad.rate(at * m.threads, true)};
+    return planning::Machine::Level{name, bytes, triad.rate(at, false),
+                                    triad.rate(at * m.threads, true)};
   };
   m.levels[0] = level("L1", l1, l1 / 2);
   m.levels[1] = level("L2", l2, 0.6 * l2);
@@ -277,9 +279,9 @@ void measure_memory(Machine& m, const Target& target) {
 }
 
 double page_ns() {
-  constexpr size_t bytes = size_t{64} << 20, page = 4096;
+  constexpr size_t bytes = size_t{64} << 20, page = planning::page_bytes;
   void* memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-  if (memory == MAP_FAILED) return Machine().page_ns;
+  if (memory == MAP_FAILED) return planning::Machine().page_ns;
   runtime::advise_huge_pages(memory, bytes);  // as for the runtime's blocks
   const auto begin = Clock::now();
   for (size_t at = 0; at < bytes; at += page) static_cast<volatile char*>(memory)[at] = 1;
@@ -290,9 +292,9 @@ double page_ns() {
 
 }  // namespace
 
-Machine calibrate(const Target& target) {
-  Machine machine = constants_for(target);
-  machine.name = processor_name();
+planning::Machine calibrate(const Target& target) {
+  planning::Machine machine = planning::constants_for(target);
+  machine.name = planning::processor_name();
   measure_operations(machine, target);
   measure_memory(machine, target);
   machine.page_ns = page_ns();

@@ -1,13 +1,13 @@
 // calibrate.h -- measures the figures of this machine by compiling and running small pipelines.
 #pragma once
 
+#include "autoschedule/machine/machine.h"
 #include "ir/target.h"
-#include "tuning/machine.h"
 
 namespace retrograde::tuning {
 
 // Takes a few seconds, and all threads; on a machine that does something else, too, the figures are
 // those of what it has left.
-Machine calibrate(const Target& target);
+planning::Machine calibrate(const Target& target);
 
 }  // namespace retrograde::tuning

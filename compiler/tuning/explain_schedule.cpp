@@ -4,11 +4,11 @@
 
 #include <algorithm>
 
+#include "autoschedule/machine/kept_machine.h"
 #include "frontend/data/buffer.h"
 #include "graph/directives/schedule_log.h"
 #include "tuning/explain_stages.h"
 #include "tuning/kernels_taken.h"
-#include "tuning/machine.h"
 #include "tuning/measure_stages.h"
 #include "tuning/predict.h"
 
@@ -77,7 +77,7 @@ ScheduleReport explain_schedule(const PipelineSpec& pipeline,
   if (shapes.empty()) shapes = output_shapes(scheduled);
   const LoweredForReport lowered = lower_for_report(pipeline, scheduled, target);
   const ir::LoweredFunction& function = lowered.function;
-  const Machine machine = machine_for(target);
+  const planning::Machine machine = planning::machine_for(target);
   const int threads = options.threads > 0 ? options.threads : handlers.thread_limit;
   ScheduleReport report;
   report.schedule = graph::schedule_log(scheduled).to_cpp();

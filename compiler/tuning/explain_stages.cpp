@@ -5,6 +5,7 @@
 #include <iomanip>
 #include <sstream>
 
+#include "autoschedule/machine/kept_machine.h"
 #include "diagnostics/error.h"
 #include "graph/definitions/own_reads.h"
 #include "graph/names.h"
@@ -39,7 +40,7 @@ void add(const StagePrediction& more, StagePrediction& sum) {
   sum.element_seconds += more.element_seconds;
   sum.scalar_seconds += more.scalar_seconds;
   sum.one_thread_seconds += more.one_thread_seconds;
-  for (size_t level = 0; level < Machine::level_count; level++) {
+  for (size_t level = 0; level < planning::Machine::level_count; level++) {
     sum.bytes[level] += more.bytes[level];
     sum.memory_seconds[level] += more.memory_seconds[level];
   }
@@ -235,7 +236,7 @@ ExplainedPipeline explain_stages(const PipelineSpec& pipeline,
   const ir::LoweredFunction function =
       lower::lower(pipeline.name, scheduled, lower::infer_arguments(pipeline.outputs), lowering);
   const ProgramSizes sizes = sizes_for(function, scheduled, output_sizes, input_sizes);
-  const Machine machine = machine_for(target);
+  const planning::Machine machine = planning::machine_for(target);
   const Prediction prediction = predict(function, sizes, machine);
   auto loops = loops_in_words(nests, scheduled, sizes);
 

@@ -16,11 +16,11 @@ constexpr int most_steps = 12;
 
 struct Term {
   const char* name;
-  std::vector<double Machine::*> figures;
+  std::vector<double planning::Machine::*> figures;
   size_t level;  // of a cache whose bandwidths it is; 0: none
 };
 const std::vector<Term>& terms() {
-  using M = Machine;
+  using M = planning::Machine;
   static const std::vector<Term> all = {
       {"arithmetic",
        {&M::operation_ns, &M::divide_ns, &M::divide_double_ns, &M::sqrt_ns, &M::sqrt_double_ns,
@@ -40,12 +40,12 @@ const std::vector<Term>& terms() {
 
 using Vector = std::vector<double>;
 
-Machine with_factors(const Machine& start, const Vector& logs) {
-  Machine machine = start;
+planning::Machine with_factors(const planning::Machine& start, const Vector& logs) {
+  planning::Machine machine = start;
   for (size_t i = 0; i < logs.size(); i++) {
     const Term& term = terms()[i];
     const double factor = std::exp(logs[i]);
-    for (double Machine::*figure : term.figures) machine.*figure *= factor;
+    for (double planning::Machine::*figure : term.figures) machine.*figure *= factor;
     if (term.level == 0) continue;
     machine.levels[term.level].one_thread /= factor;
     machine.levels[term.level].all_threads /= factor;
@@ -54,8 +54,9 @@ Machine with_factors(const Machine& start, const Vector& logs) {
 }
 
 // log(predicted / measured), then what pulls each factor to 1.
-Vector residuals(const Machine& start, const Vector& logs, const std::vector<FitSample>& samples) {
-  const Machine machine = with_factors(start, logs);
+Vector residuals(const planning::Machine& start, const Vector& logs,
+                 const std::vector<FitSample>& samples) {
+  const planning::Machine machine = with_factors(start, logs);
   Vector result;
   for (const FitSample& sample : samples)
     result.push_back(std::log(sample.predict(machine) / sample.measured_seconds));
@@ -108,7 +109,7 @@ Vector stepped(const Vector& from, const std::vector<Vector>& columns, const Vec
 
 }  // namespace
 
-double fit_error(const Machine& machine, const std::vector<FitSample>& samples) {
+double fit_error(const planning::Machine& machine, const std::vector<FitSample>& samples) {
   double sum = 0;
   for (const FitSample& sample : samples) {
     const double log = std::log(sample.predict(machine) / sample.measured_seconds);
@@ -117,7 +118,7 @@ double fit_error(const Machine& machine, const std::vector<FitSample>& samples) 
   return samples.empty() ? 1 : std::exp(std::sqrt(sum / static_cast<double>(samples.size())));
 }
 
-MachineFit fit_machine(const Machine& start, const std::vector<FitSample>& samples) {
+MachineFit fit_machine(const planning::Machine& start, const std::vector<FitSample>& samples) {
   MachineFit fit{start, {}, fit_error(start, samples), 0};
   Vector logs(terms().size());
   double damping = 0.01;

@@ -12,12 +12,12 @@
 #include <string>
 #include <vector>
 
-#include "tuning/machine.h"
+#include "autoschedule/machine/machine.h"
 
 namespace retrograde::tuning {
 
 struct FitSample {
-  std::function<double(const Machine&)> predict;  // seconds
+  std::function<double(const planning::Machine&)> predict;  // seconds
   double measured_seconds = 0;
 };
 
@@ -27,14 +27,14 @@ struct FittedTerm {
 };
 
 struct MachineFit {
-  Machine machine;
+  planning::Machine machine;
   std::vector<FittedTerm> terms;
   double error_before = 0, error_after = 0;  // see fit_error
 };
 
-MachineFit fit_machine(const Machine& start, const std::vector<FitSample>& samples);
+MachineFit fit_machine(const planning::Machine& start, const std::vector<FitSample>& samples);
 
 // By what factor a prediction is wrong: 1 is exact. The root of the mean square, on a logarithmic scale.
-double fit_error(const Machine& machine, const std::vector<FitSample>& samples);
+double fit_error(const planning::Machine& machine, const std::vector<FitSample>& samples);
 
 }  // namespace retrograde::tuning

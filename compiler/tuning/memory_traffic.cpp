@@ -5,11 +5,13 @@
 #include <deque>
 #include <tuple>
 
+#include "autoschedule/machine/reference.h"
+
 namespace retrograde::tuning {
 
 namespace {
 
-constexpr double line_bytes = 64;
+constexpr double line_bytes = planning::line_bytes;
 constexpr size_t most_offsets = 64;  // of one group; more are spread as these are
 
 double whole_lines(double bytes) { return std::ceil(bytes / line_bytes) * line_bytes; }

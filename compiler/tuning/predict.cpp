@@ -11,7 +11,6 @@ namespace retrograde::tuning {
 namespace {
 
 constexpr double ns = 1e-9;
-constexpr double page_bytes = 4096;
 // What units cannot do at the same time: of all that they do beside the slowest of them.
 constexpr double not_overlapped = 0.25;
 
@@ -20,7 +19,7 @@ struct ComputeTime {
   double all = 0, chains = 0, elements = 0, scalars = 0;
 };
 
-ComputeTime compute_ns(const Work& work, const Machine& m) {
+ComputeTime compute_ns(const Work& work, const planning::Machine& m) {
   const double arithmetic = work.operations * m.operation_ns + work.shuffles * m.shuffle_ns +
                             work.divisions * m.divide_ns +
                             work.double_divisions * m.divide_double_ns + work.roots * m.sqrt_ns +
@@ -43,11 +42,11 @@ struct Program {
   WorkTree tree;
   std::vector<std::vector<Traffic>> behind;  // by level, by stage
 
-  Program(const LoweredFunction& function, const ProgramSizes& sizes, const Machine& machine,
-          int threads)
+  Program(const LoweredFunction& function, const ProgramSizes& sizes,
+          const planning::Machine& machine, int threads)
       : tree(work_tree(function, sizes, {machine.vector_bytes, machine.registers, threads})) {
     const MemoryTraffic traffic(tree);
-    for (size_t level = 0; level + 1 < Machine::level_count; level++)
+    for (size_t level = 0; level + 1 < planning::Machine::level_count; level++)
       behind.push_back(traffic.behind(machine.levels[level].bytes));
     behind.emplace_back(tree.stages.size());  // nothing lies behind memory
   }
@@ -55,7 +54,7 @@ struct Program {
 
 class Predictor {
  public:
-  Predictor(const Program& program, const Machine& machine)
+  Predictor(const Program& program, const planning::Machine& machine)
       : tree_(program.tree),
         behind_(program.behind),
         machine_(machine),
@@ -78,7 +77,7 @@ class Predictor {
     }
     for (const WorkTree::Memory& memory : tree_.buffers) {
       if (memory.is_allocated)
-        result.first_call_seconds += memory.bytes / page_bytes * machine_.page_ns * ns;
+        result.first_call_seconds += memory.bytes / planning::page_bytes * machine_.page_ns * ns;
     }
     return result;
   }
@@ -86,7 +85,7 @@ class Predictor {
  private:
   const WorkTree& tree_;
   const std::vector<std::vector<Traffic>>& behind_;
-  const Machine& machine_;
+  const planning::Machine& machine_;
   std::vector<StagePrediction> stages_;
 
   void add_node(size_t n) {
@@ -111,8 +110,8 @@ class Predictor {
   }
 
   void add_traffic() {
-    for (size_t level = 1; level < Machine::level_count; level++) {
-      const Machine::Level& from = machine_.levels[level];
+    for (size_t level = 1; level < planning::Machine::level_count; level++) {
+      const planning::Machine::Level& from = machine_.levels[level];
       for (size_t s = 0; s < stages_.size(); s++) {
         const Traffic &in = behind_[level - 1][s], &out = behind_[level][s];
         const double serial = std::max(0.0, in.serial_bytes - out.serial_bytes);
@@ -142,10 +141,10 @@ std::string StagePrediction::bound_by() const {
 
 namespace {
 
-Prediction predict(const Program& program, const Machine& machine, int threads) {
-  Machine shared = machine;
+Prediction predict(const Program& program, const planning::Machine& machine, int threads) {
+  planning::Machine shared = machine;
   if (threads == 1) {
-    for (Machine::Level& level : shared.levels) level.all_threads = level.one_thread;
+    for (planning::Machine::Level& level : shared.levels) level.all_threads = level.one_thread;
   }
   return Predictor(program, shared).predict();
 }
@@ -153,21 +152,22 @@ Prediction predict(const Program& program, const Machine& machine, int threads) 
 }  // namespace
 
 Prediction predict(const LoweredFunction& function, const ProgramSizes& sizes,
-                   const Machine& machine, int threads) {
+                   const planning::Machine& machine, int threads) {
   const int used = threads > 0 ? threads : machine.threads;
   return predict(Program(function, sizes, machine, used), machine, used);
 }
 
-std::function<double(const Machine&)> seconds_predictor(const LoweredFunction& function,
-                                                        const ProgramSizes& sizes,
-                                                        const Machine& machine, int threads) {
+std::function<double(const planning::Machine&)> seconds_predictor(const LoweredFunction& function,
+                                                                  const ProgramSizes& sizes,
+                                                                  const planning::Machine& machine,
+                                                                  int threads) {
   const int used = threads > 0 ? threads : machine.threads;
   const auto program = std::make_shared<Program>(function, sizes, machine, used);
-  return [=](const Machine& m) { return predict(*program, m, used).seconds; };
+  return [=](const planning::Machine& m) { return predict(*program, m, used).seconds; };
 }
 
 double predicted_seconds(const LoweredFunction& function, const ProgramSizes& sizes,
-                         const Machine& machine, int threads) {
+                         const planning::Machine& machine, int threads) {
   return predict(function, sizes, machine, threads).seconds;
 }
 

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "autoschedule/machine/machine.h"
 #include "ir/lowered_function.h"
-#include "tuning/machine.h"
 #include "tuning/program_sizes.h"
 #include "tuning/work_tree.h"
 
@@ -26,7 +26,7 @@ struct StagePrediction {
   // (gathers and scatters), scalar operations, and work outside of parallel loops.
   double chain_seconds = 0, element_seconds = 0, scalar_seconds = 0, one_thread_seconds = 0;
   // Bytes from behind each cache and the time that they take: "L2" are those that L1 has not.
-  std::array<double, Machine::level_count> bytes = {}, memory_seconds = {};
+  std::array<double, planning::Machine::level_count> bytes = {}, memory_seconds = {};
   Work work;                     // of one call, over all threads
   std::string bound_by() const;  // "compute", "L2", "L3", "memory", "launch"
   double all_memory_seconds() const;
@@ -41,12 +41,13 @@ struct Prediction {
 // `threads`: that parallel loops may use; 0: those of the machine. Takes time in proportion to the text of
 // the function, not to what it computes. The same function gives the same numbers.
 Prediction predict(const LoweredFunction& function, const ProgramSizes& sizes,
-                   const Machine& machine, int threads = 0);
+                   const planning::Machine& machine, int threads = 0);
 // The same for other figures of a machine whose vectors, registers and caches are as large: quick.
-std::function<double(const Machine&)> seconds_predictor(const LoweredFunction& function,
-                                                        const ProgramSizes& sizes,
-                                                        const Machine& machine, int threads = 0);
+std::function<double(const planning::Machine&)> seconds_predictor(const LoweredFunction& function,
+                                                                  const ProgramSizes& sizes,
+                                                                  const planning::Machine& machine,
+                                                                  int threads = 0);
 double predicted_seconds(const LoweredFunction& function, const ProgramSizes& sizes,
-                         const Machine& machine, int threads = 0);
+                         const planning::Machine& machine, int threads = 0);
 
 }  // namespace retrograde::tuning

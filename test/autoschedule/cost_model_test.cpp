@@ -1,12 +1,7 @@
-// The cost model: its counts for programs with known costs, and the text form of machine
-// parameters.
+// The cost model: its counts for programs with known costs.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-
+#include "autoschedule/machine/machine.h"
 #include "frontend/include/retrograde/retrograde.h"
 #include "lower/lower.h"
 #include "support/errors.h"
@@ -16,8 +11,8 @@
 namespace retrograde {
 namespace {
 
+using planning::Machine;
 using tuning::BufferShape;
-using tuning::Machine;
 using tuning::Work;
 using tuning::WorkTree;
 
@@ -42,7 +37,7 @@ Counted counted(const Func& f, const std::vector<int>& sizes) {
   return result;
 }
 
-Machine machine() { return tuning::constants_for(avx512); }
+Machine machine() { return planning::constants_for(avx512); }
 
 TEST(CostModel, AProductThatIsAddedIsOneOperationOfEachVector) {
   ImageParam in(Float(32), 1);
@@ -221,58 +216,6 @@ TEST(CostModel, SizesAreOfEachDimension) {
   f(x, y) = x + y;
   expect_error({"sizes are given once for all outputs, or for each, one for each dimension"},
                [&] { tuning::output_shapes({f.function()}, {{3}}); });
-}
-
-// ---- machine parameters ----
-
-TEST(Machine, RoundTripsAsJson) {
-  Machine m = machine();
-  m.name = "a \"processor\"";
-  m.exp_ns = 1.0 / 3;
-  EXPECT_EQ(Machine::from_json(m.to_json(), "here"), m);
-}
-
-TEST(Machine, AFileThatIsNoneIsAnError) {
-  for (const char* text : {"", "{}", "[1, 2]", "{\"version\": 1, \"name\": 3}"}) {
-    expect_error({"a description of a machine is JSON with a number for each figure"},
-                 [&] { Machine::from_json(text, "m.json"); });
-  }
-  std::string negative = machine().to_json();
-  negative.replace(negative.find("\"exp_ns\": ") + 10, 1, "-");
-  EXPECT_THROW(Machine::from_json(negative, "m.json"), CompileError);
-}
-
-TEST(Machine, TheEnvironmentNamesAFile) {
-  const auto path = std::filesystem::temp_directory_path() /
-                    ("machine_test_" + std::to_string(::getpid()) + ".json");
-  Machine m = machine();
-  m.name = "of a file";
-  std::ofstream(path) << m.to_json();
-  ::setenv("RETROGRADE_MACHINE", path.c_str(), 1);
-  EXPECT_EQ(tuning::machine_for(avx512), m);
-  std::filesystem::remove(path);
-  expect_error({"RETROGRADE_MACHINE names a file with the description of a machine"},
-               [&] { tuning::machine_for(avx512); });
-  ::unsetenv("RETROGRADE_MACHINE");
-}
-
-TEST(Machine, WhatIsKeptIsFoundAgainUnlessItIsBroken) {
-  const auto folder =
-      std::filesystem::temp_directory_path() / ("machine_cache_" + std::to_string(::getpid()));
-  std::filesystem::create_directories(folder);
-  ::unsetenv("RETROGRADE_MACHINE");
-  const char* before = std::getenv("XDG_CACHE_HOME");
-  const std::string kept_before = before ? before : "";
-  ::setenv("XDG_CACHE_HOME", folder.c_str(), 1);
-  EXPECT_EQ(tuning::machine_for(avx512).name, "constants");
-  Machine m = machine();
-  m.name = "measured";
-  const std::string path = tuning::keep_machine(m);
-  EXPECT_EQ(tuning::machine_for(avx512), m);
-  std::ofstream(path) << "{";
-  EXPECT_EQ(tuning::machine_for(avx512).name, "constants");
-  std::filesystem::remove_all(folder);
-  before ? ::setenv("XDG_CACHE_HOME", kept_before.c_str(), 1) : ::unsetenv("XDG_CACHE_HOME");
 }
 
 // ---- the report ----

@@ -497,7 +497,10 @@ TEST_F(DefaultSchedule, TilesFitTheRegisters) {
   product(x, y) += left(k, y) * right(x, k);
   const graph::FuncContents& f = *product.function();
   const auto sums = [&](int64_t bytes) {
-    const auto tile = autoschedule::register_tile(f, f.stage(1), 16, 4, {bytes});
+    planning::Machine machine;
+    machine.accumulator_share *=
+        static_cast<double>(bytes) / static_cast<double>(machine.accumulator_bytes());
+    const auto tile = autoschedule::register_tile(f, f.stage(1), 16, 4, machine);
     int64_t count = tile ? tile->vectors : 0;
     if (tile) {
       for (const autoschedule::RegisterTile::Side& side : tile->sides) count *= side.size;

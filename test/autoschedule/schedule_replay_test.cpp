@@ -89,9 +89,9 @@ class ScheduleReplay : public ::testing::TestWithParam<Case> {};
 
 TEST_P(ScheduleReplay, GivesTheSameLoopNests) {
   const Program program = GetParam().build(), again = GetParam().build();
-  // The vector unit of the machine for which the loop nests are compiled.
-  const auto unit = autoschedule::vector_unit_of(get_jit_target_from_environment());
-  const auto scheduled = driver::schedule_unscheduled(functions(program), unit);
+  // The vectors of the machine for which the loop nests are compiled.
+  const auto machine = planning::reference_machine(get_jit_target_from_environment());
+  const auto scheduled = driver::schedule_unscheduled(functions(program), machine);
   const ScheduleLog log = graph::schedule_log(scheduled);
   EXPECT_GT(log.size(), 5u);
   EXPECT_EQ(ScheduleLog::parse(log.to_text()), log);
@@ -103,7 +103,7 @@ TEST_P(ScheduleReplay, GivesTheSameLoopNests) {
   EXPECT_EQ(same_numbers(graph::to_text(graph::graph_of(functions(again)))), text);
   const auto compiled = graph::apply_wrappers(scheduled);
   EXPECT_EQ(same_numbers(graph::to_text(
-                graph::graph_of(driver::schedule_unscheduled(functions(again), unit)))),
+                graph::graph_of(driver::schedule_unscheduled(functions(again), machine)))),
             same_numbers(graph::to_text(graph::graph_of(compiled))))
       << "and nothing is left to schedule";
   EXPECT_EQ(same_numbers(pipeline.loop_nest()), same_numbers(Pipeline(program).loop_nest()));

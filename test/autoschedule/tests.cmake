@@ -24,7 +24,8 @@ retrograde_test(
   turned_sums_test
   blocked_recurrences_test
   wavefronts_test
-  TOGETHER autoschedule_tests LIBS retrograde_dep_halide_runtime)
+  machine_test
+  TOGETHER autoschedule_tests LIBS retrograde_dep_halide_runtime retrograde_dep_json)
 retrograde_test(auto_schedule_test OPTIMIZED)
 retrograde_test(coarse_values_test)
 retrograde_test(row_guests_test LIBS retrograde_dep_halide_runtime)

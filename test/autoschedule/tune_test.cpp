@@ -18,8 +18,8 @@
 namespace retrograde {
 namespace {
 
+using planning::Machine;
 using tuning::FitSample;
-using tuning::Machine;
 
 class Tune : public testing::Test {
  protected:

@@ -16,8 +16,8 @@ namespace retrograde::tune {
 
 namespace {
 
+using planning::Machine;
 using tuning::FitSample;
-using tuning::Machine;
 
 constexpr size_t most_samples = 240;  // of all programs together, the same number for each
 
@@ -29,7 +29,7 @@ FitSample sample_of(const Measured& measured, const Target& target, int threads)
       lower::lower("fitted", graph.outputs, lower::infer_arguments(graph.outputs), lowering);
   const tuning::ProgramSizes sizes =
       tuning::program_sizes(function, tuning::output_shapes(graph.outputs));
-  return {tuning::seconds_predictor(function, sizes, tuning::machine_for(target), threads),
+  return {tuning::seconds_predictor(function, sizes, planning::machine_for(target), threads),
           measured.measurement.seconds};
 }
 
@@ -115,14 +115,14 @@ void tell_held_out(const Machine& start, const std::vector<Program>& programs, s
 
 Machine fit_database(Database& database, int threads, std::ostream& out) {
   const std::vector<Measured> all =
-      database.measured(database.machine(tuning::processor_name()), threads);
+      database.measured(database.machine(planning::processor_name()), threads);
   if (all.empty()) {
-    user_error("fit the model of " + retrograde::quoted(tuning::processor_name()),
+    user_error("fit the model of " + retrograde::quoted(planning::processor_name()),
                "the database has measurements of this machine with that number of threads",
                text("there are none with ", threads), "Measure some programs first: tune FILE");
   }
   const Target target = get_jit_target_from_environment();
-  const Machine start = tuning::machine_for(target);
+  const Machine start = planning::machine_for(target);
   Machine result;
   run_on_large_stack([&] {
     const std::vector<Program> programs = samples_of(all, target, threads);

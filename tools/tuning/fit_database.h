@@ -3,8 +3,8 @@
 
 #include <iosfwd>
 
+#include "autoschedule/machine/kept_machine.h"
 #include "database.h"
-#include "tuning/machine.h"
 
 namespace retrograde::tune {
 
@@ -12,6 +12,6 @@ namespace retrograde::tune {
 // (machine_for). Prints to `out` the prediction error before and after, and the error by two-fold cross-validation,
 // that is, for programs that the fit did not use.
 // Requires: the database has measurements of this machine with that number of threads.
-tuning::Machine fit_database(Database& database, int threads, std::ostream& out);
+planning::Machine fit_database(Database& database, int threads, std::ostream& out);
 
 }  // namespace retrograde::tune

@@ -29,12 +29,13 @@
 #include <string>
 #include <vector>
 
+#include "autoschedule/machine/kept_machine.h"
 #include "database.h"
 #include "diagnostics/error.h"
 #include "fit_database.h"
 #include "tune_program.h"
 #include "tuning/calibrate.h"
-#include "tuning/machine.h"
+#include "tuning/keep_machine.h"
 
 namespace {
 
@@ -107,7 +108,7 @@ std::optional<CommandLine> parse(int argc, char** argv) {
   return line.is_valid() ? std::optional(line) : std::nullopt;
 }
 
-void keep(const tuning::Machine& machine, const std::string& output) {
+void keep(const planning::Machine& machine, const std::string& output) {
   if (output.empty()) {
     std::cout << "kept in " << tuning::keep_machine(machine) << "\n";
     return;
@@ -122,7 +123,7 @@ void keep(const tuning::Machine& machine, const std::string& output) {
 
 std::string database_of(const CommandLine& line) {
   if (!line.database.empty()) return line.database;
-  const std::string folder = tuning::cache_folder();
+  const std::string folder = planning::cache_folder();
   if (folder.empty())
     user_error("keep measurements", "there is a cache folder, or a file is named",
                "neither XDG_CACHE_HOME nor HOME is set", "Name one: --database FILE");
@@ -191,9 +192,9 @@ void tune_command(const CommandLine& line) {
 
 void run(const CommandLine& line) {
   if (line.shows) {
-    std::cout << tuning::machine_for(get_jit_target_from_environment()).to_string();
+    std::cout << planning::machine_for(get_jit_target_from_environment()).to_string();
   } else if (line.calibrates) {
-    const tuning::Machine machine = tuning::calibrate(get_jit_target_from_environment());
+    const planning::Machine machine = tuning::calibrate(get_jit_target_from_environment());
     std::cout << machine.to_string();
     keep(machine, line.options.output);
   } else if (line.fits) {

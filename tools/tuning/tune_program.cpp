@@ -12,13 +12,13 @@
 #include <thread>
 #include <tuple>
 
+#include "autoschedule/machine/kept_machine.h"
 #include "autoschedule/schedule_search.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
 #include "driver/schedule.h"
 #include "graph/directives/wrappers.h"
 #include "graph/graph.h"
-#include "tuning/machine.h"
 #include "tuning/measure_schedule.h"
 
 namespace retrograde::tune {
@@ -45,7 +45,7 @@ class Candidates {
   }
 
   std::vector<Candidate> find(const Target& target, int threads) {
-    autoschedule::ScheduleRequest request{autoschedule::vector_unit_of(target), {}, {}};
+    autoschedule::ScheduleRequest request = autoschedule::request_for(target, {});
     request.options.threads = threads;
     const auto cost = [&](const std::vector<FuncPtr>& scheduled) {
       const double seconds = driver::predicted_seconds(scheduled, target, threads);
@@ -114,7 +114,7 @@ class Session {
           Database& database, std::ostream& out)
       : name_(name), options_(options), database_(database), out_(out) {
     program_ = database.program(name, text);
-    machine_ = database.machine(tuning::processor_name());
+    machine_ = database.machine(planning::processor_name());
     graph::Graph graph = graph::parse_graph(text);
     graph::validate(graph, "parse_graph");
     outputs_ = graph::apply_wrappers(graph.outputs);

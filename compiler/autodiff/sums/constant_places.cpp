@@ -10,6 +10,7 @@
 #include "autodiff/sums/running_sums.h"
 #include "autodiff/sums/taps.h"
 #include "autoschedule/cost_estimate.h"
+#include "autoschedule/machine/reference.h"
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 
@@ -158,7 +159,7 @@ bool is_worth_sharing(const Group& group, const AdjointTarget& target) {
   const bool is_pointwise = group.terms[0].gather.is_pointwise();
   // Elements of the sums are stored, loaded and chosen from.
   const double loads = are_chosen(group.fixed, places, target) ? 2 * *elements : 2;
-  const double cost = is_pointwise ? autoschedule::way_to_memory * count : count * (1 + loads);
+  const double cost = is_pointwise ? planning::memory_trip_operations * count : count * (1 + loads);
   const double iterations = terms_an_element(group, target);
   const auto is_worth = [&](double apart) {
     const double saved = apart - together;

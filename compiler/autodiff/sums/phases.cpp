@@ -8,6 +8,7 @@
 
 #include "analysis/linear.h"
 #include "analysis/periods.h"
+#include "autoschedule/machine/reference.h"
 #include "ir/build.h"
 #include "ir/visit.h"
 #include "simplify/simplify.h"
@@ -17,7 +18,7 @@ namespace retrograde::autodiff {
 namespace {
 
 // Elements of a full vector; vectors of at least half of them along the phase are worth a dense read.
-constexpr int64_t lanes = 16, least_lanes = 8;
+constexpr int64_t lanes = planning::schedule_lanes, least_lanes = lanes / 2;
 
 // A comparison without a common factor, of which each phase has its share: 2 * q + p <= 2 * rho + 63, with p < 2, is
 // q <= rho + 31. Borders then have the form of those without a stride (zero_borders.h).
@@ -43,14 +44,12 @@ Expr reduced(const Expr& comparison, const std::string& phase,
 Expr in_phases(const Expr& e, const Substitution& place, const std::string& phase,
                const simplification::BoundsMap& bounds) {
   if (!e.defined()) return e;
-  return rewrite(substitute(e, place),
-                 [&](const Expr& node, const std::function<Expr(const Expr&)>& recurse) {
-                   const bool joins = node.as<And>() || node.as<Or>() || node.as<Not>();
-                   if (node.type().is_bool() && !joins)
-                     return reduced(simplify(node, bounds), phase, bounds);
-                   return node.type() == Int(32) ? simplify(node, bounds)
-                                                 : map_children(node, recurse);
-                 });
+  return rewrite(
+      substitute(e, place), [&](const Expr& node, const std::function<Expr(const Expr&)>& recurse) {
+        const bool joins = node.as<And>() || node.as<Or>() || node.as<Not>();
+        if (node.type().is_bool() && !joins) return reduced(simplify(node, bounds), phase, bounds);
+        return node.type() == Int(32) ? simplify(node, bounds) : map_children(node, recurse);
+      });
 }
 
 bool sums_at_each_element(const Gather& g) {

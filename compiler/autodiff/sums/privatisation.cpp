@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "autodiff/sums/blocked_sums.h"
-#include "autoschedule/size_estimate.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/print.h"
@@ -13,20 +12,19 @@ namespace retrograde::autodiff {
 
 namespace {
 
-// The number of parts of a privatised accumulation: enough for the threads of today's machines, few enough to sum and
-// store.
-constexpr int part_count = 32;
+// The number of parts of a privatised accumulation.
+constexpr int part_count = planning::privatised_copies;
 // Zeroing and summing parts may cost as much as this many elements an iteration. With fewer than least_parts, a scatter
 // is not privatised.
 constexpr double elements_an_iteration = 4;
 constexpr int least_parts = 4;
 // The number of elements of one part of a scatter, lanes included, that fit a near cache.
-constexpr double near_elements = 1 << 14;
+constexpr double near_elements = planning::second_cache_bytes / 64;
 // The number of elements of a gather whose lanes are worth the way to a far cache.
-constexpr double far_elements = 1 << 16;
+constexpr double far_elements = planning::second_cache_bytes / 16;
 // Memory budget in bytes for all parts of one adjoint. A larger target is accumulated in place, in parallel over its
 // pure dimensions only.
-constexpr double private_bytes = 64 << 20;
+constexpr double private_bytes = 4 * planning::third_cache_bytes;
 // With at most few_elements elements, each of many_iterations iterations, the pure dimensions alone do not occupy a
 // machine. Up to one_tile elements fit one register tile; up to few_elements fit a few tiles.
 constexpr double one_tile = 64, few_elements = 1024, many_iterations = 4096;
@@ -289,7 +287,7 @@ static size_t loop_in_parts(const Iterations& update) {
   };
   size_t longest = count - 1;
   for (size_t i = count; i-- > 0;) {
-    if (extent(i) >= MachineLimits().enough_tasks) return i;
+    if (extent(i) >= planning::reference_tasks) return i;
     if (extent(i) > extent(longest)) longest = i;
   }
   return longest;

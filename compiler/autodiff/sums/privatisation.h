@@ -7,11 +7,12 @@
 #include <vector>
 
 #include "autodiff/sums/taps.h"
+#include "autoschedule/machine/reference.h"
 
 namespace retrograde::autodiff {
 
 // The number of vector lanes of a part; neighbouring iterations accumulate in separate lanes.
-inline constexpr int lane_count = 16;
+inline constexpr int lane_count = planning::schedule_lanes;
 // The assumed value of an extent that is known at run time only.
 inline constexpr double unknown_elements = 1e9;
 

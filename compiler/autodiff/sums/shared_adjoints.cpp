@@ -13,6 +13,7 @@
 #include "autodiff/sums/distinct_nodes.h"
 #include "autodiff/sums/generated_definitions.h"
 #include "autoschedule/cost_estimate.h"
+#include "autoschedule/machine/reference.h"
 #include "frontend/language/var.h"
 #include "graph/definitions/define.h"
 #include "graph/function.h"
@@ -65,7 +66,7 @@ class Sharing {
     if (kept_.empty() || kept_.size() > most_kept) return false;
     double saved = -operations(kept_, {});
     for (const Numbers& group : groups_) saved += operations(group, {}) - operations(group, kept_);
-    return saved > way_to_memory * static_cast<double>(kept_.size());
+    return saved > planning::memory_trip_operations * static_cast<double>(kept_.size());
   }
 
   std::vector<Expr> kept() const {

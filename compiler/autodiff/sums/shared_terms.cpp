@@ -10,6 +10,7 @@
 #include "autodiff/sweeps/active_symbols.h"
 #include "autodiff/updates/update_context.h"
 #include "autoschedule/cost_estimate.h"
+#include "autoschedule/machine/reference.h"
 #include "ir/build.h"
 
 namespace retrograde::autodiff {
@@ -108,7 +109,7 @@ class TermSharing {
     }
     if (targets.size() < 2 || all.size() > most_shared_terms) return 0;
     const double together = operations_of_terms(terms_of(all)) +
-                            autoschedule::way_to_memory * static_cast<double>(all.size());
+                            planning::memory_trip_operations * static_cast<double>(all.size());
     return apart - together >= least_saved_share * apart ? apart - together : 0;
   }
 

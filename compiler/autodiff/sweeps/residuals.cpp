@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "autoschedule/cost_estimate.h"
+#include "autoschedule/machine/reference.h"
 #include "autoschedule/size_estimate.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
@@ -18,9 +19,9 @@ namespace retrograde::autodiff {
 namespace {
 
 constexpr double least_terms = 64;  // that an element of a residual adds up
-constexpr double least_work =
-    1 << 16;  // terms of all elements together: a call has a cost for each buffer
-constexpr int64_t most_bytes = 4 << 20;  // of a residual
+// Terms of all elements together: a call has a cost for each buffer.
+constexpr double least_work = planning::launch_operations / 8;
+constexpr int64_t most_bytes = planning::third_cache_bytes / 4;  // of a residual
 
 bool is_scheduled(const FuncContents& f) {
   return has_directives(f) || !f.wrappers.empty() || !f.copied_inputs.empty();

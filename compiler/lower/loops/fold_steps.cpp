@@ -25,6 +25,7 @@
 
 #include <optional>
 
+#include "autoschedule/machine/reference.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 #include "ir/visit.h"
@@ -38,9 +39,11 @@ namespace retrograde::lower {
 
 namespace {
 
-constexpr int64_t small_bytes = 1 << 16;  // storage that the nearest caches hold with all steps
-constexpr int64_t large_bytes = int64_t{1} << 23;  // storage that no core's own caches hold
-constexpr int64_t most_slice_bytes = 1 << 21;      // a slice that stays in the cache until its step
+constexpr int64_t small_bytes =
+    2 * planning::first_cache_bytes;  // storage that the nearest caches hold with all steps
+constexpr int64_t large_bytes = planning::many_step_bytes;
+constexpr int64_t most_slice_bytes =
+    planning::largest_second_cache_bytes;  // a slice that stays in the cache until its step
 constexpr int64_t most_other_slices = 4;
 
 // The bytes of all slices of a Func; nullopt if unknown.

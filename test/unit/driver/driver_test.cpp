@@ -83,10 +83,10 @@ TEST(Driver, EveryCallerGetsTheSameSchedule) {
   const Pipeline pipeline = program.pipeline();
   const std::string schedule = without_numbers(pipeline.explain_schedule(avx2).schedule);
   EXPECT_EQ(without_numbers(default_compiler().schedule(pipeline.spec(), avx2).to_cpp()), schedule);
-  EXPECT_EQ(without_numbers(graph::schedule_log(
-                                driver::schedule_unscheduled({program.gradient.function()},
-                                                             autoschedule::vector_unit_of(avx2)))
-                                .to_cpp()),
+  EXPECT_EQ(without_numbers(
+                graph::schedule_log(driver::schedule_unscheduled({program.gradient.function()},
+                                                                 planning::reference_machine(avx2)))
+                    .to_cpp()),
             schedule);
   const std::string path = RETROGRADE_TEST_DIR "/golden/driver/unscheduled_gradient.schedule";
   if (std::getenv("RETROGRADE_UPDATE_GOLDEN")) std::ofstream(path) << schedule;

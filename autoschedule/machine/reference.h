@@ -1,0 +1,88 @@
+// reference.h -- the reference machine: figures that are the same for every target and every processor.
+//
+// Some decisions of a schedule choose the order in which terms are added, and so the bits of a result: the lanes of a
+// sum, its privatised copies, its blocks. They may depend on a program and its sizes, never on the machine that compiles
+// or runs it. Such decisions use the figures below. Other figures are here because no target differs enough to matter.
+#pragma once
+
+#include <cstdint>
+
+namespace retrograde::planning {
+
+// ---- Vectors ----
+
+// The elements of 32 bits in a vector of a schedule. They fill a register of 64 bytes; for targets with smaller
+// registers, code generation uses several for each vector.
+inline constexpr int schedule_lanes = 16;
+
+// ---- Caches ----
+
+inline constexpr int64_t line_bytes = 64;
+inline constexpr int64_t line_elements = line_bytes / 4;  // of 32 bits
+inline constexpr int64_t page_bytes = 4096;
+// The caches of one core, which no other core shares, and the cache that all cores share.
+inline constexpr int64_t first_cache_bytes = 32 << 10;
+inline constexpr int64_t second_cache_bytes = 1 << 20;
+inline constexpr int64_t third_cache_bytes = 16 << 20;
+// The largest caches of a core that are common. Data that exceed them reach no core without the shared cache.
+inline constexpr int64_t largest_second_cache_bytes = 2 << 20;
+// The steps of a loop over time, all together, that no core's own caches hold.
+inline constexpr int64_t many_step_bytes = third_cache_bytes / 2;
+// Rows this many bytes apart, or a multiple of it, compete for a few sets of the second cache.
+inline constexpr int64_t second_cache_set_stride = 32 << 10;
+// The lines of one set of the first cache, rounded up.
+inline constexpr int64_t first_cache_ways = 16;
+// The streams of addresses that a core fetches ahead of their use, rounded up.
+inline constexpr int64_t prefetched_streams = 32;
+
+// ---- Threads ----
+
+// The threads that a schedule expects if nobody says how many there are.
+inline constexpr int reference_threads = 2;
+// The threads of large machines. Accumulators have this many privatised copies on every machine.
+inline constexpr int privatised_copies = 32;
+// The iterations of parallel loops for each thread: no thread waits long for the others.
+inline constexpr int tasks_per_thread = 4;
+// The iterations of parallel loops that suffice for the reference threads.
+inline constexpr int64_t reference_tasks = int64_t{tasks_per_thread} * reference_threads;
+// Work that takes as long as waking the threads for a parallel loop, about 10 microseconds: operations on elements of a
+// vectorized loop, and cycles.
+inline constexpr double launch_operations = 1 << 19;
+inline constexpr double launch_cycles = 20000;
+
+// Operations that one atomic addition takes. Threads seldom add to the same cache line of an accumulator that has at
+// least this many.
+inline constexpr double atomic_add_operations = 8;
+inline constexpr int64_t uncontended_lines = 1 << 10;
+
+// ---- The cost of memory, in operations on an element of a vectorized loop ----
+
+// Storing a value to memory and loading it again: 12 bytes at the bandwidth of a core, against one operation a lane and
+// cycle.
+inline constexpr double memory_trip_operations = 24;
+// The same through a cache near the core: a store and a load that wait for no memory.
+inline constexpr double cache_trip_operations = 10;
+// Loading or storing an element of a vector whose elements are a stride apart.
+inline constexpr double strided_access_operations = 2;
+
+// ---- The execution units of a core, per register of a vector ----
+
+struct Core {
+  double loads_per_cycle = 2, products_per_cycle = 2;
+  // Cycles from operands to result.
+  double load_latency = 6, float_latency = 4, divide_latency = 13, sqrt_latency = 19;
+  // Cycles from one operation to the next that does not depend on it.
+  double divide_cycles = 7, sqrt_cycles = 10;
+  // Cycles for each addition in the approximation of a function.
+  double function_latency = 2;
+  // Instructions that execute ahead of the oldest unfinished one.
+  double reorder_window = 256;
+  // A vector at any address crosses cache lines and counts as this many loads, and as twice as many if every iteration
+  // reads a row of its own.
+  double unaligned_loads = 2, far_row_loads = 4;
+  // Loads and insertions for each lane of a gather.
+  double gather_lane_operations = 2;
+};
+inline constexpr Core core;
+
+}  // namespace retrograde::planning

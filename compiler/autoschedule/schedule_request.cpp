@@ -1,0 +1,27 @@
+#include "autoschedule/schedule_request.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace retrograde::autoschedule {
+
+ScheduleRequest request_for(const Target& target, const AutoscheduleOptions& options,
+                            const MachineParams& params) {
+  ScheduleRequest request{planning::reference_machine(target), options};
+  request.machine.levels[planning::Machine::last_cache].bytes =
+      static_cast<double>(params.last_level_cache_size);
+  if (options.threads <= 0 && params != MachineParams::generic())
+    request.options.threads = std::max(params.parallelism, 0);
+  return request;
+}
+
+planning::Machine machine_of(const ScheduleRequest& request) {
+  planning::Machine machine = request.machine;
+  if (request.options.threads > 0) machine.threads = request.options.threads;
+  machine.parallel_tasks = std::ldexp(machine.parallel_tasks, request.scales.tasks);
+  double& bytes = machine.levels[planning::Machine::last_cache].bytes;
+  bytes = std::ldexp(bytes, request.scales.caches);
+  return machine;
+}
+
+}  // namespace retrograde::autoschedule
