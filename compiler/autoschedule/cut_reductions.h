@@ -22,7 +22,8 @@
 namespace retrograde::autoschedule {
 
 // Factors long associative updates of one element, or of a number that is known to be small
-// (rfactor.h), of Funcs of this graph that nobody scheduled. The registers of the `machine` hold sums of several elements. `but`: not of these.
+// (rfactor.h), of Funcs of this graph that nobody scheduled. The registers of the `machine` hold sums of several
+// elements. `but`: not of these.
 void cut_reductions(const std::vector<FuncPtr>& outputs, const SizeEstimate& sizes,
                     const planning::Machine& machine,
                     const std::unordered_set<const Symbol*>& but = {});

@@ -156,6 +156,13 @@ TEST_F(Tune, MeasurementsFitTheModelAndHalfOfTheProgramsTestIt) {
 
 // ---- fitted machine parameters ----
 
+// Levels of one byte per nanosecond weigh as much as operations in the samples.
+Machine start_of_fit() {
+  Machine machine;
+  for (Machine::Level& level : machine.levels) level.one_thread = level.all_threads = 1;
+  return machine;
+}
+
 std::vector<FitSample> synthetic(const Machine& truth) {
   std::vector<FitSample> samples;
   for (int i = 0; i < 40; i++) {
@@ -173,7 +180,7 @@ std::vector<FitSample> synthetic(const Machine& truth) {
 }
 
 TEST(FitMachine, FindsTheFactorsThatMeasurementsWereMadeWith) {
-  const Machine start;
+  const Machine start = start_of_fit();
   Machine truth = start;
   truth.operation_ns *= 1.5;
   truth.load_ns *= 0.7;
@@ -187,7 +194,7 @@ TEST(FitMachine, FindsTheFactorsThatMeasurementsWereMadeWith) {
 }
 
 TEST(FitMachine, WhatSamplesDoNotSayStays) {
-  const Machine start;
+  const Machine start = start_of_fit();
   const tuning::MachineFit fit = tuning::fit_machine(start, synthetic(start));
   EXPECT_EQ(fit.machine, start);
   const tuning::MachineFit none = tuning::fit_machine(start, {});
@@ -195,7 +202,7 @@ TEST(FitMachine, WhatSamplesDoNotSayStays) {
 }
 
 TEST(FitMachine, FactorsAreBounded) {
-  const Machine start;
+  const Machine start = start_of_fit();
   Machine truth = start;
   truth.operation_ns *= 1000;
   for (const tuning::FittedTerm& term : tuning::fit_machine(start, synthetic(truth)).terms) {
