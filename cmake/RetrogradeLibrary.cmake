@@ -18,6 +18,7 @@ endif()
 target_include_directories(retrograde INTERFACE
   $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/compiler/frontend/include>
   $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/compiler>
+  $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
   $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
   $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/retrograde>)
 target_compile_options(retrograde INTERFACE

@@ -1,0 +1,249 @@
+// import.cpp -- reads the directives of a scheduled graph into a plan.
+//
+// Method: each Func by itself first; loops that other Funcs refer to are numbered by their depth. Then the references
+// between Funcs: a Func that shares loops with an opaque one is opaque, too, since it must keep the names of its loops.
+// Linear in the number of Funcs, apart from chains of shared loops.
+#include <algorithm>
+#include <unordered_map>
+
+#include "autoschedule/plan/loop_names.h"
+#include "autoschedule/plan/nest.h"
+#include "autoschedule/plan/plan.h"
+#include "autoschedule/plan/split_history.h"
+#include "graph/directives/give_directive.h"
+#include "graph/names.h"
+#include "ir/literal.h"
+
+namespace retrograde::planning {
+
+namespace {
+
+using graph::FuncContents;
+using graph::LoopLevel;
+using graph::StageLoops;
+
+Concurrency concurrency_of(const StageLoops& schedule) {
+  if (schedule.allow_races) return Concurrency::Racing;
+  if (!schedule.atomic) return Concurrency::Independent;
+  return schedule.override_associativity ? Concurrency::Vouched : Concurrency::Atomic;
+}
+
+// What makes the Func opaque whatever its loops are.
+Opacity opacity_of(const FuncContents& f) {
+  if (f.is_extern()) return Opacity::Extern;
+  if (f.schedule.async) return Opacity::Async;
+  if (f.schedule.memoized) return Opacity::Memoize;
+  if (f.schedule.ring.defined()) return Opacity::Ring;
+  for (int s = 0; s < f.stage_count(); ++s) {
+    const StageLoops& schedule = f.stage(s).schedule;
+    if (!schedule.specializations.empty()) return Opacity::Specialize;
+    if (!schedule.prefetches.empty()) return Opacity::Prefetch;
+  }
+  return Opacity::None;
+}
+
+int16_t dimension_of(const FuncContents& f, const std::string& name) {
+  return static_cast<int16_t>(std::ranges::find(f.args, name) - f.args.begin());
+}
+
+Opacity read_storage(const FuncContents& f, Storage& storage) {
+  storage.order.clear();
+  for (const std::string& name : f.schedule.storage_dims)
+    storage.order.push_back(dimension_of(f, name));
+  storage.memory = f.schedule.memory;
+  for (const graph::StorageRule& rule : f.schedule.storage_rules) {
+    if (!rule.fold.defined()) continue;
+    const auto extent = as_const_int(rule.fold);
+    if (!extent) return Opacity::SymbolicFold;
+    storage.folds.push_back({dimension_of(f, rule.var), *extent, rule.fold_forward});
+  }
+  std::ranges::sort(storage.folds, {}, &Fold::dimension);
+  return Opacity::None;
+}
+
+class PlanImporter {
+ public:
+  explicit PlanImporter(const std::vector<graph::FuncPtr>& outputs)
+      : program_(make_program(outputs)) {
+    const auto& funcs = program_->funcs;
+    for (size_t i = 0; i < funcs.size(); ++i) ids_[funcs[i]->name] = static_cast<FuncId>(i);
+  }
+
+  Plan run() {
+    for (const graph::FuncPtr& f : program_->funcs) plans_.push_back(read_alone(*f));
+    const auto count = static_cast<FuncId>(plans_.size());
+    for (FuncId f = 0; f < count; ++f) read_placement(f);
+    for (FuncId f = 0; f < count; ++f) read_sharing(f);
+    spread_opacity();
+    Plan plan{program_, {}};
+    for (FuncPlan& func : plans_) plan.funcs.push_back(std::make_shared<FuncPlan>(std::move(func)));
+    return plan;
+  }
+
+ private:
+  const ProgramPtr program_;
+  std::unordered_map<std::string, FuncId> ids_;
+  std::vector<FuncPlan> plans_;
+
+  const FuncContents& func(FuncId id) const { return *program_->funcs[static_cast<size_t>(id)]; }
+  FuncPlan& plan(FuncId id) { return plans_[static_cast<size_t>(id)]; }
+  void make_opaque(FuncId id, Opacity why) {
+    plan(id).opacity = why;
+    plan(id).nests.clear();
+    plan(id).storage = undecided_storage(func(id));
+  }
+  static Storage undecided_storage(const FuncContents& f) {
+    Storage storage;
+    for (int d = 0; d < f.dimensions(); ++d) storage.order.push_back(static_cast<int16_t>(d));
+    return storage;
+  }
+
+  FuncPlan read_alone(const FuncContents& f) const {
+    FuncPlan plan;
+    plan.opacity = opacity_of(f);
+    if (plan.opacity == Opacity::None) plan.opacity = read_storage(f, plan.storage);
+    for (int s = 0; s < f.stage_count() && plan.opacity == Opacity::None; ++s) {
+      History history = history_of(f, s);
+      history.nest.concurrency = concurrency_of(f.stage(s).schedule);
+      plan.nests.push_back(std::move(history.nest));
+      plan.opacity = history.why;
+    }
+    if (plan.opacity == Opacity::None) return plan;
+    return {{}, undecided_storage(f), {}, plan.opacity};
+  }
+
+  // ---- levels ----
+
+  // The depth of a loop by its name; nullopt when the stage has no such loop.
+  std::optional<int16_t> depth_of(const FuncContents& f, int stage, const std::string& loop) const {
+    const graph::LoopList& dims = f.stage(stage).schedule.dims;
+    for (size_t i = 0; i < dims.size(); ++i) {
+      if (dims[i].var == loop) return static_cast<int16_t>(dims.size() - 1 - i);
+    }
+    if (loop == graph::outermost_loop) return around_all_loops;
+    return std::nullopt;
+  }
+
+  // Whether two loops of stages of one Func have equal iterators and steps, so that they get equal names.
+  bool are_alike(const FuncContents& f, const LoopRef& a, const LoopRef& b) {
+    if (a.depth < 0 || b.depth < 0) return a.depth == b.depth;
+    if (plan(a.stage.func).opacity != Opacity::None) return true;  // it keeps its names
+    return loop_name(f, plan(a.stage.func), a) == loop_name(f, plan(b.stage.func), b);
+  }
+  static std::string loop_name(const FuncContents& f, const FuncPlan& plan, const LoopRef& loop) {
+    const Nest& nest = plan.nests[static_cast<size_t>(loop.stage.stage)];
+    return loop_names(f, loop.stage.stage, nest).loops[static_cast<size_t>(loop.depth)];
+  }
+
+  // A level that names no stage means the loop of that name in each stage.
+  Opacity read_level(const LoopLevel& level, Level& result) {
+    switch (level.kind) {
+      case LoopLevel::Kind::Inlined:
+        return Opacity::None;
+      case LoopLevel::Kind::Root:
+        result.kind = Level::Kind::Root;
+        return Opacity::None;
+      case LoopLevel::Kind::At:
+        break;
+    }
+    const auto id = ids_.find(level.func);
+    if (id == ids_.end()) return Opacity::UnknownLoop;
+    const FuncContents& f = func(id->second);
+    std::vector<LoopRef> found;
+    for (int s = 0; s < f.stage_count(); ++s) {
+      if (level.stage >= 0 && level.stage != s) continue;
+      if (const auto depth = depth_of(f, s, level.var))
+        found.push_back({{id->second, static_cast<int16_t>(s)}, *depth});
+    }
+    if (found.empty()) return Opacity::UnknownLoop;
+    result = {Level::Kind::At, found.front(), found.size() > 1};
+    const bool alike = std::ranges::all_of(
+        found, [&](const LoopRef& loop) { return are_alike(f, found.front(), loop); });
+    return alike ? Opacity::None : Opacity::DifferentLoops;
+  }
+
+  // A Func that has directives and no compute level is inlined; an output is at root instead.
+  void read_placement(FuncId id) {
+    const FuncContents& f = func(id);
+    Placement placement;
+    const graph::FuncPlacement& schedule = f.schedule;
+    Opacity why = read_level(schedule.compute_level, placement.compute);
+    if (why == Opacity::None && !(schedule.store_level == schedule.compute_level))
+      why = read_level(schedule.store_level, placement.store);
+    if (why == Opacity::None) why = read_level(schedule.hoist_level, placement.hoist);
+    if (why != Opacity::None) return make_opaque(id, why);
+    if (placement.compute.kind == Level::Kind::Undecided && graph::has_directives(f)) {
+      placement.compute.kind = is_output(*program_, id) ? Level::Kind::Root : Level::Kind::Inline;
+    }
+    plan(id).placement = placement;
+  }
+
+  // ---- loop fusion ----
+
+  void read_sharing(FuncId id) {
+    const FuncContents& f = func(id);
+    for (int s = 0; s < f.stage_count(); ++s) {
+      const LoopLevel& level = f.stage(s).schedule.fuse_level;
+      if (level.kind != LoopLevel::Kind::At || plan(id).opacity != Opacity::None) continue;
+      LoopLevel named = level;
+      named.stage = std::max(level.stage, 0);
+      Level shared;
+      if (const Opacity why = read_level(named, shared); why != Opacity::None)
+        return make_opaque(id, why);
+      plan(id).nests[static_cast<size_t>(s)].shared_with = shared.loop;
+    }
+  }
+
+  // Whether the shared loops of both nests get equal names; lowering compares the names of pure loops.
+  bool have_equal_names(StageId own, const LoopRef& shared) {
+    const Nest& nest = plan(own.func).nests[static_cast<size_t>(own.stage)];
+    const Nest& other = plan(shared.stage.func).nests[static_cast<size_t>(shared.stage.stage)];
+    if (static_cast<int>(nest.loops.size()) <= shared.depth) return false;
+    const auto own_names = loop_names(func(own.func), own.stage, nest).loops;
+    const auto other_names = loop_names(func(shared.stage.func), shared.stage.stage, other).loops;
+    const auto& dims = func(own.func).stage(own.stage).schedule.dims;
+    for (size_t d = 0; d <= static_cast<size_t>(shared.depth); ++d) {
+      const bool is_pure = !dims[dims.size() - 1 - d].is_reduction;
+      if (is_pure && own_names[d] != other_names[d]) return false;
+    }
+    return true;
+  }
+
+  // Makes the Funcs opaque that share loops with an opaque one; returns whether there were any more.
+  bool spread_opacity_once() {
+    bool changed = false;
+    const auto make = [&](FuncId id) {
+      if (plan(id).opacity != Opacity::None) return;
+      make_opaque(id, Opacity::SharedLoops);
+      changed = true;
+    };
+    for (FuncId id = 0; id < static_cast<FuncId>(plans_.size()); ++id) {
+      const FuncContents& f = func(id);
+      for (int s = 0; s < f.stage_count(); ++s) {
+        const LoopLevel& level = f.stage(s).schedule.fuse_level;
+        if (level.kind != LoopLevel::Kind::At) continue;
+        const auto other = ids_.find(level.func);
+        if (other == ids_.end()) continue;
+        const bool is_planned =
+            plan(id).opacity == Opacity::None && plan(other->second).opacity == Opacity::None;
+        const StageId own{id, static_cast<int16_t>(s)};
+        if (is_planned &&
+            have_equal_names(own, *plan(id).nests[static_cast<size_t>(s)].shared_with))
+          continue;
+        make(id);
+        make(other->second);
+      }
+    }
+    return changed;
+  }
+  void spread_opacity() {
+    while (spread_opacity_once()) {
+    }
+  }
+};
+
+}  // namespace
+
+Plan import_plan(const std::vector<graph::FuncPtr>& outputs) { return PlanImporter(outputs).run(); }
+
+}  // namespace retrograde::planning
