@@ -4,11 +4,11 @@
 //     =>   split(x, x, x_1, 32, GuardWithIf), split(x_1, x_1, x_2, 16, Auto), reorder(x_2, x_1, y, x),
 //          run(x_1, Unrolled), run(x_2, Vectorized)
 //
-// Method: the nests of all Funcs, then placements and storage, consumers first, since these name loops of others. For
-// each nest: one split for each step but the smallest, one fusion for each of the nest's, one reorder, one kind for each
-// loop.
+// Method: the nests of all Funcs, then loop fusion, placements and storage, which name loops of others. For each nest: one
+// split for each step but the smallest, one fusion for each of the nest's, one reorder, one kind for each loop. A stage
+// that shares loops renames its own.
 #include <algorithm>
-#include <optional>
+#include <set>
 
 #include "autoschedule/plan/loop_names.h"
 #include "autoschedule/plan/nest.h"
@@ -131,9 +131,12 @@ class PlanEmitter {
   explicit PlanEmitter(const Plan& plan)
       : plan_(plan), copy_(graph::copy_graph(plan.program->outputs)) {}
 
-  std::vector<FuncPtr> run() const {
+  std::vector<FuncPtr> run() {
     const auto count = static_cast<FuncId>(plan_.funcs.size());
     for (FuncId id = 0; id < count; ++id) emit_nests(id);
+    for (FuncId id = 0; id < count; ++id) {
+      for (int s = 0; s < func(id)->stage_count(); ++s) emit_sharing({id, static_cast<int16_t>(s)});
+    }
     for (FuncId id = count; id-- > 0;) emit_func(id);
     return copy_.outputs;
   }
@@ -141,6 +144,7 @@ class PlanEmitter {
  private:
   const Plan& plan_;
   const graph::GraphCopy copy_;
+  std::set<StageId> shared_;  // with their directives about loop fusion
 
   const FuncPtr& func(FuncId id) const {
     return copy_.of.at(plan_.program->funcs[static_cast<size_t>(id)].get());
@@ -160,10 +164,12 @@ class PlanEmitter {
     }
   }
 
-  std::string loop_name(const LoopRef& loop) const {
-    if (loop.depth == around_all_loops) return graph::outermost_loop;
+  const graph::Dim& dim_of(const LoopRef& loop) const {
     const graph::LoopList& dims = func(loop.stage.func)->stage(loop.stage.stage).schedule.dims;
-    return dims[dims.size() - 1 - static_cast<size_t>(loop.depth)].var;
+    return dims[dims.size() - 1 - static_cast<size_t>(loop.depth)];
+  }
+  std::string loop_name(const LoopRef& loop) const {
+    return loop.depth == around_all_loops ? graph::outermost_loop : dim_of(loop).var;
   }
 
   LoopLevel level_of(const Level& level) const {
@@ -207,16 +213,43 @@ class PlanEmitter {
     }
   }
 
-  void emit_sharing(const FuncPtr& f, StageId stage) const {
+  // ---- loop fusion ----
+
+  // A stage that owns its loops has its names; then come the stages that share them.
+  void emit_sharing(StageId stage) {
+    if (plan_.of(stage.func).opacity != Opacity::None || !shared_.insert(stage).second) return;
     const Nest& nest = plan_.nest(stage);
     if (!nest.shared_with) return;
+    emit_sharing(nest.shared_with->stage);
+    const graph::SchedulePlace place{func(stage.func), stage.stage};
+    for (int16_t d = 0; d <= nest.shared_with->depth; ++d) {
+      const LoopRef own{stage, d}, host{nest.shared_with->stage, d};
+      if (!dim_of(own).is_reduction || !dim_of(host).is_reduction)
+        rename(place, dim_of(own).var, dim_of(host).var);
+    }
     graph::ComputeWith with{{level_of({Level::Kind::At, *nest.shared_with})}};
     for (size_t d = 0; d < nest.loops.size(); ++d) {
       const LoopAlignStrategy align = nest.loops[d].align;
       if (align != LoopAlignStrategy::Auto)
         with.align.emplace_back(loop_name({stage, static_cast<int16_t>(d)}), align);
     }
-    graph::give_directive(graph::SchedulePlace{f, stage.stage}, std::move(with));
+    graph::give_directive(place, std::move(with));
+  }
+
+  // Loops that run as one have equal names, unless both are over reduction variables.
+  void rename(const graph::SchedulePlace& place, const std::string from,
+              const std::string to) const {
+    if (from == to) return;
+    const graph::LoopList& dims = place.schedule().dims;
+    const auto is_taken = [&](const std::string& name) {
+      return std::ranges::find(dims, name, &graph::Dim::var) != dims.end();
+    };
+    if (is_taken(to)) {
+      std::string other = to + "_";
+      while (is_taken(other)) other += "_";
+      graph::give_directive(place, graph::RenameLoop{to, other});
+    }
+    graph::give_directive(place, graph::RenameLoop{from, to});
   }
 
   // An opaque Func that is computed in a loop of another has to learn the loop's new name.
@@ -230,7 +263,6 @@ class PlanEmitter {
     }
     emit_placement(f, plan.placement);
     emit_storage(f, plan.storage);
-    for (int s = 0; s < f->stage_count(); ++s) emit_sharing(f, {id, static_cast<int16_t>(s)});
   }
 };
 

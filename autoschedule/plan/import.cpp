@@ -1,7 +1,7 @@
 // import.cpp -- reads the directives of a scheduled graph into a plan.
 //
 // Method: each Func by itself first; loops that other Funcs refer to are numbered by their depth. Then the references
-// between Funcs: a Func that shares loops with an opaque one is opaque, too, since it must keep the names of its loops.
+// between Funcs: a Func in whose loops an opaque one runs is opaque, too, since its loops must keep their names.
 // Linear in the number of Funcs, apart from chains of shared loops.
 #include <algorithm>
 #include <unordered_map>
@@ -126,9 +126,16 @@ class PlanImporter {
 
   // Whether two loops of stages of one Func have equal iterators and steps, so that they get equal names.
   bool are_alike(const FuncContents& f, const LoopRef& a, const LoopRef& b) {
+    if (a == b) return true;
+    if (shares_loops(f, a.stage.stage) || shares_loops(f, b.stage.stage)) return false;
     if (a.depth < 0 || b.depth < 0) return a.depth == b.depth;
     if (plan(a.stage.func).opacity != Opacity::None) return true;  // it keeps its names
     return loop_name(f, plan(a.stage.func), a) == loop_name(f, plan(b.stage.func), b);
+  }
+  // Whether its loops get the names of another Func's.
+  static bool shares_loops(const FuncContents& f, int stage) {
+    const LoopLevel& level = f.stage(stage).schedule.fuse_level;
+    return level.kind == LoopLevel::Kind::At && level.func != f.name;
   }
   static std::string loop_name(const FuncContents& f, const FuncPlan& plan, const LoopRef& loop) {
     const Nest& nest = plan.nests[static_cast<size_t>(loop.stage.stage)];
@@ -194,44 +201,19 @@ class PlanImporter {
     }
   }
 
-  // Whether the shared loops of both nests get equal names; lowering compares the names of pure loops.
-  bool have_equal_names(StageId own, const LoopRef& shared) {
-    const Nest& nest = plan(own.func).nests[static_cast<size_t>(own.stage)];
-    const Nest& other = plan(shared.stage.func).nests[static_cast<size_t>(shared.stage.stage)];
-    if (static_cast<int>(nest.loops.size()) <= shared.depth) return false;
-    const auto own_names = loop_names(func(own.func), own.stage, nest).loops;
-    const auto other_names = loop_names(func(shared.stage.func), shared.stage.stage, other).loops;
-    const auto& dims = func(own.func).stage(own.stage).schedule.dims;
-    for (size_t d = 0; d <= static_cast<size_t>(shared.depth); ++d) {
-      const bool is_pure = !dims[dims.size() - 1 - d].is_reduction;
-      if (is_pure && own_names[d] != other_names[d]) return false;
-    }
-    return true;
-  }
-
-  // Makes the Funcs opaque that share loops with an opaque one; returns whether there were any more.
+  // Makes the Funcs opaque in whose loops an opaque one runs, since that names them; returns whether there were any.
   bool spread_opacity_once() {
     bool changed = false;
-    const auto make = [&](FuncId id) {
-      if (plan(id).opacity != Opacity::None) return;
-      make_opaque(id, Opacity::SharedLoops);
-      changed = true;
-    };
-    for (FuncId id = 0; id < static_cast<FuncId>(plans_.size()); ++id) {
-      const FuncContents& f = func(id);
+    for (size_t i = 0; i < plans_.size(); ++i) {
+      const FuncContents& f = *program_->funcs[i];
+      if (plans_[i].opacity == Opacity::None) continue;
       for (int s = 0; s < f.stage_count(); ++s) {
         const LoopLevel& level = f.stage(s).schedule.fuse_level;
         if (level.kind != LoopLevel::Kind::At) continue;
-        const auto other = ids_.find(level.func);
-        if (other == ids_.end()) continue;
-        const bool is_planned =
-            plan(id).opacity == Opacity::None && plan(other->second).opacity == Opacity::None;
-        const StageId own{id, static_cast<int16_t>(s)};
-        if (is_planned &&
-            have_equal_names(own, *plan(id).nests[static_cast<size_t>(s)].shared_with))
-          continue;
-        make(id);
-        make(other->second);
+        const auto host = ids_.find(level.func);
+        if (host == ids_.end() || plan(host->second).opacity != Opacity::None) continue;
+        make_opaque(host->second, Opacity::SharedLoops);
+        changed = true;
       }
     }
     return changed;

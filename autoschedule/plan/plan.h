@@ -129,7 +129,7 @@ enum class Opacity : uint8_t {
   SymbolicFactor,  // a split whose factor is no constant
   SplitHistory,    // splits that are no decreasing steps
   SymbolicFold,    // fold_storage by an expression
-  SharedLoops,     // it shares loops with an opaque Func, or with loops of other iterators or steps
+  SharedLoops,     // an opaque Func shares its loops
   UnknownLoop,     // it is computed in a loop that only a specialization has
   DifferentLoops,  // it is computed in loops of several stages that are not alike
 };
