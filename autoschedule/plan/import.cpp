@@ -197,7 +197,11 @@ class PlanImporter {
       Level shared;
       if (const Opacity why = read_level(named, shared); why != Opacity::None)
         return make_opaque(id, why);
-      plan(id).nests[static_cast<size_t>(s)].shared_with = shared.loop;
+      Nest& nest = plan(id).nests[static_cast<size_t>(s)];
+      nest.shared_with = shared.loop;
+      for (size_t d = 0; d < nest.loops.size(); ++d) {
+        if (static_cast<int>(d) > shared.loop.depth) nest.loops[d].align = LoopAlignStrategy::Auto;
+      }
     }
   }
 
