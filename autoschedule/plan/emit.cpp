@@ -4,9 +4,9 @@
 //     =>   split(x, x, x_1, 32, GuardWithIf), split(x_1, x_1, x_2, 16, Auto), reorder(x_2, x_1, y, x),
 //          run(x_1, Unrolled), run(x_2, Vectorized)
 //
-// Method: the nests of all Funcs, then loop fusion, placements and storage, which name loops of others. For each nest: one
-// split for each step but the smallest, one fusion for each of the nest's, one reorder, one kind for each loop. A stage
-// that shares loops renames its own.
+// Method: the nests of all Funcs, then loop fusion, placements and storage, which name loops of others. For each nest: the
+// order of the reduction variables, one split for each step but the smallest, one fusion for each of the nest's, one
+// reorder, one kind for each loop. A stage that shares loops renames its own.
 #include <algorithm>
 #include <set>
 
@@ -64,11 +64,11 @@ class NestEmitter {
       : place_{f, stage}, nest_(nest), names_(loop_names(*f, stage, nest)) {}
 
   void run() const {
-    if (nest_.concurrency == Concurrency::Racing) {
-      give(graph::AllowRaces{});
-    } else if (nest_.concurrency != Concurrency::Independent) {
-      give(graph::MakeAtomic{nest_.concurrency == Concurrency::Vouched});
-    }
+    const Concurrency how = nest_.concurrency;
+    if (how == Concurrency::Racing || how == Concurrency::AtomicRacing) give(graph::AllowRaces{});
+    if (how != Concurrency::Racing && how != Concurrency::Independent)
+      give(graph::MakeAtomic{how == Concurrency::Vouched});
+    reorder_variables();
     const size_t own = names_.parts.size() - nest_.fusions.size();
     for (size_t i = 0; i < names_.parts.size(); ++i) {
       if (i >= own) fuse(nest_.fusions[i - own], names_.parts[i][0]);
@@ -95,6 +95,35 @@ class NestEmitter {
     const std::vector<Part> parts = parts_of(nest_, part.iterator);
     const auto at = std::ranges::find(parts, part.step, &Part::step) - parts.begin();
     return names_.parts[static_cast<size_t>(part.iterator)][static_cast<size_t>(at)];
+  }
+
+  // Reduction variables go into the order of their outermost loops before they are split: the new order is easier to
+  // prove legal while each has one loop.
+  void reorder_variables() const {
+    std::vector<graph::NamedLoop> now, wanted;
+    for (const graph::Dim& dim : place_.schedule().dims) {
+      if (dim.is_reduction) now.emplace_back(dim.var);
+    }
+    for (const Loop& loop : nest_.loops) add_variables(loop, now, wanted);
+    std::ranges::reverse(wanted);
+    if (wanted != now) give(graph::ReorderLoops{wanted});
+  }
+  // Adds the variables of a part that are not in the list yet, those of the outer loop first.
+  void add_variables(const Part& part, const std::vector<graph::NamedLoop>& variables,
+                     std::vector<graph::NamedLoop>& list) const {
+    const size_t own = names_.parts.size() - nest_.fusions.size();
+    if (part.iterator == once) return;
+    const auto i = static_cast<size_t>(part.iterator);
+    if (i >= own) {
+      add_variables(nest_.fusions[i - own].outer, variables, list);
+      add_variables(nest_.fusions[i - own].inner, variables, list);
+      return;
+    }
+    const std::string& name = names_.parts[i][0];
+    const auto is_in = [&](const std::vector<graph::NamedLoop>& names) {
+      return std::ranges::find(names, name) != names.end();
+    };
+    if (is_in(variables) && !is_in(list)) list.emplace_back(name);
   }
 
   void fuse(const Fusion& fusion, const std::string& fused) const {

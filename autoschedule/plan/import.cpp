@@ -23,12 +23,13 @@ using graph::LoopLevel;
 using graph::StageLoops;
 
 Concurrency concurrency_of(const StageLoops& schedule) {
-  if (schedule.allow_races) return Concurrency::Racing;
+  if (schedule.allow_races)
+    return schedule.atomic ? Concurrency::AtomicRacing : Concurrency::Racing;
   if (!schedule.atomic) return Concurrency::Independent;
   return schedule.override_associativity ? Concurrency::Vouched : Concurrency::Atomic;
 }
 
-// What makes the Func opaque whatever its loops are.
+// The reason why the Func is opaque whatever its loops are.
 Opacity opacity_of(const FuncContents& f) {
   if (f.is_extern()) return Opacity::Extern;
   if (f.schedule.async) return Opacity::Async;

@@ -42,7 +42,7 @@ struct LoopRef {
 };
 inline constexpr int16_t around_all_loops = -1;
 
-// What a loop runs over: an iterator in steps of some points.
+// The points that a loop runs over: an iterator in steps.
 struct Part {
   int16_t iterator = 0;  // of the stage, or a fusion of the nest; or `once`
   int64_t step = 1;      // points of the iterator that one iteration covers
@@ -73,6 +73,7 @@ enum class Concurrency : uint8_t {
   Atomic,       // the update is atomic, and proven to be associative and commutative
   Vouched,      // the update is atomic, and its user vouches for the rest
   Racing,       // its user, or the compiler, vouches that no race changes the result
+  AtomicRacing  // both: it is atomic, and nothing is proven
 };
 
 // The loops of one stage.
@@ -145,7 +146,7 @@ struct FuncPlan {
 };
 uint64_t hash_of(const FuncPlan& plan);
 
-// The program that a plan is about: its outputs, and all Funcs in the order of their numbers. No Func has wrappers
+// The program of a plan: its outputs, and all Funcs in the order of their numbers. No Func has wrappers
 // that are not applied yet.
 struct Program {
   std::vector<graph::FuncPtr> outputs, funcs;

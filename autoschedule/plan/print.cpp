@@ -14,7 +14,7 @@ namespace retrograde::planning {
 namespace {
 
 constexpr std::array kind_words{"", "parallel", "vector", "unroll", "block", "thread", "lane"};
-constexpr std::array concurrency_words{"", "atomic", "vouched", "racing"};
+constexpr std::array concurrency_words{"", "atomic", "vouched", "racing", "atomic_racing"};
 constexpr std::array other_words{"undecided", "inline", "root",   "at",     "each",
                                  "store",     "hoist",  "opaque", "fold",   "backward",
                                  "by",        "shared", "with",   once_word};

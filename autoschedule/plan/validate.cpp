@@ -12,15 +12,13 @@
 // Not checked: what depends on the regions that loops access, such as whether a window holds all rows that are read
 // again (P6).
 #include <algorithm>
-#include <functional>
-#include <unordered_map>
 
 #include "autoschedule/plan/nest.h"
 #include "autoschedule/plan/plan.h"
+#include "autoschedule/plan/readers.h"
 #include "diagnostics/error.h"
 #include "graph/definitions/define.h"
 #include "ir/literal.h"
-#include "ir/visit.h"
 
 namespace retrograde::planning {
 
@@ -41,8 +39,8 @@ class PlanChecker {
     for_each_planned([&](StageId stage) { check_steps(stage); });
     for_each_func([&](FuncId id) { check_levels(id); });
     if (!broken_.empty()) return broken_;
-    find_reads();
-    for_each_func([&](FuncId id) { check_reads(id); });
+    const Readers readers(plan_);
+    for_each_func([&](FuncId id) { check_reads(id, readers); });
     for_each_func([&](FuncId id) { check_storage(id); });
     for_each_planned([&](StageId stage) { check_lanes(stage); });
     for_each_func([&](FuncId id) { check_outside_of_lanes(id); });
@@ -54,7 +52,6 @@ class PlanChecker {
   using Kind = Level::Kind;
   const Plan& plan_;
   std::string broken_;
-  std::unordered_map<FuncId, std::vector<StageId>> readers_;
 
   template <typename... Parts>
   void breaks(const Parts&... parts) {
@@ -143,78 +140,14 @@ class PlanChecker {
 
   // ---- P2 ----
 
-  void find_reads() {
-    std::unordered_map<const FuncContents*, FuncId> ids;
-    for_each_func([&](FuncId id) { ids[&func(id)] = id; });
-    for_each_func([&](FuncId id) {
-      const FuncContents& f = func(id);
-      const auto note = [&](const FuncContents* callee, int stage) {
-        std::vector<StageId>& readers = readers_[ids.at(callee)];
-        const StageId reader{id, static_cast<int16_t>(stage)};
-        if (callee != &f && (readers.empty() || !(readers.back() == reader)))
-          readers.push_back(reader);
-      };
-      for (int s = 0; s < f.stage_count(); ++s) {
-        walk(f.stage(s), [&](const Call& call) {
-          if (call.call_type == CallType::Func) note(graph::func_of(call).get(), s);
-        });
-      }
-      if (!f.is_extern()) return;
-      for (const graph::FuncPtr& callee : graph::direct_callees(f)) note(callee.get(), 0);
-    });
-  }
-
-  // Whether the values of the Func are computed wherever they are read.
-  bool is_computed_at_reads(FuncId id) const {
-    const FuncPlan& plan = plan_.of(id);
-    const Kind kind = plan.placement.compute.kind;
-    return !is_output(*plan_.program, id) &&
-           (kind == Kind::Inline || (kind == Kind::Undecided && plan.opacity == Opacity::None));
-  }
-
-  void check_reads(FuncId id) {
+  void check_reads(FuncId id, const Readers& readers) {
     const Level& compute = plan_.of(id).placement.compute;
     if (compute.kind != Kind::At) return;
-    const std::optional<StageId> outside = find_reader_outside(id, compute);
+    const std::optional<StageId> outside = readers.find_outside(id, compute);
     if (outside)
       breaks("P2: ", quoted(func(id).name), " is computed at ", loop_text(compute.loop), ", but ",
              name(*outside), " reads it outside of that loop");
   }
-  std::optional<StageId> find_reader_outside(FuncId id, const Level& level) const {
-    const auto readers = readers_.find(id);
-    if (readers == readers_.end()) return std::nullopt;
-    for (const StageId reader : readers->second) {
-      if (is_computed_at_reads(reader.func)) {
-        if (const auto outside = find_reader_outside(reader.func, level)) return outside;
-      } else if (!is_inside(reader, level)) {
-        return reader;
-      }
-    }
-    return std::nullopt;
-  }
-
-  // Whether all loops of the stage are inside of the level's loop. Unknown places count as inside.
-  bool is_inside(StageId stage, const Level& level) const {
-    const StageId host = level.loop.stage;
-    if (stage.func == host.func && (stage.stage == host.stage || level.in_each_stage)) return true;
-    const FuncPlan& plan = plan_.of(stage.func);
-    if (plan.opacity != Opacity::None && plan.placement.compute.kind == Kind::Undecided)
-      return !is_output(*plan_.program, stage.func);
-    const auto is_place_inside = [&](const LoopRef& loop) {
-      const bool is_same =
-          loop.stage == host || (loop.stage.func == host.func && level.in_each_stage);
-      return is_same ? loop.depth >= level.loop.depth : is_inside(loop.stage, level);
-    };
-    if (plan.opacity == Opacity::None) {
-      const Nest& nest = plan_.nest(stage);
-      if (nest.shared_with && is_place_inside(*nest.shared_with)) return true;
-    } else if (func(stage.func).stage(stage.stage).schedule.fuse_level.kind ==
-               graph::LoopLevel::Kind::At) {
-      return true;
-    }
-    return plan.placement.compute.kind == Kind::At && is_place_inside(plan.placement.compute.loop);
-  }
-
   // ---- P3 ----
 
   void check_storage(FuncId id) {

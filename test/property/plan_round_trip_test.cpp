@@ -68,7 +68,7 @@ void try_schedule(const std::vector<graph::FuncPtr>& outputs, Count& count, bool
   }
 }
 
-constexpr int programs_of_each = many_or_few(1000, 100);
+constexpr int programs_of_each = many_or_few(1000, 60);
 
 TEST(PlanRoundTrips, RandomSchedules) {
   Count count;
@@ -87,29 +87,48 @@ TEST(PlanRoundTrips, RandomSchedules) {
 }
 
 TEST(PlanRoundTrips, DefaultSchedulesOfRandomPrograms) {
-  Count count;
+  Count count, everything;
   for (int seed = 1; seed <= programs_of_each; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     fuzz::Choices choices(static_cast<uint64_t>(seed));
     const auto program = fuzz::make_program(choices, fuzz::Style::gradients());
-    try_schedule(autoschedule::schedule_unscheduled(fuzz::outputs_of(program)), count, true);
+    const std::vector<graph::FuncPtr> outputs = fuzz::outputs_of(program);
+    try_schedule(autoschedule::schedule_unscheduled(outputs), count, true);
+    autoschedule::give_default_schedule(outputs, {}, autoschedule::Scheduling::Everything);
+    try_schedule(outputs, everything, true);
   }
   count.print("default schedules");
+  everything.print("with everything scheduled");
   EXPECT_EQ(count.opaque_funcs(), 0);
+  EXPECT_EQ(everything.opaque_funcs(), 0);
 }
 
 TEST(PlanRoundTrips, DefaultSchedulesOfKeptGraphs) {
   const char* folder = std::getenv("RETROGRADE_PLAN_GRAPHS");
   if (!folder) GTEST_SKIP() << "RETROGRADE_PLAN_GRAPHS names no folder";
-  Count count;
+  Count count, everything, on_device;
   for (const auto& entry : fs::directory_iterator(folder)) {
     SCOPED_TRACE(entry.path().filename().string());
     std::ifstream in(entry.path());
     const std::string text{std::istreambuf_iterator<char>(in), {}};
-    const graph::Graph graph = graph::parse_graph(text);
-    try_schedule(autoschedule::schedule_unscheduled(graph.outputs), count, false);
+    const auto outputs = [&] { return graph::parse_graph(text).outputs; };
+    try_schedule(autoschedule::schedule_unscheduled(outputs()), count, false);
+    for (const bool on_gpu : {false, true}) {
+      autoschedule::ScheduleRequest request;
+      request.on_gpu = on_gpu;
+      const std::vector<graph::FuncPtr> scheduled = outputs();
+      try {
+        autoschedule::give_default_schedule(scheduled, request,
+                                            autoschedule::Scheduling::Everything);
+      } catch (const Error&) {
+        continue;  // a device cannot compute it
+      }
+      try_schedule(scheduled, on_gpu ? on_device : everything, false);
+    }
   }
   count.print("kept graphs");
+  everything.print("with everything scheduled");
+  on_device.print("on a device");
 }
 
 }  // namespace

@@ -82,6 +82,17 @@ TEST_F(PlanImport, UpdatesHaveLinesOfTheirOwn) {
               "producer  at sum.1/r.x:8\n");
 }
 
+// While each has one loop, both orders are proven to keep that of all dependences.
+TEST_F(PlanImport, ReductionVariablesAreOrderedBeforeTheyAreSplit) {
+  Func table("table");
+  RDom r(1, 20, 1, 20, "r");
+  RVar ro("ro"), ri("ri");
+  table(x, y) = x + y;
+  table(r.x, r.y) = table(r.x - 1, r.y) * table(r.x, r.y - 1);
+  table.compute_root().update().reorder(r.y, r.x).split(r.y, ro, ri, 4);
+  expect_plan({table}, "table  root\n  .1  r.x, r.y:4, r.y\n");
+}
+
 TEST_F(PlanImport, LoopFusionNamesTheLoopsOfTheOther) {
   Func other("other"), both("both");
   Var u("u"), v("v"), row("row");
@@ -98,15 +109,19 @@ TEST_F(PlanImport, LoopFusionNamesTheLoopsOfTheOther) {
 }
 
 TEST_F(PlanImport, RacesAndVouchedUpdates) {
-  Func racing("careless"), vouched("trusted");
+  Func careless("careless"), trusted("trusted"), careful("careful");
   RDom r(0, 100, "r");
-  racing(x) = 0;
-  racing(r % 7) = r;
-  vouched(x) = 0;
-  vouched(r % 7) = vouched(r % 7) * 2 + r;
-  racing.compute_root().update().allow_race_conditions().parallel(r);
-  vouched.compute_root().update().atomic(true).parallel(r);
-  expect_plan({racing, vouched},
+  for (Func f : {careless, trusted, careful}) {
+    f(x) = 0;
+    f(r % 7) = f(r % 7) * 2 + r;
+    f.compute_root();
+  }
+  careless.update().allow_race_conditions().parallel(r);
+  trusted.update().atomic(true).parallel(r);
+  careful.update().atomic().allow_race_conditions().parallel(r);
+  expect_plan({careless, trusted, careful},
+              "careful  root\n"
+              "  .1  atomic_racing  parallel r.x\n"
               "trusted  root\n"
               "  .1  vouched  parallel r.x\n"
               "careless  root\n"

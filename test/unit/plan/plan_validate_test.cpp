@@ -89,6 +89,10 @@ TEST_F(PlanInvariants, P2ReadsAreInsideOfTheComputeLoop) {
                    "blur  at sum.0/y\n"),
             "");
   EXPECT_EQ(broken("out  root\nnext  root\nsum  root\nblur  at each sum.0/y\n"), "");
+  // Loops alike at different depths.
+  EXPECT_EQ(broken("out  root\nnext  root\nsum  root\n  .0  x, y\n  .1  y, x, r.y, r.x\n"
+                   "blur  at each sum.0/y\n"),
+            "");
   Plan plan = parsed("out  root\n", program);
   FuncPlan lost = *plan.funcs[0];
   lost.placement.compute = {Level::Kind::At, {{3, 0}, 9}};
