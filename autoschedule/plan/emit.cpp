@@ -91,12 +91,6 @@ class NestEmitter {
     graph::give_directive(place_, std::move(directive));
   }
 
-  const std::string& name_of(const Part& part) const {
-    const std::vector<Part> parts = parts_of(nest_, part.iterator);
-    const auto at = std::ranges::find(parts, part.step, &Part::step) - parts.begin();
-    return names_.parts[static_cast<size_t>(part.iterator)][static_cast<size_t>(at)];
-  }
-
   // Reduction variables go into the order of their outermost loops before they are split: the new order is easier to
   // prove legal while each has one loop.
   void reorder_variables() const {
@@ -127,7 +121,7 @@ class NestEmitter {
   }
 
   void fuse(const Fusion& fusion, const std::string& fused) const {
-    give(graph::FuseLoops{name_of(fusion.inner), name_of(fusion.outer), fused});
+    give(graph::FuseLoops{names_.of(nest_, fusion.inner), names_.of(nest_, fusion.outer), fused});
   }
 
   // Splits the loop of parts [first, last], which has the name of the first, after part `at`.

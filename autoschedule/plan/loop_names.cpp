@@ -9,19 +9,21 @@
 
 namespace retrograde::planning {
 
+std::string LoopNames::of(const Nest& nest, const Part& part) const {
+  if (part.iterator == once) return graph::outermost_loop;
+  const std::vector<Part> all = parts_of(nest, part.iterator);
+  const auto at = std::ranges::find(all, part.step, &Part::step) - all.begin();
+  return parts[static_cast<size_t>(part.iterator)][static_cast<size_t>(at)];
+}
+
 LoopNames loop_names(const graph::FuncContents& f, int stage, const Nest& nest) {
   const std::vector<std::string> iterators = iterators_of(f, stage);
   LoopNames names;
-  const auto name_of = [&](const Part& part) {
-    if (part.iterator == once) return std::string(graph::outermost_loop);
-    const std::vector<Part> parts = parts_of(nest, part.iterator);
-    const auto at = std::ranges::find(parts, part.step, &Part::step) - parts.begin();
-    return names.parts[static_cast<size_t>(part.iterator)][static_cast<size_t>(at)];
-  };
   std::set<std::string> used(iterators.begin(), iterators.end());
   for (size_t i = 0; i < iterators.size() + nest.fusions.size(); ++i) {
-    const std::string base =
-        i < iterators.size() ? iterators[i] : name_of(nest.fusions[i - iterators.size()].inner);
+    const std::string base = i < iterators.size()
+                                 ? iterators[i]
+                                 : names.of(nest, nest.fusions[i - iterators.size()].inner);
     names.parts.push_back({base});
     for (size_t k = 1; k < parts_of(nest, static_cast<int>(i)).size(); ++k) {
       std::string name = text(base, "_", k);
@@ -29,7 +31,7 @@ LoopNames loop_names(const graph::FuncContents& f, int stage, const Nest& nest) 
       names.parts.back().push_back(name);
     }
   }
-  for (const Loop& loop : nest.loops) names.loops.push_back(name_of(loop));
+  for (const Loop& loop : nest.loops) names.loops.push_back(names.of(nest, loop));
   return names;
 }
 

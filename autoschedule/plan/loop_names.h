@@ -13,6 +13,8 @@ namespace retrograde::planning {
 struct LoopNames {
   std::vector<std::string> loops;               // outermost first
   std::vector<std::vector<std::string>> parts;  // of each iterator, as parts_of() lists them
+
+  std::string of(const Nest& nest, const Part& part) const;
 };
 LoopNames loop_names(const graph::FuncContents& f, int stage, const Nest& nest);
 
