@@ -12,7 +12,7 @@
 #include "autoschedule/plan/split_history.h"
 #include "graph/directives/give_directive.h"
 #include "graph/names.h"
-#include "ir/literal.h"
+#include "ir/build.h"
 
 namespace retrograde::planning {
 
@@ -170,7 +170,17 @@ class PlanImporter {
     return alike ? Opacity::None : Opacity::DifferentLoops;
   }
 
-  // A Func that has directives and no compute level is inlined; an output is at root instead.
+  // Whether the Func has directives, or loops that rfactor gave it.
+  bool is_scheduled(FuncId id) {
+    const FuncContents& f = func(id);
+    const std::vector<Nest>& nests = plan(id).nests;
+    for (size_t s = 0; s < nests.size(); ++s) {
+      if (!(nests[s] == loops_of_definition(f, static_cast<int>(s)))) return true;
+    }
+    return graph::has_directives(f);
+  }
+
+  // A scheduled Func without a compute level is inlined; an output is at root instead.
   void read_placement(FuncId id) {
     const FuncContents& f = func(id);
     Placement placement;
@@ -180,7 +190,7 @@ class PlanImporter {
       why = read_level(schedule.store_level, placement.store);
     if (why == Opacity::None) why = read_level(schedule.hoist_level, placement.hoist);
     if (why != Opacity::None) return make_opaque(id, why);
-    if (placement.compute.kind == Level::Kind::Undecided && graph::has_directives(f)) {
+    if (placement.compute.kind == Level::Kind::Undecided && is_scheduled(id)) {
       placement.compute.kind = is_output(*program_, id) ? Level::Kind::Root : Level::Kind::Inline;
     }
     plan(id).placement = placement;

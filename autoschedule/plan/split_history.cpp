@@ -8,7 +8,6 @@
 #include "autoschedule/plan/nest.h"
 #include "graph/names.h"
 #include "ir/build.h"
-#include "ir/literal.h"
 
 namespace retrograde::planning {
 

@@ -18,7 +18,7 @@
 #include "autoschedule/plan/readers.h"
 #include "diagnostics/error.h"
 #include "graph/definitions/define.h"
-#include "ir/literal.h"
+#include "ir/build.h"
 
 namespace retrograde::planning {
 

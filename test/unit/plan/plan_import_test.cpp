@@ -82,6 +82,21 @@ TEST_F(PlanImport, UpdatesHaveLinesOfTheirOwn) {
               "producer  at sum.1/r.x:8\n");
 }
 
+// The Func that rfactor makes has an order of loops, but no directives.
+TEST_F(PlanImport, FactoredFuncsAreScheduled) {
+  Func sum("sum");
+  RDom r(0, 8, 0, 8, "r");
+  Var u("u");
+  sum() = 0;
+  sum() += out(r.x, r.y);
+  sum.compute_root();
+  Func parts = sum.update().rfactor(r.x, u);
+  const Plan plan = imported({sum});
+  const std::string text = plain_text(plan);
+  EXPECT_NE(text.find("sum_intm  inline\n  .1  r.y, u\n"), std::string::npos) << text;
+  EXPECT_EQ(to_text(import_plan(emit_plan(plan))), to_text(plan));
+}
+
 // While each has one loop, both orders are proven to keep that of all dependences.
 TEST_F(PlanImport, ReductionVariablesAreOrderedBeforeTheyAreSplit) {
   Func table("table");
