@@ -25,6 +25,7 @@ retrograde_many_programs(gradient_suite_fuzz SOURCES gradient/programs_suite_tes
   LIBS retrograde_dep_halide_runtime)
 retrograde_many_programs(odd_sizes_fuzz SOURCES gradient/odd_sizes_test.cpp
   LIBS retrograde_dep_halide_runtime)
+retrograde_many_programs(plan_round_trip_fuzz SOURCES property/plan_round_trip_test.cpp)
 retrograde_many_programs(ptx_fuzz SOURCES unit/codegen/ptx_test.cpp support/every_kernel.cpp LAYERS codegen)
 retrograde_many_programs(random_fuzz SOURCES property/random_test.cpp)
 retrograde_many_programs(update_random_fuzz SOURCES gradient/update_random_test.cpp

@@ -4,4 +4,5 @@ retrograde_test(gpu_page_test READS_FILES LIBS retrograde_simt retrograde_dep_ha
 retrograde_test(graph_golden_test READS_FILES LIBS retrograde_opt_parts)
 retrograde_test(lower_golden_test LAYERS lower READS_FILES)
 retrograde_test(pipeline_golden_test READS_FILES LIBS retrograde_opt_parts)
+retrograde_test(plan_golden_test READS_FILES LIBS retrograde_dep_halide_runtime)
 retrograde_test(schedule_log_test scheduling_page_test READS_FILES LIBS retrograde_dep_halide_runtime)

@@ -5,10 +5,12 @@
 // Every third program (every one in the fuzz preset) also runs through check_gradients, which compares adjoint, tangent
 // and complex step in machine code. No two of these share their derivatives.
 #include "gradient/programs_suite.h"
+#include "autoschedule/default_schedule.h"
 #include "checks/check_gradients.h"
 #include "graph/directives/give_directive.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/graph.h"
+#include "support/plan_round_trip.h"
 #include "support/program_counts.h"
 
 namespace retrograde::gradient {
@@ -69,6 +71,17 @@ TEST_P(Suite, SchedulesAreReplayed) {
   log.entries.erase(log.entries.begin(), log.entries.begin() + static_cast<long>(own));
   graph::apply_log(log, fresh.outputs);
   EXPECT_EQ(graph::difference(graph::graph_of(fresh.outputs), graph::graph_of(outputs)), "");
+}
+
+// The default schedule is a plan, in which no Func is opaque.
+TEST_P(Suite, SchedulesArePlans) {
+  std::vector<graph::FuncPtr> outputs{program.loss.function()};
+  Derivative d = propagate_adjoints(program.loss);
+  for (const Buffer<float>& input : program.inputs) outputs.push_back(d(input).function());
+  const PlanRoundTrip trip = plan_round_trip(autoschedule::schedule_unscheduled(outputs));
+  EXPECT_EQ(trip.failure, "");
+  EXPECT_EQ(trip.broken, "");
+  EXPECT_TRUE(trip.opaque.empty());
 }
 
 class CheckedSuite : public Suite {};

@@ -11,6 +11,8 @@
 //                                                   (program_text.h)
 //   opt --graph --log=FILE program.graph            applies a schedule (graph/directives/schedule_log.h) before
 //                                                   the passes run
+//   opt --graph [--pass=schedule_unscheduled] --plan program.graph
+//                                                   prints the schedule as a plan (autoschedule/plan/plan.h)
 //   opt --time-passes --dump-after=all ...          prints the time and the result of each pass
 //   opt --time-passes --dump-after=PASS,... -- PROGRAM ARGS...
 //                                                   for everything that a program compiles while it runs
@@ -34,8 +36,10 @@
 #include <string>
 #include <vector>
 
+#include "autoschedule/plan/plan.h"
 #include "diagnostics/error.h"
 #include "graph/directives/schedule_log.h"
+#include "graph/directives/wrappers.h"
 #include "graph/graph.h"
 #include "graph_passes.h"
 #include "ir/parse.h"
@@ -54,7 +58,7 @@ struct Options {
   std::string file = "-", stop_after, log;
   std::vector<char*> program;  // the words after "--", null-terminated
   bool lists = false, lists_pipeline = false, is_expr = false, is_graph = false, times = false,
-       prints = false;
+       prints = false, plans = false;
   bool dumps(const std::string& pass) const {
     return std::find(dumped.begin(), dumped.end(), pass) != dumped.end() ||
            std::find(dumped.begin(), dumped.end(), "all") != dumped.end();
@@ -84,6 +88,8 @@ bool read_option(const std::string& arg, Options& options) {
     options.dumped = split(*dumped, ',');
   } else if (arg == "--print") {
     options.prints = true;
+  } else if (arg == "--plan") {
+    options.plans = true;
   } else if (arg == "--list") {
     options.lists = true;
   } else if (arg == "--list-pipeline") {
@@ -189,8 +195,11 @@ void run_graph(const Options& options) {
   std::string result = graph::to_text(program.graph);
   for (const std::string& pass : options.passes) {
     result = opt::text_after(pass, program);
-    if (&pass != &options.passes.back()) program = opt::parse_program(result, program.target);
+    if (&pass != &options.passes.back() || options.plans)
+      program = opt::parse_program(result, program.target);
   }
+  if (options.plans)
+    result = to_text(planning::import_plan(graph::apply_wrappers(program.graph.outputs)));
   std::cout << result;
 }
 
@@ -293,12 +302,13 @@ int run(const Options& options) {
 int main(int argc, char** argv) {
   std::optional<Options> options = parse_options(argc, argv);
   if (!options) {
-    std::cerr << "usage: opt --pass=NAME,... [--expr] [--time-passes] [--dump-after=NAME,...|all] "
-                 "[FILE]\n"
-                 "       opt --print [FILE]\n"
-                 "       opt --graph [--log=FILE] [--pass=NAME,... | --stop-after=NAME] [FILE]\n"
-                 "       opt [--time-passes] [--dump-after=NAME,...|all] -- PROGRAM ARGS...\n"
-                 "       opt --list | --list-pipeline\n";
+    std::cerr
+        << "usage: opt --pass=NAME,... [--expr] [--time-passes] [--dump-after=NAME,...|all] "
+           "[FILE]\n"
+           "       opt --print [FILE]\n"
+           "       opt --graph [--log=FILE] [--pass=NAME,... | --stop-after=NAME] [--plan] [FILE]\n"
+           "       opt [--time-passes] [--dump-after=NAME,...|all] -- PROGRAM ARGS...\n"
+           "       opt --list | --list-pipeline\n";
     return 2;
   }
   try {

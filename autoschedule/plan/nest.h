@@ -1,0 +1,33 @@
+// nest.h -- questions about the loops of one stage.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "autoschedule/plan/plan.h"
+
+namespace retrograde::planning {
+
+// The names of the stage's iterators in the order of their numbers.
+std::vector<std::string> iterators_of(const graph::FuncContents& f, int stage);
+// One serial loop for each iterator, in the order of the definition.
+Nest loops_of_definition(const graph::FuncContents& f, int stage);
+
+// The parts of an iterator, among loops and fused loops, by decreasing step.
+std::vector<Part> parts_of(const Nest& nest, int iterator);
+// The part of the same iterator with the next larger or smaller step; null when there is none.
+const Part* next_larger(const std::vector<Part>& parts, int64_t step);
+const Part* next_smaller(const std::vector<Part>& parts, int64_t step);
+
+// Whether a loop of the same iterator with a larger step is inside of this one: the loop runs over remainders.
+bool is_phase(const Nest& nest, size_t depth);
+
+// The same nest with fusions in the order in which the loops mention them, outermost first and the parts of a fusion
+// before it. Nests that differ only in this order become equal.
+Nest with_ordered_fusions(const Nest& nest, int iterators);
+
+// The order in which to split an iterator at the steps of all its parts but the last: indices into parts_of. A step in
+// blocks follows the next smaller one; others follow the next larger one. The larger of two is first otherwise.
+std::vector<size_t> split_order(const std::vector<Part>& parts);
+
+}  // namespace retrograde::planning

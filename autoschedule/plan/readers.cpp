@@ -1,0 +1,101 @@
+#include "autoschedule/plan/readers.h"
+
+#include <algorithm>
+
+#include "autoschedule/plan/loop_names.h"
+#include "ir/build.h"
+#include "ir/visit.h"
+
+namespace retrograde::planning {
+
+Readers::Readers(const Plan& plan) : plan_(plan) {
+  std::unordered_map<const graph::FuncContents*, FuncId> ids;
+  const auto count = static_cast<FuncId>(plan.funcs.size());
+  for (FuncId id = 0; id < count; ++id) ids[&func(id)] = id;
+  for (FuncId id = 0; id < count; ++id) note_reads(id, ids);
+}
+
+void Readers::note_reads(FuncId id,
+                         const std::unordered_map<const graph::FuncContents*, FuncId>& ids) {
+  const graph::FuncContents& f = func(id);
+  const auto note = [&](const graph::FuncContents* callee, int stage) {
+    std::vector<StageId>& readers = readers_[ids.at(callee)];
+    const StageId reader{id, static_cast<int16_t>(stage)};
+    if (callee != &f && (readers.empty() || readers.back() != reader)) readers.push_back(reader);
+  };
+  for (int s = 0; s < f.stage_count(); ++s) {
+    walk(f.stage(s), [&](const Call& call) {
+      if (call.call_type == CallType::Func) note(graph::func_of(call).get(), s);
+    });
+  }
+  if (!f.is_extern()) return;
+  for (const graph::FuncPtr& callee : graph::direct_callees(f)) note(callee.get(), 0);
+}
+
+// Whether the values of the Func are computed wherever they are read.
+bool Readers::is_computed_at_reads(FuncId id) const {
+  const FuncPlan& plan = plan_.of(id);
+  const Level::Kind kind = plan.placement.compute.kind;
+  return !is_output(*plan_.program, id) &&
+         (kind == Level::Kind::Inline ||
+          (kind == Level::Kind::Undecided && plan.opacity == Opacity::None));
+}
+
+std::optional<StageId> Readers::find_outside(FuncId id, const Level& level) const {
+  const auto readers = readers_.find(id);
+  if (readers == readers_.end()) return std::nullopt;
+  for (const StageId reader : readers->second) {
+    if (is_computed_at_reads(reader.func)) {
+      if (const auto outside = find_outside(reader.func, level)) return outside;
+    } else if (!is_inside(reader, level)) {
+      return reader;
+    }
+  }
+  return std::nullopt;
+}
+
+// The depth of the level's loop in a stage of the same Func; nullopt when the stage has none. Loops alike of different
+// stages may be at different depths.
+std::optional<int> Readers::depth_in(StageId stage, const Level& level) const {
+  const StageId host = level.loop.stage;
+  if (stage == host || level.loop.depth == around_all_loops) return level.loop.depth;
+  if (stage.func != host.func || !level.in_each_stage) return std::nullopt;
+  const std::vector<std::string> own = names_of(stage), wanted = names_of(host);
+  const auto found = std::ranges::find(own, wanted[static_cast<size_t>(level.loop.depth)]);
+  if (found == own.end()) return std::nullopt;
+  return static_cast<int>(found - own.begin());
+}
+
+// The names of a stage's loops, outermost first.
+std::vector<std::string> Readers::names_of(StageId stage) const {
+  const graph::FuncContents& f = func(stage.func);
+  if (plan_.of(stage.func).opacity == Opacity::None)
+    return loop_names(f, stage.stage, plan_.nest(stage)).loops;
+  std::vector<std::string> names =
+      mapped(f.stage(stage.stage).schedule.dims, [](const graph::Dim& dim) { return dim.var; });
+  std::ranges::reverse(names);
+  return names;
+}
+
+bool Readers::is_place_inside(const LoopRef& loop, const Level& level) const {
+  const auto depth = depth_in(loop.stage, level);
+  return depth ? loop.depth >= *depth : is_inside(loop.stage, level);
+}
+
+// Whether all loops of the stage are inside of the level's loop. Unknown places count as inside.
+bool Readers::is_inside(StageId stage, const Level& level) const {
+  if (depth_in(stage, level)) return true;
+  const FuncPlan& plan = plan_.of(stage.func);
+  const Level& compute = plan.placement.compute;
+  if (plan.opacity == Opacity::None) {
+    const Nest& nest = plan_.nest(stage);
+    if (nest.shared_with && is_place_inside(*nest.shared_with, level)) return true;
+  } else {
+    const graph::StageLoops& schedule = func(stage.func).stage(stage.stage).schedule;
+    if (schedule.fuse_level.kind == graph::LoopLevel::Kind::At) return true;
+    if (compute.kind == Level::Kind::Undecided) return !is_output(*plan_.program, stage.func);
+  }
+  return compute.kind == Level::Kind::At && is_place_inside(compute.loop, level);
+}
+
+}  // namespace retrograde::planning

@@ -1,0 +1,35 @@
+// readers.h -- the stages that read a Func, and whether they run inside of a loop.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "autoschedule/plan/plan.h"
+
+namespace retrograde::planning {
+
+class Readers {
+ public:
+  // The plan is not copied. Requires (InternalError): its loops exist.
+  explicit Readers(const Plan& plan);
+  // A stage that reads the Func, also through inlined Funcs, and runs outside of the level's loop.
+  std::optional<StageId> find_outside(FuncId func, const Level& level) const;
+
+ private:
+  const Plan& plan_;
+  std::unordered_map<FuncId, std::vector<StageId>> readers_;
+
+  const graph::FuncContents& func(FuncId id) const {
+    return *plan_.program->funcs[static_cast<size_t>(id)];
+  }
+  void note_reads(FuncId id, const std::unordered_map<const graph::FuncContents*, FuncId>& ids);
+  bool is_computed_at_reads(FuncId id) const;
+  std::optional<int> depth_in(StageId stage, const Level& level) const;
+  std::vector<std::string> names_of(StageId stage) const;
+  bool is_inside(StageId stage, const Level& level) const;
+  bool is_place_inside(const LoopRef& loop, const Level& level) const;
+};
+
+}  // namespace retrograde::planning
