@@ -10,7 +10,7 @@
 #include <iostream>
 #include <iterator>
 
-#include "autoschedule/default_schedule.h"
+#include "driver/schedule.h"
 #include "graph/graph.h"
 #include "support/plan_round_trip.h"
 #include "support/program_counts.h"
@@ -93,7 +93,7 @@ TEST(PlanRoundTrips, DefaultSchedulesOfRandomPrograms) {
     fuzz::Choices choices(static_cast<uint64_t>(seed));
     const auto program = fuzz::make_program(choices, fuzz::Style::gradients());
     const std::vector<graph::FuncPtr> outputs = fuzz::outputs_of(program);
-    try_schedule(autoschedule::schedule_unscheduled(outputs), count, true);
+    try_schedule(driver::schedule_unscheduled(outputs), count, true);
     autoschedule::give_default_schedule(outputs, {}, autoschedule::Scheduling::Everything);
     try_schedule(outputs, everything, true);
   }
@@ -112,7 +112,7 @@ TEST(PlanRoundTrips, DefaultSchedulesOfKeptGraphs) {
     std::ifstream in(entry.path());
     const std::string text{std::istreambuf_iterator<char>(in), {}};
     const auto outputs = [&] { return graph::parse_graph(text).outputs; };
-    try_schedule(autoschedule::schedule_unscheduled(outputs()), count, false);
+    try_schedule(driver::schedule_unscheduled(outputs()), count, false);
     for (const bool on_gpu : {false, true}) {
       autoschedule::ScheduleRequest request;
       request.on_gpu = on_gpu;
