@@ -81,7 +81,7 @@ struct Machine {
 // Constants that are right within a factor of two or three for the vectors of the target. `threads`: 0 means those of
 // the processor that runs this code.
 Machine constants_for(const Target& target, int threads = 0);
-// The same with the reference threads. It depends on the target alone.
+// The machine that schedules are chosen for: the same with the reference threads. It depends on the target alone.
 Machine reference_machine(const Target& target);
 
 }  // namespace retrograde::planning

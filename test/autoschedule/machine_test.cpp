@@ -21,7 +21,7 @@ namespace {
 
 using planning::Machine;
 
-const Target wide_target("x86-64-linux-avx512_skylake");
+const Target wide_target("x86-64-linux-avx512");
 
 Machine constants() { return planning::constants_for(wide_target); }
 
@@ -37,7 +37,8 @@ TEST(Machine, TargetsDifferInTheirVectors) {
     const Machine m = planning::reference_machine(Target(target));
     return std::tuple(m.registers, m.vector_bytes, m.accumulator_bytes());
   };
-  EXPECT_EQ(registers_of("x86-64-linux-avx512_skylake"), std::tuple(32, 64, 1536));
+  EXPECT_EQ(registers_of("x86-64-linux-avx512-avx512_skylake"), std::tuple(32, 64, 1536));
+  EXPECT_EQ(registers_of("x86-64-linux-avx512_skylake"), std::tuple(16, 64, 768));
   EXPECT_EQ(registers_of("x86-64-linux-avx512"), std::tuple(32, 64, 1536));
   EXPECT_EQ(registers_of("x86-64-linux-avx2"), std::tuple(16, 32, 384));
   EXPECT_EQ(registers_of("x86-64-linux"), std::tuple(16, 16, 192));
