@@ -120,19 +120,19 @@ struct Placement {
 // Why a plan cannot express the directives of a Func, which then keeps them.
 enum class Opacity : uint8_t {
   None,
-  Extern,          // a C function computes it
-  Prefetch,        // users' directives, which no move may change
-  Async,           //
-  Memoize,         //
-  Ring,            // ring_buffer
-  Specialize,      //
-  Partition,       // of loops
+  Extern,  // a C function computes it
+  Prefetch,
+  Async,
+  Memoize,
+  Ring,  // ring_buffer
+  Specialize,
+  Partition,       // of a loop
   SymbolicFactor,  // a split whose factor is no constant
-  SplitHistory,    // splits that are no decreasing steps
-  SymbolicFold,    // fold_storage by an expression
-  SharedLoops,     // an opaque Func shares its loops
-  UnknownLoop,     // it is computed in a loop that only a specialization has
-  DifferentLoops,  // it is computed in loops of several stages that are not alike
+  SplitHistory,  // splits that are no decreasing steps, such as one of an inner loop by more than its extent
+  SymbolicFold,   // fold_storage by an expression
+  SharedLoops,    // an opaque Func shares its loops
+  UnknownLoop,    // it is computed in a loop that only a specialization has
+  DifferentLoops  // it is computed in loops of several stages that are not alike
 };
 const char* opacity_name(Opacity opacity);
 inline constexpr int opacity_count = static_cast<int>(Opacity::DifferentLoops) + 1;
