@@ -34,3 +34,9 @@ retrograde_test(gpu_auto_schedule_test SOURCES autoschedule/gpu_auto_schedule_te
 retrograde_test(gpu_auto_schedules_test OPTIMIZED LIBS retrograde_simt)
 retrograde_test(schedule_replay_test READS_FILES LIBS retrograde_dep_halide_runtime)
 retrograde_test(tune_test LIBS retrograde_tune_parts retrograde_dep_halide_runtime)
+
+# The access graph. Its headers are in the top-level folder.
+retrograde_test(access_graph_test READS_FILES LIBS retrograde_dep_halide_runtime)
+foreach(name access_graph_test)
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
+endforeach()
