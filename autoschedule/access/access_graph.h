@@ -8,7 +8,7 @@
 //       write rows(x, y)
 //       read image(clamped x - 1, y)
 //       read image(clamped x + 1, y)
-//       1 add float32 by x, y
+//       1 Add float32 by x, y
 //   func bins
 //     stage 1 (r.x)
 //       write bins(v1)      v1(r.x) = hist(r.x): data decide the place, r.x moves it
@@ -72,7 +72,8 @@ struct Access {
   bool writes = false;
   uint32_t components = 1;  // of a Tuple that are accessed: bit 0 is the first
   std::vector<IndexForm> index;
-  Value place;  // of the data-dependent parts of all indices: equal places have equal numbers
+  // Of the data-dependent parts of all indices, without their clamps: equal places have equal numbers.
+  Value place;
   Guard guard;  // beside that of the stage; of a select, both arms of which may be evaluated
   std::vector<FuncId> through;  // Funcs that were inlined on the way
 
@@ -84,7 +85,7 @@ struct Access {
 
 // How often a stage applies an operator at one point of its loops. Equal values count once.
 struct OperationCount {
-  std::string name;         // as in IR text: add, select, exp
+  std::string name;         // of the kind of node, or of the operator: Add, exp
   Type type;                  // of the operands of a comparison; of the result otherwise
   IteratorSet depends = 0;  // the loops that change the value; it is invariant in all others
   int count = 0;

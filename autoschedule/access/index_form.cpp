@@ -102,6 +102,7 @@ void scale(IndexForm& form, int64_t factor, Checked& checked) {
 
 std::optional<IndexForm> if_fits(IndexForm form, const Checked& checked) {
   form.within = {};
+  form.expr = {};
   return checked.fits() ? std::optional(std::move(form)) : std::nullopt;
 }
 

@@ -45,6 +45,7 @@ struct IndexForm {
   bool clamped = false;
   // If it is clamped, or not affine: between which elements it lies in all iterations. The ends mention parameters only.
   Interval within;
+  Expr expr;  // the index as written, if it is not affine; undefined in a composed access
 
   bool is_affine() const { return opaque.empty() && divisor == 1 && modulus == 0; }
   bool is_constant() const { return terms.empty() && opaque.empty(); }

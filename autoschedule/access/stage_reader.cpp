@@ -6,7 +6,6 @@
 #include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/lets.h"
-#include "ir/text.h"
 #include "ir/visit.h"
 
 namespace retrograde::planning {
@@ -93,16 +92,16 @@ std::vector<IndexForm> StageReader::indices(const std::vector<Expr>& args) {
 // Constants are no part of a place: the taps around one have the same.
 Value StageReader::place_of(const std::vector<IndexForm>& index) {
   ValueNumbers::Words what{0};
-  std::vector<const Value*> parts;
+  std::vector<Value> places;
   for (size_t d = 0; d < index.size(); ++d) {
     for (const OpaqueTerm& term : index[d].opaque) {
-      if (!term.value.from_data) continue;
+      if (!term.value.from_data || !term.expr.defined()) continue;
       what.push_back(d);
       what.push_back(static_cast<uint64_t>(term.coefficient));
-      parts.push_back(&term.value);
+      places.push_back(values_.place(term.expr));
     }
   }
-  return parts.empty() ? Value() : numbers_.combine(std::move(what), parts);
+  return places.empty() ? Value() : numbers_.combine(std::move(what), pointers_to(places));
 }
 
 void StageReader::read_access(const Call& call, const Guard& guard) {
@@ -151,7 +150,7 @@ void StageReader::read_extern(StageNode& node) {
       anything.number = numbers_.fresh();
       access.index.push_back(opaque_form({anything, 1, {}, {}}));
     }
-    access.place = place_of(access.index);
+    access.place = anything;
     node.reads.push_back(std::move(access));
   }
 }
@@ -187,7 +186,7 @@ void StageReader::count(const Expr& e) {
   Expr operand = e;
   if (is_comparison(e.kind())) operand = e.as<Binary>()->a;
   const Value value = values_.value(e);
-  const std::string name = call ? call->name : kind_word(e.kind());
+  const std::string name = call ? call->name : kind_name(e.kind());
   counted_.try_emplace({name, value}, OperationCount{name, operand.type(), value.depends(), 1});
 }
 

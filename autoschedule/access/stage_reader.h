@@ -24,14 +24,18 @@ class StageValues {
   StageValues(const Names& names, ValueNumbers& numbers, const std::vector<Iterator>& iterators);
 
   Value value(const Expr& e);
+  // The same, with the clamps of indices stripped: adjoints clamp what the primal doesn't.
+  Value place(const Expr& e);
   IndexForm form(const Expr& e);
   // The form with its range, as an index of an access.
   IndexForm index(const Expr& e);
   size_t nodes_visited() const { return nodes_; }
 
  private:
-  Value find_value(const Expr& e);
-  Value call_value(const Call& call);
+  using Part = Value (StageValues::*)(const Expr& e);
+  Value find_value(const Expr& e, Part part);
+  Value call_value(const Call& call, Part part);
+  Value find_place(const Expr& e);
   IndexForm find_form(const Expr& e);
   std::optional<IndexForm> binary_form(const Expr& e, const Binary& binary);
   IndexForm sum_form(const Expr& a, const Expr& b, int64_t factor);
@@ -45,7 +49,7 @@ class StageValues {
   std::unordered_map<std::string, int> iterators_;
   analysis::Scope<Interval> scope_;
   analysis::BoundsEngine bounds_;
-  NodeMemo<Value> values_;
+  NodeMemo<Value> values_, places_;
   NodeMemo<IndexForm> forms_;
   size_t nodes_ = 0;
 };

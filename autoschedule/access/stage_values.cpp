@@ -54,10 +54,34 @@ StageValues::StageValues(const Names& names, ValueNumbers& numbers,
 // ---- values ----
 
 Value StageValues::value(const Expr& e) {
-  return values_.get(e, [&] { return ++nodes_, find_value(e); });
+  return values_.get(e, [&] { return ++nodes_, find_value(e, &StageValues::value); });
 }
 
-Value StageValues::find_value(const Expr& e) {
+Value StageValues::place(const Expr& e) {
+  return places_.get(e, [&] { return ++nodes_, find_place(e); });
+}
+
+Value StageValues::find_place(const Expr& e) {
+  const IndexForm form = is_index_type(e.type()) ? this->form(e) : IndexForm();
+  const bool is_sum = !form.is_constant() && (form.opaque.empty() || !form.opaque[0].expr.same_as(e));
+  if (!is_sum) return find_value(e, &StageValues::place);
+  ValueNumbers::Words what{static_cast<uint64_t>(form.low), static_cast<uint64_t>(form.high),
+                           static_cast<uint64_t>(form.divisor),
+                           static_cast<uint64_t>(form.modulus)};
+  std::vector<Value> parts;
+  for (const Term& term : form.terms) {
+    what.push_back(static_cast<uint64_t>(term.coefficient));
+    parts.push_back(ValueNumbers::iterator(term.iterator));
+  }
+  for (const OpaqueTerm& term : form.opaque) {
+    what.push_back(static_cast<uint64_t>(term.coefficient));
+    parts.push_back(place(term.expr));
+  }
+  return numbers_.combine(std::move(what), pointers_to(parts));
+}
+
+// `part` gives the values of the operands.
+Value StageValues::find_value(const Expr& e, Part part) {
   ValueNumbers::Words what{static_cast<uint64_t>(e.kind()), word_of(e.type())};
   if (const auto* v = e.as<Variable>()) {
     const auto* iterator = ir::find_or_null(iterators_, v->name);
@@ -65,22 +89,23 @@ Value StageValues::find_value(const Expr& e) {
     what.push_back(numbers_.word_of(v->name));
     return numbers_.combine(std::move(what), {});
   }
-  if (const auto* call = e.as<Call>()) return call_value(*call);
+  if (const auto* call = e.as<Call>()) return call_value(*call, part);
   if (const auto* n = e.as<IntImm>()) what.push_back(static_cast<uint64_t>(n->value));
   if (const auto* n = e.as<UIntImm>()) what.push_back(n->value);
   if (const auto* n = e.as<FloatImm>()) what.push_back(std::bit_cast<uint64_t>(n->value));
   if (const auto* n = e.as<StringImm>()) what.push_back(numbers_.word_of(n->value));
   std::vector<Value> operands;
-  for_each_child(e, [&](const Expr& child) { operands.push_back(value(child)); });
+  for_each_child(e, [&](const Expr& child) { operands.push_back((this->*part)(child)); });
   // Operands of the other kinds, which belong to lowered code, don't describe a node completely.
   const bool is_described = e.as<Binary>() || e.as<Select>() || e.as<Not>() || e.as<Cast>() ||
                             e.as<Reinterpret>() || operands.empty();
   if (!is_described) what.push_back(numbers_.fresh());
-  return numbers_.combine(std::move(what), ir::mapped(operands, [](const Value& v) { return &v; }));
+  return numbers_.combine(std::move(what), pointers_to(operands));
 }
 
-Value StageValues::call_value(const Call& call) {
-  if (call.call_type == CallType::Operator && call.is_marker()) return value(call.args[0]);
+Value StageValues::call_value(const Call& call, Part part) {
+  if (call.call_type == CallType::Operator && call.is_marker())
+    return (this->*part)(call.args[0]);
   ValueNumbers::Words what{static_cast<uint64_t>(Kind::Call), word_of(call.type),
                            static_cast<uint64_t>(call.call_type),
                            static_cast<uint64_t>(call.component)};
@@ -95,9 +120,8 @@ Value StageValues::call_value(const Call& call) {
   }
   if (has_own_identity(call)) what.push_back(numbers_.fresh());
   std::vector<Value> operands;
-  for (const Expr& arg : call.args) operands.push_back(value(arg));
-  Value result =
-      numbers_.combine(std::move(what), ir::mapped(operands, [](const Value& v) { return &v; }));
+  for (const Expr& arg : call.args) operands.push_back((this->*part)(arg));
+  Value result = numbers_.combine(std::move(what), pointers_to(operands));
   result.from_data |= from_data;
   return result;
 }
@@ -107,6 +131,7 @@ Value StageValues::call_value(const Call& call) {
 IndexForm StageValues::index(const Expr& e) {
   IndexForm result = form(e);
   if (result.clamped || !result.is_affine()) result.within = bounds_.bounds(e);
+  if (!result.is_affine()) result.expr = e;
   return result;
 }
 

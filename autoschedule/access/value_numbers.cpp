@@ -16,6 +16,10 @@ IteratorSet Value::depends() const {
   return result;
 }
 
+std::vector<const Value*> pointers_to(const std::vector<Value>& values) {
+  return ir::mapped(values, [](const Value& v) { return &v; });
+}
+
 size_t ValueNumbers::Hash::operator()(const Words& words) const {
   uint64_t result = words.size();
   for (const uint64_t word : words) {

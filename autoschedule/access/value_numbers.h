@@ -39,6 +39,8 @@ struct Value {
   }
 };
 
+std::vector<const Value*> pointers_to(const std::vector<Value>& values);
+
 class ValueNumbers {
  public:
   using Words = std::vector<uint64_t>;
