@@ -24,17 +24,12 @@
 #include <vector>
 
 #include "autoschedule/access/index_form.h"
+#include "autoschedule/access/stage_id.h"
 #include "graph/function.h"
 
 namespace retrograde::planning {
 
-using FuncId = int32_t;  // producers before consumers
 using ImageId = int32_t;
-struct StageId {
-  FuncId func = -1;
-  int16_t stage = 0;
-  auto operator<=>(const StageId&) const = default;
-};
 
 // A loop of a stage without directives: first the pure variables at their own places, then the reduction variables, each
 // innermost first.
@@ -67,12 +62,12 @@ Guard intersection(const Guard& a, const Guard& b);
 
 struct Access {
   StageId by;
-  FuncId of = -1;      // negative: the image
+  FuncId of = -1;  // negative: the image
   ImageId image = -1;
   bool writes = false;
   uint32_t components = 1;  // of a Tuple that are accessed: bit 0 is the first
   std::vector<IndexForm> index;
-  // Of the data-dependent parts of all indices, without their clamps: equal places have equal numbers.
+  // The data-dependent parts of all indices, without their clamps. Equal places have equal numbers.
   Value place;
   Guard guard;  // beside that of the stage; of a select, both arms of which may be evaluated
   std::vector<FuncId> through;  // Funcs that were inlined on the way
@@ -80,13 +75,14 @@ struct Access {
   bool same_place(const Access& other) const {
     return of == other.of && image == other.image && index == other.index;
   }
+  size_t place_hash() const;  // equal for the same place
   IteratorSet moved_by() const;
 };
 
 // How often a stage applies an operator at one point of its loops. Equal values count once.
 struct OperationCount {
   std::string name;         // of the kind of node, or of the operator: Add, exp
-  Type type;                  // of the operands of a comparison; of the result otherwise
+  Type type;                // of the operands of a comparison; of the result otherwise
   IteratorSet depends = 0;  // the loops that change the value; it is invariant in all others
   int count = 0;
 };
@@ -125,7 +121,7 @@ class AccessGraph {
   }
   // Values with the numbers of this graph, for accesses that are derived from its own.
   const ValueNumbers& numbers() const { return numbers_; }
-  // Of expressions, for tests of the time that building takes.
+  // The number of visits to nodes of expressions: a measure of the time that building takes, for tests.
   size_t nodes_visited() const { return nodes_visited_; }
 
  private:

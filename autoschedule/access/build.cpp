@@ -13,6 +13,20 @@ IteratorSet Access::moved_by() const {
   return result;
 }
 
+size_t Access::place_hash() const {
+  size_t result = static_cast<size_t>(of * 31 + image);
+  const auto mix = [&](uint64_t word) { result = (result ^ word) * 0x9e3779b97f4a7c15u; };
+  for (const IndexForm& form : index) {
+    for (const Term& term : form.terms) {
+      mix(static_cast<uint64_t>(term.iterator));
+      mix(static_cast<uint64_t>(term.coefficient));
+    }
+    for (const OpaqueTerm& term : form.opaque) mix(term.value.number);
+    mix(static_cast<uint64_t>(form.low));
+  }
+  return result ^ result >> 29;
+}
+
 AccessGraph::AccessGraph(const std::vector<FuncPtr>& outputs) {
   const std::vector<FuncPtr> wrapped = apply_wrappers(outputs);
   for (const auto& parameter : parameters_of(wrapped)) {

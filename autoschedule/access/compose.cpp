@@ -3,6 +3,8 @@
 #include "autoschedule/access/compose.h"
 
 #include <algorithm>
+#include <functional>
+#include <unordered_map>
 
 #include "ir/build.h"
 
@@ -15,12 +17,25 @@ bool is_iterator(const IndexForm& form) {
          form.low == 0 && form.high == 0;
 }
 
-void add_read(std::vector<Access>& reads, Access read) {
-  Access* known = ir::first_where(reads, [&](const Access& a) { return a.same_place(read); });
-  if (!known) return reads.push_back(std::move(read));
-  known->components |= read.components;
-  known->guard = intersection(known->guard, read.guard);
-}
+// Reads of different places.
+class DistinctReads {
+ public:
+  void add(Access read) {
+    auto& like = by_hash_[read.place_hash()];
+    for (const size_t i : like) {
+      if (!reads[i].same_place(read)) continue;
+      reads[i].components |= read.components;
+      reads[i].guard = intersection(reads[i].guard, read.guard);
+      return;
+    }
+    like.push_back(reads.size());
+    reads.push_back(std::move(read));
+  }
+  std::vector<Access> reads;
+
+ private:
+  std::unordered_map<size_t, std::vector<size_t>> by_hash_;
+};
 
 }  // namespace
 
@@ -42,15 +57,17 @@ size_t ComposedReads::elements_of(StageId stage, FuncId inlined) const {
 // Consumers before producers: all reads of a Func are known when it is its turn.
 ComposedReads::Found ComposedReads::compose(const StageNode& stage, size_t most_reads) {
   Found found;
-  std::map<FuncId, std::vector<Access>, std::greater<>> pending;
+  DistinctReads stored;
+  std::map<FuncId, DistinctReads, std::greater<>> pending;
   const auto add = [&](const Access& read) {
     const bool is_inlined = read.of >= 0 && inlined_[static_cast<size_t>(read.of)];
-    add_read(is_inlined ? pending[read.of] : found.reads, read);
+    (is_inlined ? pending[read.of] : stored).add(read);
   };
   for (const Access& read : stage.reads) add(read);
   size_t composed = 0;
   while (!pending.empty()) {
-    const auto [func, reads] = *pending.begin();
+    const FuncId func = pending.begin()->first;
+    const std::vector<Access> reads = std::move(pending.begin()->second.reads);
     pending.erase(pending.begin());
     found.elements[func] = reads.size();
     for (const Access& outer : reads) {
@@ -61,6 +78,7 @@ ComposedReads::Found ComposedReads::compose(const StageNode& stage, size_t most_
       }
     }
   }
+  found.reads = std::move(stored.reads);
   return found;
 }
 
@@ -134,9 +152,9 @@ Value ComposedReads::compose(const Value& inner, const Access& outer) {
   bool is_renaming = true;
   for (const int16_t i : inner.iterators) {
     const IndexForm& form = outer.index[static_cast<size_t>(i)];
-    const bool is_new = is_iterator(form) && std::ranges::find(renamed.iterators,
-                                                               form.terms[0].iterator) ==
-                                                 renamed.iterators.end();
+    const bool is_new =
+        is_iterator(form) &&
+        std::ranges::find(renamed.iterators, form.terms[0].iterator) == renamed.iterators.end();
     is_renaming = is_renaming && is_new;
     if (is_new) renamed.iterators.push_back(form.terms[0].iterator);
     parts.push_back(value_of(form));

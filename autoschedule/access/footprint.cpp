@@ -9,8 +9,8 @@ namespace retrograde::planning {
 namespace {
 
 double source_extent(const Access& access, size_t dimension, const SizeModel& sizes) {
-  const Extent extent = access.of >= 0 ? sizes.of(access.of, dimension)
-                                       : sizes.of_image(access.image, dimension);
+  const Extent extent =
+      access.of >= 0 ? sizes.of(access.of, dimension) : sizes.of_image(access.image, dimension);
   return static_cast<double>(std::max<int64_t>(extent.estimate, 1));
 }
 
@@ -50,9 +50,7 @@ Window window_of(const IndexForm& form, IteratorSet loops, StageId stage, double
              trips(stage, term.iterator, sizes));
   for (const OpaqueTerm& term : form.opaque) {
     if ((loops & term.value.depends()) == 0) continue;
-    IndexForm alone = opaque_form(term);
-    alone.opaque[0].coefficient = 1;
-    const ir::ConstantRange range = sizes.range(alone, stage);
+    const ir::ConstantRange range = sizes.range(term.range);
     const double values = range.is_bounded() ? static_cast<double>(range.extent())
                                              : std::numeric_limits<double>::infinity();
     const double taken = std::min(values, trips(term.value, loops, stage, sizes));
@@ -61,6 +59,8 @@ Window window_of(const IndexForm& form, IteratorSet loops, StageId stage, double
   }
   window.reach = std::floor((window.reach - 1) / static_cast<double>(form.divisor)) + 1;
   if (form.modulus != 0) window.reach = std::min(window.reach, static_cast<double>(form.modulus));
+  const ir::ConstantRange within = sizes.range(form.within);
+  if (within.is_bounded()) extent = std::min(extent, static_cast<double>(within.extent()));
   window.reach = std::min(window.reach, extent);
   window.points = std::min(window.points, window.reach);
   return window;
@@ -99,7 +99,7 @@ Footprint footprint(const Access& access, IteratorSet loops, const SizeModel& si
                     LineSize line) {
   const auto in_line = static_cast<double>(line.elements);
   Footprint result;
-  double run = 1;         // elements that lie together
+  double run = 1;        // elements that lie together
   bool is_whole = true;  // all dimensions so far are touched from end to end
   for (size_t d = 0; d < access.index.size(); ++d) {
     const double extent = source_extent(access, d, sizes);
@@ -160,8 +160,8 @@ LaneForm lane_form(const Access& access, int iterator, int lanes, const SizeMode
   const double reach = std::abs(stride) * (lanes - 1) + 1;
   const bool has_data = std::ranges::any_of(
       access.index, [&](const IndexForm& form) { return is_moved_by_data(form, iterator); });
-  result.lines = has_data ? lanes
-                          : std::min<double>(lanes, std::ceil(reach / double(line.elements)));
+  result.lines =
+      has_data ? lanes : std::min<double>(lanes, std::ceil(reach / double(line.elements)));
   if (!is_regular) return result;
   result.kind = stride == 1    ? LaneForm::Kind::Contiguous
                 : stride == -1 ? LaneForm::Kind::Reversed

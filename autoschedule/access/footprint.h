@@ -21,7 +21,7 @@ struct Footprint {
 };
 Footprint footprint(const Access& access, IteratorSet loops, const SizeModel& sizes, LineSize line);
 
-// What the next iteration of a loop finds that the last one touched.
+// The data of one iteration of a loop that the next iteration uses again.
 struct Reuse {
   bool temporal = false;  // the same elements
   bool spatial = false;   // elements of the same lines

@@ -40,9 +40,9 @@ class GuardReader {
       add(binary->a, is_true);
       return add(binary->b, is_true);
     }
-    const bool is_index = binary && is_index_type(binary->a.type()) &&
-                          (add_congruence(e.kind(), *binary, is_true) ||
-                           add_order(e.kind(), *binary, is_true));
+    const bool is_index =
+        binary && is_index_type(binary->a.type()) &&
+        (add_congruence(e.kind(), *binary, is_true) || add_order(e.kind(), *binary, is_true));
     if (!is_index && !as_scalar(e)) note(guard_.others, values_.value(e));
   }
 
@@ -133,7 +133,7 @@ class GuardedCalls {
       for_each_child(e, [&](const Expr& child) { reach(child, condition); });
   }
 
-  // Of a condition, and of the arms where it is true and where it is false.
+  // `parts`: a condition, and the arms where it is true and where it is false.
   void pass_on_arms(int outer, const std::vector<Expr>& parts) {
     reach(parts[0], outer);
     reach(parts[1], inside(outer, parts[0], true));
@@ -143,8 +143,8 @@ class GuardedCalls {
   int inside(int outer, const Expr& condition, bool is_true) {
     const int depth = conditions_[static_cast<size_t>(outer)].depth + 1;
     if (depth > deepest_condition) return outer;
-    const auto [entry, is_new] = known_.try_emplace({outer, condition.get(), is_true},
-                                                    static_cast<int>(conditions_.size()));
+    const auto [entry, is_new] =
+        known_.try_emplace({outer, condition.get(), is_true}, static_cast<int>(conditions_.size()));
     if (is_new) {
       Guard inner = guard(outer);
       GuardReader(values_, inner).add(condition, is_true);

@@ -93,8 +93,7 @@ void add_term(std::vector<T>& list, const T& term, Key key, Checked& checked) {
 
 void scale(IndexForm& form, int64_t factor, Checked& checked) {
   for (Term& term : form.terms) term.coefficient = checked.product(term.coefficient, factor);
-  for (OpaqueTerm& term : form.opaque)
-    term.coefficient = checked.product(term.coefficient, factor);
+  for (OpaqueTerm& term : form.opaque) term.coefficient = checked.product(term.coefficient, factor);
   form.low = checked.product(form.low, factor);
   form.high = checked.product(form.high, factor);
   if (factor < 0) std::swap(form.low, form.high);

@@ -50,9 +50,9 @@ struct IndexForm {
   bool is_affine() const { return opaque.empty() && divisor == 1 && modulus == 0; }
   bool is_constant() const { return terms.empty() && opaque.empty(); }
   int64_t coefficient(int iterator) const;
-  IteratorSet moved_by() const;    // iterators that move the index
-  IteratorSet data_loops() const;  // iterators that move its data-dependent part
-  bool has_data() const;           // whether values from memory decide it
+  IteratorSet moved_by() const;                   // iterators that move the index
+  IteratorSet data_loops() const;                 // iterators that move its data-dependent part
+  bool has_data() const;                          // whether values from memory decide it
   bool same_parts(const IndexForm& other) const;  // equal up to the constant and the clamp
   bool operator==(const IndexForm& other) const;
 };

@@ -139,7 +139,8 @@ class Printer {
     if (!form.clamped) return result;
     result = "clamped " + result;
     const Interval& all = form.within;
-    if (all.min.defined() || all.max.defined()) result += " in " + end(all.min) + ".." + end(all.max);
+    if (all.min.defined() || all.max.defined())
+      result += " in " + end(all.min) + ".." + end(all.max);
     return result;
   }
 
@@ -149,8 +150,8 @@ class Printer {
       result += (result.empty() ? "" : ", ") + condition;
     };
     for (const Congruence& c : guard.congruences)
-      add("(" + sum(c.form) + ") % " + std::to_string(c.modulus) + " == " +
-          std::to_string(c.remainder));
+      add("(" + sum(c.form) + ") % " + std::to_string(c.modulus) +
+          " == " + std::to_string(c.remainder));
     for (const IndexForm& form : guard.nonnegative) add(index(form) + " >= 0");
     for (const Value& other : guard.others) add(value(other));
     return result;

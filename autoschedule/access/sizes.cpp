@@ -48,8 +48,8 @@ ConstantRange quotient(ConstantRange a, int64_t divisor) {
 }
 
 ConstantRange remainder(const ConstantRange& a, int64_t modulus) {
-  const bool stays = a.is_bounded() &&
-                     ir::euclidean_div(a.min, modulus) == ir::euclidean_div(a.max, modulus);
+  const bool stays =
+      a.is_bounded() && ir::euclidean_div(a.min, modulus) == ir::euclidean_div(a.max, modulus);
   if (!stays) return {0, modulus - 1};
   return {ir::euclidean_mod(a.min, modulus), ir::euclidean_mod(a.max, modulus)};
 }
@@ -117,7 +117,7 @@ std::optional<int64_t> SizeModel::end_of(const Expr& e, bool is_min) const {
   return end.defined() ? as_const_int(simplify(end)) : std::nullopt;
 }
 
-ConstantRange SizeModel::constant_ends(const Interval& i) const {
+ConstantRange SizeModel::range(const Interval& i) const {
   ConstantRange result;
   if (const auto min = end_of(i.min, true)) result.min = saturated(*min);
   if (const auto max = end_of(i.max, false)) result.max = saturated(*max);
@@ -227,15 +227,18 @@ void SizeModel::find_iterators(StageId stage) {
 
 void SizeModel::pass_on(const Access& read) {
   if (read.of < 0 || read.of == read.by.func) return;
-  const auto& loops = iterators_[static_cast<size_t>(read.by.func)][static_cast<size_t>(read.by.stage)];
+  const auto& loops =
+      iterators_[static_cast<size_t>(read.by.func)][static_cast<size_t>(read.by.stage)];
   for (size_t d = 0; d < read.index.size(); ++d) {
     Known found{range(read.index[d], read.by), SizeSource::Region, true, 1};
+    // A clamp bounds the region even if nothing is known of the loops.
+    const bool is_bounded = range(read.index[d].within).is_bounded();
     for (size_t i = 0; i < loops.size(); ++i) {
       if ((read.index[d].moved_by() & set_of(static_cast<int>(i))) == 0) continue;
       found.is_certain = found.is_certain && loops[i].is_certain;
-      if (loops[i].source == SizeSource::Default) found.source = SizeSource::Default;
+      if (loops[i].source == SizeSource::Default && !is_bounded) found.source = SizeSource::Default;
     }
-    if (!read.index[d].is_affine()) found.is_certain = false;
+    if (!read.index[d].is_affine() || read.index[d].clamped) found.is_certain = false;
     if (!found.range.is_bounded()) found.source = SizeSource::Default;
     std::optional<Known>& known = regions_[static_cast<size_t>(read.of)][d];
     if (known) {
@@ -256,11 +259,11 @@ ConstantRange SizeModel::bounds_in(const Expr& index, StageId stage) const {
   for (size_t i = 0; i < iterators.size(); ++i) {
     const ConstantRange loop = range(stage, static_cast<int>(i));
     const bool fits = loop.min >= INT32_MIN && loop.max <= INT32_MAX;
-    scope.push(iterators[i].name, fits ? Interval{make_const(Int(32), loop.min),
-                                                  make_const(Int(32), loop.max)}
-                                       : Interval());
+    scope.push(
+        iterators[i].name,
+        fits ? Interval{make_const(Int(32), loop.min), make_const(Int(32), loop.max)} : Interval());
   }
-  return constant_ends(analysis::bounds_of(index, scope));
+  return range(analysis::bounds_of(index, scope));
 }
 
 ConstantRange SizeModel::range(const IndexForm& form, StageId stage) const {
@@ -268,11 +271,11 @@ ConstantRange SizeModel::range(const IndexForm& form, StageId stage) const {
   for (const Term& term : form.terms)
     result = sum(result, product(range(stage, term.iterator), term.coefficient));
   for (const OpaqueTerm& term : form.opaque)
-    result = sum(result, product(constant_ends(term.range), term.coefficient));
+    result = sum(result, product(range(term.range), term.coefficient));
   if (form.divisor != 1) result = quotient(result, form.divisor);
   if (form.modulus != 0) result = remainder(result, form.modulus);
   if (form.expr.defined()) result = intersection(result, bounds_in(form.expr, stage));
-  const ConstantRange all = constant_ends(form.within);
+  const ConstantRange all = range(form.within);
   const ConstantRange inside = intersection(result, all);
   // A range beyond the border is read at the border.
   if (inside.min <= inside.max) return inside;

@@ -41,6 +41,8 @@ class SizeModel {
   ir::ConstantRange range(StageId stage, int iterator) const;
   // The values of an index while all iterators run; an end of int64's range: unbounded.
   ir::ConstantRange range(const IndexForm& form, StageId stage) const;
+  // An interval whose ends mention parameters only.
+  ir::ConstantRange range(const Interval& interval) const;
 
  private:
   struct Known {
@@ -68,7 +70,6 @@ class SizeModel {
   Known settled(const Ends& ends, const Known* region) const;
   std::optional<int64_t> certain_value(const Expr& e) const;
   std::optional<int64_t> end_of(const Expr& e, bool is_min) const;
-  ir::ConstantRange constant_ends(const Interval& i) const;
   ir::ConstantRange bounds_in(const Expr& index, StageId stage) const;
   Extent extent_of(const Known& known) const;
 

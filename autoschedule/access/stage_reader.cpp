@@ -23,26 +23,14 @@ std::vector<Iterator> iterators_of(const FuncContents& f, const Definition& defi
   return result;
 }
 
-size_t hash_of(const Access& access) {
-  size_t result = static_cast<size_t>(access.of * 31 + access.image);
-  const auto mix = [&](uint64_t word) { result = (result ^ word) * 0x9e3779b97f4a7c15u; };
-  for (const IndexForm& form : access.index) {
-    for (const Term& term : form.terms) {
-      mix(static_cast<uint64_t>(term.iterator));
-      mix(static_cast<uint64_t>(term.coefficient));
-    }
-    for (const OpaqueTerm& term : form.opaque) mix(term.value.number);
-    mix(static_cast<uint64_t>(form.low));
-  }
-  return result ^ result >> 29;
-}
-
 bool is_comparison(Kind kind) { return kind >= Kind::EQ && kind <= Kind::GE; }
 
 // Nodes that compute nothing.
 bool is_free(const Expr& e) {
   const auto* call = e.as<Call>();
-  if (call) return call->call_type != CallType::Extern && (call->call_type != CallType::Operator || call->is_marker());
+  if (call)
+    return call->call_type != CallType::Extern &&
+           (call->call_type != CallType::Operator || call->is_marker());
   return e.as<Variable>() || e.as<IntImm>() || e.as<UIntImm>() || e.as<FloatImm>() ||
          e.as<StringImm>();
 }
@@ -75,9 +63,8 @@ StageNode StageReader::read() {
   if (definition_.predicate.defined()) node.guard = guard_of(stored_.back(), true, values_);
   std::vector<Expr> roots = args_;
   ir::append(roots, stored_);
-  for_each_guarded_call(roots, values_, nodes_, [&](const Call& call, const Guard& guard) {
-    read_access(call, guard);
-  });
+  for_each_guarded_call(roots, values_, nodes_,
+                        [&](const Call& call, const Guard& guard) { read_access(call, guard); });
   node.reads = std::move(reads_);
   if (f_.is_extern()) read_extern(node);
   count_operations(node);
@@ -114,7 +101,7 @@ void StageReader::read_access(const Call& call, const Guard& guard) {
   access.components = 1u << std::min(call.component, 31);
   access.index = indices(call.args);
   access.guard = guard;
-  auto& like = reads_by_hash_[hash_of(access)];
+  auto& like = reads_by_hash_[access.place_hash()];
   for (const size_t i : like) {
     Access& known = reads_[i];
     if (!known.same_place(access)) continue;

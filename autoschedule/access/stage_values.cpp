@@ -63,7 +63,8 @@ Value StageValues::place(const Expr& e) {
 
 Value StageValues::find_place(const Expr& e) {
   const IndexForm form = is_index_type(e.type()) ? this->form(e) : IndexForm();
-  const bool is_sum = !form.is_constant() && (form.opaque.empty() || !form.opaque[0].expr.same_as(e));
+  const bool is_sum =
+      !form.is_constant() && (form.opaque.empty() || !form.opaque[0].expr.same_as(e));
   if (!is_sum) return find_value(e, &StageValues::place);
   ValueNumbers::Words what{static_cast<uint64_t>(form.low), static_cast<uint64_t>(form.high),
                            static_cast<uint64_t>(form.divisor),
@@ -104,8 +105,7 @@ Value StageValues::find_value(const Expr& e, Part part) {
 }
 
 Value StageValues::call_value(const Call& call, Part part) {
-  if (call.call_type == CallType::Operator && call.is_marker())
-    return (this->*part)(call.args[0]);
+  if (call.call_type == CallType::Operator && call.is_marker()) return (this->*part)(call.args[0]);
   ValueNumbers::Words what{static_cast<uint64_t>(Kind::Call), word_of(call.type),
                            static_cast<uint64_t>(call.call_type),
                            static_cast<uint64_t>(call.component)};
@@ -188,7 +188,7 @@ IndexForm StageValues::sum_form(const Expr& a, const Expr& b, int64_t factor) {
   return sum ? *sum : *plus(opaque(a), *scaled(opaque(b), factor));
 }
 
-// A value of which the clamp says more than its own bounds do.
+// The clamp of a single value bounds its range.
 IndexForm StageValues::clamped(IndexForm form, const Expr& clamp) {
   form.clamped = true;
   if (!form.terms.empty() || form.opaque.size() != 1 || form.opaque[0].coefficient != 1 ||
@@ -199,8 +199,14 @@ IndexForm StageValues::clamped(IndexForm form, const Expr& clamp) {
   const auto moved = [&](const Expr& end, int64_t by) {
     return end.defined() ? simplify(end - make_const(end.type(), by)) : end;
   };
-  if (!range.min.defined()) range.min = moved(all.min, form.high);
-  if (!range.max.defined()) range.max = moved(all.max, form.low);
+  const Interval inside{moved(all.min, form.high), moved(all.max, form.low)};
+  const auto replaces = [](const Expr& known, const Expr& end, int64_t sign) {
+    const auto a = known.defined() ? as_const_int(known) : std::nullopt;
+    const auto b = end.defined() ? as_const_int(end) : std::nullopt;
+    return !known.defined() || (a && b && sign * *b > sign * *a);
+  };
+  if (replaces(range.min, inside.min, 1)) range.min = inside.min;
+  if (replaces(range.max, inside.max, -1)) range.max = inside.max;
   return form;
 }
 

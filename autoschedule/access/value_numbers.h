@@ -25,8 +25,8 @@ using IteratorSet = uint32_t;
 IteratorSet set_of(int iterator);
 
 struct Value {
-  uint32_t number = 0;            // 0: none
-  bool from_data = false;         // it reads memory
+  uint32_t number = 0;             // 0: none
+  bool from_data = false;          // it reads memory
   std::vector<int16_t> iterators;  // that it depends on, in the order of their first use
 
   bool defined() const { return number != 0; }

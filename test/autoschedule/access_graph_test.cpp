@@ -34,7 +34,8 @@ Program stencil_with_borders() {
 }
 
 Program convolution() {
-  ImageParam image(Float(32), 3, "image"), filter(Float(32), 4, "filter"), seed(Float(32), 3, "seed");
+  ImageParam image(Float(32), 3, "image"), filter(Float(32), 4, "filter"),
+      seed(Float(32), 3, "seed");
   Func layer("layer");
   RDom r(0, 3, 0, 3, 0, 16);
   layer(x, y, c) += filter(r.x, r.y, r.z, c) * image(x + r.x, y + r.y, r.z);
@@ -57,7 +58,8 @@ Program warp() {
   Func warped("warped"), i("i");
   i(x, y) = clamp(cast<int>(floor(x + flow(x, y, 0))), 0, 62);
   const Expr j = clamp(cast<int>(floor(y + flow(x, y, 1))), 0, 47);
-  warped(x, y) = image(i(x, y), j) + image(i(x, y) + 1, j) * 0.5f + image(x + clamp(cast<int>(flow(x, y, 0)), -3, 3), y);
+  warped(x, y) = image(i(x, y), j) + image(i(x, y) + 1, j) * 0.5f +
+                 image(x + clamp(cast<int>(flow(x, y, 0)), -3, 3), y);
   const Derivative d = propagate_adjoints(warped, seed, {{0, 64}, {0, 48}});
   return {warped, d(image)};
 }
@@ -120,14 +122,15 @@ TEST_P(AccessGraphText, IsWhatItsFileSays) {
   EXPECT_EQ(text, std::string(std::istreambuf_iterator<char>(in), {}));
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Programs, AccessGraphText,
-    ::testing::Values(Case{"stencil_with_borders", stencil_with_borders},
-                      Case{"convolution", convolution}, Case{"strided_read", strided_read},
-                      Case{"warp", warp}, Case{"sum_over_rows", sum_over_rows},
-                      Case{"time_loop", time_loop}, Case{"index_arrays", index_arrays},
-                      Case{"tuple", tuple}),
-    [](const auto& info) { return std::string(info.param.name); });
+INSTANTIATE_TEST_SUITE_P(Programs, AccessGraphText,
+                         ::testing::Values(Case{"stencil_with_borders", stencil_with_borders},
+                                           Case{"convolution", convolution},
+                                           Case{"strided_read", strided_read}, Case{"warp", warp},
+                                           Case{"sum_over_rows", sum_over_rows},
+                                           Case{"time_loop", time_loop},
+                                           Case{"index_arrays", index_arrays},
+                                           Case{"tuple", tuple}),
+                         [](const auto& info) { return std::string(info.param.name); });
 
 size_t nodes_of_chain(int steps) {
   Func last("step");
@@ -150,8 +153,7 @@ size_t nodes_of_march(int steps) {
   ImageParam field(Float(32), 1, "field");
   Func out("out");
   Expr place = x;
-  for (int i = 0; i < steps; ++i)
-    place = clamp(place + cast<int>(field(place) * 2.0f), 0, 99);
+  for (int i = 0; i < steps; ++i) place = clamp(place + cast<int>(field(place) * 2.0f), 0, 99);
   out(x) = cast<float>(place);
   return planning::AccessGraph(functions({out})).nodes_visited();
 }
