@@ -123,6 +123,7 @@ IndexForm ComposedReads::compose(const IndexForm& inner, const Access& outer) {
     result.within = {shifted(moved.within.min, inner.low), shifted(moved.within.max, inner.high)};
   }
   result.clamped = result.clamped || inner.clamped;
+  result.turned = result.turned || inner.turned;
   return result;
 }
 

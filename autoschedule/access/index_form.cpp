@@ -132,6 +132,7 @@ std::optional<IndexForm> plus(const IndexForm& a, const IndexForm& b) {
   result.low = checked.sum(result.low, other.low);
   result.high = checked.sum(result.high, other.high);
   result.clamped = a.clamped || b.clamped;
+  result.turned = a.turned || b.turned;
   return if_fits(std::move(result), checked);
 }
 
@@ -181,6 +182,7 @@ std::optional<IndexForm> hull(const IndexForm& a, const IndexForm& b) {
   result.low = std::min(a.low, b.low);
   result.high = std::max(a.high, b.high);
   result.clamped = a.clamped || b.clamped;
+  result.turned = a.turned || b.turned;
   return result;
 }
 

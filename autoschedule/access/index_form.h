@@ -43,6 +43,8 @@ struct IndexForm {
   int64_t low = 0, high = 0;       // the constant; a range once taps are merged
   int64_t divisor = 1, modulus = 0;
   bool clamped = false;
+  // Beyond the border it goes on inside of it, as in a mirror, instead of staying at the border.
+  bool turned = false;
   // If it is clamped, or not affine: between which elements it lies in all iterations. The ends mention parameters only.
   Interval within;
   Expr expr;  // the index as written, if it is not affine; undefined in a composed access

@@ -1,10 +1,10 @@
 // Access graphs as text.
 //
-//   func blur(x, y)
+//   func blur
 //     stage 0 (x, y)
 //       write blur(x, y)
 //       read input(clamped x - 1 in 0..63, y)
-//       2 add float32 by x, y
+//       2 Add float32 by x, y
 //
 // A value that is not affine has a name by its number: v1(x, y). Numbers follow the order of the text.
 #include <map>
@@ -137,7 +137,7 @@ class Printer {
     if (form.divisor != 1) result = "(" + result + ") / " + std::to_string(form.divisor);
     if (form.modulus != 0) result = "(" + result + ") % " + std::to_string(form.modulus);
     if (!form.clamped) return result;
-    result = "clamped " + result;
+    result = (form.turned ? "turned " : "clamped ") + result;
     const Interval& all = form.within;
     if (all.min.defined() || all.max.defined())
       result += " in " + end(all.min) + ".." + end(all.max);

@@ -276,6 +276,7 @@ ConstantRange SizeModel::range(const IndexForm& form, StageId stage) const {
   if (form.modulus != 0) result = remainder(result, form.modulus);
   if (form.expr.defined()) result = intersection(result, bounds_in(form.expr, stage));
   const ConstantRange all = range(form.within);
+  if (form.turned && !result.is_within(all)) return all;
   const ConstantRange inside = intersection(result, all);
   // A range beyond the border is read at the border.
   if (inside.min <= inside.max) return inside;

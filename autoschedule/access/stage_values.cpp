@@ -229,7 +229,7 @@ std::optional<IndexForm> StageValues::select_form(const Select& select) {
   const bool first = is_likely(select.when_true), second = is_likely(select.when_false);
   if (first == second) return std::nullopt;
   IndexForm result = form(first ? select.when_true : select.when_false);
-  result.clamped = true;
+  result.clamped = result.turned = true;
   return result;
 }
 

@@ -81,6 +81,20 @@ TEST(SizeModel, KnowsShapesOfImages) {
   EXPECT_EQ(known.sizes.range(read.index[0], read.by), (ir::ConstantRange{0, 39}));
 }
 
+TEST(SizeModel, ReadsAllInsideOfAMirrorOnceARegionGoesBeyondIt) {
+  ImageParam image(Float(32), 1, "image");
+  Buffer<float> values(40);
+  image.set(values);
+  Func edge = BoundaryConditions::repeat_edge(image),
+       mirrored = BoundaryConditions::mirror_image(image), out("out");
+  out(x) = edge(x) + mirrored(x);
+  out.bound(x, 30, 20);
+  const Known known(out);
+  const Access &at_edge = known.read(edge, 0, 0), &in_mirror = known.read(mirrored, 0, 0);
+  EXPECT_EQ(known.sizes.range(at_edge.index[0], at_edge.by), (ir::ConstantRange{30, 39}));
+  EXPECT_EQ(known.sizes.range(in_mirror.index[0], in_mirror.by), (ir::ConstantRange{0, 39}));
+}
+
 TEST(Footprint, CountsOverlappingWindowsOnce) {
   ImageParam image(Float(32), 2, "image");
   Func out("out");

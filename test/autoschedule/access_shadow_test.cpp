@@ -5,10 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iostream>
 #include <map>
 #include <set>
-#include <sstream>
 #include <tuple>
 
 #include "analysis/linear.h"
@@ -42,20 +40,21 @@ using planning::SizeSource;
 using planning::StageId;
 using planning::StageNode;
 
-// The explained differences, and how often they occur.
+// The explained differences.
 enum class Difference : uint8_t {
-  OnlyNewSize,      // SizeEstimate gives up where one consumer's region is unknown
+  OnlyNewSize,      // a clamp to a parameter: SizeEstimate gives up, the form knows the loop
   GivenBeforeRead,  // SizeEstimate prefers the region read to the bound or estimate of the user
-  DefaultsPassOn,   // consumers of unknown size have a default, whose region is read
-  OldIsExact,       // SizeEstimate evaluates what terms have in common
-  NewIsExact,       // indices beyond a border count as the border
-  Cancelled,        // uses_variable() sees a variable that the index does not depend on
-  OldWindowOnly,    // read_window() understands an index that has no form
-  NewWindowOnly,    // read_window() gives up: forms keep quotients, negated terms and promises
-  EmptyLoop,        // a reduction without iterations reads nothing, in different ways
-  Folded,           // inlining folds constant conditions, and with them reads and variables
+  OnlyOldSize,      // the bounds of a whole index, in which unknown loops cancel
+  BeyondBorder,     // the form of a mirror reads all inside of the border once it reads beyond
+  OnlyNewRegion,    // SizeEstimate takes all inside of a clamp where it does not know the loops
+  Cancelled,  // uses_variable() sees a variable that moves the index by a multiple of its modulus
+  OldWindowOnly,  // read_window() takes remainders inside of sums as ranges; they are opaque terms of forms
+  NewWindowOnly,  // read_window() gives up, or is wider: forms keep quotients, clamps and promises
+  EmptyLoop,      // a reduction without iterations reads nothing, in different ways
+  Folded,         // inlining expressions folds constant conditions, and with them reads
   count
 };
+using Differences = std::array<int, size_t(Difference::count)>;
 
 class Shadow {
  public:
@@ -77,7 +76,7 @@ class Shadow {
     compare_inlined();
   }
 
-  const std::array<int, size_t(Difference::count)>& differences() const { return differences_; }
+  const Differences& differences() const { return differences_; }
   int equal_answers() const { return equal_; }
 
  private:
@@ -100,17 +99,11 @@ class Shadow {
       } else if (known && *known != extent.estimate && has_empty_loop()) {
         differ(Difference::EmptyLoop);
       } else if (known && extent.source == SizeSource::Default) {
-        differ(Difference::DefaultsPassOn);
+        differ(Difference::OnlyOldSize);
       } else if (known && *known < extent.estimate) {
-        differ(Difference::OldIsExact);
-        if (differences_[size_t(Difference::OldIsExact)] < 9)
-          ADD_FAILURE() << f.name << " " << d << ": " << *known << " " << extent.estimate << "\n"
-                        << planning::print(graph_);
+        differ(Difference::BeyondBorder);
       } else if (known && *known > extent.estimate) {
-        differ(Difference::NewIsExact);
-        if (differences_[size_t(Difference::NewIsExact)] < 9)
-          ADD_FAILURE() << f.name << " " << d << ": " << *known << " " << extent.estimate << "\n"
-                        << planning::print(graph_);
+        differ(Difference::OnlyNewRegion);
       } else if (known) {
         ++equal_;
       }
@@ -302,10 +295,8 @@ class Shadow {
           windows, [&](const Window& n) { return std::get<3>(n) - std::get<2>(n) <= high - low; });
       if (is_tighter || is_cancelled)
         differ(Difference::NewWindowOnly);
-      else if (has_unknown) {
+      else if (has_unknown)
         differ(Difference::OldWindowOnly);
-        if (differences_[size_t(Difference::OldWindowOnly)] < 3) std::cout << "OLD " << name << ": window " << loop << " * " << scale << " + [" << low << ", " << high << "]" << planning::print(graph_) << std::endl;
-      }
       else
         ADD_FAILURE() << name << ": window " << loop << " * " << scale << " + [" << low << ", "
                       << high << "]\n"
@@ -362,7 +353,7 @@ class Shadow {
   const AccessGraph graph_;
   const autoschedule::SizeEstimate old_sizes_;
   const SizeModel sizes_;
-  std::array<int, size_t(Difference::count)> differences_{};
+  Differences differences_{};
   int equal_ = 0;
 };
 
@@ -375,13 +366,16 @@ class Totals {
     equal += shadow.equal_answers();
     for (size_t i = 0; i < differences.size(); ++i) differences[i] += shadow.differences()[i];
   }
-  void report() const {
-    std::cout << "equal " << equal;
-    for (const int count : differences) std::cout << " " << count;
-    std::cout << "\n";
+  // `most`: of each difference for a thousand equal answers.
+  void expect(const Differences& most) const {
+    for (size_t i = 0; i < differences.size(); ++i)
+      EXPECT_LE(1000 * differences[i], most[i] * equal) << "difference " << i;
+    EXPECT_GT(equal, 1000);
   }
+
+ private:
   int equal = 0;
-  std::array<int, size_t(Difference::count)> differences{};
+  Differences differences{};
 };
 
 std::vector<FuncPtr> with_gradients(const gradient::Program& program) {
@@ -395,26 +389,26 @@ TEST(AccessGraphInShadow, AgreesOnTheGradientSuite) {
   Totals totals;
   for (const gradient::NamedProgram& program : gradient::programs())
     totals.add(with_gradients(program.build()), program.name);
-  totals.report();
+  totals.expect({0, 3, 0, 0, 0, 1, 5, 7, 0, 1});
 }
 
 TEST(AccessGraphInShadow, AgreesOnLargePrograms) {
   Totals totals;
   for (const gradient::LargeProgram& program : gradient::large_programs())
     totals.add(with_gradients(program.build(gradient::test_side)), program.name);
-  totals.report();
+  totals.expect({0, 0, 0, 0, 0, 0, 0, 20, 0, 0});
 }
 
 TEST(AccessGraphInShadow, AgreesOnRandomPrograms) {
   Totals totals;
-  for (int seed = 0; seed < many_or_few(500, 60); ++seed) {
+  for (int seed = 0; seed < many_or_few(400, 60); ++seed) {
     fuzz::Choices choices(static_cast<uint64_t>(seed)), more(static_cast<uint64_t>(seed));
     const auto pipeline = fuzz::make_program(choices, fuzz::Style::pipelines());
     totals.add(fuzz::outputs_of(pipeline), "pipeline " + std::to_string(seed));
     const auto large = fuzz::make_large_program(more, fuzz::LargeSizes::Full);
     totals.add(fuzz::outputs_of(large), "large program " + std::to_string(seed));
   }
-  totals.report();
+  totals.expect({1, 0, 1, 1, 3, 3, 12, 40, 5, 2});
 }
 
 }  // namespace
