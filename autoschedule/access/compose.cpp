@@ -1,0 +1,196 @@
+// A pure stage has one iterator for each dimension, so the index of the outer access in a dimension replaces the
+// iterator of the inner one.
+#include "autoschedule/access/compose.h"
+
+#include <algorithm>
+#include <functional>
+#include <unordered_map>
+
+#include "ir/build.h"
+
+namespace retrograde::planning {
+
+namespace {
+
+bool is_iterator(const IndexForm& form) {
+  return form.terms.size() == 1 && form.terms[0].coefficient == 1 && form.is_affine() &&
+         form.low == 0 && form.high == 0;
+}
+
+// Reads of different places.
+class DistinctReads {
+ public:
+  void add(Access read) {
+    auto& like = by_hash_[read.place_hash()];
+    for (const size_t i : like) {
+      if (!reads[i].same_place(read)) continue;
+      reads[i].components |= read.components;
+      reads[i].guard = intersection(reads[i].guard, read.guard);
+      return;
+    }
+    like.push_back(reads.size());
+    reads.push_back(std::move(read));
+  }
+  std::vector<Access> reads;
+
+ private:
+  std::unordered_map<size_t, std::vector<size_t>> by_hash_;
+};
+
+}  // namespace
+
+ComposedReads::ComposedReads(const AccessGraph& graph, const std::vector<bool>& inlined,
+                             size_t most_reads)
+    : graph_(graph), inlined_(inlined), numbers_(graph.numbers()) {
+  for (const FuncNode& node : graph.funcs()) {
+    for (const StageNode& stage : node.stages) {
+      if (!inlined_[static_cast<size_t>(stage.id.func)])
+        found_.emplace(stage.id, compose(stage, most_reads));
+    }
+  }
+}
+
+size_t ComposedReads::elements_of(StageId stage, FuncId inlined) const {
+  return ir::value_or(found_.at(stage).elements, inlined, size_t{0});
+}
+
+// Consumers before producers: all reads of a Func are known when it is its turn.
+ComposedReads::Found ComposedReads::compose(const StageNode& stage, size_t most_reads) {
+  Found found;
+  DistinctReads stored;
+  std::map<FuncId, DistinctReads, std::greater<>> pending;
+  const auto add = [&](const Access& read) {
+    const bool is_inlined = read.of >= 0 && inlined_[static_cast<size_t>(read.of)];
+    (is_inlined ? pending[read.of] : stored).add(read);
+  };
+  for (const Access& read : stage.reads) add(read);
+  size_t composed = 0;
+  while (!pending.empty()) {
+    const FuncId func = pending.begin()->first;
+    const std::vector<Access> reads = std::move(pending.begin()->second.reads);
+    pending.erase(pending.begin());
+    found.elements[func] = reads.size();
+    for (const Access& outer : reads) {
+      for (const Access& inner : graph_.func(func).stages[0].reads) {
+        found.is_complete = found.is_complete && composed < most_reads;
+        if (found.is_complete) add(compose(inner, outer));
+        ++composed;
+      }
+    }
+  }
+  found.reads = std::move(stored.reads);
+  return found;
+}
+
+Access ComposedReads::compose(const Access& inner, const Access& outer) {
+  Access result;
+  result.by = outer.by;
+  result.of = inner.of;
+  result.image = inner.image;
+  result.components = inner.components;
+  for (const IndexForm& form : inner.index) result.index.push_back(compose(form, outer));
+  const bool has_data = std::ranges::any_of(result.index, &IndexForm::has_data);
+  if (inner.place.defined())
+    result.place = compose(inner.place, outer);
+  else if (has_data)
+    result.place = outer.place;
+  result.guard = compose(inner.guard, outer);
+  for (const Congruence& c : outer.guard.congruences) result.guard.congruences.push_back(c);
+  ir::append(result.guard.nonnegative, outer.guard.nonnegative);
+  ir::append(result.guard.others, outer.guard.others);
+  result.through = outer.through;
+  result.through.push_back(outer.of);
+  return result;
+}
+
+IndexForm ComposedReads::compose(const IndexForm& inner, const Access& outer) {
+  auto parts = compose_parts(inner, outer);
+  if (parts && inner.divisor != 1) parts = quotient(*parts, inner.divisor);
+  if (parts && inner.modulus != 0) parts = remainder(*parts, inner.modulus);
+  IndexForm result;
+  if (parts) {
+    result = *parts;
+  } else {  // not of this form: its range is known alone
+    result = opaque_form({compose(value_of(inner), outer), 1, inner.within, {}});
+  }
+  const Term* only = inner.terms.size() == 1 && inner.is_affine() ? &inner.terms[0] : nullptr;
+  result.within = inner.within;
+  if (only && only->coefficient == 1 && !inner.clamped) {
+    const IndexForm& moved = outer.index[static_cast<size_t>(only->iterator)];
+    const auto shifted = [](const Expr& end, int64_t by) {
+      return end.defined() && by != 0 ? end + make_const(end.type(), by) : end;
+    };
+    result.within = {shifted(moved.within.min, inner.low), shifted(moved.within.max, inner.high)};
+  }
+  result.clamped = result.clamped || inner.clamped;
+  result.turned = result.turned || inner.turned;
+  return result;
+}
+
+// Without the divisor and the modulus.
+std::optional<IndexForm> ComposedReads::compose_parts(const IndexForm& inner, const Access& outer) {
+  IndexForm constant;
+  constant.low = inner.low;
+  constant.high = inner.high;
+  std::optional<IndexForm> result = constant;
+  for (const Term& term : inner.terms) {
+    const auto part = scaled(outer.index[static_cast<size_t>(term.iterator)], term.coefficient);
+    result = part && result ? plus(*result, *part) : std::nullopt;
+  }
+  for (const OpaqueTerm& term : inner.opaque) {
+    OpaqueTerm composed = term;
+    composed.value = compose(term.value, outer);
+    composed.expr = {};
+    if (result) result = plus(*result, opaque_form(composed));
+  }
+  return result;
+}
+
+// If iterators are replaced by iterators, the number stays.
+Value ComposedReads::compose(const Value& inner, const Access& outer) {
+  Value renamed{inner.number, inner.from_data, {}};
+  std::vector<Value> parts;
+  bool is_renaming = true;
+  for (const int16_t i : inner.iterators) {
+    const IndexForm& form = outer.index[static_cast<size_t>(i)];
+    const bool is_new =
+        is_iterator(form) &&
+        std::ranges::find(renamed.iterators, form.terms[0].iterator) == renamed.iterators.end();
+    is_renaming = is_renaming && is_new;
+    if (is_new) renamed.iterators.push_back(form.terms[0].iterator);
+    parts.push_back(value_of(form));
+  }
+  if (is_renaming) return renamed;
+  Value result = numbers_.combine({numbers_.word_of("composed"), inner.number}, pointers_to(parts));
+  result.from_data |= inner.from_data;
+  return result;
+}
+
+Value ComposedReads::value_of(const IndexForm& form) {
+  if (is_iterator(form)) return ValueNumbers::iterator(form.terms[0].iterator);
+  ValueNumbers::Words what{numbers_.word_of("form"), static_cast<uint64_t>(form.low),
+                           static_cast<uint64_t>(form.high), static_cast<uint64_t>(form.divisor),
+                           static_cast<uint64_t>(form.modulus)};
+  std::vector<Value> parts;
+  for (const Term& term : form.terms) {
+    what.push_back(static_cast<uint64_t>(term.coefficient));
+    parts.push_back(ValueNumbers::iterator(term.iterator));
+  }
+  for (const OpaqueTerm& term : form.opaque) {
+    what.push_back(static_cast<uint64_t>(term.coefficient));
+    parts.push_back(term.value);
+  }
+  return numbers_.combine(std::move(what), pointers_to(parts));
+}
+
+Guard ComposedReads::compose(const Guard& inner, const Access& outer) {
+  Guard result;
+  for (const Congruence& c : inner.congruences)
+    result.congruences.push_back({compose(c.form, outer), c.remainder, c.modulus});
+  for (const IndexForm& form : inner.nonnegative)
+    result.nonnegative.push_back(compose(form, outer));
+  for (const Value& other : inner.others) result.others.push_back(compose(other, outer));
+  return result;
+}
+
+}  // namespace retrograde::planning
