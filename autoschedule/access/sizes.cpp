@@ -18,7 +18,7 @@ namespace {
 using ir::ConstantRange;
 
 // Larger numbers are extremes of their types, not sizes.
-constexpr int64_t unbounded = int64_t{1} << 40;
+constexpr int64_t unbounded = 1'000'000'000'000;
 
 int64_t saturated(__int128 value) {
   if (value >= unbounded) return INT64_MAX;
