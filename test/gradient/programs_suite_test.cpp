@@ -5,8 +5,8 @@
 // Every third program (every one in the fuzz preset) also runs through check_gradients, which compares adjoint, tangent
 // and complex step in machine code. No two of these share their derivatives.
 #include "gradient/programs_suite.h"
-#include "autoschedule/default_schedule.h"
 #include "checks/check_gradients.h"
+#include "driver/schedule.h"
 #include "graph/directives/give_directive.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/graph.h"
@@ -78,7 +78,7 @@ TEST_P(Suite, SchedulesArePlans) {
   std::vector<graph::FuncPtr> outputs{program.loss.function()};
   Derivative d = propagate_adjoints(program.loss);
   for (const Buffer<float>& input : program.inputs) outputs.push_back(d(input).function());
-  const PlanRoundTrip trip = plan_round_trip(autoschedule::schedule_unscheduled(outputs));
+  const PlanRoundTrip trip = plan_round_trip(driver::schedule_unscheduled(outputs));
   EXPECT_EQ(trip.failure, "");
   EXPECT_EQ(trip.broken, "");
   EXPECT_TRUE(trip.opaque.empty());
