@@ -15,7 +15,7 @@ struct LoweredArgument {
   Kind kind = Kind::Scalar;
   Type type;           // of the scalar, or of the buffer's elements
   int dimensions = 0;  // of the buffer
-  SymbolRef symbol;    // the parameter or buffer that a call in process binds here; may be undefined
+  SymbolRef symbol;  // the parameter or buffer that a call in process binds here; may be undefined
   bool is_buffer() const { return kind != Kind::Scalar; }
 };
 
