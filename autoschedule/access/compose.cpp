@@ -161,26 +161,14 @@ Value ComposedReads::compose(const Value& inner, const Access& outer) {
     parts.push_back(value_of(form));
   }
   if (is_renaming) return renamed;
-  Value result = numbers_.combine({numbers_.word_of("composed"), inner.number}, pointers_to(parts));
+  Value result = numbers_.combine({composed_key, inner.number}, pointers_to(parts));
   result.from_data |= inner.from_data;
   return result;
 }
 
 Value ComposedReads::value_of(const IndexForm& form) {
   if (is_iterator(form)) return ValueNumbers::iterator(form.terms[0].iterator);
-  ValueNumbers::Words what{numbers_.word_of("form"), static_cast<uint64_t>(form.low),
-                           static_cast<uint64_t>(form.high), static_cast<uint64_t>(form.divisor),
-                           static_cast<uint64_t>(form.modulus)};
-  std::vector<Value> parts;
-  for (const Term& term : form.terms) {
-    what.push_back(static_cast<uint64_t>(term.coefficient));
-    parts.push_back(ValueNumbers::iterator(term.iterator));
-  }
-  for (const OpaqueTerm& term : form.opaque) {
-    what.push_back(static_cast<uint64_t>(term.coefficient));
-    parts.push_back(term.value);
-  }
-  return numbers_.combine(std::move(what), pointers_to(parts));
+  return planning::value_of(form, numbers_, [](const OpaqueTerm& term) { return term.value; });
 }
 
 Guard ComposedReads::compose(const Guard& inner, const Access& outer) {

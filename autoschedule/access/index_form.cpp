@@ -186,4 +186,21 @@ std::optional<IndexForm> hull(const IndexForm& a, const IndexForm& b) {
   return result;
 }
 
+Value value_of(const IndexForm& form, ValueNumbers& numbers,
+               ir::FunctionRef<Value(const OpaqueTerm&)> value_of_term) {
+  ValueNumbers::Words what{form_key, static_cast<uint64_t>(form.low),
+                           static_cast<uint64_t>(form.high), static_cast<uint64_t>(form.divisor),
+                           static_cast<uint64_t>(form.modulus)};
+  std::vector<Value> parts;
+  for (const Term& term : form.terms) {
+    what.push_back(static_cast<uint64_t>(term.coefficient));
+    parts.push_back(ValueNumbers::iterator(term.iterator));
+  }
+  for (const OpaqueTerm& term : form.opaque) {
+    what.push_back(static_cast<uint64_t>(term.coefficient));
+    parts.push_back(value_of_term(term));
+  }
+  return numbers.combine(std::move(what), pointers_to(parts));
+}
+
 }  // namespace retrograde::planning

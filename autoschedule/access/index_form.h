@@ -15,6 +15,7 @@
 
 #include "autoschedule/access/value_numbers.h"
 #include "ir/interval.h"
+#include "ir/visit.h"
 
 namespace retrograde::planning {
 
@@ -62,6 +63,10 @@ struct IndexForm {
 IndexForm constant_form(int64_t value);
 IndexForm iterator_form(int iterator);
 IndexForm opaque_form(OpaqueTerm term);
+
+// The value of an index; `value_of_term` gives that of a summand that is not affine.
+Value value_of(const IndexForm& form, ValueNumbers& numbers,
+               ir::FunctionRef<Value(const OpaqueTerm&)> value_of_term);
 
 // Sums, products, quotients and remainders of forms; nullopt where the result is not of this form.
 std::optional<IndexForm> plus(const IndexForm& a, const IndexForm& b);

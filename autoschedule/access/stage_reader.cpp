@@ -78,7 +78,7 @@ std::vector<IndexForm> StageReader::indices(const std::vector<Expr>& args) {
 
 // Constants are no part of a place: the taps around one have the same.
 Value StageReader::place_of(const std::vector<IndexForm>& index) {
-  ValueNumbers::Words what{0};
+  ValueNumbers::Words what{place_key};
   std::vector<Value> places;
   for (size_t d = 0; d < index.size(); ++d) {
     for (const OpaqueTerm& term : index[d].opaque) {

@@ -66,19 +66,7 @@ Value StageValues::find_place(const Expr& e) {
   const bool is_sum =
       !form.is_constant() && (form.opaque.empty() || !form.opaque[0].expr.same_as(e));
   if (!is_sum) return find_value(e, &StageValues::place);
-  ValueNumbers::Words what{static_cast<uint64_t>(form.low), static_cast<uint64_t>(form.high),
-                           static_cast<uint64_t>(form.divisor),
-                           static_cast<uint64_t>(form.modulus)};
-  std::vector<Value> parts;
-  for (const Term& term : form.terms) {
-    what.push_back(static_cast<uint64_t>(term.coefficient));
-    parts.push_back(ValueNumbers::iterator(term.iterator));
-  }
-  for (const OpaqueTerm& term : form.opaque) {
-    what.push_back(static_cast<uint64_t>(term.coefficient));
-    parts.push_back(place(term.expr));
-  }
-  return numbers_.combine(std::move(what), pointers_to(parts));
+  return value_of(form, numbers_, [&](const OpaqueTerm& term) { return place(term.expr); });
 }
 
 // `part` gives the values of the operands.

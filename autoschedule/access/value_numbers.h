@@ -41,6 +41,9 @@ struct Value {
 
 std::vector<const Value*> pointers_to(const std::vector<Value>& values);
 
+// The first word of a key that is no expression's; those of expressions start with their kind, which is smaller.
+inline constexpr uint64_t form_key = 1000, place_key = 1001, composed_key = 1002;
+
 class ValueNumbers {
  public:
   using Words = std::vector<uint64_t>;

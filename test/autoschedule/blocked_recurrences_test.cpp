@@ -106,7 +106,7 @@ TEST_F(BlockedRecurrences, AreLinear) {
   EXPECT_TRUE(is_one([&](Expr f, Expr f1, Expr) { return f1 + 0.1f * (at(0) - f1); }));
   EXPECT_TRUE(is_one([&](Expr f, Expr f1, Expr f2) { return (at(0) - f1 / 3.0f) - 0.5f * f2; }));
   EXPECT_TRUE(is_one([&](Expr f, Expr f1, Expr f2) { return exp(at(1)) + f + f2; }));
-  EXPECT_TRUE(is_one([&](Expr f, Expr f1, Expr) { return f * f + f1; }) == false);
+  EXPECT_FALSE(is_one([&](Expr f, Expr f1, Expr) { return f * f + f1; }));
   EXPECT_FALSE(is_one([&](Expr f, Expr f1, Expr) { return f + f1 * at(1); }))
       << "of changing coefficients";
   EXPECT_FALSE(is_one([&](Expr f, Expr f1, Expr) { return max(f, f1); }));
