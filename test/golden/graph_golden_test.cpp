@@ -4,37 +4,21 @@
 // it.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <stdexcept>
 
 #include "graph/directives/schedule_log.h"
 #include "graph/graph.h"
 #include "graph_passes.h"
+#include "support/golden_files.h"
 #include "support/same_numbers.h"
 
 namespace retrograde::opt {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string read_file(const fs::path& path) {
-  std::ifstream in(path);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-std::vector<fs::path> find_cases() {
-  std::vector<fs::path> cases;
-  for (const auto& entry :
-       fs::recursive_directory_iterator(fs::path(RETROGRADE_TEST_DIR) / "golden/graph")) {
-    if (entry.path().extension() == ".in") cases.push_back(entry.path());
-  }
-  std::sort(cases.begin(), cases.end());
-  return cases;
-}
 
 class GraphGolden : public ::testing::TestWithParam<fs::path> {};
 
@@ -61,11 +45,12 @@ TEST_P(GraphGolden, GivesWhatItsFileSays) {
   EXPECT_EQ(result, read_file(expected));
 }
 
-INSTANTIATE_TEST_SUITE_P(Cases, GraphGolden, ::testing::ValuesIn(find_cases()),
-                         [](const auto& info) {
-                           return info.param.parent_path().filename().string() + "_" +
-                                  info.param.stem().string();
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Cases, GraphGolden,
+    ::testing::ValuesIn(files_below(fs::path(RETROGRADE_TEST_DIR) / "golden/graph", ".in")),
+    [](const auto& info) {
+      return info.param.parent_path().filename().string() + "_" + info.param.stem().string();
+    });
 
 // Each pass has a case.
 TEST(GraphPasses, AreAllTested) {

@@ -8,7 +8,6 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
@@ -18,6 +17,7 @@
 #include "ir/print.h"
 #include "ir/validate.h"
 #include "lower/statement_passes.h"
+#include "support/golden_files.h"
 
 namespace retrograde::lower {
 namespace {
@@ -30,21 +30,10 @@ struct GoldenCase {
 };
 void PrintTo(const GoldenCase& c, std::ostream* out) { *out << c.input; }
 
-std::string read_file(const fs::path& path) {
-  std::ifstream in(path);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 std::vector<GoldenCase> find_cases() {
   std::vector<GoldenCase> cases;
-  for (const auto& entry :
-       fs::recursive_directory_iterator(fs::path(RETROGRADE_TEST_DIR) / "golden/lower")) {
-    if (entry.path().extension() == ".in") {
-      cases.push_back({entry.path().parent_path().filename().string(), entry.path()});
-    }
-  }
-  std::sort(cases.begin(), cases.end(),
-            [](const GoldenCase& a, const GoldenCase& b) { return a.input < b.input; });
+  for (const fs::path& input : files_below(fs::path(RETROGRADE_TEST_DIR) / "golden/lower", ".in"))
+    cases.push_back({input.parent_path().filename().string(), input});
   return cases;
 }
 

@@ -2,17 +2,16 @@
 // <case>.out. RETROGRADE_UPDATE_GOLDEN=1 writes the .out files instead; read the difference before you commit it.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 
 #include "diagnostics/error.h"
 #include "ir/print.h"
 #include "lower/lower.h"
 #include "lower/statement_passes.h"
 #include "program_text.h"
+#include "support/golden_files.h"
 #include "support/same_numbers.h"
 
 namespace retrograde::lower {
@@ -21,20 +20,6 @@ namespace {
 namespace fs = std::filesystem;
 
 const fs::path golden = fs::path(RETROGRADE_TEST_DIR) / "golden";
-
-std::string read_file(const fs::path& path) {
-  std::ifstream in(path);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-std::vector<fs::path> find_cases() {
-  std::vector<fs::path> cases;
-  for (const auto& entry : fs::recursive_directory_iterator(golden / "pipeline")) {
-    if (entry.path().extension() == ".in") cases.push_back(entry.path());
-  }
-  std::sort(cases.begin(), cases.end());
-  return cases;
-}
 
 // The expected output of a pass that must reject its input is the message.
 std::string outcome(const std::string& pass, const opt::ProgramText& program) {
@@ -57,7 +42,8 @@ TEST_P(PipelineGolden, GivesWhatItsFileSays) {
   EXPECT_EQ(result, read_file(expected));
 }
 
-INSTANTIATE_TEST_SUITE_P(Cases, PipelineGolden, testing::ValuesIn(find_cases()),
+INSTANTIATE_TEST_SUITE_P(Cases, PipelineGolden,
+                         testing::ValuesIn(files_below(golden / "pipeline", ".in")),
                          [](const auto& info) {
                            return info.param.parent_path().filename().string() + "_" +
                                   info.param.stem().string();

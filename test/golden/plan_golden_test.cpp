@@ -4,34 +4,18 @@
 // it.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 
 #include "graph/graph.h"
+#include "support/golden_files.h"
 #include "support/plan_round_trip.h"
 
 namespace retrograde {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string read_file(const fs::path& path) {
-  std::ifstream in(path);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-std::vector<fs::path> find_cases() {
-  std::vector<fs::path> cases;
-  for (const auto& entry : fs::directory_iterator(fs::path(RETROGRADE_TEST_DIR) /
-                                                  "golden/graph/schedule_unscheduled")) {
-    if (entry.path().extension() == ".out") cases.push_back(entry.path());
-  }
-  std::sort(cases.begin(), cases.end());
-  return cases;
-}
 
 class PlanGolden : public ::testing::TestWithParam<fs::path> {};
 
@@ -49,7 +33,10 @@ TEST_P(PlanGolden, GivesWhatItsFileSays) {
   EXPECT_TRUE(trip.opaque.empty());
 }
 
-INSTANTIATE_TEST_SUITE_P(Cases, PlanGolden, ::testing::ValuesIn(find_cases()),
+INSTANTIATE_TEST_SUITE_P(Cases, PlanGolden,
+                         ::testing::ValuesIn(files_below(fs::path(RETROGRADE_TEST_DIR) /
+                                                             "golden/graph/schedule_unscheduled",
+                                                         ".out")),
                          [](const auto& info) { return info.param.stem().string(); });
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "graph/directives/directive_text.h"
 #include "graph/graph.h"
 #include "support/errors.h"
+#include "support/golden_files.h"
 #include "support/same_numbers.h"
 #include "testing/random_schedule.h"
 
@@ -24,14 +25,9 @@ namespace {
 
 const std::string folder = std::string(RETROGRADE_TEST_DIR) + "/golden/schedule_log/";
 
-std::string read_file(const std::string& name) {
-  std::ifstream in(folder + name);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 void expect_file(const std::string& name, const std::string& text) {
   if (std::getenv("RETROGRADE_UPDATE_GOLDEN")) std::ofstream(folder + name) << text;
-  EXPECT_EQ(text, read_file(name));
+  EXPECT_EQ(text, read_file(folder + name));
 }
 
 struct Program {
@@ -64,7 +60,7 @@ std::vector<std::string> lines_of(const std::string& text) {
 std::vector<ScheduleLog> logs() {
   std::vector<ScheduleLog> result;
   std::string part;
-  for (const std::string& line : lines_of(read_file("directives.in") + "\n")) {
+  for (const std::string& line : lines_of(read_file(folder + "directives.in") + "\n")) {
     if (!line.empty()) {
       part += line + "\n";
     } else if (!part.empty()) {
