@@ -183,7 +183,7 @@ std::string to_text(const Plan& plan);
 // The text of one nest, and of one loop: `parallel y:8 GuardWithIf`.
 std::string to_text(const Plan& plan, StageId stage);
 std::string to_text(const Plan& plan, const LoopRef& loop);
-// Requires: line …: … .
+// Requires: the text of a plan, as to_text gives it; messages name line and column.
 Plan parse_plan(const std::string& text, const ProgramPtr& program);
 
 // The first invariant that the plan breaks, with the Func, the loop and the rule; empty when it keeps all of them.

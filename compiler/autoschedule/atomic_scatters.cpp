@@ -19,7 +19,7 @@ namespace retrograde::autoschedule {
 namespace {
 
 constexpr int vectors_of_a_task = 256;  // along a loop that is cut into tasks
-// Of a sum to which threads add at once.
+// The elements and the additions of a sum to which threads may add at once.
 constexpr int64_t least_elements = planning::uncontended_lines * planning::line_elements;
 constexpr double least_adds = planning::launch_operations / planning::atomic_add_operations;
 

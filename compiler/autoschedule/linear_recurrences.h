@@ -24,7 +24,7 @@ struct LinearRecurrence {
   // is the domain's.
   Interval steady;
   Expr value;
-  // Of the elements one, two, ... iterations before, as Float(64); undefined: 0.
+  // The factors of the elements from one, two, ... iterations before, as Float(64); undefined: 0.
   std::vector<Expr> coefficients;
   int order() const { return static_cast<int>(coefficients.size()); }
 };

@@ -12,7 +12,7 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-// Of all steps, and of one: as in lower/loops/fold_steps.cpp.
+// The bytes of all steps and of one step; the same limits as in lower/loops/fold_steps.cpp.
 constexpr int64_t large_bytes = planning::many_step_bytes;
 constexpr int64_t most_step_bytes = planning::largest_second_cache_bytes;
 
