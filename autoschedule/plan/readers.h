@@ -2,7 +2,6 @@
 #pragma once
 
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "autoschedule/plan/plan.h"
@@ -11,6 +10,9 @@ namespace retrograde::planning {
 
 // The stages that read each Func of a program in this order, those of the Func itself excepted.
 std::vector<std::vector<StageId>> readers_of(const std::vector<graph::FuncPtr>& funcs);
+// The depth of the level's loop in a stage; nullopt if it is no loop of the stage. Loops alike of different stages may be
+// at different depths.
+std::optional<int> depth_in(const Plan& plan, StageId stage, const Level& level);
 
 class Readers {
  public:
@@ -26,8 +28,6 @@ class Readers {
     return *plan_.program->funcs[static_cast<size_t>(id)];
   }
   bool is_computed_at_reads(FuncId id) const;
-  std::optional<int> depth_in(StageId stage, const Level& level) const;
-  std::vector<std::string> names_of(StageId stage) const;
   bool is_inside(StageId stage, const Level& level) const;
   bool is_place_inside(const LoopRef& loop, const Level& level) const;
 };
