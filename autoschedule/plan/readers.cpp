@@ -8,6 +8,31 @@
 
 namespace retrograde::planning {
 
+namespace {
+
+// The names of a stage's loops, outermost first.
+std::vector<std::string> names_of(const Plan& plan, StageId stage) {
+  const graph::FuncContents& f = *plan.program->funcs[static_cast<size_t>(stage.func)];
+  if (plan.of(stage.func).opacity == Opacity::None)
+    return loop_names(f, stage.stage, plan.nest(stage)).loops;
+  std::vector<std::string> names =
+      mapped(f.stage(stage.stage).schedule.dims, [](const graph::Dim& dim) { return dim.var; });
+  std::ranges::reverse(names);
+  return names;
+}
+
+}  // namespace
+
+std::optional<int> depth_in(const Plan& plan, StageId stage, const Level& level) {
+  const StageId host = level.loop.stage;
+  if (stage == host || level.loop.depth == around_all_loops) return level.loop.depth;
+  if (stage.func != host.func || !level.in_each_stage) return std::nullopt;
+  const std::vector<std::string> own = names_of(plan, stage), wanted = names_of(plan, host);
+  const auto found = std::ranges::find(own, wanted[static_cast<size_t>(level.loop.depth)]);
+  if (found == own.end()) return std::nullopt;
+  return static_cast<int>(found - own.begin());
+}
+
 Readers::Readers(const Plan& plan) : plan_(plan) {
   std::unordered_map<const graph::FuncContents*, FuncId> ids;
   const auto count = static_cast<FuncId>(plan.funcs.size());
@@ -54,37 +79,14 @@ std::optional<StageId> Readers::find_outside(FuncId id, const Level& level) cons
   return std::nullopt;
 }
 
-// The depth of the level's loop in a stage of the same Func; nullopt when the stage has none. Loops alike of different
-// stages may be at different depths.
-std::optional<int> Readers::depth_in(StageId stage, const Level& level) const {
-  const StageId host = level.loop.stage;
-  if (stage == host || level.loop.depth == around_all_loops) return level.loop.depth;
-  if (stage.func != host.func || !level.in_each_stage) return std::nullopt;
-  const std::vector<std::string> own = names_of(stage), wanted = names_of(host);
-  const auto found = std::ranges::find(own, wanted[static_cast<size_t>(level.loop.depth)]);
-  if (found == own.end()) return std::nullopt;
-  return static_cast<int>(found - own.begin());
-}
-
-// The names of a stage's loops, outermost first.
-std::vector<std::string> Readers::names_of(StageId stage) const {
-  const graph::FuncContents& f = func(stage.func);
-  if (plan_.of(stage.func).opacity == Opacity::None)
-    return loop_names(f, stage.stage, plan_.nest(stage)).loops;
-  std::vector<std::string> names =
-      mapped(f.stage(stage.stage).schedule.dims, [](const graph::Dim& dim) { return dim.var; });
-  std::ranges::reverse(names);
-  return names;
-}
-
 bool Readers::is_place_inside(const LoopRef& loop, const Level& level) const {
-  const auto depth = depth_in(loop.stage, level);
+  const auto depth = depth_in(plan_, loop.stage, level);
   return depth ? loop.depth >= *depth : is_inside(loop.stage, level);
 }
 
 // Whether all loops of the stage are inside of the level's loop. Unknown places count as inside.
 bool Readers::is_inside(StageId stage, const Level& level) const {
-  if (depth_in(stage, level)) return true;
+  if (depth_in(plan_, stage, level)) return true;
   const FuncPlan& plan = plan_.of(stage.func);
   const Level& compute = plan.placement.compute;
   if (plan.opacity == Opacity::None) {

@@ -2,13 +2,16 @@
 #pragma once
 
 #include <optional>
-#include <string>
 #include <unordered_map>
 #include <vector>
 
 #include "autoschedule/plan/plan.h"
 
 namespace retrograde::planning {
+
+// The depth of the level's loop in a stage; nullopt if it is no loop of the stage. Loops alike of different stages may be
+// at different depths.
+std::optional<int> depth_in(const Plan& plan, StageId stage, const Level& level);
 
 class Readers {
  public:
@@ -26,8 +29,6 @@ class Readers {
   }
   void note_reads(FuncId id, const std::unordered_map<const graph::FuncContents*, FuncId>& ids);
   bool is_computed_at_reads(FuncId id) const;
-  std::optional<int> depth_in(StageId stage, const Level& level) const;
-  std::vector<std::string> names_of(StageId stage) const;
   bool is_inside(StageId stage, const Level& level) const;
   bool is_place_inside(const LoopRef& loop, const Level& level) const;
 };
