@@ -15,10 +15,18 @@ int64_t rounded_up_quotient(int64_t a, int64_t b) { return (a + b - 1) / b; }
 // What the loops of a nest from a depth on cover.
 class NestCover {
  public:
-  // `whole`: what all loops cover.
-  NestCover(const Nest& nest, const Cover& whole, size_t first)
-      : nest_(nest), whole_(whole), first_(first) {}
+  // `whole`: what all loops cover. `iterators`: how many of these have loops; those of fusions are next.
+  NestCover(const Nest& nest, const Cover& whole, size_t first, size_t iterators)
+      : nest_(nest), whole_(whole), first_(first), iterators_(static_cast<int>(iterators)) {}
 
+  // The last iterator has no loop if it numbers the points that one iteration updates.
+  Cover points() const {
+    Cover cover = whole_;
+    for (int i = 0; i < iterators_; ++i) cover[static_cast<size_t>(i)] = points(i);
+    return cover;
+  }
+
+ private:
   int64_t points(int iterator) const {
     const std::vector<Piece> pieces = pieces_of(iterator);
     const int64_t all = extent(iterator);
@@ -30,7 +38,6 @@ class NestCover {
     return result;
   }
 
- private:
   // A loop of an iterator, and how many of its iterations are covered.
   struct Piece {
     int64_t step, iterations;
@@ -38,11 +45,11 @@ class NestCover {
   const Nest& nest_;
   const Cover& whole_;
   const size_t first_;
+  const int iterators_;
 
-  int iterators() const { return static_cast<int>(whole_.size()); }
   int64_t extent(int iterator) const {
-    if (iterator < iterators()) return whole_[static_cast<size_t>(iterator)];
-    const Fusion& fusion = nest_.fusions[static_cast<size_t>(iterator - iterators())];
+    if (iterator < iterators_) return whole_[static_cast<size_t>(iterator)];
+    const Fusion& fusion = nest_.fusions[static_cast<size_t>(iterator - iterators_)];
     return iterations(fusion.inner) * iterations(fusion.outer);
   }
   int64_t iterations(const Part& part) const {
@@ -62,7 +69,7 @@ class NestCover {
     for (size_t f = 0; f < nest_.fusions.size(); ++f) {
       const auto& [inner, outer] = nest_.fusions[f];
       if (inner.iterator != iterator && outer.iterator != iterator) continue;
-      const int64_t covered = points(iterators() + static_cast<int>(f));
+      const int64_t covered = points(iterators_ + static_cast<int>(f));
       const int64_t in_inner = std::min(covered, iterations(inner));
       if (inner.iterator == iterator) pieces.push_back({inner.step, in_inner});
       if (outer.iterator == iterator)
@@ -119,8 +126,9 @@ std::vector<const Access*> reads_of(const StageNode& stage, FuncId func) {
 Cover Covers::inside(StageId stage, int depth) {
   const Cover whole = all_of(stage);
   if (depth == around_all_loops || plan_.of(stage.func).opacity != Opacity::None) return whole;
-  const NestCover nest(plan_.nest(stage), whole, static_cast<size_t>(depth) + 1);
-  return ir::numbered(whole.size(), [&](size_t i) { return nest.points(static_cast<int>(i)); });
+  const graph::FuncContents& f = *plan_.program->funcs[static_cast<size_t>(stage.func)];
+  const size_t iterators = graph::first_loops(f, f.stage(stage.stage)).size();
+  return NestCover(plan_.nest(stage), whole, static_cast<size_t>(depth) + 1, iterators).points();
 }
 
 std::vector<int64_t> Covers::box(FuncId func, const Level& level) {

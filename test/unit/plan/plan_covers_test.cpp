@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "autoschedule/plan/covers.h"
+#include "frontend/language/integer_ops.h"
 #include "unit/plan/plan_testing.h"
 
 namespace retrograde::planning {
@@ -50,6 +51,16 @@ TEST_F(PlanCovers, FollowFusedLoops) {
             (Covers{{16, 60}, {16, 2}, {1, 1}}));
   EXPECT_EQ(covers({out}, "out  root  (x:4 y:6):8, (x:4 y:6), y, x\n", out),
             (Covers{{16, 60}, {16, 12}, {4, 6}, {4, 1}, {1, 1}}));
+}
+
+TEST_F(PlanCovers, HoldAllPointsThatOneIterationUpdates) {
+  Func out("out");
+  RDom r(0, 20, 0, 10, "r");
+  out(x, y) = 0;
+  out(x, 2 * r.x + scatter(0, 1)) = out(x, 2 * r.x + gather(1, 0)) + r.y;
+  out.bound(x, 0, 16).bound(y, 0, 60);
+  EXPECT_EQ(covers({out}, "out  root\n  .1  (r.x r.y):4, x, (r.x r.y)\n", out, 1),
+            (Covers{{16, 20, 10, 2}, {16, 4, 1, 2}, {1, 4, 1, 2}, {1, 1, 1, 2}}));
 }
 
 TEST_F(PlanCovers, OfAFuncInALoopAreThePointsThatItsConsumersNeed) {
