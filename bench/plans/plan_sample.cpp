@@ -1,0 +1,98 @@
+#include "plan_sample.h"
+
+#include <algorithm>
+#include <mutex>
+#include <set>
+
+#include "autoschedule/graph_rewrites.h"
+#include "autoschedule/schedule_search.h"
+#include "autoschedule/stored_funcs.h"
+#include "diagnostics/text_hash.h"
+#include "driver/schedule.h"
+#include "graph/directives/schedule_log.h"
+#include "graph/directives/wrappers.h"
+#include "graph/graph.h"
+#include "tuning/measure_schedule.h"
+
+namespace bench::plans {
+
+using namespace retrograde;
+using autoschedule::Scheduling;
+
+LoadedProgram load_program(const std::string& text) {
+  LoadedProgram result{graph::parse_graph(text), {}};
+  graph::validate(result.graph, "parse_graph");
+  result.outputs = graph::apply_wrappers(result.graph.outputs);
+  if (autoschedule::is_differentiated(result.outputs))
+    result.outputs = autoschedule::with_graph_rewrites(result.outputs, /*on_gpu=*/false);
+  tuning::bind_sample_inputs(result.outputs);
+  return result;
+}
+
+namespace {
+
+std::set<std::string> names_of(const std::vector<FuncPtr>& outputs) {
+  std::set<std::string> names;
+  for (const FuncPtr& f : graph::topological_order(outputs)) names.insert(f->name);
+  return names;
+}
+
+// Funcs that a schedule makes have other names in each process; the key does not depend on them.
+std::string key_of(const planning::Plan& plan, const std::set<std::string>& known) {
+  const auto log = graph::schedule_log(planning::emit_plan(plan));
+  const uint64_t hash = text_hash(autoschedule::with_stable_names(log, known));
+  char key[17];
+  std::snprintf(key, sizeof key, "%016llx", static_cast<unsigned long long>(hash));
+  return key;
+}
+
+SampledPlan imported(const std::string& source, const std::vector<FuncPtr>& scheduled,
+                     const std::set<std::string>& known) {
+  SampledPlan result{source, "", planning::import_plan(graph::apply_wrappers(scheduled))};
+  result.key = key_of(result.plan, known);
+  return result;
+}
+
+autoschedule::ScheduleRequest request_of(const SampleOptions& options) {
+  return autoschedule::request_for(options.target, {});
+}
+
+// What the search over the rules' decisions tries. It ends after so many schedules.
+std::vector<SampledPlan> plans_of_search(const std::vector<FuncPtr>& outputs,
+                                         const SampleOptions& options, const SampledPlan&) {
+  if (options.rules == 0) return {};
+  std::mutex mutex;
+  std::vector<std::vector<FuncPtr>> tried;
+  const auto cost = [&](const std::vector<FuncPtr>& scheduled) {
+    const double seconds = driver::predicted_seconds(scheduled, options.target, 0);
+    const std::lock_guard lock(mutex);
+    tried.push_back(scheduled);
+    return seconds;
+  };
+  autoschedule::search_schedule(outputs, request_of(options), Scheduling::Everything, cost,
+                                options.rules);
+  std::vector<SampledPlan> result;
+  const std::set<std::string> known = names_of(outputs);
+  for (const auto& scheduled : tried) result.push_back(imported("search", scheduled, known));
+  std::ranges::sort(result, {}, &SampledPlan::key);  // threads of the search finish in any order
+  return result;
+}
+
+}  // namespace
+
+std::vector<SampledPlan> sample_plans(const std::vector<FuncPtr>& outputs,
+                                      const SampleOptions& options) {
+  const PlanSource sources[] = {plans_of_search};
+  const auto scheduled =
+      autoschedule::schedule_within_budget(outputs, request_of(options), Scheduling::Everything);
+  std::vector<SampledPlan> result{imported("rules", scheduled.outputs, names_of(outputs))};
+  std::set<std::string> seen{result[0].key};
+  for (const PlanSource& source : sources) {
+    for (SampledPlan& plan : source(outputs, options, result[0])) {
+      if (seen.insert(plan.key).second) result.push_back(std::move(plan));
+    }
+  }
+  return result;
+}
+
+}  // namespace bench::plans
