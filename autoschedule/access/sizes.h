@@ -33,9 +33,14 @@ class SizeModel {
  public:
   SizeModel(const AccessGraph& graph, const SizeDefaults& defaults);
 
+  const AccessGraph& graph() const { return graph_; }
   Extent of(FuncId func, size_t dimension) const;
   Extent of_image(ImageId image, size_t dimension) const;
   Extent of(StageId stage, int iterator) const;
+  // That of a dimension of what is accessed.
+  Extent of(const Access& access, size_t dimension) const {
+    return access.of >= 0 ? of(access.of, dimension) : of_image(access.image, dimension);
+  }
   // The coordinates that are computed.
   ir::ConstantRange range(FuncId func, size_t dimension) const;
   ir::ConstantRange range(StageId stage, int iterator) const;

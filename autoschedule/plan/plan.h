@@ -150,6 +150,7 @@ uint64_t hash_of(const FuncPlan& plan);
 // that are not applied yet.
 struct Program {
   std::vector<graph::FuncPtr> outputs, funcs;
+  std::vector<std::vector<StageId>> readers;  // of each Func: the stages of others that read it
 };
 using ProgramPtr = std::shared_ptr<const Program>;
 ProgramPtr make_program(const std::vector<graph::FuncPtr>& outputs);
@@ -188,6 +189,9 @@ Plan parse_plan(const std::string& text, const ProgramPtr& program);
 
 // The first invariant that the plan breaks, with the Func, the loop and the rule; empty when it keeps all of them.
 std::string broken_invariant(const Plan& plan);
+// The same without P5, which takes as long as emitting the plan. P1 and P4 are checked for the Funcs that differ from
+// those of `before`, which keeps all invariants.
+std::string broken_structure(const Plan& plan, const Plan& before);
 // InternalError when the plan breaks one.
 void validate(const Plan& plan);
 

@@ -1,6 +1,7 @@
 #include "autoschedule/plan/readers.h"
 
 #include <algorithm>
+#include <unordered_map>
 
 #include "autoschedule/plan/loop_names.h"
 #include "ir/build.h"
@@ -8,28 +9,51 @@
 
 namespace retrograde::planning {
 
-Readers::Readers(const Plan& plan) : plan_(plan) {
-  std::unordered_map<const graph::FuncContents*, FuncId> ids;
-  const auto count = static_cast<FuncId>(plan.funcs.size());
-  for (FuncId id = 0; id < count; ++id) ids[&func(id)] = id;
-  for (FuncId id = 0; id < count; ++id) note_reads(id, ids);
+namespace {
+
+// The names of a stage's loops, outermost first.
+std::vector<std::string> names_of(const Plan& plan, StageId stage) {
+  const graph::FuncContents& f = *plan.program->funcs[static_cast<size_t>(stage.func)];
+  if (plan.of(stage.func).opacity == Opacity::None)
+    return loop_names(f, stage.stage, plan.nest(stage)).loops;
+  std::vector<std::string> names =
+      mapped(f.stage(stage.stage).schedule.dims, [](const graph::Dim& dim) { return dim.var; });
+  std::ranges::reverse(names);
+  return names;
 }
 
-void Readers::note_reads(FuncId id,
-                         const std::unordered_map<const graph::FuncContents*, FuncId>& ids) {
-  const graph::FuncContents& f = func(id);
-  const auto note = [&](const graph::FuncContents* callee, int stage) {
-    std::vector<StageId>& readers = readers_[ids.at(callee)];
-    const StageId reader{id, static_cast<int16_t>(stage)};
-    if (callee != &f && (readers.empty() || readers.back() != reader)) readers.push_back(reader);
-  };
-  for (int s = 0; s < f.stage_count(); ++s) {
-    walk(f.stage(s), [&](const Call& call) {
-      if (call.call_type == CallType::Func) note(graph::func_of(call).get(), s);
-    });
+}  // namespace
+
+std::optional<int> depth_in(const Plan& plan, StageId stage, const Level& level) {
+  const StageId host = level.loop.stage;
+  if (stage == host || level.loop.depth == around_all_loops) return level.loop.depth;
+  if (stage.func != host.func || !level.in_each_stage) return std::nullopt;
+  const std::vector<std::string> own = names_of(plan, stage), wanted = names_of(plan, host);
+  const auto found = std::ranges::find(own, wanted[static_cast<size_t>(level.loop.depth)]);
+  if (found == own.end()) return std::nullopt;
+  return static_cast<int>(found - own.begin());
+}
+
+std::vector<std::vector<StageId>> readers_of(const std::vector<graph::FuncPtr>& funcs) {
+  std::unordered_map<const graph::FuncContents*, size_t> ids;
+  for (const graph::FuncPtr& f : funcs) ids.emplace(f.get(), ids.size());
+  std::vector<std::vector<StageId>> readers(funcs.size());
+  for (size_t id = 0; id < funcs.size(); ++id) {
+    const graph::FuncContents& f = *funcs[id];
+    const auto note = [&](const graph::FuncContents* callee, int stage) {
+      std::vector<StageId>& list = readers[ids.at(callee)];
+      const StageId reader{static_cast<FuncId>(id), static_cast<int16_t>(stage)};
+      if (callee != &f && (list.empty() || list.back() != reader)) list.push_back(reader);
+    };
+    for (int s = 0; s < f.stage_count(); ++s) {
+      walk(f.stage(s), [&](const Call& call) {
+        if (call.call_type == CallType::Func) note(graph::func_of(call).get(), s);
+      });
+    }
+    if (!f.is_extern()) continue;
+    for (const graph::FuncPtr& callee : graph::direct_callees(f)) note(callee.get(), 0);
   }
-  if (!f.is_extern()) return;
-  for (const graph::FuncPtr& callee : graph::direct_callees(f)) note(callee.get(), 0);
+  return readers;
 }
 
 // Whether the values of the Func are computed wherever they are read.
@@ -42,9 +66,7 @@ bool Readers::is_computed_at_reads(FuncId id) const {
 }
 
 std::optional<StageId> Readers::find_outside(FuncId id, const Level& level) const {
-  const auto readers = readers_.find(id);
-  if (readers == readers_.end()) return std::nullopt;
-  for (const StageId reader : readers->second) {
+  for (const StageId reader : plan_.program->readers[static_cast<size_t>(id)]) {
     if (is_computed_at_reads(reader.func)) {
       if (const auto outside = find_outside(reader.func, level)) return outside;
     } else if (!is_inside(reader, level)) {
@@ -54,37 +76,14 @@ std::optional<StageId> Readers::find_outside(FuncId id, const Level& level) cons
   return std::nullopt;
 }
 
-// The depth of the level's loop in a stage of the same Func; nullopt when the stage has none. Loops alike of different
-// stages may be at different depths.
-std::optional<int> Readers::depth_in(StageId stage, const Level& level) const {
-  const StageId host = level.loop.stage;
-  if (stage == host || level.loop.depth == around_all_loops) return level.loop.depth;
-  if (stage.func != host.func || !level.in_each_stage) return std::nullopt;
-  const std::vector<std::string> own = names_of(stage), wanted = names_of(host);
-  const auto found = std::ranges::find(own, wanted[static_cast<size_t>(level.loop.depth)]);
-  if (found == own.end()) return std::nullopt;
-  return static_cast<int>(found - own.begin());
-}
-
-// The names of a stage's loops, outermost first.
-std::vector<std::string> Readers::names_of(StageId stage) const {
-  const graph::FuncContents& f = func(stage.func);
-  if (plan_.of(stage.func).opacity == Opacity::None)
-    return loop_names(f, stage.stage, plan_.nest(stage)).loops;
-  std::vector<std::string> names =
-      mapped(f.stage(stage.stage).schedule.dims, [](const graph::Dim& dim) { return dim.var; });
-  std::ranges::reverse(names);
-  return names;
-}
-
 bool Readers::is_place_inside(const LoopRef& loop, const Level& level) const {
-  const auto depth = depth_in(loop.stage, level);
+  const auto depth = depth_in(plan_, loop.stage, level);
   return depth ? loop.depth >= *depth : is_inside(loop.stage, level);
 }
 
 // Whether all loops of the stage are inside of the level's loop. Unknown places count as inside.
 bool Readers::is_inside(StageId stage, const Level& level) const {
-  if (depth_in(stage, level)) return true;
+  if (depth_in(plan_, stage, level)) return true;
   const FuncPlan& plan = plan_.of(stage.func);
   const Level& compute = plan.placement.compute;
   if (plan.opacity == Opacity::None) {

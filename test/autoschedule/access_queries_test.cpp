@@ -105,21 +105,27 @@ TEST(Footprint, CountsOverlappingWindowsOnce) {
   image.dim(1).set_estimate(0, 256);
   const Known known(out);
   const Access &window = known.read(out, 1, 1), &turned = known.read(out, 1, 2);
-  const IteratorSet by_x = set_of(0), by_y = set_of(1), by_r = set_of(2);
+  // Covers of x, y, r.
+  EXPECT_EQ(footprint(window, {1, 1, 3}, known.sizes, line).elements, 3);
+  EXPECT_EQ(footprint(window, {64, 1, 3}, known.sizes, line).elements, 66);
+  EXPECT_EQ(footprint(window, {64, 1, 3}, known.sizes, line).lines, 5);
+  EXPECT_EQ(footprint(window, {16, 1, 3}, known.sizes, line).elements, 18);
+  EXPECT_EQ(footprint(window, {16, 4, 3}, known.sizes, line).lines, 2 * 4);
+  EXPECT_EQ(footprint(window, {64, 32, 3}, known.sizes, line).lines, 5 * 32);
+  EXPECT_EQ(footprint(turned, {64, 1, 1}, known.sizes, line).lines, 64);
+  EXPECT_EQ(footprint(turned, {1, 32, 3}, known.sizes, line).lines, 2);
+  EXPECT_EQ(footprint(turned, {8, 8, 3}, known.sizes, line).lines, 8);
 
-  EXPECT_EQ(footprint(window, by_r, known.sizes, line).elements, 3);
-  EXPECT_EQ(footprint(window, by_x | by_r, known.sizes, line).elements, 66);
-  EXPECT_EQ(footprint(window, by_x | by_r, known.sizes, line).lines, 5);
-  EXPECT_EQ(footprint(window, by_x | by_y | by_r, known.sizes, line).lines, 5 * 32);
-  EXPECT_EQ(footprint(turned, by_x, known.sizes, line).lines, 64);
-  EXPECT_EQ(footprint(turned, by_y | by_r, known.sizes, line).lines, 2);
-
-  EXPECT_TRUE(reuse(turned, 2, 0, known.sizes, line).temporal);
-  EXPECT_TRUE(reuse(window, 0, by_r, known.sizes, line).overlap);
-  EXPECT_TRUE(reuse(window, 0, by_r, known.sizes, line).spatial);
-  EXPECT_FALSE(reuse(window, 0, 0, known.sizes, line).overlap);
-  const Reuse rows = reuse(window, 1, by_r, known.sizes, line);
+  EXPECT_TRUE(reuse(turned, 2, {1, 1, 1}, known.sizes, line).temporal);
+  EXPECT_TRUE(reuse(window, 0, {1, 1, 3}, known.sizes, line).overlap);
+  EXPECT_TRUE(reuse(window, 0, {1, 1, 3}, known.sizes, line).spatial);
+  EXPECT_FALSE(reuse(window, 0, {1, 1, 1}, known.sizes, line).overlap);
+  const Reuse rows = reuse(window, 1, {1, 1, 3}, known.sizes, line);
   EXPECT_FALSE(rows.temporal || rows.spatial || rows.overlap);
+  // A loop in steps of 16.
+  EXPECT_TRUE(reuse(window, 0, {16, 1, 3}, known.sizes, line).overlap);
+  EXPECT_FALSE(reuse(window, 0, {16, 1, 1}, known.sizes, line).overlap);
+  EXPECT_FALSE(reuse(window, 0, {16, 1, 3}, known.sizes, line).spatial);
 }
 
 TEST(Footprint, IsWithinTheRangeOfTheDataAndOfTheImage) {
@@ -132,11 +138,12 @@ TEST(Footprint, IsWithinTheRangeOfTheDataAndOfTheImage) {
   const Known known(out);
   const Access& scattered = known.read(out, 0, 1);
   EXPECT_TRUE(scattered.place.defined());
-  EXPECT_EQ(footprint(scattered, set_of(0), known.sizes, line).elements, 13);
-  EXPECT_EQ(footprint(scattered, set_of(0), known.sizes, line).lines, 1);
-  EXPECT_EQ(footprint(scattered, set_of(0) | set_of(1), known.sizes, line).elements, 130);
-  EXPECT_EQ(footprint(known.read(out, 0, 2), set_of(0), known.sizes, line).elements, 8);
-  EXPECT_EQ(footprint(known.read(out, 0, 3), set_of(0), known.sizes, line).elements, 16);
+  EXPECT_EQ(footprint(scattered, {64, 1}, known.sizes, line).elements, 13);
+  EXPECT_EQ(footprint(scattered, {64, 1}, known.sizes, line).lines, 1);
+  EXPECT_EQ(footprint(scattered, {64, 10}, known.sizes, line).elements, 130);
+  EXPECT_EQ(footprint(known.read(out, 0, 2), {64, 1}, known.sizes, line).elements, 8);
+  EXPECT_EQ(footprint(known.read(out, 0, 3), {64, 1}, known.sizes, line).elements, 16);
+  EXPECT_EQ(footprint(scattered, {4, 2}, known.sizes, line).elements, 8) << "one for each point";
 }
 
 TEST(Footprint, MergesContiguousLines) {
@@ -147,7 +154,53 @@ TEST(Footprint, MergesContiguousLines) {
   image.dim(0).set_estimate(0, 4);
   image.dim(1).set_estimate(0, 100);
   const Known known(out);
-  EXPECT_EQ(footprint(known.read(out, 0, 0), set_of(0) | set_of(1), known.sizes, line).lines, 25);
+  EXPECT_EQ(footprint(known.read(out, 0, 0), {4, 100}, known.sizes, line).lines, 25);
+}
+
+using Extents = std::vector<int64_t>;
+
+TEST(Extents, AreThoseOfTheBoxThatACoverNeeds) {
+  ImageParam image(Float(32), 2, "image"), places(UInt(8), 2, "places");
+  Func out("out");
+  RDom r(0, 3);
+  out(x, y) += image(x + r, 2 * y - 3 * r) + image(x / 2, (y + 1) / 2) + image(x % 8, 50 - x) +
+               image(clamp(x + 90, 0, 99), clamp(cast<int>(places(x, y)), 3, 9)) +
+               image(places(x, y) + y, 7);
+  out.bound(x, 0, 64).bound(y, 0, 32);
+  image.dim(0).set_bounds(0, 100).dim(1).set_bounds(-50, 200);
+  const Known known(out);
+  const auto box = [&](size_t read, const Cover& cover) {
+    return extents(known.read(out, 1, read), cover, known.sizes);
+  };
+  EXPECT_EQ(box(1, {8, 4, 3}), (Extents{10, 13}));
+  EXPECT_EQ(box(1, {1, 1, 1}), (Extents{1, 1}));
+  EXPECT_EQ(box(2, {16, 4, 1}), (Extents{8, 3})) << "y + 1 begins in the middle of a pair";
+  EXPECT_EQ(box(2, {3, 1, 1}), (Extents{2, 1}));
+  EXPECT_EQ(box(3, {4, 1, 1}), (Extents{4, 4})) << "4 divides 8, so remainders do not wrap";
+  EXPECT_EQ(box(3, {5, 1, 1}), (Extents{8, 5}));
+  EXPECT_EQ(box(5, {64, 32, 1}), (Extents{64, 7}));
+  EXPECT_EQ(box(5, {2, 1, 1}), (Extents{2, 7}));
+  EXPECT_EQ(box(6, {1, 1, 1}), (Extents{1, 1}));
+  EXPECT_EQ(box(6, {1, 2, 1}), (Extents{100, 1})) << "at most all of the dimension";
+}
+
+TEST(Extents, OfSeveralAccessesAreThoseOfOneBox) {
+  ImageParam image(Float(32), 2, "image");
+  Func out("out");
+  out(x, y) = image(x - 1, y) + image(x + 2, y) + image(2 * x, y) + image(x, 40);
+  out.bound(x, 0, 64).bound(y, 0, 32);
+  image.dim(0).set_bounds(-10, 200).dim(1).set_bounds(0, 100);
+  const Known known(out);
+  const auto box = [&](const std::vector<size_t>& reads, const Cover& cover) {
+    std::vector<const Access*> accesses;
+    for (const size_t i : reads) accesses.push_back(&known.read(out, 0, i));
+    return extents(accesses, cover, known.sizes);
+  };
+  EXPECT_EQ(box({0, 1}, {8, 1}), (Extents{11, 1}));
+  EXPECT_EQ(box({1, 0}, {8, 1}), (Extents{11, 1}));
+  EXPECT_EQ(box({0, 2}, {64, 1}), (Extents{128, 1})) << "-1 to 126, the whole loop";
+  EXPECT_EQ(box({0, 2}, {8, 1}), (Extents{8 + 56 + 8, 1})) << "x = 56: from 55 to 126";
+  EXPECT_EQ(box({0, 3}, {1, 1}), (Extents{2, 41})) << "row 40 and any row y";
 }
 
 TEST(LaneForm, TellsHowLanesLieInMemory) {

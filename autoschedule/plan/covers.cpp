@@ -1,0 +1,177 @@
+#include "autoschedule/plan/covers.h"
+
+#include <algorithm>
+
+#include "autoschedule/plan/nest.h"
+#include "autoschedule/plan/readers.h"
+#include "ir/build.h"
+
+namespace retrograde::planning {
+
+namespace {
+
+int64_t rounded_up_quotient(int64_t a, int64_t b) { return (a + b - 1) / b; }
+
+// What the loops of a nest from a depth on cover.
+class NestCover {
+ public:
+  // `whole`: what all loops cover. `iterators`: how many of these have loops; those of fusions are next.
+  NestCover(const Nest& nest, const Cover& whole, size_t first, size_t iterators)
+      : nest_(nest), whole_(whole), first_(first), iterators_(static_cast<int>(iterators)) {}
+
+  // The last iterator has no loop if it numbers the points that one iteration updates.
+  Cover points() const {
+    Cover cover = whole_;
+    for (int i = 0; i < iterators_; ++i) cover[static_cast<size_t>(i)] = points(i);
+    return cover;
+  }
+
+ private:
+  int64_t points(int iterator) const {
+    const std::vector<Piece> pieces = pieces_of(iterator);
+    const int64_t all = extent(iterator);
+    int64_t result = 1;
+    for (size_t i = 0; i < pieces.size(); ++i) {  // the smallest step first
+      const int64_t most = i + 1 < pieces.size() ? std::min(pieces[i + 1].step, all) : all;
+      result = std::min(result * pieces[i].iterations, most);
+    }
+    return result;
+  }
+
+  // A loop of an iterator, and how many of its iterations are covered.
+  struct Piece {
+    int64_t step, iterations;
+  };
+  const Nest& nest_;
+  const Cover& whole_;
+  const size_t first_;
+  const int iterators_;
+
+  int64_t extent(int iterator) const {
+    if (iterator < iterators_) return whole_[static_cast<size_t>(iterator)];
+    const Fusion& fusion = nest_.fusions[static_cast<size_t>(iterator - iterators_)];
+    return iterations(fusion.inner) * iterations(fusion.outer);
+  }
+  int64_t iterations(const Part& part) const {
+    const std::vector<Part> parts = parts_of(nest_, part.iterator);
+    const Part* larger = next_larger(parts, part.step);
+    const int64_t all = extent(part.iterator);
+    return rounded_up_quotient(larger ? std::min(larger->step, all) : all, part.step);
+  }
+
+  std::vector<Piece> pieces_of(int iterator) const {
+    std::vector<Piece> pieces;
+    for (size_t d = 0; d < nest_.loops.size(); ++d) {
+      const Loop& loop = nest_.loops[d];
+      if (loop.iterator == iterator)
+        pieces.push_back({loop.step, d < first_ ? 1 : iterations(loop)});
+    }
+    for (size_t f = 0; f < nest_.fusions.size(); ++f) {
+      const auto& [inner, outer] = nest_.fusions[f];
+      if (inner.iterator != iterator && outer.iterator != iterator) continue;
+      const int64_t covered = points(iterators_ + static_cast<int>(f));
+      const int64_t in_inner = std::min(covered, iterations(inner));
+      if (inner.iterator == iterator) pieces.push_back({inner.step, in_inner});
+      if (outer.iterator == iterator)
+        pieces.push_back({outer.step, rounded_up_quotient(covered, in_inner)});
+    }
+    std::ranges::sort(pieces, {}, &Piece::step);
+    return pieces;
+  }
+};
+
+// A box that grows. Boxes of different stages lie as their first elements in the whole program do.
+class GrowingBox {
+ public:
+  void add(const std::vector<const Access*>& accesses, const Cover& cover, const SizeModel& sizes) {
+    const std::vector<int64_t> box = extents(accesses, cover, sizes);
+    starts_.resize(box.size(), INT64_MAX);
+    ends_.resize(box.size(), INT64_MIN);
+    lengths_.resize(box.size(), 1);
+    for (size_t d = 0; d < box.size(); ++d) {
+      int64_t start = INT64_MAX;
+      for (const Access* access : accesses)
+        start = std::min(start, sizes.range(access->index[d], access->by).min);
+      starts_[d] = std::min(starts_[d], start);
+      ends_[d] = std::max(ends_[d], start == INT64_MIN ? start : start + box[d]);
+      const int64_t joint = starts_[d] == INT64_MIN ? 1 : ends_[d] - starts_[d];
+      lengths_[d] = std::max({lengths_[d], box[d], joint});
+      lengths_[d] = std::min(lengths_[d], std::max<int64_t>(sizes.of(*accesses[0], d).estimate, 1));
+    }
+  }
+  const std::vector<int64_t>& extents_of_all() const { return lengths_; }
+
+ private:
+  std::vector<int64_t> starts_, ends_, lengths_;
+};
+
+// The depth of the level's loop in a stage that shares it with the loop's own stage.
+std::optional<int> shared_depth(const Plan& plan, StageId stage, const Level& level) {
+  if (plan.of(stage.func).opacity != Opacity::None) return std::nullopt;
+  const std::optional<LoopRef>& shared = plan.nest(stage).shared_with;
+  const auto depth = shared ? depth_in(plan, shared->stage, level) : std::nullopt;
+  return depth && *depth <= shared->depth ? depth : std::nullopt;
+}
+
+std::vector<const Access*> reads_of(const StageNode& stage, FuncId func) {
+  std::vector<const Access*> result;
+  for (const Access& read : stage.reads) {
+    if (read.of == func) result.push_back(&read);
+  }
+  return result;
+}
+
+}  // namespace
+
+Cover Covers::inside(StageId stage, int depth) {
+  const Cover whole = all_of(stage);
+  if (depth == around_all_loops || plan_.of(stage.func).opacity != Opacity::None) return whole;
+  const graph::FuncContents& f = *plan_.program->funcs[static_cast<size_t>(stage.func)];
+  const size_t iterators = graph::first_loops(f, f.stage(stage.stage)).size();
+  return NestCover(plan_.nest(stage), whole, static_cast<size_t>(depth) + 1, iterators).points();
+}
+
+std::vector<int64_t> Covers::box(FuncId func, const Level& level) {
+  const Key key{func, level.loop.stage, level.loop.depth, level.in_each_stage};
+  if (const auto* known = ir::find_or_null(boxes_, key)) return *known;
+  const AccessGraph& graph = sizes_.graph();
+  GrowingBox box;
+  for (const StageId reader : graph.consumers(func))
+    box.add(reads_of(graph.stage(reader), func), cover_in(reader, level), sizes_);
+  // What an update accesses has to be there for the stages before it.
+  const std::vector<StageNode>& stages = graph.func(func).stages;
+  for (size_t s = stages.size(); s-- > 1;) {
+    std::vector<const Access*> accesses = reads_of(stages[s], func);
+    accesses.push_back(&stages[s].write);
+    box.add(accesses, cover_of_box(stages[s].id, box.extents_of_all()), sizes_);
+  }
+  return boxes_.emplace(key, box.extents_of_all()).first->second;
+}
+
+Cover Covers::all_of(StageId stage) {
+  const Level& compute = plan_.of(stage.func).placement.compute;
+  if (compute.kind != Level::Kind::At) return whole_cover(stage, sizes_);
+  return cover_of_box(stage, box(stage.func, compute));
+}
+
+// What a stage covers in one iteration of a loop around it.
+Cover Covers::cover_in(StageId stage, const Level& level) {
+  if (const auto depth = depth_in(plan_, stage, level)) return inside(stage, *depth);
+  if (const auto depth = shared_depth(plan_, stage, level)) return inside(stage, *depth);
+  const Level::Kind kind = plan_.of(stage.func).placement.compute.kind;
+  if (kind == Level::Kind::Root || sizes_.graph().func(stage.func).is_output)
+    return whole_cover(stage, sizes_);
+  return cover_of_box(stage, box(stage.func, level));
+}
+
+Cover Covers::cover_of_box(StageId stage, const std::vector<int64_t>& box) const {
+  Cover cover = whole_cover(stage, sizes_);
+  const std::vector<Iterator>& iterators = sizes_.graph().stage(stage).iterators;
+  for (size_t i = 0; i < iterators.size(); ++i) {
+    if (iterators[i].kind == Iterator::Kind::Pure)
+      cover[i] = box[static_cast<size_t>(iterators[i].dimension)];
+  }
+  return cover;
+}
+
+}  // namespace retrograde::planning
