@@ -2,34 +2,26 @@
 
 #include <algorithm>
 #include <mutex>
+#include <random>
 #include <set>
 
-#include "autoschedule/graph_rewrites.h"
+#include "autoschedule/memory_budget.h"
+#include "autoschedule/moves/move.h"
 #include "autoschedule/schedule_search.h"
-#include "autoschedule/stored_funcs.h"
 #include "diagnostics/text_hash.h"
 #include "driver/schedule.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/directives/wrappers.h"
-#include "graph/graph.h"
-#include "tuning/measure_schedule.h"
 
 namespace bench::plans {
 
 using namespace retrograde;
 using autoschedule::Scheduling;
 
-LoadedProgram load_program(const std::string& text) {
-  LoadedProgram result{graph::parse_graph(text), {}};
-  graph::validate(result.graph, "parse_graph");
-  result.outputs = graph::apply_wrappers(result.graph.outputs);
-  if (autoschedule::is_differentiated(result.outputs))
-    result.outputs = autoschedule::with_graph_rewrites(result.outputs, /*on_gpu=*/false);
-  tuning::bind_sample_inputs(result.outputs);
-  return result;
-}
-
 namespace {
+
+// Extents of which nothing is known.
+constexpr planning::SizeDefaults unknown_sizes{1000};
 
 std::set<std::string> names_of(const std::vector<FuncPtr>& outputs) {
   std::set<std::string> names;
@@ -78,11 +70,37 @@ std::vector<SampledPlan> plans_of_search(const std::vector<FuncPtr>& outputs,
   return result;
 }
 
+// Random moves from the default plan. Walks have 1, 2, 4 or 8 steps; a step that has no plan is left out.
+std::vector<SampledPlan> plans_of_walks(const std::vector<FuncPtr>& outputs,
+                                        const SampleOptions& options, const SampledPlan& standard) {
+  const planning::AccessGraph accesses(standard.plan.program->outputs);
+  const planning::SizeModel sizes(accesses, unknown_sizes);
+  const planning::Machine machine = planning::reference_machine(options.target);
+  const std::set<std::string> known = names_of(outputs);
+  std::mt19937 random(options.seed);
+  const auto below = [&](size_t count) { return random() % count; };
+  std::vector<SampledPlan> result;
+  for (size_t walk = 0; walk < options.walks; ++walk) {
+    SampledPlan reached{"walk", "", standard.plan};
+    for (int step = 1 << walk % 4; step > 0; --step) {
+      const auto func = static_cast<planning::FuncId>(below(reached.plan.funcs.size()));
+      const planning::Move& move = planning::all_moves()[below(planning::all_moves().size())];
+      const auto plans = move.apply(reached.plan, func, {accesses, sizes, machine});
+      if (plans.empty()) continue;
+      reached.plan = plans[below(plans.size())];
+      reached.source += std::string(" ") + move.name;
+    }
+    reached.key = key_of(reached.plan, known);
+    result.push_back(std::move(reached));
+  }
+  return result;
+}
+
 }  // namespace
 
 std::vector<SampledPlan> sample_plans(const std::vector<FuncPtr>& outputs,
                                       const SampleOptions& options) {
-  const PlanSource sources[] = {plans_of_search};
+  const PlanSource sources[] = {plans_of_search, plans_of_walks};
   const auto scheduled =
       autoschedule::schedule_within_budget(outputs, request_of(options), Scheduling::Everything);
   std::vector<SampledPlan> result{imported("rules", scheduled.outputs, names_of(outputs))};

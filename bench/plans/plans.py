@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """plans.py -- measures plans of the benchmarks' programs and judges cost models by them.
 
-    plans.py BUILD [--long] [--program PATTERN]... [--rules N] [--seconds S] [--stage-seconds S]
-             [--limit S] [--collect] [--output FILE] [--plot FILE] [--wrong]
+    plans.py BUILD [--long] [--program PATTERN]... [--rules N] [--walks N] [--seed N] [--seconds S]
+             [--stage-seconds S] [--limit S] [--minutes M] [--collect] [--output FILE] [--plot FILE] [--wrong]
     plans.py BUILD --pair PROGRAM FAST_KEY SLOW_KEY FILE.pair [--output FILE]
 
 BUILD is the folder of a build. The programs are those of programs.py, which runs first where it has not run before, or
 with --collect. PATTERN is a shell pattern of names, such as 'operators-*'. Each program has a process of its own; a plan
-that ends it, or takes more than --limit seconds, counts as failed.
+that ends it, or takes more than --limit seconds, counts as failed. No program begins after --minutes.
 
 --pair writes two plans of the last run to a file, with their times and the models that order them wrongly.
 
@@ -125,9 +125,12 @@ def measure_once(command, program, limit):
     return started is not None
 
 
+SAMPLE = ("rules", "walks", "seed")
+
+
 def sample_options(settings):
     """The options of a worker on which its plans depend."""
-    return ["--rules", str(settings["rules"])]
+    return [word for key in SAMPLE for word in (f"--{key}", str(settings[key]))]
 
 
 def measure(name, folder, options):
@@ -159,7 +162,7 @@ def write(report, path):
 
 def find_run(report, options):
     """The run of this commit with these settings, at the end of the report; a new one if there is none."""
-    settings = {key: getattr(options, key) for key in ("rules", "seconds", "stage_seconds")}
+    settings = {key: getattr(options, key) for key in (*SAMPLE, "seconds", "stage_seconds")}
     for run in report["runs"]:
         if run["commit"] == options.commit and run["settings"] == settings:
             report["runs"].remove(run)
@@ -211,10 +214,13 @@ def read_options():
     parser.add_argument("build")
     parser.add_argument("--long", action="store_true", help="all programs and more plans")
     parser.add_argument("--program", action="append")
-    parser.add_argument("--rules", type=int)
+    parser.add_argument("--rules", type=int, help="plans of a search over the rules' decisions")
+    parser.add_argument("--walks", type=int, help="plans of random moves")
+    parser.add_argument("--seed", type=int, default=1, help="of the moves")
     parser.add_argument("--seconds", type=float, default=0.2)
     parser.add_argument("--stage-seconds", type=float)
     parser.add_argument("--limit", type=float, default=60)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="no program begins later")
     parser.add_argument("--collect", action="store_true")
     parser.add_argument("--graphs", default="out/bench/graphs", help="the folder of the programs")
     parser.add_argument("--output", default="out/bench/plans.json")
@@ -223,7 +229,9 @@ def read_options():
     parser.add_argument("--pair", nargs=4, metavar=("PROGRAM", "FAST_KEY", "SLOW_KEY", "FILE"))
     options = parser.parse_args()
     if options.rules is None:
-        options.rules = 32 if options.long else 12
+        options.rules = 24 if options.long else 8
+    if options.walks is None:
+        options.walks = 40 if options.long else 8
     if options.stage_seconds is None:
         options.stage_seconds = 5 if options.long else 1
     options.commit = commit()
@@ -238,9 +246,9 @@ def main():
     if options.collect or not glob.glob(os.path.join(options.graphs, "*.graph")):
         programs.collect(options.build, options.graphs, programs.GROUPS)
     report = load(options.output)
-    run = find_run(report, options)
+    run, started = find_run(report, options), time.monotonic()
     for name in chosen_programs(options.graphs, options):
-        if name in run["programs"]:
+        if name in run["programs"] or time.monotonic() > started + 60 * options.minutes:
             continue
         begin = time.monotonic()
         run["programs"][name] = measure(name, options.graphs, options)

@@ -19,7 +19,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 BENCH = os.path.dirname(HERE)
 APPS = os.path.join(os.path.dirname(BENCH), "apps")
 MOST_SECONDS = 120  # for a run; the graphs that it has kept by then count
-# What a run schedules apart from its program: the pipelines that warm up a compiler, and texts too short to be a program.
+# What a run schedules apart from its program: pipelines that warm up a compiler, and texts too short to be a program.
 OTHERS = re.compile(r"^(first|trivial|warm_up)")
 SHORTEST = 300  # bytes of text
 MOST_GRAPHS = 4  # of a run
@@ -88,20 +88,29 @@ GROUPS = ("operators", "pairs", "kernels", "programs", "torch", "outside", "apps
 
 
 def run(command, kept):
-    """Runs a command and returns the texts that it keeps, the longest first; of equal ones, one."""
+    """Runs a command and returns the graphs that it keeps and their values, the longest first; of equal ones, one."""
     environment = {**os.environ, "RETROGRADE_GRAPHS": kept}
     try:
         subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                        env=environment, timeout=MOST_SECONDS, check=False)
     except subprocess.TimeoutExpired:
         pass
-    texts = set()
-    for path in glob.glob(os.path.join(kept, "*.graph")):
-        with open(path, encoding="utf-8") as file:
-            text = file.read()
+    texts = {}
+    for path in sorted(glob.glob(os.path.join(kept, "*.graph"))):
+        text = contents_of(path)
         if not OTHERS.match(os.path.basename(path)) and len(text) >= SHORTEST:
-            texts.add(text)
-    return sorted(texts, key=lambda text: (-len(text), text))[:MOST_GRAPHS]
+            texts[text] = contents_of(path + ".values") if os.path.exists(path + ".values") else ""
+    return sorted(texts.items(), key=lambda kept: (-len(kept[0]), kept[0]))[:MOST_GRAPHS]
+
+
+def contents_of(path):
+    with open(path, encoding="utf-8") as file:
+        return file.read()
+
+
+def write(path, text):
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
 
 
 def collect(build, folder, groups):
@@ -112,10 +121,10 @@ def collect(build, folder, groups):
             for name, command in runs_of(group, build, scratch).items():
                 with tempfile.TemporaryDirectory() as kept:
                     texts = run(command, kept)
-                for number, text in enumerate(texts, 1):
-                    end = f"-{number}" if number > 1 else ""
-                    with open(os.path.join(folder, f"{group}-{name}{end}.graph"), "w", encoding="utf-8") as file:
-                        file.write(text)
+                for number, (text, values) in enumerate(texts, 1):
+                    path = os.path.join(folder, f"{group}-{name}" + (f"-{number}" if number > 1 else "") + ".graph")
+                    write(path, text)
+                    write(path + ".values", values)  # empty: none are known
                 print(f"{group} {name}: {len(texts) or 'no'} graphs", flush=True)
 
 

@@ -65,6 +65,12 @@ std::string contents_of(const std::string& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
+// Empty if none were kept.
+std::string values_beside(const std::string& graph) {
+  const std::string path = graph + ".values";
+  return std::filesystem::exists(path) ? contents_of(path) : "";
+}
+
 void print(const Json& line) { std::cout << line.dump() << std::endl; }
 
 // By the name of a Func that shares loops with another: the name of that. The profiler counts both as one.
@@ -95,7 +101,7 @@ class Worker {
       : options_(options),
         machine_(planning::machine_for(options.sample.target)),
         models_(all_models(machine_, options.sample.target)),
-        program_(load_program(contents_of(options.graph))),
+        program_(load_program(contents_of(options.graph), values_beside(options.graph))),
         plans_(sample_plans(program_.outputs, options.sample)) {}
 
   void measure_all() {
@@ -240,8 +246,10 @@ int run(int argc, char** argv) {
   options.sample.target = get_jit_target_from_environment();
   CLI::App app{"prices and measures plans of one program"};
   app.add_option("graph", options.graph)->required();
-  app.add_option("--rules", options.sample.rules, "plans of the rules, at the most");
-  app.add_option("--seed", options.sample.seed);
+  app.add_option("--rules", options.sample.rules,
+                 "plans of a search over the rules' decisions, at the most");
+  app.add_option("--walks", options.sample.walks, "plans of random moves, at the most");
+  app.add_option("--seed", options.sample.seed, "of the moves");
   app.add_option("--seconds", options.seconds, "that each plan runs");
   app.add_option("--stage-seconds", options.stage_seconds,
                  "that the default runs under the profiler");

@@ -1,9 +1,15 @@
-// Pairs of plans whose times are known (test/golden/pairs): cost models order them as measured, except those models that
-// a pair names. Also the texts of pairs, and the samples of plans.
+// Pairs of plans whose times are known (test/golden/pairs): cost models order them as measured, except those models
+// that a pair names. Also the texts of pairs, programs that were kept, and samples of their plans.
+#include <HalideRuntime.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <cstdlib>
 #include <set>
 
+#include "autoschedule/keep_graph.h"
+#include "frontend/include/retrograde/retrograde.h"
+#include "loaded_program.h"
 #include "models.h"
 #include "pair_file.h"
 #include "plan_sample.h"
@@ -97,8 +103,13 @@ TEST(Samples, BeginWithTheDefaultScheduleAndHaveEachPlanOnce) {
   const auto plans = sample_plans(loaded.outputs, {target});
   ASSERT_GT(plans.size(), 3u);
   EXPECT_EQ(plans[0].source, "rules");
-  std::set<std::string> texts;
-  for (const SampledPlan& plan : plans) EXPECT_TRUE(texts.insert(to_text(plan.plan)).second);
+  std::set<std::string> texts, sources;
+  for (const SampledPlan& plan : plans) {
+    EXPECT_TRUE(texts.insert(to_text(plan.plan)).second);
+    EXPECT_EQ(broken_invariant(plan.plan), "");
+    sources.insert(plan.source.substr(0, plan.source.find(' ')));
+  }
+  EXPECT_EQ(sources, (std::set<std::string>{"rules", "search", "walk"}));
 }
 
 TEST(Samples, RunOnBoundInputs) {
@@ -107,6 +118,37 @@ TEST(Samples, RunOnBoundInputs) {
   const retrograde::tuning::CompiledSchedule compiled(
       planning::emit_plan(plans[0].plan), retrograde::get_jit_target_from_environment(), 0);
   EXPECT_GT(compiled.run(), 0);
+}
+
+TEST(LoadedPrograms, HaveTheValuesThatWereKept) {
+  using namespace retrograde;
+  Buffer<float> weights(3);
+  for (int i = 0; i < 3; ++i) weights(i) = 0.25f * static_cast<float>(i + 1);
+  ImageParam table(Float(32), 1, "table"), image(Float(32), 1, "image");
+  Param<int> count("count");
+  table.set(weights);
+  count.set(7);
+  image.dim(0).set_estimate(0, 100);
+  Var x("x");
+  Func out("out");
+  out(x) = table(clamp(x, 0, 2)) * count + image(x);
+  out.set_estimate(x, 0, 100);
+
+  const fs::path folder = testing::TempDir() + "kept_graphs_" + std::to_string(getpid());
+  fs::create_directories(folder);
+  setenv("RETROGRADE_GRAPHS", folder.c_str(), 1);
+  autoschedule::keep_graph("out", {out.function()});
+  unsetenv("RETROGRADE_GRAPHS");
+  const fs::path path = files_below(folder, ".graph").at(0);
+  const LoadedProgram loaded = load_program(read_file(path), read_file(path.string() + ".values"));
+  fs::remove_all(folder);
+  int found = 0;
+  for (const auto& p : graph::parameters_of(loaded.outputs)) {
+    if (p->name == "count") found += p->value && p->value->i == 7;
+    if (p->name == "table") found += reinterpret_cast<const float*>(p->buffer->host)[2] == 0.75f;
+    if (p->name == "image") found += p->buffer->dim[0].extent == 100;
+  }
+  EXPECT_EQ(found, 3);
 }
 
 TEST(Samples, AreTheSameEachTime) { EXPECT_EQ(keys_of_sample(), keys_of_sample()); }
