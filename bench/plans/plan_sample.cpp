@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <numeric>
 #include <random>
 #include <set>
 
@@ -19,6 +20,8 @@ using namespace retrograde;
 using autoschedule::Scheduling;
 
 namespace {
+
+constexpr double least_share = 0.02;  // of all operations, for a Func to be costly
 
 // Extents of which nothing is known.
 constexpr planning::SizeDefaults unknown_sizes{1000};
@@ -70,20 +73,44 @@ std::vector<SampledPlan> plans_of_search(const std::vector<FuncPtr>& outputs,
   return result;
 }
 
-// Random moves from the default plan. Walks have 1, 2, 4 or 8 steps; a step that has no plan is left out.
+// The Funcs that have a share of the program's operations, without what inlining repeats.
+std::vector<planning::FuncId> costly_funcs(const planning::AccessGraph& accesses,
+                                           const planning::SizeModel& sizes) {
+  std::vector<double> work(accesses.funcs().size(), 0);
+  for (const planning::FuncNode& func : accesses.funcs()) {
+    for (const planning::StageNode& stage : func.stages) {
+      double operations = 1;
+      for (const planning::OperationCount& each : stage.operations) operations += each.count;
+      for (size_t i = 0; i < stage.iterators.size(); ++i)
+        operations *= static_cast<double>(sizes.of(stage.id, static_cast<int>(i)).estimate);
+      work[static_cast<size_t>(stage.id.func)] += operations;
+    }
+  }
+  const double least = least_share * std::reduce(work.begin(), work.end());
+  std::vector<planning::FuncId> result;
+  for (size_t f = 0; f < work.size(); ++f) {
+    if (work[f] >= least) result.push_back(static_cast<planning::FuncId>(f));
+  }
+  return result;
+}
+
+// Random moves from the default plan, most of them of costly Funcs. Walks have 1, 2, 4 or 8 steps; a step that has no plan is left out.
 std::vector<SampledPlan> plans_of_walks(const std::vector<FuncPtr>& outputs,
                                         const SampleOptions& options, const SampledPlan& standard) {
   const planning::AccessGraph accesses(standard.plan.program->outputs);
   const planning::SizeModel sizes(accesses, unknown_sizes);
   const planning::Machine machine = planning::reference_machine(options.target);
   const std::set<std::string> known = names_of(outputs);
+  const std::vector<planning::FuncId> costly = costly_funcs(accesses, sizes);
   std::mt19937 random(options.seed);
   const auto below = [&](size_t count) { return random() % count; };
   std::vector<SampledPlan> result;
   for (size_t walk = 0; walk < options.walks; ++walk) {
     SampledPlan reached{"walk", "", standard.plan};
     for (int step = 1 << walk % 4; step > 0; --step) {
-      const auto func = static_cast<planning::FuncId>(below(reached.plan.funcs.size()));
+      const planning::FuncId func =
+          below(4) > 0 ? costly[below(costly.size())]
+                       : static_cast<planning::FuncId>(below(reached.plan.funcs.size()));
       const planning::Move& move = planning::all_moves()[below(planning::all_moves().size())];
       const auto plans = move.apply(reached.plan, func, {accesses, sizes, machine});
       if (plans.empty()) continue;

@@ -2,7 +2,7 @@
 """plans.py -- measures plans of the benchmarks' programs and judges cost models by them.
 
     plans.py BUILD [--long] [--program PATTERN]... [--rules N] [--walks N] [--seed N] [--seconds S]
-             [--stage-seconds S] [--limit S] [--minutes M] [--collect] [--output FILE] [--plot FILE] [--wrong]
+             [--stage-seconds S] [--repeats N] [--limit S] [--minutes M] [--collect] [--output FILE] [--plot FILE] [--wrong]
     plans.py BUILD --pair PROGRAM FAST_KEY SLOW_KEY FILE.pair [--output FILE]
 
 BUILD is the folder of a build. The programs are those of programs.py, which runs first where it has not run before, or
@@ -138,7 +138,7 @@ def measure(name, folder, options):
     program = {"plans": []}
     command = [os.path.join(options.build, "bench", "bench_plans"), os.path.join(folder, name + ".graph"),
                *sample_options(vars(options)), "--seconds", str(options.seconds),
-               "--stage-seconds", str(options.stage_seconds)]
+               "--stage-seconds", str(options.stage_seconds), "--repeats", str(options.repeats)]
     while measure_once([*command, "--skip", ",".join(["none", *(p["key"] for p in program["plans"])])], program,
                        options.limit):
         if "seconds" not in program["plans"][0]:
@@ -219,7 +219,8 @@ def read_options():
     parser.add_argument("--seed", type=int, default=1, help="of the moves")
     parser.add_argument("--seconds", type=float, default=0.2)
     parser.add_argument("--stage-seconds", type=float)
-    parser.add_argument("--limit", type=float, default=60)
+    parser.add_argument("--limit", type=float, default=60, help="seconds for a plan")
+    parser.add_argument("--repeats", type=int, default=2, help="of measurements that other load disturbed")
     parser.add_argument("--minutes", type=float, default=math.inf, help="no program begins later")
     parser.add_argument("--collect", action="store_true")
     parser.add_argument("--graphs", default="out/bench/graphs", help="the folder of the programs")
