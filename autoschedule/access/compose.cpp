@@ -45,8 +45,7 @@ ComposedReads::ComposedReads(const AccessGraph& graph, const std::vector<bool>& 
   ReadComposer composer(graph, most_reads);
   for (const FuncNode& node : graph.funcs()) {
     for (const StageNode& stage : node.stages) {
-      if (!is_inlined(stage.id.func))
-        found_.emplace(stage.id, composer.compose(stage, is_inlined));
+      if (!is_inlined(stage.id.func)) found_.emplace(stage.id, composer.compose(stage, is_inlined));
     }
   }
 }

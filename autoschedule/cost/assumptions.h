@@ -4,8 +4,12 @@
 
 #include <cstddef>
 
+#include "autoschedule/access/sizes.h"
+
 namespace retrograde::planning {
 
+// Dimensions of which nothing is known.
+inline constexpr SizeDefaults assumed_sizes{1000};
 // The units of a core work at the same time, and so do computing and moving data. Of all that the slower side hides, this
 // part shows.
 inline constexpr double not_overlapped = 0.25;
@@ -24,6 +28,9 @@ inline constexpr double equal_neighbours = 0.5;
 inline constexpr double function_call_operations = 50;
 // Registers of a loop that hold neither sums nor invariant operands.
 inline constexpr double passing_registers = 2;
+// An array of constant indices is kept in registers if it is no larger than so many times all of them. They hold this share
+// of it at most; operands take the rest.
+inline constexpr double largest_register_array = 4, operand_share = 0.8;
 // The reads that inlining may give a stage; beyond them its cost is a lower bound.
 inline constexpr size_t most_composed_reads = 2000;
 // An access beyond this stride is an element at a time.

@@ -10,9 +10,13 @@ namespace retrograde::planning {
 
 namespace {
 
-Motion resting(size_t iterators) { return {false, std::vector<std::optional<double>>(iterators, 0)}; }
+Motion resting(size_t iterators) {
+  return {false, std::vector<std::optional<double>>(iterators, 0)};
+}
 
-bool rests(const Motion& motion) { return !motion.is_table && motion == resting(motion.slopes.size()); }
+bool rests(const Motion& motion) {
+  return !motion.is_table && motion == resting(motion.slopes.size());
+}
 
 void add_motion(Motion& sum, const Motion& other, double factor) {
   sum.is_table = sum.is_table || other.is_table;
@@ -111,8 +115,7 @@ Motion Motions::of_call(const Call& call, const Names& iterators, Known& known) 
     result.is_table = !call.type.is_float();
     return result;
   }
-  const Motion& own =
-      of_func(graph_.find(call.symbol.raw()), static_cast<size_t>(call.component));
+  const Motion& own = of_func(graph_.find(call.symbol.raw()), static_cast<size_t>(call.component));
   result.is_table = own.is_table;
   for (size_t d = 0; d < call.args.size(); ++d)
     add_motion(result, scaled_motion(of(call.args[d], iterators, known), own.slopes[d]), 1);

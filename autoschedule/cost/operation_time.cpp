@@ -55,9 +55,9 @@ double division_ns(const std::string& name, Type type, const Machine& m) {
 
 OperationTime operation_time(const std::string& name, Type type, const Machine& m) {
   static const std::map<std::string, double> operations{
-      {"Add", 1}, {"Sub", 1}, {"Mul", 1}, {"Min", 1}, {"Max", 1},    {"EQ", 1},   {"NE", 1},
-      {"LT", 1},  {"LE", 1},  {"GT", 1},  {"GE", 1},  {"And", 1},    {"Or", 1},   {"Not", 0.5},
-      {"Cast", 1}, {"Select", 1}, {"Reinterpret", 0}};
+      {"Add", 1}, {"Sub", 1},   {"Mul", 1},  {"Min", 1},    {"Max", 1},        {"EQ", 1},
+      {"NE", 1},  {"LT", 1},    {"LE", 1},   {"GT", 1},     {"GE", 1},         {"And", 1},
+      {"Or", 1},  {"Not", 0.5}, {"Cast", 1}, {"Select", 1}, {"Reinterpret", 0}};
   OperationTime time;
   if (name == "Div" || name == "Mod") {
     time.vector_ns = division_ns(name, type, m);

@@ -23,7 +23,11 @@ IteratorSet carried_by(const Access& read, const Access& write) {
 class OperationTable {
  public:
   void add(const OperationCount& operation, IteratorSet depends, double times) {
-    rows_[{operation.name, operation.type, depends}] += operation.count * times;
+    // Products that ignore infinite factors of 0 are tried as plain ones first.
+    const std::string name = operation.name == "strong_mul"   ? "Mul"
+                             : operation.name == "strong_div" ? "Div"
+                                                              : operation.name;
+    rows_[{name, operation.type, depends}] += operation.count * times;
   }
   std::vector<OperationRow> rows(const Machine& machine) {
     for (auto& [key, count] : rows_) {
@@ -35,8 +39,8 @@ class OperationTable {
     for (const auto& [key, count] : rows_) {
       const auto& [name, type, depends] = key;
       if (count > 0)
-        result.push_back({operation_time(name, type, machine),
-                          static_cast<double>(type.bytes()), depends, count});
+        result.push_back({operation_time(name, type, machine), static_cast<double>(type.bytes()),
+                          depends, count});
     }
     return result;
   }
@@ -105,7 +109,8 @@ std::vector<OperationRow> FactsOfStages::operations(const StageNode& stage,
       for (const OperationCount& operation : inlined.operations) {
         IteratorSet depends = 0;
         for (size_t d = 0; d < element.index.size(); ++d)
-          if (operation.depends & set_of(static_cast<int>(d))) depends |= element.index[d].moved_by();
+          if (operation.depends & set_of(static_cast<int>(d)))
+            depends |= element.index[d].moved_by();
         table.add(operation, depends, 1);
       }
     }

@@ -80,8 +80,8 @@ double touched_lines(const Touch& touch, const Layout& layout, const Cover& cove
     (has_data ? by_data : lines) *= count;
     if (has_data && place > 0) {
       data_taps *= side.taps;
-      lines_a_point *= side.is_displaced ? std::min(side.taps, std::max(1.0, data_slope(side)))
-                                         : side.taps;
+      lines_a_point *=
+          side.is_displaced ? std::min(side.taps, std::max(1.0, data_slope(side))) : side.taps;
     }
     is_whole = is_whole && !has_data;
     if (is_whole && span.is_dense()) {
@@ -91,8 +91,7 @@ double touched_lines(const Touch& touch, const Layout& layout, const Cover& cove
     is_whole = is_whole && span.points >= layout.extents[d];
   }
   if (touch.data != 0)
-    by_data =
-        std::min(by_data, (iterations_of(touch.data, cover) - 1) * lines_a_point + data_taps);
+    by_data = std::min(by_data, (iterations_of(touch.data, cover) - 1) * lines_a_point + data_taps);
   return lines * by_data * touch.components;
 }
 
@@ -105,6 +104,8 @@ LanePlaces lane_places(const Touch& touch, const Layout& layout, const LaneLoop&
   if (touch.data & lanes.moves) return result;
   double row = 1, stride = 0, outer_stride = 0;
   bool is_bent = false;
+  const TouchedSide& rows = touch.sides[static_cast<size_t>(layout.order[0])];
+  result.is_unaligned = rows.taps > 1 || rows.moves.size() > 1;
   for (const int16_t dimension : layout.order) {
     const TouchedSide& side = touch.sides[static_cast<size_t>(dimension)];
     for (const TouchedSide::Move& move : side.moves) {
@@ -120,11 +121,11 @@ LanePlaces lane_places(const Touch& touch, const Layout& layout, const LaneLoop&
     result.runs = std::ceil(lanes.count / lanes.inner);
   using Kind = LanePlaces::Kind;
   result.stride = std::abs(stride);
-  result.kind = is_bent           ? Kind::Bent
-                : stride == 1     ? Kind::Contiguous
-                : stride == -1    ? Kind::Reversed
-                : stride == 0     ? Kind::Uniform
-                                  : Kind::Strided;
+  result.kind = is_bent        ? Kind::Bent
+                : stride == 1  ? Kind::Contiguous
+                : stride == -1 ? Kind::Reversed
+                : stride == 0  ? Kind::Uniform
+                               : Kind::Strided;
   return result;
 }
 
@@ -223,9 +224,8 @@ class TouchReader {
 
 bool differ_in_constants(const Access& a, const Access& b) {
   return a.of == b.of && a.image == b.image && a.writes == b.writes &&
-         std::ranges::equal(a.index, b.index, [](const IndexForm& f, const IndexForm& g) {
-           return f.same_parts(g);
-         });
+         std::ranges::equal(a.index, b.index,
+                            [](const IndexForm& f, const IndexForm& g) { return f.same_parts(g); });
 }
 
 }  // namespace

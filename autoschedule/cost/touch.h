@@ -31,11 +31,11 @@ struct TouchedSide {
 struct Touch {
   int buffer = 0;  // a Func, or an image after all Funcs
   bool writes = false;
-  bool is_own = false;         // an update reads the element that it writes
-  IteratorSet carried = 0;     // a stage reads its own elements at other points: along these iterators
+  bool is_own = false;      // an update reads the element that it writes
+  IteratorSet carried = 0;  // a stage reads its own elements at other points: along these iterators
   double element_bytes = 4;
-  double components = 1;       // of a Tuple, each in an array of its own
-  double count = 1;            // loads or stores of an iteration
+  double components = 1;  // of a Tuple, each in an array of its own
+  double count = 1;       // loads or stores of an iteration
   std::vector<TouchedSide> sides;
   IteratorSet moved = 0, data = 0;
 };
@@ -57,8 +57,9 @@ struct LaneLoop {
 struct LanePlaces {
   enum class Kind : uint8_t { Uniform, Contiguous, Reversed, Strided, Bent, Gather };
   Kind kind = Kind::Gather;
-  double stride = 1;  // in elements
-  double runs = 1;    // pieces that lie apart
+  double stride = 1;          // in elements
+  double runs = 1;            // pieces that lie apart
+  bool is_unaligned = false;  // vectors begin anywhere in a cache line
 };
 
 // Cache lines while the loops run over these points.
