@@ -45,10 +45,12 @@ std::string plans_after(const std::string& name, const MoveText& parts,
     user_error(text("move the Func ", quoted(parts.func)), "it must be one of the program");
   const planning::AccessGraph accesses(wrapped);
   const planning::SizeModel sizes(accesses, defaults);
+  planning::Dependences dependences(accesses);
   const planning::Machine machine = planning::reference_machine(Target("x86-64-linux-avx512"));
   const auto id = static_cast<planning::FuncId>(func - funcs.begin());
   std::string result;
-  for (const planning::Plan& after : move.apply(plan, id, {accesses, sizes, machine})) {
+  for (const planning::Plan& after :
+       move.apply(plan, id, {accesses, sizes, machine, dependences})) {
     planning::validate(after);
     result += (result.empty() ? "" : "\n") + to_text(after);
   }
