@@ -190,6 +190,12 @@ class FuncChange {
 
   // Levels and shared loops of another Func that refer to loops of this one.
   bool renumber(Plan& plan, FuncId guest) const {
+    const auto& [compute, store, hoist] = plan.of(guest).placement;
+    const bool refers = is_at(compute, func_) || is_at(store, func_) || is_at(hoist, func_) ||
+                        std::ranges::any_of(plan.of(guest).nests, [&](const Nest& nest) {
+                          return nest.shared_with && nest.shared_with->stage.func == func_;
+                        });
+    if (!refers) return true;
     FuncPlan other = plan.of(guest);
     bool is_there = true;
     const auto follow = [&](LoopRef& loop) {
