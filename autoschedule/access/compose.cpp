@@ -40,49 +40,53 @@ class DistinctReads {
 }  // namespace
 
 ComposedReads::ComposedReads(const AccessGraph& graph, const std::vector<bool>& inlined,
-                             size_t most_reads)
-    : graph_(graph), inlined_(inlined), numbers_(graph.numbers()) {
+                             size_t most_reads) {
+  const auto is_inlined = [&](FuncId func) { return inlined[static_cast<size_t>(func)]; };
+  ReadComposer composer(graph, most_reads);
   for (const FuncNode& node : graph.funcs()) {
     for (const StageNode& stage : node.stages) {
-      if (!inlined_[static_cast<size_t>(stage.id.func)])
-        found_.emplace(stage.id, compose(stage, most_reads));
+      if (!is_inlined(stage.id.func)) found_.emplace(stage.id, composer.compose(stage, is_inlined));
     }
   }
 }
 
 size_t ComposedReads::elements_of(StageId stage, FuncId inlined) const {
-  return ir::value_or(found_.at(stage).elements, inlined, size_t{0});
+  const auto* elements = ir::find_or_null(found_.at(stage).elements, inlined);
+  return elements ? elements->size() : 0;
 }
 
+ReadComposer::ReadComposer(const AccessGraph& graph, size_t most_reads)
+    : graph_(graph), most_reads_(most_reads), numbers_(graph.numbers()) {}
+
 // Consumers before producers: all reads of a Func are known when it is its turn.
-ComposedReads::Found ComposedReads::compose(const StageNode& stage, size_t most_reads) {
-  Found found;
+ReadComposer::Composed ReadComposer::compose(const StageNode& stage,
+                                             ir::FunctionRef<bool(FuncId)> is_inlined) {
+  Composed found;
   DistinctReads stored;
   std::map<FuncId, DistinctReads, std::greater<>> pending;
   const auto add = [&](const Access& read) {
-    const bool is_inlined = read.of >= 0 && inlined_[static_cast<size_t>(read.of)];
-    (is_inlined ? pending[read.of] : stored).add(read);
+    (read.of >= 0 && is_inlined(read.of) ? pending[read.of] : stored).add(read);
   };
   for (const Access& read : stage.reads) add(read);
   size_t composed = 0;
   while (!pending.empty()) {
     const FuncId func = pending.begin()->first;
-    const std::vector<Access> reads = std::move(pending.begin()->second.reads);
+    std::vector<Access> reads = std::move(pending.begin()->second.reads);
     pending.erase(pending.begin());
-    found.elements[func] = reads.size();
     for (const Access& outer : reads) {
       for (const Access& inner : graph_.func(func).stages[0].reads) {
-        found.is_complete = found.is_complete && composed < most_reads;
+        found.is_complete = found.is_complete && composed < most_reads_;
         if (found.is_complete) add(compose(inner, outer));
         ++composed;
       }
     }
+    found.elements[func] = std::move(reads);
   }
   found.reads = std::move(stored.reads);
   return found;
 }
 
-Access ComposedReads::compose(const Access& inner, const Access& outer) {
+Access ReadComposer::compose(const Access& inner, const Access& outer) {
   Access result;
   result.by = outer.by;
   result.of = inner.of;
@@ -103,7 +107,7 @@ Access ComposedReads::compose(const Access& inner, const Access& outer) {
   return result;
 }
 
-IndexForm ComposedReads::compose(const IndexForm& inner, const Access& outer) {
+IndexForm ReadComposer::compose(const IndexForm& inner, const Access& outer) {
   auto parts = compose_parts(inner, outer);
   if (parts && inner.divisor != 1) parts = quotient(*parts, inner.divisor);
   if (parts && inner.modulus != 0) parts = remainder(*parts, inner.modulus);
@@ -128,7 +132,7 @@ IndexForm ComposedReads::compose(const IndexForm& inner, const Access& outer) {
 }
 
 // Without the divisor and the modulus.
-std::optional<IndexForm> ComposedReads::compose_parts(const IndexForm& inner, const Access& outer) {
+std::optional<IndexForm> ReadComposer::compose_parts(const IndexForm& inner, const Access& outer) {
   IndexForm constant;
   constant.low = inner.low;
   constant.high = inner.high;
@@ -147,7 +151,7 @@ std::optional<IndexForm> ComposedReads::compose_parts(const IndexForm& inner, co
 }
 
 // If iterators are replaced by iterators, the number stays.
-Value ComposedReads::compose(const Value& inner, const Access& outer) {
+Value ReadComposer::compose(const Value& inner, const Access& outer) {
   Value renamed{inner.number, inner.from_data, {}};
   std::vector<Value> parts;
   bool is_renaming = true;
@@ -166,12 +170,12 @@ Value ComposedReads::compose(const Value& inner, const Access& outer) {
   return result;
 }
 
-Value ComposedReads::value_of(const IndexForm& form) {
+Value ReadComposer::value_of(const IndexForm& form) {
   if (is_iterator(form)) return ValueNumbers::iterator(form.terms[0].iterator);
   return planning::value_of(form, numbers_, [](const OpaqueTerm& term) { return term.value; });
 }
 
-Guard ComposedReads::compose(const Guard& inner, const Access& outer) {
+Guard ReadComposer::compose(const Guard& inner, const Access& outer) {
   Guard result;
   for (const Congruence& c : inner.congruences)
     result.congruences.push_back({compose(c.form, outer), c.remainder, c.modulus});

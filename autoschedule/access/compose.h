@@ -13,25 +13,21 @@
 
 namespace retrograde::planning {
 
-class ComposedReads {
+// Composes the reads of single stages, for any choice of inlined Funcs.
+class ReadComposer {
  public:
-  // `inlined`, by Func: pure Funcs that are no outputs. A stage composes no more than `most_reads` reads.
-  ComposedReads(const AccessGraph& graph, const std::vector<bool>& inlined, size_t most_reads);
-
-  // The reads of Funcs and images that are not inlined.
-  const std::vector<Access>& of(StageId stage) const { return found_.at(stage).reads; }
-  // Whether these are all: not beyond the limit.
-  bool is_complete(StageId stage) const { return found_.at(stage).is_complete; }
-  // How many elements of an inlined Func a point of the stage computes.
-  size_t elements_of(StageId stage, FuncId inlined) const;
+  struct Composed {
+    std::vector<Access> reads;  // of Funcs and images that are not inlined
+    // The elements of inlined Funcs that a point of the stage computes.
+    std::map<FuncId, std::vector<Access>> elements;
+    bool is_complete = true;  // not beyond the limit
+  };
+  // A stage composes no more than `most_reads` reads.
+  ReadComposer(const AccessGraph& graph, size_t most_reads);
+  // `is_inlined`: pure Funcs that are no outputs.
+  Composed compose(const StageNode& stage, ir::FunctionRef<bool(FuncId)> is_inlined);
 
  private:
-  struct Found {
-    std::vector<Access> reads;
-    std::map<FuncId, size_t> elements;
-    bool is_complete = true;
-  };
-  Found compose(const StageNode& stage, size_t most_reads);
   Access compose(const Access& inner, const Access& outer);
   IndexForm compose(const IndexForm& inner, const Access& outer);
   std::optional<IndexForm> compose_parts(const IndexForm& inner, const Access& outer);
@@ -40,9 +36,23 @@ class ComposedReads {
   Value value_of(const IndexForm& form);
 
   const AccessGraph& graph_;
-  const std::vector<bool> inlined_;
+  const size_t most_reads_;
   ValueNumbers numbers_;
-  std::map<StageId, Found> found_;
+};
+
+// Those of all stages.
+class ComposedReads {
+ public:
+  // `inlined`, by Func.
+  ComposedReads(const AccessGraph& graph, const std::vector<bool>& inlined, size_t most_reads);
+
+  const std::vector<Access>& of(StageId stage) const { return found_.at(stage).reads; }
+  bool is_complete(StageId stage) const { return found_.at(stage).is_complete; }
+  // How many elements of an inlined Func a point of the stage computes.
+  size_t elements_of(StageId stage, FuncId inlined) const;
+
+ private:
+  std::map<StageId, ReadComposer::Composed> found_;
 };
 
 }  // namespace retrograde::planning

@@ -35,6 +35,14 @@ bool is_free(const Expr& e) {
          e.as<StringImm>();
 }
 
+// Whether a condition tells border and interior apart.
+bool is_about_border(const Expr& e) {
+  if (is_likely(e)) return true;
+  if (const auto* n = e.as<Not>()) return is_about_border(n->a);
+  const auto* binary = e.as<Binary>();
+  return binary && e.type().is_bool() && (is_about_border(binary->a) || is_about_border(binary->b));
+}
+
 }  // namespace
 
 StageReader::StageReader(const Names& names, ValueNumbers& numbers, const FuncContents& f,
@@ -156,6 +164,24 @@ void StageReader::count_operations(StageNode& node) {
     node.operations.push_back({std::get<0>(row), std::get<1>(row), std::get<2>(row), count});
 }
 
+// Loops run without the conditions of borders but for their first and last iterations.
+bool StageReader::count_interior(const Expr& e) {
+  std::vector<Expr> arms;
+  if (const auto* select = e.as<Select>()) {
+    arms = {select->when_true, select->when_false};
+  } else if (e.kind() == Kind::Min || e.kind() == Kind::Max) {
+    arms = {e.as<Binary>()->a, e.as<Binary>()->b};
+  } else {
+    return false;
+  }
+  const bool first = is_likely(arms[0]), second = is_likely(arms[1]);
+  const bool is_border = e.as<Select>() && is_about_border(e.as<Select>()->condition);
+  if (first == second && !is_border) return false;
+  if (!second) count(arms[0]);
+  if (!first) count(arms[1]);
+  return true;
+}
+
 // Affine parts of indices are addresses, which loops move along: they count as nothing.
 void StageReader::count(const Expr& e) {
   if (!counted_nodes_.insert(e.get()).second) return;
@@ -168,6 +194,7 @@ void StageReader::count(const Expr& e) {
     }
     return;
   }
+  if (count_interior(e)) return;
   for_each_child(e, [&](const Expr& child) { count(child); });
   if (is_free(e)) return;
   Expr operand = e;

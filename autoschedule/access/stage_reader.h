@@ -65,6 +65,7 @@ class StageReader {
   void read_access(const Call& call, const Guard& guard);
   void count_operations(StageNode& node);
   void count(const Expr& e);
+  bool count_interior(const Expr& e);
   std::vector<IndexForm> indices(const std::vector<Expr>& args);
   Value place_of(const std::vector<IndexForm>& index);
 
@@ -82,6 +83,9 @@ class StageReader {
   std::map<std::pair<std::string, Value>, OperationCount> counted_;
   size_t nodes_ = 0;
 };
+
+// Whether the arm of a select, or the operand of a minimum or maximum, is the one inside of the border.
+bool is_likely(const Expr& e);
 
 // ---- guards.cpp ----
 

@@ -26,7 +26,14 @@ uint64_t word_of(Type type) {
          static_cast<uint64_t>(type.lanes());
 }
 
-// Whether the arm of a select is the one inside of the border.
+bool has_own_identity(const Call& call) {
+  if (call.call_type == CallType::Extern) return !call.is_pure_extern();
+  if (call.call_type != CallType::Operator) return false;
+  return op_info(call.op).cls == OpClass::Effect || op_info(call.op).conduct != Conduct::Silent;
+}
+
+}  // namespace
+
 bool is_likely(const Expr& e) {
   const auto* call = e.as<Call>();
   if (call && call->call_type == CallType::Operator)
@@ -35,14 +42,6 @@ bool is_likely(const Expr& e) {
   const auto* binary = e.as<Binary>();
   return is_likely(binary->a) || is_likely(binary->b);
 }
-
-bool has_own_identity(const Call& call) {
-  if (call.call_type == CallType::Extern) return !call.is_pure_extern();
-  if (call.call_type != CallType::Operator) return false;
-  return op_info(call.op).cls == OpClass::Effect || op_info(call.op).conduct != Conduct::Silent;
-}
-
-}  // namespace
 
 StageValues::StageValues(const Names& names, ValueNumbers& numbers,
                          const std::vector<Iterator>& iterators)

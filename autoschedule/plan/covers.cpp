@@ -99,6 +99,10 @@ class GrowingBox {
       lengths_[d] = std::min(lengths_[d], std::max<int64_t>(sizes.of(*accesses[0], d).estimate, 1));
     }
   }
+  // Another box that holds this one.
+  void grow(const std::vector<int64_t>& box) {
+    for (size_t d = 0; d < box.size(); ++d) lengths_[d] = std::max(lengths_[d], box[d]);
+  }
   const std::vector<int64_t>& extents_of_all() const { return lengths_; }
 
  private:
@@ -143,7 +147,7 @@ std::vector<int64_t> Covers::box(FuncId func, const Level& level) {
   for (size_t s = stages.size(); s-- > 1;) {
     std::vector<const Access*> accesses = reads_of(stages[s], func);
     accesses.push_back(&stages[s].write);
-    box.add(accesses, cover_of_box(stages[s].id, box.extents_of_all()), sizes_);
+    box.grow(extents(accesses, cover_of_box(stages[s].id, box.extents_of_all()), sizes_));
   }
   return boxes_.emplace(key, box.extents_of_all()).first->second;
 }

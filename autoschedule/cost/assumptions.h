@@ -1,0 +1,39 @@
+// assumptions.h -- the numbers of the cost model that describe neither a machine nor a program: what nobody knows before a
+// program runs, and how the terms of the model combine.
+#pragma once
+
+#include <cstddef>
+
+#include "autoschedule/access/sizes.h"
+
+namespace retrograde::planning {
+
+// Dimensions of which nothing is known.
+inline constexpr SizeDefaults assumed_sizes{1000};
+// The units of a core work at the same time, and so do computing and moving data. Of all that the slower side hides, this
+// part shows.
+inline constexpr double not_overlapped = 0.25;
+// Of a cache that a loop may fill: other data take the rest, or share sets with it.
+inline constexpr double usable_share = 0.8;
+// How often a condition on data holds.
+inline constexpr double taken_branches = 0.5;
+// A coordinate that is a sum of an iterator and values from memory moves with the iterator; the values displace it by so
+// many elements at most while a row or a column runs.
+inline constexpr double displacement = 2;
+// How far a coordinate of floating-point origin moves with an iterator when neither says: along the diagonal.
+inline constexpr double unknown_slope = 0.7;
+// Neighbouring points of data fall into the same bin this often, so that one addition waits for the last.
+inline constexpr double equal_neighbours = 0.5;
+// What a C function takes, in scalar operations.
+inline constexpr double function_call_operations = 50;
+// Registers of a loop that hold neither sums nor invariant operands.
+inline constexpr double passing_registers = 2;
+// An array of constant indices is kept in registers if it is no larger than so many times all of them. They hold this share
+// of it at most; operands take the rest.
+inline constexpr double largest_register_array = 4, operand_share = 0.8;
+// The reads that inlining may give a stage; beyond them its cost is a lower bound.
+inline constexpr size_t most_composed_reads = 2000;
+// An access beyond this stride is an element at a time.
+inline constexpr double longest_vector_stride = 4;
+
+}  // namespace retrograde::planning

@@ -1,0 +1,312 @@
+#include "autoschedule/cost/group.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "autoschedule/cost/assumptions.h"
+#include "autoschedule/plan/nest.h"
+#include "autoschedule/plan/readers.h"
+#include "ir/build.h"
+
+namespace retrograde::planning {
+
+Nest loops_of(const Plan& plan, StageId stage) {
+  if (plan.of(stage.func).opacity == Opacity::None) return plan.nest(stage);
+  return loops_of_definition(*plan.program->funcs[static_cast<size_t>(stage.func)], stage.stage);
+}
+
+int stage_count(const Plan& plan, FuncId func) {
+  return plan.program->funcs[static_cast<size_t>(func)]->stage_count();
+}
+
+bool is_inlined(const Plan& plan, const AccessGraph& graph, FuncId func) {
+  const FuncPlan& of = plan.of(func);
+  const Level::Kind kind = of.placement.compute.kind;
+  return !graph.func(func).is_output && of.opacity == Opacity::None &&
+         (kind == Level::Kind::Inline || kind == Level::Kind::Undecided) &&
+         graph.func(func).stages.size() == 1;
+}
+
+namespace {
+
+class GroupBuilder {
+ public:
+  GroupBuilder(const Plan& plan, Covers& covers, const SizeModel& sizes, const Machine& machine,
+               FactsOfStages& facts)
+      : plan_(plan), covers_(covers), sizes_(sizes), machine_(machine), facts_(facts) {}
+
+  Group build(const GroupMembers& members) {
+    size_t next = 0;
+    for (const FuncId func : members.funcs) {
+      for (int16_t s = 0; s < stage_count(plan_, func); ++s)
+        inlined_[{func, s}] = &members.inlined[next++];
+    }
+    group_.nodes.emplace_back();
+    for (const auto& [stage, inlined] : inlined_) add(stage);
+    for (auto& [stage, run] : runs_) {
+      group_.nodes[static_cast<size_t>(run.path.back())].stages.push_back(
+          static_cast<int>(group_.runs.size()));
+      group_.runs.push_back(std::move(run));
+    }
+    for (LoopNode& node : group_.nodes) {
+      std::ranges::sort(node.children, {}, [&](int child) {
+        return std::pair(group_.nodes[static_cast<size_t>(child)].loop.stage, child);
+      });
+    }
+    add_buffers();
+    return std::move(group_);
+  }
+
+ private:
+  const Plan& plan_;
+  Covers& covers_;
+  const SizeModel& sizes_;
+  const Machine& machine_;
+  FactsOfStages& facts_;
+  Group group_;
+  std::map<StageId, const std::vector<FuncId>*> inlined_;
+  std::map<StageId, StageRun> runs_;
+
+  const LoopNode& node(int index) const { return group_.nodes[static_cast<size_t>(index)]; }
+  bool is_at(FuncId func) const { return plan_.of(func).placement.compute.kind == Level::Kind::At; }
+  static bool is_around_all(const LoopRef& loop) { return loop.depth == around_all_loops; }
+
+  // ---- loops ----
+
+  const StageRun& add(StageId stage) {
+    if (const StageRun* known = ir::find_or_null(runs_, stage)) return *known;
+    const Nest nest = loops_of(plan_, stage);
+    StageRun run;
+    run.id = stage;
+    run.facts = &facts_.of(stage, *inlined_.at(stage));
+    run.path = path_around(stage, nest, run.place);
+    const Cover extents = extents_of(run);
+    run.nest = nest_trips(nest, extents);
+    for (size_t depth = run.path.size() - run.place; depth < nest.loops.size(); ++depth)
+      run.path.push_back(add_node(run.path.back(), {stage, static_cast<int16_t>(depth)},
+                                  nest.loops[depth].kind, run.nest.trips[depth]));
+    run.cover = covers_of(run, nest, extents);
+    return runs_.emplace(stage, std::move(run)).first->second;
+  }
+
+  // The nodes of other stages around the stage's own loops; `place` is how many of them are no loops of its nest.
+  std::vector<int> path_around(StageId stage, const Nest& nest, size_t& place) {
+    if (nest.shared_with && nest.shared_with->stage != stage) {
+      const LoopRef shared = *nest.shared_with;
+      const StageRun& other = add(shared.stage);
+      place = other.place;
+      return prefix(other, shared.depth);
+    }
+    std::vector<int> path{0};
+    if (is_at(stage.func)) {
+      const Level level = level_of(stage.func);
+      if (level.loop.stage.func != stage.func)
+        path = prefix(add(level.loop.stage), level.loop.depth);
+    }
+    place = path.size();
+    return path;
+  }
+  // Where a Func is computed: of loops alike, that of the first stage that reads it.
+  Level level_of(FuncId func) {
+    Level level = plan_.of(func).placement.compute;
+    for (int16_t s = 0; level.in_each_stage && s < stage_count(plan_, level.loop.stage.func); ++s) {
+      const StageId reader{level.loop.stage.func, s};
+      const auto& touches = facts_.of(reader, *inlined_.at(reader)).touches;
+      const auto depth = depth_in(plan_, reader, level);
+      if (!depth || std::ranges::find(touches, func, &Touch::buffer) == touches.end()) continue;
+      level.loop = {reader, static_cast<int16_t>(*depth)};
+      break;
+    }
+    return level;
+  }
+  // Down to this loop of the stage.
+  static std::vector<int> prefix(const StageRun& run, int depth) {
+    const size_t count = std::min(run.path.size(), run.place + static_cast<size_t>(depth + 1));
+    return {run.path.begin(), run.path.begin() + static_cast<std::ptrdiff_t>(count)};
+  }
+
+  int add_node(int parent, const LoopRef& loop, ForType kind, double trips) {
+    LoopNode child;
+    const LoopNode& outer = node(parent);
+    child.parent = parent;
+    child.loop = loop;
+    child.kind = kind;
+    child.trips = trips;
+    child.times = outer.times * (kind == ForType::Vectorized ? 1 : trips);
+    child.in_parallel = outer.in_parallel || runs_at_once(kind);
+    child.speedup = outer.speedup;
+    if (runs_at_once(kind)) {
+      // The last round may leave threads without a chunk.
+      const double threads = std::max(1.0, std::floor(machine_.threads / outer.speedup));
+      child.speedup *= trips / std::ceil(trips / threads);
+    }
+    const int index = static_cast<int>(group_.nodes.size());
+    group_.nodes.push_back(std::move(child));
+    group_.nodes[static_cast<size_t>(parent)].children.push_back(index);
+    return index;
+  }
+
+  // ---- points ----
+
+  Cover with_box(StageId stage, const std::vector<int64_t>& box) const {
+    Cover cover = whole_cover(stage, sizes_);
+    const std::vector<Iterator>& iterators = sizes_.graph().stage(stage).iterators;
+    for (size_t i = 0; i < cover.size(); ++i) {
+      if (iterators[i].kind == Iterator::Kind::Pure)
+        cover[i] = box[static_cast<size_t>(iterators[i].dimension)];
+    }
+    return cover;
+  }
+
+  // The box of a Func that is computed in loops, in one iteration of the last of `count` nodes of a path; of the root,
+  // the whole Func.
+  std::vector<int64_t> box_in(FuncId func, const std::vector<int>& path, size_t count) {
+    if (count <= 1) {
+      return ir::numbered(sizes_.graph().func(func).func->args.size(), [&](size_t d) {
+        return std::max<int64_t>(sizes_.of(func, d).estimate, 1);
+      });
+    }
+    const Level& compute = plan_.of(func).placement.compute;
+    Level level = compute;
+    level.loop = node(path[count - 1]).loop;
+    level.in_each_stage = compute.in_each_stage && level.loop.stage.func == compute.loop.stage.func;
+    return covers_.box(func, level);
+  }
+
+  // What all loops of the nest run over. Where a Func is stored outside of the loop in which it is computed, an iteration
+  // computes only what the iteration before has not.
+  Cover extents_of(const StageRun& run) {
+    if (!is_at(run.id.func) || run.place <= 1) return whole_cover(run.id, sizes_);
+    std::vector<int64_t> box = box_in(run.id.func, run.path, run.place);
+    const std::vector<int64_t> all = box;
+    for (size_t count = run.place - 1; count >= store_place(run); --count) {
+      const std::vector<int64_t> outer = box_in(run.id.func, run.path, count);
+      const double trips = node(run.path[count]).trips;
+      for (size_t d = 0; d < box.size(); ++d) {
+        if (outer[d] <= all[d] || box[d] != all[d] || trips <= 1) continue;
+        const auto step = static_cast<int64_t>(std::ceil(double(outer[d] - all[d]) / (trips - 1)));
+        box[d] = std::clamp<int64_t>(step, 1, all[d]);
+      }
+    }
+    return with_box(run.id, box);
+  }
+
+  // How many nodes of the path are around the Func's storage; the root is one of them.
+  size_t store_place(const StageRun& run) const {
+    const Level& store = plan_.of(run.id.func).placement.store;
+    if (store.kind == Level::Kind::Root) return 1;
+    if (store.kind != Level::Kind::At || is_around_all(store.loop)) return run.place;
+    for (size_t k = 1; k < run.place; ++k)
+      if (node(run.path[k]).loop == store.loop) return k + 1;
+    return run.place;
+  }
+
+  std::vector<Cover> covers_of(const StageRun& run, const Nest& nest, const Cover& extents) {
+    std::vector<Cover> result{whole_cover(run.id, sizes_)};
+    const bool at = is_at(run.id.func);
+    for (size_t count = 1; count < run.place; ++count)
+      result.push_back(at ? with_box(run.id, box_in(run.id.func, run.path, count)) : result[0]);
+    result.push_back(extents);
+    const bool is_opaque = plan_.of(run.id.func).opacity != Opacity::None;
+    for (size_t depth = 0; depth < nest.loops.size(); ++depth) {
+      Cover cover = result.back();
+      if (is_opaque) {
+        cover[static_cast<size_t>(nest.loops[depth].iterator)] = 1;
+      } else {
+        cover = covers_.inside(run.id, static_cast<int>(depth));
+        for (size_t i = 0; i < cover.size(); ++i) cover[i] = std::min(cover[i], extents[i]);
+      }
+      result.push_back(std::move(cover));
+    }
+    return result;
+  }
+
+  // ---- storage ----
+
+  void add_buffers() {
+    for (const StageRun& run : group_.runs) {
+      for (const Touch& touch : run.facts->touches)
+        if (!group_.buffers.contains(touch.buffer)) group_.buffers[touch.buffer] = stored(touch);
+    }
+    for (auto& [buffer, stored] : group_.buffers)
+      if (stored.inside > 1) stored.register_share = register_share(buffer, stored);
+  }
+
+  StoredBuffer stored(const Touch& touch) const {
+    const auto func_count = static_cast<int>(plan_.funcs.size());
+    StoredBuffer result;
+    if (touch.buffer >= func_count) {
+      for (size_t d = 0; d < touch.sides.size(); ++d) {
+        result.layout.order.push_back(static_cast<int16_t>(d));
+        const Extent extent = sizes_.of_image(touch.buffer - func_count, d);
+        result.layout.extents.push_back(double(std::max<int64_t>(extent.estimate, 1)));
+      }
+      return result;
+    }
+    return stored_func(touch);
+  }
+
+  StoredBuffer stored_func(const Touch& touch) const {
+    const FuncId func = touch.buffer;
+    const Storage& storage = plan_.of(func).storage;
+    StoredBuffer result;
+    result.layout.order = storage.order;
+    const StageRun* own = ir::first_where(group_.runs, [&](const StageRun& run) {
+      return run.id == StageId{func, 0};
+    });
+    const size_t place = own && is_at(func) ? store_place(*own) : 1;
+    for (size_t d = 0; d < touch.sides.size(); ++d) {
+      if (storage.order.size() < touch.sides.size())
+        result.layout.order.push_back(static_cast<int16_t>(d));
+      const int64_t points =
+          place > 1 ? own->cover[place][d] : std::max<int64_t>(sizes_.of(func, d).estimate, 1);
+      result.layout.extents.push_back(static_cast<double>(points));
+    }
+    for (const Fold& fold : storage.folds) {
+      double& extent = result.layout.extents[static_cast<size_t>(fold.dimension)];
+      extent = std::min(extent, static_cast<double>(fold.extent));
+    }
+    if (place > 1) allocate(result, touch, *own, place);
+    return result;
+  }
+
+  void allocate(StoredBuffer& stored, const Touch& touch, const StageRun& own, size_t place) const {
+    stored.inside = place;
+    double copies = 1;
+    for (size_t k = 1; k < place; ++k)
+      if (runs_at_once(node(own.path[k]).kind)) copies *= node(own.path[k]).trips;
+    const double bytes = stored.layout.elements() * touch.element_bytes * touch.components;
+    stored.allocated_bytes = bytes * std::min(copies, static_cast<double>(machine_.threads));
+  }
+
+  // A small array becomes registers if its indices are constants: no loop inside of its allocation but unrolled ones and
+  // vectors moves them.
+  double register_share(int buffer, const StoredBuffer& stored) const {
+    double bytes = 0;
+    for (const StageRun& run : group_.runs) {
+      for (const Touch& touch : run.facts->touches) {
+        if (touch.buffer != buffer) continue;
+        bytes = stored.layout.elements() * touch.element_bytes * touch.components;
+        for (size_t k = std::max(stored.inside, run.place); k < run.path.size(); ++k) {
+          const bool is_serial = node(run.path[k]).kind != ForType::Unrolled &&
+                                 node(run.path[k]).kind != ForType::Vectorized;
+          if (is_serial && node(run.path[k]).trips > 1 &&
+              (run.nest.moves[k - run.place] & touch.moved))
+            return 0;
+        }
+        if (run.place > stored.inside && touch.moved != 0) return 0;
+      }
+    }
+    const double room = static_cast<double>(machine_.vector_bytes) * machine_.registers;
+    return bytes <= largest_register_array * room ? std::min(1.0, operand_share * room / bytes) : 0;
+  }
+};
+
+}  // namespace
+
+Group group_of(const Plan& plan, const GroupMembers& members, Covers& covers,
+               const SizeModel& sizes, const Machine& machine, FactsOfStages& facts) {
+  return GroupBuilder(plan, covers, sizes, machine, facts).build(members);
+}
+
+}  // namespace retrograde::planning

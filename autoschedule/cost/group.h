@@ -1,0 +1,71 @@
+// group.h -- the loops of a group of stages as a tree: what runs inside of what, how often, and over which points.
+//
+//   out   root       parallel y:8, y, x            root -- y:8 -+- y -- x       blur
+//   blur  at out/y:8  y, x                                      |
+//                                                               +- y -- x       out
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "autoschedule/cost/nest_trips.h"
+#include "autoschedule/cost/stage_facts.h"
+#include "autoschedule/plan/covers.h"
+
+namespace retrograde::planning {
+
+struct LoopNode {
+  int parent = -1;  // of the root: none
+  LoopRef loop;     // of the first stage that has it
+  ForType kind = ForType::Serial;
+  double trips = 1,
+         times = 1;           // iterations in one run of the loops around it; in all, without lanes
+  double speedup = 1;         // by threads
+  bool in_parallel = false;   // it, or a loop around it
+  std::vector<int> children;  // in the order in which they run
+  std::vector<int> stages;    // of which it is the innermost loop
+};
+
+struct StageRun {
+  StageId id;
+  const StageFacts* facts = nullptr;
+  NestTrips nest;
+  std::vector<int> path;  // nodes from the root to the innermost loop
+  size_t place = 1;       // how many of them are around the stage's own nest
+  // What the loops from path[k] inwards cover: whole[k]. All 1 at the end.
+  std::vector<Cover> cover;
+
+  int node_of(size_t depth) const { return path[place + depth]; }
+};
+
+// Where the elements of a buffer are.
+struct StoredBuffer {
+  Layout layout;
+  size_t inside =
+      0;  // loops of a path around the allocation: its elements are used again in each iteration
+  double register_share = 0;   // the part of it that registers hold
+  double allocated_bytes = 0;  // in one group at once, for all threads
+};
+
+struct Group {
+  std::vector<LoopNode> nodes;          // parents before children; the first is the root
+  std::vector<StageRun> runs;           // by StageId
+  std::map<int, StoredBuffer> buffers;  // that the stages touch
+};
+
+// The Funcs that make a group, and for each of their stages, in order, the Funcs that are inlined into it.
+struct GroupMembers {
+  std::vector<FuncId> funcs;
+  std::vector<std::vector<FuncId>> inlined;
+};
+
+Group group_of(const Plan& plan, const GroupMembers& members, Covers& covers,
+               const SizeModel& sizes, const Machine& machine, FactsOfStages& facts);
+
+// The loops of a stage: those of its definition if the Func is opaque.
+Nest loops_of(const Plan& plan, StageId stage);
+int stage_count(const Plan& plan, FuncId func);
+// The Func stands for its value: undecided Funcs, too, but no outputs.
+bool is_inlined(const Plan& plan, const AccessGraph& graph, FuncId func);
+
+}  // namespace retrograde::planning

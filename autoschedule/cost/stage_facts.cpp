@@ -1,0 +1,121 @@
+#include "autoschedule/cost/stage_facts.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "autoschedule/cost/assumptions.h"
+
+namespace retrograde::planning {
+
+namespace {
+
+// The iterators of a recurrence: those that move an index in which the read differs from the write.
+IteratorSet carried_by(const Access& read, const Access& write) {
+  IteratorSet result = 0;
+  for (size_t d = 0; d < read.index.size(); ++d) {
+    const IndexForm &from = read.index[d], &to = write.index[d];
+    if (!(from == to)) result |= from.moved_by() | to.moved_by();
+  }
+  return result;
+}
+
+// Operations that depend on the same iterators. Products that are added are one operation with the sum.
+class OperationTable {
+ public:
+  void add(const OperationCount& operation, IteratorSet depends, double times) {
+    // Products that ignore infinite factors of 0 are tried as plain ones first.
+    const std::string name = operation.name == "strong_mul"   ? "Mul"
+                             : operation.name == "strong_div" ? "Div"
+                                                              : operation.name;
+    rows_[{name, operation.type, depends}] += operation.count * times;
+  }
+  std::vector<OperationRow> rows(const Machine& machine) {
+    for (auto& [key, count] : rows_) {
+      const auto& [name, type, depends] = key;
+      if (name == "Mul" && type.is_float())
+        count -= std::min(count, count_of("Add", type, depends) + count_of("Sub", type, depends));
+    }
+    std::vector<OperationRow> result;
+    for (const auto& [key, count] : rows_) {
+      const auto& [name, type, depends] = key;
+      if (count > 0)
+        result.push_back({operation_time(name, type, machine), static_cast<double>(type.bytes()),
+                          depends, count});
+    }
+    return result;
+  }
+
+ private:
+  std::map<std::tuple<std::string, Type, IteratorSet>, double> rows_;
+
+  double count_of(const char* name, Type type, IteratorSet depends) const {
+    return ir::value_or(rows_, {name, type, depends}, 0.0);
+  }
+};
+
+}  // namespace
+
+FactsOfStages::FactsOfStages(const SizeModel& sizes, const Machine& machine)
+    : graph_(sizes.graph()),
+      sizes_(sizes),
+      machine_(machine),
+      motions_(graph_),
+      composer_(graph_, most_composed_reads) {}
+
+const StageFacts& FactsOfStages::of(StageId stage, const std::vector<FuncId>& inlined) {
+  std::pair key{stage, inlined};
+  if (const StageFacts* found = ir::find_or_null(known_, key)) return *found;
+  return known_.emplace(std::move(key), find(graph_.stage(stage), inlined)).first->second;
+}
+
+StageFacts FactsOfStages::find(const StageNode& stage, const std::vector<FuncId>& inlined) {
+  const auto composed = composer_.compose(
+      stage, [&](FuncId func) { return std::ranges::binary_search(inlined, func); });
+  StageFacts facts;
+  facts.touches = touches(stage, composed.reads);
+  facts.operations = operations(stage, composed);
+  facts.taken =
+      stage.guard.fraction() * std::pow(taken_branches, double(stage.guard.others.size()));
+  return facts;
+}
+
+std::vector<Touch> FactsOfStages::touches(const StageNode& stage,
+                                          const std::vector<Access>& reads) const {
+  std::vector<const Access*> others{&stage.write};
+  std::vector<Touch> own;
+  for (const Access& read : reads) {
+    if (read.of != stage.id.func) {
+      others.push_back(&read);
+      continue;
+    }
+    Touch touch = touches_of({&read}, sizes_, motions_)[0];
+    touch.carried = carried_by(read, stage.write);
+    touch.is_own = touch.carried == 0;
+    own.push_back(std::move(touch));
+  }
+  std::vector<Touch> result = touches_of(others, sizes_, motions_);
+  ir::append(result, own);
+  return result;
+}
+
+std::vector<OperationRow> FactsOfStages::operations(const StageNode& stage,
+                                                    const ReadComposer::Composed& composed) const {
+  OperationTable table;
+  for (const OperationCount& operation : stage.operations)
+    table.add(operation, operation.depends, 1);
+  for (const auto& [func, elements] : composed.elements) {
+    const StageNode& inlined = graph_.func(func).stages[0];
+    for (const Access& element : elements) {
+      for (const OperationCount& operation : inlined.operations) {
+        IteratorSet depends = 0;
+        for (size_t d = 0; d < element.index.size(); ++d)
+          if (operation.depends & set_of(static_cast<int>(d)))
+            depends |= element.index[d].moved_by();
+        table.add(operation, depends, 1);
+      }
+    }
+  }
+  return table.rows(machine_);
+}
+
+}  // namespace retrograde::planning

@@ -1,0 +1,245 @@
+#include "autoschedule/cost/touch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "autoschedule/cost/assumptions.h"
+#include "autoschedule/machine/reference.h"
+
+namespace retrograde::planning {
+
+namespace {
+
+double points_in(const Cover& cover, int iterator) {
+  return static_cast<double>(cover[static_cast<size_t>(iterator)]);
+}
+
+// The iterations of some iterators, all together.
+double iterations_of(IteratorSet iterators, const Cover& cover) {
+  double result = 1;
+  for (size_t i = 0; i < cover.size(); ++i)
+    if (iterators & set_of(static_cast<int>(i))) result *= static_cast<double>(cover[i]);
+  return result;
+}
+
+// Elements along a dimension: how many, and from the first to the last one.
+struct Span {
+  double points, reach;
+  bool is_dense() const { return points >= reach; }
+};
+
+Span span_of(const TouchedSide& side, const Cover& cover) {
+  Span span{side.taps, side.reach};
+  for (const TouchedSide::Move& move : side.moves) {
+    const double count = points_in(cover, move.iterator), step = std::abs(move.slope);
+    if (count <= 1) continue;
+    const bool joins = span.is_dense() && step <= span.reach;
+    span.reach += step * (count - 1);
+    span.points = joins ? span.reach : std::min(span.points * count, span.reach);
+  }
+  if (iterations_of(side.data, cover) > 1) {
+    span.reach = side.is_displaced ? span.reach + displacement * side.divisor
+                                   : std::numeric_limits<double>::infinity();
+    span.points = span.reach;
+  }
+  span.reach = std::min(std::floor((span.reach - 1) / side.divisor) + 1, side.most);
+  span.points = std::min(span.points, span.reach);
+  return span;
+}
+
+double data_slope(const TouchedSide& side) {
+  double slope = 0;
+  for (const TouchedSide::Move& move : side.moves) slope += std::abs(move.slope);
+  return slope / side.divisor;
+}
+
+}  // namespace
+
+double Layout::elements() const {
+  double result = 1;
+  for (const double extent : extents) result *= extent;
+  return result;
+}
+
+// Regular dimensions multiply. A data-dependent dimension is touched anywhere between its ends, but by no more lines
+// than there are iterations.
+double touched_lines(const Touch& touch, const Layout& layout, const Cover& cover) {
+  const double in_line = static_cast<double>(line_bytes) / touch.element_bytes;
+  double lines = 1, by_data = 1, data_taps = 1, lines_a_point = 1;
+  double run = 1;        // elements that lie together
+  bool is_whole = true;  // all dimensions so far are touched from end to end
+  for (size_t place = 0; place < layout.order.size(); ++place) {
+    const auto d = static_cast<size_t>(layout.order[place]);
+    const TouchedSide& side = touch.sides[d];
+    const Span span = span_of(side, cover);
+    const bool has_data = side.data != 0;
+    const double count =
+        place > 0 ? span.points : std::min(span.points, std::ceil(span.reach / in_line));
+    (has_data ? by_data : lines) *= count;
+    if (has_data && place > 0) {
+      data_taps *= side.taps;
+      lines_a_point *=
+          side.is_displaced ? std::min(side.taps, std::max(1.0, data_slope(side))) : side.taps;
+    }
+    is_whole = is_whole && !has_data;
+    if (is_whole && span.is_dense()) {
+      run *= span.points;
+      lines = std::min(lines, std::ceil(run / in_line));
+    }
+    is_whole = is_whole && span.points >= layout.extents[d];
+  }
+  if (touch.data != 0)
+    by_data = std::min(by_data, (iterations_of(touch.data, cover) - 1) * lines_a_point + data_taps);
+  return lines * by_data * touch.components;
+}
+
+LanePlaces lane_places(const Touch& touch, const Layout& layout, const LaneLoop& lanes) {
+  LanePlaces result;
+  if ((touch.moved & lanes.moves) == 0) {
+    result.kind = LanePlaces::Kind::Uniform;
+    return result;
+  }
+  if (touch.data & lanes.moves) return result;
+  double row = 1, stride = 0, outer_stride = 0;
+  bool is_bent = false;
+  const TouchedSide& rows = touch.sides[static_cast<size_t>(layout.order[0])];
+  result.is_unaligned = rows.taps > 1 || rows.moves.size() > 1;
+  for (const int16_t dimension : layout.order) {
+    const TouchedSide& side = touch.sides[static_cast<size_t>(dimension)];
+    for (const TouchedSide::Move& move : side.moves) {
+      const double slope = move.slope / side.divisor * row;
+      if (move.iterator == lanes.outer) outer_stride += slope;
+      if (move.iterator != lanes.iterator) continue;
+      is_bent = is_bent || (side.is_bent && std::fmod(move.slope * lanes.step, side.divisor) != 0);
+      stride += slope * lanes.step;
+    }
+    row *= layout.extents[static_cast<size_t>(dimension)];
+  }
+  if (lanes.outer >= 0 && outer_stride != stride * lanes.inner)
+    result.runs = std::ceil(lanes.count / lanes.inner);
+  using Kind = LanePlaces::Kind;
+  result.stride = std::abs(stride);
+  result.kind = is_bent        ? Kind::Bent
+                : stride == 1  ? Kind::Contiguous
+                : stride == -1 ? Kind::Reversed
+                : stride == 0  ? Kind::Uniform
+                               : Kind::Strided;
+  return result;
+}
+
+// ---- from accesses ----
+
+namespace {
+
+class TouchReader {
+ public:
+  TouchReader(const SizeModel& sizes, const Motions& motions) : sizes_(sizes), motions_(motions) {}
+
+  // `accesses` differ in constants alone.
+  Touch read(const std::vector<const Access*>& accesses) const {
+    const Access& first = *accesses[0];
+    Touch touch;
+    const auto func_count = static_cast<int>(sizes_.graph().funcs().size());
+    touch.buffer = first.of >= 0 ? first.of : func_count + first.image;
+    touch.writes = first.writes;
+    touch.element_bytes = bytes_of(first);
+    uint32_t components = 0;
+    touch.count = 0;
+    for (const Access* access : accesses) {
+      components |= access->components;
+      touch.count += __builtin_popcount(access->components);
+    }
+    touch.components = __builtin_popcount(components);
+    for (size_t d = 0; d < first.index.size(); ++d) {
+      touch.sides.push_back(side_of(accesses, d));
+      touch.moved |= first.index[d].moved_by();
+      touch.data |= touch.sides.back().data;
+    }
+    return touch;
+  }
+
+ private:
+  const SizeModel& sizes_;
+  const Motions& motions_;
+
+  // Of one component.
+  double bytes_of(const Access& access) const {
+    const AccessGraph& graph = sizes_.graph();
+    if (access.of < 0) return graph.images()[static_cast<size_t>(access.image)]->type.bytes();
+    double bytes = 0;
+    const std::vector<Type>& types = graph.func(access.of).func->types;
+    for (const Type& type : types) bytes += type.bytes();
+    return std::max(1.0, bytes / static_cast<double>(std::max<size_t>(types.size(), 1)));
+  }
+
+  TouchedSide side_of(const std::vector<const Access*>& accesses, size_t d) const {
+    const IndexForm& form = accesses[0]->index[d];
+    TouchedSide side;
+    std::set<std::pair<int64_t, int64_t>> taps;
+    int64_t low = form.low, high = form.high;
+    for (const Access* access : accesses) {
+      taps.emplace(access->index[d].low, access->index[d].high);
+      low = std::min(low, access->index[d].low);
+      high = std::max(high, access->index[d].high);
+    }
+    side.taps = 0;
+    for (const auto& [first, last] : taps) side.taps += static_cast<double>(last - first + 1);
+    side.reach = static_cast<double>(high - low + 1);
+    side.taps = std::min(side.taps, side.reach);
+    side.divisor = static_cast<double>(form.divisor);
+    side.is_bent = form.divisor != 1 || form.modulus != 0;
+    side.most = static_cast<double>(std::max<int64_t>(sizes_.of(*accesses[0], d).estimate, 1));
+    const ir::ConstantRange within = sizes_.range(form.within);
+    if (within.is_bounded())
+      side.most = std::min(side.most, std::max(1.0, static_cast<double>(within.extent())));
+    if (form.modulus != 0) side.most = std::min(side.most, static_cast<double>(form.modulus));
+    for (const Term& term : form.terms)
+      side.moves.push_back({term.iterator, static_cast<double>(term.coefficient), true});
+    for (const OpaqueTerm& term : form.opaque) add_opaque(side, term);
+    std::ranges::sort(side.moves, {}, [](const auto& move) { return std::abs(move.slope); });
+    return side;
+  }
+
+  void add_opaque(TouchedSide& side, const OpaqueTerm& term) const {
+    if (term.value.iterators.empty()) return;
+    side.data |= term.value.depends();
+    const Motion* motion = motions_.of(term.value);
+    side.is_displaced = !motion || !motion->is_table;
+    if (!side.is_displaced) return;
+    for (size_t i = 0; i < term.value.iterators.size(); ++i) {
+      const double slope = motion ? motion->slopes[i].value_or(unknown_slope) : unknown_slope;
+      if (slope != 0)
+        side.moves.push_back(
+            {term.value.iterators[i], slope * static_cast<double>(term.coefficient), false});
+    }
+    // Values that nothing but data move go anywhere between their ends.
+    side.is_displaced = !side.moves.empty();
+    const ir::ConstantRange range = sizes_.range(term.range);
+    if (side.moves.empty() && range.is_bounded())
+      side.most = std::min(side.most, std::max(1.0, side.reach - 1 + double(range.extent())));
+  }
+};
+
+bool differ_in_constants(const Access& a, const Access& b) {
+  return a.of == b.of && a.image == b.image && a.writes == b.writes &&
+         std::ranges::equal(a.index, b.index,
+                            [](const IndexForm& f, const IndexForm& g) { return f.same_parts(g); });
+}
+
+}  // namespace
+
+std::vector<Touch> touches_of(const std::vector<const Access*>& accesses, const SizeModel& sizes,
+                              const Motions& motions) {
+  std::vector<std::vector<const Access*>> alike;
+  for (const Access* access : accesses) {
+    const auto found = std::ranges::find_if(
+        alike, [&](const auto& list) { return differ_in_constants(*list[0], *access); });
+    found == alike.end() ? alike.push_back({access}) : found->push_back(access);
+  }
+  const TouchReader reader(sizes, motions);
+  return ir::mapped(alike, [&](const auto& list) { return reader.read(list); });
+}
+
+}  // namespace retrograde::planning

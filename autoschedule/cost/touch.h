@@ -1,0 +1,73 @@
+// touch.h -- what a stage reads or writes of one buffer: cache lines while some of its loops run, and how the lanes of a
+// vector lie in memory.
+//
+// Accesses that differ in constants alone are one touch: the nine reads of a 3x3 stencil are a window of 3 by 3 elements.
+// Unlike a footprint (access/footprint.h), it knows the order of storage and the motion of data-dependent indices.
+#pragma once
+
+#include <vector>
+
+#include "autoschedule/access/cover.h"
+#include "autoschedule/cost/motion.h"
+
+namespace retrograde::planning {
+
+// One dimension.
+struct TouchedSide {
+  struct Move {
+    int16_t iterator;
+    double slope;   // elements from one point to the next
+    bool is_exact;  // not of a data-dependent index
+  };
+  double taps = 1, reach = 1;  // of one iteration: elements, and from the first to the last
+  std::vector<Move> moves;     // the smallest slope first
+  IteratorSet data = 0;        // the iterators that move a data-dependent part
+  bool is_displaced = false;   // the data only displace the index
+  bool is_bent = false;        // divided or wrapped: neighbours may have one element
+  double divisor = 1;          // of taps, reach and slopes
+  double most = 1;             // elements between the ends of the index
+};
+
+struct Touch {
+  int buffer = 0;  // a Func, or an image after all Funcs
+  bool writes = false;
+  bool is_own = false;      // an update reads the element that it writes
+  IteratorSet carried = 0;  // a stage reads its own elements at other points: along these iterators
+  double element_bytes = 4;
+  double components = 1;  // of a Tuple, each in an array of its own
+  double count = 1;       // loads or stores of an iteration
+  std::vector<TouchedSide> sides;
+  IteratorSet moved = 0, data = 0;
+};
+
+// How a buffer is stored.
+struct Layout {
+  std::vector<int16_t> order;   // dimensions, innermost first
+  std::vector<double> extents;  // by dimension
+  double elements() const;
+};
+
+// The lanes of a vector, along one iterator or, if that is shorter, along two.
+struct LaneLoop {
+  int iterator = -1, outer = -1;
+  double count = 1, inner = 1, step = 1;
+  IteratorSet moves = 0;
+};
+
+struct LanePlaces {
+  enum class Kind : uint8_t { Uniform, Contiguous, Reversed, Strided, Bent, Gather };
+  Kind kind = Kind::Gather;
+  double stride = 1;          // in elements
+  double runs = 1;            // pieces that lie apart
+  bool is_unaligned = false;  // vectors begin anywhere in a cache line
+};
+
+// Cache lines while the loops run over these points.
+double touched_lines(const Touch& touch, const Layout& layout, const Cover& cover);
+LanePlaces lane_places(const Touch& touch, const Layout& layout, const LaneLoop& lanes);
+
+// The touches of the accesses of one stage.
+std::vector<Touch> touches_of(const std::vector<const Access*>& accesses, const SizeModel& sizes,
+                              const Motions& motions);
+
+}  // namespace retrograde::planning

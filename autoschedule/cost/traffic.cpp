@@ -1,0 +1,198 @@
+#include "autoschedule/cost/traffic.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "autoschedule/cost/assumptions.h"
+#include "autoschedule/machine/reference.h"
+
+namespace retrograde::planning {
+
+namespace {
+
+// What is touched of a buffer.
+struct Region {
+  int buffer = 0, run = 0;
+  double bytes = 0;
+  bool is_stored = false;
+  double moved_bytes() const {
+    return bytes * (is_stored ? 2 : 1);
+  }  // lines that are stored are loaded before
+};
+using Regions = std::vector<Region>;
+
+double bytes_of(const Regions& regions) {
+  double sum = 0;
+  for (const Region& region : regions) sum += region.bytes;
+  return sum;
+}
+
+class RegionFinder {
+ public:
+  explicit RegionFinder(const Group& group) : group_(group), below_(group.nodes.size()) {
+    for (size_t r = 0; r < group.runs.size(); ++r) {
+      for (const int node : group.runs[r].path) below_[static_cast<size_t>(node)].push_back(r);
+    }
+    for (size_t n = 0; n < group.nodes.size(); ++n) {
+      iterations_.push_back(find(n, 1));
+      runs_.push_back(find(n, 0));
+    }
+  }
+  // While all iterations of a node run, and one of them.
+  const Regions& run(int node) const { return runs_[static_cast<size_t>(node)]; }
+  const Regions& iteration(int node) const { return iterations_[static_cast<size_t>(node)]; }
+  // What the stages touch themselves whose innermost loop it is.
+  Regions own(int node) const {
+    Regions result;
+    for (const int run : group_.nodes[static_cast<size_t>(node)].stages)
+      add(result, static_cast<size_t>(run), group_.runs[static_cast<size_t>(run)].path.size());
+    return result;
+  }
+
+ private:
+  const Group& group_;
+  std::vector<std::vector<size_t>> below_;  // the stages in a node
+  std::vector<Regions> runs_, iterations_;
+
+  Regions find(size_t n, size_t inside) const {
+    Regions result;
+    for (const size_t r : below_[n]) {
+      const std::vector<int>& path = group_.runs[r].path;
+      const auto at = std::ranges::find(path, static_cast<int>(n)) - path.begin();
+      add(result, r, static_cast<size_t>(at) + inside);
+    }
+    return result;
+  }
+
+  // Touches of one stage are different parts of a buffer; stages touch the same ones.
+  void add(Regions& regions, size_t r, size_t from) const {
+    const StageRun& run = group_.runs[r];
+    Regions own;
+    for (const Touch& touch : run.facts->touches) {
+      const StoredBuffer& stored = group_.buffers.at(touch.buffer);
+      const double share = 1 - stored.register_share;
+      if (share <= 0) continue;
+      const Cover& cover = run.cover[std::min(std::max(from, stored.inside), run.cover.size() - 1)];
+      const double most = std::ceil(stored.layout.elements() * touch.element_bytes / line_bytes);
+      const double lines = touched_lines(touch, stored.layout, cover);
+      const double bytes = share * std::min(lines, most * touch.components) * line_bytes;
+      Region& region = of_buffer(own, touch.buffer);
+      region.run = static_cast<int>(r);
+      const bool is_same = touch.is_own || touch.carried;  // as what the stage writes
+      region.bytes =
+          is_same ? std::max(region.bytes, bytes)
+                  : std::min(region.bytes + bytes, share * most * touch.components * line_bytes);
+      region.is_stored = region.is_stored || touch.writes;
+    }
+    for (const Region& region : own) {
+      Region& all = of_buffer(regions, region.buffer);
+      if (region.bytes > all.bytes) all.run = region.run;
+      all.bytes = std::max(all.bytes, region.bytes);
+      all.is_stored = all.is_stored || region.is_stored;
+    }
+  }
+
+  static Region& of_buffer(Regions& regions, int buffer) {
+    Region* known =
+        ir::first_where(regions, [&](const Region& region) { return region.buffer == buffer; });
+    return known ? *known : regions.emplace_back(Region{buffer});
+  }
+};
+
+// What was touched, the latest first.
+class LatestRegions {
+ public:
+  // Whether most of the region is still among so many bytes.
+  bool hold(const Region& region, double cache_bytes) const {
+    double sum = 0;
+    for (const auto& [buffer, bytes] : buffers_) {
+      sum += bytes;
+      if (sum > cache_bytes) return false;
+      if (buffer == region.buffer) return 2 * bytes >= region.bytes;
+    }
+    return false;
+  }
+  // Small ones are used all the time while large ones stream by.
+  void touch(Regions regions) {
+    std::ranges::stable_sort(regions, std::greater(), &Region::bytes);
+    for (const Region& region : regions) {
+      std::erase_if(buffers_, [&](const auto& known) { return known.first == region.buffer; });
+      buffers_.insert(buffers_.begin(), {region.buffer, region.bytes});
+    }
+  }
+
+ private:
+  std::vector<std::pair<int, double>> buffers_;
+};
+
+class TrafficWalk {
+ public:
+  TrafficWalk(const Group& group, const RegionFinder& regions, const Machine& machine, size_t level)
+      : group_(group), regions_(regions), machine_(machine), level_(level) {}
+
+  std::vector<BufferTraffic> find() {
+    visit(0, 1);
+    for (const Region& region : regions_.run(0)) {
+      double left = region.moved_bytes();
+      for (BufferTraffic& traffic : found_) {
+        if (traffic.buffer != region.buffer) continue;
+        traffic.first_bytes = std::min(left, traffic.bytes);
+        left -= traffic.first_bytes;
+      }
+    }
+    return std::move(found_);
+  }
+
+ private:
+  const Group& group_;
+  const RegionFinder& regions_;
+  const Machine& machine_;
+  const size_t level_;
+  LatestRegions latest_;
+  std::vector<BufferTraffic> found_;
+
+  // The threads share the last cache, one iteration of a parallel loop each.
+  double room(bool in_parallel) const {
+    const double bytes = usable_share * machine_.levels[level_].bytes;
+    const bool is_shared = in_parallel && level_ == Machine::last_cache;
+    return is_shared ? bytes / machine_.threads : bytes;
+  }
+
+  void visit(int n, double times) {
+    const LoopNode& node = group_.nodes[static_cast<size_t>(n)];
+    const bool outside =
+        node.parent < 0 || !group_.nodes[static_cast<size_t>(node.parent)].in_parallel;
+    const bool is_loop = node.parent >= 0;
+    if (bytes_of(regions_.run(n)) <= room(!outside) ||
+        (is_loop && bytes_of(regions_.iteration(n)) <= room(node.in_parallel)))
+      return load(regions_.run(n), times, n);
+    times *= node.trips;
+    for (const int child : node.children) visit(child, times);
+    if (!node.stages.empty()) load(regions_.own(n), times, n);
+  }
+
+  void load(const Regions& regions, double times, int n) {
+    for (const Region& region : regions) {
+      if (latest_.hold(region, room(group_.nodes[static_cast<size_t>(n)].in_parallel))) continue;
+      const StageRun& run = group_.runs[static_cast<size_t>(region.run)];
+      const bool in_parallel = group_.nodes[static_cast<size_t>(run.path.back())].in_parallel;
+      found_.push_back({region.run, region.buffer, times * region.moved_bytes(), 0, in_parallel});
+    }
+    latest_.touch(regions);
+  }
+};
+
+}  // namespace
+
+GroupTraffic traffic_of(const Group& group, const Machine& machine) {
+  const RegionFinder regions(group);
+  GroupTraffic result;
+  for (size_t level = 0; level < result.behind.size(); ++level)
+    result.behind[level] = TrafficWalk(group, regions, machine, level).find();
+  Regions all = regions.run(0);
+  std::ranges::stable_sort(all, std::greater(), &Region::bytes);
+  for (const Region& region : all) result.touched.emplace_back(region.buffer, region.bytes);
+  return result;
+}
+
+}  // namespace retrograde::planning

@@ -1,0 +1,237 @@
+// What does not change in a loop is computed outside of it, and what unrolled copies have in common once for all. So an
+// operation is executed as often as the loops run that are outside of the innermost loop that changes it, and that loop.
+#include "autoschedule/cost/work.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "autoschedule/cost/assumptions.h"
+#include "autoschedule/machine/reference.h"
+
+namespace retrograde::planning {
+
+double UnitTimes::all() const {
+  const double slowest = std::max({arithmetic, loads, stores, scalars, loops});
+  const double sum = arithmetic + loads + stores + scalars + loops;
+  return std::max(slowest + not_overlapped * (sum - slowest), chain);
+}
+
+namespace {
+
+class StageWork {
+ public:
+  StageWork(const StageRun& run, const Group& group, const Machine& machine)
+      : run_(run), group_(group), m_(machine), lanes_(run.nest.lanes) {
+    for (size_t d = 0; d < depth(); ++d) {
+      if (is_serial(d) && run.nest.trips[d] > 1) innermost_ = static_cast<int>(d);
+    }
+  }
+
+  UnitTimes find() {
+    for (const Touch& touch : run_.facts->touches) {
+      for (size_t d = 0; touch.writes && d < depth(); ++d)
+        if (is_serial(d) && run_.nest.trips[d] > 1 && moves(d, touch.moved))
+          last_mover_ = static_cast<int>(d);
+    }
+    for (const OperationRow& row : run_.facts->operations) add_operation(row);
+    for (const Touch& touch : run_.facts->touches) add_touch(touch);
+    add_spills();
+    units_.chain /= overlapping_chains();
+    const double taken = run_.facts->taken;
+    for (double UnitTimes::*part : {&UnitTimes::arithmetic, &UnitTimes::loads, &UnitTimes::stores,
+                                    &UnitTimes::scalars, &UnitTimes::chain})
+      units_.*part *= taken;
+    add_loops();
+    return units_;
+  }
+
+ private:
+  const StageRun& run_;
+  const Group& group_;
+  const Machine& m_;
+  const LaneLoop& lanes_;
+  int innermost_ = -1;  // the serial loop that runs innermost
+  UnitTimes units_;
+  double accumulators_ = 0, invariants_ = 0;  // registers of the innermost serial loop
+  double instructions_ = 0;                   // of all iterations
+  int last_mover_ = -1;                       // the innermost serial loop that moves the write
+
+  size_t depth() const { return run_.nest.trips.size(); }
+  const LoopNode& node(size_t d) const {
+    return group_.nodes[static_cast<size_t>(run_.node_of(d))];
+  }
+  ForType kind(size_t d) const { return node(d).kind; }
+  bool is_serial(size_t d) const {
+    return kind(d) != ForType::Unrolled && kind(d) != ForType::Vectorized;
+  }
+  double place_times() const {
+    return group_.nodes[static_cast<size_t>(run_.path[run_.place - 1])].times;
+  }
+  bool moves(size_t d, IteratorSet depends) const { return (run_.nest.moves[d] & depends) != 0; }
+  bool is_vector(IteratorSet depends) const { return (lanes_.moves & depends) != 0; }
+
+  // How often something is executed that these iterators change; lanes count as one. Each unrolled copy moves out of the
+  // loops around it by itself.
+  double times(IteratorSet depends) const {
+    double result = place_times();
+    bool is_moved = false;  // by a serial loop that is deeper
+    for (size_t d = depth(); d-- > 0;) {
+      const bool is_mover = moves(d, depends);
+      if (kind(d) != ForType::Vectorized && (is_mover || is_moved)) result *= run_.nest.trips[d];
+      is_moved = is_moved || (is_mover && is_serial(d));
+    }
+    return result;
+  }
+  // Iterations of the innermost serial loop.
+  double iterations() const {
+    double result = place_times();
+    for (size_t d = 0; d < depth(); ++d)
+      if (is_serial(d)) result *= run_.nest.trips[d];
+    return result;
+  }
+  // The unrolled copies that these iterators tell apart.
+  double copies(IteratorSet depends, bool moved) const {
+    double result = 1;
+    for (size_t d = 0; d < depth(); ++d) {
+      const bool is_inside = static_cast<int>(d) > innermost_;
+      if (kind(d) == ForType::Unrolled && is_inside && moves(d, depends) == moved)
+        result *= run_.nest.trips[d];
+    }
+    return result;
+  }
+  double vectors(double element_bytes, IteratorSet depends) const {
+    if (!is_vector(depends)) return 1;
+    return std::max(1.0, std::ceil(lanes_.count * element_bytes / m_.vector_bytes));
+  }
+
+  void add_operation(const OperationRow& row) {
+    const double count = row.count * times(row.depends);
+    instructions_ += count * vectors(row.element_bytes, row.depends);
+    if (is_vector(row.depends))
+      units_.arithmetic += count * vectors(row.element_bytes, row.depends) * row.time.vector_ns;
+    else
+      (row.time.is_integer ? units_.scalars : units_.arithmetic) += count * row.time.scalar_ns;
+  }
+
+  // ---- memory ----
+
+  void add_touch(const Touch& touch) {
+    const StoredBuffer& stored = group_.buffers.at(touch.buffer);
+    const bool is_sum = touch.is_own || (touch.writes && has_own_read());
+    note_registers(touch, is_sum);
+    if (touch.is_own) add_chain(touch);
+    if (touch.carried) add_recurrence(touch);
+    const double count = touch.count * times(touch.moved) * (1 - stored.register_share);
+    instructions_ += count * vectors(touch.element_bytes, touch.moved);
+    if (count > 0) add_moves(touch, stored, count);
+  }
+  bool has_own_read() const {
+    return std::ranges::any_of(run_.facts->touches, [](const Touch& t) { return t.is_own; });
+  }
+
+  void add_moves(const Touch& touch, const StoredBuffer& stored, double count) {
+    const LanePlaces places = lane_places(touch, stored.layout, lanes_);
+    const double lanes = is_vector(touch.moved) ? lanes_.count : 1;
+    const double whole = vectors(touch.element_bytes, touch.moved);
+    double moved = 1, single = 0, shuffled = 0;  // vectors, elements, shuffles
+    using Kind = LanePlaces::Kind;
+    switch (places.kind) {
+      case Kind::Uniform:
+        break;
+      case Kind::Contiguous:
+      case Kind::Reversed:
+        moved = std::max(whole, places.runs);  // runs that lie apart are put together
+        if (places.is_unaligned) moved *= 1 + m_.vector_bytes / double(line_bytes);
+        if (places.runs > whole) shuffled = moved;
+        if (places.kind == Kind::Reversed) shuffled = whole;
+        break;
+      case Kind::Strided:
+        if (places.stride > longest_vector_stride) {
+          moved = 0;
+          single = lanes;
+        } else {
+          moved = std::max(1.0, places.stride) * whole;
+          shuffled = (touch.writes ? 2 : 1) * moved;
+        }
+        break;
+      case Kind::Bent:
+        moved = 2 * whole;
+        shuffled = whole;
+        break;
+      case Kind::Gather:
+        moved = 0;
+        single = lanes;
+        break;
+    }
+    double& units = touch.writes ? units_.stores : units_.loads;
+    const double vector_ns = touch.writes ? m_.store_ns : m_.load_ns;
+    const double lane_ns = touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns;
+    units += count * (moved * vector_ns + single * lane_ns);
+    units_.arithmetic += count * shuffled * m_.shuffle_ns;
+  }
+
+  // What the innermost loop does not move stays in registers.
+  void note_registers(const Touch& touch, bool is_sum) {
+    if (innermost_ < 0 || moves(static_cast<size_t>(innermost_), touch.moved)) return;
+    const double needed =
+        touch.count * copies(touch.moved, true) * vectors(touch.element_bytes, touch.moved);
+    if (is_sum && touch.is_own)
+      accumulators_ += needed;
+    else if (!touch.writes && touch.data == 0)
+      invariants_ += needed;
+  }
+  void add_spills() {
+    const double excess = accumulators_ + invariants_ + passing_registers - m_.registers;
+    if (excess <= 0) return;
+    const double sums = std::min(excess, accumulators_);
+    units_.loads += iterations() * std::min(excess, accumulators_ + invariants_) * m_.load_ns;
+    units_.stores += iterations() * sums * m_.store_ns;
+  }
+
+  // ---- chains ----
+
+  // A sum waits for the last one to the same element: in a register, or through memory where neighbours meet.
+  void add_chain(const Touch& touch) {
+    if (innermost_ < 0) return;
+    if (touch.data != 0) {
+      const double in_vector = touch.data & lanes_.moves ? lanes_.count : 1;
+      units_.chain +=
+          iterations() * copies(0, false) * in_vector * equal_neighbours * m_.memory_latency_ns;
+    } else if (!moves(static_cast<size_t>(innermost_), touch.moved)) {
+      units_.chain += iterations() * copies(touch.moved, false) * m_.latency_ns;
+    }
+  }
+  // An element waits for the one before, which the last iteration stored.
+  void add_recurrence(const Touch& touch) {
+    if (innermost_ < 0 || !moves(static_cast<size_t>(innermost_), touch.carried)) return;
+    double in_iteration = 1;
+    for (size_t d = static_cast<size_t>(innermost_) + 1; d < depth(); ++d)
+      if (kind(d) == ForType::Unrolled && moves(d, touch.carried))
+        in_iteration *= run_.nest.trips[d];
+    const double chain = iterations() * in_iteration * m_.memory_latency_ns;
+    units_.chain = std::max(units_.chain, chain);
+  }
+
+  // Short sums of different elements run at the same time, as far as the core looks ahead.
+  double overlapping_chains() const {
+    double runs = place_times();
+    for (int d = 0; d <= last_mover_; ++d)
+      if (is_serial(static_cast<size_t>(d))) runs *= run_.nest.trips[static_cast<size_t>(d)];
+    return std::max(1.0, core.reorder_window * runs / std::max(instructions_, 1.0));
+  }
+
+  void add_loops() {
+    for (size_t d = 0; d < depth(); ++d) {
+      const bool is_own = node(d).loop.stage == run_.id;
+      if (is_own && is_serial(d)) units_.loops += node(d).times * m_.iteration_ns;
+    }
+  }
+};
+
+}  // namespace
+
+UnitTimes work_of(const StageRun& run, const Group& group, const Machine& machine) {
+  return StageWork(run, group, machine).find();
+}
+
+}  // namespace retrograde::planning

@@ -1,0 +1,265 @@
+// Programs in which one term of the cost dominates, with figures that are computed by hand.
+#include <gtest/gtest.h>
+
+#include "frontend/data/param.h"
+#include "unit/cost/cost_testing.h"
+
+namespace retrograde::planning {
+namespace {
+
+constexpr double columns = 4096, rows = 2048, image_bytes = 4 * columns * rows;
+
+struct CostProbes : ::testing::Test {
+  CostProbes() {
+    for (ImageParam* image : {&in, &other}) {
+      image->dim(0).set_estimate(0, 4096);
+      image->dim(1).set_estimate(0, 2048);
+    }
+  }
+  // Of `out`, whose size is that of the images if nothing else is said.
+  Cost cost_of(const std::string& text) {
+    if (!std::exchange(is_sized, true)) out.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+    return priced(out, text);
+  }
+  // Of the update, the loops of which are given.
+  StageCost update_cost(const std::string& loops) {
+    return cost_of("out  root\n  .0  y, x:16, vector x\n  .1  " + loops + "\n").stages[1];
+  }
+  bool is_sized = false;
+  ImageParam in{Float(32), 2, "in"}, other{Float(32), 2, "other"};
+  Func out{"out"}, rows_sum{"rows_sum"};
+};
+
+// ---- memory ----
+
+TEST_F(CostProbes, ACopyMovesEachLineThreeTimes) {
+  out(x, y) = in(x, y);
+  const Cost cost = cost_of("out  root  y, x:16, vector x\n");
+  ASSERT_EQ(cost.stages.size(), 1u);
+  const StageCost& copy = cost.stages[0];
+  EXPECT_EQ(copy.bytes.back(), 3 * image_bytes) << "lines that are stored are loaded before";
+  EXPECT_NEAR(copy.memory_seconds.back(), 3 * image_bytes / 9 * 1e-9, micro) << "one thread";
+  // A store, and a quarter of what goes on beside it.
+  const double vector_ns = 0.35 + 0.25 * (0.2 + 0.3);
+  EXPECT_NEAR(copy.compute_seconds, columns * rows / 16 * vector_ns * 1e-9, 10 * micro);
+  EXPECT_NEAR(copy.seconds, copy.memory_seconds.back() + 0.25 * copy.compute_seconds, 2 * micro);
+  EXPECT_EQ(copy.bound_by(), "memory");
+}
+
+TEST_F(CostProbes, ThreadsShareTheBandwidthOfMemory) {
+  out(x, y) = in(x, y);
+  const Cost cost = cost_of("out  root  parallel y, x:16, vector x\n");
+  EXPECT_NEAR(cost.stages[0].memory_seconds.back(), 3 * image_bytes / 18 * 1e-9, micro);
+  EXPECT_NEAR(cost.stages[0].launch_seconds, 5 * micro, 0.1 * micro);
+}
+
+TEST_F(CostProbes, TheLastRoundOfChunksLeavesAThreadIdle) {
+  out(x, y) = exp(in(x, y));
+  out.bound(y, 0, 3);
+  const double serial = compute_seconds(cost_of("out  root  y, x:16, vector x\n"));
+  const double parallel = compute_seconds(cost_of("out  root  parallel y, x:16, vector x\n"));
+  EXPECT_NEAR(parallel / serial, 2.0 / 3, 0.01);
+}
+
+TEST_F(CostProbes, SmallDataStayInTheCacheFromCallToCall) {
+  out(x, y) = in(x, y);
+  out.bound(x, 0, 64).bound(y, 0, 16);
+  const Cost cost = cost_of("out  root  y, x:16, vector x\n");
+  EXPECT_EQ(memory_bytes(cost), 0);
+  EXPECT_EQ(cost.stages[0].bytes[1], 0) << "all of it is in L1";
+}
+
+// A sum of three rows of sums of three columns.
+struct StencilProbes : CostProbes {
+  StencilProbes() {
+    rows_sum(x, y) = in(x - 1, y) + in(x, y) + in(x + 1, y);
+    out(x, y) = rows_sum(x, y - 1) + rows_sum(x, y) + rows_sum(x, y + 1);
+    root = cost_of(out_loops + "rows_sum  root  parallel y, x:16, vector x\n");
+    inlined = cost_of(out_loops + "rows_sum  inline\n");
+    strips = cost_of(out_loops + "rows_sum  at out/y:32  y, x:16, vector x\n");
+    sliding = cost_of(out_loops +
+                      "rows_sum  at out/y  store at out/y:32  fold y by 4  y, x:16, vector x\n");
+  }
+  const std::string out_loops = "out  root  parallel y:32, y, x:16, vector x\n";
+  Cost root, inlined, strips, sliding;
+};
+
+TEST_F(StencilProbes, RowsThatOverlapAreLoadedOnce) {
+  EXPECT_NEAR(memory_bytes(inlined), 3 * image_bytes, 0.01 * image_bytes);
+  EXPECT_NEAR(memory_bytes(root), 6 * image_bytes, 0.02 * image_bytes);
+  EXPECT_NEAR(memory_bytes(sliding), 3 * image_bytes, 0.01 * image_bytes);
+}
+
+TEST_F(StencilProbes, StripsRecomputeTheirBorders) {
+  const auto seconds_of = [](const Cost& cost) { return cost.stages[0].compute_seconds; };
+  EXPECT_NEAR(seconds_of(strips) / seconds_of(root), 34.0 / 32, 0.02);
+  EXPECT_NEAR(seconds_of(sliding) / seconds_of(root), 1, 0.02);
+  EXPECT_GT(compute_seconds(inlined), compute_seconds(sliding));
+}
+
+TEST_F(StencilProbes, StripsAreFasterThanTheDetourThroughMemory) {
+  EXPECT_LT(sliding.seconds, 0.7 * root.seconds);
+  EXPECT_LT(sliding.seconds, strips.seconds);
+}
+
+TEST_F(StencilProbes, ThePeakIsWhatIsAliveAtOnce) {
+  EXPECT_NEAR(root.peak_bytes, 4 * columns * (rows + 2), 1);
+  EXPECT_EQ(inlined.peak_bytes, 0);
+  EXPECT_EQ(strips.peak_bytes, 2 * 4 * columns * 34) << "of each thread";
+  EXPECT_EQ(sliding.peak_bytes, 2 * 4 * columns * 4);
+}
+
+TEST_F(CostProbes, LoadsBehindAColumnOfTheWrongOrderTakeALineEach) {
+  out(x, y) = in(y, x);
+  in.dim(0).set_estimate(0, 2048);
+  in.dim(1).set_estimate(0, 4096);
+  const double across = memory_bytes(cost_of("out  root  y, x:16, vector x\n"));
+  const double tiles = memory_bytes(cost_of("out  root  y:16, x:16, y, vector x\n"));
+  EXPECT_GT(across, 1.9 * tiles) << "4096 lines of a column do not stay until the next row";
+}
+
+// ---- arithmetic ----
+
+TEST_F(CostProbes, FunctionsCountByVectors) {
+  out(x, y) = exp(in(x, y));
+  const double seconds = compute_seconds(cost_of("out  root  y, x:16, vector x\n"));
+  EXPECT_NEAR(seconds, columns * rows / 16 * (4 + 0.25 * 0.85) * 1e-9, 0.02 * seconds);
+}
+
+TEST_F(CostProbes, WhatALoopDoesNotChangeIsComputedOutsideOfIt) {
+  out(x, y) = in(x, y) + exp(other(0, y));
+  const double once = compute_seconds(cost_of("out  root  y, x:16, vector x\n"));
+  const double each = compute_seconds(cost_of("out  root  x:16, y, vector x\n"));
+  EXPECT_LT(once, columns * rows / 16 * 0.7e-9);
+  EXPECT_GT(each, columns * rows / 16 * 4e-9);
+}
+
+TEST_F(CostProbes, InlinedFuncsAreComputedForEachElement) {
+  rows_sum(x, y) = exp(in(x, y));
+  out(x, y) = rows_sum(x, y) + rows_sum(x + 1, y);
+  const double one =
+      compute_seconds(cost_of("out  root  y, x:16, vector x\nrows_sum  root  y, x:16, vector x\n"));
+  const double two = compute_seconds(cost_of("out  root  y, x:16, vector x\nrows_sum  inline\n"));
+  EXPECT_NEAR(two / one, 2, 0.3);
+}
+
+struct ProductProbes : CostProbes {
+  ProductProbes() {
+    for (ImageParam* image : {&in, &other}) {
+      image->dim(0).set_estimate(0, 512);
+      image->dim(1).set_estimate(0, 512);
+    }
+    out(x, y) = 0.0f;
+    out(x, y) += in(k, y) * other(x, k);
+    out.bound(x, 0, 512).bound(y, 0, 512);
+  }
+  static constexpr double products = 512.0 * 512 * 512 / 16;  // in vectors
+  RDom k{0, 512, "k"};
+};
+
+TEST_F(ProductProbes, ARegisterTileIsBoundByMultiplyAdds) {
+  const StageCost cost = update_cost("y:4, x:64, k.x, unroll y, unroll x:16, vector x");
+  // Sixteen multiply-adds beside eight loads and one iteration.
+  const double iteration_ns = 16 * 0.2 + 0.25 * (8 * 0.2 + 0.3);
+  EXPECT_NEAR(cost.compute_seconds, products / 16 * iteration_ns * 1e-9, 50 * micro);
+  EXPECT_EQ(cost.bound_by(), "compute");
+}
+
+TEST_F(ProductProbes, ASingleSumWaitsForItself) {
+  EXPECT_NEAR(update_cost("y, x:16, k.x, vector x").compute_seconds, products * 1.3e-9,
+              100 * micro);
+}
+
+TEST_F(ProductProbes, ATileThatExceedsTheRegistersSpills) {
+  const StageCost fits = update_cost("y:4, x:64, k.x, unroll y, unroll x:16, vector x");
+  const StageCost spills = update_cost("y:16, x:64, k.x, unroll y, unroll x:16, vector x");
+  EXPECT_GT(spills.compute_seconds, 1.2 * fits.compute_seconds);
+}
+
+// ---- chains ----
+
+TEST_F(CostProbes, ASumOfScalarsIsAChain) {
+  Func total("total");
+  RDom r(0, 1000000, "r");
+  total() += in(r, 0);
+  const Cost cost = priced(total, "total  root\n  .0\n  .1  r.x\n");
+  EXPECT_NEAR(cost.stages[1].compute_seconds, 1.3e-3, 20 * micro);
+}
+
+TEST_F(CostProbes, ShortSumsOverlap) {
+  RDom r(0, 4, "r");
+  out(x, y) = 0.0f;
+  out(x, y) += in(x + r, y);
+  const double chain = columns * rows / 16 * 4 * 1.3e-9;
+  EXPECT_LT(update_cost("y, x:16, r.x, vector x").compute_seconds, chain / 1.2);
+}
+
+TEST_F(CostProbes, ARecurrenceAlongALineWaitsForMemory) {
+  RDom r(1, 4095, "r");
+  out(x, y) = 0.0f;
+  out(r, y) = 0.5f * out(r - 1, y) + in(r, y);
+  const auto update = [&](const std::string& loops) { return update_cost(loops).compute_seconds; };
+  EXPECT_NEAR(update("y, r.x"), 4095 * rows * 2.5e-9, 100 * micro);
+  EXPECT_LT(update("y:16, r.x, unroll y"), 4095 * rows * 1.5e-9);
+}
+
+// ---- places that data decide ----
+
+TEST_F(CostProbes, ATableIsReadALineAnElement) {
+  ImageParam places(Int(32), 2, "places"), table(Float(32), 1, "table");
+  places.dim(0).set_estimate(0, 4096);
+  places.dim(1).set_estimate(0, 2048);
+  table.dim(0).set_estimate(0, 1 << 26);
+  out(x, y) = table(clamp(places(x, y), 0, (1 << 26) - 1));
+  const Cost cost = cost_of("out  root  y, x:16, vector x\n");
+  EXPECT_GT(memory_bytes(cost), 4.0 * (1 << 26));
+  EXPECT_GT(cost.stages[0].compute_seconds, columns * rows * 0.35e-9);
+}
+
+TEST_F(CostProbes, ADisplacedImageIsReadAsAWhole) {
+  out(x, y) = in(clamp(cast<int>(x + other(x, y)), 0, 4095), y);
+  const Cost cost = cost_of("out  root  y, x:16, vector x\n");
+  EXPECT_NEAR(memory_bytes(cost), 4 * image_bytes, 0.1 * image_bytes);
+  EXPECT_GT(cost.stages[0].compute_seconds, columns * rows * 0.35e-9) << "lane by lane";
+}
+
+TEST_F(CostProbes, ARotatedImageIsReadInManyLinesAVector) {
+  Param<float> angle("angle");
+  const Expr u = cast<int>(angle * x + y), v = cast<int>(x - angle * y);
+  out(x, y) = in(clamp(u, 0, 4095), clamp(v, 0, 2047));
+  const StageCost rotated = cost_of("out  root  y, x:16, vector x\n").stages[0];
+  EXPECT_GT(rotated.bytes[2] + rotated.bytes[3], 5 * image_bytes);
+}
+
+TEST_F(CostProbes, TheBinsOfACellAreOneLine) {
+  ImageParam values(Int(32), 2, "values");
+  values.dim(0).set_estimate(0, 4096);
+  values.dim(1).set_estimate(0, 2048);
+  Func cells("cells");
+  RDom r(0, 4096, 0, 2048, "r");
+  cells(z, x, y) = 0.0f;
+  cells(clamp(values(r.x, r.y), 0, 12), r.x / 8, r.y / 8) += in(r.x, r.y);
+  cells.bound(z, 0, 13).bound(x, 0, 512).bound(y, 0, 256);
+  const Cost cost = priced(cells, "cells  root\n  .0  y, x, z\n  .1  r.y, r.x\n");
+  const double cell_bytes = 64 * 512 * 256;
+  EXPECT_LT(cost.stages[1].bytes.back(), 2 * image_bytes + 3 * cell_bytes);
+  EXPECT_LT(cost.stages[1].bytes[2], 9 * cell_bytes) << "eight rows of pixels use a cell";
+}
+
+// ---- the report ----
+
+TEST_F(CostProbes, AReportHasALineForEachStage) {
+  out(x, y) = in(x, y);
+  const Plan plan = parsed("out  root  y, x:16, vector x\n", std::vector<Func>{out});
+  Pricing pricing({out});
+  EXPECT_EQ(to_text(pricing.price(plan), plan),
+            "stage                               us   compute    launch     L2 KB     L3 KB    "
+            "mem KB  bound by\n"
+            "out                           1.12e+04       249         0         0         0  "
+            "1.01e+05    memory\n"
+            "total                         1.12e+04\n"
+            "peak KB                              0\n");
+}
+
+}  // namespace
+}  // namespace retrograde::planning
