@@ -2,7 +2,7 @@
 // vector lie in memory.
 //
 // Accesses that differ in constants alone are one touch: the nine reads of a 3x3 stencil are a window of 3 by 3 elements.
-// Unlike a footprint (access/footprint.h), it knows the order of storage and the motion of data-dependent indices.
+// Unlike a lane form (access/lane_form.h), it knows the order of storage and the motion of data-dependent indices.
 #pragma once
 
 #include <vector>

@@ -6,7 +6,7 @@
 // many points as there are lanes stands outside. Lanes of a sum stay: removing them would make its chains of additions longer.
 #include <algorithm>
 
-#include "autoschedule/access/footprint.h"
+#include "autoschedule/access/lane_form.h"
 #include "autoschedule/moves/edit.h"
 
 namespace retrograde::planning::moves {

@@ -130,8 +130,8 @@ std::vector<const Access*> reads_of(const StageNode& stage, FuncId func) {
 Cover Covers::inside(StageId stage, int depth) {
   const Cover whole = all_of(stage);
   if (depth == around_all_loops || plan_.of(stage.func).opacity != Opacity::None) return whole;
-  const graph::FuncContents& f = *plan_.program->funcs[static_cast<size_t>(stage.func)];
-  const size_t iterators = graph::first_loops(f, f.stage(stage.stage)).size();
+  const bool has_points = point_number(sizes_.graph().func(stage.func).func->stage(stage.stage));
+  const size_t iterators = whole.size() - (has_points ? 1 : 0);
   return NestCover(plan_.nest(stage), whole, static_cast<size_t>(depth) + 1, iterators).points();
 }
 

@@ -1,4 +1,5 @@
 # Random programs and schedules against the interpreter.
+retrograde_test(computed_boxes_test)
 retrograde_test(gpu_faults_test LIBS retrograde_simt retrograde_dep_halide_runtime)
 retrograde_test(gpu_schedules_test LIBS retrograde_simt)
 retrograde_test(interval_property_test LAYERS analysis)

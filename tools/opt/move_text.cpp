@@ -11,7 +11,7 @@ namespace retrograde::opt {
 namespace {
 
 const std::string move_line = "\nmove ";
-constexpr planning::SizeDefaults defaults{1000};
+constexpr planning::SizeDefaults defaults{planning::unknown_extent};
 
 const planning::Move& move_of(const std::string& name) {
   if (const planning::Move* move = planning::find_move(name)) return *move;
