@@ -53,7 +53,7 @@ class GroupBuilder {
         return std::pair(group_.nodes[static_cast<size_t>(child)].loop.stage, child);
       });
     }
-    add_buffers();
+    add_buffers(plan_, sizes_, machine_, group_);
     return std::move(group_);
   }
 
@@ -80,6 +80,7 @@ class GroupBuilder {
     run.id = stage;
     run.facts = &facts_.of(stage, *inlined_.at(stage));
     run.path = path_around(stage, nest, run.place);
+    run.storage_place = is_at(stage.func) ? store_place(run) : 1;
     const Cover extents = extents_of(run);
     run.nest = nest_trips(nest, extents);
     for (size_t depth = run.path.size() - run.place; depth < nest.loops.size(); ++depth)
@@ -179,7 +180,7 @@ class GroupBuilder {
     if (!is_at(run.id.func) || run.place <= 1) return whole_cover(run.id, sizes_);
     std::vector<int64_t> box = box_in(run.id.func, run.path, run.place);
     const std::vector<int64_t> all = box;
-    for (size_t count = run.place - 1; count >= store_place(run); --count) {
+    for (size_t count = run.place - 1; count >= run.storage_place; --count) {
       const std::vector<int64_t> outer = box_in(run.id.func, run.path, count);
       const double trips = node(run.path[count]).trips;
       for (size_t d = 0; d < box.size(); ++d) {
@@ -191,7 +192,6 @@ class GroupBuilder {
     return with_box(run.id, box);
   }
 
-  // How many nodes of the path are around the Func's storage; the root is one of them.
   size_t store_place(const StageRun& run) const {
     const Level& store = plan_.of(run.id.func).placement.store;
     if (store.kind == Level::Kind::Root) return 1;
@@ -219,86 +219,6 @@ class GroupBuilder {
       result.push_back(std::move(cover));
     }
     return result;
-  }
-
-  // ---- storage ----
-
-  void add_buffers() {
-    for (const StageRun& run : group_.runs) {
-      for (const Touch& touch : run.facts->touches)
-        if (!group_.buffers.contains(touch.buffer)) group_.buffers[touch.buffer] = stored(touch);
-    }
-    for (auto& [buffer, stored] : group_.buffers)
-      if (stored.inside > 1) stored.register_share = register_share(buffer, stored);
-  }
-
-  StoredBuffer stored(const Touch& touch) const {
-    const auto func_count = static_cast<int>(plan_.funcs.size());
-    StoredBuffer result;
-    if (touch.buffer >= func_count) {
-      for (size_t d = 0; d < touch.sides.size(); ++d) {
-        result.layout.order.push_back(static_cast<int16_t>(d));
-        const Extent extent = sizes_.of_image(touch.buffer - func_count, d);
-        result.layout.extents.push_back(double(std::max<int64_t>(extent.estimate, 1)));
-      }
-      return result;
-    }
-    return stored_func(touch);
-  }
-
-  StoredBuffer stored_func(const Touch& touch) const {
-    const FuncId func = touch.buffer;
-    const Storage& storage = plan_.of(func).storage;
-    StoredBuffer result;
-    result.layout.order = storage.order;
-    const StageRun* own = ir::first_where(group_.runs, [&](const StageRun& run) {
-      return run.id == StageId{func, 0};
-    });
-    const size_t place = own && is_at(func) ? store_place(*own) : 1;
-    for (size_t d = 0; d < touch.sides.size(); ++d) {
-      if (storage.order.size() < touch.sides.size())
-        result.layout.order.push_back(static_cast<int16_t>(d));
-      const int64_t points =
-          place > 1 ? own->cover[place][d] : std::max<int64_t>(sizes_.of(func, d).estimate, 1);
-      result.layout.extents.push_back(static_cast<double>(points));
-    }
-    for (const Fold& fold : storage.folds) {
-      double& extent = result.layout.extents[static_cast<size_t>(fold.dimension)];
-      extent = std::min(extent, static_cast<double>(fold.extent));
-    }
-    if (place > 1) allocate(result, touch, *own, place);
-    return result;
-  }
-
-  void allocate(StoredBuffer& stored, const Touch& touch, const StageRun& own, size_t place) const {
-    stored.inside = place;
-    double copies = 1;
-    for (size_t k = 1; k < place; ++k)
-      if (runs_at_once(node(own.path[k]).kind)) copies *= node(own.path[k]).trips;
-    const double bytes = stored.layout.elements() * touch.element_bytes * touch.components;
-    stored.allocated_bytes = bytes * std::min(copies, static_cast<double>(machine_.threads));
-  }
-
-  // A small array becomes registers if its indices are constants: no loop inside of its allocation but unrolled ones and
-  // vectors moves them.
-  double register_share(int buffer, const StoredBuffer& stored) const {
-    double bytes = 0;
-    for (const StageRun& run : group_.runs) {
-      for (const Touch& touch : run.facts->touches) {
-        if (touch.buffer != buffer) continue;
-        bytes = stored.layout.elements() * touch.element_bytes * touch.components;
-        for (size_t k = std::max(stored.inside, run.place); k < run.path.size(); ++k) {
-          const bool is_serial = node(run.path[k]).kind != ForType::Unrolled &&
-                                 node(run.path[k]).kind != ForType::Vectorized;
-          if (is_serial && node(run.path[k]).trips > 1 &&
-              (run.nest.moves[k - run.place] & touch.moved))
-            return 0;
-        }
-        if (run.place > stored.inside && touch.moved != 0) return 0;
-      }
-    }
-    const double room = static_cast<double>(machine_.vector_bytes) * machine_.registers;
-    return bytes <= largest_register_array * room ? std::min(1.0, operand_share * room / bytes) : 0;
   }
 };
 

@@ -30,8 +30,9 @@ struct StageRun {
   StageId id;
   const StageFacts* facts = nullptr;
   NestTrips nest;
-  std::vector<int> path;  // nodes from the root to the innermost loop
-  size_t place = 1;       // how many of them are around the stage's own nest
+  std::vector<int> path;     // nodes from the root to the innermost loop
+  size_t place = 1;          // how many of them are around the stage's own nest
+  size_t storage_place = 1;  // and around the storage of its Func
   // What the loops from path[k] inwards cover: whole[k]. All 1 at the end.
   std::vector<Cover> cover;
 
@@ -52,6 +53,11 @@ struct Group {
   std::vector<StageRun> runs;           // by StageId
   std::map<int, StoredBuffer> buffers;  // that the stages touch
 };
+
+// Finds the buffers of the stages.
+void add_buffers(const Plan& plan, const SizeModel& sizes, const Machine& machine, Group& group);
+// By dimension, of a Func at root; less in folded dimensions.
+std::vector<double> stored_extents(FuncId func, const FuncPlan& plan, const SizeModel& sizes);
 
 // The Funcs that make a group, and for each of their stages, in order, the Funcs that are inlined into it.
 struct GroupMembers {

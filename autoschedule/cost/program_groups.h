@@ -26,4 +26,8 @@ class GroupFinder {
   void add_reads(PlannedGroup& group, StageId stage, const std::vector<bool>& inlined) const;
 };
 
+// The bytes alive at once; `own`: what each group allocates for the Funcs that are computed in its loops.
+double peak_bytes(const Plan& plan, const SizeModel& sizes, const std::vector<PlannedGroup>& groups,
+                  const std::vector<double>& own);
+
 }  // namespace retrograde::planning

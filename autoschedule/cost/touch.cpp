@@ -196,7 +196,7 @@ class TouchReader {
       side.most = std::min(side.most, std::max(1.0, static_cast<double>(within.extent())));
     if (form.modulus != 0) side.most = std::min(side.most, static_cast<double>(form.modulus));
     for (const Term& term : form.terms)
-      side.moves.push_back({term.iterator, static_cast<double>(term.coefficient), true});
+      side.moves.push_back({term.iterator, static_cast<double>(term.coefficient)});
     for (const OpaqueTerm& term : form.opaque) add_opaque(side, term);
     std::ranges::sort(side.moves, {}, [](const auto& move) { return std::abs(move.slope); });
     return side;
@@ -209,10 +209,10 @@ class TouchReader {
     side.is_displaced = !motion || !motion->is_table;
     if (!side.is_displaced) return;
     for (size_t i = 0; i < term.value.iterators.size(); ++i) {
-      const double slope = motion ? motion->slopes[i].value_or(unknown_slope) : unknown_slope;
+      const double known = motion ? motion->slopes[i] : NAN;
+      const double slope = std::isnan(known) ? unknown_slope : known;
       if (slope != 0)
-        side.moves.push_back(
-            {term.value.iterators[i], slope * static_cast<double>(term.coefficient), false});
+        side.moves.push_back({term.value.iterators[i], slope * double(term.coefficient)});
     }
     // Values that nothing but data move go anywhere between their ends.
     side.is_displaced = !side.moves.empty();

@@ -16,8 +16,7 @@ namespace retrograde::planning {
 struct TouchedSide {
   struct Move {
     int16_t iterator;
-    double slope;   // elements from one point to the next
-    bool is_exact;  // not of a data-dependent index
+    double slope;  // elements from one point to the next
   };
   double taps = 1, reach = 1;  // of one iteration: elements, and from the first to the last
   std::vector<Move> moves;     // the smallest slope first

@@ -28,15 +28,10 @@ class StageWork {
   }
 
   UnitTimes find() {
-    for (const Touch& touch : run_.facts->touches) {
-      for (size_t d = 0; touch.writes && d < depth(); ++d)
-        if (is_serial(d) && run_.nest.trips[d] > 1 && moves(d, touch.moved))
-          last_mover_ = static_cast<int>(d);
-    }
     for (const OperationRow& row : run_.facts->operations) add_operation(row);
     for (const Touch& touch : run_.facts->touches) add_touch(touch);
     add_spills();
-    units_.chain /= overlapping_chains();
+    add_chains();
     const double taken = run_.facts->taken;
     for (double UnitTimes::*part : {&UnitTimes::arithmetic, &UnitTimes::loads, &UnitTimes::stores,
                                     &UnitTimes::scalars, &UnitTimes::chain})
@@ -52,9 +47,9 @@ class StageWork {
   const LaneLoop& lanes_;
   int innermost_ = -1;  // the serial loop that runs innermost
   UnitTimes units_;
-  double accumulators_ = 0, invariants_ = 0;  // registers of the innermost serial loop
-  double instructions_ = 0;                   // of all iterations
-  int last_mover_ = -1;                       // the innermost serial loop that moves the write
+  double accumulators_ = 0, invariants_ = 0;       // registers of the innermost serial loop
+  double instructions_ = 0;                        // of all iterations
+  std::vector<std::pair<double, double>> chains_;  // nanoseconds, and how many independent ones
 
   size_t depth() const { return run_.nest.trips.size(); }
   const LoopNode& node(size_t d) const {
@@ -119,7 +114,7 @@ class StageWork {
     const StoredBuffer& stored = group_.buffers.at(touch.buffer);
     const bool is_sum = touch.is_own || (touch.writes && has_own_read());
     note_registers(touch, is_sum);
-    if (touch.is_own) add_chain(touch);
+    if (touch.is_own) add_sum(touch);
     if (touch.carried) add_recurrence(touch);
     const double count = touch.count * times(touch.moved) * (1 - stored.register_share);
     instructions_ += count * vectors(touch.element_bytes, touch.moved);
@@ -190,34 +185,44 @@ class StageWork {
 
   // ---- chains ----
 
+  // `ns` of each iteration of the innermost serial loop wait for the iteration before, in the loops from `depth` inwards.
+  // Short chains of different elements run at the same time, as far as the core looks ahead.
+  void add_chain(double iteration_ns, size_t from) {
+    double runs = place_times();
+    for (size_t d = 0; d < from; ++d)
+      if (is_serial(d)) runs *= run_.nest.trips[d];
+    chains_.push_back({iterations() * iteration_ns, runs});
+  }
+
   // A sum waits for the last one to the same element: in a register, or through memory where neighbours meet.
-  void add_chain(const Touch& touch) {
+  void add_sum(const Touch& touch) {
     if (innermost_ < 0) return;
+    const auto innermost = static_cast<size_t>(innermost_);
     if (touch.data != 0) {
       const double in_vector = touch.data & lanes_.moves ? lanes_.count : 1;
-      units_.chain +=
-          iterations() * copies(0, false) * in_vector * equal_neighbours * m_.memory_latency_ns;
-    } else if (!moves(static_cast<size_t>(innermost_), touch.moved)) {
-      units_.chain += iterations() * copies(touch.moved, false) * m_.latency_ns;
+      add_chain(copies(0, false) * in_vector * equal_neighbours * m_.memory_latency_ns, 0);
+    } else if (!moves(innermost, touch.moved)) {
+      size_t from = innermost;
+      while (from > 0 && !(is_serial(from - 1) && moves(from - 1, touch.moved))) --from;
+      add_chain(copies(touch.moved, false) * m_.latency_ns, from);
     }
   }
   // An element waits for the one before, which the last iteration stored.
   void add_recurrence(const Touch& touch) {
     if (innermost_ < 0 || !moves(static_cast<size_t>(innermost_), touch.carried)) return;
+    size_t from = 0;
+    while (!moves(from, touch.carried)) ++from;
     double in_iteration = 1;
     for (size_t d = static_cast<size_t>(innermost_) + 1; d < depth(); ++d)
       if (kind(d) == ForType::Unrolled && moves(d, touch.carried))
         in_iteration *= run_.nest.trips[d];
-    const double chain = iterations() * in_iteration * m_.memory_latency_ns;
-    units_.chain = std::max(units_.chain, chain);
+    add_chain(in_iteration * m_.memory_latency_ns, from);
   }
-
-  // Short sums of different elements run at the same time, as far as the core looks ahead.
-  double overlapping_chains() const {
-    double runs = place_times();
-    for (int d = 0; d <= last_mover_; ++d)
-      if (is_serial(static_cast<size_t>(d))) runs *= run_.nest.trips[static_cast<size_t>(d)];
-    return std::max(1.0, core.reorder_window * runs / std::max(instructions_, 1.0));
+  void add_chains() {
+    for (const auto& [chain_ns, runs] : chains_) {
+      const double overlap = core.reorder_window * runs / std::max(instructions_, 1.0);
+      units_.chain = std::max(units_.chain, chain_ns / std::max(overlap, 1.0));
+    }
   }
 
   void add_loops() {
