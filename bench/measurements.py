@@ -14,8 +14,9 @@ import re
 import sys
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-sys.path += [HERE, os.path.join(HERE, "operators")]
+sys.path += [HERE, os.path.join(HERE, "operators"), os.path.join(HERE, "plans")]
 import decisions  # noqa: E402
+import judge  # noqa: E402
 import model  # noqa: E402
 
 
@@ -202,7 +203,7 @@ def compile_time(report):
 SECTIONS = {"demo": demo, "kernels": pairs, "gradient_peers": pairs, "programs": programs,
             "programs_second": programs, "programs_gradients": programs, "gradients": gradients,
             "pytorch_peers": pytorch, "torch": torch_operators, "outside": outside, "operators": operators, "autoscheduled": autoscheduled,
-            "compile_time": compile_time, "model": model.table,
+            "compile_time": compile_time, "model": model.table, "plans": judge.table,
             "decisions": lambda report: decisions.table(report) + "\n"}
 
 

@@ -174,7 +174,7 @@ class GroupBuilder {
     return covers_.box(func, level);
   }
 
-  // What all loops of the nest run over. Where a Func is stored outside of the loop in which it is computed, an iteration
+  // The points of all loops of the nest. Where a Func is stored outside of the loop in which it is computed, an iteration
   // computes only what the iteration before has not.
   Cover extents_of(const StageRun& run) {
     if (!is_at(run.id.func) || run.place <= 1) return whole_cover(run.id, sizes_);

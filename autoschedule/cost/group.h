@@ -8,11 +8,22 @@
 #include <map>
 #include <vector>
 
-#include "autoschedule/cost/nest_trips.h"
 #include "autoschedule/cost/stage_facts.h"
+#include "autoschedule/machine/machine.h"
 #include "autoschedule/plan/covers.h"
+#include "autoschedule/plan/plan.h"
 
 namespace retrograde::planning {
+
+// How often the loops of a nest run, and which iterators they move.
+struct NestTrips {
+  std::vector<double> trips;       // by depth, of one run of the loops around it
+  std::vector<IteratorSet> moves;  // by depth
+  LaneLoop lanes;                  // of the loop over lanes, if there is one
+};
+
+// `extents`: the points of the stage's iterators that all loops together run over.
+NestTrips nest_trips(const Nest& nest, const Cover& extents);
 
 struct LoopNode {
   int parent = -1;  // of the root: none
@@ -33,7 +44,7 @@ struct StageRun {
   std::vector<int> path;     // nodes from the root to the innermost loop
   size_t place = 1;          // how many of them are around the stage's own nest
   size_t storage_place = 1;  // and around the storage of its Func
-  // What the loops from path[k] inwards cover: whole[k]. All 1 at the end.
+  // The points that the loops from path[k] inwards run over are cover[k]. All 1 at the end.
   std::vector<Cover> cover;
 
   int node_of(size_t depth) const { return path[place + depth]; }
@@ -64,6 +75,18 @@ struct GroupMembers {
   std::vector<FuncId> funcs;
   std::vector<std::vector<FuncId>> inlined;
 };
+
+struct PlannedGroup {
+  GroupMembers members;
+  std::vector<FuncId> reads;  // Funcs of other groups, also through inlined ones; each once
+};
+
+// In the order in which they run.
+std::vector<PlannedGroup> groups_of(const Plan& plan, const AccessGraph& graph);
+
+// The bytes alive at once; `own`: what each group allocates for the Funcs that are computed in its loops.
+double peak_bytes(const Plan& plan, const SizeModel& sizes, const std::vector<PlannedGroup>& groups,
+                  const std::vector<double>& own);
 
 Group group_of(const Plan& plan, const GroupMembers& members, Covers& covers,
                const SizeModel& sizes, const Machine& machine, FactsOfStages& facts);

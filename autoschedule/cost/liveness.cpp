@@ -1,7 +1,7 @@
 // The bytes that a program has allocated at once.
 #include <algorithm>
 
-#include "autoschedule/cost/program_groups.h"
+#include "autoschedule/cost/group.h"
 
 namespace retrograde::planning {
 

@@ -1,4 +1,4 @@
-#include "autoschedule/cost/nest_trips.h"
+#include "autoschedule/cost/group.h"
 
 #include <algorithm>
 #include <cmath>

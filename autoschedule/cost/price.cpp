@@ -6,10 +6,8 @@
 
 #include "autoschedule/cost/assumptions.h"
 #include "autoschedule/cost/cost.h"
-#include "autoschedule/cost/program_groups.h"
 #include "autoschedule/cost/recent.h"
-#include "autoschedule/cost/traffic.h"
-#include "autoschedule/cost/work.h"
+#include "autoschedule/cost/terms.h"
 
 namespace retrograde::planning {
 
@@ -50,14 +48,10 @@ struct KeyHash {
 class CostModel::Prices {
  public:
   Prices(const AccessGraph& accesses, const SizeModel& sizes, const Machine& machine)
-      : graph_(accesses),
-        sizes_(sizes),
-        machine_(machine),
-        finder_(accesses),
-        facts_(sizes, machine) {}
+      : graph_(accesses), sizes_(sizes), machine_(machine), facts_(sizes, machine) {}
 
   Cost price(const Plan& plan) {
-    const std::vector<PlannedGroup> groups = finder_.groups_of(plan);
+    const std::vector<PlannedGroup> groups = groups_of(plan, graph_);
     Covers covers(plan, sizes_);
     std::vector<const GroupPrice*> prices;
     for (const PlannedGroup& group : groups) prices.push_back(&price_of(plan, group, covers));
@@ -82,7 +76,6 @@ class CostModel::Prices {
   const AccessGraph& graph_;
   const SizeModel& sizes_;
   const Machine& machine_;
-  const GroupFinder finder_;
   FactsOfStages facts_;
   Hashes hashes_;
   std::unordered_map<Key, GroupPrice, KeyHash> known_;
@@ -140,7 +133,7 @@ class CostModel::Prices {
     for (const auto& [buffer, bytes] : price.traffic.touched) recent.touch(buffer, bytes);
   }
 
-  // What a cache supplies is what the smaller one lacks and it has.
+  // A cache supplies what the smaller one lacks and it has.
   void add_stages(const GroupPrice& price, const RecentBuffers& recent, Cost& cost) const {
     struct Bytes {
       double serial = 0, parallel = 0;

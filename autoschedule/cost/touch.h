@@ -53,17 +53,18 @@ struct LaneLoop {
   IteratorSet moves = 0;
 };
 
-struct LanePlaces {
-  enum class Kind : uint8_t { Uniform, Contiguous, Reversed, Strided, Bent, Gather };
-  Kind kind = Kind::Gather;
-  double stride = 1;          // in elements
-  double runs = 1;            // pieces that lie apart
+// Instructions of a load or store of all lanes.
+struct LaneMoves {
+  double vectors = 1, shuffles = 0;
+  bool is_by_lane = false;    // an element at a time
   bool is_unaligned = false;  // vectors begin anywhere in a cache line
 };
 
 // Cache lines while the loops run over these points.
 double touched_lines(const Touch& touch, const Layout& layout, const Cover& cover);
-LanePlaces lane_places(const Touch& touch, const Layout& layout, const LaneLoop& lanes);
+// `vectors`: of the machine, that the lanes fill.
+LaneMoves lane_moves(const Touch& touch, const Layout& layout, const LaneLoop& lanes,
+                     double vectors);
 
 // The touches of the accesses of one stage.
 std::vector<Touch> touches_of(const std::vector<const Access*>& accesses, const SizeModel& sizes,

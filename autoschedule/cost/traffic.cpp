@@ -1,4 +1,7 @@
-#include "autoschedule/cost/traffic.h"
+// The outermost loops whose run fits into a cache load what they touch once. Loops of which one iteration fits do, too:
+// what iterations share, such as the rows of a stencil, is used again while it is there. Farther out, all is loaded anew.
+// Source: Wolf and Lam, "A Data Locality Optimizing Algorithm" (PLDI 1991).
+#include "autoschedule/cost/terms.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +14,7 @@ namespace retrograde::planning {
 
 namespace {
 
-// What is touched of a buffer.
+// The part of a buffer that is touched.
 struct Region {
   int buffer = 0, run = 0;
   double bytes = 0;
@@ -42,7 +45,7 @@ class RegionFinder {
   // While all iterations of a node run, and one of them.
   const Regions& run(int node) const { return runs_[static_cast<size_t>(node)]; }
   const Regions& iteration(int node) const { return iterations_[static_cast<size_t>(node)]; }
-  // What the stages touch themselves whose innermost loop it is.
+  // The touches of the stages whose innermost loop it is.
   Regions own(int node) const {
     Regions result;
     for (const int run : group_.nodes[static_cast<size_t>(node)].stages)

@@ -1,6 +1,6 @@
-// What does not change in a loop is computed outside of it, and what unrolled copies have in common once for all. So an
+// Values that a loop does not change are computed outside of it, and those that unrolled copies have in common once. So an
 // operation is executed as often as the loops run that are outside of the innermost loop that changes it, and that loop.
-#include "autoschedule/cost/work.h"
+#include "autoschedule/cost/terms.h"
 
 #include <algorithm>
 #include <cmath>
@@ -125,47 +125,19 @@ class StageWork {
   }
 
   void add_moves(const Touch& touch, const StoredBuffer& stored, double count) {
-    const LanePlaces places = lane_places(touch, stored.layout, lanes_);
-    const double lanes = is_vector(touch.moved) ? lanes_.count : 1;
-    const double whole = vectors(touch.element_bytes, touch.moved);
-    double moved = 1, single = 0, shuffled = 0;  // vectors, elements, shuffles
-    using Kind = LanePlaces::Kind;
-    switch (places.kind) {
-      case Kind::Uniform:
-        break;
-      case Kind::Contiguous:
-      case Kind::Reversed:
-        moved = std::max(whole, places.runs);  // runs that lie apart are put together
-        if (places.is_unaligned) moved *= 1 + m_.vector_bytes / double(line_bytes);
-        if (places.runs > whole) shuffled = moved;
-        if (places.kind == Kind::Reversed) shuffled = whole;
-        break;
-      case Kind::Strided:
-        if (places.stride > longest_vector_stride) {
-          moved = 0;
-          single = lanes;
-        } else {
-          moved = std::max(1.0, places.stride) * whole;
-          shuffled = (touch.writes ? 2 : 1) * moved;
-        }
-        break;
-      case Kind::Bent:
-        moved = 2 * whole;
-        shuffled = whole;
-        break;
-      case Kind::Gather:
-        moved = 0;
-        single = lanes;
-        break;
-    }
+    const LaneMoves moved =
+        lane_moves(touch, stored.layout, lanes_, vectors(touch.element_bytes, touch.moved));
     double& units = touch.writes ? units_.stores : units_.loads;
-    const double vector_ns = touch.writes ? m_.store_ns : m_.load_ns;
-    const double lane_ns = touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns;
-    units += count * (moved * vector_ns + single * lane_ns);
-    units_.arithmetic += count * shuffled * m_.shuffle_ns;
+    if (moved.is_by_lane) {
+      units += count * lanes_.count * (touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns);
+      return;
+    }
+    const double crossing = moved.is_unaligned ? 1 + m_.vector_bytes / double(line_bytes) : 1;
+    units += count * moved.vectors * crossing * (touch.writes ? m_.store_ns : m_.load_ns);
+    units_.arithmetic += count * moved.shuffles * m_.shuffle_ns;
   }
 
-  // What the innermost loop does not move stays in registers.
+  // Elements that the innermost loop does not move stay in registers.
   void note_registers(const Touch& touch, bool is_sum) {
     if (innermost_ < 0 || moves(static_cast<size_t>(innermost_), touch.moved)) return;
     const double needed =
@@ -176,7 +148,7 @@ class StageWork {
       invariants_ += needed;
   }
   void add_spills() {
-    const double excess = accumulators_ + invariants_ + passing_registers - m_.registers;
+    const double excess = accumulators_ + invariants_ + passing_operands - m_.registers;
     if (excess <= 0) return;
     const double sums = std::min(excess, accumulators_);
     units_.loads += iterations() * std::min(excess, accumulators_ + invariants_) * m_.load_ns;

@@ -55,6 +55,18 @@ inline constexpr double launch_cycles = 20000;
 inline constexpr double atomic_add_operations = 8;
 inline constexpr int64_t uncontended_lines = 1 << 10;
 
+// ---- Programs ----
+
+// The extent of a dimension of which nothing is known.
+inline constexpr int64_t unknown_extent = 1000;
+
+// ---- Code ----
+
+// Operations in the body of a loop, with its unrolled copies: the time that compiling takes grows with them.
+inline constexpr int64_t most_body_operations = 2000;
+// How often each value of a Func is computed at most, if loops that overlap compute it again.
+inline constexpr double most_recomputation = 16;
+
 // ---- The cost of memory, in operations on an element of a vectorized loop ----
 
 // Storing a value to memory and loading it again: 12 bytes at the bandwidth of a core, against one operation a lane and

@@ -4,6 +4,7 @@
 #include <type_traits>
 
 #include "autoschedule/plan/nest.h"
+#include "autoschedule/plan/readers.h"
 #include "diagnostics/error.h"
 
 namespace retrograde::planning {
@@ -17,11 +18,12 @@ const char* opacity_name(Opacity opacity) {
 }
 
 ProgramPtr make_program(const std::vector<graph::FuncPtr>& outputs) {
-  auto program = std::make_shared<Program>(Program{outputs, graph::topological_order(outputs)});
+  auto program = std::make_shared<Program>(Program{outputs, graph::topological_order(outputs), {}});
   for (const graph::FuncPtr& f : program->funcs) {
     RETROGRADE_ASSERT(f->wrappers.empty() && f->copied_inputs.empty(), "wrappers of ",
                       quoted(f->name), " are not applied");
   }
+  program->readers = readers_of(program->funcs);
   return program;
 }
 

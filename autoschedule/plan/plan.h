@@ -14,7 +14,7 @@
 // fusion of two loops is an iterator of its nest, too, whose loops have steps of their own: `(x:16 y):4, (x:16 y)`.
 //
 //   import_plan   reads the directives of a scheduled graph into a plan          import.cpp
-//   emit_plan     gives the directives of a plan to a copy of the graph          emit.cpp
+//   emit_plan, emit_changes   give the directives of a plan to a copy of the graph   emit.cpp
 //   to_text, parse_plan   the text form                                          print.cpp, parse.cpp
 //   validate      checks the invariants of plans                                 validate.cpp
 #pragma once
@@ -150,6 +150,7 @@ uint64_t hash_of(const FuncPlan& plan);
 // that are not applied yet.
 struct Program {
   std::vector<graph::FuncPtr> outputs, funcs;
+  std::vector<std::vector<StageId>> readers;  // of each Func: the stages of others that read it
 };
 using ProgramPtr = std::shared_ptr<const Program>;
 ProgramPtr make_program(const std::vector<graph::FuncPtr>& outputs);
@@ -177,6 +178,9 @@ Plan import_plan(const std::vector<graph::FuncPtr>& outputs);
 // Gives the plan's directives to a copy of the program and returns the outputs of that. Opaque Funcs keep theirs.
 // Directives check that the stages allow the loops; what they cannot know is left to `validate`.
 std::vector<graph::FuncPtr> emit_plan(const Plan& plan);
+// The same, but Funcs that run alike in `kept`, the plan that was imported from the program, keep the directives that they
+// have there, among them those that made other Funcs (rfactor, wrappers).
+std::vector<graph::FuncPtr> emit_changes(const Plan& plan, const Plan& kept);
 
 // One line for each Func, consumers first, and one for each stage where there are several.
 std::string to_text(const Plan& plan);
@@ -188,6 +192,9 @@ Plan parse_plan(const std::string& text, const ProgramPtr& program);
 
 // The first invariant that the plan breaks, with the Func, the loop and the rule; empty when it keeps all of them.
 std::string broken_invariant(const Plan& plan);
+// The same without P5, which takes as long as emitting the plan. P1 and P4 are checked for the Funcs that differ from
+// those of `before`, which keeps all invariants.
+std::string broken_structure(const Plan& plan, const Plan& before);
 // InternalError when the plan breaks one.
 void validate(const Plan& plan);
 

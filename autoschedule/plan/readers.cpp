@@ -1,6 +1,7 @@
 #include "autoschedule/plan/readers.h"
 
 #include <algorithm>
+#include <unordered_map>
 
 #include "autoschedule/plan/loop_names.h"
 #include "ir/build.h"
@@ -33,28 +34,26 @@ std::optional<int> depth_in(const Plan& plan, StageId stage, const Level& level)
   return static_cast<int>(found - own.begin());
 }
 
-Readers::Readers(const Plan& plan) : plan_(plan) {
-  std::unordered_map<const graph::FuncContents*, FuncId> ids;
-  const auto count = static_cast<FuncId>(plan.funcs.size());
-  for (FuncId id = 0; id < count; ++id) ids[&func(id)] = id;
-  for (FuncId id = 0; id < count; ++id) note_reads(id, ids);
-}
-
-void Readers::note_reads(FuncId id,
-                         const std::unordered_map<const graph::FuncContents*, FuncId>& ids) {
-  const graph::FuncContents& f = func(id);
-  const auto note = [&](const graph::FuncContents* callee, int stage) {
-    std::vector<StageId>& readers = readers_[ids.at(callee)];
-    const StageId reader{id, static_cast<int16_t>(stage)};
-    if (callee != &f && (readers.empty() || readers.back() != reader)) readers.push_back(reader);
-  };
-  for (int s = 0; s < f.stage_count(); ++s) {
-    walk(f.stage(s), [&](const Call& call) {
-      if (call.call_type == CallType::Func) note(graph::func_of(call).get(), s);
-    });
+std::vector<std::vector<StageId>> readers_of(const std::vector<graph::FuncPtr>& funcs) {
+  std::unordered_map<const graph::FuncContents*, size_t> ids;
+  for (const graph::FuncPtr& f : funcs) ids.emplace(f.get(), ids.size());
+  std::vector<std::vector<StageId>> readers(funcs.size());
+  for (size_t id = 0; id < funcs.size(); ++id) {
+    const graph::FuncContents& f = *funcs[id];
+    const auto note = [&](const graph::FuncContents* callee, int stage) {
+      std::vector<StageId>& list = readers[ids.at(callee)];
+      const StageId reader{static_cast<FuncId>(id), static_cast<int16_t>(stage)};
+      if (callee != &f && (list.empty() || list.back() != reader)) list.push_back(reader);
+    };
+    for (int s = 0; s < f.stage_count(); ++s) {
+      walk(f.stage(s), [&](const Call& call) {
+        if (call.call_type == CallType::Func) note(graph::func_of(call).get(), s);
+      });
+    }
+    if (!f.is_extern()) continue;
+    for (const graph::FuncPtr& callee : graph::direct_callees(f)) note(callee.get(), 0);
   }
-  if (!f.is_extern()) return;
-  for (const graph::FuncPtr& callee : graph::direct_callees(f)) note(callee.get(), 0);
+  return readers;
 }
 
 // Whether the values of the Func are computed wherever they are read.
@@ -67,9 +66,7 @@ bool Readers::is_computed_at_reads(FuncId id) const {
 }
 
 std::optional<StageId> Readers::find_outside(FuncId id, const Level& level) const {
-  const auto readers = readers_.find(id);
-  if (readers == readers_.end()) return std::nullopt;
-  for (const StageId reader : readers->second) {
+  for (const StageId reader : plan_.program->readers[static_cast<size_t>(id)]) {
     if (is_computed_at_reads(reader.func)) {
       if (const auto outside = find_outside(reader.func, level)) return outside;
     } else if (!is_inside(reader, level)) {

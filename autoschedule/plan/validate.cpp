@@ -33,24 +33,30 @@ bool is_parallel(ForType kind) {
 
 class PlanChecker {
  public:
-  explicit PlanChecker(const Plan& plan) : plan_(plan) {}
+  // `before`: null, or a plan that keeps the invariants.
+  PlanChecker(const Plan& plan, const Plan* before) : plan_(plan), before_(before) {}
 
   std::string run() {
-    for_each_planned([&](StageId stage) { check_steps(stage); });
+    check_structure();
+    if (broken_.empty()) check_order();
+    return broken_;
+  }
+  std::string check_structure() {
+    for_each_changed([&](StageId stage) { check_steps(stage); });
     for_each_func([&](FuncId id) { check_levels(id); });
     if (!broken_.empty()) return broken_;
     const Readers readers(plan_);
     for_each_func([&](FuncId id) { check_reads(id, readers); });
     for_each_func([&](FuncId id) { check_storage(id); });
-    for_each_planned([&](StageId stage) { check_lanes(stage); });
+    for_each_changed([&](StageId stage) { check_lanes(stage); });
     for_each_func([&](FuncId id) { check_outside_of_lanes(id); });
-    if (broken_.empty()) check_order();
     return broken_;
   }
 
  private:
   using Kind = Level::Kind;
   const Plan& plan_;
+  const Plan* before_;
   std::string broken_;
 
   template <typename... Parts>
@@ -62,8 +68,10 @@ class PlanChecker {
     for (size_t id = 0; id < plan_.funcs.size(); ++id) f(static_cast<FuncId>(id));
   }
   template <typename F>
-  void for_each_planned(const F& f) const {
+  void for_each_changed(const F& f) const {
     for_each_func([&](FuncId id) {
+      const auto i = static_cast<size_t>(id);
+      if (before_ && plan_.funcs[i] == before_->funcs[i]) return;
       for (size_t s = 0; s < plan_.of(id).nests.size(); ++s)
         f(StageId{id, static_cast<int16_t>(s)});
     });
@@ -229,7 +237,10 @@ class PlanChecker {
 
 }  // namespace
 
-std::string broken_invariant(const Plan& plan) { return PlanChecker(plan).run(); }
+std::string broken_invariant(const Plan& plan) { return PlanChecker(plan, nullptr).run(); }
+std::string broken_structure(const Plan& plan, const Plan& before) {
+  return PlanChecker(plan, &before).check_structure();
+}
 
 void validate(const Plan& plan) {
   const std::string broken = broken_invariant(plan);

@@ -19,6 +19,7 @@ namespace retrograde::tuning {
 namespace {
 
 constexpr int fewest_timed_runs = 3;
+constexpr const char* asked_of_schedule = "measure a schedule";
 
 Buffer<> buffer_of(Type type, const BufferShape& shape) {
   std::vector<int> sizes;
@@ -93,31 +94,55 @@ void bind_sample_inputs(const std::vector<FuncPtr>& outputs) {
   }
 }
 
+std::vector<Buffer<>> sample_outputs(const std::vector<FuncPtr>& outputs) {
+  std::vector<Buffer<>> result;
+  const std::vector<BufferShape> shapes = output_shapes(outputs);
+  for (const FuncPtr& f : outputs) {
+    for (const Type& type : f->types) result.push_back(buffer_of(type, shapes[result.size()]));
+  }
+  return result;
+}
+
+struct CompiledSchedule::Call {
+  CompiledOnce code;
+  std::vector<Buffer<>> outputs;
+  JITHandlers handlers;
+  std::unique_ptr<frontend::Arguments> arguments;
+};
+
+CompiledSchedule::CompiledSchedule(const std::vector<FuncPtr>& scheduled, const Target& target,
+                                   int threads)
+    : call_(std::make_unique<Call>(Call{CompiledOnce(lowered(scheduled, target), target, {}),
+                                        sample_outputs(scheduled),
+                                        {},
+                                        nullptr})) {
+  std::vector<halide_buffer_t*> raw;
+  for (Buffer<>& buffer : call_->outputs) raw.push_back(buffer.raw_buffer());
+  call_->arguments = std::make_unique<frontend::Arguments>(
+      call_->code, raw, false, asked_of_schedule, ParamMap::empty_map());
+  if (threads > 0) call_->handlers.thread_limit = threads;
+}
+
+CompiledSchedule::~CompiledSchedule() = default;
+
+double CompiledSchedule::run() const {
+  const auto begin = std::chrono::steady_clock::now();
+  frontend::call(call_->code, call_->handlers, call_->arguments->argv(), asked_of_schedule,
+                 nullptr);
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
+  return spent.count();
+}
+
 MeasuredSchedule measure_schedule(const std::vector<FuncPtr>& scheduled, const Target& target,
                                   const MeasureOptions& options) {
-  using Clock = std::chrono::steady_clock;
-  const auto since = [](Clock::time_point begin) {
-    return std::chrono::duration<double>(Clock::now() - begin).count();
-  };
-  const CompiledOnce code(lowered(scheduled, target), target, {});
-  std::vector<Buffer<>> made;
-  std::vector<halide_buffer_t*> outputs;
-  const std::vector<BufferShape> shapes = output_shapes(scheduled);
-  for (const FuncPtr& f : scheduled) {
-    for (const Type& type : f->types) made.push_back(buffer_of(type, shapes[made.size()]));
-  }
-  for (Buffer<>& buffer : made) outputs.push_back(buffer.raw_buffer());
-  const std::string asked = "measure a schedule";
-  frontend::Arguments arguments(code, outputs, false, asked, ParamMap::empty_map());
-  JITHandlers handlers;
-  if (options.threads > 0) handlers.thread_limit = options.threads;
+  const CompiledSchedule compiled(scheduled, target, options.threads);
   MeasuredSchedule result{std::numeric_limits<double>::infinity(), 0};
-  const auto begin = Clock::now();
-  while (result.runs < fewest_timed_runs || since(begin) < options.seconds) {
-    const auto start = Clock::now();
-    frontend::call(code, handlers, arguments.argv(), asked, nullptr);
-    result.seconds = std::min(result.seconds, since(start));
+  double spent = 0;
+  while (result.runs < fewest_timed_runs || spent < options.seconds) {
+    const double seconds = compiled.run();
     result.runs++;
+    spent += seconds;
+    result.seconds = std::min(result.seconds, seconds);
     if (options.hopeless_seconds > 0 && result.seconds > options.hopeless_seconds) break;
   }
   return result;

@@ -68,6 +68,8 @@ MeasuredStages measure_stages(const PipelineSpec& pipeline,
     result.total_seconds = std::min(result.total_seconds, call());
   const halide_profiler_pipeline_stats* stats = retrograde_profiler_pipeline(name.c_str());
   if (!stats || stats->time == 0) return result;
+  result.sampled_seconds = 1e-9 * static_cast<double>(stats->time);
+  result.peak_bytes = static_cast<double>(stats->memory_peak);
   // The shares are of all runs, the time is that of the fastest.
   for (int i = 0; i < stats->num_funcs; i++) {
     const double share =

@@ -13,6 +13,8 @@ namespace retrograde::tuning {
 struct MeasuredStages {
   std::map<std::string, double> seconds;  // of one run, by Func; "overhead" is none
   double total_seconds = 0;               // of the fastest run
+  double sampled_seconds = 0;             // of all runs, one sample a millisecond
+  double peak_bytes = 0;                  // of the memory that a run allocates
 };
 
 // `scheduled`: what lowering is given, of the pipeline.

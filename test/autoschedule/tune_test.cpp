@@ -47,7 +47,8 @@ const std::string& program() {
     Func product("product"), rows("rows"), out("out");
     a.dim(0).set_estimate(0, 96).dim(1).set_estimate(0, 96);
     b.dim(0).set_estimate(0, 96).dim(1).set_estimate(0, 96);
-    product(x, y) += a(k, y) * b(x, k);
+    const Func read_b = b;  // the image is read through a Func
+    product(x, y) += a(k, y) * read_b(x, k);
     rows(x, y) = exp(product(x, y)) + product(x, y + 1);
     out(x, y) = rows(x, y) + rows(x + 1, y) * rows(x + 2, y);
     out.set_estimate(x, 0, 90).set_estimate(y, 0, 90);

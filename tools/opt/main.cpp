@@ -15,6 +15,8 @@
 //                                                   prints the schedule as a plan (autoschedule/plan/plan.h)
 //   opt --graph [--pass=schedule_unscheduled] --cost program.graph
 //                                                   prints what the schedule costs (autoschedule/cost/cost.h)
+//   opt --graph --move=tile [--func=f] program.graph
+//                                                   prints the plans that a move gives (move_text.h)
 //   opt --time-passes --dump-after=all ...          prints the time and the result of each pass
 //   opt --time-passes --dump-after=PASS,... -- PROGRAM ARGS...
 //                                                   for everything that a program compiles while it runs
@@ -51,6 +53,7 @@
 #include "ir/print.h"
 #include "lower/lower.h"
 #include "lower/statement_passes.h"
+#include "move_text.h"
 #include "program_text.h"
 #include "simplify/simplify.h"
 
@@ -60,7 +63,7 @@ using namespace retrograde;
 
 struct Options {
   std::vector<std::string> passes, dumped;
-  std::string file = "-", stop_after, log;
+  std::string file = "-", stop_after, log, move, func;
   std::vector<char*> program;  // the words after "--", null-terminated
   bool lists = false, lists_pipeline = false, is_expr = false, is_graph = false, times = false,
        prints = false, plans = false, prices = false;
@@ -89,6 +92,10 @@ bool read_option(const std::string& arg, Options& options) {
     options.passes = split(*passes, ',');
   } else if (const auto log = value_of(arg, "log")) {
     options.log = *log;
+  } else if (const auto move = value_of(arg, "move")) {
+    options.move = *move;
+  } else if (const auto func = value_of(arg, "func")) {
+    options.func = *func;
   } else if (const auto dumped = value_of(arg, "dump-after")) {
     options.dumped = split(*dumped, ',');
   } else if (arg == "--print") {
@@ -194,7 +201,9 @@ std::string cost_text(const planning::Plan& plan, const Target& target) {
 }
 
 void run_graph(const Options& options) {
-  opt::ProgramText program = opt::parse_program(read_all(options.file), get_host_target());
+  opt::MoveText move = opt::split_move(read_all(options.file));
+  if (!options.func.empty()) move.func = options.func;
+  opt::ProgramText program = opt::parse_program(move.graph, get_host_target());
   if (!options.log.empty()) {
     const ScheduleLog log = ScheduleLog::parse(read_all(options.log));
     program.graph = graph::graph_of(graph::with_log(log, program.graph.outputs));
@@ -209,10 +218,12 @@ void run_graph(const Options& options) {
   std::string result = graph::to_text(program.graph);
   for (const std::string& pass : options.passes) {
     result = opt::text_after(pass, program);
-    if (&pass != &options.passes.back() || options.plans || options.prices)
+    if (&pass != &options.passes.back() || options.plans || options.prices || !options.move.empty())
       program = opt::parse_program(result, program.target);
   }
-  if (options.plans || options.prices) {
+  if (!options.move.empty()) {
+    result = opt::plans_after(options.move, move, program.graph.outputs);
+  } else if (options.plans || options.prices) {
     const auto plan = planning::import_plan(graph::apply_wrappers(program.graph.outputs));
     result = options.plans ? to_text(plan) : "";
     if (options.prices) result += cost_text(plan, program.target);
@@ -324,6 +335,7 @@ int main(int argc, char** argv) {
                  "       opt --print [FILE]\n"
                  "       opt --graph [--log=FILE] [--pass=NAME,... | --stop-after=NAME] [--plan] "
                  "[--cost] [FILE]\n"
+                 "       opt --graph [--pass=NAME,...] --move=NAME [--func=NAME] [FILE]\n"
                  "       opt [--time-passes] [--dump-after=NAME,...|all] -- PROGRAM ARGS...\n"
                  "       opt --list | --list-pipeline\n";
     return 2;

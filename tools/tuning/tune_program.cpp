@@ -115,9 +115,9 @@ class Session {
       : name_(name), options_(options), database_(database), out_(out) {
     program_ = database.program(name, text);
     machine_ = database.machine(planning::processor_name());
-    graph::Graph graph = graph::parse_graph(text);
-    graph::validate(graph, "parse_graph");
-    outputs_ = graph::apply_wrappers(graph.outputs);
+    graph_ = graph::parse_graph(text);
+    graph::validate(graph_, "parse_graph");
+    outputs_ = graph::apply_wrappers(graph_.outputs);
     tuning::bind_sample_inputs(outputs_);
   }
 
@@ -141,6 +141,7 @@ class Session {
   std::ostream& out_;
   const Target target_ = get_jit_target_from_environment();
   int64_t program_ = 0, machine_ = 0;
+  graph::Graph graph_;  // keeps the parameters that expressions read
   std::vector<FuncPtr> outputs_;
   int measured_ = 0, known_ = 0, left_ = 0;
   double best_seconds_ = 0, rules_seconds_ = 0;  // 0: none yet

@@ -19,12 +19,12 @@ struct CostProbes : ::testing::Test {
       image->dim(1).set_estimate(0, 2048);
     }
   }
-  // Of `out`, whose size is that of the images if nothing else is said.
+  // The cost of `out`, whose size is that of the images if nothing else is said.
   Cost cost_of(const std::string& text) {
     if (!std::exchange(is_sized, true)) out.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
     return priced(out, text);
   }
-  // Of the update, the loops of which are given.
+  // The cost of its update with these loops.
   StageCost update_cost(const std::string& loops) {
     return cost_of("out  root\n  .0  y, x:16, vector x\n  .1  " + loops + "\n").stages[1];
   }
@@ -209,7 +209,7 @@ TEST_F(CostProbes, ARecurrenceAlongALineWaitsForMemory) {
   EXPECT_LT(update("y:16, r.x, unroll y"), 4095 * rows * 1.5e-9);
 }
 
-// ---- places that data decide ----
+// ---- data-dependent indices ----
 
 TEST_F(CostProbes, ATableIsReadALineAnElement) {
   ImageParam places(Int(32), 2, "places"), table(Float(32), 1, "table");

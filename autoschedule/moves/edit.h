@@ -1,0 +1,77 @@
+// edit.h -- the vocabulary in which moves are written: questions about loops, changes of a nest, changes of a plan.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "autoschedule/moves/move.h"
+
+namespace retrograde::planning::moves {
+
+// ---- questions ----
+
+// Whether the plan expresses the Func, all of its loops run on the processor, and each is a step of one iterator that
+// stands outside of smaller steps (L8).
+bool is_editable(const Plan& plan, FuncId func);
+// Whether it is also computed somewhere, so that it has loops.
+bool has_loops(const Plan& plan, FuncId func);
+// Whether iterations of a loop over the iterator may run in any order, and concurrently (L1, L6).
+bool is_free(const Context& context, StageId stage, int iterator);
+// Whether the region that is read of the Func is bounded (L3), also through inlined Funcs: data decide no index without a
+// range.
+bool has_bounded_region(const Plan& plan, const Context& context, FuncId func);
+// Whether no loop needs a dimension of constant extent (L4).
+bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func);
+bool is_reduction(const Context& context, StageId stage, int iterator);
+// The depth of a loop; of the loop with step 1, which exists in plans.
+std::optional<size_t> find_loop(const Nest& nest, int iterator, int64_t step);
+size_t innermost_loop(const Nest& nest, int iterator);
+// The next larger step of the same iterator; 0: there is none.
+int64_t outer_step(const Nest& nest, int iterator, int64_t step);
+std::optional<size_t> vector_loop(const Nest& nest);
+// The first of the loops at the end that are unrolled or lanes: they make the body of the loops around them.
+size_t body_depth(const Nest& nest);
+// The points of an iterator that run inside of a loop: the estimated extent if no loop down to this one steps over it.
+int64_t points_inside(const Context& context, StageId stage, const Nest& nest, int depth,
+                      int iterator);
+// How often a loop runs for each iteration of the loops around it.
+int64_t trips(const Context& context, StageId stage, const Nest& nest, size_t depth);
+// Copies of the stage's definition in the code that its loops make.
+int64_t copies(const Nest& nest, const Context& context, StageId stage);
+// Operations of the stage's definition and of what is inlined into it (L5).
+int64_t operations(const Plan& plan, const Context& context, StageId stage);
+// The lanes of a vector of the stage's values along a loop of this extent: a vector, or for a shorter loop the half or
+// quarter of one. 1: the loop is too short.
+int64_t lanes_for(const Plan& plan, StageId stage, int64_t extent);
+
+// ---- changes of a nest ----
+
+// Adds a loop with this step before the loop at `depth`.
+void insert_step(Nest& nest, int iterator, int64_t step, size_t depth,
+                 ForType kind = ForType::Serial);
+// Removes a loop; the loop of the next larger step runs over its points.
+void drop_loop(Nest& nest, size_t depth);
+// The nest without lanes and unrolled loops, and without the steps that made room for them; nullopt if lanes add up a
+// sum, whose chains of additions would become longer. Unrolled loops of the reduction stay where they are.
+std::optional<Nest> without_body(const Nest& nest, const Context& context, StageId stage);
+// Runs so many points of the iterator inside of all other loops. Requires: no step is smaller, except 1.
+void run_inside(Nest& nest, int iterator, int64_t points, ForType kind);
+// Serial loops for the stage of a Func whose dimensions have these extents, along rows: lanes of the first stored
+// dimension inside, then the reduction, then the other dimensions. `min_lanes`: fewer aren't used.
+Nest row_loops(const Plan& plan, const Context& context, StageId stage,
+               const std::vector<int64_t>& extents, int64_t min_lanes);
+// Makes the outermost loops parallel until there are enough chunks of work for the threads.
+void run_in_parallel(Nest& nest, const Context& context, StageId stage);
+
+// ---- changes of a plan ----
+
+// The plan in which the Func runs like this; nullopt if it's no other plan or not a legal one: a loop is gone in which
+// something is placed, its region changes though it needs constant extents (L4), a window changes (L9), or loops that
+// stages share differ (L11).
+std::optional<Plan> with_func(const Plan& plan, FuncId func, FuncPlan changed,
+                              const Context& context);
+std::optional<Plan> with_nest(const Plan& plan, StageId stage, Nest nest, const Context& context);
+// Adds a plan that isn't in the list yet.
+void add(std::vector<Plan>& plans, std::optional<Plan> plan);
+
+}  // namespace retrograde::planning::moves

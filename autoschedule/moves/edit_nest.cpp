@@ -1,0 +1,240 @@
+#include <algorithm>
+#include <functional>
+#include <map>
+
+#include "autoschedule/moves/edit.h"
+#include "autoschedule/plan/nest.h"
+
+namespace retrograde::planning::moves {
+
+namespace {
+
+bool runs_on_device(const Loop& loop) {
+  return loop.iterator == once || loop.kind == ForType::GpuBlock ||
+         loop.kind == ForType::GpuThread || loop.kind == ForType::GpuLane;
+}
+
+bool is_plain(const Nest& nest) {
+  if (!nest.fusions.empty()) return false;
+  for (size_t d = 0; d < nest.loops.size(); ++d) {
+    if (runs_on_device(nest.loops[d]) || nest.loops[d].in_blocks || is_phase(nest, d)) return false;
+  }
+  return true;
+}
+
+bool has_range(const IndexForm& form, const SizeModel& sizes) {
+  return sizes.range(form.within).is_bounded() ||
+         std::ranges::all_of(form.opaque, [&](const OpaqueTerm& term) {
+           return !term.value.from_data || term.range.is_bounded();
+         });
+}
+
+// Steps that divide the next larger one have no tail. Where a tail would compute more than is asked for, regions of
+// other Funcs would change, so all others are guards.
+void set_tails(Nest& nest, int iterator) {
+  int64_t larger = 0;
+  for (const Part& part : parts_of(nest, iterator)) {
+    Loop& loop = nest.loops[*find_loop(nest, iterator, part.step)];
+    const bool has_tail = part.step > 1 && (larger == 0 || larger % part.step != 0);
+    loop.tail = has_tail ? TailStrategy::GuardWithIf : TailStrategy::Auto;
+    larger = part.step;
+  }
+}
+
+}  // namespace
+
+// ---- questions ----
+
+bool is_editable(const Plan& plan, FuncId func) {
+  const FuncPlan& own = plan.of(func);
+  const bool in_memory =
+      own.storage.memory == MemoryType::Auto || own.storage.memory == MemoryType::Heap;
+  return own.opacity == Opacity::None && in_memory && std::ranges::all_of(own.nests, is_plain);
+}
+
+bool has_loops(const Plan& plan, FuncId func) {
+  const Level::Kind kind = plan.of(func).placement.compute.kind;
+  return is_editable(plan, func) && (kind == Level::Kind::Root || kind == Level::Kind::At);
+}
+
+bool has_bounded_region(const Plan& plan, const Context& context, FuncId func) {
+  for (const StageId reader : context.accesses.consumers(func)) {
+    const FuncPlan& other = plan.of(reader.func);
+    if (other.opacity != Opacity::None) return false;
+    for (const Access& read : context.accesses.stage(reader).reads) {
+      const auto is_bounded = [&](const IndexForm& form) { return has_range(form, context.sizes); };
+      if (read.of == func && !std::ranges::all_of(read.index, is_bounded)) return false;
+    }
+    const bool is_inlined = other.placement.compute.kind == Level::Kind::Inline;
+    if (is_inlined && !has_bounded_region(plan, context, reader.func)) return false;
+  }
+  return true;
+}
+
+bool is_reduction(const Context& context, StageId stage, int iterator) {
+  const StageNode& node = context.accesses.stage(stage);
+  return node.iterators[static_cast<size_t>(iterator)].kind == Iterator::Kind::Reduction;
+}
+
+// A pure variable stands for itself in the stage's own reads, too, so its iterations never meet.
+bool is_free(const Context& context, StageId stage, int iterator) {
+  return !is_reduction(context, stage, iterator);
+}
+
+std::optional<size_t> find_loop(const Nest& nest, int iterator, int64_t step) {
+  const auto found = std::ranges::find_if(
+      nest.loops, [&](const Loop& loop) { return loop.iterator == iterator && loop.step == step; });
+  if (found == nest.loops.end()) return std::nullopt;
+  return static_cast<size_t>(found - nest.loops.begin());
+}
+
+int64_t outer_step(const Nest& nest, int iterator, int64_t step) {
+  const std::vector<Part> parts = parts_of(nest, iterator);
+  const Part* larger = next_larger(parts, step);
+  return larger ? larger->step : 0;
+}
+
+size_t innermost_loop(const Nest& nest, int iterator) { return *find_loop(nest, iterator, 1); }
+
+std::optional<size_t> vector_loop(const Nest& nest) {
+  const auto found = std::ranges::find(nest.loops, ForType::Vectorized, &Loop::kind);
+  if (found == nest.loops.end()) return std::nullopt;
+  return static_cast<size_t>(found - nest.loops.begin());
+}
+
+size_t body_depth(const Nest& nest) {
+  size_t depth = nest.loops.size();
+  const auto is_body = [&](ForType kind) {
+    return kind == ForType::Vectorized || kind == ForType::Unrolled;
+  };
+  while (depth > 0 && is_body(nest.loops[depth - 1].kind)) --depth;
+  return depth;
+}
+
+int64_t points_inside(const Context& context, StageId stage, const Nest& nest, int depth,
+                      int iterator) {
+  int64_t points = std::max<int64_t>(context.sizes.of(stage, iterator).estimate, 1);
+  for (int d = 0; d <= depth; ++d) {
+    const Loop& loop = nest.loops[static_cast<size_t>(d)];
+    if (loop.iterator == iterator) points = std::min(points, loop.step);
+  }
+  return points;
+}
+
+int64_t trips(const Context& context, StageId stage, const Nest& nest, size_t depth) {
+  const Loop& loop = nest.loops[depth];
+  const int64_t points =
+      points_inside(context, stage, nest, static_cast<int>(depth) - 1, loop.iterator);
+  return (points + loop.step - 1) / loop.step;
+}
+
+int64_t copies(const Nest& nest, const Context& context, StageId stage) {
+  int64_t product = 1;
+  for (size_t d = 0; d < nest.loops.size(); ++d) {
+    if (nest.loops[d].kind == ForType::Unrolled) product *= trips(context, stage, nest, d);
+  }
+  return product;
+}
+
+int64_t operations(const Plan& plan, const Context& context, StageId stage) {
+  std::map<StageId, int64_t> known;
+  const std::function<int64_t(StageId)> count = [&](StageId id) {
+    if (const auto found = known.find(id); found != known.end()) return found->second;
+    const StageNode& node = context.accesses.stage(id);
+    int64_t sum = 1;
+    for (const OperationCount& operation : node.operations) sum += operation.count;
+    for (const Access& read : node.reads) {
+      const bool is_inlined = read.of >= 0 && read.of != id.func &&
+                              plan.of(read.of).placement.compute.kind == Level::Kind::Inline;
+      if (is_inlined) sum += count({read.of, 0});
+      sum = std::min(sum, 2 * most_body_operations);  // no chain overflows
+    }
+    return known[id] = sum;
+  };
+  return count(stage);
+}
+
+int64_t lanes_for(const Plan& plan, StageId stage, int64_t extent) {
+  int bits = 0;
+  for (const Type& type : plan.program->funcs[static_cast<size_t>(stage.func)]->types)
+    bits = std::max(bits, type.bits());
+  const int64_t full = std::clamp(schedule_lanes * 32 / bits, schedule_lanes, 4 * schedule_lanes);
+  int64_t lanes = full;
+  while (lanes > extent && 4 * lanes > full) lanes /= 2;
+  return lanes <= extent && 4 * lanes >= full ? lanes : 1;
+}
+
+// ---- changes ----
+
+void insert_step(Nest& nest, int iterator, int64_t step, size_t depth, ForType kind) {
+  Loop loop;
+  loop.iterator = static_cast<int16_t>(iterator);
+  loop.step = step;
+  loop.kind = kind;
+  nest.loops.insert(nest.loops.begin() + static_cast<std::ptrdiff_t>(depth), loop);
+  set_tails(nest, iterator);
+}
+
+void drop_loop(Nest& nest, size_t depth) {
+  const Loop dropped = nest.loops[depth];
+  const int64_t larger = outer_step(nest, dropped.iterator, dropped.step);
+  if (larger > 0) nest.loops[*find_loop(nest, dropped.iterator, larger)].step = dropped.step;
+  nest.loops.erase(nest.loops.begin() + static_cast<std::ptrdiff_t>(depth));
+  set_tails(nest, dropped.iterator);
+}
+
+std::optional<Nest> without_body(const Nest& nest, const Context& context, StageId stage) {
+  Nest result = nest;
+  for (size_t d = nest.loops.size(); d-- > body_depth(nest);) {
+    Loop& loop = result.loops[d];
+    const bool adds_up = is_reduction(context, stage, loop.iterator);
+    if (adds_up && loop.kind == ForType::Vectorized) return std::nullopt;
+    loop.kind = ForType::Serial;
+    if (!adds_up && outer_step(result, loop.iterator, loop.step) > 0) drop_loop(result, d);
+  }
+  // Lanes outside of other loops would stay.
+  return vector_loop(result) ? std::nullopt : std::optional(result);
+}
+
+void run_inside(Nest& nest, int iterator, int64_t points, ForType kind) {
+  const size_t at = innermost_loop(nest, iterator);
+  if (outer_step(nest, iterator, 1) == points) {  // its loop has just these points
+    const auto loop = nest.loops.begin() + static_cast<std::ptrdiff_t>(at);
+    std::rotate(loop, loop + 1, nest.loops.end());
+    nest.loops.back().kind = kind;
+  } else {
+    nest.loops[at].step = points;
+    insert_step(nest, iterator, 1, nest.loops.size(), kind);
+  }
+}
+
+Nest row_loops(const Plan& plan, const Context& context, StageId stage,
+               const std::vector<int64_t>& extents, int64_t min_lanes) {
+  const graph::FuncContents& f = *plan.program->funcs[static_cast<size_t>(stage.func)];
+  const StageNode& node = context.accesses.stage(stage);
+  Nest nest = loops_of_definition(f, stage.stage);
+  const std::vector<int16_t>& order = plan.of(stage.func).storage.order;
+  const auto rank = [&](const Loop& loop) {
+    const Iterator& iterator = node.iterators[static_cast<size_t>(loop.iterator)];
+    if (iterator.kind == Iterator::Kind::Reduction) return -1;
+    return static_cast<int>(std::ranges::find(order, iterator.dimension) - order.begin());
+  };
+  std::ranges::stable_sort(nest.loops, std::greater(), rank);
+  const auto first = std::ranges::find(nest.loops, 0, rank);
+  if (first == nest.loops.end()) return nest;
+  const int64_t lanes = lanes_for(plan, stage, extents[static_cast<size_t>(order[0])]);
+  if (lanes > 1 && lanes >= min_lanes)
+    run_inside(nest, first->iterator, lanes, ForType::Vectorized);
+  return nest;
+}
+
+void run_in_parallel(Nest& nest, const Context& context, StageId stage) {
+  int64_t chunks = 1;
+  for (size_t d = 0; d < body_depth(nest) && chunks < context.machine.enough_tasks(); ++d) {
+    if (!is_free(context, stage, nest.loops[d].iterator)) return;
+    nest.loops[d].kind = ForType::Parallel;
+    chunks *= trips(context, stage, nest, d);
+  }
+}
+
+}  // namespace retrograde::planning::moves

@@ -1,0 +1,207 @@
+// The changes of a plan: what refers to loops that changed, and which plans are dropped.
+#include <algorithm>
+
+#include "autoschedule/moves/edit.h"
+#include "autoschedule/plan/nest.h"
+
+namespace retrograde::planning::moves {
+
+namespace {
+
+using Kind = Level::Kind;
+
+bool is_at(const Level& level, FuncId func) {
+  return level.kind == Kind::At && level.loop.stage.func == func;
+}
+
+bool has_equal_loops(const Nest& a, const Nest& b, int depth) {
+  const auto count = static_cast<size_t>(depth + 1);
+  return a.loops.size() >= count && b.loops.size() >= count &&
+         std::equal(a.loops.begin(), a.loops.begin() + static_cast<std::ptrdiff_t>(count),
+                    b.loops.begin());
+}
+
+// The smallest step of an iterator down to a loop; 0: none, so all of its points run inside.
+int64_t span(const Nest& nest, int depth, int iterator) {
+  int64_t result = 0;
+  for (int d = 0; d <= depth; ++d) {
+    const Loop& loop = nest.loops[static_cast<size_t>(d)];
+    if (loop.iterator == iterator && (result == 0 || loop.step < result)) result = loop.step;
+  }
+  return result;
+}
+
+// Whether a Func is stored somewhere else than where it is computed, or in a window.
+bool has_window(const FuncPlan& func) {
+  const auto& [compute, store, hoist] = func.placement;
+  return func.opacity != Opacity::None || !func.storage.folds.empty() ||
+         hoist.kind != Kind::Undecided || (store.kind != Kind::Undecided && !(store == compute));
+}
+
+// One change of a Func in a plan.
+class FuncChange {
+ public:
+  FuncChange(const Plan& plan, FuncId func, FuncPlan changed, const Context& context)
+      : before_(plan), context_(context), func_(func), changed_(std::move(changed)) {
+    is_moved_ = !(changed_.placement == before().placement);
+  }
+
+  std::optional<Plan> run() {
+    const auto id = static_cast<size_t>(func_);
+    Plan plan = before_;
+    plan.funcs[id] = std::make_shared<FuncPlan>(changed_);
+    if (!keeps_shared_loops()) return std::nullopt;
+    for (size_t other = 0; other < plan.funcs.size(); ++other) {
+      const auto guest = static_cast<FuncId>(other);
+      if (guest == func_) continue;
+      if (is_moved_ && has_window(before_.of(guest)) && is_read(guest)) return std::nullopt;
+      if (!keeps_region(guest) || !renumber(plan, guest)) return std::nullopt;
+    }
+    if (!broken_structure(plan, before_).empty()) return std::nullopt;
+    return plan;
+  }
+
+ private:
+  const Plan& before_;
+  const Context& context_;
+  const FuncId func_;
+  const FuncPlan changed_;
+  bool is_moved_ = false;
+
+  const FuncPlan& before() const { return before_.of(func_); }
+  const Nest& old_nest(StageId stage) const { return before_.nest(stage); }
+  const Nest& new_nest(StageId stage) const {
+    return changed_.nests[static_cast<size_t>(stage.stage)];
+  }
+
+  // The loop of the same part; nullopt: it is gone.
+  std::optional<int16_t> new_depth(const LoopRef& loop) const {
+    if (loop.depth == around_all_loops) return loop.depth;
+    const Loop& old = old_nest(loop.stage).loops[static_cast<size_t>(loop.depth)];
+    const auto found = find_loop(new_nest(loop.stage), old.iterator, old.step);
+    return found ? std::optional(static_cast<int16_t>(*found)) : std::nullopt;
+  }
+
+  // ---- L11 ----
+
+  // Loops that stages share stay, and so do the places of Funcs that share theirs.
+  bool keeps_shared_loops() const {
+    for (size_t id = 0; id < before_.funcs.size(); ++id) {
+      const bool is_own = static_cast<FuncId>(id) == func_;
+      for (size_t s = 0; s < before_.funcs[id]->nests.size(); ++s) {
+        const Nest& nest = before_.funcs[id]->nests[s];
+        if (!nest.shared_with) continue;
+        const auto [host, depth] = *nest.shared_with;
+        if (!is_own && host.func != func_) continue;
+        if (is_own != (host.func == func_) && is_moved_) return false;
+        const StageId stage{func_, static_cast<int16_t>(s)};
+        if (is_own && !(changed_.nests[s].shared_with == nest.shared_with)) continue;
+        if (is_own && !has_equal_loops(nest, new_nest(stage), depth)) return false;
+        if (host.func == func_ && !has_equal_loops(old_nest(host), new_nest(host), depth))
+          return false;
+      }
+    }
+    return true;
+  }
+
+  // ---- L4, L9 ----
+
+  // The loop of this Func in which another one is computed, perhaps inside of loops of others.
+  std::optional<LoopRef> place_of(FuncId guest) const {
+    const Level* level = &before_.of(guest).placement.compute;
+    while (level->kind == Kind::At) {
+      if (is_at(*level, func_)) return level->loop;
+      level = &before_.of(level->loop.stage.func).placement.compute;
+    }
+    return std::nullopt;
+  }
+
+  // Whether the Func reads another one, perhaps through inlined Funcs.
+  bool is_read(FuncId other) const {
+    for (const StageId reader : before_.program->readers[static_cast<size_t>(other)]) {
+      if (reader.func == func_) return true;
+      const bool is_inlined = before_.of(reader.func).placement.compute.kind == Kind::Inline;
+      if (is_inlined && is_read(reader.func)) return true;
+    }
+    return false;
+  }
+
+  bool keeps_region(FuncId guest) const {
+    const std::optional<LoopRef> place = place_of(guest);
+    if (!place) return true;
+    const FuncPlan& other = before_.of(guest);
+    if (is_moved_) return !has_window(other) && runs_at_any_size(other, context_, guest);
+    const Nest &old = old_nest(place->stage), &nest = new_nest(place->stage);
+    const auto depth = new_depth(*place);
+    if (!depth) return false;
+    if (has_window(other) && !has_equal_loops(old, nest, place->depth)) return false;
+    const size_t iterators = context_.accesses.stage(place->stage).iterators.size();
+    for (int i = 0; i < static_cast<int>(iterators); ++i) {
+      if (span(old, place->depth, i) != span(nest, *depth, i))
+        return runs_at_any_size(other, context_, guest);
+    }
+    return true;
+  }
+
+  // ---- references ----
+
+  // Levels and shared loops of another Func that refer to loops of this one.
+  bool renumber(Plan& plan, FuncId guest) const {
+    FuncPlan other = plan.of(guest);
+    bool is_there = true;
+    const auto follow = [&](LoopRef& loop) {
+      const auto depth = new_depth(loop);
+      is_there = is_there && depth;
+      if (depth) loop.depth = *depth;
+    };
+    for (Level* level :
+         {&other.placement.compute, &other.placement.store, &other.placement.hoist}) {
+      if (!is_at(*level, func_)) continue;
+      if (level->in_each_stage && !(changed_.nests == before().nests)) return false;
+      follow(level->loop);
+    }
+    for (Nest& nest : other.nests) {
+      if (nest.shared_with && nest.shared_with->stage.func == func_) follow(*nest.shared_with);
+    }
+    if (is_there && !(other == plan.of(guest)))
+      plan.funcs[static_cast<size_t>(guest)] = std::make_shared<FuncPlan>(std::move(other));
+    return is_there;
+  }
+};
+
+}  // namespace
+
+bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func) {
+  if (plan.opacity != Opacity::None ||
+      (plan.storage.memory != MemoryType::Auto && plan.storage.memory != MemoryType::Heap))
+    return false;
+  for (size_t s = 0; s < plan.nests.size(); ++s) {
+    const StageId stage{func, static_cast<int16_t>(s)};
+    const auto iterators = static_cast<int>(context.accesses.stage(stage).iterators.size());
+    for (const Loop& loop : plan.nests[s].loops) {
+      if (loop.kind == ForType::Serial || loop.kind == ForType::Parallel) continue;
+      if (outer_step(plan.nests[s], loop.iterator, loop.step) > 0) continue;
+      const bool is_own = loop.iterator >= 0 && loop.iterator < iterators;
+      if (!is_own || !is_reduction(context, stage, loop.iterator)) return false;
+    }
+  }
+  return true;
+}
+
+std::optional<Plan> with_func(const Plan& plan, FuncId func, FuncPlan changed,
+                              const Context& context) {
+  if (changed == plan.of(func)) return std::nullopt;
+  return FuncChange(plan, func, std::move(changed), context).run();
+}
+
+std::optional<Plan> with_nest(const Plan& plan, StageId stage, Nest nest, const Context& context) {
+  FuncPlan changed = plan.of(stage.func);
+  changed.nests[static_cast<size_t>(stage.stage)] = std::move(nest);
+  return with_func(plan, stage.func, std::move(changed), context);
+}
+
+void add(std::vector<Plan>& plans, std::optional<Plan> plan) {
+  if (plan && std::ranges::find(plans, *plan) == plans.end()) plans.push_back(std::move(*plan));
+}
+
+}  // namespace retrograde::planning::moves

@@ -1,0 +1,51 @@
+// move.h -- moves: plans that differ from a plan in how one Func runs.
+//
+//   tile of out      out  root  y, x:16, vector x     =>     out  root  y:8, y, x:16, vector x
+//                                                            out  root  y:8, x:64, y, x:16, vector x
+//
+// A move is a pure function. It only gives legal plans, so a search needs no checks of its own. It gives few of them,
+// with sizes at which something changes: the cost decides which of them are good. The loops of other Funcs stay;
+// placements in a loop that moves follow it, and a plan in which such a loop is gone isn't given.
+//
+// The conditions under which a plan is legal have numbers, which code and tests mention:
+//
+//   L1   no dependence is carried by loops that change their order or kind
+//   L2   the order in which one element takes its terms stays, so that its bits do
+//   L3   all reads are inside of the loop in which a Func is placed (P2), and the region that they need is bounded
+//   L4   extents of vectors and of unrolled loops are constant
+//   L5   the code that inlining and unrolling make is bounded
+//   L6   iterations that run in parallel write different elements
+//   L8   no extern stage, no opaque Func and no loop of a device changes
+//   L9   windows that are stored keep the rows that are read again
+//   L11  loops that stages share stay equal
+//
+// Of the conditions in the design, L7 holds since no move splits a sum, and L10 is about devices.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "autoschedule/access/sizes.h"
+#include "autoschedule/machine/machine.h"
+#include "autoschedule/plan/plan.h"
+
+namespace retrograde::planning {
+
+// The program and the machine that moves are for. It outlives plans.
+struct Context {
+  const AccessGraph&
+      accesses;  // of the program's outputs; its Funcs have the numbers of the plan's
+  const SizeModel& sizes;
+  const Machine& machine;
+};
+
+// Plans that differ from `plan` in how `func` runs; `plan` keeps all invariants, and they do, too.
+using MoveFunction = std::vector<Plan> (*)(const Plan& plan, FuncId func, const Context& context);
+struct Move {
+  const char* name;
+  MoveFunction apply;
+};
+std::span<const Move> all_moves();               // list.def
+const Move* find_move(const std::string& name);  // null: there is none
+
+}  // namespace retrograde::planning

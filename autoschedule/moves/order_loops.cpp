@@ -1,0 +1,79 @@
+// order_loops -- other orders of the loops around a stage's body, which are the loops at its end that are unrolled or lanes.
+//
+//   r.x, y, x:16, vector x     =>     y, x:16, r.x, vector x       rows as they are stored, the reduction inside
+//                              =>     r.x, y, x:16, vector x       the reduction outside
+//                              =>     x:16, y, r.x, vector x       across rows
+//
+// Legal: L1, L2. Loops of the reduction keep their order among each other, so each element takes its terms in the same
+// order; iterations of pure loops never meet. Parallel loops stay outside. A nest that has two loops of an iterator keeps
+// the order of its pure loops, which makes its tiles.
+#include <algorithm>
+#include <functional>
+#include <set>
+
+#include "autoschedule/moves/edit.h"
+
+namespace retrograde::planning::moves {
+
+namespace {
+
+enum class Reduction : uint8_t { Inside, Outside };
+
+class LoopOrder {
+ public:
+  LoopOrder(const Plan& plan, StageId stage, const Context& context)
+      : nest_(plan.nest(stage)), stage_(stage), context_(context) {
+    end_ = body_depth(nest_);
+    while (begin_ < end_ && nest_.loops[begin_].kind == ForType::Parallel) ++begin_;
+    std::set<int16_t> seen;
+    for (size_t d = begin_; d < end_; ++d)
+      is_tiled_ = !seen.insert(nest_.loops[d].iterator).second || is_tiled_;
+    const std::vector<int16_t>& order = plan.of(stage.func).storage.order;
+    for (const Iterator& i : context.accesses.stage(stage).iterators) {
+      const bool is_pure = i.kind == Iterator::Kind::Pure;
+      ranks_.push_back(is_pure ? std::ranges::find(order, i.dimension) - order.begin() : 0);
+    }
+  }
+  bool is_tiled() const { return is_tiled_; }
+
+  Nest ordered(Reduction reduction, bool along_rows) const {
+    const auto key = [&](const Loop& loop) {
+      const auto iterator = static_cast<size_t>(loop.iterator);
+      if (is_reduction(context_, stage_, loop.iterator))
+        return std::pair(reduction == Reduction::Inside ? 1 : -1, std::ptrdiff_t{0});
+      if (is_tiled_) return std::pair(0, std::ptrdiff_t{0});
+      return std::pair(0, along_rows ? -ranks_[iterator] : ranks_[iterator]);
+    };
+    Nest nest = nest_;
+    const auto first = nest.loops.begin();
+    std::ranges::stable_sort(first + static_cast<std::ptrdiff_t>(begin_),
+                             first + static_cast<std::ptrdiff_t>(end_), std::less(), key);
+    return nest;
+  }
+
+ private:
+  const Nest& nest_;
+  const StageId stage_;
+  const Context& context_;
+  size_t begin_ = 0, end_ = 0;  // the loops that are ordered
+  bool is_tiled_ = false;
+  std::vector<std::ptrdiff_t> ranks_;  // by iterator: of the dimension in memory
+};
+
+}  // namespace
+
+std::vector<Plan> order_loops(const Plan& plan, FuncId func, const Context& context) {
+  std::vector<Plan> plans;
+  if (!has_loops(plan, func)) return plans;
+  for (size_t s = 0; s < plan.of(func).nests.size(); ++s) {
+    const StageId stage{func, static_cast<int16_t>(s)};
+    const LoopOrder order(plan, stage, context);
+    add(plans, with_nest(plan, stage, order.ordered(Reduction::Inside, true), context));
+    add(plans, with_nest(plan, stage, order.ordered(Reduction::Outside, true), context));
+    if (!order.is_tiled())
+      add(plans, with_nest(plan, stage, order.ordered(Reduction::Inside, false), context));
+  }
+  return plans;
+}
+
+}  // namespace retrograde::planning::moves

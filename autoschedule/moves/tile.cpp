@@ -1,0 +1,128 @@
+// tile -- a larger step of one or two pure iterators outside of the others, or a tile of another size.
+//
+//   parallel y, x:16, vector x     =>     parallel y:8, y, x:16, vector x             strips of rows
+//                                  =>     parallel y:8, x:64, y, x:16, vector x       tiles
+//   y:8, y, x:16, vector x         =>     y:16, y, x:16, vector x and y:4, y, x:16, vector x
+//
+// Legal: L1, since iterations of pure loops never meet. Sizes are powers of two; the first ones fill the first or the
+// second cache with what the stage accesses.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "autoschedule/moves/edit.h"
+
+namespace retrograde::planning::moves {
+
+namespace {
+
+int64_t power_of_two_below(double size) {
+  return size < 1 ? 1 : static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(size)));
+}
+
+class Tiler {
+ public:
+  Tiler(const Plan& plan, StageId stage, const Context& context)
+      : plan_(plan), stage_(stage), context_(context), nest_(plan.nest(stage)) {
+    const size_t body = body_depth(nest_);
+    for (size_t d = body; d-- > 0;) {
+      const int16_t i = nest_.loops[d].iterator;
+      if (!is_free(context, stage, i)) continue;
+      if (std::ranges::find(inner_, i, &Inner::iterator) == inner_.end()) inner_.push_back({i, d});
+    }
+  }
+
+  void run(std::vector<Plan>& plans) const {
+    for (const size_t level : {size_t{0}, Machine::near_cache}) {
+      const double points = context_.machine.levels[level].bytes / bytes_of_point();
+      if (inner_.size() > 1) {
+        const auto row = static_cast<double>(points_of(inner_[0]));
+        tile({{inner_[1], power_of_two_below(points / row)}}, plans);
+        const int64_t side = power_of_two_below(std::sqrt(points));
+        tile({{inner_[1], side}, {inner_[0], side}}, plans);
+      } else if (!inner_.empty()) {
+        tile({{inner_[0], power_of_two_below(points)}}, plans);
+      }
+    }
+    for (const Inner& inner : inner_) resize(inner, plans);
+  }
+
+ private:
+  struct Inner {  // the innermost loop of an iterator around the body
+    int16_t iterator;
+    size_t depth;
+  };
+  struct Side {
+    Inner inner;
+    int64_t size;
+  };
+  const Plan& plan_;
+  const StageId stage_;
+  const Context& context_;
+  const Nest& nest_;
+  std::vector<Inner> inner_;  // innermost first
+
+  int64_t points_of(const Inner& inner) const {
+    return points_inside(context_, stage_, nest_, static_cast<int>(inner.depth) - 1,
+                         inner.iterator);
+  }
+  double bytes_of_point() const {
+    const StageNode& node = context_.accesses.stage(stage_);
+    double bytes = bytes_of(node.write);
+    for (const Access& read : node.reads) bytes += bytes_of(read);
+    return bytes;
+  }
+  double bytes_of(const Access& access) const {
+    if (access.of < 0)
+      return context_.accesses.images()[static_cast<size_t>(access.image)]->type.bytes();
+    return context_.accesses.func(access.of).func->types[0].bytes();
+  }
+
+  void tile(const std::vector<Side>& sides, std::vector<Plan>& plans) const {
+    Nest nest = nest_;
+    size_t first = nest.loops.size();
+    for (const auto& [inner, size] : sides) {
+      const Loop& loop = nest_.loops[inner.depth];
+      if (size <= loop.step || 2 * size > points_of(inner)) return;
+      first = std::min(first, inner.depth);
+    }
+    for (size_t i = sides.size(); i-- > 0;) {
+      const auto& [inner, size] = sides[i];
+      Loop& loop = nest.loops[*find_loop(nest, inner.iterator, nest_.loops[inner.depth].step)];
+      const ForType kind = loop.kind;
+      loop.kind = ForType::Serial;
+      insert_step(nest, inner.iterator, size, first, kind);
+    }
+    add(plans, with_nest(plan_, stage_, std::move(nest), context_));
+  }
+
+  // Doubles and halves a step between others.
+  void resize(const Inner& inner, std::vector<Plan>& plans) const {
+    const int64_t smaller = nest_.loops[inner.depth].step;
+    const int64_t step = outer_step(nest_, inner.iterator, smaller);
+    if (step == 0 || body_depth(nest_) <= *find_loop(nest_, inner.iterator, step)) return;
+    const int64_t larger = outer_step(nest_, inner.iterator, step);
+    const int64_t limit = larger > 0 ? larger : context_.sizes.of(stage_, inner.iterator).estimate;
+    for (const int64_t size : {2 * step, step / 2}) {
+      if (size <= smaller || size >= limit || step % 2 != 0) continue;
+      Nest nest = nest_;
+      const size_t depth = *find_loop(nest, inner.iterator, step);
+      const ForType kind = nest.loops[depth].kind;
+      nest.loops.erase(nest.loops.begin() + static_cast<std::ptrdiff_t>(depth));
+      insert_step(nest, inner.iterator, size, depth, kind);
+      add(plans, with_nest(plan_, stage_, std::move(nest), context_));
+    }
+  }
+};
+
+}  // namespace
+
+std::vector<Plan> tile(const Plan& plan, FuncId func, const Context& context) {
+  std::vector<Plan> plans;
+  if (!has_loops(plan, func)) return plans;
+  for (size_t s = 0; s < plan.of(func).nests.size(); ++s)
+    Tiler(plan, {func, static_cast<int16_t>(s)}, context).run(plans);
+  return plans;
+}
+
+}  // namespace retrograde::planning::moves

@@ -1,0 +1,143 @@
+#include "plan_sample.h"
+
+#include <algorithm>
+#include <mutex>
+#include <numeric>
+#include <random>
+#include <set>
+
+#include "autoschedule/memory_budget.h"
+#include "autoschedule/moves/move.h"
+#include "autoschedule/schedule_search.h"
+#include "diagnostics/text_hash.h"
+#include "driver/schedule.h"
+#include "graph/directives/schedule_log.h"
+#include "graph/directives/wrappers.h"
+
+namespace bench::plans {
+
+using namespace retrograde;
+using autoschedule::Scheduling;
+
+namespace {
+
+constexpr double least_share = 0.02;  // of all operations, for a Func to be costly
+
+// Extents of which nothing is known.
+constexpr planning::SizeDefaults unknown_sizes{1000};
+
+std::set<std::string> names_of(const std::vector<FuncPtr>& outputs) {
+  std::set<std::string> names;
+  for (const FuncPtr& f : graph::topological_order(outputs)) names.insert(f->name);
+  return names;
+}
+
+// Funcs that a schedule makes have other names in each process; the key does not depend on them.
+std::string key_of(const planning::Plan& plan, const std::set<std::string>& known) {
+  const auto log = graph::schedule_log(planning::emit_plan(plan));
+  const uint64_t hash = text_hash(autoschedule::with_stable_names(log, known));
+  char key[17];
+  std::snprintf(key, sizeof key, "%016llx", static_cast<unsigned long long>(hash));
+  return key;
+}
+
+SampledPlan imported(const std::string& source, const std::vector<FuncPtr>& scheduled,
+                     const std::set<std::string>& known) {
+  SampledPlan result{source, "", planning::import_plan(graph::apply_wrappers(scheduled))};
+  result.key = key_of(result.plan, known);
+  return result;
+}
+
+autoschedule::ScheduleRequest request_of(const SampleOptions& options) {
+  return autoschedule::request_for(options.target, {});
+}
+
+// What the search over the rules' decisions tries. It ends after so many schedules.
+std::vector<SampledPlan> plans_of_search(const std::vector<FuncPtr>& outputs,
+                                         const SampleOptions& options, const SampledPlan&) {
+  if (options.rules == 0) return {};
+  std::mutex mutex;
+  std::vector<std::vector<FuncPtr>> tried;
+  const auto cost = [&](const std::vector<FuncPtr>& scheduled) {
+    const double seconds = driver::predicted_seconds(scheduled, options.target, 0);
+    const std::lock_guard lock(mutex);
+    tried.push_back(scheduled);
+    return seconds;
+  };
+  autoschedule::search_schedule(outputs, request_of(options), Scheduling::Everything, cost,
+                                options.rules);
+  std::vector<SampledPlan> result;
+  const std::set<std::string> known = names_of(outputs);
+  for (const auto& scheduled : tried) result.push_back(imported("search", scheduled, known));
+  std::ranges::sort(result, {}, &SampledPlan::key);  // threads of the search finish in any order
+  return result;
+}
+
+// The Funcs that have a share of the program's operations, without what inlining repeats.
+std::vector<planning::FuncId> costly_funcs(const planning::AccessGraph& accesses,
+                                           const planning::SizeModel& sizes) {
+  std::vector<double> work(accesses.funcs().size(), 0);
+  for (const planning::FuncNode& func : accesses.funcs()) {
+    for (const planning::StageNode& stage : func.stages) {
+      double operations = 1;
+      for (const planning::OperationCount& each : stage.operations) operations += each.count;
+      for (size_t i = 0; i < stage.iterators.size(); ++i)
+        operations *= static_cast<double>(sizes.of(stage.id, static_cast<int>(i)).estimate);
+      work[static_cast<size_t>(stage.id.func)] += operations;
+    }
+  }
+  const double least = least_share * std::reduce(work.begin(), work.end());
+  std::vector<planning::FuncId> result;
+  for (size_t f = 0; f < work.size(); ++f) {
+    if (work[f] >= least) result.push_back(static_cast<planning::FuncId>(f));
+  }
+  return result;
+}
+
+// Random moves from the default plan, most of them of costly Funcs. Walks have 1, 2, 4 or 8 steps; a step that has no plan is left out.
+std::vector<SampledPlan> plans_of_walks(const std::vector<FuncPtr>& outputs,
+                                        const SampleOptions& options, const SampledPlan& standard) {
+  const planning::AccessGraph accesses(standard.plan.program->outputs);
+  const planning::SizeModel sizes(accesses, unknown_sizes);
+  const planning::Machine machine = planning::reference_machine(options.target);
+  const std::set<std::string> known = names_of(outputs);
+  const std::vector<planning::FuncId> costly = costly_funcs(accesses, sizes);
+  std::mt19937 random(options.seed);
+  const auto below = [&](size_t count) { return random() % count; };
+  std::vector<SampledPlan> result;
+  for (size_t walk = 0; walk < options.walks; ++walk) {
+    SampledPlan reached{"walk", "", standard.plan};
+    for (int step = 1 << walk % 4; step > 0; --step) {
+      const planning::FuncId func =
+          below(4) > 0 ? costly[below(costly.size())]
+                       : static_cast<planning::FuncId>(below(reached.plan.funcs.size()));
+      const planning::Move& move = planning::all_moves()[below(planning::all_moves().size())];
+      const auto plans = move.apply(reached.plan, func, {accesses, sizes, machine});
+      if (plans.empty()) continue;
+      reached.plan = plans[below(plans.size())];
+      reached.source += std::string(" ") + move.name;
+    }
+    reached.key = key_of(reached.plan, known);
+    result.push_back(std::move(reached));
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<SampledPlan> sample_plans(const std::vector<FuncPtr>& outputs,
+                                      const SampleOptions& options) {
+  const PlanSource sources[] = {plans_of_search, plans_of_walks};
+  const auto scheduled =
+      autoschedule::schedule_within_budget(outputs, request_of(options), Scheduling::Everything);
+  std::vector<SampledPlan> result{imported("rules", scheduled.outputs, names_of(outputs))};
+  std::set<std::string> seen{result[0].key};
+  for (const PlanSource& source : sources) {
+    for (SampledPlan& plan : source(outputs, options, result[0])) {
+      if (seen.insert(plan.key).second) result.push_back(std::move(plan));
+    }
+  }
+  return result;
+}
+
+}  // namespace bench::plans

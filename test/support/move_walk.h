@@ -1,0 +1,121 @@
+// move_walk.h -- random moves on the plan of a random program: each plan on the way keeps the invariants, and the code
+// of the last one computes what the interpreter does.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "autoschedule/default_schedule.h"
+#include "autoschedule/moves/move.h"
+#include "graph/copy_graph.h"
+#include "graph/directives/wrappers.h"
+#include "graph/names.h"
+#include "testing/check_program.h"
+#include "testing/programs/large.h"
+
+namespace retrograde::fuzz {
+
+class MoveWalk {
+ public:
+  explicit MoveWalk(Choices& choices) : c_(choices), program_(made(choices)) {
+    default_extent_ = c_.pick<int64_t>({7, 40, 1000});
+    if (c_.chance(50)) machine_.levels[0].bytes = 1 << 10;
+    if (c_.chance(50)) machine_.levels[1].bytes = 1 << 12;
+    start();
+  }
+
+  // Until a plan breaks an invariant or no move gives one.
+  void run() {
+    const planning::AccessGraph accesses(plan_.program->outputs);
+    const planning::SizeModel sizes(accesses, {default_extent_});
+    const auto moves = planning::all_moves();
+    const auto funcs = static_cast<int>(plan_.funcs.size());
+    for (int step = c_.between(0, most_steps); step > 0; --step) {
+      const auto id = static_cast<planning::FuncId>(c_.below(funcs));
+      const planning::Move& move = moves[static_cast<size_t>(c_.below(int(moves.size())))];
+      const std::vector<planning::Plan> plans = move.apply(plan_, id, {accesses, sizes, machine_});
+      for (const planning::Plan& after : plans) check(after, move, id);
+      if (plans.empty() || !broken_.empty()) continue;
+      plan_ = c_.pick(plans);
+      trace_ += retrograde::text("\n", move.name, " of ", name_of(id), "\n", to_text(plan_));
+      ++counts_[move.name];
+    }
+  }
+
+  Judged judge(const Target& target) {
+    Judged result{broken_.empty() ? Judgement::Right : Judgement::Broken, broken_};
+    if (broken_.empty()) {
+      result = judge(plan_, target);
+      // Whoever cannot even compile the first plan is no finding.
+      if (result.judgement != Judgement::Right &&
+          judge(first_, target).judgement != Judgement::Right)
+        return {Judgement::Illegal, result.detail};
+      if (result.judgement == Judgement::Refused) result.judgement = Judgement::Broken;
+    }
+    for (const auto& [move, count] : counts_) result.counts[move] += count;
+    return result;
+  }
+  std::string text() const { return fuzz::to_text(program_) + trace_ + broken_; }
+
+ private:
+  static constexpr int most_steps = 12;
+  Choices& c_;
+  const RandomProgram program_;
+  int64_t default_extent_ = 0;
+  planning::Machine machine_;
+  planning::Plan first_, plan_;
+  std::string trace_, broken_;
+  std::map<std::string, uint64_t> counts_;
+
+  static RandomProgram made(Choices& choices) {
+    const int kind = choices.below(5);
+    if (kind == 0) return make_program(choices, Style::pipelines());
+    if (kind == 1) return make_program(choices, Style::chains());
+    if (kind == 2) return make_program(choices, Style::gradients());
+    if (kind == 3) return make_program(choices, Style::pieces());
+    return make_large_program(choices, LargeSizes::Small);
+  }
+
+  // The plan of the default schedule, or of all Funcs at root without one.
+  void start() {
+    const std::vector<graph::FuncPtr> outputs =
+        graph::copy_graph(graph::apply_wrappers(outputs_of(program_))).outputs;
+    if (c_.chance(50)) {
+      autoschedule::give_default_schedule(outputs, {}, autoschedule::Scheduling::Everything);
+      plan_ = planning::import_plan(graph::apply_wrappers(outputs));
+    } else {
+      plan_ = planning::undecided_plan(planning::make_program(outputs));
+      for (auto& func : plan_.funcs) {
+        planning::FuncPlan at_root = *func;
+        if (at_root.opacity == planning::Opacity::None)
+          at_root.placement.compute.kind = planning::Level::Kind::Root;
+        func = std::make_shared<planning::FuncPlan>(at_root);
+      }
+    }
+    first_ = plan_;
+    trace_ = "\n" + to_text(plan_);
+    broken_ = broken_invariant(plan_);
+    if (!broken_.empty()) broken_ = "the first plan: " + broken_;
+  }
+
+  const std::string& name_of(planning::FuncId id) const {
+    return plan_.program->funcs[static_cast<size_t>(id)]->name;
+  }
+  void check(const planning::Plan& after, const planning::Move& move, planning::FuncId id) {
+    const std::string broken = broken_invariant(after);
+    if (!broken.empty() && broken_.empty())
+      broken_ =
+          retrograde::text(move.name, " of ", name_of(id), ": ", broken, "\n", to_text(after));
+  }
+
+  Judged judge(const planning::Plan& plan, const Target& target) const {
+    RandomProgram program = program_;
+    program.outputs.clear();
+    for (const graph::FuncPtr& output : planning::emit_plan(plan))
+      program.outputs.emplace_back(output);
+    return check_with_schedule(
+        program, [] {}, target);
+  }
+};
+
+}  // namespace retrograde::fuzz

@@ -1,0 +1,58 @@
+#include "move_text.h"
+
+#include <algorithm>
+
+#include "autoschedule/moves/move.h"
+#include "diagnostics/error.h"
+#include "graph/directives/wrappers.h"
+
+namespace retrograde::opt {
+
+namespace {
+
+const std::string move_line = "\nmove ";
+constexpr planning::SizeDefaults defaults{1000};
+
+const planning::Move& move_of(const std::string& name) {
+  if (const planning::Move* move = planning::find_move(name)) return *move;
+  const std::string names =
+      listed(planning::all_moves(), [](const planning::Move& m) { return quoted(m.name); });
+  user_error(text("move ", quoted(name)), "a move must exist", text("the moves are ", names));
+}
+
+}  // namespace
+
+MoveText split_move(const std::string& text) {
+  const size_t at = text.find(move_line);
+  if (at == std::string::npos) return {text, "", ""};
+  const size_t name = at + move_line.size(), end = std::min(text.find('\n', name), text.size());
+  return {text.substr(0, at + 1), text.substr(name, end - name),
+          text.substr(std::min(end + 1, text.size()))};
+}
+
+std::string plans_after(const std::string& name, const MoveText& parts,
+                        const std::vector<graph::FuncPtr>& outputs) {
+  const planning::Move& move = move_of(name);
+  const std::vector<graph::FuncPtr> wrapped = graph::apply_wrappers(outputs);
+  const planning::Plan plan =
+      parts.plan.empty() ? planning::import_plan(wrapped)
+                         : planning::parse_plan(parts.plan, planning::make_program(wrapped));
+  planning::validate(plan);
+  const std::vector<graph::FuncPtr>& funcs = plan.program->funcs;
+  const auto func =
+      std::ranges::find(funcs, parts.func, [](const graph::FuncPtr& f) { return f->name; });
+  if (func == funcs.end())
+    user_error(text("move the Func ", quoted(parts.func)), "it must be one of the program");
+  const planning::AccessGraph accesses(wrapped);
+  const planning::SizeModel sizes(accesses, defaults);
+  const planning::Machine machine = planning::reference_machine(Target("x86-64-linux-avx512"));
+  const auto id = static_cast<planning::FuncId>(func - funcs.begin());
+  std::string result;
+  for (const planning::Plan& after : move.apply(plan, id, {accesses, sizes, machine})) {
+    planning::validate(after);
+    result += (result.empty() ? "" : "\n") + to_text(after);
+  }
+  return result.empty() ? "no plan\n" : result;
+}
+
+}  // namespace retrograde::opt

@@ -1,0 +1,26 @@
+// move_text.h -- the plans that a move gives, as text, which tools/opt prints and the golden tests compare.
+//
+//   func f(x, y) float32 ...     the text of a graph
+//   output f
+//   move f                       the Func whose loops move
+//   f  root  y, x                its plan; without one, that of the graph's directives
+#pragma once
+
+#include <string>
+
+#include "graph/graph.h"
+
+namespace retrograde::opt {
+
+struct MoveText {
+  std::string graph, func, plan;
+};
+// Without a line "move", all of it is the graph.
+MoveText split_move(const std::string& text);
+
+// One plan after the other, with an empty line between; the first line says so if there are none. UserError if there is no
+// such move or Func.
+std::string plans_after(const std::string& move, const MoveText& text,
+                        const std::vector<graph::FuncPtr>& outputs);
+
+}  // namespace retrograde::opt
