@@ -10,23 +10,6 @@
 
 namespace retrograde::planning {
 
-Nest loops_of(const Plan& plan, StageId stage) {
-  if (plan.of(stage.func).opacity == Opacity::None) return plan.nest(stage);
-  return loops_of_definition(*plan.program->funcs[static_cast<size_t>(stage.func)], stage.stage);
-}
-
-int stage_count(const Plan& plan, FuncId func) {
-  return plan.program->funcs[static_cast<size_t>(func)]->stage_count();
-}
-
-bool is_inlined(const Plan& plan, const AccessGraph& graph, FuncId func) {
-  const FuncPlan& of = plan.of(func);
-  const Level::Kind kind = of.placement.compute.kind;
-  return !graph.func(func).is_output && of.opacity == Opacity::None &&
-         (kind == Level::Kind::Inline || kind == Level::Kind::Undecided) &&
-         graph.func(func).stages.size() == 1;
-}
-
 namespace {
 
 class GroupBuilder {
@@ -35,11 +18,10 @@ class GroupBuilder {
                FactsOfStages& facts)
       : plan_(plan), covers_(covers), sizes_(sizes), machine_(machine), facts_(facts) {}
 
-  Group build(const GroupMembers& members) {
+  Group build(const PlannedGroup& planned) {
     size_t next = 0;
-    for (const FuncId func : members.funcs) {
-      for (int16_t s = 0; s < stage_count(plan_, func); ++s)
-        inlined_[{func, s}] = &members.inlined[next++];
+    for (const FuncId func : planned.funcs) {
+      for (const StageNode& stage : stages(func)) inlined_[stage.id] = &planned.inlined[next++];
     }
     group_.nodes.emplace_back();
     for (const auto& [stage, inlined] : inlined_) add(stage);
@@ -68,6 +50,14 @@ class GroupBuilder {
   std::map<StageId, StageRun> runs_;
 
   const LoopNode& node(int index) const { return group_.nodes[static_cast<size_t>(index)]; }
+  const std::vector<StageNode>& stages(FuncId func) const {
+    return sizes_.graph().func(func).stages;
+  }
+  // Opaque Funcs have the loops of their definitions.
+  Nest loops_of(StageId stage) const {
+    if (plan_.of(stage.func).opacity == Opacity::None) return plan_.nest(stage);
+    return loops_of_definition(*plan_.program->funcs[static_cast<size_t>(stage.func)], stage.stage);
+  }
   bool is_at(FuncId func) const { return plan_.of(func).placement.compute.kind == Level::Kind::At; }
   static bool is_around_all(const LoopRef& loop) { return loop.depth == around_all_loops; }
 
@@ -75,7 +65,7 @@ class GroupBuilder {
 
   const StageRun& add(StageId stage) {
     if (const StageRun* known = ir::find_or_null(runs_, stage)) return *known;
-    const Nest nest = loops_of(plan_, stage);
+    const Nest nest = loops_of(stage);
     StageRun run;
     run.id = stage;
     run.facts = &facts_.of(stage, *inlined_.at(stage));
@@ -110,12 +100,12 @@ class GroupBuilder {
   // Where a Func is computed: of loops alike, that of the first stage that reads it.
   Level level_of(FuncId func) {
     Level level = plan_.of(func).placement.compute;
-    for (int16_t s = 0; level.in_each_stage && s < stage_count(plan_, level.loop.stage.func); ++s) {
-      const StageId reader{level.loop.stage.func, s};
-      const auto& touches = facts_.of(reader, *inlined_.at(reader)).touches;
-      const auto depth = depth_in(plan_, reader, level);
+    if (!level.in_each_stage) return level;
+    for (const StageNode& reader : stages(level.loop.stage.func)) {
+      const auto& touches = facts_.of(reader.id, *inlined_.at(reader.id)).touches;
+      const auto depth = depth_in(plan_, reader.id, level);
       if (!depth || std::ranges::find(touches, func, &Touch::buffer) == touches.end()) continue;
-      level.loop = {reader, static_cast<int16_t>(*depth)};
+      level.loop = {reader.id, static_cast<int16_t>(*depth)};
       break;
     }
     return level;
@@ -224,9 +214,9 @@ class GroupBuilder {
 
 }  // namespace
 
-Group group_of(const Plan& plan, const GroupMembers& members, Covers& covers,
+Group group_of(const Plan& plan, const PlannedGroup& planned, Covers& covers,
                const SizeModel& sizes, const Machine& machine, FactsOfStages& facts) {
-  return GroupBuilder(plan, covers, sizes, machine, facts).build(members);
+  return GroupBuilder(plan, covers, sizes, machine, facts).build(planned);
 }
 
 }  // namespace retrograde::planning

@@ -70,14 +70,10 @@ void add_buffers(const Plan& plan, const SizeModel& sizes, const Machine& machin
 // By dimension, of a Func at root; less in folded dimensions.
 std::vector<double> stored_extents(FuncId func, const FuncPlan& plan, const SizeModel& sizes);
 
-// The Funcs that make a group, and for each of their stages, in order, the Funcs that are inlined into it.
-struct GroupMembers {
-  std::vector<FuncId> funcs;
-  std::vector<std::vector<FuncId>> inlined;
-};
-
+// The Funcs whose loops are nested.
 struct PlannedGroup {
-  GroupMembers members;
+  std::vector<FuncId> funcs;
+  std::vector<std::vector<FuncId>> inlined;  // into each of their stages, in order
   std::vector<FuncId> reads;  // Funcs of other groups, also through inlined ones; each once
 };
 
@@ -88,13 +84,7 @@ std::vector<PlannedGroup> groups_of(const Plan& plan, const AccessGraph& graph);
 double peak_bytes(const Plan& plan, const SizeModel& sizes, const std::vector<PlannedGroup>& groups,
                   const std::vector<double>& own);
 
-Group group_of(const Plan& plan, const GroupMembers& members, Covers& covers,
+Group group_of(const Plan& plan, const PlannedGroup& planned, Covers& covers,
                const SizeModel& sizes, const Machine& machine, FactsOfStages& facts);
-
-// The loops of a stage: those of its definition if the Func is opaque.
-Nest loops_of(const Plan& plan, StageId stage);
-int stage_count(const Plan& plan, FuncId func);
-// The Func stands for its value: undecided Funcs, too, but no outputs.
-bool is_inlined(const Plan& plan, const AccessGraph& graph, FuncId func);
 
 }  // namespace retrograde::planning

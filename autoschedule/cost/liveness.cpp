@@ -21,13 +21,13 @@ double peak_bytes(const Plan& plan, const SizeModel& sizes, const std::vector<Pl
                   const std::vector<double>& own) {
   std::vector<size_t> last(plan.funcs.size());  // the group that reads it last
   for (size_t g = 0; g < groups.size(); ++g) {
-    for (const FuncId func : groups[g].members.funcs) last[static_cast<size_t>(func)] = g;
+    for (const FuncId func : groups[g].funcs) last[static_cast<size_t>(func)] = g;
     for (const FuncId read : groups[g].reads) last[static_cast<size_t>(read)] = g;
   }
   std::vector<double> freed(groups.size());  // after each group
   double alive = 0, peak = 0;
   for (size_t g = 0; g < groups.size(); ++g) {
-    for (const FuncId func : groups[g].members.funcs) {
+    for (const FuncId func : groups[g].funcs) {
       const FuncPlan& of = plan.of(func);
       if (of.placement.compute.kind == Level::Kind::At || sizes.graph().func(func).is_output)
         continue;

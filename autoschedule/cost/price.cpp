@@ -86,9 +86,9 @@ class CostModel::Prices {
     const auto add = [&](auto... words) {
       key.insert(key.end(), {static_cast<uint64_t>(words)...});
     };
-    for (const FuncId func : group.members.funcs)
+    for (const FuncId func : group.funcs)
       add(func, hashes_.of(plan.funcs[static_cast<size_t>(func)]));
-    for (const std::vector<FuncId>& inlined : group.members.inlined) {
+    for (const std::vector<FuncId>& inlined : group.inlined) {
       add(-1);
       key.insert(key.end(), inlined.begin(), inlined.end());
     }
@@ -104,7 +104,7 @@ class CostModel::Prices {
   const GroupPrice& price_of(const Plan& plan, const PlannedGroup& planned, Covers& covers) {
     Key key = key_of(plan, planned);
     if (const GroupPrice* found = ir::find_or_null(known_, key)) return *found;
-    const Group group = group_of(plan, planned.members, covers, sizes_, machine_, facts_);
+    const Group group = group_of(plan, planned, covers, sizes_, machine_, facts_);
     GroupPrice price;
     price.traffic = traffic_of(group, machine_);
     for (const StageRun& run : group.runs) price.stages.push_back(cost_of(run, group));

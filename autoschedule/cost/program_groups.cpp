@@ -16,6 +16,14 @@ bool insert_once(std::vector<FuncId>& list, FuncId func) {
   return is_new;
 }
 
+// The Func stands for its value: undecided Funcs, too, but no outputs.
+bool is_inlined(const Plan& plan, const FuncNode& node, FuncId func) {
+  const FuncPlan& of = plan.of(func);
+  const Level::Kind kind = of.placement.compute.kind;
+  return !node.is_output && of.opacity == Opacity::None && node.stages.size() == 1 &&
+         (kind == Level::Kind::Inline || kind == Level::Kind::Undecided);
+}
+
 // The Func in whose loops it runs; itself if there is none.
 FuncId host_of(const Plan& plan, FuncId func) {
   const Level& compute = plan.of(func).placement.compute;
@@ -33,8 +41,8 @@ void add_reads(const StageNode& stage, const AccessGraph& graph, const std::vect
     const FuncId read = access.of;
     if (read < 0 || read == stage.id.func) continue;
     if (!inlined[static_cast<size_t>(read)]) {
-      if (!std::ranges::binary_search(group.members.funcs, read)) insert_once(group.reads, read);
-    } else if (insert_once(group.members.inlined.back(), read)) {
+      if (!std::ranges::binary_search(group.funcs, read)) insert_once(group.reads, read);
+    } else if (insert_once(group.inlined.back(), read)) {
       add_reads(graph.func(read).stages[0], graph, inlined, group);
     }
   }
@@ -54,7 +62,7 @@ std::vector<PlannedGroup> groups_of(const Plan& plan, const AccessGraph& graph) 
   std::vector<bool> inlined(count);
   for (size_t f = 0; f < count; ++f) {
     const auto func = static_cast<FuncId>(f);
-    inlined[f] = is_inlined(plan, graph, func);
+    inlined[f] = is_inlined(plan, graph.func(func), func);
     if (inlined[f]) continue;
     const FuncId a = root(func), b = root(host_of(plan, func));
     group[static_cast<size_t>(std::min(a, b))] = std::max(a, b);
@@ -62,13 +70,13 @@ std::vector<PlannedGroup> groups_of(const Plan& plan, const AccessGraph& graph) 
   std::map<FuncId, PlannedGroup> found;
   for (size_t f = 0; f < count; ++f) {
     const auto func = static_cast<FuncId>(f);
-    if (!inlined[f]) found[root(func)].members.funcs.push_back(func);
+    if (!inlined[f]) found[root(func)].funcs.push_back(func);
   }
   std::vector<PlannedGroup> result;
   for (auto& [last, own] : found) {
-    for (const FuncId func : own.members.funcs) {
+    for (const FuncId func : own.funcs) {
       for (const StageNode& stage : graph.func(func).stages) {
-        own.members.inlined.emplace_back();
+        own.inlined.emplace_back();
         add_reads(stage, graph, inlined, own);
       }
     }
