@@ -36,6 +36,7 @@ class GroupBuilder {
       });
     }
     add_buffers(plan_, sizes_, machine_, group_);
+    add_inner_lanes(sizes_, machine_, group_);
     return std::move(group_);
   }
 
@@ -59,6 +60,9 @@ class GroupBuilder {
     return loops_of_definition(*plan_.program->funcs[static_cast<size_t>(stage.func)], stage.stage);
   }
   bool is_at(FuncId func) const { return plan_.of(func).placement.compute.kind == Level::Kind::At; }
+  static bool is_lane_loop(const StageRun& run, size_t depth) {
+    return run.nest.lanes.iterator >= 0 && run.nest.lanes.depth == static_cast<int>(depth);
+  }
   static bool is_around_all(const LoopRef& loop) { return loop.depth == around_all_loops; }
 
   // ---- loops ----
@@ -75,7 +79,8 @@ class GroupBuilder {
     run.nest = nest_trips(nest, extents);
     for (size_t depth = run.path.size() - run.place; depth < nest.loops.size(); ++depth)
       run.path.push_back(add_node(run.path.back(), {stage, static_cast<int16_t>(depth)},
-                                  nest.loops[depth].kind, run.nest.trips[depth]));
+                                  nest.loops[depth].kind,
+                                  is_lane_loop(run, depth) ? 1 : run.nest.trips[depth]));
     run.cover = covers_of(run, nest, extents);
     return runs_.emplace(stage, std::move(run)).first->second;
   }
@@ -123,7 +128,7 @@ class GroupBuilder {
     child.loop = loop;
     child.kind = kind;
     child.trips = trips;
-    child.times = outer.times * (kind == ForType::Vectorized ? 1 : trips);
+    child.times = outer.times * trips;
     child.in_parallel = outer.in_parallel || runs_at_once(kind);
     child.speedup = outer.speedup;
     if (runs_at_once(kind)) {
@@ -206,6 +211,9 @@ class GroupBuilder {
         cover = covers_.inside(run.id, static_cast<int>(depth));
         for (size_t i = 0; i < cover.size(); ++i) cover[i] = std::min(cover[i], extents[i]);
       }
+      // All lanes run at once, whatever loops are inside of theirs.
+      if (run.nest.lanes.iterator >= 0 && run.nest.lanes.depth <= static_cast<int>(depth))
+        cover_lanes(run.nest.lanes, cover);
       result.push_back(std::move(cover));
     }
     return result;

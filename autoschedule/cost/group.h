@@ -29,12 +29,11 @@ struct LoopNode {
   int parent = -1;  // of the root: none
   LoopRef loop;     // of the first stage that has it
   ForType kind = ForType::Serial;
-  double trips = 1,
-         times = 1;           // iterations in one run of the loops around it; in all, without lanes
-  double speedup = 1;         // by threads
-  bool in_parallel = false;   // it, or a loop around it
-  std::vector<int> children;  // in the order in which they run
-  std::vector<int> stages;    // of which it is the innermost loop
+  double trips = 1, times = 1;  // iterations in one run of the loops around it, and in all
+  double speedup = 1;           // by threads
+  bool in_parallel = false;     // it, or a loop around it
+  std::vector<int> children;    // in the order in which they run
+  std::vector<int> stages;      // of which it is the innermost loop
 };
 
 struct StageRun {
@@ -65,6 +64,10 @@ struct Group {
   std::map<int, StoredBuffer> buffers;  // that the stages touch
 };
 
+// Adds the points of all lanes.
+void cover_lanes(const LaneLoop& lanes, Cover& cover);
+// Gives lanes to innermost loops that code generation vectorises although the plan does not.
+void add_inner_lanes(const SizeModel& sizes, const Machine& machine, Group& group);
 // Finds the buffers of the stages.
 void add_buffers(const Plan& plan, const SizeModel& sizes, const Machine& machine, Group& group);
 // By dimension, of a Func at root; less in folded dimensions.

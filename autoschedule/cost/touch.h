@@ -49,6 +49,7 @@ struct Layout {
 // The lanes of a vector, along one iterator or, if that is shorter, along two.
 struct LaneLoop {
   int iterator = -1, outer = -1;
+  int depth = 0;  // of the loop
   double count = 1, inner = 1, step = 1;
   IteratorSet moves = 0;
 };

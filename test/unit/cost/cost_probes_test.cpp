@@ -149,6 +149,13 @@ TEST_F(CostProbes, InlinedFuncsAreComputedForEachElement) {
   EXPECT_NEAR(two / one, 2 - 0.85 / 4, 0.2) << "a load and a store less";
 }
 
+TEST_F(CostProbes, InnermostLoopsBecomeVectorsByThemselves) {
+  out(x, y) = exp(in(x, y));
+  const double vectors = compute_seconds(cost_of("out  root  y, x:16, vector x\n"));
+  EXPECT_NEAR(compute_seconds(cost_of("out  root  y, x\n")), vectors, 0.01 * vectors);
+  EXPECT_GT(compute_seconds(cost_of("out  root  x, y\n")), 10 * vectors) << "strided stores";
+}
+
 struct ProductProbes : CostProbes {
   ProductProbes() {
     for (ImageParam* image : {&in, &other}) {
@@ -174,6 +181,13 @@ TEST_F(ProductProbes, ARegisterTileIsBoundByMultiplyAdds) {
 TEST_F(ProductProbes, ASingleSumWaitsForItself) {
   EXPECT_NEAR(update_cost("y, x:16, k.x, vector x").compute_seconds, products * 1.3e-9,
               100 * micro);
+}
+
+TEST_F(ProductProbes, LanesMoveTogetherWhateverLoopsAreInside) {
+  const StageCost inside = update_cost("y, x:16, k.x, vector x");
+  const StageCost around = update_cost("y, x:16, vector x, k.x");
+  EXPECT_EQ(around.bytes, inside.bytes);
+  EXPECT_EQ(around.compute_seconds, inside.compute_seconds);
 }
 
 TEST_F(ProductProbes, ATileThatExceedsTheRegistersSpills) {
