@@ -118,7 +118,7 @@ class Measurements(unittest.TestCase):
                 for commit, predicted in (("old", 0.5), ("new", 2.0))]
         page = self.record("plans", {"runs": runs}, PAGE.replace("programs", "plans"))
         self.assertIn("| regret, worst | 1.00 |", page)
-        self.assertIn("| blur | 2 | 1e+03 | 1e+03 | 2 % | – | 1.00 | 1.00 | 1.00 |", page)
+        self.assertIn("| blur | 2 | 1e+03 | 1e+03 | 2 % | – | – | 1.00 | 1.00 |", page)
 
     def test_decisions_are_medians_beside_all_of_them(self):
         report = {"warp": {"": [1.0, 2.0, 9.0], "slices": [4.0], "all": None}}

@@ -8,7 +8,8 @@ default plan, so that other load on the machine matters less. A program's noise 
 plan differ from it, one measured first and one last; at least LEAST_NOISE. Figures of a model:
 
 - tau: Kendall's tau-b over pairs of stages of the default plan whose measured times differ by more than the noise;
-- rho: Spearman's rank correlation over the plans of a program, where these differ by more than the noise;
+- rho: Spearman's rank correlation over the plans of a program, if there are FEWEST_PLANS and these differ by more than
+  twice the noise;
 - regret: measured time of the plan that the model prices least, over that of the fastest plan;
 - predicted / measured: times of the default plan, or of all plans.
 
@@ -26,6 +27,7 @@ from model import spearman  # noqa: E402
 
 LEAST_NOISE = 0.02
 MOST_SLOWDOWN = 1.08  # of the default plan beside which another one was measured; of others, the measurement is dropped
+FEWEST_PLANS = 4  # for a correlation over the plans of a program
 FEWEST_SAMPLES = 20  # of the profiler, for a stage to count
 SAMPLE_SECONDS = 1e-3
 RIGHT_FACTOR = 1.5
@@ -114,7 +116,8 @@ def plan_pairs(program, model):
 
 def plans_rho(pairs, noise):
     times = [measured for _, measured in pairs]
-    return spearman(pairs) if times and max(times) > min(times) * (1 + 2 * noise) else None
+    differ = len(pairs) >= FEWEST_PLANS and max(times) > min(times) * (1 + 2 * noise)
+    return spearman(pairs) if differ else None
 
 
 def judge_program(program, model):
@@ -152,7 +155,7 @@ def summary(judged):
     ratios = [p / m for figures in judged.values() for p, m in figures["pairs"]]
     every_stage = [pair for figures in judged.values() for pair in figures["stages"]]
     mean = lambda values: statistics.fmean(values) if values else None  # noqa: E731
-    return {"tau, mean": mean(known("tau")), "tau, worst": min(known("tau"), default=None),
+    return {"programs": len(judged), "plans": len(ratios), "tau, mean": mean(known("tau")), "tau, worst": min(known("tau"), default=None),
             "rho over plans, mean": mean(known("rho")), "rho over plans, worst": min(known("rho"), default=None),
             "regret, mean": mean(known("regret")), "regret, worst": max(known("regret"), default=None),
             f"plans within a factor of {RIGHT_FACTOR}": share_within(ratios, RIGHT_FACTOR),
@@ -179,6 +182,8 @@ def wrong_pairs(program, model):
 # ---- reports ----
 
 def number(value):
+    if isinstance(value, int):
+        return str(value)
     return "–" if value is None or math.isnan(value) else f"{value:.2f}"
 
 

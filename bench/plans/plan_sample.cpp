@@ -23,9 +23,6 @@ namespace {
 
 constexpr double least_share = 0.02;  // of all operations, for a Func to be costly
 
-// Extents of which nothing is known.
-constexpr planning::SizeDefaults unknown_sizes{1000};
-
 std::set<std::string> names_of(const std::vector<FuncPtr>& outputs) {
   std::set<std::string> names;
   for (const FuncPtr& f : graph::topological_order(outputs)) names.insert(f->name);

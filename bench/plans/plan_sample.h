@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "autoschedule/access/sizes.h"
 #include "autoschedule/machine/machine.h"
 #include "autoschedule/plan/plan.h"
 #include "ir/target.h"
@@ -14,6 +15,9 @@ namespace bench::plans {
 
 using retrograde::Target;
 namespace planning = retrograde::planning;
+
+// Extents of which nothing is known.
+inline constexpr planning::SizeDefaults unknown_sizes{1000};
 
 struct SampledPlan {
   std::string source;  // where it comes from: "rules", "search 3", "walk 7"

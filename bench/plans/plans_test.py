@@ -91,9 +91,9 @@ class Programs(unittest.TestCase):
     def test_the_table_has_every_program(self):
         failed = {"plans": [{"key": "x", "error": "it ended"}], "error": "no"}
         report = {"runs": [{"commit": "abc", "programs": {
-            "blur": program(plan("a", 1, 1.0), plan("b", 4, 2.0), plan("c", 3, 3.0)), "warp": failed}}]}
+            "blur": program(plan("a", 1, 1.0), plan("b", 4, 2.0), plan("c", 3, 3.0), plan("d", 5, 4.0)), "warp": failed}}]}
         text = judge.table(report)
-        self.assertIn("| blur | 3 | 1e+03 | 1e+03 | 2 % | – | 0.50 | 1.00 | 1.00 |", text)
+        self.assertIn("| blur | 4 | 1e+03 | 1e+03 | 2 % | – | 0.80 | 1.00 | 1.00 |", text)
         self.assertIn("| warp | failed |", text)
         self.assertIn("| regret, worst | 1.00 |", text)
 
