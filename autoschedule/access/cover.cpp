@@ -20,7 +20,7 @@ bool contains(const std::vector<OpaqueTerm>& terms, const OpaqueTerm& term) {
   return std::ranges::find(terms, term) != terms.end();
 }
 
-// Of numerators of indices, up to what all indices of a box have in common.
+// Numerators of indices, up to what all indices of a box have in common.
 struct Span {
   double low = 0, high = 0;
 

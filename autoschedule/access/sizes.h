@@ -37,7 +37,7 @@ class SizeModel {
   Extent of(FuncId func, size_t dimension) const;
   Extent of_image(ImageId image, size_t dimension) const;
   Extent of(StageId stage, int iterator) const;
-  // That of a dimension of what is accessed.
+  // A dimension of the Func or image that is accessed.
   Extent of(const Access& access, size_t dimension) const {
     return access.of >= 0 ? of(access.of, dimension) : of_image(access.image, dimension);
   }

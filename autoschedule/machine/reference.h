@@ -59,6 +59,8 @@ inline constexpr int64_t uncontended_lines = 1 << 10;
 
 // Operations in the body of a loop, with its unrolled copies: the time that compiling takes grows with them.
 inline constexpr int64_t most_body_operations = 2000;
+// How often each value of a Func is computed at most, if loops that overlap compute it again.
+inline constexpr double most_recomputation = 16;
 
 // ---- The cost of memory, in operations on an element of a vectorized loop ----
 

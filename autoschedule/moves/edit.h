@@ -17,6 +17,11 @@ bool is_editable(const Plan& plan, FuncId func);
 bool has_loops(const Plan& plan, FuncId func);
 // Whether iterations of a loop over the iterator may run in any order, and concurrently (L1, L6).
 bool is_free(const Context& context, StageId stage, int iterator);
+// Whether the region that is read of the Func is bounded (L3), also through inlined Funcs: data decide no index without a
+// range.
+bool has_bounded_region(const Plan& plan, const Context& context, FuncId func);
+// Whether no loop needs a dimension of constant extent (L4).
+bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func);
 bool is_reduction(const Context& context, StageId stage, int iterator);
 // The depth of a loop; of the loop with step 1, which exists in plans.
 std::optional<size_t> find_loop(const Nest& nest, int iterator, int64_t step);

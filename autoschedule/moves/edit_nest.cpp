@@ -22,6 +22,13 @@ bool is_plain(const Nest& nest) {
   return true;
 }
 
+bool has_range(const IndexForm& form, const SizeModel& sizes) {
+  return sizes.range(form.within).is_bounded() ||
+         std::ranges::all_of(form.opaque, [&](const OpaqueTerm& term) {
+           return !term.value.from_data || term.range.is_bounded();
+         });
+}
+
 // Steps that divide the next larger one have no tail. Where a tail would compute more than is asked for, regions of
 // other Funcs would change, so all others are guards.
 void set_tails(Nest& nest, int iterator) {
@@ -48,6 +55,20 @@ bool is_editable(const Plan& plan, FuncId func) {
 bool has_loops(const Plan& plan, FuncId func) {
   const Level::Kind kind = plan.of(func).placement.compute.kind;
   return is_editable(plan, func) && (kind == Level::Kind::Root || kind == Level::Kind::At);
+}
+
+bool has_bounded_region(const Plan& plan, const Context& context, FuncId func) {
+  for (const StageId reader : context.accesses.consumers(func)) {
+    const FuncPlan& other = plan.of(reader.func);
+    if (other.opacity != Opacity::None) return false;
+    for (const Access& read : context.accesses.stage(reader).reads) {
+      const auto is_bounded = [&](const IndexForm& form) { return has_range(form, context.sizes); };
+      if (read.of == func && !std::ranges::all_of(read.index, is_bounded)) return false;
+    }
+    const bool is_inlined = other.placement.compute.kind == Level::Kind::Inline;
+    if (is_inlined && !has_bounded_region(plan, context, reader.func)) return false;
+  }
+  return true;
 }
 
 bool is_reduction(const Context& context, StageId stage, int iterator) {

@@ -130,34 +130,15 @@ class FuncChange {
     const std::optional<LoopRef> place = place_of(guest);
     if (!place) return true;
     const FuncPlan& other = before_.of(guest);
-    if (is_moved_) return !has_window(other) && runs_at_any_size(guest);
+    if (is_moved_) return !has_window(other) && runs_at_any_size(other, context_, guest);
     const Nest &old = old_nest(place->stage), &nest = new_nest(place->stage);
     const auto depth = new_depth(*place);
     if (!depth) return false;
     if (has_window(other) && !has_equal_loops(old, nest, place->depth)) return false;
     const size_t iterators = context_.accesses.stage(place->stage).iterators.size();
     for (int i = 0; i < static_cast<int>(iterators); ++i) {
-      if (span(old, place->depth, i) != span(nest, *depth, i)) return runs_at_any_size(guest);
-    }
-    return true;
-  }
-
-  // Whether no loop of the Func needs a dimension of constant extent.
-  bool runs_at_any_size(FuncId guest) const {
-    const FuncPlan& other = before_.of(guest);
-    const bool in_memory =
-        other.storage.memory == MemoryType::Auto || other.storage.memory == MemoryType::Heap;
-    if (!in_memory || other.opacity != Opacity::None) return false;
-    for (size_t s = 0; s < other.nests.size(); ++s) {
-      const Nest& nest = other.nests[s];
-      for (const Loop& loop : nest.loops) {
-        if (loop.kind == ForType::Serial || loop.kind == ForType::Parallel) continue;
-        if (next_larger(parts_of(nest, loop.iterator), loop.step)) continue;
-        const StageId stage{guest, static_cast<int16_t>(s)};
-        const auto count = context_.accesses.stage(stage).iterators.size();
-        const bool is_fused = loop.iterator < 0 || static_cast<size_t>(loop.iterator) >= count;
-        if (is_fused || !is_reduction(context_, stage, loop.iterator)) return false;
-      }
+      if (span(old, place->depth, i) != span(nest, *depth, i))
+        return runs_at_any_size(other, context_, guest);
     }
     return true;
   }
@@ -189,6 +170,23 @@ class FuncChange {
 };
 
 }  // namespace
+
+bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func) {
+  if (plan.opacity != Opacity::None ||
+      (plan.storage.memory != MemoryType::Auto && plan.storage.memory != MemoryType::Heap))
+    return false;
+  for (size_t s = 0; s < plan.nests.size(); ++s) {
+    const StageId stage{func, static_cast<int16_t>(s)};
+    const auto iterators = static_cast<int>(context.accesses.stage(stage).iterators.size());
+    for (const Loop& loop : plan.nests[s].loops) {
+      if (loop.kind == ForType::Serial || loop.kind == ForType::Parallel) continue;
+      if (outer_step(plan.nests[s], loop.iterator, loop.step) > 0) continue;
+      const bool is_own = loop.iterator >= 0 && loop.iterator < iterators;
+      if (!is_own || !is_reduction(context, stage, loop.iterator)) return false;
+    }
+  }
+  return true;
+}
 
 std::optional<Plan> with_func(const Plan& plan, FuncId func, FuncPlan changed,
                               const Context& context) {

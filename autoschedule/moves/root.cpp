@@ -2,13 +2,14 @@
 //
 //   blur  at out/y  y, x     =>     blur  root  parallel y, x:16, vector x
 //
-// Legal: L8. A Func that is computed in a loop is dropped with the plan if this Func reads it from outside then (P2).
+// Legal: L3, L8. A Func that is computed in a loop is dropped with the plan if this Func reads it from outside then (P2).
 #include "autoschedule/moves/edit.h"
 
 namespace retrograde::planning::moves {
 
 std::vector<Plan> root(const Plan& plan, FuncId func, const Context& context) {
-  if (!is_editable(plan, func) || plan.of(func).placement.compute.kind == Level::Kind::Root)
+  if (!is_editable(plan, func) || plan.of(func).placement.compute.kind == Level::Kind::Root ||
+      !has_bounded_region(plan, context, func))
     return {};
   FuncPlan changed = plan.of(func);
   changed.placement = {};

@@ -12,7 +12,7 @@ namespace {
 
 int64_t rounded_up_quotient(int64_t a, int64_t b) { return (a + b - 1) / b; }
 
-// What the loops of a nest from a depth on cover.
+// The points that the loops of a nest cover from a depth on.
 class NestCover {
  public:
   // `whole`: what all loops cover. `iterators`: how many of these have loops; those of fusions are next.
@@ -142,7 +142,7 @@ std::vector<int64_t> Covers::box(FuncId func, const Level& level) {
   GrowingBox box;
   for (const StageId reader : graph.consumers(func))
     box.add(reads_of(graph.stage(reader), func), cover_in(reader, level), sizes_);
-  // What an update accesses has to be there for the stages before it.
+  // Earlier stages compute all that an update accesses.
   const std::vector<StageNode>& stages = graph.func(func).stages;
   for (size_t s = stages.size(); s-- > 1;) {
     std::vector<const Access*> accesses = reads_of(stages[s], func);
@@ -158,7 +158,7 @@ Cover Covers::all_of(StageId stage) {
   return cover_of_box(stage, box(stage.func, compute));
 }
 
-// What a stage covers in one iteration of a loop around it.
+// The points of a stage in one iteration of a loop around it.
 Cover Covers::cover_in(StageId stage, const Level& level) {
   if (const auto depth = depth_in(plan_, stage, level)) return inside(stage, *depth);
   if (const auto depth = shared_depth(plan_, stage, level)) return inside(stage, *depth);

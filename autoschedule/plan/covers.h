@@ -22,8 +22,8 @@ class Covers {
   // Both are referred to. Requires: the sizes are those of the plan's program.
   Covers(const Plan& plan, const SizeModel& sizes) : plan_(plan), sizes_(sizes) {}
 
-  // What one iteration of the loop at this depth covers; `around_all_loops`: all loops of the stage, which cover all that
-  // is computed at once at the place of the Func. Of an opaque stage, each loop covers all.
+  // The points that one iteration of the loop at this depth covers. `around_all_loops`: those of all loops, which are all
+  // points that are computed at once at the place of the Func. Loops of an opaque stage cover all of it each.
   Cover inside(StageId stage, int depth);
   // By dimension, the extents of the box of a Func that one iteration of the level's loop needs, also through other
   // Funcs inside of the loop, and through updates of the Func itself. Requires: a stage inside of the loop reads it.

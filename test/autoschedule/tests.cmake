@@ -38,13 +38,14 @@ retrograde_test(tune_test LIBS retrograde_tune_parts retrograde_dep_halide_runti
 
 # The access graph. Its headers are in the top-level folder. In shadow, it answers for the programs of the gradient
 # suite.
-retrograde_test(access_graph_test access_queries_test READS_FILES LIBS retrograde_dep_halide_runtime)
+retrograde_test(access_graph_test access_queries_test dependences_test READS_FILES LIBS retrograde_dep_halide_runtime)
 retrograde_test(access_shadow_test
-  SOURCES autoschedule/access_shadow_test.cpp gradient/programs_accesses.cpp gradient/programs_large.cpp
+  SOURCES autoschedule/access_shadow_test.cpp autoschedule/dependences_shadow_test.cpp
+          gradient/programs_accesses.cpp gradient/programs_large.cpp
           gradient/programs_pathologies.cpp gradient/programs_pointwise.cpp gradient/update_programs.cpp
           gradient/update_reductions.cpp gradient/update_filters.cpp gradient/update_scans.cpp
           gradient/update_steps.cpp
   LIBS retrograde_dep_halide_runtime)
-foreach(name access_graph_test access_queries_test access_shadow_test)
+foreach(name access_graph_test access_queries_test dependences_test access_shadow_test)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
 endforeach()

@@ -1,4 +1,4 @@
-// What pieces of nests cover, and the boxes of Funcs that are computed in loops.
+// The points that pieces of nests cover, and the boxes of Funcs that are computed in loops.
 #include <gtest/gtest.h>
 
 #include "autoschedule/plan/covers.h"

@@ -1,0 +1,336 @@
+#include "autoschedule/access/dependences.h"
+
+#include <algorithm>
+
+#include "graph/definitions/own_reads.h"
+#include "graph/definitions/race_checks.h"
+#include "ir/build.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::planning {
+
+namespace {
+
+using ir::ConstantRange;
+using Terms = std::vector<IntegerSystem::Term>;
+
+bool is_loop(const StageNode& stage, const Definition& definition, size_t iterator) {
+  return iterator + 1 < stage.iterators.size() || !point_number(definition);
+}
+
+std::optional<int64_t> constant_extent(const Iterator& iterator) {
+  return iterator.extent.defined() ? as_const_int(simplify(iterator.extent)) : std::nullopt;
+}
+
+ConstantRange range_of(const Iterator& iterator) {
+  if (iterator.kind == Iterator::Kind::Pure) return {};
+  const auto min = as_const_int(simplify(iterator.min)), extent = constant_extent(iterator);
+  return {min.value_or(INT64_MIN), min && extent ? *min + *extent - 1 : INT64_MAX};
+}
+
+ConstantRange negative(const ConstantRange& range) {
+  return {range.has_upper_bound() ? -range.max : INT64_MIN,
+          range.has_lower_bound() ? -range.min : INT64_MAX};
+}
+
+// The conditions under which two iterations of a stage access one element.
+class PairOfIterations {
+ public:
+  PairOfIterations(const StageNode& stage, const FuncContents& f) : stage_(stage), f_(f) {
+    for (const Iterator& i : stage.iterators) {
+      const bool is_pure = i.kind == Iterator::Kind::Pure;
+      const auto extent = is_pure ? std::optional<int64_t>(1) : constant_extent(i);
+      system_.add_variable(extent ? ConstantRange{1 - *extent, *extent - 1} : ConstantRange());
+    }
+    for (const Iterator& i : stage.iterators) {
+      const ConstantRange range = range_of(i);
+      const int first = system_.add_variable(range);
+      if (range.is_bounded())  // so is the second one's
+        system_.add_condition({{first, 1}, {first - count(), 1}}, {-range.max, -range.min});
+    }
+    for (const int side : {0, 1}) add_guard(stage.guard, side);
+  }
+
+  IntegerSystem meet(const Access& first, const Access& second) {
+    for (size_t d = 0; d < first.index.size(); ++d) {
+      const IndexForm &a = first.index[d], &b = second.index[d];
+      const bool are_alike = a.divisor == b.divisor && a.modulus == b.modulus;
+      // A clamp makes different numbers equal.
+      if (are_alike && !a.clamped && !b.clamped) add_equal(a, b);
+    }
+    system_.combine_equations(count());
+    return system_;
+  }
+
+ private:
+  const StageNode& stage_;
+  const FuncContents& f_;
+  IntegerSystem system_;  // distances, iterators of the first iteration, further integers
+  // Values that are not affine, by iteration; those that are the same for both count as the first one's.
+  std::map<std::pair<Value, int>, int> values_;
+
+  int count() const { return static_cast<int>(stage_.iterators.size()); }
+
+  static void add(Terms& sum, int variable, int64_t coefficient) {
+    const auto known = std::ranges::find(sum, variable, &IntegerSystem::Term::variable);
+    if (known == sum.end())
+      sum.push_back({variable, coefficient});
+    else if ((known->coefficient += coefficient) == 0)
+      sum.erase(known);
+  }
+
+  // Adds the numerator of a form in one of the iterations, without its constant.
+  void add(Terms& sum, const IndexForm& form, int side, int64_t factor) {
+    for (const Term& term : form.terms) {
+      add(sum, count() + term.iterator, factor * term.coefficient);
+      if (side == 1) add(sum, term.iterator, factor * term.coefficient);
+    }
+    for (const OpaqueTerm& term : form.opaque)
+      add(sum, variable_of(term, side), factor * term.coefficient);
+  }
+
+  int variable_of(const OpaqueTerm& term, int side) {
+    const std::pair key{term.value, is_same_for_both(term) ? 0 : side};
+    const auto [place, is_new] = values_.try_emplace(key, 0);
+    if (is_new) place->second = system_.add_variable();  // the rules of directives know no range
+    return place->second;
+  }
+  bool is_same_for_both(const OpaqueTerm& term) const {
+    const bool is_outside = std::ranges::all_of(term.value.iterators, [&](int16_t i) {
+      return stage_.iterators[static_cast<size_t>(i)].kind == Iterator::Kind::Pure;
+    });
+    // What the update changes differs from iteration to iteration.
+    bool reads_own = !term.expr.defined();
+    if (term.expr.defined()) {
+      walk(term.expr, [&](const Call& call) { reads_own = reads_own || is_call_of(call, &f_); });
+    }
+    return is_outside && !reads_own;
+  }
+
+  // floor(a / divisor) mod modulus is the same for both.
+  void add_equal(const IndexForm& a, const IndexForm& b) {
+    if (a.modulus == 0) {
+      const int64_t rest = a.divisor - 1;
+      Terms sum;
+      add(sum, a, 0, 1);
+      add(sum, b, 1, -1);
+      system_.add_condition(sum, {a.low - b.high - rest, a.high - b.low + rest});
+      if (a.divisor == 1) return;
+    }
+    const int result = system_.add_variable();
+    for (const int side : {0, 1}) {
+      const IndexForm& form = side == 0 ? a : b;
+      Terms sum;
+      add(sum, form, side, 1);
+      add(sum, result, -form.divisor);
+      if (form.modulus != 0) add(sum, system_.add_variable(), -form.divisor * form.modulus);
+      system_.add_condition(sum, {form.low - (form.divisor - 1), form.high});
+    }
+  }
+
+  void add_guard(const Guard& guard, int side) {
+    for (const Congruence& c : guard.congruences) {
+      if (c.form.clamped || c.form.divisor != 1 || c.form.modulus != 0) continue;
+      Terms sum;
+      add(sum, c.form, side, 1);
+      add(sum, system_.add_variable(), -c.modulus);
+      system_.add_condition(sum, {c.form.low - c.remainder, c.form.high - c.remainder});
+    }
+    for (const IndexForm& form : guard.nonnegative) {
+      if (form.clamped || form.divisor != 1 || form.modulus != 0) continue;
+      Terms sum;
+      add(sum, form, side, 1);
+      system_.add_condition(sum, {INT64_MIN, form.high});
+    }
+  }
+};
+
+// Whether a loop of the same iterator with a larger step is inside: the loop runs over remainders. 0: it does not.
+int64_t period_of(const std::vector<LoopStep>& loops, size_t depth) {
+  int64_t period = 0;
+  for (size_t d = depth + 1; d < loops.size(); ++d) {
+    if (loops[d].iterator == loops[depth].iterator && loops[d].step > loops[depth].step)
+      period = std::max(period, loops[d].step);
+  }
+  return period;
+}
+
+// The iterators all of whose loops are outside of this one.
+IteratorSet iterators_around(const std::vector<LoopStep>& loops, size_t depth) {
+  IteratorSet result = 0, inside = 0;
+  for (size_t d = 0; d < loops.size(); ++d) {
+    IteratorSet& side = d < depth ? result : inside;
+    side |= set_of(loops[d].iterator);
+  }
+  return result & ~inside;
+}
+
+}  // namespace
+
+// The outermost loop in which both iterations differ decides their order.
+bool keeps(const Dependence& dependence, const std::vector<LoopStep>& loops) {
+  for (size_t d = 0; d < loops.size(); ++d) {
+    const ConstantRange& distance = dependence.distances[static_cast<size_t>(loops[d].iterator)];
+    const int64_t period = period_of(loops, d);
+    if (period != 0 && distance.is_point() && distance.min % period == 0) continue;
+    if (distance.min < 0 || period != 0) return false;
+    if (distance.min >= loops[d].step) return true;
+  }
+  return true;
+}
+
+// ---- from forms ----
+
+StageDependences::StageDependences(const AccessGraph& graph, StageId id) {
+  const StageNode& stage = graph.stage(id);
+  const FuncContents& f = *graph.func(id.func).func;
+  iterators_ = stage.iterators.size();
+  for (size_t i = iterators_; i-- > 0;) {
+    const bool is_reduction = stage.iterators[i].kind == Iterator::Kind::Reduction;
+    if (is_reduction && is_loop(stage, f.stage(id.stage), i))
+      levels_.push_back(static_cast<int>(i));
+  }
+  const bool never_runs = std::ranges::any_of(
+      stage.iterators, [](const Iterator& i) { return constant_extent(i).value_or(1) <= 0; });
+  if (never_runs) levels_.clear();
+  if (levels_.empty()) return;
+  for (const int i : levels_) {
+    const auto extent = constant_extent(stage.iterators[static_cast<size_t>(i)]);
+    const bool is_moved = (stage.write.moved_by() & set_of(i)) != 0;
+    if (stage.guard.is_empty() && !is_moved && extent.value_or(2) > 1) unmoved_ |= set_of(i);
+  }
+  pairs_.push_back(PairOfIterations(stage, f).meet(stage.write, stage.write));
+  for (const Access& read : stage.reads) {
+    if (read.of == id.func && !read.same_place(stage.write))
+      pairs_.push_back(PairOfIterations(stage, f).meet(stage.write, read));
+  }
+  find_dependences();
+}
+
+IntegerSystem StageDependences::ordered(const IntegerSystem& pair, size_t level) const {
+  IntegerSystem result = pair;
+  for (size_t outer = 0; outer < level; ++outer)
+    result.restrict(levels_[outer], ConstantRange::point(0));
+  return result;
+}
+
+void StageDependences::find_dependences() {
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    for (size_t level = 0; level < levels_.size(); ++level) {
+      for (const bool writes_first : {true, false}) {
+        IntegerSystem system = ordered(pairs_[p], level);
+        system.restrict(levels_[level],
+                        writes_first ? ConstantRange{1, INT64_MAX} : ConstantRange{INT64_MIN, -1});
+        if (!system.narrow()) continue;
+        Dependence found;
+        for (size_t i = 0; i < iterators_; ++i) {
+          const ConstantRange range = system.range(static_cast<int>(i));
+          found.distances.push_back(writes_first ? range : negative(range));
+        }
+        if (std::ranges::find(dependences_, found) == dependences_.end())
+          dependences_.push_back(std::move(found));
+      }
+    }
+  }
+}
+
+bool StageDependences::are_independent(int iterator, IteratorSet around) const {
+  if (std::ranges::find(levels_, iterator) == levels_.end()) return true;
+  return std::ranges::none_of(pairs_, [&](const IntegerSystem& pair) {
+    IntegerSystem system = pair;
+    for (const int i : levels_) {
+      // The last bit of the set is no single iterator.
+      if (i != iterator && i < 31 && (around & set_of(i)))
+        system.restrict(i, ConstantRange::point(0));
+    }
+    IntegerSystem reversed = system;
+    system.restrict(iterator, {1, INT64_MAX});
+    reversed.restrict(iterator, {INT64_MIN, -1});
+    return system.narrow() || reversed.narrow();
+  });
+}
+
+bool StageDependences::writes_once(IteratorSet iterators) const {
+  if (pairs_.empty()) return true;
+  IntegerSystem system = pairs_[0];
+  for (const int i : levels_) {
+    if ((iterators & set_of(i)) == 0) system.restrict(i, ConstantRange::point(0));
+  }
+  return std::ranges::all_of(levels_, [&](int level) {
+    IntegerSystem differing = system;
+    differing.restrict(level, {1, INT64_MAX});
+    return (iterators & set_of(level)) == 0 || !differing.narrow();
+  });
+}
+
+// ---- with the rules of directives ----
+
+Dependences::Known& Dependences::known(StageId stage) {
+  auto found = known_.find(stage);
+  if (found == known_.end())
+    found = known_.emplace(stage, Known{StageDependences(graph_, stage), {}, {}, {}}).first;
+  return found->second;
+}
+
+const StageDependences& Dependences::of(StageId stage) { return known(stage).forms; }
+
+bool Dependences::may_run_at_once(StageId stage, int iterator, IteratorSet around) {
+  Known& known = this->known(stage);
+  if (known.forms.is_certainly_carried(iterator)) return false;
+  const StageNode& node = graph_.stage(stage);
+  const auto [answer, is_new] = known.at_once.try_emplace({iterator, around}, true);
+  if (!is_new) return answer->second;
+  // The rules may understand less of a predicate.
+  const bool is_proven = node.guard.is_empty() && known.forms.are_independent(iterator, around);
+  if (is_proven) return answer->second;
+  const FuncContents& f = *graph_.func(stage.func).func;
+  const std::vector<Iterator>& iterators = node.iterators;
+  std::unordered_set<std::string> names;
+  for (size_t i = 0; i < iterators.size(); ++i) {
+    if (around & set_of(static_cast<int>(i))) names.insert(iterators[i].name);
+  }
+  const std::string& name = iterators[static_cast<size_t>(iterator)].name;
+  return answer->second = can_prove_race_free(f, f.stage(stage.stage), name, names);
+}
+
+bool Dependences::commutes(StageId stage) {
+  Known& known = this->known(stage);
+  if (!known.commutes) {
+    const FuncContents& f = *graph_.func(stage.func).func;
+    const Definition& update = f.stage(stage.stage);
+    known.commutes =
+        stage.stage == 0 || stores_one_value(f, update) || can_prove_commutative(f, update);
+  }
+  return *known.commutes;
+}
+
+bool Dependences::keeps_order(StageId stage, const std::vector<LoopStep>& loops) {
+  for (size_t d = 0; d < loops.size(); ++d) {
+    const LoopStep& loop = loops[d];
+    if (loop.is_concurrent && !may_run_at_once(stage, loop.iterator, iterators_around(loops, d)))
+      return false;
+  }
+  const StageDependences& forms = of(stage);
+  return std::ranges::all_of(forms.all(), [&](const Dependence& d) { return keeps(d, loops); }) ||
+         commutes(stage) || keeps_order_of_variables(stage, loops);
+}
+
+// Proves it for loops that are the reduction variables themselves.
+bool Dependences::keeps_order_of_variables(StageId stage, const std::vector<LoopStep>& loops) {
+  const FuncContents& f = *graph_.func(stage.func).func;
+  const Definition& update = f.stage(stage.stage);
+  if (point_number(update)) return false;
+  std::vector<std::string> order;
+  for (const LoopStep& loop : loops) {
+    const Iterator& iterator = graph_.stage(stage).iterators[static_cast<size_t>(loop.iterator)];
+    if (iterator.kind == Iterator::Kind::Reduction) order.insert(order.begin(), iterator.name);
+  }
+  if (order.size() != update.rvars.size()) return false;
+  const auto [answer, is_new] = known(stage).orders.try_emplace(order, false);
+  if (is_new)
+    answer->second =
+        can_prove_same_order(f, update, ir::mapped(update.rvars, &ReductionVariable::var), order);
+  return answer->second;
+}
+
+}  // namespace retrograde::planning
