@@ -33,10 +33,31 @@ ConstantRange negative(const ConstantRange& range) {
           range.has_lower_bound() ? -range.min : INT64_MAX};
 }
 
-// The conditions under which two iterations of a stage access one element.
+// Conditions on two iterations of a stage, the first of which writes an element that the second one accesses.
 class PairOfIterations {
  public:
-  PairOfIterations(const StageNode& stage, const FuncContents& f) : stage_(stage), f_(f) {
+  // Conditions that hold for all such pairs, with those of the predicate or without; or pairs for which they hold are
+  // such pairs.
+  enum class Kind : uint8_t { Necessary, WithoutPredicate, Sufficient };
+
+  // Undefined: there are no sufficient conditions of this form.
+  static std::optional<IntegerSystem> conditions(const StageNode& stage, const FuncContents& f,
+                                                 const Access& access, Kind kind) {
+    PairOfIterations pair(stage, f, kind);
+    if (kind != Kind::WithoutPredicate) {
+      for (const int iteration : {0, 1}) pair.add_guard(stage.guard, iteration);
+    }
+    if (kind == Kind::Sufficient) pair.add_guard(access.guard, 1);
+    for (size_t d = 0; d < access.index.size(); ++d)
+      pair.add_dimension(stage.write.index[d], access.index[d]);
+    if (kind == Kind::Sufficient && !pair.is_exact_) return std::nullopt;
+    pair.system_.combine_equations(pair.count());
+    return std::move(pair.system_);
+  }
+
+ private:
+  PairOfIterations(const StageNode& stage, const FuncContents& f, Kind kind)
+      : stage_(stage), f_(f), kind_(kind) {
     for (const Iterator& i : stage.iterators) {
       const bool is_pure = i.kind == Iterator::Kind::Pure;
       const auto extent = is_pure ? std::optional<int64_t>(1) : constant_extent(i);
@@ -48,23 +69,12 @@ class PairOfIterations {
       if (range.is_bounded())  // so is the second one's
         system_.add_condition({{first, 1}, {first - count(), 1}}, {-range.max, -range.min});
     }
-    for (const int side : {0, 1}) add_guard(stage.guard, side);
   }
 
-  IntegerSystem meet(const Access& first, const Access& second) {
-    for (size_t d = 0; d < first.index.size(); ++d) {
-      const IndexForm &a = first.index[d], &b = second.index[d];
-      const bool are_alike = a.divisor == b.divisor && a.modulus == b.modulus;
-      // A clamp makes different numbers equal.
-      if (are_alike && !a.clamped && !b.clamped) add_equal(a, b);
-    }
-    system_.combine_equations(count());
-    return system_;
-  }
-
- private:
   const StageNode& stage_;
   const FuncContents& f_;
+  const Kind kind_;
+  bool is_exact_ = true;  // no condition is left out
   IntegerSystem system_;  // distances, iterators of the first iteration, further integers
   // Values that are not affine, by iteration; those that are the same for both count as the first one's.
   std::map<std::pair<Value, int>, int> values_;
@@ -90,16 +100,20 @@ class PairOfIterations {
   }
 
   int variable_of(const OpaqueTerm& term, int side) {
-    const std::pair key{term.value, is_same_for_both(term) ? 0 : side};
-    const auto [place, is_new] = values_.try_emplace(key, 0);
-    if (is_new) place->second = system_.add_variable();  // the rules of directives know no range
+    is_exact_ = is_exact_ && term.value.from_data;  // parameters may be related to sizes
+    const bool is_same = is_same_for_both(term);
+    const auto [place, is_new] = values_.try_emplace({term.value, is_same ? 0 : side}, 0);
+    // The rules of directives know no ranges of values. All types hold 0 and 1.
+    const bool is_example = kind_ == Kind::Sufficient;
+    if (is_new)
+      place->second = system_.add_variable(is_example ? ConstantRange{0, 1} : ConstantRange());
     return place->second;
   }
   bool is_same_for_both(const OpaqueTerm& term) const {
     const bool is_outside = std::ranges::all_of(term.value.iterators, [&](int16_t i) {
       return stage_.iterators[static_cast<size_t>(i)].kind == Iterator::Kind::Pure;
     });
-    // What the update changes differs from iteration to iteration.
+    // Values that the update changes differ from iteration to iteration.
     bool reads_own = !term.expr.defined();
     if (term.expr.defined()) {
       walk(term.expr, [&](const Call& call) { reads_own = reads_own || is_call_of(call, &f_); });
@@ -107,8 +121,11 @@ class PairOfIterations {
     return is_outside && !reads_own;
   }
 
-  // floor(a / divisor) mod modulus is the same for both.
-  void add_equal(const IndexForm& a, const IndexForm& b) {
+  // floor(a / divisor) mod modulus is the same for both. A clamp makes different numbers equal, too.
+  void add_dimension(const IndexForm& a, const IndexForm& b) {
+    const bool are_alike = a.divisor == b.divisor && a.modulus == b.modulus;
+    is_exact_ = is_exact_ && are_alike;
+    if (!are_alike || (kind_ != Kind::Sufficient && (a.clamped || b.clamped))) return;
     if (a.modulus == 0) {
       const int64_t rest = a.divisor - 1;
       Terms sum;
@@ -129,19 +146,25 @@ class PairOfIterations {
   }
 
   void add_guard(const Guard& guard, int side) {
+    is_exact_ = is_exact_ && guard.others.empty();
     for (const Congruence& c : guard.congruences) {
-      if (c.form.clamped || c.form.divisor != 1 || c.form.modulus != 0) continue;
       Terms sum;
-      add(sum, c.form, side, 1);
       add(sum, system_.add_variable(), -c.modulus);
-      system_.add_condition(sum, {c.form.low - c.remainder, c.form.high - c.remainder});
+      // The form is that of the remainder.
+      add_condition(c.form, c.form.modulus, side, sum, {-c.remainder, -c.remainder});
     }
-    for (const IndexForm& form : guard.nonnegative) {
-      if (form.clamped || form.divisor != 1 || form.modulus != 0) continue;
-      Terms sum;
-      add(sum, form, side, 1);
-      system_.add_condition(sum, {INT64_MIN, form.high});
-    }
+    for (const IndexForm& form : guard.nonnegative)
+      add_condition(form, 0, side, {}, {INT64_MIN, 0});
+  }
+  void add_condition(const IndexForm& form, int64_t modulus, int side, Terms sum,
+                     ConstantRange constant) {
+    const bool is_simple = !form.clamped && form.divisor == 1 && form.modulus == modulus;
+    is_exact_ = is_exact_ && is_simple;
+    if (!is_simple) return;
+    add(sum, form, side, 1);
+    if (constant.has_lower_bound()) constant.min += form.low;
+    constant.max += form.high;
+    system_.add_condition(sum, constant);
   }
 };
 
@@ -153,6 +176,17 @@ int64_t period_of(const std::vector<LoopStep>& loops, size_t depth) {
       period = std::max(period, loops[d].step);
   }
   return period;
+}
+
+// Tries the smallest numbers.
+bool has_solution(IntegerSystem system) {
+  for (int variable = 0; variable < system.variables(); ++variable) {
+    if (!system.narrow()) return false;
+    const ConstantRange range = system.range(variable);
+    const int64_t smallest = range.contains(0) ? 0 : range.min > 0 ? range.min : range.max;
+    system.restrict(variable, ConstantRange::point(smallest));
+  }
+  return system.narrow();
 }
 
 // The iterators all of whose loops are outside of this one.
@@ -181,7 +215,7 @@ bool keeps(const Dependence& dependence, const std::vector<LoopStep>& loops) {
 
 // ---- from forms ----
 
-StageDependences::StageDependences(const AccessGraph& graph, StageId id) {
+StageDependences::StageDependences(const AccessGraph& graph, StageId id, bool with_predicate) {
   const StageNode& stage = graph.stage(id);
   const FuncContents& f = *graph.func(id.func).func;
   iterators_ = stage.iterators.size();
@@ -194,72 +228,75 @@ StageDependences::StageDependences(const AccessGraph& graph, StageId id) {
       stage.iterators, [](const Iterator& i) { return constant_extent(i).value_or(1) <= 0; });
   if (never_runs) levels_.clear();
   if (levels_.empty()) return;
-  for (const int i : levels_) {
-    const auto extent = constant_extent(stage.iterators[static_cast<size_t>(i)]);
-    const bool is_moved = (stage.write.moved_by() & set_of(i)) != 0;
-    if (stage.guard.is_empty() && !is_moved && extent.value_or(2) > 1) unmoved_ |= set_of(i);
-  }
-  pairs_.push_back(PairOfIterations(stage, f).meet(stage.write, stage.write));
+  // A store may leave an element as it was.
+  const bool may_keep = std::ranges::any_of(stage.reads, [&](const Access& read) {
+    return read.same_place(stage.write) && !read.guard.is_empty();
+  });
+  using Kind = PairOfIterations::Kind;
+  const auto add = [&](const Access& access) {
+    const Kind kind = with_predicate ? Kind::Necessary : Kind::WithoutPredicate;
+    pairs_.push_back(*PairOfIterations::conditions(stage, f, access, kind));
+    find_dependences(pairs_.back());
+    if (!access.writes && may_keep) return;
+    const auto certain = PairOfIterations::conditions(stage, f, access, Kind::Sufficient);
+    if (certain) certain_pairs_.push_back(*certain);
+  };
+  add(stage.write);
   for (const Access& read : stage.reads) {
-    if (read.of == id.func && !read.same_place(stage.write))
-      pairs_.push_back(PairOfIterations(stage, f).meet(stage.write, read));
+    if (read.of == id.func && !read.same_place(stage.write)) add(read);
   }
-  find_dependences();
 }
 
-IntegerSystem StageDependences::ordered(const IntegerSystem& pair, size_t level) const {
+IntegerSystem StageDependences::differing(const IntegerSystem& pair, int iterator,
+                                          IteratorSet around, bool upwards) const {
   IntegerSystem result = pair;
-  for (size_t outer = 0; outer < level; ++outer)
-    result.restrict(levels_[outer], ConstantRange::point(0));
+  for (const int i : levels_) {
+    // The last bit of a set is no single iterator.
+    if (i != iterator && i < 31 && (around & set_of(i)))
+      result.restrict(i, ConstantRange::point(0));
+  }
+  result.restrict(iterator, upwards ? ConstantRange{1, INT64_MAX} : ConstantRange{INT64_MIN, -1});
   return result;
 }
 
-void StageDependences::find_dependences() {
-  for (size_t p = 0; p < pairs_.size(); ++p) {
-    for (size_t level = 0; level < levels_.size(); ++level) {
-      for (const bool writes_first : {true, false}) {
-        IntegerSystem system = ordered(pairs_[p], level);
-        system.restrict(levels_[level],
-                        writes_first ? ConstantRange{1, INT64_MAX} : ConstantRange{INT64_MIN, -1});
-        if (!system.narrow()) continue;
-        Dependence found;
-        for (size_t i = 0; i < iterators_; ++i) {
-          const ConstantRange range = system.range(static_cast<int>(i));
-          found.distances.push_back(writes_first ? range : negative(range));
-        }
-        if (std::ranges::find(dependences_, found) == dependences_.end())
-          dependences_.push_back(std::move(found));
+void StageDependences::find_dependences(const IntegerSystem& pair) {
+  IteratorSet outer = 0;
+  for (const int level : levels_) {
+    for (const bool writes_first : {true, false}) {
+      IntegerSystem system = differing(pair, level, outer, writes_first);
+      if (!system.narrow()) continue;
+      Dependence found;
+      for (size_t i = 0; i < iterators_; ++i) {
+        const ConstantRange range = system.range(static_cast<int>(i));
+        found.distances.push_back(writes_first ? range : negative(range));
       }
+      if (std::ranges::find(dependences_, found) == dependences_.end())
+        dependences_.push_back(std::move(found));
     }
+    outer |= set_of(level);
   }
 }
 
 bool StageDependences::are_independent(int iterator, IteratorSet around) const {
   if (std::ranges::find(levels_, iterator) == levels_.end()) return true;
   return std::ranges::none_of(pairs_, [&](const IntegerSystem& pair) {
-    IntegerSystem system = pair;
-    for (const int i : levels_) {
-      // The last bit of the set is no single iterator.
-      if (i != iterator && i < 31 && (around & set_of(i)))
-        system.restrict(i, ConstantRange::point(0));
-    }
-    IntegerSystem reversed = system;
-    system.restrict(iterator, {1, INT64_MAX});
-    reversed.restrict(iterator, {INT64_MIN, -1});
-    return system.narrow() || reversed.narrow();
+    return differing(pair, iterator, around, true).narrow() ||
+           differing(pair, iterator, around, false).narrow();
+  });
+}
+
+bool StageDependences::are_dependent(int iterator, IteratorSet around) const {
+  return std::ranges::any_of(certain_pairs_, [&](const IntegerSystem& pair) {
+    return has_solution(differing(pair, iterator, around, true)) ||
+           has_solution(differing(pair, iterator, around, false));
   });
 }
 
 bool StageDependences::writes_once(IteratorSet iterators) const {
   if (pairs_.empty()) return true;
-  IntegerSystem system = pairs_[0];
-  for (const int i : levels_) {
-    if ((iterators & set_of(i)) == 0) system.restrict(i, ConstantRange::point(0));
-  }
   return std::ranges::all_of(levels_, [&](int level) {
-    IntegerSystem differing = system;
-    differing.restrict(level, {1, INT64_MAX});
-    return (iterators & set_of(level)) == 0 || !differing.narrow();
+    return (iterators & set_of(level)) == 0 ||
+           !differing(pairs_[0], level, ~iterators, true).narrow();
   });
 }
 
@@ -276,12 +313,15 @@ const StageDependences& Dependences::of(StageId stage) { return known(stage).for
 
 bool Dependences::may_run_at_once(StageId stage, int iterator, IteratorSet around) {
   Known& known = this->known(stage);
-  if (known.forms.is_certainly_carried(iterator)) return false;
+  if (known.forms.are_dependent(iterator, around)) return false;
   const StageNode& node = graph_.stage(stage);
+  if (node.iterators[static_cast<size_t>(iterator)].kind == Iterator::Kind::Pure) return true;
   const auto [answer, is_new] = known.at_once.try_emplace({iterator, around}, true);
   if (!is_new) return answer->second;
   // The rules may understand less of a predicate.
-  const bool is_proven = node.guard.is_empty() && known.forms.are_independent(iterator, around);
+  const bool is_proven = known.forms.are_independent(iterator, around) &&
+                         (node.guard.is_empty() ||
+                          StageDependences(graph_, stage, false).are_independent(iterator, around));
   if (is_proven) return answer->second;
   const FuncContents& f = *graph_.func(stage.func).func;
   const std::vector<Iterator>& iterators = node.iterators;

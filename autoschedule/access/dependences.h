@@ -41,7 +41,8 @@ bool keeps(const Dependence& dependence, const std::vector<LoopStep>& loops);
 // The dependences of a stage on itself, from the affine forms of its accesses alone.
 class StageDependences {
  public:
-  StageDependences(const AccessGraph& graph, StageId stage);
+  // `with_predicate`: iterations for which the predicate does not hold access nothing.
+  StageDependences(const AccessGraph& graph, StageId stage, bool with_predicate = true);
 
   const std::vector<Dependence>& all() const { return dependences_; }
   // Whether no two iterations that differ in the iterator, and agree in those of `around`, access one element that one of
@@ -49,23 +50,25 @@ class StageDependences {
   bool are_independent(int iterator, IteratorSet around = 0) const;
   // Whether no two iterations that agree in all other iterators write one element. False: unknown.
   bool writes_once(IteratorSet iterators) const;
-  // Whether iterations that differ in this iterator alone write one element for certain: no index depends on it.
-  bool is_certainly_carried(int iterator) const { return (unmoved_ & set_of(iterator)) != 0; }
+  // Whether there are such iterations for certain, if values from memory may be any integers. False: unknown.
+  bool are_dependent(int iterator, IteratorSet around = 0) const;
 
  private:
-  void find_dependences();
-  IntegerSystem ordered(const IntegerSystem& pair, size_t level) const;
+  void find_dependences(const IntegerSystem& pair);
+  // The pair, of iterations that agree in these iterators and differ in the other one, upwards or downwards.
+  IntegerSystem differing(const IntegerSystem& pair, int iterator, IteratorSet around,
+                          bool upwards) const;
 
   std::vector<int> levels_;  // the reduction loops, outermost first
   size_t iterators_ = 0;
   // Pairs of iterations that access one element; the first pair is that of the write with itself. The variables from 0
   // on are the distances of the iterators, those of the second iteration minus those of the first, which writes.
   std::vector<IntegerSystem> pairs_;
+  std::vector<IntegerSystem> certain_pairs_;  // solutions of these systems exist
   std::vector<Dependence> dependences_;
-  IteratorSet unmoved_ = 0;
 };
 
-// Of all stages of a program, each found when it is first asked for.
+// The dependences of all stages of a program, found when they are first asked for.
 class Dependences {
  public:
   explicit Dependences(const AccessGraph& graph) : graph_(graph) {}  // is referred to

@@ -32,6 +32,7 @@ class IntegerSystem {
   void combine_equations(int kept);
   // Narrows the ranges. False: there is no solution.
   bool narrow();
+  int variables() const { return static_cast<int>(ranges_.size()); }
   const ir::ConstantRange& range(int variable) const {
     return ranges_[static_cast<size_t>(variable)];
   }

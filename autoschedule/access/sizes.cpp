@@ -112,9 +112,13 @@ std::optional<int64_t> SizeModel::certain_value(const Expr& e) const {
 std::optional<int64_t> SizeModel::end_of(const Expr& e, bool is_min) const {
   if (!e.defined()) return std::nullopt;
   if (const auto constant = as_const_int(e)) return constant;
+  auto& known = ends_[is_min ? 0 : 1];
+  if (const auto* end = ir::find_or_null(known, e.get())) return end->second;
   const Interval all = analysis::bounds_of(e, parameters_);
   const Expr end = is_min ? all.min : all.max;
-  return end.defined() ? as_const_int(simplify(end)) : std::nullopt;
+  const auto value = end.defined() ? as_const_int(simplify(end)) : std::nullopt;
+  known.emplace(e.get(), std::pair(e, value));
+  return value;
 }
 
 ConstantRange SizeModel::range(const Interval& i) const {

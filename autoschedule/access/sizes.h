@@ -4,8 +4,11 @@
 // region that consumers read, a default for what nothing is known of.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "analysis/interval.h"
@@ -81,6 +84,9 @@ class SizeModel {
   const AccessGraph& graph_;
   const SizeDefaults defaults_;
   analysis::Scope<Interval> parameters_;  // with estimates
+  // The smallest and the largest value of expressions over parameters, which are asked for again and again.
+  using KnownEnd = std::pair<Expr, std::optional<int64_t>>;
+  mutable std::array<std::unordered_map<const ir::ExprNode*, KnownEnd>, 2> ends_;
   std::vector<std::vector<Known>> funcs_, images_;
   std::vector<std::vector<std::optional<Known>>> regions_;  // of Funcs, by their consumers
   std::vector<std::vector<std::vector<Known>>> iterators_;  // by Func, stage, iterator

@@ -55,6 +55,11 @@ inline constexpr double launch_cycles = 20000;
 inline constexpr double atomic_add_operations = 8;
 inline constexpr int64_t uncontended_lines = 1 << 10;
 
+// ---- Programs ----
+
+// The extent of a dimension of which nothing is known.
+inline constexpr int64_t unknown_extent = 1000;
+
 // ---- Code ----
 
 // Operations in the body of a loop, with its unrolled copies: the time that compiling takes grows with them.

@@ -151,8 +151,14 @@ class NestEmitter {
 
 class PlanEmitter {
  public:
-  explicit PlanEmitter(const Plan& plan)
-      : plan_(plan), copy_(graph::copy_graph(plan.program->outputs)) {}
+  // `kept`: the plan of the directives that the program has; null: all of them are given anew.
+  PlanEmitter(const Plan& plan, const Plan* kept)
+      : plan_(plan), copy_(graph::copy_graph(plan.program->outputs)) {
+    for (size_t i = 0; i < plan.funcs.size(); ++i)
+      changes_.push_back(!kept || !(*plan.funcs[i] == *kept->funcs[i]));
+    while (spread_changes()) {
+    }
+  }
 
   std::vector<FuncPtr> run() {
     const auto count = static_cast<FuncId>(plan_.funcs.size());
@@ -167,7 +173,21 @@ class PlanEmitter {
  private:
   const Plan& plan_;
   const graph::GraphCopy copy_;
-  std::set<StageId> shared_;  // with their directives about loop fusion
+  std::vector<bool> changes_;  // by Func: gets directives
+  std::set<StageId> shared_;   // with their directives about loop fusion
+
+  bool changes(FuncId id) const { return changes_[static_cast<size_t>(id)]; }
+  // Loops that a Func shares have the names of their owner's, which may change. Returns whether a Func was added.
+  bool spread_changes() {
+    bool found = false;
+    for (size_t i = 0; i < changes_.size(); ++i) {
+      for (const Nest& nest : plan_.funcs[i]->nests) {
+        if (changes_[i] || !nest.shared_with || !changes(nest.shared_with->stage.func)) continue;
+        changes_[i] = found = true;
+      }
+    }
+    return found;
+  }
 
   const FuncPtr& func(FuncId id) const {
     return copy_.of.at(plan_.program->funcs[static_cast<size_t>(id)].get());
@@ -175,7 +195,7 @@ class PlanEmitter {
 
   void emit_nests(FuncId id) const {
     const FuncPlan& plan = plan_.of(id);
-    if (plan.opacity != Opacity::None) return;
+    if (plan.opacity != Opacity::None || !changes(id)) return;
     const FuncPtr& f = func(id);
     graph::reset_loops(*f);
     clear_placement(*f);
@@ -240,7 +260,8 @@ class PlanEmitter {
 
   // A stage that owns its loops has its names; then come the stages that share them.
   void emit_sharing(StageId stage) {
-    if (plan_.of(stage.func).opacity != Opacity::None || !shared_.insert(stage).second) return;
+    const bool is_kept = plan_.of(stage.func).opacity != Opacity::None || !changes(stage.func);
+    if (is_kept || !shared_.insert(stage).second) return;
     const Nest& nest = plan_.nest(stage);
     if (!nest.shared_with) return;
     emit_sharing(nest.shared_with->stage);
@@ -275,12 +296,20 @@ class PlanEmitter {
     graph::give_directive(place, graph::RenameLoop{from, to});
   }
 
-  // An opaque Func that is computed in a loop of another has to learn the loop's new name.
+  bool is_in_changed_loop(const Placement& placement) const {
+    const auto changes_at = [&](const Level& level) {
+      return level.kind == Level::Kind::At && changes(level.loop.stage.func);
+    };
+    return changes_at(placement.compute) || changes_at(placement.store) ||
+           changes_at(placement.hoist);
+  }
+
+  // A Func that keeps its directives has to learn the new name of a loop in which it is computed.
   void emit_func(FuncId id) const {
     const FuncPlan& plan = plan_.of(id);
     const FuncPtr& f = func(id);
-    if (plan.opacity != Opacity::None) {
-      if (plan.placement.compute.kind != Level::Kind::At) return;
+    if (plan.opacity != Opacity::None || !changes(id)) {
+      if (!is_in_changed_loop(plan.placement)) return;
       clear_placement(*f);
       return emit_placement(f, plan.placement);
     }
@@ -291,6 +320,10 @@ class PlanEmitter {
 
 }  // namespace
 
-std::vector<FuncPtr> emit_plan(const Plan& plan) { return PlanEmitter(plan).run(); }
+std::vector<FuncPtr> emit_plan(const Plan& plan) { return PlanEmitter(plan, nullptr).run(); }
+
+std::vector<FuncPtr> emit_changes(const Plan& plan, const Plan& kept) {
+  return PlanEmitter(plan, &kept).run();
+}
 
 }  // namespace retrograde::planning

@@ -14,7 +14,7 @@
 // fusion of two loops is an iterator of its nest, too, whose loops have steps of their own: `(x:16 y):4, (x:16 y)`.
 //
 //   import_plan   reads the directives of a scheduled graph into a plan          import.cpp
-//   emit_plan     gives the directives of a plan to a copy of the graph          emit.cpp
+//   emit_plan, emit_changes   give the directives of a plan to a copy of the graph   emit.cpp
 //   to_text, parse_plan   the text form                                          print.cpp, parse.cpp
 //   validate      checks the invariants of plans                                 validate.cpp
 #pragma once
@@ -178,6 +178,9 @@ Plan import_plan(const std::vector<graph::FuncPtr>& outputs);
 // Gives the plan's directives to a copy of the program and returns the outputs of that. Opaque Funcs keep theirs.
 // Directives check that the stages allow the loops; what they cannot know is left to `validate`.
 std::vector<graph::FuncPtr> emit_plan(const Plan& plan);
+// The same, but Funcs that run alike in `kept`, the plan that was imported from the program, keep the directives that they
+// have there, among them those that made other Funcs (rfactor, wrappers).
+std::vector<graph::FuncPtr> emit_changes(const Plan& plan, const Plan& kept);
 
 // One line for each Func, consumers first, and one for each stage where there are several.
 std::string to_text(const Plan& plan);

@@ -47,6 +47,9 @@ TEST(Dependences, HaveConstantDistancesInATimeLoop) {
   EXPECT_TRUE(stage.at_once(1, set_of(2))) << "inside of a loop over time";
   EXPECT_FALSE(stage.at_once(2));
   EXPECT_TRUE(stage.at_once(2, set_of(1))) << "one place reads others";
+  const StageDependences& forms = stage.dependences.of(stage.id);
+  EXPECT_TRUE(forms.are_dependent(1) && forms.are_dependent(2));
+  EXPECT_FALSE(forms.are_dependent(0) || forms.are_dependent(1, set_of(2)));
   EXPECT_FALSE(stage.dependences.commutes(stage.id));
   EXPECT_TRUE(stage.dependences.of(stage.id).writes_once(set_of(1) | set_of(2)));
 }
@@ -110,6 +113,7 @@ TEST(Dependences, OfDataDependentWritesMayBeAnywhere) {
   LastStage stage(bins);
   EXPECT_EQ(stage.distances(), (Distances{{{-29, 29}, {1, 19}}, {{1, 29}, still}}));
   EXPECT_FALSE(stage.at_once(0) || stage.at_once(1));
+  EXPECT_TRUE(stage.dependences.of(stage.id).are_dependent(0));
   // The row is data-dependent, but different for each r.x: the same summand for both iterations.
   shifted(x, y) = 0.0f;
   shifted(r.x + places(0, y), y) = shifted(r.x + places(0, y) + 40, y) + 1.0f;
@@ -120,8 +124,8 @@ TEST(Dependences, OfDataDependentWritesMayBeAnywhere) {
 }
 
 TEST(Dependences, RespectRemaindersAndConditions) {
-  Func f("f"), g("g"), h("h"), k("k");
-  RDom r(0, 40), odd(1, 97), below(0, 10, 0, 10);
+  Func f("f"), g("g"), h("h"), k("k"), part("part");
+  RDom r(0, 40), odd(1, 97), below(0, 10, 0, 10), last(0, 16, 0, 4);
   f(x) = 1.0f;
   f(2 * r) = f(2 * r + 1) + f(2 * r + 81);
   EXPECT_EQ(LastStage(f).distances(), Distances());
@@ -136,6 +140,13 @@ TEST(Dependences, RespectRemaindersAndConditions) {
   k(x) = 1.0f;
   k(r / 4) = k(r / 4 + 1) + 1.0f;
   EXPECT_EQ(LastStage(k).distances(), (Distances{{{1, 3}}, {{1, 7}}}));
+  last.where(16 * last.y + last.x < 50);
+  part(y) = 0.0f;
+  part(last.y) += 1.0f;
+  LastStage tail(part);
+  const StageDependences& forms = tail.dependences.of(tail.id);
+  EXPECT_TRUE(forms.are_dependent(0)) << "in all but the last parts";
+  EXPECT_TRUE(forms.are_independent(1) && tail.at_once(1));
 }
 
 TEST(Dependences, SeeThatDigitsOfOneNumberDiffer) {
@@ -198,6 +209,7 @@ TEST(Dependences, AskTheRulesOfDirectivesWhereFormsAreSilent) {
   g(size - 1 - half) = g(half);
   LastStage mirrored(g);
   EXPECT_FALSE(mirrored.dependences.of(mirrored.id).are_independent(0));
+  EXPECT_FALSE(mirrored.dependences.of(mirrored.id).are_dependent(0));
   EXPECT_TRUE(mirrored.at_once(0));
 }
 

@@ -245,5 +245,57 @@ TEST_F(PlanImport, LoopsOfSeveralStagesMustBeAlike) {
             std::string::npos);
 }
 
+// What a changed plan makes of the directives that the program has.
+std::string changed_log(const std::vector<Func>& outputs, const std::string& text) {
+  const Plan kept = imported(outputs);
+  const Plan changed = parsed(text, kept.program);
+  const std::vector<graph::FuncPtr> emitted = emit_changes(changed, kept);
+  EXPECT_EQ(plain_text(import_plan(emitted)), text);
+  return graph::without_numbers(graph::schedule_log(emitted).to_text());
+}
+
+TEST_F(PlanImport, FuncsThatRunAsBeforeKeepTheirDirectives) {
+  Func sum("sum"), all("all");
+  RDom r({{0, 64}, {0, 4}}, "r");
+  Var u("u");
+  RVar ro("ro"), ri("ri");
+  out.compute_root();
+  sum(x) = 0;
+  sum(x) += out(x, r.x) * r.y;
+  sum.compute_root();
+  sum.update().split(r.x, ro, ri, 8);
+  Func parts = sum.update().rfactor(ro, u);
+  parts.compute_root().split(x, xo, xi, 8);
+  all(x) = sum(x);
+  producer.compute_at(out, y);
+  const std::string before = plain_text(imported({all}));
+  const std::string after =
+      std::regex_replace(before, std::regex("out  root"), "out  root  parallel y:8, y, x");
+  ASSERT_NE(before, after);
+  EXPECT_EQ(changed_log({all}, after),
+            "sum.compute_at(root)\n"
+            "sum.update(0).split(r.x, ro, ri, 8, Auto)\n"
+            "sum.update(0).rfactor(sum_intm, ro, u)\n"
+            "sum_intm.compute_at(root)\n"
+            "sum_intm.split(x, xo, xi, 8, Auto)\n"
+            "out.split(y, y, y_1, 8, Auto)\n"
+            "out.run(y, Parallel)\n"
+            "out.compute_at(root)\n"
+            "producer.compute_at(loop(out, y_1, 0))\n");
+}
+
+TEST_F(PlanImport, FuncsThatShareChangedLoopsChange) {
+  Func other("other"), both("both");
+  other(x, y) = x - y;
+  both(x, y) = out(x, y) + other(x, y);
+  out.compute_root().parallel(y);
+  other.compute_root().rename(y, t).parallel(t).rename(t, y).compute_with(out, y);
+  const std::string before = plain_text(imported({both}));
+  const std::string after = std::regex_replace(before, std::regex("parallel y, x"), "y, x:8, x");
+  ASSERT_NE(before, after);
+  const std::string log = changed_log({both}, after);
+  EXPECT_EQ(log.find("rename"), std::string::npos) << log;
+}
+
 }  // namespace
 }  // namespace retrograde::planning

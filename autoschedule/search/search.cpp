@@ -1,0 +1,175 @@
+#include "autoschedule/search/search.h"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <unordered_set>
+
+namespace retrograde::planning {
+
+namespace {
+
+constexpr int sweeps = 2;
+constexpr double worth_another_sweep = 0.98;  // of the time before the last one
+constexpr int moves_of_a_func = 3;            // one after another, in one visit
+constexpr double smallest_share = 0.01;       // of the whole time: a Func with less is not visited
+constexpr double least_gain = 0.1;            // of the time of the stages that change
+constexpr int64_t prices_per_func = 200;      // for each plan of the beam
+
+// A plan of the beam. Steps are a list that plans share, the last first.
+struct State {
+  struct Step {
+    SearchStep step;
+    std::shared_ptr<const Step> before;
+  };
+  Plan plan;
+  Cost cost;
+  std::shared_ptr<const Step> last;
+};
+
+bool is_faster(const State& a, const State& b) { return a.cost.seconds < b.cost.seconds; }
+
+// Whether the gain exceeds the error of the model, which is about the stages whose times differ.
+bool is_worth_it(const Cost& before, const Cost& after) {
+  std::map<StageId, double> seconds;
+  for (const StageCost& stage : before.stages) seconds[stage.stage] = stage.seconds;
+  double changed = 0;
+  for (const StageCost& stage : after.stages) {
+    const auto known = seconds.extract(stage.stage);
+    const double was = known ? known.mapped() : 0;
+    if (was != stage.seconds) changed += std::max(was, stage.seconds);
+  }
+  for (const auto& [stage, was] : seconds) changed += was;
+  return after.seconds < before.seconds - least_gain * changed;
+}
+
+FoundPlan found_of(const State& state) {
+  FoundPlan found{state.plan, state.cost, {}};
+  for (const State::Step* at = state.last.get(); at; at = at->before.get())
+    found.steps.push_back(at->step);
+  std::ranges::reverse(found.steps);
+  return found;
+}
+
+// One beam search of a width.
+class Beam {
+ public:
+  Beam(const Plan& start, const Context& context, CostModel& cost, const SearchOptions& options,
+       int width)
+      : context_(context),
+        cost_(cost),
+        kept_(options.kept),
+        width_(static_cast<size_t>(width)),
+        left_(prices_per_func * static_cast<int64_t>(start.funcs.size()) * width) {
+    states_.push_back({start, cost_.price(start), nullptr});
+    most_bytes_ = states_[0].cost.peak_bytes + options.spare_bytes;
+    seen_.insert(hash_of(start));
+  }
+
+  // The best plans, the fastest first: one more than the width, so that a descent tells what else was good.
+  std::vector<State> run() {
+    for (int sweep = 0; sweep < sweeps; ++sweep) {
+      const double before = states_[0].cost.seconds;
+      for (auto f = static_cast<FuncId>(context_.accesses.funcs().size()); f-- > 0;) {
+        if (is_worth_visiting(f)) visit(f);
+      }
+      if (states_[0].cost.seconds > worth_another_sweep * before) break;
+    }
+    return states_;
+  }
+  int64_t priced() const { return static_cast<int64_t>(seen_.size()); }
+
+ private:
+  const Context& context_;
+  CostModel& cost_;
+  const std::vector<bool>& kept_;
+  const size_t width_;
+  int64_t left_;
+  double most_bytes_;
+  std::unordered_set<uint64_t> seen_;
+  std::vector<State> states_;  // the fastest first; never empty
+
+  // Of what the fastest plan spends in the stages of the Func or, if it is inlined, in those that read it.
+  double share_of(FuncId f) const {
+    const State& state = states_[0];
+    double seconds = 0;
+    for (const StageCost& stage : state.cost.stages)
+      if (stage.stage.func == f) seconds += stage.seconds;
+    if (seconds == 0) {
+      for (const StageId& reader : context_.accesses.consumers(f)) seconds += share_of(reader.func);
+    }
+    return seconds;
+  }
+  bool is_worth_visiting(FuncId f) const {
+    const auto i = static_cast<size_t>(f);
+    if (i < kept_.size() && kept_[i]) return false;
+    return share_of(f) >= smallest_share * states_[0].cost.seconds;
+  }
+
+  // A plan on the way from one of the states.
+  struct Candidate : State {
+    size_t from = 0;
+  };
+
+  void visit(FuncId f) {
+    const std::vector<State> before = states_;
+    std::vector<Candidate> front;
+    for (size_t i = 0; i < before.size(); ++i) front.push_back({before[i], i});
+    for (int depth = 0; depth < moves_of_a_func && !front.empty() && left_ > 0; ++depth) {
+      std::vector<Candidate> next;
+      for (const Candidate& from : front) add_neighbours(from, f, next);
+      std::ranges::stable_sort(next, is_faster);
+      if (next.size() > width_) next.resize(width_);
+      bool is_better = false;
+      for (const Candidate& candidate : next) {
+        if (!is_worth_it(before[candidate.from].cost, candidate.cost)) continue;
+        is_better |= candidate.cost.seconds < states_[0].cost.seconds;
+        states_.push_back(candidate);
+      }
+      std::ranges::stable_sort(states_, is_faster);
+      if (states_.size() > width_ + 1) states_.resize(width_ + 1);
+      // A step may make things worse once, at the beginning, where the next one makes up for it.
+      if (depth > 0 && !is_better) break;
+      front = std::move(next);
+    }
+  }
+
+  void add_neighbours(const Candidate& from, FuncId f, std::vector<Candidate>& next) {
+    for (const Move& move : all_moves()) {
+      for (Plan& plan : move.apply(from.plan, f, context_)) {
+        if (left_ == 0) return;
+        if (!seen_.insert(hash_of(plan)).second) continue;
+        --left_;
+        Cost cost = cost_.price(plan);
+        if (cost.peak_bytes > most_bytes_) continue;
+        const SearchStep step{f, move.name, cost.seconds};
+        const auto last = std::make_shared<const State::Step>(State::Step{step, from.last});
+        next.push_back({{std::move(plan), std::move(cost), last}, from.from});
+      }
+    }
+  }
+};
+
+}  // namespace
+
+SearchResult search(const Plan& start, const Context& context, CostModel& cost,
+                    const SearchOptions& options) {
+  SearchResult result;
+  std::vector<State> found;
+  const auto add = [&](int width) {
+    Beam beam(start, context, cost, options, width);
+    for (State& state : beam.run()) {
+      const auto is_it = [&](const State& known) { return known.plan == state.plan; };
+      if (std::ranges::none_of(found, is_it)) found.push_back(std::move(state));
+    }
+    result.priced += beam.priced();
+  };
+  add(1);
+  if (options.width > 1) add(options.width);
+  std::ranges::stable_sort(found, is_faster);
+  result.start = {start, cost.price(start), {}};
+  for (const State& state : found) result.found.push_back(found_of(state));
+  return result;
+}
+
+}  // namespace retrograde::planning

@@ -1,0 +1,55 @@
+// search.h -- from a whole plan to a better one: moves, Func by Func, as long as the predicted time falls.
+//
+//   start               9.1 ms      place f at g/y:8   8.7 ms      tile f x:32     8.2 ms
+//                              =>   inline f           9.4 ms  =>  vectorise f x   8.6 ms
+//                                   ...                            ...
+//
+// A beam search: Funcs are visited consumers first, so that a producer knows the loops in which it may run, and twice, so
+// that a consumer also knows its producers. At each Func the best plans go on by its moves, several after another. With
+// width 1 it is a descent that may climb once. The work is bounded by a count of prices, never by a clock: one program
+// has one result on every machine with these figures. Plans that cost the same keep their order.
+// Method: B. Lowerre, The Harpy Speech Recognition System, 1976 (beam search); the order of decisions as in Adams et al.,
+// Learning to Optimize Halide with Tree Search and Random Programs, SIGGRAPH 2019, section 3.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "autoschedule/cost/cost.h"
+#include "autoschedule/moves/move.h"
+
+namespace retrograde::planning {
+
+struct SearchOptions {
+  int width = 1;  // plans that go on from each step
+  double spare_bytes =
+      std::numeric_limits<double>::infinity();  // alive at once, beyond those of the start
+  std::vector<bool> kept;                       // by Func: no move changes how it runs
+};
+
+struct SearchStep {
+  FuncId func = -1;
+  std::string move;
+  double seconds = 0;  // of the plan after it
+};
+
+struct FoundPlan {
+  Plan plan;
+  Cost cost;
+  std::vector<SearchStep> steps;  // from the start
+};
+
+struct SearchResult {
+  FoundPlan start;
+  std::vector<FoundPlan>
+      found;           // the fastest first, the start among them unless `width` others are faster
+  int64_t priced = 0;  // different plans
+};
+
+// The first of those found is never predicted to be slower than the start, nor than that of a narrower search.
+SearchResult search(const Plan& start, const Context& context, CostModel& cost,
+                    const SearchOptions& options);
+
+}  // namespace retrograde::planning

@@ -1,0 +1,95 @@
+// Searches over plans: what they find, what they keep, and that nothing but the program decides it.
+#include "autoschedule/search/search.h"
+
+#include <gtest/gtest.h>
+
+#include "unit/plan/plan_testing.h"
+
+namespace retrograde::planning {
+namespace {
+
+// A blur of a costly Func, with its last stage at root and nothing else decided.
+struct SearchTest : ::testing::Test {
+  SearchTest() {
+    heavy(x, y) = exp(sin(cast<float>(x)) * cast<float>(y));
+    rows(x, y) = heavy(x - 1, y) + heavy(x, y) + heavy(x + 1, y);
+    out(x, y) = rows(x, y - 1) + rows(x, y) + rows(x, y + 1);
+    out.set_estimates({{0, 1000}, {0, 800}});
+    heavy.compute_root();
+    rows.compute_root();
+    out.compute_root();
+    start = imported({out});
+    accesses.emplace(start.program->outputs);
+    sizes.emplace(*accesses, SizeDefaults{unknown_extent});
+  }
+  SearchResult found(const SearchOptions& options) {
+    CostModel cost(*accesses, *sizes, machine);
+    return search(start, {*accesses, *sizes, machine}, cost, options);
+  }
+  FuncId id(const std::string& name) const {
+    for (size_t i = 0; i < start.program->funcs.size(); ++i) {
+      if (graph::without_numbers(start.program->funcs[i]->name) == name)
+        return static_cast<FuncId>(i);
+    }
+    return -1;
+  }
+
+  Var x{"x"}, y{"y"};
+  Func heavy{"heavy"}, rows{"rows"}, out{"out"};
+  const Machine machine = {};
+  Plan start;
+  std::optional<AccessGraph> accesses;
+  std::optional<SizeModel> sizes;
+};
+
+TEST_F(SearchTest, SerialLoopsBecomeParallelVectorsAndProducersMove) {
+  const SearchResult result = found({});
+  const FoundPlan& best = result.found[0];
+  EXPECT_LT(best.cost.seconds, result.start.cost.seconds / 8);
+  EXPECT_FALSE(best.steps.empty());
+  EXPECT_EQ(best.steps.back().seconds, best.cost.seconds);
+  const std::string text = plain_text(best.plan);
+  EXPECT_NE(text.find("out  root  parallel"), std::string::npos) << text;
+  EXPECT_NE(text.find("vector x"), std::string::npos) << text;
+  EXPECT_EQ(text.find("rows  root"), std::string::npos) << text;
+  EXPECT_EQ(broken_invariant(best.plan), "");
+}
+
+TEST_F(SearchTest, AWiderSearchFindsNothingSlower) {
+  const SearchResult narrow = found({.width = 1}), wide = found({.width = 4});
+  EXPECT_LE(wide.found[0].cost.seconds, narrow.found[0].cost.seconds);
+  EXPECT_GT(wide.priced, narrow.priced);
+  EXPECT_TRUE(std::ranges::is_sorted(wide.found, {},
+                                     [](const FoundPlan& plan) { return plan.cost.seconds; }));
+}
+
+TEST_F(SearchTest, EqualSearchesFindEqualPlans) {
+  const SearchResult first = found({.width = 3}), second = found({.width = 3});
+  ASSERT_EQ(first.found.size(), second.found.size());
+  for (size_t i = 0; i < first.found.size(); ++i)
+    EXPECT_EQ(to_text(first.found[i].plan), to_text(second.found[i].plan));
+  EXPECT_EQ(first.priced, second.priced);
+}
+
+TEST_F(SearchTest, KeptFuncsRunAsBefore) {
+  SearchOptions options;
+  options.kept.assign(start.funcs.size(), false);
+  options.kept[static_cast<size_t>(id("heavy"))] = true;
+  for (const FoundPlan& found : found(options).found) {
+    EXPECT_TRUE(found.plan.of(id("heavy")) == start.of(id("heavy")));
+    for (const SearchStep& step : found.steps) EXPECT_NE(step.func, id("heavy"));
+  }
+}
+
+TEST_F(SearchTest, PlansKeepWithinTheMemoryOfTheStart) {
+  // Without `rows` at root, which the search stores again.
+  start = parsed("out  root\nrows  inline\nheavy  root\n", start.program);
+  SearchOptions options;
+  options.spare_bytes = 0;
+  const SearchResult result = found(options);
+  for (const FoundPlan& found : result.found)
+    EXPECT_LE(found.cost.peak_bytes, result.start.cost.peak_bytes);
+}
+
+}  // namespace
+}  // namespace retrograde::planning
