@@ -111,7 +111,7 @@ class Measurements(unittest.TestCase):
 
     def test_plans_are_judged_by_the_last_run(self):
         def row(key, predicted, seconds):
-            return {"key": key, "seconds": seconds, "default_seconds": 1.0, "prices": {"predict": {
+            return {"key": key, "source": "search", "seconds": seconds, "default_seconds": 1.0, "prices": {"predict": {
                 "seconds": predicted, "stages": {}, "peak_bytes": 8.0, "price_seconds": 0.02}}}
 
         runs = [{"commit": commit, "programs": {"blur": {"plans": [row("a", 1.0, 1.0), row("b", predicted, 2.0)]}}}

@@ -92,7 +92,7 @@ output out
 
 std::vector<std::string> keys_of_sample() {
   const LoadedProgram loaded = load_program(program);
-  SampleOptions options{target};
+  const SampleOptions options{target, planning::reference_machine(target)};
   std::vector<std::string> keys;
   for (const SampledPlan& plan : sample_plans(loaded.outputs, options)) keys.push_back(plan.key);
   return keys;
@@ -100,23 +100,26 @@ std::vector<std::string> keys_of_sample() {
 
 TEST(Samples, BeginWithTheDefaultScheduleAndHaveEachPlanOnce) {
   const LoadedProgram loaded = load_program(program);
-  const auto plans = sample_plans(loaded.outputs, {target});
+  const auto plans = sample_plans(loaded.outputs, {target, planning::reference_machine(target)});
   ASSERT_GT(plans.size(), 3u);
-  EXPECT_EQ(plans[0].source, "rules");
+  EXPECT_TRUE(plans[0].source.starts_with("rules"));
   std::set<std::string> texts, sources;
+  int beams = 0;
   for (const SampledPlan& plan : plans) {
     EXPECT_TRUE(texts.insert(to_text(plan.plan)).second);
     EXPECT_EQ(broken_invariant(plan.plan), "");
-    sources.insert(plan.source.substr(0, plan.source.find(' ')));
+    sources.insert(plan.source.substr(0, plan.source.find_first_of(" ,")));
+    beams += plan.source.find("beam 1") != std::string::npos;
   }
-  EXPECT_EQ(sources, (std::set<std::string>{"rules", "search", "walk"}));
+  EXPECT_TRUE(sources.contains("search") && sources.contains("walk"));
+  EXPECT_EQ(beams, 1);
 }
 
 TEST(Samples, RunOnBoundInputs) {
   const LoadedProgram loaded = load_program(program);
-  const auto plans = sample_plans(loaded.outputs, {retrograde::get_jit_target_from_environment()});
-  const retrograde::tuning::CompiledSchedule compiled(
-      planning::emit_plan(plans[0].plan), retrograde::get_jit_target_from_environment(), 0);
+  const Target host = retrograde::get_jit_target_from_environment();
+  const auto plans = sample_plans(loaded.outputs, {host, planning::reference_machine(host)});
+  const retrograde::tuning::CompiledSchedule compiled(planning::emit_plan(plans[0].plan), host, 0);
   EXPECT_GT(compiled.run(), 0);
 }
 

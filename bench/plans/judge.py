@@ -165,6 +165,29 @@ def summary(judged):
             "ms for a price, median": 1e3 * statistics.median(known("price_seconds"))}
 
 
+def searched(run):
+    """By the width of a search over moves: (program, time of the plan that it takes over that of the default plan)."""
+    result = {}
+    for name, program in run["programs"].items():
+        plans = measured_plans(program)
+        for plan in plans:
+            for source in plan["source"].split(", "):
+                if source.startswith("beam "):
+                    result.setdefault(int(source[len("beam "):]), []).append((name, plan["time"] / plans[0]["time"]))
+    return dict(sorted(result.items()))
+
+
+def searched_text(run):
+    lines = []
+    for width, found in searched(run).items():
+        times = [time for _, time in found]
+        worst = max(found, key=lambda pair: pair[1])
+        lines.append(f"A search over moves of width {width} takes plans whose time is {statistics.geometric_mean(times):.2f} "
+                     f"of the default plans' (geometric mean of {len(times)} programs), at worst {worst[1]:.2f} "
+                     f"({worst[0]}).\n")
+    return "".join(lines)
+
+
 def wrong_pairs(program, model):
     """(fast plan, slow plan, measured factor, predicted factor) for pairs that the model orders wrongly, the worst
     first. Equal prices are not wrong."""
@@ -198,7 +221,7 @@ def table(report, commit=None):
     models = list(judged)
     summaries = [summary(judged[model]) for model in models]
     rows = [[key, *(number(s[key]) for s in summaries)] for key in summaries[0]] if models else []
-    text = markdown(["over all programs", *models], rows) + "\n"
+    text = markdown(["over all programs", *models], rows) + "\n" + searched_text(run) + "\n"
     figures = ("tau", "rho", "regret", "ratio")
     names = {"tau": "tau", "rho": "rho", "regret": "regret", "ratio": "predicted / measured"}
     rows = []

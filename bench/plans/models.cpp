@@ -42,7 +42,7 @@ struct PricedProgram {
   PricedProgram(planning::ProgramPtr priced, const planning::Machine& machine)
       : program(std::move(priced)),
         accesses(program->outputs),
-        sizes(accesses, unknown_sizes),
+        sizes(accesses, {planning::unknown_extent}),
         model(accesses, sizes, machine) {}
 };
 

@@ -16,8 +16,9 @@ import plans  # noqa: E402
 
 
 def plan(key, predicted, seconds, default=1.0, **more):
+    price = {"seconds": predicted, "stages": {}, "peak_bytes": 8.0, "price_seconds": 0.02}
     return {"key": key, "source": "search", "seconds": seconds, "default_seconds": default, "runs": 5,
-            "prices": {"predict": {"seconds": predicted, "stages": {}, "peak_bytes": 8.0, "price_seconds": 0.02}}, **more}
+            "prices": {"predict": price}, **more}
 
 
 def program(*rows, again=(1.0, 1.0)):
@@ -97,6 +98,13 @@ class Programs(unittest.TestCase):
         self.assertIn("| warp | failed |", text)
         self.assertIn("| regret, worst | 1.00 |", text)
 
+    def test_searches_over_moves_are_compared_with_the_default(self):
+        rows = [plan("a", 1, 1.0, source="rules, beam 1"), plan("b", 4, 2.0, source="beam 4"), plan("c", 4, 0.5)]
+        run = {"programs": {"blur": program(*rows), "warp": program(plan("d", 1, 1.0, source="rules, beam 4"))}}
+        self.assertEqual(judge.searched(run), {1: [("blur", 1.0)], 4: [("blur", 2.0), ("warp", 1.0)]})
+        self.assertIn("width 4 takes plans whose time is 1.41 of", judge.searched_text(run))
+        self.assertIn("at worst 2.00 (blur)", judge.searched_text(run))
+
     def test_a_program_that_a_model_cannot_price_has_no_figures(self):
         rows = [plan("a", 1, 1.0), plan("b", 4, 2.0)]
         rows[0]["prices"], rows[1]["prices"] = {}, {}
@@ -105,10 +113,10 @@ class Programs(unittest.TestCase):
 
 WORKER = """#!/bin/sh
 case "$*" in
-  *--skip*bad*) echo '{"starts": "good"}'; echo '{"key": "good", "seconds": 1.0, "default_seconds": 1.0, "prices": {}}'
+  *--skip*bad*) echo '{"starts": "good"}'; echo '{"key": "good", "seconds": 1.0, "default_seconds": 1.0, "prices": {}, "source": "rules"}'
                 echo '{"again": {"seconds": 1.0, "default_seconds": 1.0}}' ;;
   *) echo '{"machine": "m"}'
-     echo '{"starts": "first"}'; echo '{"key": "first", "seconds": 1.0, "default_seconds": 1.0, "prices": {}}'
+     echo '{"starts": "first"}'; echo '{"key": "first", "seconds": 1.0, "default_seconds": 1.0, "prices": {}, "source": "rules"}'
      echo '{"starts": "bad"}'; echo 'out of memory' >&2; exit 3 ;;
 esac
 """
