@@ -56,8 +56,8 @@ def kendall_tau_b(pairs, differ):
 
 
 def regret(pairs):
-    """Measured time of the entry that is predicted fastest, over the least measured time. Of equal predictions the first
-    counts, as in a search."""
+    """Measured time of the entry that is predicted fastest, over the least measured time. As in a search, the first of
+    equal predictions counts."""
     picked = min(range(len(pairs)), key=lambda i: pairs[i][0])
     return pairs[picked][1] / min(measured for _, measured in pairs)
 
@@ -155,7 +155,8 @@ def summary(judged):
     ratios = [p / m for figures in judged.values() for p, m in figures["pairs"]]
     every_stage = [pair for figures in judged.values() for pair in figures["stages"]]
     mean = lambda values: statistics.fmean(values) if values else None  # noqa: E731
-    return {"programs": len(judged), "plans": len(ratios), "tau, mean": mean(known("tau")), "tau, worst": min(known("tau"), default=None),
+    return {"programs": len(judged), "plans": len(ratios),
+            "tau, mean": mean(known("tau")), "tau, worst": min(known("tau"), default=None),
             "rho over plans, mean": mean(known("rho")), "rho over plans, worst": min(known("rho"), default=None),
             "regret, mean": mean(known("regret")), "regret, worst": max(known("regret"), default=None),
             f"plans within a factor of {RIGHT_FACTOR}": share_within(ratios, RIGHT_FACTOR),
@@ -182,9 +183,9 @@ def searched_text(run):
     for width, found in searched(run).items():
         times = [time for _, time in found]
         worst = max(found, key=lambda pair: pair[1])
-        lines.append(f"A search over moves of width {width} takes plans whose time is {statistics.geometric_mean(times):.2f} "
-                     f"of the default plans' (geometric mean of {len(times)} programs), at worst {worst[1]:.2f} "
-                     f"({worst[0]}).\n")
+        lines.append(f"Time of the plans that a search over moves of width {width} takes, over that of the default "
+                     f"plans: geometric mean {statistics.geometric_mean(times):.2f} ({len(times)} programs), "
+                     f"at worst {worst[1]:.2f} ({worst[0]}).\n\n")
     return "".join(lines)
 
 
@@ -221,7 +222,7 @@ def table(report, commit=None):
     models = list(judged)
     summaries = [summary(judged[model]) for model in models]
     rows = [[key, *(number(s[key]) for s in summaries)] for key in summaries[0]] if models else []
-    text = markdown(["over all programs", *models], rows) + "\n" + searched_text(run) + "\n"
+    text = markdown(["over all programs", *models], rows) + "\n" + searched_text(run)
     figures = ("tau", "rho", "regret", "ratio")
     names = {"tau": "tau", "rho": "rho", "regret": "regret", "ratio": "predicted / measured"}
     rows = []

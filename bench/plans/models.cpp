@@ -32,7 +32,7 @@ Price predict_lowered(const planning::Plan& plan, const planning::Machine& machi
   return price;
 }
 
-// What pricing the plans of one program needs.
+// A program whose plans are priced.
 struct PricedProgram {
   planning::ProgramPtr program;
   planning::AccessGraph accesses;

@@ -51,7 +51,7 @@ autoschedule::ScheduleRequest request_of(const SampleOptions& options) {
   return autoschedule::request_for(options.target, {});
 }
 
-// What the search over the rules' decisions tries. It ends after so many schedules.
+// The plans that the search over the rules' decisions tries.
 std::vector<SampledPlan> plans_of_search(const std::vector<FuncPtr>& outputs,
                                          const SampleOptions& options, const StandardPlan&) {
   if (options.rules == 0) return {};
@@ -93,7 +93,8 @@ std::vector<planning::FuncId> costly_funcs(const planning::AccessGraph& accesses
   return result;
 }
 
-// Random moves from the default plan, most of them of costly Funcs. Walks have 1, 2, 4 or 8 steps; a step that has no plan is left out.
+// Random moves from the default plan, most of them of costly Funcs. Walks have 1, 2, 4 or 8 steps; a step that has no
+// plan is left out.
 std::vector<SampledPlan> plans_of_walks(const std::vector<FuncPtr>& outputs,
                                         const SampleOptions& options,
                                         const StandardPlan& standard) {

@@ -6,9 +6,9 @@
              [--plot FILE] [--wrong]
     plans.py BUILD --pair PROGRAM FAST_KEY SLOW_KEY FILE.pair [--output FILE]
 
-BUILD is the folder of a build. The programs are those of programs.py, which runs first where it has not run before, or
-with --collect. PATTERN is a shell pattern of names, such as 'operators-*'. Each program has a process of its own; a plan
-that ends it, or takes more than --limit seconds, counts as failed. No program begins after --minutes.
+BUILD is the folder of a build. The programs are those of programs.py, which runs first if it has not run before, or
+with --collect. PATTERN is a shell pattern of names, such as 'operators-*'. Each program has a process of its own. A
+plan that ends it, or takes more than --limit seconds, counts as failed. No program begins after --minutes.
 
 --pair writes two plans of the last run to a file, with their times and the models that order them wrongly.
 
@@ -92,7 +92,7 @@ class Worker:
 
 
 def keep_row(plans, row):
-    """Adds the row of a plan. A second measurement of the same plan replaces the first one, if that was disturbed more."""
+    """Adds the row of a plan. A second measurement of a plan replaces the first one if that was disturbed more."""
     for i, known in enumerate(plans):
         if known["key"] == row["key"]:
             if row.get("default_seconds", math.inf) < known.get("default_seconds", math.inf):
