@@ -23,9 +23,9 @@ Machine constants_for(const Target& target, int threads) {
   machine.registers = machine.vector_bytes >= 64 || target.arch == Target::ARM ? 32 : 16;
   const double count = machine.threads, width = machine.vector_bytes;
   machine.levels = {Machine::Level{"L1", first_cache_bytes, 4 * width, 4 * width * count},
-                    Machine::Level{"L2", second_cache_bytes, 1.2 * width, 1.2 * width * count},
-                    Machine::Level{"L3", third_cache_bytes, 18, 12 * count},
-                    Machine::Level{"memory", 1e15, 9, std::min(9 * count, 25.0)}};
+                    Machine::Level{"L2", second_cache_bytes, 1.6 * width, 1.6 * width * count},
+                    Machine::Level{"L3", third_cache_bytes, 60, 60 * count},
+                    Machine::Level{"memory", 1e15, 25, std::min(25 * count, 80.0)}};
   return machine;
 }
 

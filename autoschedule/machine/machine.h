@@ -32,26 +32,27 @@ struct Machine {
   int registers = 32;  // of vectors
   // "L1", "L2", "L3", "memory". The last is never full.
   std::array<Level, level_count> levels = {Level{"L1", first_cache_bytes, 256, 512},
-                                           Level{"L2", second_cache_bytes, 1.2 * 64, 1.2 * 64 * 2},
-                                           Level{"L3", third_cache_bytes, 18, 24},
-                                           Level{"memory", 1e15, 9, 18}};
+                                           Level{"L2", second_cache_bytes, 1.6 * 64, 1.6 * 64 * 2},
+                                           Level{"L3", third_cache_bytes, 60, 120},
+                                           Level{"memory", 1e15, 25, 50}};
 
-  // Nanoseconds of one thread per vector, for many independent operations.
-  double operation_ns = 0.2;  // sum, product, multiply-add, comparison, choice, conversion
-  double divide_ns = 2, divide_double_ns = 4;
-  double sqrt_ns = 2, sqrt_double_ns = 4;
-  double exp_ns = 4, log_ns = 5, pow_ns = 20, sin_ns = 6;
-  double load_ns = 0.2, store_ns = 0.35;
-  double gather_lane_ns = 0.35;  // one lane of a gather
-  double scatter_lane_ns = 0.5;
-  double shuffle_ns = 0.3;
-  double scalar_ns = 0.1;          // a scalar operation
-  double scalar_divide_ns = 4;     // an integer division
-  double latency_ns = 1.3;         // from one multiply-add to the next that depends on it
-  double memory_latency_ns = 2.5;  // from a sum in memory to the next that adds to it
-  double iteration_ns = 0.3;       // loop overhead
-  double launch_ns = 5000;         // of a parallel loop
-  double page_ns = 250;            // the first touch of a page of memory
+  // Nanoseconds of one thread per vector, for many independent operations. The constants are figures of `tune --machine`
+  // on servers of 2023, rounded.
+  double operation_ns = 0.25;  // sum, product, multiply-add, comparison, choice, conversion
+  double divide_ns = 1.8, divide_double_ns = 3;
+  double sqrt_ns = 2.5, sqrt_double_ns = 4.5;
+  double exp_ns = 6, log_ns = 10, pow_ns = 25, sin_ns = 12;
+  double load_ns = 0.35, store_ns = 0.7;
+  double gather_lane_ns = 0.3;  // one lane of a gather
+  double scatter_lane_ns = 0.4;
+  double shuffle_ns = 0.45;
+  double scalar_ns = 0.12;         // a scalar operation
+  double scalar_divide_ns = 2;     // an integer division
+  double latency_ns = 1.1;         // from one multiply-add to the next that depends on it
+  double memory_latency_ns = 3.5;  // from a sum in memory to the next that adds to it
+  double iteration_ns = 0.4;       // loop overhead
+  double launch_ns = 4000;         // of a parallel loop
+  double page_ns = 500;            // the first touch of a page of memory
 
   // Proportions from which the limits below follow. A search of schedules scales them.
   double accumulator_share = 0.75;  // of the registers: they hold sums, the others hold operands
