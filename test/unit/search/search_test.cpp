@@ -46,7 +46,8 @@ struct SearchTest : ::testing::Test {
 TEST_F(SearchTest, SerialLoopsBecomeParallelVectorsAndProducersMove) {
   const SearchResult result = found({});
   const FoundPlan& best = result.found[0];
-  EXPECT_LT(best.cost.seconds, result.start.cost.seconds / 8);
+  // Two threads; lowering vectorises the loops of the start, too.
+  EXPECT_LT(best.cost.seconds, result.start.cost.seconds / 2);
   EXPECT_FALSE(best.steps.empty());
   EXPECT_EQ(best.steps.back().seconds, best.cost.seconds);
   const std::string text = plain_text(best.plan);
