@@ -245,6 +245,17 @@ TEST_F(CostProbes, ADisplacedImageIsReadAsAWhole) {
   EXPECT_GT(cost.stages[0].compute_seconds, columns * rows * 0.35e-9) << "lane by lane";
 }
 
+TEST_F(CostProbes, VectorsAtBordersAreReadLaneByLane) {
+  const auto compute_of = [&](int width, bool is_clamped) {
+    Func f("f");
+    f(x, y) = in(is_clamped ? clamp(x, 0, width - 1) : Expr(x), y);
+    f.bound(x, 0, width).set_estimate(y, 0, 2048);
+    return compute_seconds(priced(f, "f  root  y, x:16, vector x\n"));
+  };
+  EXPECT_GT(compute_of(64, true), 2 * compute_of(64, false)) << "each second vector is at a border";
+  EXPECT_LT(compute_of(4096, true), 1.2 * compute_of(4096, false));
+}
+
 TEST_F(CostProbes, ARotatedImageIsReadInManyLinesAVector) {
   Param<float> angle("angle");
   const Expr u = cast<int>(angle * x + y), v = cast<int>(x - angle * y);
