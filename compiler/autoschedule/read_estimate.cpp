@@ -86,22 +86,6 @@ double repeats_of_blocks(const LinearDecomposition& form, const std::vector<Loop
   return repeats;
 }
 
-// In  f(32 x + r - 32 block), the gradient of what was read at  x / 32 + block , blocks repeat the steps of x: each
-// element of f is in a cell that has as many readers as there are blocks. Steps of 1 are those of windows, whose readers
-// are made from one read (sums_at_once).
-double repeats_of_blocks(const LinearDecomposition& form, const std::vector<Loop>& loops) {
-  double repeats = 1;
-  for (size_t i = 0; i < loops.size(); ++i) {
-    const auto step = std::abs(form.coefficients[i].second);
-    if (!loops[i].is_block || loops[i].is_decided || step <= 1) continue;
-    for (size_t j = 0; j < loops.size(); ++j) {
-      const bool is_dimension = loops[j].is_long && !loops[j].is_block && !loops[j].is_decided;
-      if (is_dimension && std::abs(form.coefficients[j].second) == step) repeats *= loops[i].extent;
-    }
-  }
-  return repeats;
-}
-
 // Iterations for each value of one index; nothing when it is not linear in the loops.
 std::optional<double> iterations_a_value(const Expr& any_index, std::vector<Loop>& loops) {
   const Expr index = unclamped(any_index, [&](const Expr& e) { return uses_loops(e, loops); });
