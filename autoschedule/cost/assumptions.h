@@ -28,7 +28,7 @@ inline constexpr double passing_operands = 2;
 // of it at most; operands take the rest.
 inline constexpr double largest_register_array = 4, operand_share = 0.8;
 // Loops that become vectors although no plan says so take longer than others: their remainders run element by element.
-inline constexpr double inner_lanes_overhead = 1.1;
+inline constexpr double remainder_overhead = 1.1;
 // The reads that inlining may give a stage; beyond them its cost is a lower bound.
 inline constexpr size_t most_composed_reads = 2000;
 // An access beyond this stride is an element at a time.

@@ -61,10 +61,10 @@ void add_inner_lanes(const SizeModel& sizes, const Machine& machine, Group& grou
     if (lanes.iterator < 0 || run.nest.trips[d] < lanes.count || !can_be_lanes(run, group, lanes))
       continue;
     run.nest.lanes = lanes;
-    run.nest.trips[d] *= inner_lanes_overhead / lanes.count;
+    run.nest.trips[d] *= remainder_overhead / lanes.count;
     group.nodes[static_cast<size_t>(run.node_of(d))].trips /= lanes.count;
     for (size_t k = run.place + d; k < run.path.size(); ++k) {
-      group.nodes[static_cast<size_t>(run.path[k])].times *= inner_lanes_overhead / lanes.count;
+      group.nodes[static_cast<size_t>(run.path[k])].times *= remainder_overhead / lanes.count;
       cover_lanes(lanes, run.cover[k + 1]);
     }
   }
