@@ -111,14 +111,14 @@ class Measurements(unittest.TestCase):
 
     def test_plans_are_judged_by_the_last_run(self):
         def row(key, predicted, seconds):
-            return {"key": key, "seconds": seconds, "default_seconds": 1.0, "prices": {"predict": {
+            return {"key": key, "source": "search", "seconds": seconds, "default_seconds": 1.0, "prices": {"predict": {
                 "seconds": predicted, "stages": {}, "peak_bytes": 8.0, "price_seconds": 0.02}}}
 
         runs = [{"commit": commit, "programs": {"blur": {"plans": [row("a", 1.0, 1.0), row("b", predicted, 2.0)]}}}
                 for commit, predicted in (("old", 0.5), ("new", 2.0))]
         page = self.record("plans", {"runs": runs}, PAGE.replace("programs", "plans"))
         self.assertIn("| regret, worst | 1.00 |", page)
-        self.assertIn("| blur | 2 | 1e+03 | 1e+03 | 2 % | – | 1.00 | 1.00 | 1.00 |", page)
+        self.assertIn("| blur | 2 | 1e+03 | 1e+03 | 2 % | – | – | 1.00 | 1.00 |", page)
 
     def test_decisions_are_medians_beside_all_of_them(self):
         report = {"warp": {"": [1.0, 2.0, 9.0], "slices": [4.0], "all": None}}

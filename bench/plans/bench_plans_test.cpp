@@ -1,10 +1,12 @@
 // Pairs of plans whose times are known (test/golden/pairs): cost models order them as measured, except those models
 // that a pair names. Also the texts of pairs, programs that were kept, and samples of their plans.
+// RETROGRADE_UPDATE_GOLDEN=1 writes the models that are wrong into the pairs; read the difference before you commit it.
 #include <HalideRuntime.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <cstdlib>
+#include <fstream>
 #include <set>
 
 #include "autoschedule/keep_graph.h"
@@ -29,15 +31,33 @@ const Target target("x86-64-linux-avx-avx2-avx512-avx512_skylake-f16c-fma-sse41"
 
 class Pairs : public ::testing::TestWithParam<fs::path> {};
 
+std::string words(const std::set<std::string>& names) {
+  std::string result;
+  for (const std::string& name : names) result += "  " + name;
+  return result;
+}
+
+// The text of a pair with other models in its line "wrong".
+std::string with_wrong(const std::string& text, const std::set<std::string>& models) {
+  const size_t at = text.find("\nwrong") + 1;
+  return text.substr(0, at) + "wrong" + words(models) + text.substr(text.find('\n', at));
+}
+
 TEST_P(Pairs, AreOrderedAsMeasured) {
-  const PlanPair pair = parse_pair(read_file(GetParam()));
+  const std::string text = read_file(GetParam());
+  const PlanPair pair = parse_pair(text);
   ASSERT_GT(pair.factor(), 1);
+  std::set<std::string> wrong;
+  std::string prices;
   for (const auto& [name, model] : all_models(planning::reference_machine(target), target)) {
     const double fast = model(pair.fast).seconds, slow = model(pair.slow).seconds;
-    EXPECT_EQ(fast < slow, !pair.wrong.contains(name))
-        << name << " predicts " << 1e3 * fast << " ms for the fast plan and " << 1e3 * slow
-        << " ms for the slow one. If it is right now, take it from the line \"wrong\".";
+    if (fast >= slow) wrong.insert(name);
+    prices += retrograde::text("\n", name, ": ", 1e3 * fast, " ms, ", 1e3 * slow, " ms");
   }
+  if (std::getenv("RETROGRADE_UPDATE_GOLDEN"))
+    std::ofstream(GetParam()) << with_wrong(text, wrong);
+  else
+    EXPECT_EQ(words(wrong), words(pair.wrong)) << "fast and slow plan" << prices;
 }
 
 TEST_P(Pairs, AreWrittenAsTheyAreRead) {
@@ -92,7 +112,7 @@ output out
 
 std::vector<std::string> keys_of_sample() {
   const LoadedProgram loaded = load_program(program);
-  SampleOptions options{target};
+  const SampleOptions options{target, planning::reference_machine(target)};
   std::vector<std::string> keys;
   for (const SampledPlan& plan : sample_plans(loaded.outputs, options)) keys.push_back(plan.key);
   return keys;
@@ -100,23 +120,26 @@ std::vector<std::string> keys_of_sample() {
 
 TEST(Samples, BeginWithTheDefaultScheduleAndHaveEachPlanOnce) {
   const LoadedProgram loaded = load_program(program);
-  const auto plans = sample_plans(loaded.outputs, {target});
+  const auto plans = sample_plans(loaded.outputs, {target, planning::reference_machine(target)});
   ASSERT_GT(plans.size(), 3u);
-  EXPECT_EQ(plans[0].source, "rules");
+  EXPECT_TRUE(plans[0].source.starts_with("rules"));
   std::set<std::string> texts, sources;
+  int beams = 0;
   for (const SampledPlan& plan : plans) {
     EXPECT_TRUE(texts.insert(to_text(plan.plan)).second);
     EXPECT_EQ(broken_invariant(plan.plan), "");
-    sources.insert(plan.source.substr(0, plan.source.find(' ')));
+    sources.insert(plan.source.substr(0, plan.source.find_first_of(" ,")));
+    beams += plan.source.find("beam 1") != std::string::npos;
   }
-  EXPECT_EQ(sources, (std::set<std::string>{"rules", "search", "walk"}));
+  EXPECT_TRUE(sources.contains("search") && sources.contains("walk"));
+  EXPECT_EQ(beams, 1);
 }
 
 TEST(Samples, RunOnBoundInputs) {
   const LoadedProgram loaded = load_program(program);
-  const auto plans = sample_plans(loaded.outputs, {retrograde::get_jit_target_from_environment()});
-  const retrograde::tuning::CompiledSchedule compiled(
-      planning::emit_plan(plans[0].plan), retrograde::get_jit_target_from_environment(), 0);
+  const Target host = retrograde::get_jit_target_from_environment();
+  const auto plans = sample_plans(loaded.outputs, {host, planning::reference_machine(host)});
+  const retrograde::tuning::CompiledSchedule compiled(planning::emit_plan(plans[0].plan), host, 0);
   EXPECT_GT(compiled.run(), 0);
 }
 

@@ -8,7 +8,8 @@ default plan, so that other load on the machine matters less. A program's noise 
 plan differ from it, one measured first and one last; at least LEAST_NOISE. Figures of a model:
 
 - tau: Kendall's tau-b over pairs of stages of the default plan whose measured times differ by more than the noise;
-- rho: Spearman's rank correlation over the plans of a program, where these differ by more than the noise;
+- rho: Spearman's rank correlation over the plans of a program, if there are FEWEST_PLANS and these differ by more than
+  twice the noise;
 - regret: measured time of the plan that the model prices least, over that of the fastest plan;
 - predicted / measured: times of the default plan, or of all plans.
 
@@ -26,6 +27,7 @@ from model import spearman  # noqa: E402
 
 LEAST_NOISE = 0.02
 MOST_SLOWDOWN = 1.08  # of the default plan beside which another one was measured; of others, the measurement is dropped
+FEWEST_PLANS = 4  # for a correlation over the plans of a program
 FEWEST_SAMPLES = 20  # of the profiler, for a stage to count
 SAMPLE_SECONDS = 1e-3
 RIGHT_FACTOR = 1.5
@@ -54,8 +56,8 @@ def kendall_tau_b(pairs, differ):
 
 
 def regret(pairs):
-    """Measured time of the entry that is predicted fastest, over the least measured time. Of equal predictions the first
-    counts, as in a search."""
+    """Measured time of the entry that is predicted fastest, over the least measured time. As in a search, the first of
+    equal predictions counts."""
     picked = min(range(len(pairs)), key=lambda i: pairs[i][0])
     return pairs[picked][1] / min(measured for _, measured in pairs)
 
@@ -114,7 +116,8 @@ def plan_pairs(program, model):
 
 def plans_rho(pairs, noise):
     times = [measured for _, measured in pairs]
-    return spearman(pairs) if times and max(times) > min(times) * (1 + 2 * noise) else None
+    differ = len(pairs) >= FEWEST_PLANS and max(times) > min(times) * (1 + 2 * noise)
+    return spearman(pairs) if differ else None
 
 
 def judge_program(program, model):
@@ -152,7 +155,8 @@ def summary(judged):
     ratios = [p / m for figures in judged.values() for p, m in figures["pairs"]]
     every_stage = [pair for figures in judged.values() for pair in figures["stages"]]
     mean = lambda values: statistics.fmean(values) if values else None  # noqa: E731
-    return {"tau, mean": mean(known("tau")), "tau, worst": min(known("tau"), default=None),
+    return {"programs": len(judged), "plans": len(ratios),
+            "tau, mean": mean(known("tau")), "tau, worst": min(known("tau"), default=None),
             "rho over plans, mean": mean(known("rho")), "rho over plans, worst": min(known("rho"), default=None),
             "regret, mean": mean(known("regret")), "regret, worst": max(known("regret"), default=None),
             f"plans within a factor of {RIGHT_FACTOR}": share_within(ratios, RIGHT_FACTOR),
@@ -160,6 +164,29 @@ def summary(judged):
             "rho over all stages": spearman(every_stage),
             "peak memory, predicted / measured, median": statistics.median(known("peak_ratio") or [math.nan]),
             "ms for a price, median": 1e3 * statistics.median(known("price_seconds"))}
+
+
+def searched(run):
+    """By the width of a search over moves: (program, time of the plan that it takes over that of the default plan)."""
+    result = {}
+    for name, program in run["programs"].items():
+        plans = measured_plans(program)
+        for plan in plans:
+            for source in plan["source"].split(", "):
+                if source.startswith("beam "):
+                    result.setdefault(int(source[len("beam "):]), []).append((name, plan["time"] / plans[0]["time"]))
+    return dict(sorted(result.items()))
+
+
+def searched_text(run):
+    lines = []
+    for width, found in searched(run).items():
+        times = [time for _, time in found]
+        worst = max(found, key=lambda pair: pair[1])
+        lines.append(f"Time of the plans that a search over moves of width {width} takes, over that of the default "
+                     f"plans: geometric mean {statistics.geometric_mean(times):.2f} ({len(times)} programs), "
+                     f"at worst {worst[1]:.2f} ({worst[0]}).\n\n")
+    return "".join(lines)
 
 
 def wrong_pairs(program, model):
@@ -179,6 +206,8 @@ def wrong_pairs(program, model):
 # ---- reports ----
 
 def number(value):
+    if isinstance(value, int):
+        return str(value)
     return "–" if value is None or math.isnan(value) else f"{value:.2f}"
 
 
@@ -193,7 +222,7 @@ def table(report, commit=None):
     models = list(judged)
     summaries = [summary(judged[model]) for model in models]
     rows = [[key, *(number(s[key]) for s in summaries)] for key in summaries[0]] if models else []
-    text = markdown(["over all programs", *models], rows) + "\n"
+    text = markdown(["over all programs", *models], rows) + "\n" + searched_text(run)
     figures = ("tau", "rho", "regret", "ratio")
     names = {"tau": "tau", "rho": "rho", "regret": "regret", "ratio": "predicted / measured"}
     rows = []

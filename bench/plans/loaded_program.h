@@ -17,8 +17,8 @@ struct LoadedProgram {
   // expects.
   std::vector<FuncPtr> outputs;
 };
-// Inputs are bound to the values that autoschedule/keep_graph.h kept with the graph, and else to made-up ones. Requires:
-// the text of a graph (graph/graph.h).
+// Inputs are bound to the values that autoschedule/keep_graph.h kept with the graph, and else to made-up ones.
+// Requires: the text of a graph (graph/graph.h).
 LoadedProgram load_program(const std::string& text, const std::string& values = "");
 
 }  // namespace bench::plans

@@ -19,7 +19,8 @@ struct Price {
 // Prices a plan; throws what lowering throws.
 using Model = std::function<Price(const planning::Plan& plan)>;
 
-// By name: "predict" lowers a plan and walks the statement (tuning/predict.h).
+// By name: "predict" lowers a plan and walks the statement (tuning/predict.h), "cost" walks the plan
+// (autoschedule/cost/cost.h).
 std::map<std::string, Model> all_models(const planning::Machine& machine, const Target& target);
 
 }  // namespace bench::plans

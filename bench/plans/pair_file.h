@@ -25,7 +25,7 @@ struct PlanPair {
   double fast_seconds = 0, slow_seconds = 0;  // measured
   std::set<std::string> wrong;                // models that are known to order the plans wrongly
   planning::Plan fast, slow;
-  // Of a pair that was read: they keep the parameters that expressions of the plans' programs read.
+  // The graphs of a pair that was read keep the parameters that its expressions read.
   std::vector<retrograde::graph::Graph> graphs;
 
   double factor() const { return slow_seconds / fast_seconds; }

@@ -1,6 +1,7 @@
 #include "plan_sample.h"
 
 #include <algorithm>
+#include <limits>
 #include <mutex>
 #include <numeric>
 #include <random>
@@ -10,6 +11,7 @@
 #include "autoschedule/moves/move.h"
 #include "autoschedule/schedule_search.h"
 #include "diagnostics/text_hash.h"
+#include "driver/plan_search.h"
 #include "driver/schedule.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/directives/wrappers.h"
@@ -22,9 +24,6 @@ using autoschedule::Scheduling;
 namespace {
 
 constexpr double least_share = 0.02;  // of all operations, for a Func to be costly
-
-// Extents of which nothing is known.
-constexpr planning::SizeDefaults unknown_sizes{1000};
 
 std::set<std::string> names_of(const std::vector<FuncPtr>& outputs) {
   std::set<std::string> names;
@@ -52,9 +51,9 @@ autoschedule::ScheduleRequest request_of(const SampleOptions& options) {
   return autoschedule::request_for(options.target, {});
 }
 
-// What the search over the rules' decisions tries. It ends after so many schedules.
+// The plans that the search over the rules' decisions tries.
 std::vector<SampledPlan> plans_of_search(const std::vector<FuncPtr>& outputs,
-                                         const SampleOptions& options, const SampledPlan&) {
+                                         const SampleOptions& options, const StandardPlan&) {
   if (options.rules == 0) return {};
   std::mutex mutex;
   std::vector<std::vector<FuncPtr>> tried;
@@ -94,12 +93,13 @@ std::vector<planning::FuncId> costly_funcs(const planning::AccessGraph& accesses
   return result;
 }
 
-// Random moves from the default plan, most of them of costly Funcs. Walks have 1, 2, 4 or 8 steps; a step that has no plan is left out.
+// Random moves from the default plan, most of them of costly Funcs. Walks have 1, 2, 4 or 8 steps; a step that has no
+// plan is left out.
 std::vector<SampledPlan> plans_of_walks(const std::vector<FuncPtr>& outputs,
-                                        const SampleOptions& options, const SampledPlan& standard) {
+                                        const SampleOptions& options,
+                                        const StandardPlan& standard) {
   const planning::AccessGraph accesses(standard.plan.program->outputs);
-  const planning::SizeModel sizes(accesses, unknown_sizes);
-  const planning::Machine machine = planning::reference_machine(options.target);
+  const planning::SizeModel sizes(accesses, {planning::unknown_extent});
   const std::set<std::string> known = names_of(outputs);
   const std::vector<planning::FuncId> costly = costly_funcs(accesses, sizes);
   std::mt19937 random(options.seed);
@@ -112,7 +112,7 @@ std::vector<SampledPlan> plans_of_walks(const std::vector<FuncPtr>& outputs,
           below(4) > 0 ? costly[below(costly.size())]
                        : static_cast<planning::FuncId>(below(reached.plan.funcs.size()));
       const planning::Move& move = planning::all_moves()[below(planning::all_moves().size())];
-      const auto plans = move.apply(reached.plan, func, {accesses, sizes, machine});
+      const auto plans = move.apply(reached.plan, func, {accesses, sizes, options.machine});
       if (plans.empty()) continue;
       reached.plan = plans[below(plans.size())];
       reached.source += std::string(" ") + move.name;
@@ -123,18 +123,39 @@ std::vector<SampledPlan> plans_of_walks(const std::vector<FuncPtr>& outputs,
   return result;
 }
 
+// The plans that searches over moves take.
+std::vector<SampledPlan> plans_of_beams(const std::vector<FuncPtr>& outputs,
+                                        const SampleOptions& options,
+                                        const StandardPlan& standard) {
+  const std::set<std::string> known = names_of(outputs);
+  std::vector<SampledPlan> result;
+  for (const int width : options.widths) {
+    const auto found = driver::search_plans(standard.scheduled, outputs, options.machine,
+                                            std::numeric_limits<int64_t>::max(), width);
+    const planning::Plan& plan = found.result.found.at(0).plan;
+    result.push_back({"beam " + std::to_string(width), key_of(plan, known), plan});
+  }
+  return result;
+}
+
 }  // namespace
 
 std::vector<SampledPlan> sample_plans(const std::vector<FuncPtr>& outputs,
                                       const SampleOptions& options) {
-  const PlanSource sources[] = {plans_of_search, plans_of_walks};
-  const auto scheduled =
-      autoschedule::schedule_within_budget(outputs, request_of(options), Scheduling::Everything);
-  std::vector<SampledPlan> result{imported("rules", scheduled.outputs, names_of(outputs))};
-  std::set<std::string> seen{result[0].key};
+  const PlanSource sources[] = {plans_of_beams, plans_of_search, plans_of_walks};
+  StandardPlan standard;
+  standard.scheduled =
+      autoschedule::schedule_within_budget(outputs, request_of(options), Scheduling::Everything)
+          .outputs;
+  static_cast<SampledPlan&>(standard) = imported("rules", standard.scheduled, names_of(outputs));
+  std::vector<SampledPlan> result{standard};
   for (const PlanSource& source : sources) {
-    for (SampledPlan& plan : source(outputs, options, result[0])) {
-      if (seen.insert(plan.key).second) result.push_back(std::move(plan));
+    for (SampledPlan& plan : source(outputs, options, standard)) {
+      const auto known = std::ranges::find(result, plan.key, &SampledPlan::key);
+      if (known == result.end())
+        result.push_back(std::move(plan));
+      else if (plan.source.starts_with("beam"))
+        known->source += ", " + plan.source;
     }
   }
   return result;

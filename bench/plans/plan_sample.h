@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "autoschedule/access/sizes.h"
 #include "autoschedule/machine/machine.h"
 #include "autoschedule/plan/plan.h"
 #include "ir/target.h"
@@ -16,22 +17,30 @@ using retrograde::Target;
 namespace planning = retrograde::planning;
 
 struct SampledPlan {
-  std::string source;  // where it comes from: "rules", "search 3", "walk 7"
-  std::string key;     // equal for equal plans, in each run
+  // Where it comes from: "rules", "search", "walk tile root", "beam 1". If searches over moves take it, too, they
+  // are named: "rules, beam 1, beam 4".
+  std::string source;
+  std::string key;  // equal for equal plans, in each run
   planning::Plan plan;
 };
 
 struct SampleOptions {
   Target target;
-  size_t rules = 16;  // plans of a search over the rules' decisions
-  size_t walks = 16;  // plans of random moves from the default plan
-  uint32_t seed = 1;  // of the moves
+  planning::Machine machine;      // for which plans are searched
+  size_t rules = 16;              // plans of a search over the rules' decisions
+  size_t walks = 16;              // plans of random moves from the default plan
+  uint32_t seed = 1;              // of the moves
+  std::vector<int> widths = {1};  // searches over moves, a plan each
 };
 
-// `standard` is the plan of the default schedule. Plans may belong to different programs, where a schedule adds Funcs.
+// The default schedule.
+struct StandardPlan : SampledPlan {
+  std::vector<FuncPtr> scheduled;
+};
+// Plans may belong to different programs, where a schedule adds Funcs.
 using PlanSource = std::function<std::vector<SampledPlan>(const std::vector<FuncPtr>& outputs,
                                                           const SampleOptions& options,
-                                                          const SampledPlan& standard)>;
+                                                          const StandardPlan& standard)>;
 
 // The default schedule, then those of every source. Equal plans occur once.
 std::vector<SampledPlan> sample_plans(const std::vector<FuncPtr>& outputs,

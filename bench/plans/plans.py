@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """plans.py -- measures plans of the benchmarks' programs and judges cost models by them.
 
-    plans.py BUILD [--long] [--program PATTERN]... [--rules N] [--walks N] [--seed N] [--seconds S]
-             [--stage-seconds S] [--repeats N] [--limit S] [--minutes M] [--collect] [--output FILE] [--plot FILE] [--wrong]
+    plans.py BUILD [--long] [--program PATTERN]... [--rules N] [--walks N] [--seed N] [--widths N,...]
+             [--seconds S] [--stage-seconds S] [--repeats N] [--limit S] [--minutes M] [--collect] [--output FILE]
+             [--plot FILE] [--wrong]
     plans.py BUILD --pair PROGRAM FAST_KEY SLOW_KEY FILE.pair [--output FILE]
 
-BUILD is the folder of a build. The programs are those of programs.py, which runs first where it has not run before, or
-with --collect. PATTERN is a shell pattern of names, such as 'operators-*'. Each program has a process of its own; a plan
-that ends it, or takes more than --limit seconds, counts as failed. No program begins after --minutes.
+BUILD is the folder of a build. The programs are those of programs.py, which runs first if it has not run before, or
+with --collect. PATTERN is a shell pattern of names, such as 'operators-*'. Each program has a process of its own. A
+plan that ends it, or takes more than --limit seconds, counts as failed. No program begins after --minutes.
 
 --pair writes two plans of the last run to a file, with their times and the models that order them wrongly.
 
@@ -91,7 +92,7 @@ class Worker:
 
 
 def keep_row(plans, row):
-    """Adds the row of a plan. A second measurement of the same plan replaces the first one, if that was disturbed more."""
+    """Adds the row of a plan. A second measurement of a plan replaces the first one if that was disturbed more."""
     for i, known in enumerate(plans):
         if known["key"] == row["key"]:
             if row.get("default_seconds", math.inf) < known.get("default_seconds", math.inf):
@@ -125,7 +126,7 @@ def measure_once(command, program, limit):
     return started is not None
 
 
-SAMPLE = ("rules", "walks", "seed")
+SAMPLE = ("rules", "walks", "seed", "widths")
 
 
 def sample_options(settings):
@@ -216,6 +217,7 @@ def read_options():
     parser.add_argument("--program", action="append")
     parser.add_argument("--rules", type=int, help="plans of a search over the rules' decisions")
     parser.add_argument("--walks", type=int, help="plans of random moves")
+    parser.add_argument("--widths", default="1,4", help="of searches over moves, a plan each")
     parser.add_argument("--seed", type=int, default=1, help="of the moves")
     parser.add_argument("--seconds", type=float, default=0.2)
     parser.add_argument("--stage-seconds", type=float)

@@ -16,8 +16,9 @@ import plans  # noqa: E402
 
 
 def plan(key, predicted, seconds, default=1.0, **more):
+    price = {"seconds": predicted, "stages": {}, "peak_bytes": 8.0, "price_seconds": 0.02}
     return {"key": key, "source": "search", "seconds": seconds, "default_seconds": default, "runs": 5,
-            "prices": {"predict": {"seconds": predicted, "stages": {}, "peak_bytes": 8.0, "price_seconds": 0.02}}, **more}
+            "prices": {"predict": price}, **more}
 
 
 def program(*rows, again=(1.0, 1.0)):
@@ -90,12 +91,19 @@ class Programs(unittest.TestCase):
 
     def test_the_table_has_every_program(self):
         failed = {"plans": [{"key": "x", "error": "it ended"}], "error": "no"}
-        report = {"runs": [{"commit": "abc", "programs": {
-            "blur": program(plan("a", 1, 1.0), plan("b", 4, 2.0), plan("c", 3, 3.0)), "warp": failed}}]}
+        rows = [plan("a", 1, 1.0), plan("b", 4, 2.0), plan("c", 3, 3.0), plan("d", 5, 4.0)]
+        report = {"runs": [{"commit": "abc", "programs": {"blur": program(*rows), "warp": failed}}]}
         text = judge.table(report)
-        self.assertIn("| blur | 3 | 1e+03 | 1e+03 | 2 % | – | 0.50 | 1.00 | 1.00 |", text)
+        self.assertIn("| blur | 4 | 1e+03 | 1e+03 | 2 % | – | 0.80 | 1.00 | 1.00 |", text)
         self.assertIn("| warp | failed |", text)
         self.assertIn("| regret, worst | 1.00 |", text)
+
+    def test_searches_over_moves_are_compared_with_the_default(self):
+        rows = [plan("a", 1, 1.0, source="rules, beam 1"), plan("b", 4, 2.0, source="beam 4"), plan("c", 4, 0.5)]
+        run = {"programs": {"blur": program(*rows), "warp": program(plan("d", 1, 1.0, source="rules, beam 4"))}}
+        self.assertEqual(judge.searched(run), {1: [("blur", 1.0)], 4: [("blur", 2.0), ("warp", 1.0)]})
+        self.assertIn("width 4 takes, over that of the default plans: geometric mean 1.41", judge.searched_text(run))
+        self.assertIn("at worst 2.00 (blur)", judge.searched_text(run))
 
     def test_a_program_that_a_model_cannot_price_has_no_figures(self):
         rows = [plan("a", 1, 1.0), plan("b", 4, 2.0)]
@@ -105,10 +113,12 @@ class Programs(unittest.TestCase):
 
 WORKER = """#!/bin/sh
 case "$*" in
-  *--skip*bad*) echo '{"starts": "good"}'; echo '{"key": "good", "seconds": 1.0, "default_seconds": 1.0, "prices": {}}'
+  *--skip*bad*) echo '{"starts": "good"}'
+                echo '{"key": "good", "seconds": 1.0, "default_seconds": 1.0, "prices": {}, "source": "walk"}'
                 echo '{"again": {"seconds": 1.0, "default_seconds": 1.0}}' ;;
   *) echo '{"machine": "m"}'
-     echo '{"starts": "first"}'; echo '{"key": "first", "seconds": 1.0, "default_seconds": 1.0, "prices": {}}'
+     echo '{"starts": "first"}'
+     echo '{"key": "first", "seconds": 1.0, "default_seconds": 1.0, "prices": {}, "source": "rules"}'
      echo '{"starts": "bad"}'; echo 'out of memory' >&2; exit 3 ;;
 esac
 """

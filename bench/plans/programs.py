@@ -19,7 +19,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 BENCH = os.path.dirname(HERE)
 APPS = os.path.join(os.path.dirname(BENCH), "apps")
 MOST_SECONDS = 120  # for a run; the graphs that it has kept by then count
-# What a run schedules apart from its program: pipelines that warm up a compiler, and texts too short to be a program.
+# Names of pipelines that warm up a compiler; shorter texts are no programs either.
 OTHERS = re.compile(r"^(first|trivial|warm_up)")
 SHORTEST = 300  # bytes of text
 MOST_GRAPHS = 4  # of a run

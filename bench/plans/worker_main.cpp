@@ -99,14 +99,13 @@ class Worker {
  public:
   explicit Worker(const Options& options)
       : options_(options),
-        machine_(planning::machine_for(options.sample.target)),
-        models_(all_models(machine_, options.sample.target)),
+        models_(all_models(options.sample.machine, options.sample.target)),
         program_(load_program(contents_of(options.graph), values_beside(options.graph))),
         plans_(sample_plans(program_.outputs, options.sample)) {}
 
   void measure_all() {
-    print({{"machine", machine_.name},
-           {"threads", machine_.threads},
+    print({{"machine", options_.sample.machine.name},
+           {"threads", options_.sample.machine.threads},
            {"funcs", plans_[0].plan.funcs.size()},
            {"sampled", plans_.size()}});
     print({{"starts", plans_[0].key}});
@@ -132,7 +131,6 @@ class Worker {
 
  private:
   const Options& options_;
-  const planning::Machine machine_;
   const std::map<std::string, Model> models_;
   const LoadedProgram program_;
   const std::vector<SampledPlan> plans_;
@@ -244,11 +242,13 @@ class Worker {
 int run(int argc, char** argv) {
   Options options;
   options.sample.target = get_jit_target_from_environment();
+  options.sample.machine = planning::machine_for(options.sample.target);
   CLI::App app{"prices and measures plans of one program"};
   app.add_option("graph", options.graph)->required();
   app.add_option("--rules", options.sample.rules,
                  "plans of a search over the rules' decisions, at the most");
   app.add_option("--walks", options.sample.walks, "plans of random moves, at the most");
+  app.add_option("--widths", options.sample.widths, "of searches over moves")->delimiter(',');
   app.add_option("--seed", options.sample.seed, "of the moves");
   app.add_option("--seconds", options.seconds, "that each plan runs");
   app.add_option("--stage-seconds", options.stage_seconds,

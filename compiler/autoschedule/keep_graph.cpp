@@ -22,7 +22,7 @@ namespace retrograde::autoschedule {
 
 namespace {
 
-constexpr size_t most_values = 4096;  // of an image that is kept
+constexpr size_t most_values = 5000;  // of an image that is kept
 
 std::string header_of(const graph::ParameterContents& p) {
   return (p.is_literal ? "buffer " : "image ") + to_string(p.type) + " " + ir::quote_name(p.name) +

@@ -31,6 +31,7 @@ class Chain {
       funcs_.push_back(next);
     }
     funcs_.back().bound(x_, 0, 64).bound(y_, 0, 32);
+    around_[count - 1] = {count - 1};
     loops_[count - 1] = split(funcs_.back().compute_root());
     for (size_t i = count - 1; i-- > 0;) place(i);
   }
@@ -55,23 +56,37 @@ class Chain {
     return sum;
   }
 
-  // Inlined, at a loop of the only consumer that is not inlined, or at root.
+  // Inlined, in a loop of the only consumer that is not inlined, in the outermost loop of a Func around all consumers, or
+  // at root.
   void place(size_t i) {
     Func& f = funcs_[i];
-    const bool has_updates = f.has_update_definition();
+    for (const size_t reader : readers_[i]) around_[i].merge(std::set(around_[reader]));
+    const bool may_inline = !f.has_update_definition() && readers_[i].size() == 1;
+    if (may_inline && choices_.chance(25)) {
+      inlined_.insert(i);
+      return;
+    }
+    size_t host = *around_[i].begin();
+    bool is_inside = around_[i].size() == 1 && choices_.chance(80);
+    std::vector<Var> loops{y_};
+    if (is_inside && !loops_[host].empty()) loops = {loops_[host].back()};
     size_t reader = *readers_[i].begin();
     bool has_one_reader = readers_[i].size() == 1;
-    if (has_one_reader && !has_updates && choices_.chance(25)) return inlined_.insert(i), void();
     while (has_one_reader && inlined_.contains(reader)) {
       has_one_reader = readers_[reader].size() == 1;
       reader = *readers_[reader].begin();
     }
-    const std::vector<Var>& loops = loops_[reader];
-    if (has_one_reader && !funcs_[reader].has_update_definition() && choices_.chance(80)) {
-      f.compute_at(funcs_[reader], loops[number(0, static_cast<int>(loops.size()) - 1)]);
+    if (is_inside && has_one_reader && choices_.chance(80)) {
+      host = reader;
+      loops = loops_[host];
+    }
+    is_inside = is_inside && !funcs_[host].has_update_definition();
+    if (is_inside) {
+      f.compute_at(funcs_[host], loops[number(0, static_cast<int>(loops.size()) - 1)]);
       loops_[i] = {x_, y_};
     } else {
       loops_[i] = split(f.compute_root());
+      around_[i] = {i};
     }
   }
   std::vector<Var> split(Func& f) {
@@ -87,7 +102,7 @@ class Chain {
   fuzz::Choices& choices_;
   const Var x_{"x"}, y_{"y"};
   std::vector<Func> funcs_;
-  std::map<size_t, std::set<size_t>> readers_;
+  std::map<size_t, std::set<size_t>> readers_, around_;  // Funcs at root around all uses of a Func
   std::map<size_t, std::vector<Var>> loops_;
   std::set<size_t> inlined_;
 };
@@ -110,7 +125,7 @@ int32_t note(JITUserContext* context, const halide_trace_event_t* e) {
 }
 
 struct Counts {
-  int boxes = 0, equal = 0;
+  int boxes = 0, equal = 0, near = 0;
 
   void add(Chain& chain) {
     const auto outputs = graph::apply_wrappers({chain.output().function()});
@@ -130,22 +145,26 @@ struct Counts {
       ASSERT_EQ(box.size(), actual.size());
       ++boxes;
       equal += box == actual;
+      const auto is_near = [](int64_t a, int64_t b) { return std::abs(a - b) <= 1; };
+      near += std::ranges::equal(box, actual, is_near);
     }
   }
 };
 
 TEST(ComputedBoxes, AreThoseThatCompiledProgramsProduce) {
   Counts counts;
-  for (int seed = 1; seed <= many_or_few(400, 40); ++seed) {
+  for (int seed = 1; seed <= many_or_few(400, 60); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     fuzz::Choices choices(static_cast<uint64_t>(seed));
     Chain chain(choices);
     counts.add(chain);
   }
   // Where an index is divided, tails and boxes of boxes may begin anywhere.
-  std::cout << counts.equal << " of " << counts.boxes << " boxes are equal\n";
+  std::cout << counts.equal << " of " << counts.boxes << " boxes are equal, " << counts.near
+            << " nearly\n";
   EXPECT_GT(counts.boxes, 30);
-  EXPECT_GE(counts.equal, 0.95 * counts.boxes);
+  EXPECT_GE(counts.equal, 0.9 * counts.boxes);
+  EXPECT_GE(counts.near, 0.97 * counts.boxes);
 }
 
 }  // namespace
