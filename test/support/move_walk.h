@@ -30,18 +30,22 @@ class MoveWalk {
     const planning::AccessGraph accesses(plan_.program->outputs);
     const planning::SizeModel sizes(accesses, {default_extent_});
     planning::Dependences dependences(accesses);
-    const auto moves = planning::all_moves();
+    const planning::Context context{accesses, sizes, machine_, dependences};
     const auto funcs = static_cast<int>(plan_.funcs.size());
-    for (int step = c_.between(0, most_steps); step > 0; --step) {
+    for (int step = c_.between(0, most_steps); step > 0 && broken_.empty(); --step) {
       const auto id = static_cast<planning::FuncId>(c_.below(funcs));
-      const planning::Move& move = moves[static_cast<size_t>(c_.below(int(moves.size())))];
-      const std::vector<planning::Plan> plans =
-          move.apply(plan_, id, {accesses, sizes, machine_, dependences});
-      for (const planning::Plan& after : plans) check(after, move, id);
-      if (plans.empty() || !broken_.empty()) continue;
+      std::vector<Choice> possible;  // rare moves are as likely as others
+      for (const planning::Move& move : planning::all_moves()) {
+        Choice choice{&move, move.apply(plan_, id, context)};
+        if (!choice.plans.empty()) possible.push_back(std::move(choice));
+      }
+      if (possible.empty()) continue;
+      const auto [move, plans] = c_.pick(possible);
+      for (const planning::Plan& after : plans) check(after, *move, id);
+      if (!broken_.empty()) break;
       plan_ = c_.pick(plans);
-      trace_ += retrograde::text("\n", move.name, " of ", name_of(id), "\n", to_text(plan_));
-      ++counts_[move.name];
+      trace_ += retrograde::text("\n", move->name, " of ", name_of(id), "\n", to_text(plan_));
+      ++counts_[move->name];
     }
   }
 
@@ -61,7 +65,11 @@ class MoveWalk {
   std::string text() const { return fuzz::to_text(program_) + trace_ + broken_; }
 
  private:
-  static constexpr int most_steps = 12;
+  struct Choice {
+    const planning::Move* move;
+    std::vector<planning::Plan> plans;
+  };
+  static constexpr int most_steps = 8;
   Choices& c_;
   const RandomProgram program_;
   std::vector<graph::FuncPtr> unscheduled_;
