@@ -24,6 +24,7 @@ retrograde_many_programs(gpu_programs_fuzz SOURCES unit/gpu/gpu_programs_test.cp
   LIBS retrograde_simt retrograde_dep_halide_runtime)
 retrograde_many_programs(gradient_suite_fuzz SOURCES gradient/programs_suite_test.cpp ${suite_programs}
   LIBS retrograde_dep_halide_runtime)
+retrograde_many_programs(move_walk_fuzz SOURCES property/move_walk_test.cpp READS_FILES)
 retrograde_many_programs(odd_sizes_fuzz SOURCES gradient/odd_sizes_test.cpp
   LIBS retrograde_dep_halide_runtime)
 retrograde_many_programs(plan_round_trip_fuzz SOURCES property/plan_round_trip_test.cpp)

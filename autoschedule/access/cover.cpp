@@ -128,14 +128,9 @@ class BoxExtent {
 }  // namespace
 
 Cover whole_cover(StageId stage, const SizeModel& sizes) {
-  Cover cover = point_cover(stage, sizes);
-  for (size_t i = 0; i < cover.size(); ++i)
-    cover[i] = std::max<int64_t>(sizes.of(stage, static_cast<int>(i)).estimate, 1);
-  return cover;
-}
-
-Cover point_cover(StageId stage, const SizeModel& sizes) {
-  return Cover(sizes.graph().stage(stage).iterators.size(), 1);
+  return ir::numbered(sizes.graph().stage(stage).iterators.size(), [&](size_t i) {
+    return std::max<int64_t>(sizes.of(stage, static_cast<int>(i)).estimate, 1);
+  });
 }
 
 std::vector<int64_t> extents(const Access& access, const Cover& cover, const SizeModel& sizes) {

@@ -20,8 +20,6 @@ using Cover = std::vector<int64_t>;
 
 // All points of all iterators, at least 1 of each.
 Cover whole_cover(StageId stage, const SizeModel& sizes);
-// One point of the stage.
-Cover point_cover(StageId stage, const SizeModel& sizes);
 
 // The extents in elements, by dimension of what is accessed, of the box that the access needs. A data-dependent part of
 // an index takes all values of its range. No extent is larger than that of the whole dimension.

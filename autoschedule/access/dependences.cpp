@@ -352,7 +352,7 @@ bool Dependences::keeps_order(StageId stage, const std::vector<LoopStep>& loops)
   }
   const StageDependences& forms = of(stage);
   return std::ranges::all_of(forms.all(), [&](const Dependence& d) { return keeps(d, loops); }) ||
-         commutes(stage) || keeps_order_of_variables(stage, loops);
+         keeps_order_of_variables(stage, loops);
 }
 
 // Proves it for loops that are the reduction variables themselves.

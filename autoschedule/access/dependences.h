@@ -80,8 +80,8 @@ class Dependences {
   // Whether any order of iterations gives the same result, but for rounding. If they are to run at the same time, the
   // update has to be atomic.
   bool commutes(StageId stage);
-  // Whether the loops, outermost first, run all iterations that access one element in the order of the definition, or
-  // need not. Those of concurrent loops may run at once.
+  // Whether the loops, outermost first, run all iterations that access one element in the order of the definition, so
+  // that no bit changes. Those of concurrent loops may run at once.
   bool keeps_order(StageId stage, const std::vector<LoopStep>& loops);
 
  private:

@@ -61,7 +61,7 @@ struct Row {
     const auto combine = [&](int64_t& value, int64_t subtracted) {
       const Wide combined = Wide{value} * own - Wide{subtracted} * other;
       value = static_cast<int64_t>(combined);
-      return combined <= largest && combined >= -largest;
+      return combined < INT64_MAX && combined > -INT64_MAX;
     };
     bool fits = true;
     for (size_t v = 0; v < coefficients.size(); ++v)
@@ -70,9 +70,6 @@ struct Row {
     if (constant.has_upper_bound()) fits = combine(constant.max, equation.constant.min) && fits;
     return fits;
   }
-
- private:
-  static constexpr int64_t largest = int64_t{1} << 60;
 };
 
 }  // namespace

@@ -13,7 +13,7 @@ inline constexpr SizeDefaults assumed_sizes{1000};
 // The units of a core work at the same time, and so do computing and moving data. Of all that the slower side hides, this
 // part shows.
 inline constexpr double not_overlapped = 0.25;
-// Of a cache that a loop may fill: other data take the rest, or share sets with it.
+// The part of a cache that a loop may fill: other data take the rest, or share sets with it.
 inline constexpr double usable_share = 0.8;
 // How often a condition on data holds.
 inline constexpr double taken_branches = 0.5;
@@ -24,10 +24,10 @@ inline constexpr double displacement = 2;
 inline constexpr double unknown_slope = 0.7;
 // Neighbouring points of data fall into the same bin this often, so that one addition waits for the last.
 inline constexpr double equal_neighbours = 0.5;
-// What a C function takes, in scalar operations.
+// A C function takes as long as so many scalar operations.
 inline constexpr double function_call_operations = 50;
-// Registers of a loop that hold neither sums nor invariant operands.
-inline constexpr double passing_registers = 2;
+// Operands of a loop that need a register for a while.
+inline constexpr double passing_operands = 2;
 // An array of constant indices is kept in registers if it is no larger than so many times all of them. They hold this share
 // of it at most; operands take the rest.
 inline constexpr double largest_register_array = 4, operand_share = 0.8;

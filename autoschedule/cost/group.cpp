@@ -10,23 +10,6 @@
 
 namespace retrograde::planning {
 
-Nest loops_of(const Plan& plan, StageId stage) {
-  if (plan.of(stage.func).opacity == Opacity::None) return plan.nest(stage);
-  return loops_of_definition(*plan.program->funcs[static_cast<size_t>(stage.func)], stage.stage);
-}
-
-int stage_count(const Plan& plan, FuncId func) {
-  return plan.program->funcs[static_cast<size_t>(func)]->stage_count();
-}
-
-bool is_inlined(const Plan& plan, const AccessGraph& graph, FuncId func) {
-  const FuncPlan& of = plan.of(func);
-  const Level::Kind kind = of.placement.compute.kind;
-  return !graph.func(func).is_output && of.opacity == Opacity::None &&
-         (kind == Level::Kind::Inline || kind == Level::Kind::Undecided) &&
-         graph.func(func).stages.size() == 1;
-}
-
 namespace {
 
 class GroupBuilder {
@@ -35,11 +18,10 @@ class GroupBuilder {
                FactsOfStages& facts)
       : plan_(plan), covers_(covers), sizes_(sizes), machine_(machine), facts_(facts) {}
 
-  Group build(const GroupMembers& members) {
+  Group build(const PlannedGroup& planned) {
     size_t next = 0;
-    for (const FuncId func : members.funcs) {
-      for (int16_t s = 0; s < stage_count(plan_, func); ++s)
-        inlined_[{func, s}] = &members.inlined[next++];
+    for (const FuncId func : planned.funcs) {
+      for (const StageNode& stage : stages(func)) inlined_[stage.id] = &planned.inlined[next++];
     }
     group_.nodes.emplace_back();
     for (const auto& [stage, inlined] : inlined_) add(stage);
@@ -53,7 +35,8 @@ class GroupBuilder {
         return std::pair(group_.nodes[static_cast<size_t>(child)].loop.stage, child);
       });
     }
-    add_buffers();
+    add_buffers(plan_, sizes_, machine_, group_);
+    add_inner_lanes(sizes_, machine_, group_);
     return std::move(group_);
   }
 
@@ -68,23 +51,36 @@ class GroupBuilder {
   std::map<StageId, StageRun> runs_;
 
   const LoopNode& node(int index) const { return group_.nodes[static_cast<size_t>(index)]; }
+  const std::vector<StageNode>& stages(FuncId func) const {
+    return sizes_.graph().func(func).stages;
+  }
+  // Opaque Funcs have the loops of their definitions.
+  Nest loops_of(StageId stage) const {
+    if (plan_.of(stage.func).opacity == Opacity::None) return plan_.nest(stage);
+    return loops_of_definition(*plan_.program->funcs[static_cast<size_t>(stage.func)], stage.stage);
+  }
   bool is_at(FuncId func) const { return plan_.of(func).placement.compute.kind == Level::Kind::At; }
+  static bool is_lane_loop(const StageRun& run, size_t depth) {
+    return run.nest.lanes.iterator >= 0 && run.nest.lanes.depth == static_cast<int>(depth);
+  }
   static bool is_around_all(const LoopRef& loop) { return loop.depth == around_all_loops; }
 
   // ---- loops ----
 
   const StageRun& add(StageId stage) {
     if (const StageRun* known = ir::find_or_null(runs_, stage)) return *known;
-    const Nest nest = loops_of(plan_, stage);
+    const Nest nest = loops_of(stage);
     StageRun run;
     run.id = stage;
     run.facts = &facts_.of(stage, *inlined_.at(stage));
     run.path = path_around(stage, nest, run.place);
+    run.storage_place = is_at(stage.func) ? store_place(run) : 1;
     const Cover extents = extents_of(run);
     run.nest = nest_trips(nest, extents);
     for (size_t depth = run.path.size() - run.place; depth < nest.loops.size(); ++depth)
       run.path.push_back(add_node(run.path.back(), {stage, static_cast<int16_t>(depth)},
-                                  nest.loops[depth].kind, run.nest.trips[depth]));
+                                  nest.loops[depth].kind,
+                                  is_lane_loop(run, depth) ? 1 : run.nest.trips[depth]));
     run.cover = covers_of(run, nest, extents);
     return runs_.emplace(stage, std::move(run)).first->second;
   }
@@ -109,12 +105,12 @@ class GroupBuilder {
   // Where a Func is computed: of loops alike, that of the first stage that reads it.
   Level level_of(FuncId func) {
     Level level = plan_.of(func).placement.compute;
-    for (int16_t s = 0; level.in_each_stage && s < stage_count(plan_, level.loop.stage.func); ++s) {
-      const StageId reader{level.loop.stage.func, s};
-      const auto& touches = facts_.of(reader, *inlined_.at(reader)).touches;
-      const auto depth = depth_in(plan_, reader, level);
+    if (!level.in_each_stage) return level;
+    for (const StageNode& reader : stages(level.loop.stage.func)) {
+      const auto& touches = facts_.of(reader.id, *inlined_.at(reader.id)).touches;
+      const auto depth = depth_in(plan_, reader.id, level);
       if (!depth || std::ranges::find(touches, func, &Touch::buffer) == touches.end()) continue;
-      level.loop = {reader, static_cast<int16_t>(*depth)};
+      level.loop = {reader.id, static_cast<int16_t>(*depth)};
       break;
     }
     return level;
@@ -132,7 +128,7 @@ class GroupBuilder {
     child.loop = loop;
     child.kind = kind;
     child.trips = trips;
-    child.times = outer.times * (kind == ForType::Vectorized ? 1 : trips);
+    child.times = outer.times * trips;
     child.in_parallel = outer.in_parallel || runs_at_once(kind);
     child.speedup = outer.speedup;
     if (runs_at_once(kind)) {
@@ -173,13 +169,13 @@ class GroupBuilder {
     return covers_.box(func, level);
   }
 
-  // What all loops of the nest run over. Where a Func is stored outside of the loop in which it is computed, an iteration
+  // The points of all loops of the nest. Where a Func is stored outside of the loop in which it is computed, an iteration
   // computes only what the iteration before has not.
   Cover extents_of(const StageRun& run) {
     if (!is_at(run.id.func) || run.place <= 1) return whole_cover(run.id, sizes_);
     std::vector<int64_t> box = box_in(run.id.func, run.path, run.place);
     const std::vector<int64_t> all = box;
-    for (size_t count = run.place - 1; count >= store_place(run); --count) {
+    for (size_t count = run.place - 1; count >= run.storage_place; --count) {
       const std::vector<int64_t> outer = box_in(run.id.func, run.path, count);
       const double trips = node(run.path[count]).trips;
       for (size_t d = 0; d < box.size(); ++d) {
@@ -191,7 +187,6 @@ class GroupBuilder {
     return with_box(run.id, box);
   }
 
-  // How many nodes of the path are around the Func's storage; the root is one of them.
   size_t store_place(const StageRun& run) const {
     const Level& store = plan_.of(run.id.func).placement.store;
     if (store.kind == Level::Kind::Root) return 1;
@@ -216,97 +211,20 @@ class GroupBuilder {
         cover = covers_.inside(run.id, static_cast<int>(depth));
         for (size_t i = 0; i < cover.size(); ++i) cover[i] = std::min(cover[i], extents[i]);
       }
+      // All lanes run at once, whatever loops are inside of theirs.
+      if (run.nest.lanes.iterator >= 0 && run.nest.lanes.depth <= static_cast<int>(depth))
+        cover_lanes(run.nest.lanes, cover);
       result.push_back(std::move(cover));
     }
     return result;
-  }
-
-  // ---- storage ----
-
-  void add_buffers() {
-    for (const StageRun& run : group_.runs) {
-      for (const Touch& touch : run.facts->touches)
-        if (!group_.buffers.contains(touch.buffer)) group_.buffers[touch.buffer] = stored(touch);
-    }
-    for (auto& [buffer, stored] : group_.buffers)
-      if (stored.inside > 1) stored.register_share = register_share(buffer, stored);
-  }
-
-  StoredBuffer stored(const Touch& touch) const {
-    const auto func_count = static_cast<int>(plan_.funcs.size());
-    StoredBuffer result;
-    if (touch.buffer >= func_count) {
-      for (size_t d = 0; d < touch.sides.size(); ++d) {
-        result.layout.order.push_back(static_cast<int16_t>(d));
-        const Extent extent = sizes_.of_image(touch.buffer - func_count, d);
-        result.layout.extents.push_back(double(std::max<int64_t>(extent.estimate, 1)));
-      }
-      return result;
-    }
-    return stored_func(touch);
-  }
-
-  StoredBuffer stored_func(const Touch& touch) const {
-    const FuncId func = touch.buffer;
-    const Storage& storage = plan_.of(func).storage;
-    StoredBuffer result;
-    result.layout.order = storage.order;
-    const StageRun* own = ir::first_where(group_.runs, [&](const StageRun& run) {
-      return run.id == StageId{func, 0};
-    });
-    const size_t place = own && is_at(func) ? store_place(*own) : 1;
-    for (size_t d = 0; d < touch.sides.size(); ++d) {
-      if (storage.order.size() < touch.sides.size())
-        result.layout.order.push_back(static_cast<int16_t>(d));
-      const int64_t points =
-          place > 1 ? own->cover[place][d] : std::max<int64_t>(sizes_.of(func, d).estimate, 1);
-      result.layout.extents.push_back(static_cast<double>(points));
-    }
-    for (const Fold& fold : storage.folds) {
-      double& extent = result.layout.extents[static_cast<size_t>(fold.dimension)];
-      extent = std::min(extent, static_cast<double>(fold.extent));
-    }
-    if (place > 1) allocate(result, touch, *own, place);
-    return result;
-  }
-
-  void allocate(StoredBuffer& stored, const Touch& touch, const StageRun& own, size_t place) const {
-    stored.inside = place;
-    double copies = 1;
-    for (size_t k = 1; k < place; ++k)
-      if (runs_at_once(node(own.path[k]).kind)) copies *= node(own.path[k]).trips;
-    const double bytes = stored.layout.elements() * touch.element_bytes * touch.components;
-    stored.allocated_bytes = bytes * std::min(copies, static_cast<double>(machine_.threads));
-  }
-
-  // A small array becomes registers if its indices are constants: no loop inside of its allocation but unrolled ones and
-  // vectors moves them.
-  double register_share(int buffer, const StoredBuffer& stored) const {
-    double bytes = 0;
-    for (const StageRun& run : group_.runs) {
-      for (const Touch& touch : run.facts->touches) {
-        if (touch.buffer != buffer) continue;
-        bytes = stored.layout.elements() * touch.element_bytes * touch.components;
-        for (size_t k = std::max(stored.inside, run.place); k < run.path.size(); ++k) {
-          const bool is_serial = node(run.path[k]).kind != ForType::Unrolled &&
-                                 node(run.path[k]).kind != ForType::Vectorized;
-          if (is_serial && node(run.path[k]).trips > 1 &&
-              (run.nest.moves[k - run.place] & touch.moved))
-            return 0;
-        }
-        if (run.place > stored.inside && touch.moved != 0) return 0;
-      }
-    }
-    const double room = static_cast<double>(machine_.vector_bytes) * machine_.registers;
-    return bytes <= largest_register_array * room ? std::min(1.0, operand_share * room / bytes) : 0;
   }
 };
 
 }  // namespace
 
-Group group_of(const Plan& plan, const GroupMembers& members, Covers& covers,
+Group group_of(const Plan& plan, const PlannedGroup& planned, Covers& covers,
                const SizeModel& sizes, const Machine& machine, FactsOfStages& facts) {
-  return GroupBuilder(plan, covers, sizes, machine, facts).build(members);
+  return GroupBuilder(plan, covers, sizes, machine, facts).build(planned);
 }
 
 }  // namespace retrograde::planning

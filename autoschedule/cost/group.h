@@ -8,31 +8,42 @@
 #include <map>
 #include <vector>
 
-#include "autoschedule/cost/nest_trips.h"
 #include "autoschedule/cost/stage_facts.h"
+#include "autoschedule/machine/machine.h"
 #include "autoschedule/plan/covers.h"
+#include "autoschedule/plan/plan.h"
 
 namespace retrograde::planning {
+
+// How often the loops of a nest run, and which iterators they move.
+struct NestTrips {
+  std::vector<double> trips;       // by depth, of one run of the loops around it
+  std::vector<IteratorSet> moves;  // by depth
+  LaneLoop lanes;                  // of the loop over lanes, if there is one
+};
+
+// `extents`: the points of the stage's iterators that all loops together run over.
+NestTrips nest_trips(const Nest& nest, const Cover& extents);
 
 struct LoopNode {
   int parent = -1;  // of the root: none
   LoopRef loop;     // of the first stage that has it
   ForType kind = ForType::Serial;
-  double trips = 1,
-         times = 1;           // iterations in one run of the loops around it; in all, without lanes
-  double speedup = 1;         // by threads
-  bool in_parallel = false;   // it, or a loop around it
-  std::vector<int> children;  // in the order in which they run
-  std::vector<int> stages;    // of which it is the innermost loop
+  double trips = 1, times = 1;  // iterations in one run of the loops around it, and in all
+  double speedup = 1;           // by threads
+  bool in_parallel = false;     // it, or a loop around it
+  std::vector<int> children;    // in the order in which they run
+  std::vector<int> stages;      // of which it is the innermost loop
 };
 
 struct StageRun {
   StageId id;
   const StageFacts* facts = nullptr;
   NestTrips nest;
-  std::vector<int> path;  // nodes from the root to the innermost loop
-  size_t place = 1;       // how many of them are around the stage's own nest
-  // What the loops from path[k] inwards cover: whole[k]. All 1 at the end.
+  std::vector<int> path;     // nodes from the root to the innermost loop
+  size_t place = 1;          // how many of them are around the stage's own nest
+  size_t storage_place = 1;  // and around the storage of its Func
+  // The points that the loops from path[k] inwards run over are cover[k]. All 1 at the end.
   std::vector<Cover> cover;
 
   int node_of(size_t depth) const { return path[place + depth]; }
@@ -53,19 +64,30 @@ struct Group {
   std::map<int, StoredBuffer> buffers;  // that the stages touch
 };
 
-// The Funcs that make a group, and for each of their stages, in order, the Funcs that are inlined into it.
-struct GroupMembers {
+// Adds the points of all lanes.
+void cover_lanes(const LaneLoop& lanes, Cover& cover);
+// Gives lanes to innermost loops that code generation vectorises although the plan does not.
+void add_inner_lanes(const SizeModel& sizes, const Machine& machine, Group& group);
+// Finds the buffers of the stages.
+void add_buffers(const Plan& plan, const SizeModel& sizes, const Machine& machine, Group& group);
+// By dimension, of a Func at root; less in folded dimensions.
+std::vector<double> stored_extents(FuncId func, const FuncPlan& plan, const SizeModel& sizes);
+
+// The Funcs whose loops are nested.
+struct PlannedGroup {
   std::vector<FuncId> funcs;
-  std::vector<std::vector<FuncId>> inlined;
+  std::vector<std::vector<FuncId>> inlined;  // into each of their stages, in order
+  std::vector<FuncId> reads;  // Funcs of other groups, also through inlined ones; each once
 };
 
-Group group_of(const Plan& plan, const GroupMembers& members, Covers& covers,
-               const SizeModel& sizes, const Machine& machine, FactsOfStages& facts);
+// In the order in which they run.
+std::vector<PlannedGroup> groups_of(const Plan& plan, const AccessGraph& graph);
 
-// The loops of a stage: those of its definition if the Func is opaque.
-Nest loops_of(const Plan& plan, StageId stage);
-int stage_count(const Plan& plan, FuncId func);
-// The Func stands for its value: undecided Funcs, too, but no outputs.
-bool is_inlined(const Plan& plan, const AccessGraph& graph, FuncId func);
+// The bytes alive at once; `own`: what each group allocates for the Funcs that are computed in its loops.
+double peak_bytes(const Plan& plan, const SizeModel& sizes, const std::vector<PlannedGroup>& groups,
+                  const std::vector<double>& own);
+
+Group group_of(const Plan& plan, const PlannedGroup& planned, Covers& covers,
+               const SizeModel& sizes, const Machine& machine, FactsOfStages& facts);
 
 }  // namespace retrograde::planning

@@ -1,6 +1,7 @@
 #include "autoschedule/cost/motion.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "ir/build.h"
 #include "ir/lets.h"
@@ -10,37 +11,21 @@ namespace retrograde::planning {
 
 namespace {
 
-Motion resting(size_t iterators) {
-  return {false, std::vector<std::optional<double>>(iterators, 0)};
-}
-
 bool rests(const Motion& motion) {
-  return !motion.is_table && motion == resting(motion.slopes.size());
+  return !motion.is_table && std::ranges::all_of(motion.slopes, [](double s) { return s == 0; });
 }
 
-void add_motion(Motion& sum, const Motion& other, double factor) {
-  sum.is_table = sum.is_table || other.is_table;
-  for (size_t i = 0; i < sum.slopes.size(); ++i) {
-    std::optional<double>& slope = sum.slopes[i];
-    if (slope && other.slopes[i])
-      *slope += factor * *other.slopes[i];
-    else
-      slope.reset();
-  }
+// Unknown factors leave what rests at rest.
+Motion sum(Motion a, const Motion& b, double factor = 1) {
+  a.is_table = a.is_table || b.is_table;
+  for (size_t i = 0; i < a.slopes.size(); ++i)
+    a.slopes[i] += b.slopes[i] == 0 ? 0 : factor * b.slopes[i];
+  return a;
 }
 
-Motion scaled_motion(const Motion& motion, std::optional<double> factor) {
-  Motion result = resting(motion.slopes.size());
-  add_motion(result, motion, factor.value_or(1));
-  for (std::optional<double>& slope : result.slopes) {
-    if (!factor && slope != 0.0) slope.reset();
-  }
-  return result;
-}
-
-std::optional<double> constant_of(const Expr& e) {
+double constant_or_unknown(const Expr& e) {
   const auto scalar = as_scalar(e);
-  return scalar ? std::optional(scalar->as_double()) : std::nullopt;
+  return scalar ? scalar->as_double() : NAN;
 }
 
 }  // namespace
@@ -48,77 +33,67 @@ std::optional<double> constant_of(const Expr& e) {
 Motions::Motions(const AccessGraph& graph) : graph_(graph) {
   for (const FuncNode& node : graph.funcs()) {
     for (const StageNode& stage : node.stages) {
-      Names iterators;
-      for (const Iterator& i : stage.iterators) iterators.emplace(i.name, iterators.size());
-      Known known;
-      const auto note = [&](const Access& access) {
-        for (const IndexForm& form : access.index) {
-          for (const OpaqueTerm& term : form.opaque) {
-            if (!term.expr.defined() || by_number_.contains(term.value.number)) continue;
-            const Motion all = of(without_lets(term.expr), iterators, known);
-            Motion own{all.is_table, {}};
-            for (const int16_t i : term.value.iterators)
-              own.slopes.push_back(all.slopes[static_cast<size_t>(i)]);
-            by_number_.emplace(term.value.number, std::move(own));
-          }
-        }
-      };
-      note(stage.write);
-      for (const Access& read : stage.reads) note(read);
+      Scope scope;
+      for (const Iterator& i : stage.iterators)
+        scope.iterators.emplace(i.name, scope.iterators.size());
+      note(stage.write, scope);
+      for (const Access& read : stage.reads) note(read, scope);
     }
   }
 }
 
-Motion Motions::of(const Expr& e, const Names& iterators, Known& known) {
-  if (const Motion* found = ir::find_or_null(known, e.get())) return *found;
-  Motion motion = find(e, iterators, known);
-  return known.emplace(e.get(), std::move(motion)).first->second;
+void Motions::note(const Access& access, Scope& scope) {
+  for (const IndexForm& form : access.index) {
+    for (const auto& [value, coefficient, range, expr] : form.opaque) {
+      if (!expr.defined() || by_number_.contains(value.number)) continue;
+      const Motion all = of(without_lets(expr), scope);
+      by_number_[value.number] = {all.is_table, ir::mapped(value.iterators, [&](int16_t i) {
+                                    return all.slopes[static_cast<size_t>(i)];
+                                  })};
+    }
+  }
 }
 
-Motion Motions::find(const Expr& e, const Names& iterators, Known& known) {
-  Motion result = resting(iterators.size());
-  const auto part = [&](const Expr& operand) { return of(operand, iterators, known); };
+Motion Motions::of(const Expr& e, Scope& scope) {
+  if (const Motion* found = ir::find_or_null(scope.known, e.get())) return *found;
+  Motion motion = find(e, scope);
+  return scope.known.emplace(e.get(), std::move(motion)).first->second;
+}
+
+Motion Motions::find(const Expr& e, Scope& scope) {
+  Motion rest{false, std::vector<double>(scope.iterators.size())};
   if (const auto* v = e.as<Variable>()) {
-    if (const size_t* i = ir::find_or_null(iterators, v->name)) result.slopes[*i] = 1;
-    return result;
+    if (const size_t* i = ir::find_or_null(scope.iterators, v->name)) rest.slopes[*i] = 1;
+    return rest;
   }
-  if (const auto* call = e.as<Call>()) return of_call(*call, iterators, known);
-  if (const auto* cast = e.as<Cast>()) return part(cast->value);
-  if (const auto* select = e.as<Select>()) return part(select->when_true);
+  if (const auto* call = e.as<Call>()) return of_call(*call, scope);
+  if (const auto* cast = e.as<Cast>()) return of(cast->value, scope);
+  if (const auto* select = e.as<Select>()) return of(select->when_true, scope);
   const auto* binary = e.as<Binary>();
-  if (!binary) return result;
-  const Motion a = part(binary->a), b = part(binary->b);
-  switch (e.kind()) {
-    case Kind::Add:
-    case Kind::Sub:
-      add_motion(result, a, 1);
-      add_motion(result, b, e.kind() == Kind::Add ? 1 : -1);
-      return result;
-    case Kind::Mul:
-      if (rests(b)) return scaled_motion(a, constant_of(binary->b));
-      return scaled_motion(b, rests(a) ? constant_of(binary->a) : std::nullopt);
-    case Kind::Div: {
-      const auto divisor = constant_of(binary->b);
-      return scaled_motion(a, divisor ? std::optional(1 / *divisor) : std::nullopt);
-    }
-    default:
-      return rests(a) ? b : a;  // of a minimum or a maximum
-  }
+  if (!binary) return rest;
+  const Motion a = of(binary->a, scope), b = of(binary->b, scope);
+  if (e.kind() == Kind::Add) return sum(a, b);
+  if (e.kind() == Kind::Sub) return sum(a, b, -1);
+  if (e.kind() == Kind::Div) return sum(rest, a, 1 / constant_or_unknown(binary->b));
+  if (e.kind() == Kind::Mul)
+    return rests(b) ? sum(rest, a, constant_or_unknown(binary->b))
+                    : sum(rest, b, constant_or_unknown(binary->a));
+  return rests(a) ? b : a;  // of a minimum or a maximum
 }
 
-Motion Motions::of_call(const Call& call, const Names& iterators, Known& known) {
-  Motion result = resting(iterators.size());
+Motion Motions::of_call(const Call& call, Scope& scope) {
+  Motion result{false, std::vector<double>(scope.iterators.size())};
   if (call.call_type == CallType::Operator)
-    return call.args.empty() ? result : of(call.args[0], iterators, known);
-  const bool is_func = call.call_type == CallType::Func;
-  if (!is_func || graph_.func(graph_.find(call.symbol.raw())).stages.size() != 1) {
+    return call.args.empty() ? result : of(call.args[0], scope);
+  const FuncId func = call.call_type == CallType::Func ? graph_.find(call.symbol.raw()) : -1;
+  if (func < 0 || graph_.func(func).stages.size() != 1 || graph_.func(func).func->is_extern()) {
     result.is_table = !call.type.is_float();
     return result;
   }
-  const Motion& own = of_func(graph_.find(call.symbol.raw()), static_cast<size_t>(call.component));
+  const Motion& own = of_func(func, static_cast<size_t>(call.component));
   result.is_table = own.is_table;
   for (size_t d = 0; d < call.args.size(); ++d)
-    add_motion(result, scaled_motion(of(call.args[d], iterators, known), own.slopes[d]), 1);
+    if (own.slopes[d] != 0) result = sum(result, of(call.args[d], scope), own.slopes[d]);
   return result;
 }
 
@@ -126,13 +101,9 @@ const Motion& Motions::of_func(FuncId func, size_t component) {
   const uint64_t key = static_cast<uint64_t>(func) << 32 | component;
   if (const Motion* found = ir::find_or_null(funcs_, key)) return *found;
   const FuncContents& f = *graph_.func(func).func;
-  Motion motion = resting(f.args.size());
-  if (!f.is_extern()) {
-    Names iterators;
-    for (const std::string& arg : f.args) iterators.emplace(arg, iterators.size());
-    Known known;
-    motion = of(without_lets(f.stage(0).values[component]), iterators, known);
-  }
+  Scope scope;
+  for (const std::string& arg : f.args) scope.iterators.emplace(arg, scope.iterators.size());
+  Motion motion = of(without_lets(f.stage(0).values[component]), scope);
   return funcs_.emplace(key, std::move(motion)).first->second;
 }
 

@@ -7,7 +7,6 @@
 // It decides how many cache lines a vector of a gather touches, and whether the next row touches them again.
 #pragma once
 
-#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -16,10 +15,8 @@
 namespace retrograde::planning {
 
 struct Motion {
-  bool is_table = false;                      // values from an array of integers
-  std::vector<std::optional<double>> slopes;  // by iterator; nullopt: unknown
-
-  bool operator==(const Motion&) const = default;
+  bool is_table = false;       // values from an array of integers
+  std::vector<double> slopes;  // by iterator; NaN: unknown
 };
 
 class Motions {
@@ -30,17 +27,20 @@ class Motions {
   const Motion* of(const Value& value) const { return ir::find_or_null(by_number_, value.number); }
 
  private:
-  using Names = std::unordered_map<std::string, size_t>;
-  using Known = std::unordered_map<const ir::ExprNode*, Motion>;
-
-  Motion of(const Expr& e, const Names& iterators, Known& known);
-  Motion find(const Expr& e, const Names& iterators, Known& known);
-  Motion of_call(const Call& call, const Names& iterators, Known& known);
-  const Motion& of_func(FuncId func, size_t component);
-
+  // The iterators of the expressions that are read, and what is known of these.
+  struct Scope {
+    std::unordered_map<std::string, size_t> iterators;
+    std::unordered_map<const ir::ExprNode*, Motion> known;
+  };
   const AccessGraph& graph_;
   std::unordered_map<uint32_t, Motion> by_number_;
   std::unordered_map<uint64_t, Motion> funcs_;  // by Func and component: along its dimensions
+
+  void note(const Access& access, Scope& scope);
+  Motion of(const Expr& e, Scope& scope);
+  Motion find(const Expr& e, Scope& scope);
+  Motion of_call(const Call& call, Scope& scope);
+  const Motion& of_func(FuncId func, size_t component);
 };
 
 }  // namespace retrograde::planning

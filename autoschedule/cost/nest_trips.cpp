@@ -1,4 +1,4 @@
-#include "autoschedule/cost/nest_trips.h"
+#include "autoschedule/cost/group.h"
 
 #include <algorithm>
 #include <cmath>
@@ -83,7 +83,10 @@ NestTrips nest_trips(const Nest& nest, const Cover& extents) {
     result.trips.push_back(
         std::max(1.0, counter.trips(loop, is_lane || loop.kind == ForType::Unrolled)));
     result.moves.push_back(counter.moves(loop.iterator));
-    if (is_lane) result.lanes = counter.lanes(loop);
+    if (is_lane) {
+      result.lanes = counter.lanes(loop);
+      result.lanes.depth = static_cast<int>(result.trips.size()) - 1;
+    }
   }
   return result;
 }

@@ -1,9 +1,9 @@
-#include "autoschedule/cost/operation_time.h"
-
+// The cost of an operation on one core.
 #include <algorithm>
 #include <map>
 
 #include "autoschedule/cost/assumptions.h"
+#include "autoschedule/cost/stage_facts.h"
 #include "ir/operators.h"
 
 namespace retrograde::planning {

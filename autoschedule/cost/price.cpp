@@ -6,10 +6,8 @@
 
 #include "autoschedule/cost/assumptions.h"
 #include "autoschedule/cost/cost.h"
-#include "autoschedule/cost/liveness.h"
-#include "autoschedule/cost/program_groups.h"
-#include "autoschedule/cost/traffic.h"
-#include "autoschedule/cost/work.h"
+#include "autoschedule/cost/recent.h"
+#include "autoschedule/cost/terms.h"
 
 namespace retrograde::planning {
 
@@ -23,70 +21,26 @@ struct GroupPrice {
   double allocated_bytes = 0;  // for Funcs that are computed in its loops
 };
 
-// The numbers of equal values.
-template <class T>
-class Numbers {
+// Plans of Funcs by their addresses, which nobody else gets as long as they are kept.
+class Hashes {
  public:
-  int of(const std::shared_ptr<const T>& value) {
-    const auto [entry, is_new] = known_.try_emplace(value.get(), 0);
-    if (!is_new) return entry->second;
-    kept_.push_back(value);
-    std::vector<int>& like = by_hash_[hash_of(*value)];
-    const int* equal = ir::first_where(
-        like, [&](int number) { return *kept_[static_cast<size_t>(number)] == *value; });
-    if (!equal) like.push_back(static_cast<int>(kept_.size()) - 1);
-    return entry->second = equal ? *equal : static_cast<int>(kept_.size()) - 1;
+  uint64_t of(const std::shared_ptr<const FuncPlan>& plan) {
+    const auto [entry, is_new] = known_.try_emplace(plan.get());
+    if (is_new) entry->second = {plan, hash_of(*plan)};
+    return entry->second.second;
   }
 
  private:
-  std::unordered_map<const T*, int> known_;
-  std::vector<std::shared_ptr<const T>> kept_;  // so that no other one gets their address
-  std::unordered_map<uint64_t, std::vector<int>> by_hash_;
+  std::unordered_map<const FuncPlan*, std::pair<std::shared_ptr<const FuncPlan>, uint64_t>> known_;
 };
 
-using Key = std::vector<int>;
+using Key = std::vector<uint64_t>;
 struct KeyHash {
   size_t operator()(const Key& key) const {
     size_t hash = key.size();
-    for (const int word : key) hash = (hash ^ static_cast<size_t>(word)) * 0x9e3779b97f4a7c15u;
+    for (const uint64_t word : key) hash = (hash ^ word) * 0x9e3779b97f4a7c15u;
     return hash ^ hash >> 29;
   }
-};
-
-// Buffers in the order in which they were touched, as a list, the latest first.
-class Residents {
- public:
-  explicit Residents(size_t buffers)
-      : next_(buffers + 1, -1), last_(buffers + 1, -1), bytes_(buffers) {
-    head_ = buffers;
-  }
-  // The bytes touched since, with its own; infinite if it was never touched.
-  double distance(int buffer, double most) const {
-    double sum = 0;
-    for (int b = next_[head_]; b >= 0 && sum <= most; b = next_[static_cast<size_t>(b)]) {
-      sum += bytes_[static_cast<size_t>(b)];
-      if (b == buffer) return sum;
-    }
-    return INFINITY;
-  }
-  double bytes(int buffer) const { return bytes_[static_cast<size_t>(buffer)]; }
-  void touch(int buffer, double bytes) {
-    const auto b = static_cast<size_t>(buffer);
-    if (last_[b] >= 0) {
-      next_[static_cast<size_t>(last_[b])] = next_[b];
-      if (next_[b] >= 0) last_[static_cast<size_t>(next_[b])] = last_[b];
-    }
-    bytes_[b] = bytes;
-    next_[b] = next_[head_];
-    last_[b] = static_cast<int>(head_);
-    if (next_[b] >= 0) last_[static_cast<size_t>(next_[b])] = buffer;
-    next_[head_] = buffer;
-  }
-
- private:
-  std::vector<int> next_, last_;
-  std::vector<double> bytes_;
-  size_t head_;
 };
 
 }  // namespace
@@ -94,28 +48,26 @@ class Residents {
 class CostModel::Prices {
  public:
   Prices(const AccessGraph& accesses, const SizeModel& sizes, const Machine& machine)
-      : graph_(accesses),
-        sizes_(sizes),
-        machine_(machine),
-        finder_(accesses),
-        facts_(sizes, machine) {}
+      : graph_(accesses), sizes_(sizes), machine_(machine), facts_(sizes, machine) {}
 
   Cost price(const Plan& plan) {
-    const std::vector<PlannedGroup> groups = finder_.groups_of(plan);
+    const std::vector<PlannedGroup> groups = groups_of(plan, graph_);
     Covers covers(plan, sizes_);
     std::vector<const GroupPrice*> prices;
     for (const PlannedGroup& group : groups) prices.push_back(&price_of(plan, group, covers));
     Cost cost;
-    Residents residents(graph_.funcs().size() + graph_.images().size());
+    RecentBuffers recent(graph_.funcs().size() + graph_.images().size());
     // The call is one of many: what the last one left in the caches counts.
-    for (const GroupPrice* price : prices) leave(*price, residents);
+    for (const GroupPrice* price : prices) leave(*price, recent);
     for (const GroupPrice* price : prices) {
-      add_stages(*price, residents, cost);
-      leave(*price, residents);
+      add_stages(*price, recent, cost);
+      leave(*price, recent);
     }
     std::ranges::sort(cost.stages, {}, &StageCost::stage);
     for (const StageCost& stage : cost.stages) cost.seconds += stage.seconds;
-    cost.peak_bytes = peak_of(plan, groups, prices);
+    cost.peak_bytes =
+        peak_bytes(plan, sizes_, groups,
+                   ir::mapped(prices, [](const GroupPrice* p) { return p->allocated_bytes; }));
     return cost;
   }
   size_t groups_priced() const { return known_.size(); }
@@ -124,27 +76,27 @@ class CostModel::Prices {
   const AccessGraph& graph_;
   const SizeModel& sizes_;
   const Machine& machine_;
-  const GroupFinder finder_;
   FactsOfStages facts_;
-  Numbers<FuncPlan> numbers_;
+  Hashes hashes_;
   std::unordered_map<Key, GroupPrice, KeyHash> known_;
 
+  // All that the price of a group depends on.
   Key key_of(const Plan& plan, const PlannedGroup& group) {
     Key key;
-    const auto number = [&](FuncId func) {
-      return numbers_.of(plan.funcs[static_cast<size_t>(func)]);
+    const auto add = [&](auto... words) {
+      key.insert(key.end(), {static_cast<uint64_t>(words)...});
     };
-    for (const FuncId func : group.members.funcs) key.insert(key.end(), {func, number(func)});
-    for (const std::vector<FuncId>& inlined : group.members.inlined) {
-      key.push_back(-1);
-      ir::append(key, inlined);
+    for (const FuncId func : group.funcs)
+      add(func, hashes_.of(plan.funcs[static_cast<size_t>(func)]));
+    for (const std::vector<FuncId>& inlined : group.inlined) {
+      add(-1);
+      key.insert(key.end(), inlined.begin(), inlined.end());
     }
-    key.push_back(-1);
+    add(-1);
     for (const FuncId read : group.reads) {
-      key.push_back(read);
-      for (const int16_t dimension : plan.of(read).storage.order) key.push_back(dimension);
-      for (const Fold& fold : plan.of(read).storage.folds)
-        key.insert(key.end(), {fold.dimension, static_cast<int>(fold.extent)});
+      add(read);
+      for (const int16_t dimension : plan.of(read).storage.order) add(dimension);
+      for (const Fold& fold : plan.of(read).storage.folds) add(fold.dimension, fold.extent);
     }
     return key;
   }
@@ -152,7 +104,7 @@ class CostModel::Prices {
   const GroupPrice& price_of(const Plan& plan, const PlannedGroup& planned, Covers& covers) {
     Key key = key_of(plan, planned);
     if (const GroupPrice* found = ir::find_or_null(known_, key)) return *found;
-    const Group group = group_of(plan, planned.members, covers, sizes_, machine_, facts_);
+    const Group group = group_of(plan, planned, covers, sizes_, machine_, facts_);
     GroupPrice price;
     price.traffic = traffic_of(group, machine_);
     for (const StageRun& run : group.runs) price.stages.push_back(cost_of(run, group));
@@ -177,22 +129,20 @@ class CostModel::Prices {
 
   // ---- memory ----
 
-  static void leave(const GroupPrice& price, Residents& residents) {
-    for (const auto& [buffer, bytes] : price.traffic.touched) residents.touch(buffer, bytes);
+  static void leave(const GroupPrice& price, RecentBuffers& recent) {
+    for (const auto& [buffer, bytes] : price.traffic.touched) recent.touch(buffer, bytes);
   }
 
-  // What a cache supplies is what the smaller one lacks and it has.
-  void add_stages(const GroupPrice& price, const Residents& residents, Cost& cost) const {
+  // A cache supplies what the smaller one lacks and it has.
+  void add_stages(const GroupPrice& price, const RecentBuffers& recent, Cost& cost) const {
     struct Bytes {
       double serial = 0, parallel = 0;
     };
     std::vector<std::array<Bytes, Machine::level_count>> behind(price.stages.size());
     const double most = machine_.levels[Machine::last_cache].bytes;
     std::unordered_map<int, double> distances;
-    for (const auto& [buffer, bytes] : price.traffic.touched) {
-      const bool is_there = 2 * residents.bytes(buffer) >= bytes;
-      distances[buffer] = is_there ? residents.distance(buffer, most) : INFINITY;
-    }
+    for (const auto& [buffer, bytes] : price.traffic.touched)
+      distances[buffer] = recent.distance(buffer, bytes, most);
     for (size_t level = 0; level < price.traffic.behind.size(); ++level) {
       const double room = usable_share * machine_.levels[level].bytes;
       for (const BufferTraffic& traffic : price.traffic.behind[level]) {
@@ -219,42 +169,6 @@ class CostModel::Prices {
                       stage.launch_seconds;
       cost.stages.push_back(stage);
     }
-  }
-
-  // ---- liveness ----
-
-  double bytes_of(FuncId func, const FuncPlan& plan) const {
-    const FuncContents& f = *graph_.func(func).func;
-    double bytes = 0;
-    for (const Type& type : f.types) bytes += type.bytes();
-    for (size_t d = 0; d < f.args.size(); ++d) {
-      auto extent = static_cast<double>(std::max<int64_t>(sizes_.of(func, d).estimate, 1));
-      for (const Fold& fold : plan.storage.folds)
-        if (fold.dimension == static_cast<int>(d))
-          extent = std::min(extent, static_cast<double>(fold.extent));
-      bytes *= extent;
-    }
-    return bytes;
-  }
-
-  double peak_of(const Plan& plan, const std::vector<PlannedGroup>& groups,
-                 const std::vector<const GroupPrice*>& prices) const {
-    std::vector<LiveBuffer> buffers;
-    std::vector<int> number(plan.funcs.size(), -1);  // of the buffer
-    std::vector<double> own;
-    for (size_t g = 0; g < groups.size(); ++g) {
-      own.push_back(prices[g]->allocated_bytes);
-      for (const FuncId func : groups[g].members.funcs) {
-        const FuncPlan& of = plan.of(func);
-        if (of.placement.compute.kind == Level::Kind::At || graph_.func(func).is_output) continue;
-        number[static_cast<size_t>(func)] = static_cast<int>(buffers.size());
-        buffers.push_back({g, g, bytes_of(func, of)});
-      }
-      for (const FuncId read : groups[g].reads)
-        if (const int n = number[static_cast<size_t>(read)]; n >= 0)
-          buffers[static_cast<size_t>(n)].last = g;
-    }
-    return peak_bytes(buffers, own);
   }
 };
 

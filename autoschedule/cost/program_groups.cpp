@@ -1,33 +1,31 @@
-#include "autoschedule/cost/program_groups.h"
-
+// The groups of a plan: stages whose loops are nested.
 #include <algorithm>
 #include <map>
 #include <numeric>
+
+#include "autoschedule/cost/group.h"
 
 namespace retrograde::planning {
 
 namespace {
 
-void insert_once(std::vector<FuncId>& list, FuncId func) {
+bool insert_once(std::vector<FuncId>& list, FuncId func) {
   const auto place = std::ranges::lower_bound(list, func);
-  if (place == list.end() || *place != func) list.insert(place, func);
+  const bool is_new = place == list.end() || *place != func;
+  if (is_new) list.insert(place, func);
+  return is_new;
 }
 
-}  // namespace
-
-GroupFinder::GroupFinder(const AccessGraph& graph) : graph_(graph) {
-  for (const FuncNode& node : graph.funcs()) {
-    auto& stages = reads_.emplace_back();
-    for (const StageNode& stage : node.stages) {
-      auto& reads = stages.emplace_back();
-      for (const Access& read : stage.reads)
-        if (read.of >= 0 && read.of != stage.id.func) insert_once(reads, read.of);
-    }
-  }
+// The Func stands for its value: undecided Funcs, too, but no outputs.
+bool is_inlined(const Plan& plan, const FuncNode& node, FuncId func) {
+  const FuncPlan& of = plan.of(func);
+  const Level::Kind kind = of.placement.compute.kind;
+  return !node.is_output && of.opacity == Opacity::None && node.stages.size() == 1 &&
+         (kind == Level::Kind::Inline || kind == Level::Kind::Undecided);
 }
 
 // The Func in whose loops it runs; itself if there is none.
-FuncId GroupFinder::host_of(const Plan& plan, FuncId func) const {
+FuncId host_of(const Plan& plan, FuncId func) {
   const Level& compute = plan.of(func).placement.compute;
   if (compute.kind == Level::Kind::At) return compute.loop.stage.func;
   for (const Nest& nest : plan.of(func).nests)
@@ -36,8 +34,24 @@ FuncId GroupFinder::host_of(const Plan& plan, FuncId func) const {
   return func;
 }
 
+// The Funcs of other groups that a stage reads, and those that are inlined into it.
+void add_reads(const StageNode& stage, const AccessGraph& graph, const std::vector<bool>& inlined,
+               PlannedGroup& group) {
+  for (const Access& access : stage.reads) {
+    const FuncId read = access.of;
+    if (read < 0 || read == stage.id.func) continue;
+    if (!inlined[static_cast<size_t>(read)]) {
+      if (!std::ranges::binary_search(group.funcs, read)) insert_once(group.reads, read);
+    } else if (insert_once(group.inlined.back(), read)) {
+      add_reads(graph.func(read).stages[0], graph, inlined, group);
+    }
+  }
+}
+
+}  // namespace
+
 // Groups run in the order of their last Funcs: all that a group reads is before it.
-std::vector<PlannedGroup> GroupFinder::groups_of(const Plan& plan) const {
+std::vector<PlannedGroup> groups_of(const Plan& plan, const AccessGraph& graph) {
   const size_t count = plan.funcs.size();
   std::vector<FuncId> group(count);
   std::iota(group.begin(), group.end(), 0);
@@ -48,44 +62,27 @@ std::vector<PlannedGroup> GroupFinder::groups_of(const Plan& plan) const {
   std::vector<bool> inlined(count);
   for (size_t f = 0; f < count; ++f) {
     const auto func = static_cast<FuncId>(f);
-    inlined[f] = is_inlined(plan, graph_, func);
+    inlined[f] = is_inlined(plan, graph.func(func), func);
     if (inlined[f]) continue;
     const FuncId a = root(func), b = root(host_of(plan, func));
     group[static_cast<size_t>(std::min(a, b))] = std::max(a, b);
   }
   std::map<FuncId, PlannedGroup> found;
   for (size_t f = 0; f < count; ++f) {
-    if (inlined[f]) continue;
-    PlannedGroup& own = found[root(static_cast<FuncId>(f))];
-    own.members.funcs.push_back(static_cast<FuncId>(f));
+    const auto func = static_cast<FuncId>(f);
+    if (!inlined[f]) found[root(func)].funcs.push_back(func);
   }
   std::vector<PlannedGroup> result;
   for (auto& [last, own] : found) {
-    for (const FuncId func : own.members.funcs) {
-      for (size_t s = 0; s < reads_[static_cast<size_t>(func)].size(); ++s)
-        add_reads(own, {func, static_cast<int16_t>(s)}, inlined);
+    for (const FuncId func : own.funcs) {
+      for (const StageNode& stage : graph.func(func).stages) {
+        own.inlined.emplace_back();
+        add_reads(stage, graph, inlined, own);
+      }
     }
     result.push_back(std::move(own));
   }
   return result;
-}
-
-void GroupFinder::add_reads(PlannedGroup& group, StageId stage,
-                            const std::vector<bool>& inlined) const {
-  std::vector<FuncId>& inside = group.members.inlined.emplace_back();
-  std::vector<FuncId> pending{stage.func};
-  const auto visit = [&](const std::vector<FuncId>& reads) {
-    for (const FuncId read : reads) {
-      if (!inlined[static_cast<size_t>(read)]) {
-        if (!std::ranges::binary_search(group.members.funcs, read)) insert_once(group.reads, read);
-      } else if (!std::ranges::binary_search(inside, read)) {
-        insert_once(inside, read);
-        pending.push_back(read);
-      }
-    }
-  };
-  visit(reads_[static_cast<size_t>(stage.func)][static_cast<size_t>(stage.stage)]);
-  for (size_t i = 1; i < pending.size(); ++i) visit(reads_[static_cast<size_t>(pending[i])][0]);
 }
 
 }  // namespace retrograde::planning

@@ -95,17 +95,13 @@ double touched_lines(const Touch& touch, const Layout& layout, const Cover& cove
   return lines * by_data * touch.components;
 }
 
-LanePlaces lane_places(const Touch& touch, const Layout& layout, const LaneLoop& lanes) {
-  LanePlaces result;
-  if ((touch.moved & lanes.moves) == 0) {
-    result.kind = LanePlaces::Kind::Uniform;
-    return result;
-  }
-  if (touch.data & lanes.moves) return result;
+LaneMoves lane_moves(const Touch& touch, const Layout& layout, const LaneLoop& lanes,
+                     double vectors) {
+  LaneMoves result;
+  if ((touch.moved & lanes.moves) == 0) return result;
+  result.is_by_lane = (touch.data & lanes.moves) != 0;
   double row = 1, stride = 0, outer_stride = 0;
   bool is_bent = false;
-  const TouchedSide& rows = touch.sides[static_cast<size_t>(layout.order[0])];
-  result.is_unaligned = rows.taps > 1 || rows.moves.size() > 1;
   for (const int16_t dimension : layout.order) {
     const TouchedSide& side = touch.sides[static_cast<size_t>(dimension)];
     for (const TouchedSide::Move& move : side.moves) {
@@ -117,15 +113,20 @@ LanePlaces lane_places(const Touch& touch, const Layout& layout, const LaneLoop&
     }
     row *= layout.extents[static_cast<size_t>(dimension)];
   }
-  if (lanes.outer >= 0 && outer_stride != stride * lanes.inner)
-    result.runs = std::ceil(lanes.count / lanes.inner);
-  using Kind = LanePlaces::Kind;
-  result.stride = std::abs(stride);
-  result.kind = is_bent        ? Kind::Bent
-                : stride == 1  ? Kind::Contiguous
-                : stride == -1 ? Kind::Reversed
-                : stride == 0  ? Kind::Uniform
-                               : Kind::Strided;
+  if (is_bent) {  // neighbours share elements
+    result.vectors = 2 * vectors;
+    result.shuffles = vectors;
+  } else if (std::abs(stride) == 1) {  // runs that lie apart are put together
+    const TouchedSide& rows = touch.sides[static_cast<size_t>(layout.order[0])];
+    const bool is_joined = lanes.outer < 0 || outer_stride == stride * lanes.inner;
+    result.vectors = is_joined ? vectors : std::max(vectors, std::ceil(lanes.count / lanes.inner));
+    result.is_unaligned = rows.taps > 1 || rows.moves.size() > 1;
+    if (stride < 0 || result.vectors > vectors) result.shuffles = result.vectors;
+  } else if (stride != 0) {
+    result.is_by_lane = result.is_by_lane || std::abs(stride) > longest_vector_stride;
+    result.vectors = std::max(1.0, std::abs(stride)) * vectors;
+    result.shuffles = (touch.writes ? 2 : 1) * result.vectors;
+  }
   return result;
 }
 
@@ -164,7 +165,7 @@ class TouchReader {
   const SizeModel& sizes_;
   const Motions& motions_;
 
-  // Of one component.
+  // A component's.
   double bytes_of(const Access& access) const {
     const AccessGraph& graph = sizes_.graph();
     if (access.of < 0) return graph.images()[static_cast<size_t>(access.image)]->type.bytes();
@@ -196,7 +197,7 @@ class TouchReader {
       side.most = std::min(side.most, std::max(1.0, static_cast<double>(within.extent())));
     if (form.modulus != 0) side.most = std::min(side.most, static_cast<double>(form.modulus));
     for (const Term& term : form.terms)
-      side.moves.push_back({term.iterator, static_cast<double>(term.coefficient), true});
+      side.moves.push_back({term.iterator, static_cast<double>(term.coefficient)});
     for (const OpaqueTerm& term : form.opaque) add_opaque(side, term);
     std::ranges::sort(side.moves, {}, [](const auto& move) { return std::abs(move.slope); });
     return side;
@@ -209,10 +210,10 @@ class TouchReader {
     side.is_displaced = !motion || !motion->is_table;
     if (!side.is_displaced) return;
     for (size_t i = 0; i < term.value.iterators.size(); ++i) {
-      const double slope = motion ? motion->slopes[i].value_or(unknown_slope) : unknown_slope;
+      const double known = motion ? motion->slopes[i] : NAN;
+      const double slope = std::isnan(known) ? unknown_slope : known;
       if (slope != 0)
-        side.moves.push_back(
-            {term.value.iterators[i], slope * static_cast<double>(term.coefficient), false});
+        side.moves.push_back({term.value.iterators[i], slope * double(term.coefficient)});
     }
     // Values that nothing but data move go anywhere between their ends.
     side.is_displaced = !side.moves.empty();

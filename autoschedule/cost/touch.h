@@ -2,7 +2,7 @@
 // vector lie in memory.
 //
 // Accesses that differ in constants alone are one touch: the nine reads of a 3x3 stencil are a window of 3 by 3 elements.
-// Unlike a footprint (access/footprint.h), it knows the order of storage and the motion of data-dependent indices.
+// Unlike a lane form (access/lane_form.h), it knows the order of storage and the motion of data-dependent indices.
 #pragma once
 
 #include <vector>
@@ -16,8 +16,7 @@ namespace retrograde::planning {
 struct TouchedSide {
   struct Move {
     int16_t iterator;
-    double slope;   // elements from one point to the next
-    bool is_exact;  // not of a data-dependent index
+    double slope;  // elements from one point to the next
   };
   double taps = 1, reach = 1;  // of one iteration: elements, and from the first to the last
   std::vector<Move> moves;     // the smallest slope first
@@ -50,21 +49,23 @@ struct Layout {
 // The lanes of a vector, along one iterator or, if that is shorter, along two.
 struct LaneLoop {
   int iterator = -1, outer = -1;
+  int depth = 0;  // of the loop
   double count = 1, inner = 1, step = 1;
   IteratorSet moves = 0;
 };
 
-struct LanePlaces {
-  enum class Kind : uint8_t { Uniform, Contiguous, Reversed, Strided, Bent, Gather };
-  Kind kind = Kind::Gather;
-  double stride = 1;          // in elements
-  double runs = 1;            // pieces that lie apart
+// Instructions of a load or store of all lanes.
+struct LaneMoves {
+  double vectors = 1, shuffles = 0;
+  bool is_by_lane = false;    // an element at a time
   bool is_unaligned = false;  // vectors begin anywhere in a cache line
 };
 
 // Cache lines while the loops run over these points.
 double touched_lines(const Touch& touch, const Layout& layout, const Cover& cover);
-LanePlaces lane_places(const Touch& touch, const Layout& layout, const LaneLoop& lanes);
+// `vectors`: of the machine, that the lanes fill.
+LaneMoves lane_moves(const Touch& touch, const Layout& layout, const LaneLoop& lanes,
+                     double vectors);
 
 // The touches of the accesses of one stage.
 std::vector<Touch> touches_of(const std::vector<const Access*>& accesses, const SizeModel& sizes,

@@ -1,16 +1,20 @@
-#include "autoschedule/cost/traffic.h"
+// The outermost loops whose run fits into a cache load what they touch once. Loops of which one iteration fits do, too:
+// what iterations share, such as the rows of a stencil, is used again while it is there. Farther out, all is loaded anew.
+// Source: Wolf and Lam, "A Data Locality Optimizing Algorithm" (PLDI 1991).
+#include "autoschedule/cost/terms.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "autoschedule/cost/assumptions.h"
+#include "autoschedule/cost/recent.h"
 #include "autoschedule/machine/reference.h"
 
 namespace retrograde::planning {
 
 namespace {
 
-// What is touched of a buffer.
+// The part of a buffer that is touched.
 struct Region {
   int buffer = 0, run = 0;
   double bytes = 0;
@@ -41,12 +45,12 @@ class RegionFinder {
   // While all iterations of a node run, and one of them.
   const Regions& run(int node) const { return runs_[static_cast<size_t>(node)]; }
   const Regions& iteration(int node) const { return iterations_[static_cast<size_t>(node)]; }
-  // What the stages touch themselves whose innermost loop it is.
+  // The touches of the stages whose innermost loop it is.
   Regions own(int node) const {
     Regions result;
     for (const int run : group_.nodes[static_cast<size_t>(node)].stages)
       add(result, static_cast<size_t>(run), group_.runs[static_cast<size_t>(run)].path.size());
-    return result;
+    return sorted(std::move(result));
   }
 
  private:
@@ -61,7 +65,12 @@ class RegionFinder {
       const auto at = std::ranges::find(path, static_cast<int>(n)) - path.begin();
       add(result, r, static_cast<size_t>(at) + inside);
     }
-    return result;
+    return sorted(std::move(result));
+  }
+  // Small ones are used all the time while large ones stream by: as if they were touched last.
+  static Regions sorted(Regions regions) {
+    std::ranges::stable_sort(regions, std::greater(), &Region::bytes);
+    return regions;
   }
 
   // Touches of one stage are different parts of a buffer; stages touch the same ones.
@@ -99,36 +108,14 @@ class RegionFinder {
   }
 };
 
-// What was touched, the latest first.
-class LatestRegions {
- public:
-  // Whether most of the region is still among so many bytes.
-  bool hold(const Region& region, double cache_bytes) const {
-    double sum = 0;
-    for (const auto& [buffer, bytes] : buffers_) {
-      sum += bytes;
-      if (sum > cache_bytes) return false;
-      if (buffer == region.buffer) return 2 * bytes >= region.bytes;
-    }
-    return false;
-  }
-  // Small ones are used all the time while large ones stream by.
-  void touch(Regions regions) {
-    std::ranges::stable_sort(regions, std::greater(), &Region::bytes);
-    for (const Region& region : regions) {
-      std::erase_if(buffers_, [&](const auto& known) { return known.first == region.buffer; });
-      buffers_.insert(buffers_.begin(), {region.buffer, region.bytes});
-    }
-  }
-
- private:
-  std::vector<std::pair<int, double>> buffers_;
-};
-
 class TrafficWalk {
  public:
   TrafficWalk(const Group& group, const RegionFinder& regions, const Machine& machine, size_t level)
-      : group_(group), regions_(regions), machine_(machine), level_(level) {}
+      : group_(group),
+        regions_(regions),
+        machine_(machine),
+        level_(level),
+        recent_(static_cast<size_t>(group.buffers.rbegin()->first) + 1) {}
 
   std::vector<BufferTraffic> find() {
     visit(0, 1);
@@ -148,7 +135,7 @@ class TrafficWalk {
   const RegionFinder& regions_;
   const Machine& machine_;
   const size_t level_;
-  LatestRegions latest_;
+  RecentBuffers recent_;
   std::vector<BufferTraffic> found_;
 
   // The threads share the last cache, one iteration of a parallel loop each.
@@ -172,13 +159,14 @@ class TrafficWalk {
   }
 
   void load(const Regions& regions, double times, int n) {
+    const double most = room(group_.nodes[static_cast<size_t>(n)].in_parallel);
     for (const Region& region : regions) {
-      if (latest_.hold(region, room(group_.nodes[static_cast<size_t>(n)].in_parallel))) continue;
+      if (recent_.distance(region.buffer, region.bytes, most) <= most) continue;
       const StageRun& run = group_.runs[static_cast<size_t>(region.run)];
       const bool in_parallel = group_.nodes[static_cast<size_t>(run.path.back())].in_parallel;
       found_.push_back({region.run, region.buffer, times * region.moved_bytes(), 0, in_parallel});
     }
-    latest_.touch(regions);
+    for (const Region& region : regions) recent_.touch(region.buffer, region.bytes);
   }
 };
 
@@ -189,9 +177,8 @@ GroupTraffic traffic_of(const Group& group, const Machine& machine) {
   GroupTraffic result;
   for (size_t level = 0; level < result.behind.size(); ++level)
     result.behind[level] = TrafficWalk(group, regions, machine, level).find();
-  Regions all = regions.run(0);
-  std::ranges::stable_sort(all, std::greater(), &Region::bytes);
-  for (const Region& region : all) result.touched.emplace_back(region.buffer, region.bytes);
+  for (const Region& region : regions.run(0))
+    result.touched.emplace_back(region.buffer, region.bytes);
   return result;
 }
 

@@ -1,6 +1,6 @@
-// What does not change in a loop is computed outside of it, and what unrolled copies have in common once for all. So an
+// Values that a loop does not change are computed outside of it, and those that unrolled copies have in common once. So an
 // operation is executed as often as the loops run that are outside of the innermost loop that changes it, and that loop.
-#include "autoschedule/cost/work.h"
+#include "autoschedule/cost/terms.h"
 
 #include <algorithm>
 #include <cmath>
@@ -28,15 +28,10 @@ class StageWork {
   }
 
   UnitTimes find() {
-    for (const Touch& touch : run_.facts->touches) {
-      for (size_t d = 0; touch.writes && d < depth(); ++d)
-        if (is_serial(d) && run_.nest.trips[d] > 1 && moves(d, touch.moved))
-          last_mover_ = static_cast<int>(d);
-    }
     for (const OperationRow& row : run_.facts->operations) add_operation(row);
     for (const Touch& touch : run_.facts->touches) add_touch(touch);
     add_spills();
-    units_.chain /= overlapping_chains();
+    add_chains();
     const double taken = run_.facts->taken;
     for (double UnitTimes::*part : {&UnitTimes::arithmetic, &UnitTimes::loads, &UnitTimes::stores,
                                     &UnitTimes::scalars, &UnitTimes::chain})
@@ -52,9 +47,9 @@ class StageWork {
   const LaneLoop& lanes_;
   int innermost_ = -1;  // the serial loop that runs innermost
   UnitTimes units_;
-  double accumulators_ = 0, invariants_ = 0;  // registers of the innermost serial loop
-  double instructions_ = 0;                   // of all iterations
-  int last_mover_ = -1;                       // the innermost serial loop that moves the write
+  double accumulators_ = 0, invariants_ = 0;       // registers of the innermost serial loop
+  double instructions_ = 0;                        // of all iterations
+  std::vector<std::pair<double, double>> chains_;  // nanoseconds, and how many independent ones
 
   size_t depth() const { return run_.nest.trips.size(); }
   const LoopNode& node(size_t d) const {
@@ -119,7 +114,7 @@ class StageWork {
     const StoredBuffer& stored = group_.buffers.at(touch.buffer);
     const bool is_sum = touch.is_own || (touch.writes && has_own_read());
     note_registers(touch, is_sum);
-    if (touch.is_own) add_chain(touch);
+    if (touch.is_own) add_sum(touch);
     if (touch.carried) add_recurrence(touch);
     const double count = touch.count * times(touch.moved) * (1 - stored.register_share);
     instructions_ += count * vectors(touch.element_bytes, touch.moved);
@@ -130,47 +125,19 @@ class StageWork {
   }
 
   void add_moves(const Touch& touch, const StoredBuffer& stored, double count) {
-    const LanePlaces places = lane_places(touch, stored.layout, lanes_);
-    const double lanes = is_vector(touch.moved) ? lanes_.count : 1;
-    const double whole = vectors(touch.element_bytes, touch.moved);
-    double moved = 1, single = 0, shuffled = 0;  // vectors, elements, shuffles
-    using Kind = LanePlaces::Kind;
-    switch (places.kind) {
-      case Kind::Uniform:
-        break;
-      case Kind::Contiguous:
-      case Kind::Reversed:
-        moved = std::max(whole, places.runs);  // runs that lie apart are put together
-        if (places.is_unaligned) moved *= 1 + m_.vector_bytes / double(line_bytes);
-        if (places.runs > whole) shuffled = moved;
-        if (places.kind == Kind::Reversed) shuffled = whole;
-        break;
-      case Kind::Strided:
-        if (places.stride > longest_vector_stride) {
-          moved = 0;
-          single = lanes;
-        } else {
-          moved = std::max(1.0, places.stride) * whole;
-          shuffled = (touch.writes ? 2 : 1) * moved;
-        }
-        break;
-      case Kind::Bent:
-        moved = 2 * whole;
-        shuffled = whole;
-        break;
-      case Kind::Gather:
-        moved = 0;
-        single = lanes;
-        break;
-    }
+    const LaneMoves moved =
+        lane_moves(touch, stored.layout, lanes_, vectors(touch.element_bytes, touch.moved));
     double& units = touch.writes ? units_.stores : units_.loads;
-    const double vector_ns = touch.writes ? m_.store_ns : m_.load_ns;
-    const double lane_ns = touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns;
-    units += count * (moved * vector_ns + single * lane_ns);
-    units_.arithmetic += count * shuffled * m_.shuffle_ns;
+    if (moved.is_by_lane) {
+      units += count * lanes_.count * (touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns);
+      return;
+    }
+    const double crossing = moved.is_unaligned ? 1 + m_.vector_bytes / double(line_bytes) : 1;
+    units += count * moved.vectors * crossing * (touch.writes ? m_.store_ns : m_.load_ns);
+    units_.arithmetic += count * moved.shuffles * m_.shuffle_ns;
   }
 
-  // What the innermost loop does not move stays in registers.
+  // Elements that the innermost loop does not move stay in registers.
   void note_registers(const Touch& touch, bool is_sum) {
     if (innermost_ < 0 || moves(static_cast<size_t>(innermost_), touch.moved)) return;
     const double needed =
@@ -181,7 +148,7 @@ class StageWork {
       invariants_ += needed;
   }
   void add_spills() {
-    const double excess = accumulators_ + invariants_ + passing_registers - m_.registers;
+    const double excess = accumulators_ + invariants_ + passing_operands - m_.registers;
     if (excess <= 0) return;
     const double sums = std::min(excess, accumulators_);
     units_.loads += iterations() * std::min(excess, accumulators_ + invariants_) * m_.load_ns;
@@ -190,34 +157,44 @@ class StageWork {
 
   // ---- chains ----
 
+  // `ns` of each iteration of the innermost serial loop wait for the iteration before, in the loops from `depth` inwards.
+  // Short chains of different elements run at the same time, as far as the core looks ahead.
+  void add_chain(double iteration_ns, size_t from) {
+    double runs = place_times();
+    for (size_t d = 0; d < from; ++d)
+      if (is_serial(d)) runs *= run_.nest.trips[d];
+    chains_.push_back({iterations() * iteration_ns, runs});
+  }
+
   // A sum waits for the last one to the same element: in a register, or through memory where neighbours meet.
-  void add_chain(const Touch& touch) {
+  void add_sum(const Touch& touch) {
     if (innermost_ < 0) return;
+    const auto innermost = static_cast<size_t>(innermost_);
     if (touch.data != 0) {
       const double in_vector = touch.data & lanes_.moves ? lanes_.count : 1;
-      units_.chain +=
-          iterations() * copies(0, false) * in_vector * equal_neighbours * m_.memory_latency_ns;
-    } else if (!moves(static_cast<size_t>(innermost_), touch.moved)) {
-      units_.chain += iterations() * copies(touch.moved, false) * m_.latency_ns;
+      add_chain(copies(0, false) * in_vector * equal_neighbours * m_.memory_latency_ns, 0);
+    } else if (!moves(innermost, touch.moved)) {
+      size_t from = innermost;
+      while (from > 0 && !(is_serial(from - 1) && moves(from - 1, touch.moved))) --from;
+      add_chain(copies(touch.moved, false) * m_.latency_ns, from);
     }
   }
   // An element waits for the one before, which the last iteration stored.
   void add_recurrence(const Touch& touch) {
     if (innermost_ < 0 || !moves(static_cast<size_t>(innermost_), touch.carried)) return;
+    size_t from = 0;
+    while (!moves(from, touch.carried)) ++from;
     double in_iteration = 1;
     for (size_t d = static_cast<size_t>(innermost_) + 1; d < depth(); ++d)
       if (kind(d) == ForType::Unrolled && moves(d, touch.carried))
         in_iteration *= run_.nest.trips[d];
-    const double chain = iterations() * in_iteration * m_.memory_latency_ns;
-    units_.chain = std::max(units_.chain, chain);
+    add_chain(in_iteration * m_.memory_latency_ns, from);
   }
-
-  // Short sums of different elements run at the same time, as far as the core looks ahead.
-  double overlapping_chains() const {
-    double runs = place_times();
-    for (int d = 0; d <= last_mover_; ++d)
-      if (is_serial(static_cast<size_t>(d))) runs *= run_.nest.trips[static_cast<size_t>(d)];
-    return std::max(1.0, core.reorder_window * runs / std::max(instructions_, 1.0));
+  void add_chains() {
+    for (const auto& [chain_ns, runs] : chains_) {
+      const double overlap = core.reorder_window * runs / std::max(instructions_, 1.0);
+      units_.chain = std::max(units_.chain, chain_ns / std::max(overlap, 1.0));
+    }
   }
 
   void add_loops() {

@@ -32,7 +32,11 @@ class LevelFinder {
   // Innermost first.
   std::vector<Place> run() {
     std::vector<Place> places;
-    const std::vector<Level> levels = levels_of(first_reader(func_));
+    const std::vector<StageId> readers = all_readers(plan_, context_, func_);
+    const auto reader = std::ranges::find_if(
+        readers, [&](StageId stage) { return !is_inlined(plan_, stage.func); });
+    if (reader == readers.end()) return places;
+    const std::vector<Level> levels = levels_of(*reader);
     for (const double bytes : sizes_of_memories()) {
       std::optional<Place> outermost;
       for (const Level& level : levels) {
@@ -59,13 +63,6 @@ class LevelFinder {
     for (size_t l = 0; l <= Machine::last_cache; ++l)
       bytes.push_back(context_.machine.levels[l].bytes);
     return bytes;
-  }
-
-  // A stage with loops that reads the Func, perhaps through inlined Funcs.
-  StageId first_reader(FuncId func) const {
-    const StageId reader = context_.accesses.consumers(func).front();
-    const bool is_inlined = plan_.of(reader.func).placement.compute.kind == Level::Kind::Inline;
-    return is_inlined ? first_reader(reader.func) : reader;
   }
 
   // The loops around a stage, innermost first; loops of its body and those that it shares are none.
@@ -133,8 +130,7 @@ bool stays_in_place(const Context& context, FuncId func) {
 std::vector<Plan> compute_at(const Plan& plan, FuncId func, const Context& context) {
   std::vector<Plan> plans;
   if (!is_editable(plan, func) || is_output(*plan.program, func) ||
-      context.accesses.consumers(func).empty() || !has_bounded_region(plan, context, func) ||
-      !stays_in_place(context, func))
+      !has_bounded_region(plan, context, func) || !stays_in_place(context, func))
     return plans;
   for (const auto& [level, box] : LevelFinder(plan, func, context).run()) {
     FuncPlan changed = plan.of(func);
@@ -151,7 +147,7 @@ std::vector<Plan> compute_at(const Plan& plan, FuncId func, const Context& conte
     for (size_t s = 0; s < changed.nests.size(); ++s) {
       const StageId stage{func, static_cast<int16_t>(s)};
       const int64_t full = lanes_for(plan, stage, INT64_MAX);
-      changed.nests[s] = row_loops(plan, context, stage, box, full / 2);
+      changed.nests[s] = row_loops(plan, context, stage, changed.storage.order, box, full / 2);
     }
     add(plans, with_func(plan, func, std::move(changed), context));
   }

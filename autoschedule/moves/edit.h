@@ -15,8 +15,15 @@ namespace retrograde::planning::moves {
 bool is_editable(const Plan& plan, FuncId func);
 // Whether it is also computed somewhere, so that it has loops.
 bool has_loops(const Plan& plan, FuncId func);
-// Whether iterations of a loop over the iterator may run in any order, and concurrently (L1, L6).
+// Whether iterations of a loop over the iterator may run in any order, and concurrently (L1, L6): they access different
+// elements, those of pure variables always.
 bool is_free(const Context& context, StageId stage, int iterator);
+// The same for iterations of one loop of a nest, which agree in the iterators whose loops are all around it.
+bool may_run_at_once(const Context& context, StageId stage, const Nest& nest, size_t depth);
+// Whether the values of the Func are computed wherever they are read.
+bool is_inlined(const Plan& plan, FuncId func);
+// The stages that read the Func, also through inlined Funcs; those of inlined Funcs, too.
+std::vector<StageId> all_readers(const Plan& plan, const Context& context, FuncId func);
 // Whether the region that is read of the Func is bounded (L3), also through inlined Funcs: data decide no index without a
 // range.
 bool has_bounded_region(const Plan& plan, const Context& context, FuncId func);
@@ -29,6 +36,8 @@ size_t innermost_loop(const Nest& nest, int iterator);
 // The next larger step of the same iterator; 0: there is none.
 int64_t outer_step(const Nest& nest, int iterator, int64_t step);
 std::optional<size_t> vector_loop(const Nest& nest);
+// The outermost loops that stages share (L11).
+size_t shared_loops(const Plan& plan, StageId stage);
 // The first of the loops at the end that are unrolled or lanes: they make the body of the loops around them.
 size_t body_depth(const Nest& nest);
 // The points of an iterator that run inside of a loop: the estimated extent if no loop down to this one steps over it.
@@ -38,6 +47,8 @@ int64_t points_inside(const Context& context, StageId stage, const Nest& nest, i
 int64_t trips(const Context& context, StageId stage, const Nest& nest, size_t depth);
 // Copies of the stage's definition in the code that its loops make.
 int64_t copies(const Nest& nest, const Context& context, StageId stage);
+// The bytes of an element that is accessed.
+double bytes_of_element(const Context& context, const Access& access);
 // Operations of the stage's definition and of what is inlined into it (L5).
 int64_t operations(const Plan& plan, const Context& context, StageId stage);
 // The lanes of a vector of the stage's values along a loop of this extent: a vector, or for a shorter loop the half or
@@ -56,18 +67,19 @@ void drop_loop(Nest& nest, size_t depth);
 std::optional<Nest> without_body(const Nest& nest, const Context& context, StageId stage);
 // Runs so many points of the iterator inside of all other loops. Requires: no step is smaller, except 1.
 void run_inside(Nest& nest, int iterator, int64_t points, ForType kind);
-// Serial loops for the stage of a Func whose dimensions have these extents, along rows: lanes of the first stored
-// dimension inside, then the reduction, then the other dimensions. `min_lanes`: fewer aren't used.
+// Serial loops for the stage of a Func with this storage order, whose dimensions have these extents, along rows: lanes of
+// the first stored dimension inside, then the reduction, then the other dimensions. `min_lanes`: fewer aren't used.
 Nest row_loops(const Plan& plan, const Context& context, StageId stage,
-               const std::vector<int64_t>& extents, int64_t min_lanes);
+               const std::vector<int16_t>& order, const std::vector<int64_t>& extents,
+               int64_t min_lanes);
 // Makes the outermost loops parallel until there are enough chunks of work for the threads.
 void run_in_parallel(Nest& nest, const Context& context, StageId stage);
 
 // ---- changes of a plan ----
 
 // The plan in which the Func runs like this; nullopt if it's no other plan or not a legal one: a loop is gone in which
-// something is placed, its region changes though it needs constant extents (L4), a window changes (L9), or loops that
-// stages share differ (L11).
+// something is placed, its region changes though it needs constant extents (L4), a window changes (L9), loops that
+// stages share differ (L11), or iterations of an update that access one element change their order (L1, L2).
 std::optional<Plan> with_func(const Plan& plan, FuncId func, FuncPlan changed,
                               const Context& context);
 std::optional<Plan> with_nest(const Plan& plan, StageId stage, Nest nest, const Context& context);

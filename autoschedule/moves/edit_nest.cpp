@@ -57,18 +57,42 @@ bool has_loops(const Plan& plan, FuncId func) {
   return is_editable(plan, func) && (kind == Level::Kind::Root || kind == Level::Kind::At);
 }
 
-bool has_bounded_region(const Plan& plan, const Context& context, FuncId func) {
-  for (const StageId reader : context.accesses.consumers(func)) {
-    const FuncPlan& other = plan.of(reader.func);
-    if (other.opacity != Opacity::None) return false;
-    for (const Access& read : context.accesses.stage(reader).reads) {
-      const auto is_bounded = [&](const IndexForm& form) { return has_range(form, context.sizes); };
-      if (read.of == func && !std::ranges::all_of(read.index, is_bounded)) return false;
+bool is_inlined(const Plan& plan, FuncId func) {
+  const FuncPlan& own = plan.of(func);
+  const Level::Kind kind = own.placement.compute.kind;
+  const bool is_left = kind == Level::Kind::Undecided && own.opacity == Opacity::None;
+  return (kind == Level::Kind::Inline || is_left) && !is_output(*plan.program, func);
+}
+
+std::vector<StageId> all_readers(const Plan& plan, const Context& context, FuncId func) {
+  std::vector<StageId> result;
+  std::vector<FuncId> read{func};
+  for (size_t i = 0; i < read.size(); ++i) {
+    for (const StageId reader : context.accesses.consumers(read[i])) {
+      if (std::ranges::find(result, reader) != result.end()) continue;
+      result.push_back(reader);
+      if (is_inlined(plan, reader.func)) read.push_back(reader.func);
     }
-    const bool is_inlined = other.placement.compute.kind == Level::Kind::Inline;
-    if (is_inlined && !has_bounded_region(plan, context, reader.func)) return false;
   }
-  return true;
+  return result;
+}
+
+bool has_bounded_region(const Plan& plan, const Context& context, FuncId func) {
+  const std::vector<StageId> readers = all_readers(plan, context, func);
+  const auto leads_to = [&](FuncId read) {
+    return read == func || (std::ranges::find(readers, read, &StageId::func) != readers.end() &&
+                            is_inlined(plan, read));
+  };
+  return std::ranges::all_of(readers, [&](StageId reader) {
+    const std::vector<Access>& reads = context.accesses.stage(reader).reads;
+    return plan.of(reader.func).opacity == Opacity::None &&
+           std::ranges::all_of(reads, [&](const Access& read) {
+             return !leads_to(read.of) ||
+                    std::ranges::all_of(read.index, [&](const IndexForm& form) {
+                      return has_range(form, context.sizes);
+                    });
+           });
+  });
 }
 
 bool is_reduction(const Context& context, StageId stage, int iterator) {
@@ -76,9 +100,20 @@ bool is_reduction(const Context& context, StageId stage, int iterator) {
   return node.iterators[static_cast<size_t>(iterator)].kind == Iterator::Kind::Reduction;
 }
 
-// A pure variable stands for itself in the stage's own reads, too, so its iterations never meet.
 bool is_free(const Context& context, StageId stage, int iterator) {
-  return !is_reduction(context, stage, iterator);
+  return !is_reduction(context, stage, iterator) ||
+         context.dependences.may_run_at_once(stage, iterator);
+}
+
+bool may_run_at_once(const Context& context, StageId stage, const Nest& nest, size_t depth) {
+  const int iterator = nest.loops[depth].iterator;
+  if (!is_reduction(context, stage, iterator)) return true;
+  IteratorSet around = 0;
+  for (size_t d = 0; d < nest.loops.size(); ++d) {
+    const IteratorSet own = set_of(nest.loops[d].iterator);
+    around = d < depth ? around | own : around & ~own;
+  }
+  return context.dependences.may_run_at_once(stage, iterator, around);
 }
 
 std::optional<size_t> find_loop(const Nest& nest, int iterator, int64_t step) {
@@ -100,6 +135,18 @@ std::optional<size_t> vector_loop(const Nest& nest) {
   const auto found = std::ranges::find(nest.loops, ForType::Vectorized, &Loop::kind);
   if (found == nest.loops.end()) return std::nullopt;
   return static_cast<size_t>(found - nest.loops.begin());
+}
+
+size_t shared_loops(const Plan& plan, StageId stage) {
+  const std::optional<LoopRef>& own = plan.nest(stage).shared_with;
+  int depth = own ? own->depth : -1;
+  for (const auto& func : plan.funcs) {
+    for (const Nest& nest : func->nests) {
+      if (nest.shared_with && nest.shared_with->stage == stage)
+        depth = std::max<int>(depth, nest.shared_with->depth);
+    }
+  }
+  return static_cast<size_t>(depth + 1);
 }
 
 size_t body_depth(const Nest& nest) {
@@ -136,6 +183,12 @@ int64_t copies(const Nest& nest, const Context& context, StageId stage) {
   return product;
 }
 
+double bytes_of_element(const Context& context, const Access& access) {
+  if (access.of < 0)
+    return context.accesses.images()[static_cast<size_t>(access.image)]->type.bytes();
+  return context.accesses.func(access.of).func->types[0].bytes();
+}
+
 int64_t operations(const Plan& plan, const Context& context, StageId stage) {
   std::map<StageId, int64_t> known;
   const std::function<int64_t(StageId)> count = [&](StageId id) {
@@ -144,9 +197,8 @@ int64_t operations(const Plan& plan, const Context& context, StageId stage) {
     int64_t sum = 1;
     for (const OperationCount& operation : node.operations) sum += operation.count;
     for (const Access& read : node.reads) {
-      const bool is_inlined = read.of >= 0 && read.of != id.func &&
-                              plan.of(read.of).placement.compute.kind == Level::Kind::Inline;
-      if (is_inlined) sum += count({read.of, 0});
+      if (read.of >= 0 && read.of != id.func && is_inlined(plan, read.of))
+        sum += count({read.of, 0});
       sum = std::min(sum, 2 * most_body_operations);  // no chain overflows
     }
     return known[id] = sum;
@@ -188,9 +240,11 @@ std::optional<Nest> without_body(const Nest& nest, const Context& context, Stage
   for (size_t d = nest.loops.size(); d-- > body_depth(nest);) {
     Loop& loop = result.loops[d];
     const bool adds_up = is_reduction(context, stage, loop.iterator);
-    if (adds_up && loop.kind == ForType::Vectorized) return std::nullopt;
+    const bool is_lane = loop.kind == ForType::Vectorized;
+    if (adds_up && is_lane && nest.concurrency != Concurrency::Independent) return std::nullopt;
     loop.kind = ForType::Serial;
-    if (!adds_up && outer_step(result, loop.iterator, loop.step) > 0) drop_loop(result, d);
+    if ((!adds_up || is_lane) && outer_step(result, loop.iterator, loop.step) > 0)
+      drop_loop(result, d);
   }
   // Lanes outside of other loops would stay.
   return vector_loop(result) ? std::nullopt : std::optional(result);
@@ -209,11 +263,11 @@ void run_inside(Nest& nest, int iterator, int64_t points, ForType kind) {
 }
 
 Nest row_loops(const Plan& plan, const Context& context, StageId stage,
-               const std::vector<int64_t>& extents, int64_t min_lanes) {
+               const std::vector<int16_t>& order, const std::vector<int64_t>& extents,
+               int64_t min_lanes) {
   const graph::FuncContents& f = *plan.program->funcs[static_cast<size_t>(stage.func)];
   const StageNode& node = context.accesses.stage(stage);
   Nest nest = loops_of_definition(f, stage.stage);
-  const std::vector<int16_t>& order = plan.of(stage.func).storage.order;
   const auto rank = [&](const Loop& loop) {
     const Iterator& iterator = node.iterators[static_cast<size_t>(loop.iterator)];
     if (iterator.kind == Iterator::Kind::Reduction) return -1;
@@ -231,7 +285,7 @@ Nest row_loops(const Plan& plan, const Context& context, StageId stage,
 void run_in_parallel(Nest& nest, const Context& context, StageId stage) {
   int64_t chunks = 1;
   for (size_t d = 0; d < body_depth(nest) && chunks < context.machine.enough_tasks(); ++d) {
-    if (!is_free(context, stage, nest.loops[d].iterator)) return;
+    if (!may_run_at_once(context, stage, nest, d)) return;
     nest.loops[d].kind = ForType::Parallel;
     chunks *= trips(context, stage, nest, d);
   }

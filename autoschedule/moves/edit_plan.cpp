@@ -50,7 +50,7 @@ class FuncChange {
     const auto id = static_cast<size_t>(func_);
     Plan plan = before_;
     plan.funcs[id] = std::make_shared<FuncPlan>(changed_);
-    if (!keeps_shared_loops()) return std::nullopt;
+    if (!keeps_order() || !keeps_shared_loops()) return std::nullopt;
     for (size_t other = 0; other < plan.funcs.size(); ++other) {
       const auto guest = static_cast<FuncId>(other);
       if (guest == func_) continue;
@@ -80,6 +80,53 @@ class FuncChange {
     const Loop& old = old_nest(loop.stage).loops[static_cast<size_t>(loop.depth)];
     const auto found = find_loop(new_nest(loop.stage), old.iterator, old.step);
     return found ? std::optional(static_cast<int16_t>(*found)) : std::nullopt;
+  }
+
+  // ---- L1, L2 ----
+
+  // The loops over the reduction, where neighbours of one iterator count as one: steps of it change no order.
+  std::vector<LoopStep> reduction_loops(StageId stage, const Nest& nest) const {
+    std::vector<LoopStep> loops;
+    for (const Loop& loop : nest.loops) {
+      if (!is_reduction(context_, stage, loop.iterator)) continue;
+      const bool at_once = loop.kind == ForType::Vectorized || loop.kind == ForType::Parallel;
+      const bool is_next = !loops.empty() && loops.back().iterator == loop.iterator &&
+                           loops.back().is_concurrent == at_once;
+      if (is_next) loops.pop_back();
+      loops.push_back({loop.iterator, loop.step, at_once});
+    }
+    return loops;
+  }
+  static bool are_alike(const std::vector<LoopStep>& a, const std::vector<LoopStep>& b) {
+    return std::ranges::equal(a, b, [](const LoopStep& s, const LoopStep& t) {
+      return s.iterator == t.iterator && s.is_concurrent == t.is_concurrent;
+    });
+  }
+  // Whether loops that run at once, and are neither atomic nor vouched for, may.
+  bool are_independent(StageId stage) const {
+    const Nest& nest = new_nest(stage);
+    for (size_t d = 0; d < nest.loops.size(); ++d) {
+      const ForType kind = nest.loops[d].kind;
+      const bool at_once = kind == ForType::Vectorized || kind == ForType::Parallel;
+      if (at_once && nest.concurrency == Concurrency::Independent &&
+          !may_run_at_once(context_, stage, nest, d))
+        return false;
+    }
+    return true;
+  }
+  bool keeps_order() const {
+    for (size_t s = 0; s < changed_.nests.size(); ++s) {
+      const StageId stage{func_, static_cast<int16_t>(s)};
+      if (old_nest(stage) == new_nest(stage)) continue;
+      if (!are_independent(stage)) return false;
+      const std::vector<LoopStep> loops = reduction_loops(stage, new_nest(stage));
+      if (are_alike(loops, reduction_loops(stage, old_nest(stage)))) continue;
+      const bool is_kept =
+          std::ranges::all_of(context_.dependences.of(stage).all(),
+                              [&](const Dependence& d) { return keeps(d, loops); });
+      if (!is_kept) return false;
+    }
+    return true;
   }
 
   // ---- L11 ----
@@ -118,12 +165,8 @@ class FuncChange {
 
   // Whether the Func reads another one, perhaps through inlined Funcs.
   bool is_read(FuncId other) const {
-    for (const StageId reader : before_.program->readers[static_cast<size_t>(other)]) {
-      if (reader.func == func_) return true;
-      const bool is_inlined = before_.of(reader.func).placement.compute.kind == Kind::Inline;
-      if (is_inlined && is_read(reader.func)) return true;
-    }
-    return false;
+    const std::vector<StageId> readers = all_readers(before_, context_, other);
+    return std::ranges::find(readers, func_, &StageId::func) != readers.end();
   }
 
   bool keeps_region(FuncId guest) const {
@@ -147,6 +190,12 @@ class FuncChange {
 
   // Levels and shared loops of another Func that refer to loops of this one.
   bool renumber(Plan& plan, FuncId guest) const {
+    const auto& [compute, store, hoist] = plan.of(guest).placement;
+    const bool refers = is_at(compute, func_) || is_at(store, func_) || is_at(hoist, func_) ||
+                        std::ranges::any_of(plan.of(guest).nests, [&](const Nest& nest) {
+                          return nest.shared_with && nest.shared_with->stage.func == func_;
+                        });
+    if (!refers) return true;
     FuncPlan other = plan.of(guest);
     bool is_there = true;
     const auto follow = [&](LoopRef& loop) {

@@ -8,6 +8,14 @@
 
 namespace retrograde::planning::moves {
 
+namespace {
+
+int64_t body_size(const Plan& plan, const Context& context, StageId stage) {
+  return operations(plan, context, stage) * copies(plan.nest(stage), context, stage);
+}
+
+}  // namespace
+
 std::vector<Plan> inline_func(const Plan& plan, FuncId func, const Context& context) {
   const graph::FuncContents& f = *plan.program->funcs[static_cast<size_t>(func)];
   if (!is_editable(plan, func) || f.stage_count() > 1 || is_output(*plan.program, func)) return {};
@@ -17,21 +25,12 @@ std::vector<Plan> inline_func(const Plan& plan, FuncId func, const Context& cont
   for (int d = 0; d < f.dimensions(); ++d) inlined.storage.order.push_back(static_cast<int16_t>(d));
   const std::optional<Plan> result = with_func(plan, func, std::move(inlined), context);
   if (!result) return {};
-  for (size_t id = 0; id < result->funcs.size(); ++id) {
-    const FuncPlan& reader = *result->funcs[id];
-    const std::vector<StageNode>& stages = context.accesses.func(static_cast<FuncId>(id)).stages;
-    for (const StageNode& stage : stages) {
-      bool reads = false;
-      for (const Access& read : stage.reads) reads = reads || read.of == func;
-      if (reads && reader.opacity != Opacity::None) return {};
-      if (reader.opacity != Opacity::None || reader.placement.compute.kind == Level::Kind::Inline)
-        continue;
-      const int64_t size = operations(*result, context, stage.id) *
-                           copies(result->nest(stage.id), context, stage.id);
-      const int64_t before =
-          operations(plan, context, stage.id) * copies(plan.nest(stage.id), context, stage.id);
-      if (size > before && size > most_body_operations) return {};
-    }
+  for (const StageId reader : all_readers(*result, context, func)) {
+    if (result->of(reader.func).opacity != Opacity::None) return {};
+    if (is_inlined(*result, reader.func)) continue;
+    const int64_t before = body_size(plan, context, reader);
+    const int64_t size = body_size(*result, context, reader);
+    if (size > before && size > most_body_operations) return {};
   }
   return {*result};
 }

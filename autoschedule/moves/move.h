@@ -19,12 +19,13 @@
 //   L9   windows that are stored keep the rows that are read again
 //   L11  loops that stages share stay equal
 //
-// Of the conditions in the design, L7 holds since no move splits a sum, and L10 is about devices.
+// The design has two more: L7 holds since no move splits a sum, and L10 is about devices.
 #pragma once
 
 #include <span>
 #include <vector>
 
+#include "autoschedule/access/dependences.h"
 #include "autoschedule/access/sizes.h"
 #include "autoschedule/machine/machine.h"
 #include "autoschedule/plan/plan.h"
@@ -37,6 +38,7 @@ struct Context {
       accesses;  // of the program's outputs; its Funcs have the numbers of the plan's
   const SizeModel& sizes;
   const Machine& machine;
+  Dependences& dependences;  // of the same access graph
 };
 
 // Plans that differ from `plan` in how `func` runs; `plan` keeps all invariants, and they do, too.

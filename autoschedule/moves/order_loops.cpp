@@ -24,6 +24,7 @@ class LoopOrder {
   LoopOrder(const Plan& plan, StageId stage, const Context& context)
       : nest_(plan.nest(stage)), stage_(stage), context_(context) {
     end_ = body_depth(nest_);
+    begin_ = std::min(shared_loops(plan, stage), end_);
     while (begin_ < end_ && nest_.loops[begin_].kind == ForType::Parallel) ++begin_;
     std::set<int16_t> seen;
     for (size_t d = begin_; d < end_; ++d)

@@ -27,13 +27,14 @@ std::vector<Plan> parallelise(const Plan& plan, FuncId func, const Context& cont
     Nest outermost = serial;
     run_in_parallel(outermost, context, stage);
     add(plans, with_nest(plan, stage, std::move(outermost), context));
-    if (body_depth(serial) > 0 && is_free(context, stage, serial.loops[0].iterator)) {
-      const int64_t each = trips(context, stage, serial, 0) / enough;
+    if (body_depth(serial) > 0 && may_run_at_once(context, stage, serial, 0)) {
+      Nest chunks = serial;
+      const int16_t first = chunks.loops[0].iterator;
+      if (chunks.loops.size() > 1 && chunks.loops[1].iterator == first) drop_loop(chunks, 1);
+      const int64_t each = trips(context, stage, chunks, 0) / enough;
       if (each > 1) {
-        const Loop& first = serial.loops[0];
         const auto rows = static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(each)));
-        Nest chunks = serial;
-        insert_step(chunks, first.iterator, rows * first.step, 0, ForType::Parallel);
+        insert_step(chunks, first, rows * chunks.loops[0].step, 0, ForType::Parallel);
         add(plans, with_nest(plan, stage, std::move(chunks), context));
       }
     }

@@ -96,7 +96,7 @@ class RegisterTiles {
     return static_cast<double>(all) / static_cast<double>(points);
   }
 
-  // Of one term in a register.
+  // The cycles of one term in a register.
   double cycles(int64_t vectors, int64_t size, int side, int64_t bytes) const {
     const double registers =
         std::max(1.0, static_cast<double>(bytes) / context_.machine.vector_bytes);

@@ -20,7 +20,7 @@ std::vector<Plan> root(const Plan& plan, FuncId func, const Context& context) {
     extents.push_back(context.sizes.of(func, d).estimate);
   for (size_t s = 0; s < changed.nests.size(); ++s) {
     const StageId stage{func, static_cast<int16_t>(s)};
-    changed.nests[s] = row_loops(plan, context, stage, extents, 1);
+    changed.nests[s] = row_loops(plan, context, stage, changed.storage.order, extents, 1);
     run_in_parallel(changed.nests[s], context, stage);
   }
   std::vector<Plan> plans;

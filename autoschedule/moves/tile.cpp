@@ -1,11 +1,12 @@
-// tile -- a larger step of one or two pure iterators outside of the others, or a tile of another size.
+// tile -- a larger step of one or two iterators outside of the others, or a tile of another size.
 //
 //   parallel y, x:16, vector x     =>     parallel y:8, y, x:16, vector x             strips of rows
 //                                  =>     parallel y:8, x:64, y, x:16, vector x       tiles
+//   r.t, x:16, vector x            =>     x:256, r.t, x:16, vector x                  columns, over a whole reduction
 //   y:8, y, x:16, vector x         =>     y:16, y, x:16, vector x and y:4, y, x:16, vector x
 //
-// Legal: L1, since iterations of pure loops never meet. Sizes are powers of two; the first ones fill the first or the
-// second cache with what the stage accesses.
+// Legal: L1: iterations of pure loops never meet, and steps of a reduction keep the order of those that do.
+// Sizes are powers of two; the first ones fill the first or the second cache with what the stage accesses.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -33,16 +34,22 @@ class Tiler {
   }
 
   void run(std::vector<Plan>& plans) const {
+    if (inner_.empty()) return;
     for (const size_t level : {size_t{0}, Machine::near_cache}) {
       const double points = context_.machine.levels[level].bytes / bytes_of_point();
       if (inner_.size() > 1) {
         const auto row = static_cast<double>(points_of(inner_[0]));
-        tile({{inner_[1], power_of_two_below(points / row)}}, plans);
+        tile({{inner_[1], power_of_two_below(points / row)}}, inner_[1].depth, plans);
         const int64_t side = power_of_two_below(std::sqrt(points));
-        tile({{inner_[1], side}, {inner_[0], side}}, plans);
-      } else if (!inner_.empty()) {
-        tile({{inner_[0], power_of_two_below(points)}}, plans);
+        tile({{inner_[1], side}, {inner_[0], side}}, std::min(inner_[0].depth, inner_[1].depth),
+             plans);
       }
+      size_t outside = shared_loops(plan_, stage_);
+      while (outside < inner_[0].depth && nest_.loops[outside].kind == ForType::Parallel) ++outside;
+      const bool is_in_reduction =
+          outside < inner_[0].depth &&
+          is_reduction(context_, stage_, nest_.loops[inner_[0].depth - 1].iterator);
+      if (is_in_reduction) tile({{inner_[0], power_of_two_below(points)}}, outside, plans);
     }
     for (const Inner& inner : inner_) resize(inner, plans);
   }
@@ -68,30 +75,24 @@ class Tiler {
   }
   double bytes_of_point() const {
     const StageNode& node = context_.accesses.stage(stage_);
-    double bytes = bytes_of(node.write);
-    for (const Access& read : node.reads) bytes += bytes_of(read);
+    double bytes = bytes_of_element(context_, node.write);
+    for (const Access& read : node.reads) bytes += bytes_of_element(context_, read);
     return bytes;
   }
-  double bytes_of(const Access& access) const {
-    if (access.of < 0)
-      return context_.accesses.images()[static_cast<size_t>(access.image)]->type.bytes();
-    return context_.accesses.func(access.of).func->types[0].bytes();
-  }
 
-  void tile(const std::vector<Side>& sides, std::vector<Plan>& plans) const {
+  // The new loops stand at `depth`.
+  void tile(const std::vector<Side>& sides, size_t depth, std::vector<Plan>& plans) const {
     Nest nest = nest_;
-    size_t first = nest.loops.size();
     for (const auto& [inner, size] : sides) {
       const Loop& loop = nest_.loops[inner.depth];
       if (size <= loop.step || 2 * size > points_of(inner)) return;
-      first = std::min(first, inner.depth);
     }
     for (size_t i = sides.size(); i-- > 0;) {
       const auto& [inner, size] = sides[i];
       Loop& loop = nest.loops[*find_loop(nest, inner.iterator, nest_.loops[inner.depth].step)];
       const ForType kind = loop.kind;
       loop.kind = ForType::Serial;
-      insert_step(nest, inner.iterator, size, first, kind);
+      insert_step(nest, inner.iterator, size, depth, kind);
     }
     add(plans, with_nest(plan_, stage_, std::move(nest), context_));
   }

@@ -2,11 +2,11 @@
 //
 //   y, x:16, vector x     =>     y:16, x, vector y      and      y, x
 //
-// Legal: L1, since iterations of pure loops never meet, and L4: a step of as many points as there are lanes stands
-// outside. Lanes of a sum stay: removing them would make its chains of additions longer.
+// Legal: L1: iterations of pure loops never meet, and those of a reduction are lanes only if they don't; L4: a step of as
+// many points as there are lanes stands outside. Lanes of a sum stay: removing them would make its chains of additions longer.
 #include <algorithm>
 
-#include "autoschedule/access/footprint.h"
+#include "autoschedule/access/lane_form.h"
 #include "autoschedule/moves/edit.h"
 
 namespace retrograde::planning::moves {
@@ -43,18 +43,21 @@ std::vector<Plan> vectorise(const Plan& plan, FuncId func, const Context& contex
     std::vector<int> iterators;
     const auto count = static_cast<int>(context.accesses.stage(stage).iterators.size());
     for (int i = 0; i < count; ++i) {
-      if (is_free(context, stage, i)) iterators.push_back(i);
+      if (find_loop(*plain, i, 1)) iterators.push_back(i);
     }
     std::ranges::stable_sort(iterators, std::greater(),
                              [&](int i) { return together(context, stage, i); });
-    if (iterators.size() > most_iterators) iterators.resize(most_iterators);
+    size_t given = 0;
     for (const int i : iterators) {
+      if (given == most_iterators) break;
       const auto depth = static_cast<int>(innermost_loop(*plain, i));
       const int64_t points = points_inside(context, stage, *plain, depth - 1, i);
       const int64_t lanes = lanes_for(plan, stage, points);
       if (lanes == 1) continue;
       Nest nest = *plain;
       run_inside(nest, i, lanes, ForType::Vectorized);
+      if (!may_run_at_once(context, stage, nest, nest.loops.size() - 1)) continue;
+      ++given;
       add(plans, with_nest(plan, stage, std::move(nest), context));
     }
     add(plans, with_nest(plan, stage, *plain, context));

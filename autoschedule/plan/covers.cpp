@@ -80,33 +80,41 @@ class NestCover {
   }
 };
 
-// A box that grows. Boxes of different stages lie as their first elements in the whole program do.
+// A box that holds those of several stages. As the loops around all of them go on, each box moves from one end of what
+// its stage accesses in the whole program to the other one; at one of the ends they are furthest apart.
 class GrowingBox {
  public:
   void add(const std::vector<const Access*>& accesses, const Cover& cover, const SizeModel& sizes) {
     const std::vector<int64_t> box = extents(accesses, cover, sizes);
-    starts_.resize(box.size(), INT64_MAX);
-    ends_.resize(box.size(), INT64_MIN);
-    lengths_.resize(box.size(), 1);
+    sides_.resize(box.size());
     for (size_t d = 0; d < box.size(); ++d) {
-      int64_t start = INT64_MAX;
+      ir::ConstantRange all{INT64_MAX, INT64_MIN};
       for (const Access* access : accesses)
-        start = std::min(start, sizes.range(access->index[d], access->by).min);
-      starts_[d] = std::min(starts_[d], start);
-      ends_[d] = std::max(ends_[d], start == INT64_MIN ? start : start + box[d]);
-      const int64_t joint = starts_[d] == INT64_MIN ? 1 : ends_[d] - starts_[d];
-      lengths_[d] = std::max({lengths_[d], box[d], joint});
-      lengths_[d] = std::min(lengths_[d], std::max<int64_t>(sizes.of(*accesses[0], d).estimate, 1));
+        all = hull(all, sizes.range(access->index[d], access->by));
+      const int64_t most = std::max<int64_t>(sizes.of(*accesses[0], d).estimate, 1);
+      sides_[d].add(all, box[d], most);
     }
   }
   // Another box that holds this one.
   void grow(const std::vector<int64_t>& box) {
-    for (size_t d = 0; d < box.size(); ++d) lengths_[d] = std::max(lengths_[d], box[d]);
+    for (size_t d = 0; d < box.size(); ++d) sides_[d].length = std::max(sides_[d].length, box[d]);
   }
-  const std::vector<int64_t>& extents_of_all() const { return lengths_; }
+  std::vector<int64_t> extents_of_all() const { return ir::mapped(sides_, &Side::length); }
 
  private:
-  std::vector<int64_t> starts_, ends_, lengths_;
+  struct Side {
+    ir::ConstantRange first{INT64_MAX, INT64_MIN}, last = first;  // at the ends of the loops around
+    int64_t length = 1;
+
+    void add(const ir::ConstantRange& all, int64_t extent, int64_t most) {
+      length = std::max(length, extent);
+      if (!all.is_bounded()) return;
+      first = hull(first, {all.min, all.min + extent - 1});
+      last = hull(last, {all.max - extent + 1, all.max});
+      length = std::min(std::max({length, first.extent(), last.extent()}), most);
+    }
+  };
+  std::vector<Side> sides_;
 };
 
 // The depth of the level's loop in a stage that shares it with the loop's own stage.
@@ -130,8 +138,8 @@ std::vector<const Access*> reads_of(const StageNode& stage, FuncId func) {
 Cover Covers::inside(StageId stage, int depth) {
   const Cover whole = all_of(stage);
   if (depth == around_all_loops || plan_.of(stage.func).opacity != Opacity::None) return whole;
-  const graph::FuncContents& f = *plan_.program->funcs[static_cast<size_t>(stage.func)];
-  const size_t iterators = graph::first_loops(f, f.stage(stage.stage)).size();
+  const bool has_points = point_number(sizes_.graph().func(stage.func).func->stage(stage.stage));
+  const size_t iterators = whole.size() - (has_points ? 1 : 0);
   return NestCover(plan_.nest(stage), whole, static_cast<size_t>(depth) + 1, iterators).points();
 }
 

@@ -42,12 +42,14 @@ PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
   PlanSearch search{{}, planning::import_plan(outputs)};
   const planning::AccessGraph accesses(outputs);
   const planning::SizeModel sizes(accesses, {planning::unknown_extent});
+  planning::Dependences dependences(accesses);
   planning::CostModel cost(accesses, sizes, machine);
   planning::SearchOptions options;
   options.width = width;
   options.spare_bytes = static_cast<double>(spare_bytes);
   options.kept = kept_funcs(search.rules, unscheduled);
-  search.result = planning::search(search.rules, {accesses, sizes, machine}, cost, options);
+  search.result =
+      planning::search(search.rules, {accesses, sizes, machine, dependences}, cost, options);
   return search;
 }
 

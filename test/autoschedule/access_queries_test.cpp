@@ -1,10 +1,11 @@
-// Sizes, footprints, reuse, lane forms and composed reads of small programs.
+// Sizes, boxes, lane forms and composed reads of small programs.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "autoschedule/access/compose.h"
-#include "autoschedule/access/footprint.h"
+#include "autoschedule/access/cover.h"
+#include "autoschedule/access/lane_form.h"
 #include "autoschedule/access/sizes.h"
 #include "frontend/language/boundary_conditions.h"
 #include "support/variables.h"
@@ -93,68 +94,6 @@ TEST(SizeModel, ReadsAllInsideOfAMirrorOnceARegionGoesBeyondIt) {
   const Access &at_edge = known.read(edge, 0, 0), &in_mirror = known.read(mirrored, 0, 0);
   EXPECT_EQ(known.sizes.range(at_edge.index[0], at_edge.by), (ir::ConstantRange{30, 39}));
   EXPECT_EQ(known.sizes.range(in_mirror.index[0], in_mirror.by), (ir::ConstantRange{0, 39}));
-}
-
-TEST(Footprint, CountsOverlappingWindowsOnce) {
-  ImageParam image(Float(32), 2, "image");
-  Func out("out");
-  RDom r(0, 3);
-  out(x, y) += image(x + r, 2 * y) * image(y, x);
-  out.bound(x, 0, 64).bound(y, 0, 32);
-  image.dim(0).set_estimate(0, 256);
-  image.dim(1).set_estimate(0, 256);
-  const Known known(out);
-  const Access &window = known.read(out, 1, 1), &turned = known.read(out, 1, 2);
-  // Covers of x, y, r.
-  EXPECT_EQ(footprint(window, {1, 1, 3}, known.sizes, line).elements, 3);
-  EXPECT_EQ(footprint(window, {64, 1, 3}, known.sizes, line).elements, 66);
-  EXPECT_EQ(footprint(window, {64, 1, 3}, known.sizes, line).lines, 5);
-  EXPECT_EQ(footprint(window, {16, 1, 3}, known.sizes, line).elements, 18);
-  EXPECT_EQ(footprint(window, {16, 4, 3}, known.sizes, line).lines, 2 * 4);
-  EXPECT_EQ(footprint(window, {64, 32, 3}, known.sizes, line).lines, 5 * 32);
-  EXPECT_EQ(footprint(turned, {64, 1, 1}, known.sizes, line).lines, 64);
-  EXPECT_EQ(footprint(turned, {1, 32, 3}, known.sizes, line).lines, 2);
-  EXPECT_EQ(footprint(turned, {8, 8, 3}, known.sizes, line).lines, 8);
-
-  EXPECT_TRUE(reuse(turned, 2, {1, 1, 1}, known.sizes, line).temporal);
-  EXPECT_TRUE(reuse(window, 0, {1, 1, 3}, known.sizes, line).overlap);
-  EXPECT_TRUE(reuse(window, 0, {1, 1, 3}, known.sizes, line).spatial);
-  EXPECT_FALSE(reuse(window, 0, {1, 1, 1}, known.sizes, line).overlap);
-  const Reuse rows = reuse(window, 1, {1, 1, 3}, known.sizes, line);
-  EXPECT_FALSE(rows.temporal || rows.spatial || rows.overlap);
-  // A loop in steps of 16.
-  EXPECT_TRUE(reuse(window, 0, {16, 1, 3}, known.sizes, line).overlap);
-  EXPECT_FALSE(reuse(window, 0, {16, 1, 1}, known.sizes, line).overlap);
-  EXPECT_FALSE(reuse(window, 0, {16, 1, 3}, known.sizes, line).spatial);
-}
-
-TEST(Footprint, IsWithinTheRangeOfTheDataAndOfTheImage) {
-  ImageParam image(Float(32), 2, "image"), places(UInt(8), 1, "places");
-  Func out("out");
-  out(x, y) = image(clamp(cast<int>(places(x)), 0, 12), y) + image(x % 8, 0) + image(x / 4, 0);
-  out.bound(x, 0, 64).bound(y, 0, 10);
-  image.dim(0).set_estimate(0, 256);
-  image.dim(1).set_estimate(0, 10);
-  const Known known(out);
-  const Access& scattered = known.read(out, 0, 1);
-  EXPECT_TRUE(scattered.place.defined());
-  EXPECT_EQ(footprint(scattered, {64, 1}, known.sizes, line).elements, 13);
-  EXPECT_EQ(footprint(scattered, {64, 1}, known.sizes, line).lines, 1);
-  EXPECT_EQ(footprint(scattered, {64, 10}, known.sizes, line).elements, 130);
-  EXPECT_EQ(footprint(known.read(out, 0, 2), {64, 1}, known.sizes, line).elements, 8);
-  EXPECT_EQ(footprint(known.read(out, 0, 3), {64, 1}, known.sizes, line).elements, 16);
-  EXPECT_EQ(footprint(scattered, {4, 2}, known.sizes, line).elements, 8) << "one for each point";
-}
-
-TEST(Footprint, MergesContiguousLines) {
-  ImageParam image(Float(32), 2, "image");
-  Func out("out");
-  out(x, y) = image(x, y);
-  out.bound(x, 0, 4).bound(y, 0, 100);
-  image.dim(0).set_estimate(0, 4);
-  image.dim(1).set_estimate(0, 100);
-  const Known known(out);
-  EXPECT_EQ(footprint(known.read(out, 0, 0), {4, 100}, known.sizes, line).lines, 25);
 }
 
 using Extents = std::vector<int64_t>;

@@ -11,7 +11,6 @@
 
 #include "analysis/linear.h"
 #include "autoschedule/access/compose.h"
-#include "autoschedule/access/footprint.h"
 #include "autoschedule/access/sizes.h"
 #include "autoschedule/inlined_reads.h"
 #include "autoschedule/read_estimate.h"

@@ -1,9 +1,10 @@
 # Random programs and schedules against the interpreter.
+retrograde_test(computed_boxes_test)
 retrograde_test(gpu_faults_test LIBS retrograde_simt retrograde_dep_halide_runtime)
 retrograde_test(gpu_schedules_test LIBS retrograde_simt)
 retrograde_test(interval_property_test LAYERS analysis)
 retrograde_test(loop_passes_test LAYERS lower OPTIMIZED)
-retrograde_test(move_walk_test)
+retrograde_test(move_walk_test READS_FILES)
 retrograde_test(plan_round_trip_test)
 retrograde_test(random_test)
 retrograde_test(simplify_property_test SOURCES property/simplify_test.cpp LAYERS simplify)

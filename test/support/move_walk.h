@@ -28,12 +28,14 @@ class MoveWalk {
   void run() {
     const planning::AccessGraph accesses(plan_.program->outputs);
     const planning::SizeModel sizes(accesses, {default_extent_});
+    planning::Dependences dependences(accesses);
     const auto moves = planning::all_moves();
     const auto funcs = static_cast<int>(plan_.funcs.size());
     for (int step = c_.between(0, most_steps); step > 0; --step) {
       const auto id = static_cast<planning::FuncId>(c_.below(funcs));
       const planning::Move& move = moves[static_cast<size_t>(c_.below(int(moves.size())))];
-      const std::vector<planning::Plan> plans = move.apply(plan_, id, {accesses, sizes, machine_});
+      const std::vector<planning::Plan> plans =
+          move.apply(plan_, id, {accesses, sizes, machine_, dependences});
       for (const planning::Plan& after : plans) check(after, move, id);
       if (plans.empty() || !broken_.empty()) continue;
       plan_ = c_.pick(plans);
@@ -46,7 +48,7 @@ class MoveWalk {
     Judged result{broken_.empty() ? Judgement::Right : Judgement::Broken, broken_};
     if (broken_.empty()) {
       result = judge(plan_, target);
-      // Whoever cannot even compile the first plan is no finding.
+      // A program whose first plan fails is no finding.
       if (result.judgement != Judgement::Right &&
           judge(first_, target).judgement != Judgement::Right)
         return {Judgement::Illegal, result.detail};

@@ -13,6 +13,8 @@
 //                                                   the passes run
 //   opt --graph [--pass=schedule_unscheduled] --plan program.graph
 //                                                   prints the schedule as a plan (autoschedule/plan/plan.h)
+//   opt --graph [--pass=schedule_unscheduled] --cost program.graph
+//                                                   prints what the schedule costs (autoschedule/cost/cost.h)
 //   opt --graph --move=tile [--func=f] program.graph
 //                                                   prints the plans that a move gives (move_text.h)
 //   opt --time-passes --dump-after=all ...          prints the time and the result of each pass
@@ -38,6 +40,9 @@
 #include <string>
 #include <vector>
 
+#include "autoschedule/cost/assumptions.h"
+#include "autoschedule/cost/cost.h"
+#include "autoschedule/machine/kept_machine.h"
 #include "autoschedule/plan/plan.h"
 #include "diagnostics/error.h"
 #include "graph/directives/schedule_log.h"
@@ -61,7 +66,7 @@ struct Options {
   std::string file = "-", stop_after, log, move, func;
   std::vector<char*> program;  // the words after "--", null-terminated
   bool lists = false, lists_pipeline = false, is_expr = false, is_graph = false, times = false,
-       prints = false, plans = false;
+       prints = false, plans = false, prices = false;
   bool dumps(const std::string& pass) const {
     return std::find(dumped.begin(), dumped.end(), pass) != dumped.end() ||
            std::find(dumped.begin(), dumped.end(), "all") != dumped.end();
@@ -97,6 +102,8 @@ bool read_option(const std::string& arg, Options& options) {
     options.prints = true;
   } else if (arg == "--plan") {
     options.plans = true;
+  } else if (arg == "--cost") {
+    options.prices = true;
   } else if (arg == "--list") {
     options.lists = true;
   } else if (arg == "--list-pipeline") {
@@ -186,6 +193,13 @@ void run_expr(const Options& options) {
   std::cout << simplification::simplify(ir::parse_expr(read_all(options.file))) << "\n";
 }
 
+std::string cost_text(const planning::Plan& plan, const Target& target) {
+  const planning::AccessGraph accesses(plan.program->outputs);
+  const planning::SizeModel sizes(accesses, planning::assumed_sizes);
+  const planning::Machine machine = planning::machine_for(target);
+  return to_text(planning::CostModel(accesses, sizes, machine).price(plan), plan);
+}
+
 void run_graph(const Options& options) {
   opt::MoveText move = opt::split_move(read_all(options.file));
   if (!options.func.empty()) move.func = options.func;
@@ -204,13 +218,16 @@ void run_graph(const Options& options) {
   std::string result = graph::to_text(program.graph);
   for (const std::string& pass : options.passes) {
     result = opt::text_after(pass, program);
-    if (&pass != &options.passes.back() || options.plans || !options.move.empty())
+    if (&pass != &options.passes.back() || options.plans || options.prices || !options.move.empty())
       program = opt::parse_program(result, program.target);
   }
-  if (!options.move.empty())
+  if (!options.move.empty()) {
     result = opt::plans_after(options.move, move, program.graph.outputs);
-  else if (options.plans)
-    result = to_text(planning::import_plan(graph::apply_wrappers(program.graph.outputs)));
+  } else if (options.plans || options.prices) {
+    const auto plan = planning::import_plan(graph::apply_wrappers(program.graph.outputs));
+    result = options.plans ? to_text(plan) : "";
+    if (options.prices) result += cost_text(plan, program.target);
+  }
   std::cout << result;
 }
 
@@ -313,14 +330,14 @@ int run(const Options& options) {
 int main(int argc, char** argv) {
   std::optional<Options> options = parse_options(argc, argv);
   if (!options) {
-    std::cerr
-        << "usage: opt --pass=NAME,... [--expr] [--time-passes] [--dump-after=NAME,...|all] "
-           "[FILE]\n"
-           "       opt --print [FILE]\n"
-           "       opt --graph [--log=FILE] [--pass=NAME,... | --stop-after=NAME] [--plan] [FILE]\n"
-           "       opt --graph [--pass=NAME,...] --move=NAME [--func=NAME] [FILE]\n"
-           "       opt [--time-passes] [--dump-after=NAME,...|all] -- PROGRAM ARGS...\n"
-           "       opt --list | --list-pipeline\n";
+    std::cerr << "usage: opt --pass=NAME,... [--expr] [--time-passes] [--dump-after=NAME,...|all] "
+                 "[FILE]\n"
+                 "       opt --print [FILE]\n"
+                 "       opt --graph [--log=FILE] [--pass=NAME,... | --stop-after=NAME] [--plan] "
+                 "[--cost] [FILE]\n"
+                 "       opt --graph [--pass=NAME,...] --move=NAME [--func=NAME] [FILE]\n"
+                 "       opt [--time-passes] [--dump-after=NAME,...|all] -- PROGRAM ARGS...\n"
+                 "       opt --list | --list-pipeline\n";
     return 2;
   }
   try {

@@ -11,7 +11,7 @@ namespace retrograde::opt {
 namespace {
 
 const std::string move_line = "\nmove ";
-constexpr planning::SizeDefaults defaults{1000};
+constexpr planning::SizeDefaults defaults{planning::unknown_extent};
 
 const planning::Move& move_of(const std::string& name) {
   if (const planning::Move* move = planning::find_move(name)) return *move;
@@ -45,10 +45,12 @@ std::string plans_after(const std::string& name, const MoveText& parts,
     user_error(text("move the Func ", quoted(parts.func)), "it must be one of the program");
   const planning::AccessGraph accesses(wrapped);
   const planning::SizeModel sizes(accesses, defaults);
+  planning::Dependences dependences(accesses);
   const planning::Machine machine = planning::reference_machine(Target("x86-64-linux-avx512"));
   const auto id = static_cast<planning::FuncId>(func - funcs.begin());
   std::string result;
-  for (const planning::Plan& after : move.apply(plan, id, {accesses, sizes, machine})) {
+  for (const planning::Plan& after :
+       move.apply(plan, id, {accesses, sizes, machine, dependences})) {
     planning::validate(after);
     result += (result.empty() ? "" : "\n") + to_text(after);
   }

@@ -1,4 +1,4 @@
-// What holds for the prices of all plans: they are figures, the same ones each time, and they never fall when anything
+// Properties of the prices of all plans: they are finite, the same ones each time, and they never fall when anything
 // takes longer.
 #include <gtest/gtest.h>
 

@@ -1,6 +1,9 @@
 // Programs in which one term of the cost dominates, with figures that are computed by hand.
 #include <gtest/gtest.h>
 
+#include <regex>
+#include <utility>
+
 #include "frontend/data/param.h"
 #include "unit/cost/cost_testing.h"
 
@@ -16,12 +19,12 @@ struct CostProbes : ::testing::Test {
       image->dim(1).set_estimate(0, 2048);
     }
   }
-  // Of `out`, whose size is that of the images if nothing else is said.
+  // The cost of `out`, whose size is that of the images if nothing else is said.
   Cost cost_of(const std::string& text) {
     if (!std::exchange(is_sized, true)) out.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
     return priced(out, text);
   }
-  // Of the update, the loops of which are given.
+  // The cost of its update with these loops.
   StageCost update_cost(const std::string& loops) {
     return cost_of("out  root\n  .0  y, x:16, vector x\n  .1  " + loops + "\n").stages[1];
   }
@@ -109,13 +112,16 @@ TEST_F(StencilProbes, ThePeakIsWhatIsAliveAtOnce) {
   EXPECT_EQ(sliding.peak_bytes, 2 * 4 * columns * 4);
 }
 
-TEST_F(CostProbes, LoadsBehindAColumnOfTheWrongOrderTakeALineEach) {
+TEST_F(CostProbes, ATransposeLoadsALineForEachElement) {
   out(x, y) = in(y, x);
   in.dim(0).set_estimate(0, 2048);
   in.dim(1).set_estimate(0, 4096);
-  const double across = memory_bytes(cost_of("out  root  y, x:16, vector x\n"));
-  const double tiles = memory_bytes(cost_of("out  root  y:16, x:16, y, vector x\n"));
-  EXPECT_GT(across, 1.9 * tiles) << "4096 lines of a column do not stay until the next row";
+  const StageCost rows_first = cost_of("out  root  y, x:16, vector x\n").stages[0];
+  const StageCost tiles = cost_of("out  root  y:16, x:16, y, vector x\n").stages[0];
+  EXPECT_GT(rows_first.bytes[1], 14 * image_bytes)
+      << "4096 lines do not stay in L1 until the next row";
+  EXPECT_LT(tiles.bytes[1], image_bytes) << "beside what comes from memory";
+  EXPECT_EQ(rows_first.bytes.back(), 3 * image_bytes);
 }
 
 // ---- arithmetic ----
@@ -140,21 +146,28 @@ TEST_F(CostProbes, InlinedFuncsAreComputedForEachElement) {
   const double one =
       compute_seconds(cost_of("out  root  y, x:16, vector x\nrows_sum  root  y, x:16, vector x\n"));
   const double two = compute_seconds(cost_of("out  root  y, x:16, vector x\nrows_sum  inline\n"));
-  EXPECT_NEAR(two / one, 2, 0.3);
+  EXPECT_NEAR(two / one, 2 - 0.85 / 4, 0.2) << "a load and a store less";
+}
+
+TEST_F(CostProbes, InnermostLoopsBecomeVectorsByThemselves) {
+  out(x, y) = exp(in(x, y));
+  const double vectors = compute_seconds(cost_of("out  root  y, x:16, vector x\n"));
+  EXPECT_NEAR(compute_seconds(cost_of("out  root  y, x\n")), vectors, 0.01 * vectors);
+  EXPECT_GT(compute_seconds(cost_of("out  root  x, y\n")), 10 * vectors) << "strided stores";
 }
 
 struct ProductProbes : CostProbes {
   ProductProbes() {
     for (ImageParam* image : {&in, &other}) {
-      image->dim(0).set_estimate(0, 512);
-      image->dim(1).set_estimate(0, 512);
+      image->dim(0).set_estimate(0, 256);
+      image->dim(1).set_estimate(0, 256);
     }
     out(x, y) = 0.0f;
     out(x, y) += in(k, y) * other(x, k);
-    out.bound(x, 0, 512).bound(y, 0, 512);
+    out.bound(x, 0, 256).bound(y, 0, 256);
   }
-  static constexpr double products = 512.0 * 512 * 512 / 16;  // in vectors
-  RDom k{0, 512, "k"};
+  static constexpr double products = 256.0 * 256 * 256 / 16;  // in vectors
+  RDom k{0, 256, "k"};
 };
 
 TEST_F(ProductProbes, ARegisterTileIsBoundByMultiplyAdds) {
@@ -168,6 +181,13 @@ TEST_F(ProductProbes, ARegisterTileIsBoundByMultiplyAdds) {
 TEST_F(ProductProbes, ASingleSumWaitsForItself) {
   EXPECT_NEAR(update_cost("y, x:16, k.x, vector x").compute_seconds, products * 1.3e-9,
               100 * micro);
+}
+
+TEST_F(ProductProbes, LanesMoveTogetherWhateverLoopsAreInside) {
+  const StageCost inside = update_cost("y, x:16, k.x, vector x");
+  const StageCost around = update_cost("y, x:16, vector x, k.x");
+  EXPECT_EQ(around.bytes, inside.bytes);
+  EXPECT_EQ(around.compute_seconds, inside.compute_seconds);
 }
 
 TEST_F(ProductProbes, ATileThatExceedsTheRegistersSpills) {
@@ -203,7 +223,7 @@ TEST_F(CostProbes, ARecurrenceAlongALineWaitsForMemory) {
   EXPECT_LT(update("y:16, r.x, unroll y"), 4095 * rows * 1.5e-9);
 }
 
-// ---- places that data decide ----
+// ---- data-dependent indices ----
 
 TEST_F(CostProbes, ATableIsReadALineAnElement) {
   ImageParam places(Int(32), 2, "places"), table(Float(32), 1, "table");
@@ -228,7 +248,8 @@ TEST_F(CostProbes, ARotatedImageIsReadInManyLinesAVector) {
   const Expr u = cast<int>(angle * x + y), v = cast<int>(x - angle * y);
   out(x, y) = in(clamp(u, 0, 4095), clamp(v, 0, 2047));
   const StageCost rotated = cost_of("out  root  y, x:16, vector x\n").stages[0];
-  EXPECT_GT(rotated.bytes[2] + rotated.bytes[3], 5 * image_bytes);
+  EXPECT_GT(rotated.bytes[1], 10 * image_bytes);
+  EXPECT_LT(rotated.bytes.back(), 4 * image_bytes) << "the next row finds the lines in L2";
 }
 
 TEST_F(CostProbes, TheBinsOfACellAreOneLine) {
@@ -251,14 +272,12 @@ TEST_F(CostProbes, TheBinsOfACellAreOneLine) {
 TEST_F(CostProbes, AReportHasALineForEachStage) {
   out(x, y) = in(x, y);
   const Plan plan = parsed("out  root  y, x:16, vector x\n", std::vector<Func>{out});
-  Pricing pricing({out});
-  EXPECT_EQ(to_text(pricing.price(plan), plan),
-            "stage                               us   compute    launch     L2 KB     L3 KB    "
-            "mem KB  bound by\n"
-            "out                           1.12e+04       249         0         0         0  "
-            "1.01e+05    memory\n"
-            "total                         1.12e+04\n"
-            "peak KB                              0\n");
+  const std::string text = to_text(cost_of("out  root  y, x:16, vector x\n"), plan);
+  EXPECT_EQ(std::regex_replace(graph::without_numbers(text), std::regex(" +"), " "),
+            "stage us compute launch L2 KB L3 KB mem KB bound by\n"
+            "out 1.12e+04 249 0 0 0 1.01e+05 memory\n"
+            "total 1.12e+04\n"
+            "peak KB 0\n");
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ namespace retrograde::planning {
 
 inline constexpr double micro = 1e-6;
 
-// What prices the plans of one program.
+// Prices the plans of one program.
 struct Pricing {
   explicit Pricing(const std::vector<graph::FuncPtr>& outputs, const Machine& machine = {})
       : machine(machine), program(make_program(outputs)), accesses(outputs) {}

@@ -98,6 +98,14 @@ TEST_F(PlanCovers, HoldTheReadsOfAllConsumers) {
   EXPECT_EQ(covers({out}, "out  root  y, x:16, x\nrows  at out/x:16\n", rows),
             (Covers{{19, 1}, {19, 1}, {1, 1}}))
       << "from x - 3 to x + 15";
+  Func all("all"), same("same"), twice("twice"), both("both");
+  all(x, y) = x + y;
+  same(x, y) = all(x, y);
+  twice(x, y) = all(x, 2 * y);
+  both(x, y) = same(x, y) + twice(x, y);
+  both.bound(x, 0, 128).bound(y, 0, 64);
+  EXPECT_EQ(covers({both}, "both  root\nall  at both/y\n", all)[0], (Cover{128, 64}))
+      << "in the last row, from 63 to 126";
 }
 
 TEST_F(PlanCovers, HoldWhatUpdatesAccess) {

@@ -24,7 +24,8 @@ struct SearchTest : ::testing::Test {
   }
   SearchResult found(const SearchOptions& options) {
     CostModel cost(*accesses, *sizes, machine);
-    return search(start, {*accesses, *sizes, machine}, cost, options);
+    Dependences dependences(*accesses);
+    return search(start, {*accesses, *sizes, machine, dependences}, cost, options);
   }
   FuncId id(const std::string& name) const {
     for (size_t i = 0; i < start.program->funcs.size(); ++i) {

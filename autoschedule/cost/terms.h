@@ -1,8 +1,4 @@
-// traffic.h -- the bytes that a group of stages moves between the caches and memory.
-//
-// The outermost loops whose run fits into a cache load what they touch once. Loops of which one iteration fits do, too:
-// what iterations share, such as the rows of a stencil, is used again while it is there. Farther out, all is loaded anew.
-// Source: Wolf and Lam, "A Data Locality Optimizing Algorithm" (PLDI 1991).
+// terms.h -- the terms of a group's price: what each stage computes, and the bytes that move between caches and memory.
 #pragma once
 
 #include <vector>
@@ -10,6 +6,16 @@
 #include "autoschedule/cost/group.h"
 
 namespace retrograde::planning {
+
+// Nanoseconds of one thread that each kind of unit of a core is busy. They work at the same time.
+struct UnitTimes {
+  double arithmetic = 0, loads = 0, stores = 0, scalars = 0;
+  double loops = 0;    // counts iterations
+  double chain = 0;    // operations of which each waits for the one before
+  double all() const;  // with what they cannot overlap
+};
+// All iterations of a stage on one thread, if all its data are in the first cache.
+UnitTimes work_of(const StageRun& run, const Group& group, const Machine& machine);
 
 // The bytes of a buffer that a stage fetches from behind a cache, and writes back.
 struct BufferTraffic {
@@ -19,12 +25,10 @@ struct BufferTraffic {
       0;  // of these, what would not have to be moved if the buffer were in the cache before
   bool in_parallel = false;
 };
-
 struct GroupTraffic {
   std::array<std::vector<BufferTraffic>, Machine::level_count - 1> behind;  // by cache
   std::vector<std::pair<int, double>> touched;  // each buffer with its bytes, the largest first
 };
-
 GroupTraffic traffic_of(const Group& group, const Machine& machine);
 
 }  // namespace retrograde::planning

@@ -1,0 +1,60 @@
+// fuse_stages -- the first update of a Func runs in the outer loops of the pure definition, so that a tile of the result
+// stays near from its start to its end; or each stage has its own loops again.
+//
+//   sum  root                                                    sum  root
+//     .0  c, y, x                                                  .0  c:4, y, x:32, unroll c, unroll x:16, vector x
+//     .1  c:4, y, x:32, r.x, unroll c, unroll x:16, vector x  =>   .1  shared with sum.0/x:32  c:4, y, x:32, r.x, ...
+//
+// Legal: L11: the pure definition gets the loops of the update without those of its reduction, and iterations of pure loops
+// touch no elements of others, so none of them runs too early. No Func is computed in loops that would be shared.
+#include <algorithm>
+
+#include "autoschedule/moves/edit.h"
+
+namespace retrograde::planning::moves {
+
+namespace {
+
+bool hosts_a_func(const Plan& plan, FuncId func) {
+  return std::ranges::any_of(plan.funcs, [&](const auto& other) {
+    const Level& level = other->placement.compute;
+    return level.kind == Level::Kind::At && level.loop.stage.func == func;
+  });
+}
+
+}  // namespace
+
+std::vector<Plan> fuse_stages(const Plan& plan, FuncId func, const Context& context) {
+  std::vector<Plan> plans;
+  if (!has_loops(plan, func) || plan.of(func).nests.size() < 2 || hosts_a_func(plan, func))
+    return plans;
+  const StageId update{func, 1};
+  FuncPlan changed = plan.of(func);
+  Nest &first = changed.nests[0], &nest = changed.nests[1];
+  if (nest.shared_with || shared_loops(plan, {func, 0}) > 0) {
+    if (nest.shared_with && nest.shared_with->stage == StageId{func, 0}) {
+      nest.shared_with.reset();
+      add(plans, with_func(plan, func, std::move(changed), context));
+    }
+    return plans;
+  }
+  const auto adds_up = [&](const Loop& loop) {
+    return is_reduction(context, update, loop.iterator);
+  };
+  const auto pure =
+      static_cast<size_t>(std::ranges::find_if(nest.loops, adds_up) - nest.loops.begin());
+  const size_t shared = std::min(pure, body_depth(nest));
+  const bool has_all_dimensions =
+      context.accesses.stage({func, 0}).iterators.size() ==
+      static_cast<size_t>(std::ranges::count(context.accesses.stage(update).iterators,
+                                             Iterator::Kind::Pure, &Iterator::kind));
+  if (shared == 0 || !has_all_dimensions || first.concurrency != Concurrency::Independent)
+    return plans;
+  first.loops = nest.loops;
+  std::erase_if(first.loops, adds_up);
+  nest.shared_with = LoopRef{{func, 0}, static_cast<int16_t>(shared - 1)};
+  add(plans, with_func(plan, func, std::move(changed), context));
+  return plans;
+}
+
+}  // namespace retrograde::planning::moves

@@ -1,0 +1,69 @@
+// scatter_lanes -- a scatter runs in vectors along a dimension that its places don't depend on. This dimension is innermost
+// in memory, so lanes lie together and never meet.
+//
+//   sum  root                                      sum  root  (c, x, y)
+//     .1  c, r.y, r.x                     =>         .0  y, x, c:4, vector c
+//                                                    .1  c:4, r.y, r.x, vector c
+//
+// Legal: L4, L6: iterations of a pure variable write different elements; L2: the loops of the reduction keep their order.
+// Outputs keep their layout.
+#include <algorithm>
+
+#include "autoschedule/moves/edit.h"
+
+namespace retrograde::planning::moves {
+
+namespace {
+
+constexpr size_t most_dimensions = 2;
+
+// Whether the reduction decides where the stage writes.
+bool scatters(const Context& context, const StageNode& stage) {
+  const auto count = static_cast<int>(stage.iterators.size());
+  for (int i = 0; i < count; ++i) {
+    if (is_reduction(context, stage.id, i) && (stage.write.moved_by() & set_of(i))) return true;
+  }
+  return false;
+}
+
+bool is_pure_in_all_stages(const Context& context, FuncId func, int dimension) {
+  const std::vector<StageNode>& stages = context.accesses.func(func).stages;
+  return std::ranges::all_of(stages, [&](const StageNode& stage) {
+    return std::ranges::find(stage.iterators, dimension, &Iterator::dimension) !=
+           stage.iterators.end();
+  });
+}
+
+}  // namespace
+
+std::vector<Plan> scatter_lanes(const Plan& plan, FuncId func, const Context& context) {
+  const std::vector<StageNode>& stages = context.accesses.func(func).stages;
+  const bool may_change = has_loops(plan, func) && !is_output(*plan.program, func) &&
+                          has_bounded_region(plan, context, func);
+  std::vector<Plan> plans;
+  if (!may_change || std::ranges::none_of(
+                         stages, [&](const StageNode& stage) { return scatters(context, stage); }))
+    return plans;
+  std::vector<int64_t> extents;
+  for (size_t d = 0; d < plan.of(func).storage.order.size(); ++d)
+    extents.push_back(context.sizes.of(func, d).estimate);
+  for (size_t d = 0; d < extents.size() && plans.size() < most_dimensions; ++d) {
+    if (!is_pure_in_all_stages(context, func, static_cast<int>(d))) continue;
+    FuncPlan changed = plan.of(func);
+    std::vector<int16_t>& order = changed.storage.order;
+    const auto at = std::ranges::find(order, static_cast<int16_t>(d));
+    std::rotate(order.begin(), at, at + 1);
+    bool has_lanes = true;
+    for (const StageNode& stage : stages) {
+      Nest& nest = changed.nests[static_cast<size_t>(stage.id.stage)];
+      nest = row_loops(plan, context, stage.id, order, extents, 1);
+      has_lanes = has_lanes && vector_loop(nest);
+      if (changed.placement.compute.kind == Level::Kind::Root)
+        run_in_parallel(nest, context, stage.id);
+    }
+    if (has_lanes) add(plans, with_func(plan, func, std::move(changed), context));
+  }
+  return plans;
+}
+
+}  // namespace retrograde::planning::moves
