@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <bit>
 
-#include "autoschedule/access/cover.h"
 #include "autoschedule/moves/edit.h"
 
 namespace retrograde::planning::moves {
@@ -17,8 +16,8 @@ namespace retrograde::planning::moves {
 namespace {
 
 // Bytes that the stage reads, while it runs so many points of one iterator and all of the others.
-double bytes_read(const Context& context, StageId stage, int iterator, int64_t points) {
-  Cover cover = whole_cover(stage, context.sizes);
+double bytes_read(const Context& context, StageId stage, Cover cover, int iterator,
+                  int64_t points) {
   cover[static_cast<size_t>(iterator)] = points;
   double sum = 0;
   for (const Access& read : context.accesses.stage(stage).reads) {
@@ -32,10 +31,10 @@ double bytes_read(const Context& context, StageId stage, int iterator, int64_t p
 }
 
 // The largest power of two whose operands fit; 1 if none does.
-int64_t largest_chunk(const Context& context, StageId stage, int iterator, double bytes,
-                      int64_t points) {
+int64_t largest_chunk(const Context& context, StageId stage, const Cover& extents, int iterator,
+                      double bytes, int64_t points) {
   auto chunk = static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(points)));
-  while (chunk > 1 && bytes_read(context, stage, iterator, chunk) > bytes) chunk /= 2;
+  while (chunk > 1 && bytes_read(context, stage, extents, iterator, chunk) > bytes) chunk /= 2;
   return chunk;
 }
 
@@ -53,14 +52,16 @@ std::vector<Plan> chunk_reduction(const Plan& plan, FuncId func, const Context& 
     while (at < nest.loops.size() && nest.loops[at].kind == ForType::Parallel) ++at;
     const auto depth = static_cast<size_t>(loop - nest.loops.begin());
     if (loop == nest.loops.end() || depth <= at || loop->kind != ForType::Serial) continue;
-    const int64_t points = trips(context, stage, nest, depth) * loop->step;
+    const Cover extents = loop_extents(plan, context, stage);
+    const int64_t points = trips(extents, nest, depth) * loop->step;
     for (const size_t level : {Machine::near_cache, Machine::last_cache}) {
       const double bytes = context.machine.levels[level].bytes;
-      const int64_t chunk = largest_chunk(context, stage, loop->iterator, bytes, points);
+      const int64_t chunk = largest_chunk(context, stage, extents, loop->iterator, bytes, points);
       if (chunk <= loop->step || 2 * chunk > points) continue;
       Nest chunks = nest;
       insert_step(chunks, loop->iterator, chunk, at);
-      add(plans, with_nest(plan, stage, std::move(chunks), context));
+      if (!has_same_order(nest, chunks, extents))
+        add(plans, with_nest(plan, stage, std::move(chunks), context));
     }
   }
   return plans;

@@ -101,9 +101,10 @@ class LevelFinder {
   // L5: how often an element is computed.
   bool is_worth(const Level& level, const std::vector<int64_t>& box) const {
     const auto [stage, depth] = level.loop;
+    const Cover extents = whole_cover(stage, context_.sizes);
     double computed = elements_of(box), all = 1;
     for (size_t d = 0; d <= static_cast<size_t>(depth); ++d)
-      computed *= static_cast<double>(trips(context_, stage, plan_.nest(stage), d));
+      computed *= static_cast<double>(trips(extents, plan_.nest(stage), d));
     for (size_t d = 0; d < box.size(); ++d)
       all *= static_cast<double>(std::max<int64_t>(context_.sizes.of(func_, d).estimate, 1));
     return computed <= most_recomputation * all;

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "autoschedule/access/cover.h"
 #include "autoschedule/moves/move.h"
 
 namespace retrograde::planning::moves {
@@ -40,13 +41,19 @@ std::optional<size_t> vector_loop(const Nest& nest);
 size_t shared_loops(const Plan& plan, StageId stage);
 // The first of the loops at the end that are unrolled or lanes: they make the body of the loops around them.
 size_t body_depth(const Nest& nest);
-// The points of an iterator that run inside of a loop: the estimated extent if no loop down to this one steps over it.
-int64_t points_inside(const Context& context, StageId stage, const Nest& nest, int depth,
-                      int iterator);
+// The points of each iterator that all loops of a stage run over: estimates, or of a Func that is computed in a loop its
+// box there; of a window that is stored outside of that loop, what each iteration adds.
+Cover loop_extents(const Plan& plan, const Context& context, StageId stage);
+// The points of an iterator that run inside of a loop: all if no loop down to this one steps over it.
+int64_t points_inside(const Cover& extents, const Nest& nest, int depth, int iterator);
 // How often a loop runs for each iteration of the loops around it.
-int64_t trips(const Context& context, StageId stage, const Nest& nest, size_t depth);
+int64_t trips(const Cover& extents, const Nest& nest, size_t depth);
 // Copies of the stage's definition in the code that its loops make.
-int64_t copies(const Nest& nest, const Context& context, StageId stage);
+int64_t copies(const Nest& nest, const Cover& extents);
+// Whether a step is all of so many points, or not more than half of them: others waste what lies beyond the end.
+bool fits(int64_t step, int64_t points);
+// Whether loops of two nests, in which no Func is placed, run over the points in the same order.
+bool has_same_order(const Nest& a, const Nest& b, const Cover& extents);
 // The bytes of an element that is accessed.
 double bytes_of_element(const Context& context, const Access& access);
 // Operations of the stage's definition and of what is inlined into it (L5).
@@ -70,9 +77,9 @@ void run_inside(Nest& nest, int iterator, int64_t points, ForType kind);
 // Serial loops for the stage of a Func with this storage order, whose dimensions have these extents, along rows: lanes of
 // the first stored dimension inside, then the reduction, then the other dimensions. `min_lanes`: fewer aren't used.
 Nest row_loops(const Plan& plan, const Context& context, StageId stage,
-               const std::vector<int16_t>& order, const std::vector<int64_t>& extents,
-               int64_t min_lanes);
-// Makes the outermost loops parallel until there are enough chunks of work for the threads.
+               const std::vector<int16_t>& order, const Cover& extents, int64_t min_lanes);
+// Makes the outermost loops of a stage at root parallel until there are enough chunks of work for the threads; none for
+// one thread.
 void run_in_parallel(Nest& nest, const Context& context, StageId stage);
 
 // ---- changes of a plan ----

@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <functional>
 #include <map>
+#include <tuple>
 
 #include "autoschedule/moves/edit.h"
+#include "autoschedule/plan/covers.h"
 #include "autoschedule/plan/nest.h"
 
 namespace retrograde::planning::moves {
@@ -158,9 +160,41 @@ size_t body_depth(const Nest& nest) {
   return depth;
 }
 
-int64_t points_inside(const Context& context, StageId stage, const Nest& nest, int depth,
-                      int iterator) {
-  int64_t points = std::max<int64_t>(context.sizes.of(stage, iterator).estimate, 1);
+Cover loop_extents(const Plan& plan, const Context& context, StageId stage) {
+  Covers covers(plan, context.sizes);
+  Cover extents = covers.inside(stage, around_all_loops);
+  const auto& [compute, store, hoist] = plan.of(stage.func).placement;
+  const bool has_window =
+      compute.kind == Level::Kind::At && store.kind != Level::Kind::Undecided && store != compute;
+  const StageId host = compute.loop.stage;
+  if (!has_window || !is_editable(plan, host.func)) return extents;
+  const Cover around = covers.inside(host, around_all_loops);
+  const bool is_near = store.kind == Level::Kind::At && store.loop.stage == host;
+  const int last = is_near ? store.loop.depth : around_all_loops;
+  Level level = compute;
+  std::vector<int64_t> box = covers.box(stage.func, level), added = box;
+  while (level.loop.depth > last) {
+    const int64_t moves =
+        trips(around, plan.nest(host), static_cast<size_t>(level.loop.depth--)) - 1;
+    const std::vector<int64_t> all = level.loop.depth == around_all_loops
+                                         ? whole_cover({stage.func, 0}, context.sizes)
+                                         : covers.box(stage.func, level);
+    for (size_t d = 0; d < box.size(); ++d) {
+      if (all[d] > box[d] && moves > 0)
+        added[d] = std::min(added[d], (all[d] - box[d] + moves - 1) / moves);
+    }
+    box = all;
+  }
+  for (size_t i = 0; i < extents.size(); ++i) {
+    const Iterator& iterator = context.accesses.stage(stage).iterators[i];
+    if (iterator.kind == Iterator::Kind::Pure)
+      extents[i] = added[static_cast<size_t>(iterator.dimension)];
+  }
+  return extents;
+}
+
+int64_t points_inside(const Cover& extents, const Nest& nest, int depth, int iterator) {
+  int64_t points = extents[static_cast<size_t>(iterator)];
   for (int d = 0; d <= depth; ++d) {
     const Loop& loop = nest.loops[static_cast<size_t>(d)];
     if (loop.iterator == iterator) points = std::min(points, loop.step);
@@ -168,19 +202,36 @@ int64_t points_inside(const Context& context, StageId stage, const Nest& nest, i
   return points;
 }
 
-int64_t trips(const Context& context, StageId stage, const Nest& nest, size_t depth) {
+int64_t trips(const Cover& extents, const Nest& nest, size_t depth) {
   const Loop& loop = nest.loops[depth];
-  const int64_t points =
-      points_inside(context, stage, nest, static_cast<int>(depth) - 1, loop.iterator);
+  const int64_t points = points_inside(extents, nest, static_cast<int>(depth) - 1, loop.iterator);
   return (points + loop.step - 1) / loop.step;
 }
 
-int64_t copies(const Nest& nest, const Context& context, StageId stage) {
+int64_t copies(const Nest& nest, const Cover& extents) {
   int64_t product = 1;
   for (size_t d = 0; d < nest.loops.size(); ++d) {
-    if (nest.loops[d].kind == ForType::Unrolled) product *= trips(context, stage, nest, d);
+    if (nest.loops[d].kind == ForType::Unrolled) product *= trips(extents, nest, d);
   }
   return product;
+}
+
+bool fits(int64_t step, int64_t points) { return step == points || 2 * step <= points; }
+
+bool has_same_order(const Nest& a, const Nest& b, const Cover& extents) {
+  const auto order = [&](const Nest& nest) {  // neighbours of one iterator count as one
+    std::vector<std::tuple<int16_t, int64_t, ForType>> loops;
+    for (size_t d = 0; d < nest.loops.size(); ++d) {
+      const Loop& loop = nest.loops[d];
+      if (trips(extents, nest, d) == 1) continue;
+      const bool is_next = !loops.empty() && std::get<0>(loops.back()) == loop.iterator &&
+                           std::get<2>(loops.back()) == loop.kind;
+      if (is_next) loops.pop_back();
+      loops.emplace_back(loop.iterator, loop.step, loop.kind);
+    }
+    return loops;
+  };
+  return order(a) == order(b);
 }
 
 double bytes_of_element(const Context& context, const Access& access) {
@@ -263,8 +314,7 @@ void run_inside(Nest& nest, int iterator, int64_t points, ForType kind) {
 }
 
 Nest row_loops(const Plan& plan, const Context& context, StageId stage,
-               const std::vector<int16_t>& order, const std::vector<int64_t>& extents,
-               int64_t min_lanes) {
+               const std::vector<int16_t>& order, const Cover& extents, int64_t min_lanes) {
   const graph::FuncContents& f = *plan.program->funcs[static_cast<size_t>(stage.func)];
   const StageNode& node = context.accesses.stage(stage);
   Nest nest = loops_of_definition(f, stage.stage);
@@ -283,11 +333,13 @@ Nest row_loops(const Plan& plan, const Context& context, StageId stage,
 }
 
 void run_in_parallel(Nest& nest, const Context& context, StageId stage) {
+  if (context.machine.threads == 1) return;
+  const Cover extents = whole_cover(stage, context.sizes);
   int64_t chunks = 1;
   for (size_t d = 0; d < body_depth(nest) && chunks < context.machine.enough_tasks(); ++d) {
     if (!may_run_at_once(context, stage, nest, d)) return;
     nest.loops[d].kind = ForType::Parallel;
-    chunks *= trips(context, stage, nest, d);
+    chunks *= trips(extents, nest, d);
   }
 }
 

@@ -11,7 +11,8 @@ namespace retrograde::planning::moves {
 namespace {
 
 int64_t body_size(const Plan& plan, const Context& context, StageId stage) {
-  return operations(plan, context, stage) * copies(plan.nest(stage), context, stage);
+  return operations(plan, context, stage) *
+         copies(plan.nest(stage), loop_extents(plan, context, stage));
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 //
 //   y, x:16, vector x     =>     parallel y, x:16, vector x
 //                         =>     parallel y:64, y, x:16, vector x       with as many rows as make enough tasks
-//   parallel y, ...       =>     y, ...                                 too little work for a launch
+//   parallel y, ...       =>     y, ...                                 too little work for a launch, or one thread
 //
 // Legal: L1, L6, since iterations of pure loops write different elements. A window that is stored outside of a loop is
 // dropped with the plan if the loop becomes parallel (P3).
@@ -27,11 +27,12 @@ std::vector<Plan> parallelise(const Plan& plan, FuncId func, const Context& cont
     Nest outermost = serial;
     run_in_parallel(outermost, context, stage);
     add(plans, with_nest(plan, stage, std::move(outermost), context));
-    if (body_depth(serial) > 0 && may_run_at_once(context, stage, serial, 0)) {
+    if (context.machine.threads > 1 && body_depth(serial) > 0 &&
+        may_run_at_once(context, stage, serial, 0)) {
       Nest chunks = serial;
       const int16_t first = chunks.loops[0].iterator;
       if (chunks.loops.size() > 1 && chunks.loops[1].iterator == first) drop_loop(chunks, 1);
-      const int64_t each = trips(context, stage, chunks, 0) / enough;
+      const int64_t each = trips(whole_cover(stage, context.sizes), chunks, 0) / enough;
       if (each > 1) {
         const auto rows = static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(each)));
         insert_step(chunks, first, rows * chunks.loops[0].step, 0, ForType::Parallel);

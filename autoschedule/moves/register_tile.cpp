@@ -23,7 +23,11 @@ constexpr size_t most_tiles = 3;
 class RegisterTiles {
  public:
   RegisterTiles(const Plan& plan, StageId stage, const Context& context)
-      : plan_(plan), stage_(stage), context_(context), node_(context.accesses.stage(stage)) {}
+      : plan_(plan),
+        stage_(stage),
+        context_(context),
+        node_(context.accesses.stage(stage)),
+        extents_(loop_extents(plan, context, stage)) {}
 
   void run(std::vector<Plan>& plans) {
     if (!is_sum()) return;
@@ -51,6 +55,7 @@ class RegisterTiles {
   const StageId stage_;
   const Context& context_;
   const StageNode& node_;
+  const Cover extents_;
   int x_ = 0;
   int64_t lanes_ = 1;
   std::vector<Tile> tiles_;
@@ -69,7 +74,7 @@ class RegisterTiles {
   }
   int64_t points_of(const Nest& nest, int iterator) const {
     const auto depth = static_cast<int>(innermost_loop(nest, iterator));
-    return points_inside(context_, stage_, nest, depth - 1, iterator);
+    return points_inside(extents_, nest, depth - 1, iterator);
   }
 
   void find_tiles(const Nest& plain) {
@@ -80,11 +85,14 @@ class RegisterTiles {
     for (int i = 0; i < static_cast<int>(node_.iterators.size()); ++i) {
       if (i == x_ || !is_free(context_, stage_, i)) continue;
       const int64_t points = points_of(plain, i);
-      for (int64_t vectors = 1; vectors <= most_vectors && vectors * lanes_ <= row; vectors *= 2) {
+      for (int64_t vectors = 1; vectors <= most_vectors; vectors *= 2) {
+        if (!fits(vectors * lanes_, row)) continue;
         for (int64_t size = 2; size <= std::min(most_of_side, points); ++size) {
           const int64_t sums = vectors * size;
           const bool is_even = size == points || (size & (size - 1)) == 0;
-          if (!is_even || sums * bytes > context_.machine.accumulator_bytes()) continue;
+          if (!is_even || !fits(size, points) ||
+              sums * bytes > context_.machine.accumulator_bytes())
+            continue;
           const double waste = lost(points, size) * lost(row, vectors * lanes_);
           tiles_.push_back({cycles(vectors, size, i, bytes) * waste, sums, vectors, size, i});
         }

@@ -15,9 +15,7 @@ std::vector<Plan> root(const Plan& plan, FuncId func, const Context& context) {
   changed.placement = {};
   changed.placement.compute.kind = Level::Kind::Root;
   changed.storage.folds.clear();
-  std::vector<int64_t> extents;
-  for (size_t d = 0; d < changed.storage.order.size(); ++d)
-    extents.push_back(context.sizes.of(func, d).estimate);
+  const Cover extents = whole_cover({func, 0}, context.sizes);
   for (size_t s = 0; s < changed.nests.size(); ++s) {
     const StageId stage{func, static_cast<int16_t>(s)};
     changed.nests[s] = row_loops(plan, context, stage, changed.storage.order, extents, 1);

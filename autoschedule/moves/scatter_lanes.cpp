@@ -44,9 +44,7 @@ std::vector<Plan> scatter_lanes(const Plan& plan, FuncId func, const Context& co
   if (!may_change || std::ranges::none_of(
                          stages, [&](const StageNode& stage) { return scatters(context, stage); }))
     return plans;
-  std::vector<int64_t> extents;
-  for (size_t d = 0; d < plan.of(func).storage.order.size(); ++d)
-    extents.push_back(context.sizes.of(func, d).estimate);
+  const Cover extents = loop_extents(plan, context, {func, 0});
   for (size_t d = 0; d < extents.size() && plans.size() < most_dimensions; ++d) {
     if (!is_pure_in_all_stages(context, func, static_cast<int>(d))) continue;
     FuncPlan changed = plan.of(func);

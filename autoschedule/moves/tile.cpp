@@ -24,7 +24,11 @@ int64_t power_of_two_below(double size) {
 class Tiler {
  public:
   Tiler(const Plan& plan, StageId stage, const Context& context)
-      : plan_(plan), stage_(stage), context_(context), nest_(plan.nest(stage)) {
+      : plan_(plan),
+        stage_(stage),
+        context_(context),
+        nest_(plan.nest(stage)),
+        extents_(loop_extents(plan, context, stage)) {
     const size_t body = body_depth(nest_);
     for (size_t d = body; d-- > 0;) {
       const int16_t i = nest_.loops[d].iterator;
@@ -67,11 +71,11 @@ class Tiler {
   const StageId stage_;
   const Context& context_;
   const Nest& nest_;
+  const Cover extents_;
   std::vector<Inner> inner_;  // innermost first
 
   int64_t points_of(const Inner& inner) const {
-    return points_inside(context_, stage_, nest_, static_cast<int>(inner.depth) - 1,
-                         inner.iterator);
+    return points_inside(extents_, nest_, static_cast<int>(inner.depth) - 1, inner.iterator);
   }
   double bytes_of_point() const {
     const StageNode& node = context_.accesses.stage(stage_);
@@ -94,6 +98,7 @@ class Tiler {
       loop.kind = ForType::Serial;
       insert_step(nest, inner.iterator, size, depth, kind);
     }
+    if (has_same_order(nest_, nest, extents_)) return;
     add(plans, with_nest(plan_, stage_, std::move(nest), context_));
   }
 
@@ -103,9 +108,9 @@ class Tiler {
     const int64_t step = outer_step(nest_, inner.iterator, smaller);
     if (step == 0 || body_depth(nest_) <= *find_loop(nest_, inner.iterator, step)) return;
     const int64_t larger = outer_step(nest_, inner.iterator, step);
-    const int64_t limit = larger > 0 ? larger : context_.sizes.of(stage_, inner.iterator).estimate;
+    const int64_t limit = larger > 0 ? larger : extents_[static_cast<size_t>(inner.iterator)];
     for (const int64_t size : {2 * step, step / 2}) {
-      if (size <= smaller || size >= limit || step % 2 != 0) continue;
+      if (size <= smaller || 2 * size > limit || step % 2 != 0) continue;
       Nest nest = nest_;
       const size_t depth = *find_loop(nest, inner.iterator, step);
       const ForType kind = nest.loops[depth].kind;

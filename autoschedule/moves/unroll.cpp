@@ -1,11 +1,13 @@
 // unroll -- the innermost loop around a stage's body becomes part of it, by a step or wholly.
 //
-//   y, r.x, x:16, vector x     =>     y, r.x, x:32, unroll x:16, vector x       and steps of 64 and 128
-//   y, x:16, r.x, vector x     =>     y, x:16, unroll r.x, vector x             if r.x has few iterations
-//   y, unroll r.x, vector x    =>     y, r.x, vector x
+//   c, y, r.z, x:16, vector x     =>     c, y, r.z, x:32, unroll x:16, vector x     if copies share what they load
+//   y, x:16, r.x, vector x        =>     y, x:16, unroll r.x, vector x              if r.x has few iterations
+//   y, unroll r.x, vector x       =>     y, r.x, vector x
 //
 // Legal: L2, since the order of all iterations stays, and L4: the extent of an unrolled loop is a step outside of it, or
 // a constant of the reduction; L5.
+// Large bodies cost more than they save: points at borders run outside of them. So copies are few, and many iterations
+// of the loop around remain.
 #include <algorithm>
 
 #include "autoschedule/moves/edit.h"
@@ -14,14 +16,50 @@ namespace retrograde::planning::moves {
 
 namespace {
 
-constexpr int64_t most_of_one_loop = 8;  // iterations that become part of the body
+constexpr int64_t most_copies = 4, least_iterations = 8;
+constexpr int64_t loops_of_register_tile = 2;
 
-bool is_small_and_constant(const Context& context, StageId stage, const Nest& nest, size_t depth) {
-  const Loop& loop = nest.loops[depth];
-  const bool is_inside = outer_step(nest, loop.iterator, loop.step) > 0;
-  const bool is_constant = is_inside || (is_reduction(context, stage, loop.iterator) &&
-                                         context.sizes.of(stage, loop.iterator).is_constant());
-  return is_constant && trips(context, stage, nest, depth) <= most_of_one_loop;
+// Whether the stage has values that are the same at all points of the iterator.
+bool shares_values(const StageNode& stage, int iterator) {
+  const IteratorSet own = set_of(iterator);
+  return std::ranges::any_of(stage.reads,
+                             [&](const Access& read) { return !(read.moved_by() & own); }) ||
+         std::ranges::any_of(stage.operations, [&](const OperationCount& operation) {
+           return !(operation.depends & own);
+         });
+}
+
+// The nests in which the loop before the body is part of it.
+std::vector<Nest> with_larger_body(const Plan& plan, StageId stage, const Cover& extents,
+                                   const Context& context) {
+  const Nest& nest = plan.nest(stage);
+  const size_t body = body_depth(nest), d = body - 1;
+  if (body == 0 || nest.loops[d].kind != ForType::Serial) return {};
+  const auto [iterator, step] = std::pair(nest.loops[d].iterator, nest.loops[d].step);
+  int64_t unrolled = 0;
+  for (size_t b = body; b < nest.loops.size(); ++b) {
+    if (nest.loops[b].kind != ForType::Unrolled) continue;
+    if (nest.loops[b].iterator == iterator) return {};
+    ++unrolled;
+  }
+  const bool is_whole = outer_step(nest, iterator, step) == 0;
+  const int64_t count = trips(extents, nest, d);
+  Nest larger = nest;
+  larger.loops[d].kind = ForType::Unrolled;
+  if (is_reduction(context, stage, iterator)) {
+    const bool is_small = is_whole && step == 1 && count <= most_copies &&
+                          context.sizes.of(stage, iterator).is_constant();
+    return is_small && unrolled < loops_of_register_tile ? std::vector{larger}
+                                                         : std::vector<Nest>{};
+  }
+  if (!shares_values(context.accesses.stage(stage), iterator)) return {};
+  if (!is_whole && count <= most_copies)
+    return trips(extents, nest, d - 1) >= least_iterations ? std::vector{larger}
+                                                           : std::vector<Nest>{};
+  std::vector<Nest> steps;
+  for (int64_t n = 2; n <= most_copies && least_iterations * n <= count; n *= 2)
+    insert_step(steps.emplace_back(larger), iterator, n * step, d);
+  return steps;
 }
 
 }  // namespace
@@ -32,33 +70,19 @@ std::vector<Plan> unroll(const Plan& plan, FuncId func, const Context& context) 
   for (size_t s = 0; s < plan.of(func).nests.size(); ++s) {
     const StageId stage{func, static_cast<int16_t>(s)};
     const Nest& nest = plan.nest(stage);
-    const size_t body = body_depth(nest);
+    const Cover extents = loop_extents(plan, context, stage);
     const int64_t work = operations(plan, context, stage);
-    const auto give = [&](Nest changed) {
-      if (work * copies(changed, context, stage) <= most_body_operations)
-        add(plans, with_nest(plan, stage, std::move(changed), context));
-    };
-    if (body > 0 && nest.loops[body - 1].kind == ForType::Serial) {
-      const size_t d = body - 1;
-      Nest unrolled = nest;
-      unrolled.loops[d].kind = ForType::Unrolled;
-      if (is_small_and_constant(context, stage, nest, d)) {
-        give(unrolled);
-      } else {
-        for (int64_t n = 2; n <= most_of_one_loop && 2 * n <= trips(context, stage, nest, d);
-             n *= 2) {
-          Nest part = unrolled;
-          insert_step(part, nest.loops[d].iterator, n * nest.loops[d].step, d);
-          give(std::move(part));
-        }
-      }
+    for (Nest& larger : with_larger_body(plan, stage, extents, context)) {
+      if (work * copies(larger, extents) <= most_body_operations)
+        add(plans, with_nest(plan, stage, std::move(larger), context));
     }
+    const size_t body = body_depth(nest);
     if (body == nest.loops.size() || nest.loops[body].kind != ForType::Unrolled) continue;
     Nest rolled = nest;
     rolled.loops[body].kind = ForType::Serial;
     const bool is_adjacent = body > 0 && nest.loops[body - 1].iterator == nest.loops[body].iterator;
     if (is_adjacent) drop_loop(rolled, body);
-    give(std::move(rolled));
+    add(plans, with_nest(plan, stage, std::move(rolled), context));
   }
   return plans;
 }

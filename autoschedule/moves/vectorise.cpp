@@ -40,6 +40,7 @@ std::vector<Plan> vectorise(const Plan& plan, FuncId func, const Context& contex
     const StageId stage{func, static_cast<int16_t>(s)};
     const std::optional<Nest> plain = without_body(plan.nest(stage), context, stage);
     if (!plain) continue;
+    const Cover extents = loop_extents(plan, context, stage);
     std::vector<int> iterators;
     const auto count = static_cast<int>(context.accesses.stage(stage).iterators.size());
     for (int i = 0; i < count; ++i) {
@@ -51,7 +52,7 @@ std::vector<Plan> vectorise(const Plan& plan, FuncId func, const Context& contex
     for (const int i : iterators) {
       if (given == most_iterators) break;
       const auto depth = static_cast<int>(innermost_loop(*plain, i));
-      const int64_t points = points_inside(context, stage, *plain, depth - 1, i);
+      const int64_t points = points_inside(extents, *plain, depth - 1, i);
       const int64_t lanes = lanes_for(plan, stage, points);
       if (lanes == 1) continue;
       Nest nest = *plain;

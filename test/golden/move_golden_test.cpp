@@ -17,6 +17,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
+size_t parallel_loops(const std::string& plans) {
+  size_t count = 0;
+  for (size_t at = 0; (at = plans.find("parallel ", at)) != std::string::npos; ++at) ++count;
+  return count;
+}
+
 class MoveGolden : public ::testing::TestWithParam<fs::path> {};
 
 TEST_P(MoveGolden, GivesWhatItsFileSays) {
@@ -36,6 +42,21 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& info) {
       return info.param.parent_path().filename().string() + "_" + info.param.stem().string();
     });
+
+// Programs whose loops become parallel if there are more threads.
+TEST(Moves, MakeNoLoopParallelForOneThread) {
+  for (const std::string name : {"parallelise/rows_or_strips", "parallelise/columns_of_a_scan",
+                                 "root/from_the_loop_of_its_consumer"}) {
+    const fs::path file = fs::path(RETROGRADE_TEST_DIR) / "golden/moves" / (name + ".in");
+    const opt::MoveText input = opt::split_move(read_file(file));
+    const auto given = [&](int threads) {
+      const std::string move = file.parent_path().filename().string();
+      return opt::plans_after(move, input, graph::parse_graph(input.graph).outputs, threads);
+    };
+    EXPECT_GT(parallel_loops(given(2)), parallel_loops(input.plan)) << name;
+    EXPECT_LE(parallel_loops(given(1)), parallel_loops(input.plan)) << name;
+  }
+}
 
 TEST(Moves, AreAllTested) {
   for (const planning::Move& move : planning::all_moves())

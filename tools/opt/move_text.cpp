@@ -31,7 +31,7 @@ MoveText split_move(const std::string& text) {
 }
 
 std::string plans_after(const std::string& name, const MoveText& parts,
-                        const std::vector<graph::FuncPtr>& outputs) {
+                        const std::vector<graph::FuncPtr>& outputs, int threads) {
   const planning::Move& move = move_of(name);
   const std::vector<graph::FuncPtr> wrapped = graph::apply_wrappers(outputs);
   const planning::Plan plan =
@@ -46,7 +46,8 @@ std::string plans_after(const std::string& name, const MoveText& parts,
   const planning::AccessGraph accesses(wrapped);
   const planning::SizeModel sizes(accesses, defaults);
   planning::Dependences dependences(accesses);
-  const planning::Machine machine = planning::reference_machine(Target("x86-64-linux-avx512"));
+  planning::Machine machine = planning::reference_machine(Target("x86-64-linux-avx512"));
+  machine.threads = threads;
   const auto id = static_cast<planning::FuncId>(func - funcs.begin());
   std::string result;
   for (const planning::Plan& after :

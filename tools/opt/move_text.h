@@ -8,6 +8,7 @@
 
 #include <string>
 
+#include "autoschedule/machine/reference.h"
 #include "graph/graph.h"
 
 namespace retrograde::opt {
@@ -19,8 +20,9 @@ struct MoveText {
 MoveText split_move(const std::string& text);
 
 // One plan after the other, with an empty line between; the first line says so if there are none. UserError if there is no
-// such move or Func.
+// such move or Func. The machine is the reference machine with so many threads.
 std::string plans_after(const std::string& move, const MoveText& text,
-                        const std::vector<graph::FuncPtr>& outputs);
+                        const std::vector<graph::FuncPtr>& outputs,
+                        int threads = planning::reference_threads);
 
 }  // namespace retrograde::opt
