@@ -38,33 +38,32 @@ int64_t largest_chunk(const Context& context, StageId stage, const Cover& extent
   return chunk;
 }
 
+std::vector<Nest> chunked(const StageLoops& loops) {
+  const auto& [plan, context, stage, nest, extents] = loops;
+  const auto loop = std::ranges::find_if(nest.loops, [&](const Loop& l) {
+    return is_reduction(loops.context, loops.stage, l.iterator);
+  });
+  size_t at = shared_loops(plan, stage);
+  while (at < nest.loops.size() && nest.loops[at].kind == ForType::Parallel) ++at;
+  const auto depth = static_cast<size_t>(loop - nest.loops.begin());
+  if (loop == nest.loops.end() || depth <= at || loop->kind != ForType::Serial) return {};
+  const int64_t points = trips(extents, nest, depth) * loop->step;
+  std::vector<Nest> nests;
+  for (const size_t level : {Machine::near_cache, Machine::last_cache}) {
+    const double bytes = context.machine.levels[level].bytes;
+    const int64_t chunk = largest_chunk(context, stage, extents, loop->iterator, bytes, points);
+    if (chunk <= loop->step || 2 * chunk > points) continue;
+    Nest chunks = nest;
+    insert_step(chunks, loop->iterator, chunk, at);
+    if (!has_same_order(nest, chunks, extents)) nests.push_back(std::move(chunks));
+  }
+  return nests;
+}
+
 }  // namespace
 
 std::vector<Plan> chunk_reduction(const Plan& plan, FuncId func, const Context& context) {
-  std::vector<Plan> plans;
-  if (!has_loops(plan, func)) return plans;
-  for (size_t s = 1; s < plan.of(func).nests.size(); ++s) {
-    const StageId stage{func, static_cast<int16_t>(s)};
-    const Nest& nest = plan.nest(stage);
-    const auto loop = std::ranges::find_if(
-        nest.loops, [&](const Loop& l) { return is_reduction(context, stage, l.iterator); });
-    size_t at = shared_loops(plan, stage);
-    while (at < nest.loops.size() && nest.loops[at].kind == ForType::Parallel) ++at;
-    const auto depth = static_cast<size_t>(loop - nest.loops.begin());
-    if (loop == nest.loops.end() || depth <= at || loop->kind != ForType::Serial) continue;
-    const Cover extents = loop_extents(plan, context, stage);
-    const int64_t points = trips(extents, nest, depth) * loop->step;
-    for (const size_t level : {Machine::near_cache, Machine::last_cache}) {
-      const double bytes = context.machine.levels[level].bytes;
-      const int64_t chunk = largest_chunk(context, stage, extents, loop->iterator, bytes, points);
-      if (chunk <= loop->step || 2 * chunk > points) continue;
-      Nest chunks = nest;
-      insert_step(chunks, loop->iterator, chunk, at);
-      if (!has_same_order(nest, chunks, extents))
-        add(plans, with_nest(plan, stage, std::move(chunks), context));
-    }
-  }
-  return plans;
+  return with_nests(plan, func, context, chunked);
 }
 
 }  // namespace retrograde::planning::moves

@@ -145,11 +145,7 @@ std::vector<Plan> compute_at(const Plan& plan, FuncId func, const Context& conte
     }
     const bool has_own_loops = has_loops(plan, func) && runs_at_any_size(changed, context, func);
     if (has_own_loops) add(plans, with_func(plan, func, changed, context));
-    for (size_t s = 0; s < changed.nests.size(); ++s) {
-      const StageId stage{func, static_cast<int16_t>(s)};
-      const int64_t full = lanes_for(plan, stage, INT64_MAX);
-      changed.nests[s] = row_loops(plan, context, stage, changed.storage.order, box, full / 2);
-    }
+    run_along_rows(changed, plan, context, func, box, lanes_for(plan, {func, 0}, INT64_MAX) / 2);
     add(plans, with_func(plan, func, std::move(changed), context));
   }
   return plans;

@@ -74,10 +74,13 @@ void drop_loop(Nest& nest, size_t depth);
 std::optional<Nest> without_body(const Nest& nest, const Context& context, StageId stage);
 // Runs so many points of the iterator inside of all other loops. Requires: no step is smaller, except 1.
 void run_inside(Nest& nest, int iterator, int64_t points, ForType kind);
-// Serial loops for the stage of a Func with this storage order, whose dimensions have these extents, along rows: lanes of
-// the first stored dimension inside, then the reduction, then the other dimensions. `min_lanes`: fewer aren't used.
-Nest row_loops(const Plan& plan, const Context& context, StageId stage,
-               const std::vector<int16_t>& order, const Cover& extents, int64_t min_lanes);
+// Loops for all stages of a changed Func of the plan, whose dimensions have these extents, along rows as they are stored:
+// lanes of the first dimension inside, then the reduction, then the other dimensions; in parallel at root. `min_lanes`:
+// fewer aren't used.
+void run_along_rows(FuncPlan& changed, const Plan& plan, const Context& context, FuncId func,
+                    const Cover& extents, int64_t min_lanes);
+// Makes a dimension the innermost one in memory.
+void store_first(Storage& storage, int dimension);
 // Makes the outermost loops of a stage at root parallel until there are enough chunks of work for the threads; none for
 // one thread.
 void run_in_parallel(Nest& nest, const Context& context, StageId stage);
@@ -89,7 +92,17 @@ void run_in_parallel(Nest& nest, const Context& context, StageId stage);
 // stages share differ (L11), or iterations of an update that access one element change their order (L1, L2).
 std::optional<Plan> with_func(const Plan& plan, FuncId func, FuncPlan changed,
                               const Context& context);
-std::optional<Plan> with_nest(const Plan& plan, StageId stage, Nest nest, const Context& context);
+// The loops of a stage of a plan.
+struct StageLoops {
+  const Plan& plan;
+  const Context& context;
+  const StageId stage;
+  const Nest& nest;
+  const Cover extents;  // loop_extents
+};
+// The legal plans in which one stage of the Func has one of these nests instead.
+std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& context,
+                             std::vector<Nest> (*nests)(const StageLoops&));
 // Adds a plan that isn't in the list yet.
 void add(std::vector<Plan>& plans, std::optional<Plan> plan);
 

@@ -43,6 +43,26 @@ void set_tails(Nest& nest, int iterator) {
   }
 }
 
+// Serial loops of one stage.
+Nest row_loops(const Plan& plan, const Context& context, StageId stage,
+               const std::vector<int16_t>& order, const Cover& extents, int64_t min_lanes) {
+  const graph::FuncContents& f = *plan.program->funcs[static_cast<size_t>(stage.func)];
+  const StageNode& node = context.accesses.stage(stage);
+  Nest nest = loops_of_definition(f, stage.stage);
+  const auto rank = [&](const Loop& loop) {
+    const Iterator& iterator = node.iterators[static_cast<size_t>(loop.iterator)];
+    if (iterator.kind == Iterator::Kind::Reduction) return -1;
+    return static_cast<int>(std::ranges::find(order, iterator.dimension) - order.begin());
+  };
+  std::ranges::stable_sort(nest.loops, std::greater(), rank);
+  const auto first = std::ranges::find(nest.loops, 0, rank);
+  if (first == nest.loops.end()) return nest;
+  const int64_t lanes = lanes_for(plan, stage, extents[static_cast<size_t>(order[0])]);
+  if (lanes > 1 && lanes >= min_lanes)
+    run_inside(nest, first->iterator, lanes, ForType::Vectorized);
+  return nest;
+}
+
 }  // namespace
 
 // ---- questions ----
@@ -313,23 +333,19 @@ void run_inside(Nest& nest, int iterator, int64_t points, ForType kind) {
   }
 }
 
-Nest row_loops(const Plan& plan, const Context& context, StageId stage,
-               const std::vector<int16_t>& order, const Cover& extents, int64_t min_lanes) {
-  const graph::FuncContents& f = *plan.program->funcs[static_cast<size_t>(stage.func)];
-  const StageNode& node = context.accesses.stage(stage);
-  Nest nest = loops_of_definition(f, stage.stage);
-  const auto rank = [&](const Loop& loop) {
-    const Iterator& iterator = node.iterators[static_cast<size_t>(loop.iterator)];
-    if (iterator.kind == Iterator::Kind::Reduction) return -1;
-    return static_cast<int>(std::ranges::find(order, iterator.dimension) - order.begin());
-  };
-  std::ranges::stable_sort(nest.loops, std::greater(), rank);
-  const auto first = std::ranges::find(nest.loops, 0, rank);
-  if (first == nest.loops.end()) return nest;
-  const int64_t lanes = lanes_for(plan, stage, extents[static_cast<size_t>(order[0])]);
-  if (lanes > 1 && lanes >= min_lanes)
-    run_inside(nest, first->iterator, lanes, ForType::Vectorized);
-  return nest;
+void run_along_rows(FuncPlan& changed, const Plan& plan, const Context& context, FuncId func,
+                    const Cover& extents, int64_t min_lanes) {
+  for (size_t s = 0; s < changed.nests.size(); ++s) {
+    const StageId stage{func, static_cast<int16_t>(s)};
+    changed.nests[s] = row_loops(plan, context, stage, changed.storage.order, extents, min_lanes);
+    if (changed.placement.compute.kind == Level::Kind::Root)
+      run_in_parallel(changed.nests[s], context, stage);
+  }
+}
+
+void store_first(Storage& storage, int dimension) {
+  const auto at = std::ranges::find(storage.order, dimension);
+  std::rotate(storage.order.begin(), at, at + 1);
 }
 
 void run_in_parallel(Nest& nest, const Context& context, StageId stage) {

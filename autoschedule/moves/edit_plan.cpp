@@ -243,10 +243,20 @@ std::optional<Plan> with_func(const Plan& plan, FuncId func, FuncPlan changed,
   return FuncChange(plan, func, std::move(changed), context).run();
 }
 
-std::optional<Plan> with_nest(const Plan& plan, StageId stage, Nest nest, const Context& context) {
-  FuncPlan changed = plan.of(stage.func);
-  changed.nests[static_cast<size_t>(stage.stage)] = std::move(nest);
-  return with_func(plan, stage.func, std::move(changed), context);
+std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& context,
+                             std::vector<Nest> (*nests)(const StageLoops&)) {
+  std::vector<Plan> plans;
+  if (!has_loops(plan, func)) return plans;
+  for (const StageNode& node : context.accesses.func(func).stages) {
+    const StageLoops loops{plan, context, node.id, plan.nest(node.id),
+                           loop_extents(plan, context, node.id)};
+    for (Nest& nest : nests(loops)) {
+      FuncPlan changed = plan.of(func);
+      changed.nests[static_cast<size_t>(node.id.stage)] = std::move(nest);
+      add(plans, with_func(plan, func, std::move(changed), context));
+    }
+  }
+  return plans;
 }
 
 void add(std::vector<Plan>& plans, std::optional<Plan> plan) {

@@ -21,22 +21,27 @@ enum class Reduction : uint8_t { Inside, Outside };
 
 class LoopOrder {
  public:
-  LoopOrder(const Plan& plan, StageId stage, const Context& context)
-      : nest_(plan.nest(stage)), stage_(stage), context_(context) {
+  explicit LoopOrder(const StageLoops& loops)
+      : nest_(loops.nest), stage_(loops.stage), context_(loops.context) {
     end_ = body_depth(nest_);
-    begin_ = std::min(shared_loops(plan, stage), end_);
+    begin_ = std::min(shared_loops(loops.plan, stage_), end_);
     while (begin_ < end_ && nest_.loops[begin_].kind == ForType::Parallel) ++begin_;
     std::set<int16_t> seen;
     for (size_t d = begin_; d < end_; ++d)
       is_tiled_ = !seen.insert(nest_.loops[d].iterator).second || is_tiled_;
-    const std::vector<int16_t>& order = plan.of(stage.func).storage.order;
-    for (const Iterator& i : context.accesses.stage(stage).iterators) {
+    const std::vector<int16_t>& order = loops.plan.of(stage_.func).storage.order;
+    for (const Iterator& i : context_.accesses.stage(stage_).iterators) {
       const bool is_pure = i.kind == Iterator::Kind::Pure;
       ranks_.push_back(is_pure ? std::ranges::find(order, i.dimension) - order.begin() : 0);
     }
   }
-  bool is_tiled() const { return is_tiled_; }
+  std::vector<Nest> run() const {
+    std::vector<Nest> nests{ordered(Reduction::Inside, true), ordered(Reduction::Outside, true)};
+    if (!is_tiled_) nests.push_back(ordered(Reduction::Inside, false));
+    return nests;
+  }
 
+ private:
   Nest ordered(Reduction reduction, bool along_rows) const {
     const auto key = [&](const Loop& loop) {
       const auto iterator = static_cast<size_t>(loop.iterator);
@@ -52,7 +57,6 @@ class LoopOrder {
     return nest;
   }
 
- private:
   const Nest& nest_;
   const StageId stage_;
   const Context& context_;
@@ -61,20 +65,12 @@ class LoopOrder {
   std::vector<std::ptrdiff_t> ranks_;  // by iterator: of the dimension in memory
 };
 
+std::vector<Nest> orders(const StageLoops& loops) { return LoopOrder(loops).run(); }
+
 }  // namespace
 
 std::vector<Plan> order_loops(const Plan& plan, FuncId func, const Context& context) {
-  std::vector<Plan> plans;
-  if (!has_loops(plan, func)) return plans;
-  for (size_t s = 0; s < plan.of(func).nests.size(); ++s) {
-    const StageId stage{func, static_cast<int16_t>(s)};
-    const LoopOrder order(plan, stage, context);
-    add(plans, with_nest(plan, stage, order.ordered(Reduction::Inside, true), context));
-    add(plans, with_nest(plan, stage, order.ordered(Reduction::Outside, true), context));
-    if (!order.is_tiled())
-      add(plans, with_nest(plan, stage, order.ordered(Reduction::Inside, false), context));
-  }
-  return plans;
+  return with_nests(plan, func, context, orders);
 }
 
 }  // namespace retrograde::planning::moves

@@ -13,35 +13,38 @@
 
 namespace retrograde::planning::moves {
 
-std::vector<Plan> parallelise(const Plan& plan, FuncId func, const Context& context) {
-  std::vector<Plan> plans;
-  if (!is_editable(plan, func) || plan.of(func).placement.compute.kind != Level::Kind::Root)
-    return plans;
-  const int64_t enough = context.machine.enough_tasks();
-  for (size_t s = 0; s < plan.of(func).nests.size(); ++s) {
-    const StageId stage{func, static_cast<int16_t>(s)};
-    Nest serial = plan.nest(stage);
-    for (Loop& loop : serial.loops) {
-      if (loop.kind == ForType::Parallel) loop.kind = ForType::Serial;
-    }
-    Nest outermost = serial;
-    run_in_parallel(outermost, context, stage);
-    add(plans, with_nest(plan, stage, std::move(outermost), context));
-    if (context.machine.threads > 1 && body_depth(serial) > 0 &&
-        may_run_at_once(context, stage, serial, 0)) {
-      Nest chunks = serial;
-      const int16_t first = chunks.loops[0].iterator;
-      if (chunks.loops.size() > 1 && chunks.loops[1].iterator == first) drop_loop(chunks, 1);
-      const int64_t each = trips(whole_cover(stage, context.sizes), chunks, 0) / enough;
-      if (each > 1) {
-        const auto rows = static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(each)));
-        insert_step(chunks, first, rows * chunks.loops[0].step, 0, ForType::Parallel);
-        add(plans, with_nest(plan, stage, std::move(chunks), context));
-      }
-    }
-    add(plans, with_nest(plan, stage, std::move(serial), context));
+namespace {
+
+std::vector<Nest> in_parallel(const StageLoops& loops) {
+  const auto& [plan, context, stage, nest, extents] = loops;
+  Nest serial = nest;
+  for (Loop& loop : serial.loops) {
+    if (loop.kind == ForType::Parallel) loop.kind = ForType::Serial;
   }
-  return plans;
+  if (context.machine.threads == 1) return {serial};
+  Nest outermost = serial;
+  run_in_parallel(outermost, context, stage);
+  std::vector<Nest> nests{outermost};
+  if (body_depth(serial) > 0 && may_run_at_once(context, stage, serial, 0)) {
+    Nest chunks = serial;
+    const int16_t first = chunks.loops[0].iterator;
+    if (chunks.loops.size() > 1 && chunks.loops[1].iterator == first) drop_loop(chunks, 1);
+    const int64_t each = trips(extents, chunks, 0) / context.machine.enough_tasks();
+    if (each > 1) {
+      const auto rows = static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(each)));
+      insert_step(chunks, first, rows * chunks.loops[0].step, 0, ForType::Parallel);
+      nests.push_back(std::move(chunks));
+    }
+  }
+  nests.push_back(std::move(serial));
+  return nests;
+}
+
+}  // namespace
+
+std::vector<Plan> parallelise(const Plan& plan, FuncId func, const Context& context) {
+  if (plan.of(func).placement.compute.kind != Level::Kind::Root) return {};
+  return with_nests(plan, func, context, in_parallel);
 }
 
 }  // namespace retrograde::planning::moves

@@ -41,9 +41,7 @@ std::vector<Plan> permute_storage(const Plan& plan, FuncId func, const Context& 
   std::vector<Plan> plans;
   for (const int d : wanted) {
     FuncPlan changed = plan.of(func);
-    std::vector<int16_t>& order = changed.storage.order;
-    const auto at = std::ranges::find(order, d);
-    std::rotate(order.begin(), at, at + 1);
+    store_first(changed.storage, d);
     if (plans.size() < most_orders) add(plans, with_func(plan, func, std::move(changed), context));
   }
   return plans;

@@ -22,26 +22,27 @@ constexpr size_t most_tiles = 3;
 
 class RegisterTiles {
  public:
-  RegisterTiles(const Plan& plan, StageId stage, const Context& context)
-      : plan_(plan),
-        stage_(stage),
-        context_(context),
-        node_(context.accesses.stage(stage)),
-        extents_(loop_extents(plan, context, stage)) {}
+  explicit RegisterTiles(const StageLoops& loops)
+      : loops_(loops),
+        context_(loops.context),
+        stage_(loops.stage),
+        node_(context_.accesses.stage(stage_)) {}
 
-  void run(std::vector<Plan>& plans) {
-    if (!is_sum()) return;
-    const std::optional<Nest> plain = without_body(plan_.nest(stage_), context_, stage_);
-    const auto row = std::ranges::find(node_.iterators, plan_.of(stage_.func).storage.order[0],
-                                       &Iterator::dimension);
-    if (!plain || row == node_.iterators.end()) return;
+  std::vector<Nest> run() {
+    if (!is_sum()) return {};
+    const std::optional<Nest> plain = without_body(loops_.nest, context_, stage_);
+    const auto row = std::ranges::find(
+        node_.iterators, loops_.plan.of(stage_.func).storage.order[0], &Iterator::dimension);
+    if (!plain || row == node_.iterators.end()) return {};
     x_ = static_cast<int>(row - node_.iterators.begin());
-    lanes_ = lanes_for(plan_, stage_, points_of(*plain, x_));
+    lanes_ = lanes_for(loops_.plan, stage_, points_of(*plain, x_));
     if (lanes_ > 1) find_tiles(*plain);
     std::ranges::sort(tiles_);
-    for (size_t i = 0, given = plans.size(); i < tiles_.size() && plans.size() < given + most_tiles;
-         ++i)
-      give(*plain, tiles_[i], plans);
+    std::vector<Nest> nests;
+    for (const Tile& tile : tiles_) {
+      if (nests.size() < most_tiles) give(*plain, tile, nests);
+    }
+    return nests;
   }
 
  private:
@@ -51,11 +52,10 @@ class RegisterTiles {
     int side;
     auto operator<=>(const Tile&) const = default;
   };
-  const Plan& plan_;
-  const StageId stage_;
+  const StageLoops& loops_;
   const Context& context_;
+  const StageId stage_;
   const StageNode& node_;
-  const Cover extents_;
   int x_ = 0;
   int64_t lanes_ = 1;
   std::vector<Tile> tiles_;
@@ -74,7 +74,7 @@ class RegisterTiles {
   }
   int64_t points_of(const Nest& nest, int iterator) const {
     const auto depth = static_cast<int>(innermost_loop(nest, iterator));
-    return points_inside(extents_, nest, depth - 1, iterator);
+    return points_inside(loops_.extents, nest, depth - 1, iterator);
   }
 
   void find_tiles(const Nest& plain) {
@@ -121,7 +121,7 @@ class RegisterTiles {
                      core.float_latency / sums});
   }
 
-  void give(const Nest& plain, const Tile& tile, std::vector<Plan>& plans) const {
+  void give(const Nest& plain, const Tile& tile, std::vector<Nest>& nests) const {
     Nest nest = plain;
     const auto is_sum_loop = [&](const Loop& loop) {
       return is_reduction(context_, stage_, loop.iterator);
@@ -138,19 +138,18 @@ class RegisterTiles {
     } else {
       run_inside(nest, x_, lanes_, ForType::Vectorized);
     }
-    if (operations(plan_, context_, stage_) * tile.sums > most_body_operations) return;
-    add(plans, with_nest(plan_, stage_, std::move(nest), context_));
+    if (operations(loops_.plan, context_, stage_) * tile.sums <= most_body_operations)
+      nests.push_back(std::move(nest));
   }
 };
+
+std::vector<Nest> tiles_of_sums(const StageLoops& loops) { return RegisterTiles(loops).run(); }
 
 }  // namespace
 
 std::vector<Plan> register_tile(const Plan& plan, FuncId func, const Context& context) {
-  std::vector<Plan> plans;
-  if (!has_loops(plan, func) || context.accesses.func(func).func->dimensions() < 2) return plans;
-  for (size_t s = 1; s < plan.of(func).nests.size(); ++s)
-    RegisterTiles(plan, {func, static_cast<int16_t>(s)}, context).run(plans);
-  return plans;
+  if (context.accesses.func(func).func->dimensions() < 2) return {};
+  return with_nests(plan, func, context, tiles_of_sums);
 }
 
 }  // namespace retrograde::planning::moves

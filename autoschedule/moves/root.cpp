@@ -15,12 +15,7 @@ std::vector<Plan> root(const Plan& plan, FuncId func, const Context& context) {
   changed.placement = {};
   changed.placement.compute.kind = Level::Kind::Root;
   changed.storage.folds.clear();
-  const Cover extents = whole_cover({func, 0}, context.sizes);
-  for (size_t s = 0; s < changed.nests.size(); ++s) {
-    const StageId stage{func, static_cast<int16_t>(s)};
-    changed.nests[s] = row_loops(plan, context, stage, changed.storage.order, extents, 1);
-    run_in_parallel(changed.nests[s], context, stage);
-  }
+  run_along_rows(changed, plan, context, func, whole_cover({func, 0}, context.sizes), 1);
   std::vector<Plan> plans;
   add(plans, with_func(plan, func, std::move(changed), context));
   return plans;

@@ -48,18 +48,11 @@ std::vector<Plan> scatter_lanes(const Plan& plan, FuncId func, const Context& co
   for (size_t d = 0; d < extents.size() && plans.size() < most_dimensions; ++d) {
     if (!is_pure_in_all_stages(context, func, static_cast<int>(d))) continue;
     FuncPlan changed = plan.of(func);
-    std::vector<int16_t>& order = changed.storage.order;
-    const auto at = std::ranges::find(order, static_cast<int16_t>(d));
-    std::rotate(order.begin(), at, at + 1);
-    bool has_lanes = true;
-    for (const StageNode& stage : stages) {
-      Nest& nest = changed.nests[static_cast<size_t>(stage.id.stage)];
-      nest = row_loops(plan, context, stage.id, order, extents, 1);
-      has_lanes = has_lanes && vector_loop(nest);
-      if (changed.placement.compute.kind == Level::Kind::Root)
-        run_in_parallel(nest, context, stage.id);
-    }
-    if (has_lanes) add(plans, with_func(plan, func, std::move(changed), context));
+    store_first(changed.storage, static_cast<int>(d));
+    run_along_rows(changed, plan, context, func, extents, 1);
+    const auto has_lanes = [](const Nest& nest) { return vector_loop(nest).has_value(); };
+    if (std::ranges::all_of(changed.nests, has_lanes))
+      add(plans, with_func(plan, func, std::move(changed), context));
   }
   return plans;
 }

@@ -23,39 +23,34 @@ int64_t power_of_two_below(double size) {
 
 class Tiler {
  public:
-  Tiler(const Plan& plan, StageId stage, const Context& context)
-      : plan_(plan),
-        stage_(stage),
-        context_(context),
-        nest_(plan.nest(stage)),
-        extents_(loop_extents(plan, context, stage)) {
+  explicit Tiler(const StageLoops& loops) : loops_(loops), nest_(loops.nest) {
     const size_t body = body_depth(nest_);
     for (size_t d = body; d-- > 0;) {
       const int16_t i = nest_.loops[d].iterator;
-      if (!is_free(context, stage, i)) continue;
+      if (!is_free(loops_.context, loops_.stage, i)) continue;
       if (std::ranges::find(inner_, i, &Inner::iterator) == inner_.end()) inner_.push_back({i, d});
     }
   }
 
-  void run(std::vector<Plan>& plans) const {
-    if (inner_.empty()) return;
+  std::vector<Nest> run() {
+    if (inner_.empty()) return {};
     for (const size_t level : {size_t{0}, Machine::near_cache}) {
-      const double points = context_.machine.levels[level].bytes / bytes_of_point();
+      const double points = loops_.context.machine.levels[level].bytes / bytes_of_point();
       if (inner_.size() > 1) {
         const auto row = static_cast<double>(points_of(inner_[0]));
-        tile({{inner_[1], power_of_two_below(points / row)}}, inner_[1].depth, plans);
+        tile({{inner_[1], power_of_two_below(points / row)}}, inner_[1].depth);
         const int64_t side = power_of_two_below(std::sqrt(points));
-        tile({{inner_[1], side}, {inner_[0], side}}, std::min(inner_[0].depth, inner_[1].depth),
-             plans);
+        tile({{inner_[1], side}, {inner_[0], side}}, std::min(inner_[0].depth, inner_[1].depth));
       }
-      size_t outside = shared_loops(plan_, stage_);
+      size_t outside = shared_loops(loops_.plan, loops_.stage);
       while (outside < inner_[0].depth && nest_.loops[outside].kind == ForType::Parallel) ++outside;
       const bool is_in_reduction =
           outside < inner_[0].depth &&
-          is_reduction(context_, stage_, nest_.loops[inner_[0].depth - 1].iterator);
-      if (is_in_reduction) tile({{inner_[0], power_of_two_below(points)}}, outside, plans);
+          is_reduction(loops_.context, loops_.stage, nest_.loops[inner_[0].depth - 1].iterator);
+      if (is_in_reduction) tile({{inner_[0], power_of_two_below(points)}}, outside);
     }
-    for (const Inner& inner : inner_) resize(inner, plans);
+    for (const Inner& inner : inner_) resize(inner);
+    return std::move(nests_);
   }
 
  private:
@@ -67,25 +62,23 @@ class Tiler {
     Inner inner;
     int64_t size;
   };
-  const Plan& plan_;
-  const StageId stage_;
-  const Context& context_;
+  const StageLoops& loops_;
   const Nest& nest_;
-  const Cover extents_;
+  std::vector<Nest> nests_;
   std::vector<Inner> inner_;  // innermost first
 
   int64_t points_of(const Inner& inner) const {
-    return points_inside(extents_, nest_, static_cast<int>(inner.depth) - 1, inner.iterator);
+    return points_inside(loops_.extents, nest_, static_cast<int>(inner.depth) - 1, inner.iterator);
   }
   double bytes_of_point() const {
-    const StageNode& node = context_.accesses.stage(stage_);
-    double bytes = bytes_of_element(context_, node.write);
-    for (const Access& read : node.reads) bytes += bytes_of_element(context_, read);
+    const StageNode& node = loops_.context.accesses.stage(loops_.stage);
+    double bytes = bytes_of_element(loops_.context, node.write);
+    for (const Access& read : node.reads) bytes += bytes_of_element(loops_.context, read);
     return bytes;
   }
 
   // The new loops stand at `depth`.
-  void tile(const std::vector<Side>& sides, size_t depth, std::vector<Plan>& plans) const {
+  void tile(const std::vector<Side>& sides, size_t depth) {
     Nest nest = nest_;
     for (const auto& [inner, size] : sides) {
       const Loop& loop = nest_.loops[inner.depth];
@@ -98,17 +91,16 @@ class Tiler {
       loop.kind = ForType::Serial;
       insert_step(nest, inner.iterator, size, depth, kind);
     }
-    if (has_same_order(nest_, nest, extents_)) return;
-    add(plans, with_nest(plan_, stage_, std::move(nest), context_));
+    if (!has_same_order(nest_, nest, loops_.extents)) nests_.push_back(std::move(nest));
   }
 
   // Doubles and halves a step between others.
-  void resize(const Inner& inner, std::vector<Plan>& plans) const {
+  void resize(const Inner& inner) {
     const int64_t smaller = nest_.loops[inner.depth].step;
     const int64_t step = outer_step(nest_, inner.iterator, smaller);
     if (step == 0 || body_depth(nest_) <= *find_loop(nest_, inner.iterator, step)) return;
     const int64_t larger = outer_step(nest_, inner.iterator, step);
-    const int64_t limit = larger > 0 ? larger : extents_[static_cast<size_t>(inner.iterator)];
+    const int64_t limit = larger > 0 ? larger : loops_.extents[static_cast<size_t>(inner.iterator)];
     for (const int64_t size : {2 * step, step / 2}) {
       if (size <= smaller || 2 * size > limit || step % 2 != 0) continue;
       Nest nest = nest_;
@@ -116,19 +108,17 @@ class Tiler {
       const ForType kind = nest.loops[depth].kind;
       nest.loops.erase(nest.loops.begin() + static_cast<std::ptrdiff_t>(depth));
       insert_step(nest, inner.iterator, size, depth, kind);
-      add(plans, with_nest(plan_, stage_, std::move(nest), context_));
+      nests_.push_back(std::move(nest));
     }
   }
 };
 
+std::vector<Nest> tiles(const StageLoops& loops) { return Tiler(loops).run(); }
+
 }  // namespace
 
 std::vector<Plan> tile(const Plan& plan, FuncId func, const Context& context) {
-  std::vector<Plan> plans;
-  if (!has_loops(plan, func)) return plans;
-  for (size_t s = 0; s < plan.of(func).nests.size(); ++s)
-    Tiler(plan, {func, static_cast<int16_t>(s)}, context).run(plans);
-  return plans;
+  return with_nests(plan, func, context, tiles);
 }
 
 }  // namespace retrograde::planning::moves

@@ -30,9 +30,8 @@ bool shares_values(const StageNode& stage, int iterator) {
 }
 
 // The nests in which the loop before the body is part of it.
-std::vector<Nest> with_larger_body(const Plan& plan, StageId stage, const Cover& extents,
-                                   const Context& context) {
-  const Nest& nest = plan.nest(stage);
+std::vector<Nest> with_larger_body(const StageLoops& loops) {
+  const auto& [plan, context, stage, nest, extents] = loops;
   const size_t body = body_depth(nest), d = body - 1;
   if (body == 0 || nest.loops[d].kind != ForType::Serial) return {};
   const auto [iterator, step] = std::pair(nest.loops[d].iterator, nest.loops[d].step);
@@ -62,29 +61,24 @@ std::vector<Nest> with_larger_body(const Plan& plan, StageId stage, const Cover&
   return steps;
 }
 
+std::vector<Nest> unrolled(const StageLoops& loops) {
+  const auto& [plan, context, stage, nest, extents] = loops;
+  const int64_t most = most_body_operations / operations(plan, context, stage);
+  std::vector<Nest> nests = with_larger_body(loops);
+  std::erase_if(nests, [&](const Nest& larger) { return copies(larger, loops.extents) > most; });
+  const size_t body = body_depth(nest);
+  if (body == nest.loops.size() || nest.loops[body].kind != ForType::Unrolled) return nests;
+  Nest& rolled = nests.emplace_back(nest);
+  rolled.loops[body].kind = ForType::Serial;
+  const bool is_adjacent = body > 0 && nest.loops[body - 1].iterator == nest.loops[body].iterator;
+  if (is_adjacent) drop_loop(rolled, body);
+  return nests;
+}
+
 }  // namespace
 
 std::vector<Plan> unroll(const Plan& plan, FuncId func, const Context& context) {
-  std::vector<Plan> plans;
-  if (!has_loops(plan, func)) return plans;
-  for (size_t s = 0; s < plan.of(func).nests.size(); ++s) {
-    const StageId stage{func, static_cast<int16_t>(s)};
-    const Nest& nest = plan.nest(stage);
-    const Cover extents = loop_extents(plan, context, stage);
-    const int64_t work = operations(plan, context, stage);
-    for (Nest& larger : with_larger_body(plan, stage, extents, context)) {
-      if (work * copies(larger, extents) <= most_body_operations)
-        add(plans, with_nest(plan, stage, std::move(larger), context));
-    }
-    const size_t body = body_depth(nest);
-    if (body == nest.loops.size() || nest.loops[body].kind != ForType::Unrolled) continue;
-    Nest rolled = nest;
-    rolled.loops[body].kind = ForType::Serial;
-    const bool is_adjacent = body > 0 && nest.loops[body - 1].iterator == nest.loops[body].iterator;
-    if (is_adjacent) drop_loop(rolled, body);
-    add(plans, with_nest(plan, stage, std::move(rolled), context));
-  }
-  return plans;
+  return with_nests(plan, func, context, unrolled);
 }
 
 }  // namespace retrograde::planning::moves

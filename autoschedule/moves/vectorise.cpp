@@ -31,39 +31,35 @@ int together(const Context& context, StageId stage, int iterator) {
   return count;
 }
 
+std::vector<Nest> with_lanes(const StageLoops& loops) {
+  const auto& [plan, context, stage, nest, extents] = loops;
+  const std::optional<Nest> plain = without_body(nest, context, stage);
+  if (!plain) return {};
+  std::vector<int> iterators;
+  for (int i = 0; i < static_cast<int>(extents.size()); ++i) {
+    if (find_loop(*plain, i, 1)) iterators.push_back(i);
+  }
+  std::ranges::stable_sort(iterators, std::greater(),
+                           [&](int i) { return together(loops.context, loops.stage, i); });
+  std::vector<Nest> nests;
+  for (const int i : iterators) {
+    if (nests.size() == most_iterators) break;
+    const auto depth = static_cast<int>(innermost_loop(*plain, i));
+    const int64_t lanes = lanes_for(plan, stage, points_inside(extents, *plain, depth - 1, i));
+    if (lanes == 1) continue;
+    Nest along = *plain;
+    run_inside(along, i, lanes, ForType::Vectorized);
+    if (may_run_at_once(context, stage, along, along.loops.size() - 1))
+      nests.push_back(std::move(along));
+  }
+  nests.push_back(*plain);
+  return nests;
+}
+
 }  // namespace
 
 std::vector<Plan> vectorise(const Plan& plan, FuncId func, const Context& context) {
-  std::vector<Plan> plans;
-  if (!has_loops(plan, func)) return plans;
-  for (size_t s = 0; s < plan.of(func).nests.size(); ++s) {
-    const StageId stage{func, static_cast<int16_t>(s)};
-    const std::optional<Nest> plain = without_body(plan.nest(stage), context, stage);
-    if (!plain) continue;
-    const Cover extents = loop_extents(plan, context, stage);
-    std::vector<int> iterators;
-    const auto count = static_cast<int>(context.accesses.stage(stage).iterators.size());
-    for (int i = 0; i < count; ++i) {
-      if (find_loop(*plain, i, 1)) iterators.push_back(i);
-    }
-    std::ranges::stable_sort(iterators, std::greater(),
-                             [&](int i) { return together(context, stage, i); });
-    size_t given = 0;
-    for (const int i : iterators) {
-      if (given == most_iterators) break;
-      const auto depth = static_cast<int>(innermost_loop(*plain, i));
-      const int64_t points = points_inside(extents, *plain, depth - 1, i);
-      const int64_t lanes = lanes_for(plan, stage, points);
-      if (lanes == 1) continue;
-      Nest nest = *plain;
-      run_inside(nest, i, lanes, ForType::Vectorized);
-      if (!may_run_at_once(context, stage, nest, nest.loops.size() - 1)) continue;
-      ++given;
-      add(plans, with_nest(plan, stage, std::move(nest), context));
-    }
-    add(plans, with_nest(plan, stage, *plain, context));
-  }
-  return plans;
+  return with_nests(plan, func, context, with_lanes);
 }
 
 }  // namespace retrograde::planning::moves

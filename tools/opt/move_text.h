@@ -20,7 +20,7 @@ struct MoveText {
 MoveText split_move(const std::string& text);
 
 // One plan after the other, with an empty line between; the first line says so if there are none. UserError if there is no
-// such move or Func. The machine is the reference machine with so many threads.
+// such move or Func. `threads`: those of the machine, which is the reference machine otherwise.
 std::string plans_after(const std::string& move, const MoveText& text,
                         const std::vector<graph::FuncPtr>& outputs,
                         int threads = planning::reference_threads);
