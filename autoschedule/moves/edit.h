@@ -44,7 +44,8 @@ size_t body_depth(const Nest& nest);
 // The points of each iterator that all loops of a stage run over: estimates, or of a Func that is computed in a loop its
 // box there; of a window that is stored outside of that loop, what each iteration adds.
 Cover loop_extents(const Plan& plan, const Context& context, StageId stage);
-// The points of an iterator that run inside of a loop: all if no loop down to this one steps over it.
+// The points of an iterator that run inside of a loop: all if no loop down to this one steps over it. Loops that are fused
+// count as very long where no step says how long they are.
 int64_t points_inside(const Cover& extents, const Nest& nest, int depth, int iterator);
 // How often a loop runs for each iteration of the loops around it.
 int64_t trips(const Cover& extents, const Nest& nest, size_t depth);

@@ -11,6 +11,8 @@ namespace retrograde::planning::moves {
 
 namespace {
 
+constexpr int64_t points_of_fusion = INT32_MAX;  // where no step outside bounds them
+
 bool runs_on_device(const Loop& loop) {
   return loop.iterator == once || loop.kind == ForType::GpuBlock ||
          loop.kind == ForType::GpuThread || loop.kind == ForType::GpuLane;
@@ -214,7 +216,8 @@ Cover loop_extents(const Plan& plan, const Context& context, StageId stage) {
 }
 
 int64_t points_inside(const Cover& extents, const Nest& nest, int depth, int iterator) {
-  int64_t points = extents[static_cast<size_t>(iterator)];
+  const auto id = static_cast<size_t>(iterator);
+  int64_t points = id < extents.size() ? extents[id] : points_of_fusion;
   for (int d = 0; d <= depth; ++d) {
     const Loop& loop = nest.loops[static_cast<size_t>(d)];
     if (loop.iterator == iterator) points = std::min(points, loop.step);
@@ -230,7 +233,7 @@ int64_t trips(const Cover& extents, const Nest& nest, size_t depth) {
 
 int64_t copies(const Nest& nest, const Cover& extents) {
   int64_t product = 1;
-  for (size_t d = 0; d < nest.loops.size(); ++d) {
+  for (size_t d = 0; d < nest.loops.size() && product < most_body_operations; ++d) {
     if (nest.loops[d].kind == ForType::Unrolled) product *= trips(extents, nest, d);
   }
   return product;
