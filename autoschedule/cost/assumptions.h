@@ -4,12 +4,8 @@
 
 #include <cstddef>
 
-#include "autoschedule/access/sizes.h"
-
 namespace retrograde::planning {
 
-// Dimensions of which nothing is known.
-inline constexpr SizeDefaults assumed_sizes{1000};
 // The units of a core work at the same time, and so do computing and moving data. Of all that the slower side hides, this
 // part shows.
 inline constexpr double not_overlapped = 0.25;
@@ -31,6 +27,8 @@ inline constexpr double passing_operands = 2;
 // An array of constant indices is kept in registers if it is no larger than so many times all of them. They hold this share
 // of it at most; operands take the rest.
 inline constexpr double largest_register_array = 4, operand_share = 0.8;
+// Loops that become vectors although no plan says so take longer than others: their remainders run element by element.
+inline constexpr double remainder_overhead = 1.1;
 // The reads that inlining may give a stage; beyond them its cost is a lower bound.
 inline constexpr size_t most_composed_reads = 2000;
 // An access beyond this stride is an element at a time.

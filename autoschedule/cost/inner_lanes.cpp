@@ -1,6 +1,7 @@
 // The lanes that lowering gives to innermost loops by itself (compiler/lower/vectors/vectorize_inner_loops.cpp).
 #include <algorithm>
 
+#include "autoschedule/cost/assumptions.h"
 #include "autoschedule/cost/group.h"
 
 namespace retrograde::planning {
@@ -16,12 +17,14 @@ void cover_lanes(const LaneLoop& lanes, Cover& cover) {
 
 namespace {
 
-// The depth of a serial loop with nothing inside of it but unrolled ones; -1: there is none.
+// The depth of a serial loop over single points with nothing inside of it but unrolled ones; -1: there is none.
 int innermost_serial(const StageRun& run, const Group& group) {
+  IteratorSet moved = 0;
   for (size_t d = run.nest.trips.size(); d-- > 0;) {
     const LoopNode& node = group.nodes[static_cast<size_t>(run.node_of(d))];
     if (node.children.size() + node.stages.size() != 1) return -1;
-    if (node.kind == ForType::Serial) return static_cast<int>(d);
+    if (node.kind == ForType::Serial) return moved & run.nest.moves[d] ? -1 : static_cast<int>(d);
+    moved |= run.nest.moves[d];
     if (node.kind != ForType::Unrolled) return -1;
   }
   return -1;
@@ -58,10 +61,10 @@ void add_inner_lanes(const SizeModel& sizes, const Machine& machine, Group& grou
     if (lanes.iterator < 0 || run.nest.trips[d] < lanes.count || !can_be_lanes(run, group, lanes))
       continue;
     run.nest.lanes = lanes;
-    run.nest.trips[d] /= lanes.count;
+    run.nest.trips[d] *= remainder_overhead / lanes.count;
     group.nodes[static_cast<size_t>(run.node_of(d))].trips /= lanes.count;
     for (size_t k = run.place + d; k < run.path.size(); ++k) {
-      group.nodes[static_cast<size_t>(run.path[k])].times /= lanes.count;
+      group.nodes[static_cast<size_t>(run.path[k])].times *= remainder_overhead / lanes.count;
       cover_lanes(lanes, run.cover[k + 1]);
     }
   }

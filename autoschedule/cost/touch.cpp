@@ -108,6 +108,10 @@ LaneMoves lane_moves(const Touch& touch, const Layout& layout, const LaneLoop& l
       const double slope = move.slope / side.divisor * row;
       if (move.iterator == lanes.outer) outer_stride += slope;
       if (move.iterator != lanes.iterator) continue;
+      if (side.is_clamped) {  // the first and the last vector of a row
+        const double reach = lanes.count * std::abs(move.slope * lanes.step) / side.divisor;
+        result.border_share = std::max(result.border_share, std::min(1.0, 2 * reach / side.most));
+      }
       is_bent = is_bent || (side.is_bent && std::fmod(move.slope * lanes.step, side.divisor) != 0);
       stride += slope * lanes.step;
     }
@@ -182,6 +186,7 @@ class TouchReader {
     int64_t low = form.low, high = form.high;
     for (const Access* access : accesses) {
       taps.emplace(access->index[d].low, access->index[d].high);
+      side.is_clamped = side.is_clamped || access->index[d].clamped;
       low = std::min(low, access->index[d].low);
       high = std::max(high, access->index[d].high);
     }

@@ -22,6 +22,7 @@ struct TouchedSide {
   std::vector<Move> moves;     // the smallest slope first
   IteratorSet data = 0;        // the iterators that move a data-dependent part
   bool is_displaced = false;   // the data only displace the index
+  bool is_clamped = false;     // at borders
   bool is_bent = false;        // divided or wrapped: neighbours may have one element
   double divisor = 1;          // of taps, reach and slopes
   double most = 1;             // elements between the ends of the index
@@ -59,6 +60,7 @@ struct LaneMoves {
   double vectors = 1, shuffles = 0;
   bool is_by_lane = false;    // an element at a time
   bool is_unaligned = false;  // vectors begin anywhere in a cache line
+  double border_share = 0;    // of vectors, some lanes of which are clamped to one element
 };
 
 // Cache lines while the loops run over these points.

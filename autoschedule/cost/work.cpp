@@ -128,10 +128,12 @@ class StageWork {
     const LaneMoves moved =
         lane_moves(touch, stored.layout, lanes_, vectors(touch.element_bytes, touch.moved));
     double& units = touch.writes ? units_.stores : units_.loads;
+    const double by_lane = lanes_.count * (touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns);
     if (moved.is_by_lane) {
-      units += count * lanes_.count * (touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns);
+      units += count * by_lane;
       return;
     }
+    units += count * by_lane * moved.border_share;
     const double crossing = moved.is_unaligned ? 1 + m_.vector_bytes / double(line_bytes) : 1;
     units += count * moved.vectors * crossing * (touch.writes ? m_.store_ns : m_.load_ns);
     units_.arithmetic += count * moved.shuffles * m_.shuffle_ns;

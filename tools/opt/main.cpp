@@ -40,7 +40,6 @@
 #include <string>
 #include <vector>
 
-#include "autoschedule/cost/assumptions.h"
 #include "autoschedule/cost/cost.h"
 #include "autoschedule/machine/kept_machine.h"
 #include "autoschedule/plan/plan.h"
@@ -195,7 +194,7 @@ void run_expr(const Options& options) {
 
 std::string cost_text(const planning::Plan& plan, const Target& target) {
   const planning::AccessGraph accesses(plan.program->outputs);
-  const planning::SizeModel sizes(accesses, planning::assumed_sizes);
+  const planning::SizeModel sizes(accesses, {planning::unknown_extent});
   const planning::Machine machine = planning::machine_for(target);
   return to_text(planning::CostModel(accesses, sizes, machine).price(plan), plan);
 }

@@ -101,7 +101,7 @@ TEST(CostOfPlans, NeverFallsOnASlowerMachine) {
   for_each_random_plan([&](const auto& outputs, const Plan& plan) {
     const double seconds = Pricing(outputs).price(plan).seconds;
     for (const auto& [what, change] : slower) {
-      Machine machine;
+      Machine machine = probed_machine();
       change(machine);
       EXPECT_GE(Pricing(outputs, machine).price(plan).seconds, seconds * (1 - 1e-12))
           << what << "\n"

@@ -46,13 +46,14 @@ struct SearchTest : ::testing::Test {
 TEST_F(SearchTest, SerialLoopsBecomeParallelVectorsAndProducersMove) {
   const SearchResult result = found({});
   const FoundPlan& best = result.found[0];
-  EXPECT_LT(best.cost.seconds, result.start.cost.seconds / 8);
+  // Two threads; lowering vectorises the loops of the start, too.
+  EXPECT_LT(best.cost.seconds, result.start.cost.seconds / 2);
   EXPECT_FALSE(best.steps.empty());
   EXPECT_EQ(best.steps.back().seconds, best.cost.seconds);
   const std::string text = plain_text(best.plan);
   EXPECT_NE(text.find("out  root  parallel"), std::string::npos) << text;
   EXPECT_NE(text.find("vector x"), std::string::npos) << text;
-  EXPECT_EQ(text.find("rows  root"), std::string::npos) << text;
+  EXPECT_EQ(text.find("heavy  root"), std::string::npos) << text;
   EXPECT_EQ(broken_invariant(best.plan), "");
 }
 
