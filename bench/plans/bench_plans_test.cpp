@@ -135,6 +135,23 @@ TEST(Samples, BeginWithTheDefaultScheduleAndHaveEachPlanOnce) {
   EXPECT_EQ(beams, 1);
 }
 
+TEST(LoadedPrograms, HaveImagesAsLargeAsTheOutputsNeed) {
+  const LoadedProgram loaded = load_program(R"(image float32 input(1)
+param float32 factor
+func out(x) float32
+  define
+    value image input(x + 3) * factor
+  schedule
+    set_estimate(x, 0, 50)
+output out
+)");
+  for (const auto& p : retrograde::graph::parameters_of(loaded.outputs)) {
+    if (!p->is_buffer) continue;
+    EXPECT_EQ(p->buffer->dim[0].min, 3);
+    EXPECT_EQ(p->buffer->dim[0].extent, 50);
+  }
+}
+
 TEST(Samples, RunOnBoundInputs) {
   const LoadedProgram loaded = load_program(program);
   const Target host = retrograde::get_jit_target_from_environment();

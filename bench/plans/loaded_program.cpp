@@ -7,10 +7,14 @@
 #include <sstream>
 
 #include "autoschedule/graph_rewrites.h"
+#include "autoschedule/memory_budget.h"
 #include "autoschedule/stored_funcs.h"
+#include "frontend/run/call.h"
 #include "graph/definitions/parameter_contents.h"
 #include "graph/directives/wrappers.h"
 #include "ir/text.h"
+#include "lower/lower.h"
+#include "tuning/compiled_once.h"
 #include "tuning/measure_schedule.h"
 
 namespace bench::plans {
@@ -54,6 +58,55 @@ ir::Scalar scalar_of(const Type& type, double value) {
   return ir::Scalar::of_uint(type, static_cast<uint64_t>(value));
 }
 
+bool has_size(const graph::ParameterContents& image) {
+  const auto is_known = [](const graph::BufferConstraint& c) {
+    return c.extent.defined() || c.extent_estimate.defined();
+  };
+  return !image.constraints.empty() && std::ranges::all_of(image.constraints, is_known);
+}
+
+// Scalars that nobody bound have their estimates, or are zero.
+void bind_scalars(const std::vector<FuncPtr>& outputs) {
+  for (const auto& p : graph::parameters_of(outputs)) {
+    if (p->is_buffer || p->value) continue;
+    const auto estimate = p->estimate.defined() ? ir::as_scalar(p->estimate) : std::nullopt;
+    p->value = scalar_of(p->type, estimate ? estimate->as_double() : 0);
+  }
+}
+
+// Estimates of images of which nothing is known: the region that the outputs need.
+void estimate_images(const std::vector<FuncPtr>& outputs) {
+  const auto parameters = graph::parameters_of(outputs);
+  const auto is_unknown = [](const auto& p) { return p->is_buffer && !p->buffer && !has_size(*p); };
+  if (std::ranges::none_of(parameters, is_unknown)) return;
+  const Target target = get_jit_target_from_environment();
+  const auto scheduled =
+      autoschedule::schedule_within_budget(outputs, autoschedule::request_for(target, {}),
+                                           autoschedule::Scheduling::Everything)
+          .outputs;
+  lower::LowerOptions options;
+  options.target = target;
+  const tuning::CompiledOnce code(
+      lower::lower("asked", scheduled, lower::infer_arguments(scheduled), options), target, {});
+  std::vector<Buffer<>> buffers = tuning::sample_outputs(scheduled);
+  std::vector<halide_buffer_t*> raw;
+  for (Buffer<>& buffer : buffers) raw.push_back(buffer.raw_buffer());
+  const std::string asked = "find the sizes of inputs";
+  frontend::Arguments arguments(code, raw, /*is_query=*/true, asked, ParamMap::empty_map());
+  frontend::call(code, {}, arguments.argv(), asked, nullptr);
+  for (auto& query : arguments.queries()) {
+    if (!is_unknown(query.parameter)) continue;
+    auto& constraints = query.parameter->constraints;
+    constraints.resize(static_cast<size_t>(query.parameter->dimensions));
+    for (size_t d = 0; d < constraints.size(); ++d) {
+      const auto dim = query.buffer.dim(static_cast<int>(d));
+      if (dim.extent() <= 0) continue;
+      constraints[d].min_estimate = dim.min();
+      constraints[d].extent_estimate = dim.extent();
+    }
+  }
+}
+
 void bind_inputs(const std::vector<FuncPtr>& outputs, const std::string& text) {
   const auto values = read_values(text);
   const auto parameters = graph::parameters_of(outputs);
@@ -66,6 +119,8 @@ void bind_inputs(const std::vector<FuncPtr>& outputs, const std::string& text) {
   for_each_known([](auto& p, const auto& known) {
     if (!p.is_buffer && known.size() == 1) p.value = scalar_of(p.type, known[0]);
   });
+  bind_scalars(outputs);
+  estimate_images(outputs);
   tuning::bind_sample_inputs(outputs);
   for_each_known([](auto& p, const auto& known) {
     if (p.is_buffer) write(*p.buffer, p.type, known);

@@ -113,7 +113,8 @@ std::vector<SampledPlan> plans_of_walks(const std::vector<FuncPtr>& outputs,
           below(4) > 0 ? costly[below(costly.size())]
                        : static_cast<planning::FuncId>(below(reached.plan.funcs.size()));
       const planning::Move& move = planning::all_moves()[below(planning::all_moves().size())];
-      const auto plans = move.apply(reached.plan, func, {accesses, sizes, options.machine, dependences});
+      const auto plans =
+          move.apply(reached.plan, func, {accesses, sizes, options.machine, dependences});
       if (plans.empty()) continue;
       reached.plan = plans[below(plans.size())];
       reached.source += std::string(" ") + move.name;

@@ -50,9 +50,10 @@ def commit():
 
 
 def chosen_programs(folder, options):
+    """The names of the programs in the order of the patterns."""
     names = sorted(os.path.basename(path).removesuffix(".graph") for path in glob.glob(os.path.join(folder, "*.graph")))
     patterns = options.program or (["*"] if options.long else SHORT)
-    return [name for name in names if any(fnmatch.fnmatch(name, pattern) for pattern in patterns)]
+    return list(dict.fromkeys(name for pattern in patterns for name in fnmatch.filter(names, pattern)))
 
 
 class Worker:

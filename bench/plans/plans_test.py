@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Tests the statistics of judge.py and how plans.py reads a worker."""
+import argparse
 import io
 import json
 import os
@@ -162,6 +163,13 @@ class Driver(unittest.TestCase):
         report, text = self.run_plans("--rules", "5")  # other settings: a run of their own
         self.assertEqual(len(report["runs"]), 2)
         self.assertIn("failed", text)
+
+    def test_programs_run_in_the_order_of_the_patterns(self):
+        for name in ("a-x", "b-x", "b-y"):
+            with open(self.path(name + ".graph"), "w", encoding="utf-8") as file:
+                file.write("output f")
+        options = argparse.Namespace(program=["b-*", "*x"], long=False)
+        self.assertEqual(plans.chosen_programs(self.folder.name, options), ["b-x", "b-y", "a-x"])
 
     def test_of_two_measurements_the_less_disturbed_one_is_kept(self):
         rows = [plan("a", 1, 2.0, 2.0, stages={"f": 1})]

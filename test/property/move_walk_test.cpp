@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t walks = many_or_few(2000, 100);
+constexpr uint64_t walks = many_or_few(1000, 100);
 
 TEST(MoveWalks, GivePlansThatComputeTheSame) {
   std::map<std::string, uint64_t> moves;
@@ -39,7 +39,7 @@ TEST(MoveWalks, GivePlansThatComputeTheSame) {
   }
   EXPECT_LT(illegal, walks / 4);
   for (const planning::Move& move : planning::all_moves()) {
-    EXPECT_GT(moves[move.name], 0u) << move.name;
+    if (takes_many) EXPECT_GT(moves[move.name], 0u) << move.name;
     std::cout << move.name << " " << moves[move.name] << "\n";
   }
 }

@@ -7,6 +7,7 @@
 
 #include "autoschedule/default_schedule.h"
 #include "autoschedule/moves/move.h"
+#include "driver/schedule.h"
 #include "graph/copy_graph.h"
 #include "graph/directives/wrappers.h"
 #include "graph/names.h"
@@ -29,18 +30,22 @@ class MoveWalk {
     const planning::AccessGraph accesses(plan_.program->outputs);
     const planning::SizeModel sizes(accesses, {default_extent_});
     planning::Dependences dependences(accesses);
-    const auto moves = planning::all_moves();
+    const planning::Context context{accesses, sizes, machine_, dependences};
     const auto funcs = static_cast<int>(plan_.funcs.size());
-    for (int step = c_.between(0, most_steps); step > 0; --step) {
+    for (int step = c_.between(0, most_steps); step > 0 && broken_.empty(); --step) {
       const auto id = static_cast<planning::FuncId>(c_.below(funcs));
-      const planning::Move& move = moves[static_cast<size_t>(c_.below(int(moves.size())))];
-      const std::vector<planning::Plan> plans =
-          move.apply(plan_, id, {accesses, sizes, machine_, dependences});
-      for (const planning::Plan& after : plans) check(after, move, id);
-      if (plans.empty() || !broken_.empty()) continue;
+      std::vector<Choice> possible;  // rare moves are as likely as others
+      for (const planning::Move& move : planning::all_moves()) {
+        Choice choice{&move, move.apply(plan_, id, context)};
+        if (!choice.plans.empty()) possible.push_back(std::move(choice));
+      }
+      if (possible.empty()) continue;
+      const auto [move, plans] = c_.pick(possible);
+      for (const planning::Plan& after : plans) check(after, *move, id);
+      if (!broken_.empty()) break;
       plan_ = c_.pick(plans);
-      trace_ += retrograde::text("\n", move.name, " of ", name_of(id), "\n", to_text(plan_));
-      ++counts_[move.name];
+      trace_ += retrograde::text("\n", move->name, " of ", name_of(id), "\n", to_text(plan_));
+      ++counts_[move->name];
     }
   }
 
@@ -60,9 +65,14 @@ class MoveWalk {
   std::string text() const { return fuzz::to_text(program_) + trace_ + broken_; }
 
  private:
-  static constexpr int most_steps = 12;
+  struct Choice {
+    const planning::Move* move;
+    std::vector<planning::Plan> plans;
+  };
+  static constexpr int most_steps = 8;
   Choices& c_;
   const RandomProgram program_;
+  std::vector<graph::FuncPtr> unscheduled_;
   int64_t default_extent_ = 0;
   planning::Machine machine_;
   planning::Plan first_, plan_;
@@ -70,23 +80,50 @@ class MoveWalk {
   std::map<std::string, uint64_t> counts_;
 
   static RandomProgram made(Choices& choices) {
-    const int kind = choices.below(5);
+    const int kind = choices.below(6);
     if (kind == 0) return make_program(choices, Style::pipelines());
     if (kind == 1) return make_program(choices, Style::chains());
-    if (kind == 2) return make_program(choices, Style::gradients());
+    if (kind == 2) return with_gradients(make_program(choices, Style::gradients()));
     if (kind == 3) return make_program(choices, Style::pieces());
-    return make_large_program(choices, LargeSizes::Small);
+    const RandomProgram large = make_large_program(choices, LargeSizes::Small);
+    return kind == 4 ? large : with_gradients(large);
+  }
+
+  // The program and its gradients by all images.
+  static RandomProgram with_gradients(RandomProgram program) {
+    const Func output = program.output();
+    if (output.outputs() != 1) return program;
+    std::vector<AdjointInput> inputs;
+    for (size_t i = 0; i < program.images.size(); ++i) inputs.push_back(program.image(i));
+    Region bounds;
+    for (size_t d = 0; d < program.region().mins.size(); ++d)
+      bounds.push_back({program.region().mins[d], program.region().extents[d]});
+    Func seed("seed");
+    seed(output.args()) =
+        output.args().empty() ? Expr(1.0f) : cast<float>(output.args()[0] % 3 + 1);
+    const Derivative d = propagate_adjoints(output, seed, bounds, {.wrt = inputs});
+    std::vector<oracle::Region> regions{program.region()};
+    program.outputs = {output};
+    for (size_t i = 0; i < inputs.size(); ++i) {
+      const Func gradient = d.of(inputs[i]);
+      if (!gradient.defined()) continue;
+      program.outputs.push_back(gradient);
+      regions.push_back(oracle::region_of(*program.images[i].raw_buffer()));
+    }
+    program.runs = {regions};
+    return program;
   }
 
   // The plan of the default schedule, or of all Funcs at root without one.
   void start() {
-    const std::vector<graph::FuncPtr> outputs =
-        graph::copy_graph(graph::apply_wrappers(outputs_of(program_))).outputs;
+    unscheduled_ = graph::copy_graph(graph::apply_wrappers(outputs_of(program_))).outputs;
     if (c_.chance(50)) {
+      // Of gradients as compiling gives it, with its rewrites; of all Funcs otherwise.
+      std::vector<graph::FuncPtr> outputs = driver::schedule_unscheduled(unscheduled_);
       autoschedule::give_default_schedule(outputs, {}, autoschedule::Scheduling::Everything);
       plan_ = planning::import_plan(graph::apply_wrappers(outputs));
     } else {
-      plan_ = planning::undecided_plan(planning::make_program(outputs));
+      plan_ = planning::undecided_plan(planning::make_program(unscheduled_));
       for (auto& func : plan_.funcs) {
         planning::FuncPlan at_root = *func;
         if (at_root.opacity == planning::Opacity::None)
