@@ -179,6 +179,16 @@ class TouchReader {
     return std::max(1.0, bytes / static_cast<double>(std::max<size_t>(types.size(), 1)));
   }
 
+  // Whether the loops go beyond the ends of a clamp.
+  bool crosses_border(const Access& access, size_t d) const {
+    IndexForm free = access.index[d];
+    if (!free.clamped) return false;
+    const ir::ConstantRange within = sizes_.range(free.within);
+    free.within = {};
+    free.expr = {};
+    return !within.is_bounded() || !sizes_.range(free, access.by).is_within(within);
+  }
+
   TouchedSide side_of(const std::vector<const Access*>& accesses, size_t d) const {
     const IndexForm& form = accesses[0]->index[d];
     TouchedSide side;
@@ -186,7 +196,7 @@ class TouchReader {
     int64_t low = form.low, high = form.high;
     for (const Access* access : accesses) {
       taps.emplace(access->index[d].low, access->index[d].high);
-      side.is_clamped = side.is_clamped || access->index[d].clamped;
+      side.is_clamped = side.is_clamped || crosses_border(*access, d);
       low = std::min(low, access->index[d].low);
       high = std::max(high, access->index[d].high);
     }

@@ -188,9 +188,6 @@ TEST(CostOfPlans, OnlyChangedStagesArePricedAgain) {
     EXPECT_EQ(pricing.model.groups_priced(), known + 2) << "the consumer";
     std::cout << stages << " stages: " << first << " us at first, " << one << " us after a change, "
               << again << " us unchanged\n";
-    if (stages >= 100) {
-      EXPECT_LT(one, first / 2);
-    }
   }
 }
 
