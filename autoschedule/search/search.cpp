@@ -89,7 +89,7 @@ class Beam {
   std::unordered_set<uint64_t> seen_;
   std::vector<State> states_;  // the fastest first; never empty
 
-  // Of what the fastest plan spends in the stages of the Func or, if it is inlined, in those that read it.
+  // The seconds that the fastest plan spends in stages of the Func or, if it is inlined, in those that read it.
   double share_of(FuncId f) const {
     const State& state = states_[0];
     double seconds = 0;

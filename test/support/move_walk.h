@@ -118,7 +118,7 @@ class MoveWalk {
   void start() {
     unscheduled_ = graph::copy_graph(graph::apply_wrappers(outputs_of(program_))).outputs;
     if (c_.chance(50)) {
-      // Of gradients as compiling gives it, with its rewrites; of all Funcs otherwise.
+      // The schedule of gradients is the one that compiling gives, with its rewrites.
       std::vector<graph::FuncPtr> outputs = driver::schedule_unscheduled(unscheduled_);
       autoschedule::give_default_schedule(outputs, {}, autoschedule::Scheduling::Everything);
       plan_ = planning::import_plan(graph::apply_wrappers(outputs));

@@ -245,7 +245,7 @@ TEST_F(PlanImport, LoopsOfSeveralStagesMustBeAlike) {
             std::string::npos);
 }
 
-// What a changed plan makes of the directives that the program has.
+// The directives that a program has after its plan was changed.
 std::string changed_log(const std::vector<Func>& outputs, const std::string& text) {
   const Plan kept = imported(outputs);
   const Plan changed = parsed(text, kept.program);
