@@ -108,8 +108,9 @@ LaneMoves lane_moves(const Touch& touch, const Layout& layout, const LaneLoop& l
       const double slope = move.slope / side.divisor * row;
       if (move.iterator == lanes.outer) outer_stride += slope;
       if (move.iterator != lanes.iterator) continue;
-      if (side.is_clamped) {  // the first and the last vector of a row
-        const double reach = lanes.count * std::abs(move.slope * lanes.step) / side.divisor;
+      if (side.is_clamped) {  // the first and the last block of a row
+        const double points = std::max(lanes.block, lanes.inner * lanes.step);
+        const double reach = points * std::abs(move.slope) / side.divisor;
         result.border_share = std::max(result.border_share, std::min(1.0, 2 * reach / side.most));
       }
       is_bent = is_bent || (side.is_bent && std::fmod(move.slope * lanes.step, side.divisor) != 0);

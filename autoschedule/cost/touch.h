@@ -53,6 +53,9 @@ struct LaneLoop {
   int depth = 0;  // of the loop
   double count = 1, inner = 1, step = 1;
   IteratorSet moves = 0;
+  // The points of the iterator in one iteration of the innermost loop along it that is no lane and no copy. Lowering
+  // gives whole iterations of that loop to a border.
+  double block = 1;
 };
 
 // Instructions of a load or store of all lanes.
@@ -60,7 +63,7 @@ struct LaneMoves {
   double vectors = 1, shuffles = 0;
   bool is_by_lane = false;    // an element at a time
   bool is_unaligned = false;  // vectors begin anywhere in a cache line
-  double border_share = 0;    // of vectors, some lanes of which are clamped to one element
+  double border_share = 0;    // of vectors, whose lanes are clamped one by one
 };
 
 // Cache lines while the loops run over these points.

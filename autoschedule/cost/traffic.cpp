@@ -156,6 +156,8 @@ class TrafficWalk {
     times *= node.trips;
     for (const int child : node.children) visit(child, times);
     if (!node.stages.empty()) load(regions_.own(n), times, n);
+    // All iterations have passed, not only those that were looked at.
+    for (const Region& region : regions_.run(n)) recent_.touch(region.buffer, region.bytes);
   }
 
   void load(const Regions& regions, double times, int n) {

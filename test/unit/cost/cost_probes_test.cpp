@@ -101,6 +101,30 @@ TEST_F(StencilProbes, StripsRecomputeTheirBorders) {
   EXPECT_GT(compute_seconds(inlined), compute_seconds(sliding));
 }
 
+TEST_F(CostProbes, AWindowMovesByWholeRows) {
+  rows_sum(x, y) = exp(in(x, y));
+  out(x, y) = rows_sum(x, y - 1) + rows_sum(x, y) + rows_sum(x, y + 1);
+  const auto seconds_of = [&](const std::string& strip, const std::string& tail) {
+    return cost_of("out  root  y:" + strip + tail + ", y, x:16, vector x\n" +
+                   "rows_sum  at out/y  store at out/y:" + strip + "  y, x:16, vector x\n")
+        .stages[0]
+        .compute_seconds;
+  };
+  EXPECT_NEAR(seconds_of("640", " GuardWithIf") / seconds_of("512", ""), 1, 0.05);
+}
+
+// Rows that all together exceed the first cache.
+TEST_F(CostProbes, BlocksOfAProducerLeaveAllOfItBehind) {
+  rows_sum(x, y) = in(x, y) + in(x, y + 1);
+  out(x, y) = rows_sum(x, y) + rows_sum(x, y + 1);
+  const auto bytes_of = [&](const std::string& loops) {
+    return cost_of("out  root  y:32, y, x:16, vector x\nrows_sum  at out/y:32  " + loops + "\n")
+        .stages[1]
+        .bytes[1];
+  };
+  EXPECT_NEAR(bytes_of("y:128, x:128, y, x:16, vector x") / bytes_of("y, x:16, vector x"), 1, 0.1);
+}
+
 TEST_F(StencilProbes, StripsAreFasterThanTheDetourThroughMemory) {
   EXPECT_LT(sliding.seconds, 0.7 * root.seconds);
   EXPECT_LT(sliding.seconds, strips.seconds);
@@ -131,6 +155,16 @@ TEST_F(CostProbes, FunctionsCountByVectors) {
   out(x, y) = exp(in(x, y));
   const double seconds = compute_seconds(cost_of("out  root  y, x:16, vector x\n"));
   EXPECT_NEAR(seconds, columns * rows / 16 * (4 + 0.25 * 0.85) * 1e-9, 0.02 * seconds);
+}
+
+// Lowering gives whole blocks to a border, and loads their elements one by one.
+TEST_F(CostProbes, ABorderIsABlock) {
+  out(x, y) = in(clamp(x - 1, 0, 4095), y) + in(clamp(x + 1, 0, 4095), y);
+  const double vectors = compute_seconds(cost_of("out  root  y, x:16, vector x\n"));
+  const double blocks = compute_seconds(cost_of("out  root  y, x:1024, unroll x:16, vector x\n"));
+  const double loops = compute_seconds(cost_of("out  root  y, x:1024, x:16, vector x\n"));
+  EXPECT_GT(blocks, 2 * vectors) << "half of the points are in the blocks of the borders";
+  EXPECT_NEAR(loops / vectors, 1, 0.05);
 }
 
 TEST_F(CostProbes, WhatALoopDoesNotChangeIsComputedOutsideOfIt) {
