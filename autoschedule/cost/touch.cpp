@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <set>
 
 #include "autoschedule/cost/assumptions.h"
@@ -93,6 +94,30 @@ double touched_lines(const Touch& touch, const Layout& layout, const Cover& cove
   if (touch.data != 0)
     by_data = std::min(by_data, (iterations_of(touch.data, cover) - 1) * lines_a_point + data_taps);
   return lines * by_data * touch.components;
+}
+
+double bytes_by_sets(const Touch& touch, const Layout& layout, const Cover& cover,
+                     int64_t set_stride) {
+  const auto all = static_cast<double>(set_stride), line = static_cast<double>(line_bytes);
+  double touched = line, sets = line;  // bytes; of these, in different sets
+  double stride = touch.element_bytes;
+  for (const int16_t dimension : layout.order) {
+    const Span span = span_of(touch.sides[static_cast<size_t>(dimension)], cover);
+    if (touch.sides[static_cast<size_t>(dimension)].data != 0) return 0;
+    if (stride * span.reach <= touched) {
+      // Inside of the line, or of the rows so far.
+    } else if (stride < touched) {
+      touched = sets = stride * span.reach;
+    } else {
+      const auto step = static_cast<int64_t>(stride);
+      const double places = all / double(std::max(std::gcd(step, set_stride), line_bytes));
+      touched *= span.points;
+      sets *= std::min(span.points, places);
+    }
+    sets = std::min(sets, all);
+    stride *= layout.extents[static_cast<size_t>(dimension)];
+  }
+  return touched / sets * all;
 }
 
 LaneMoves lane_moves(const Touch& touch, const Layout& layout, const LaneLoop& lanes,

@@ -68,6 +68,10 @@ struct LaneMoves {
 
 // Cache lines while the loops run over these points.
 double touched_lines(const Touch& touch, const Layout& layout, const Cover& cover);
+// The bytes of a cache that would have to be touched evenly for as many lines in each set as the fullest sets have now.
+// `set_stride`: bytes from a line to the next one of its set.
+double bytes_by_sets(const Touch& touch, const Layout& layout, const Cover& cover,
+                     int64_t set_stride);
 // `vectors`: of the machine, that the lanes fill.
 LaneMoves lane_moves(const Touch& touch, const Layout& layout, const LaneLoop& lanes,
                      double vectors);

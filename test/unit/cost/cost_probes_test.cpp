@@ -139,7 +139,7 @@ TEST_F(StencilProbes, ThePeakIsWhatIsAliveAtOnce) {
 
 TEST_F(CostProbes, ATransposeLoadsALineForEachElement) {
   out(x, y) = in(y, x);
-  in.dim(0).set_estimate(0, 2048);
+  in.dim(0).set_estimate(0, 2064);  // rows in different sets
   in.dim(1).set_estimate(0, 4096);
   const StageCost rows_first = cost_of("out  root  y, x:16, vector x\n").stages[0];
   const StageCost tiles = cost_of("out  root  y:16, x:16, y, vector x\n").stages[0];
@@ -147,6 +147,50 @@ TEST_F(CostProbes, ATransposeLoadsALineForEachElement) {
       << "4096 lines do not stay in L1 until the next row";
   EXPECT_LT(tiles.bytes[1], image_bytes) << "beside what comes from memory";
   EXPECT_EQ(rows_first.bytes.back(), 3 * image_bytes);
+}
+
+// Sixteen rows whose lines are all in one set of L1.
+TEST_F(CostProbes, RowsThatShareSetsEvictEachOther) {
+  const auto lines_of = [&](int width) {
+    Func copy("copy");
+    copy(x, y) = in(x, y);
+    copy.set_estimate(x, 0, width).set_estimate(y, 0, 512);
+    in.dim(0).set_estimate(0, width);
+    in.dim(1).set_estimate(0, 512);
+    const Cost cost = priced(copy, "copy  root  y:16, x, vector y\n");
+    return cost.stages[0].bytes[1] / (width * 512);
+  };
+  EXPECT_GT(lines_of(1024), 5 * lines_of(1040));
+}
+
+// Rows of a recurrence along x wait for nothing but themselves, whether a read of the same row is clamped or not.
+TEST_F(CostProbes, AClampOfTheSameRowCarriesNothing) {
+  RDom r(1, 4095, 0, 2048, "r");
+  const auto chain_of = [&](const Expr& row) {
+    Func scan("scan");
+    scan(x, y) = in(x, y);
+    scan(r.x, r.y) += scan(r.x - 1, row) * 0.5f;
+    scan.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+    return priced(scan, "scan  root\n  .0  y, x:16, vector x\n  .1  r.y:8, r.x, unroll r.y\n")
+        .stages[1]
+        .compute_seconds;
+  };
+  EXPECT_NEAR(chain_of(clamp(r.y, 0, 2047)) / chain_of(r.y), 1, 0.01);
+}
+
+// The conditions of borders hold for all but a few iterations.
+TEST_F(CostProbes, ConditionsOfBordersAreFree) {
+  const auto seconds_of = [&](bool is_masked) {
+    Func sum("sum");
+    RDom r(0, 64, "r");
+    if (is_masked) r.where(likely(x > 2) && likely(y > 2) && likely(x < 4000));
+    sum(x, y) += in(x, y + r);
+    sum.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+    return priced(sum, "sum  root\n  .0  y, x:16, vector x\n  .1  y, r.x, x:16, vector x\n")
+        .stages[1]
+        .compute_seconds;
+  };
+  EXPECT_NEAR(seconds_of(true) / seconds_of(false), 1, 0.01);
 }
 
 // ---- arithmetic ----
