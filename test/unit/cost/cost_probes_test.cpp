@@ -201,6 +201,22 @@ TEST_F(CostProbes, FunctionsCountByVectors) {
   EXPECT_NEAR(seconds, columns * rows / 16 * (4 + 0.25 * 0.85) * 1e-9, 0.02 * seconds);
 }
 
+// Registers hold the vectors of a small array only if all loads are of the vectors that were stored.
+TEST_F(CostProbes, ShiftedVectorsComeFromMemory) {
+  rows_sum(x, y) = in(x, y) * 2;
+  const auto loads_of = [&](const Expr& value) {
+    Func sum("sum");
+    sum(x, y) = value;
+    sum.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+    const Cost cost = priced(sum,
+                             "sum  root  y, x:16, vector x\n"
+                             "rows_sum  at sum/x:16  y, unroll x:16, vector x\n");
+    return cost.stages[1].compute_seconds;
+  };
+  EXPECT_GT(loads_of(rows_sum(x, y) + rows_sum(x + 1, y)),
+            loads_of(rows_sum(x, y) + 1) + columns * rows / 16 * 0.4e-9);
+}
+
 // Lowering gives whole blocks to a border, and loads their elements one by one.
 TEST_F(CostProbes, ABorderIsABlock) {
   out(x, y) = in(clamp(x - 1, 0, 4095), y) + in(clamp(x + 1, 0, 4095), y);
