@@ -113,6 +113,18 @@ TEST_F(CostProbes, AWindowMovesByWholeRows) {
   EXPECT_NEAR(seconds_of("640", " GuardWithIf") / seconds_of("512", ""), 1, 0.05);
 }
 
+TEST_F(CostProbes, AWindowStaysForIterationsThatNeedNoNewRow) {
+  rows_sum(x, y) = exp(in(x, y));
+  out(x, y) = rows_sum(x, y / 2) + rows_sum(x, y / 2 + 1);
+  const auto seconds_of = [&](const std::string& place) {
+    return cost_of("out  root  y:512, y, x:16, vector x\nrows_sum  at out/" + place +
+                   "  y, x:16, vector x\n")
+        .stages[0]
+        .compute_seconds;
+  };
+  EXPECT_NEAR(seconds_of("y  store at out/y:512") / seconds_of("y:512"), 1, 0.05);
+}
+
 // Rows that all together exceed the first cache.
 TEST_F(CostProbes, BlocksOfAProducerLeaveAllOfItBehind) {
   rows_sum(x, y) = in(x, y) + in(x, y + 1);
