@@ -171,7 +171,7 @@ class TrafficWalk {
     const bool is_loop = node.parent >= 0;
     if (fit(regions_.run(n), room(!outside)) ||
         (is_loop && fit(regions_.iteration(n), room(node.in_parallel))))
-      return load(regions_.run(n), times, n);
+      return load(regions_.run(n), times * std::min(1.0, node.trips), n);
     times *= node.trips;
     for (const int child : node.children) visit(child, times);
     if (!node.stages.empty()) load(regions_.own(n), times, n);
