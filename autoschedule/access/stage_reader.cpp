@@ -166,6 +166,10 @@ void StageReader::count_operations(StageNode& node) {
 
 // Loops run without the conditions of borders but for their first and last iterations.
 bool StageReader::count_interior(const Expr& e) {
+  if (e.type().is_bool() && is_about_border(e)) {
+    if (e.kind() == Kind::And) for_each_child(e, [&](const Expr& child) { count(child); });
+    return true;
+  }
   std::vector<Expr> arms;
   if (const auto* select = e.as<Select>()) {
     arms = {select->when_true, select->when_false};

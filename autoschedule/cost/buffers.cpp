@@ -74,13 +74,15 @@ class BufferFinder {
                              std::min(copies, static_cast<double>(machine_.threads));
   }
 
-  // A small array becomes registers if its indices are constants: no loop inside of its allocation but unrolled ones and
-  // vectors moves them.
+  // A small array becomes registers if its indices are constants, and its vectors are loaded as they were stored: no loop
+  // inside of its allocation but unrolled ones and vectors moves them.
   double register_share(const StoredBuffer& stored, const Touch& written) const {
     for (const StageRun& run : group_.runs) {
       for (const Touch& touch : run.facts->touches) {
         if (touch.buffer != written.buffer || touch.moved == 0) continue;
         if (run.place > stored.inside) return 0;
+        const LaneMoves moved = lane_moves(touch, stored.layout, run.nest.lanes, 1);
+        if (moved.is_by_lane || moved.is_unaligned || moved.shuffles > 0) return 0;
         for (size_t k = stored.inside; k < run.path.size(); ++k) {
           const LoopNode& loop = node(run.path[k]);
           const bool is_serial = loop.kind != ForType::Unrolled && loop.kind != ForType::Vectorized;

@@ -75,13 +75,17 @@ class GroupBuilder {
     run.facts = &facts_.of(stage, *inlined_.at(stage));
     run.path = path_around(stage, nest, run.place);
     run.storage_place = is_at(stage.func) ? store_place(run) : 1;
-    const Cover extents = extents_of(run);
+    double share = 1;
+    const Cover extents = extents_of(run, share);
     run.nest = nest_trips(nest, extents);
+    const size_t first = run.path.size() - run.place;
+    if (first < run.nest.trips.size() && !is_lane_loop(run, first)) run.nest.trips[first] *= share;
     for (size_t depth = run.path.size() - run.place; depth < nest.loops.size(); ++depth)
       run.path.push_back(add_node(run.path.back(), {stage, static_cast<int16_t>(depth)},
                                   nest.loops[depth].kind,
                                   is_lane_loop(run, depth) ? 1 : run.nest.trips[depth]));
     run.cover = covers_of(run, nest, extents);
+    if (run.nest.lanes.iterator >= 0) run.nest.lanes.block = block_of(run);
     return runs_.emplace(stage, std::move(run)).first->second;
   }
 
@@ -142,6 +146,18 @@ class GroupBuilder {
     return index;
   }
 
+  // The points of the lanes' iterator inside of the innermost loop along it that is neither of lanes nor unrolled.
+  double block_of(const StageRun& run) const {
+    const auto i = static_cast<size_t>(run.nest.lanes.iterator);
+    size_t k = run.path.size() - 1;
+    const auto is_copy = [&] {
+      const ForType kind = node(run.path[k]).kind;
+      return kind == ForType::Unrolled || kind == ForType::Vectorized;
+    };
+    while (k > 0 && (is_copy() || run.cover[k][i] == run.cover[k + 1][i])) --k;
+    return static_cast<double>(run.cover[k > 0 ? k + 1 : 0][i]);
+  }
+
   // ---- points ----
 
   Cover with_box(StageId stage, const std::vector<int64_t>& box) const {
@@ -170,21 +186,33 @@ class GroupBuilder {
   }
 
   // The points of all loops of the nest. Where a Func is stored outside of the loop in which it is computed, an iteration
-  // computes only what the iteration before has not.
-  Cover extents_of(const StageRun& run) {
+  // computes only what the iteration before has not. `share`: the iterations that compute anything.
+  Cover extents_of(const StageRun& run, double& share) {
     if (!is_at(run.id.func) || run.place <= 1) return whole_cover(run.id, sizes_);
     std::vector<int64_t> box = box_in(run.id.func, run.path, run.place);
     const std::vector<int64_t> all = box;
+    std::vector<bool> is_window(box.size());
     for (size_t count = run.place - 1; count >= run.storage_place; --count) {
       const std::vector<int64_t> outer = box_in(run.id.func, run.path, count);
-      const double trips = node(run.path[count]).trips;
+      const double trips = full_trips(run.path[count], count);
       for (size_t d = 0; d < box.size(); ++d) {
-        if (outer[d] <= all[d] || box[d] != all[d] || trips <= 1) continue;
-        const auto step = static_cast<int64_t>(std::ceil(double(outer[d] - all[d]) / (trips - 1)));
-        box[d] = std::clamp<int64_t>(step, 1, all[d]);
+        if (outer[d] <= all[d] || is_window[d] || trips <= 1) continue;
+        is_window[d] = true;
+        const double step = double(outer[d] - all[d]) / (trips - 1);
+        box[d] = std::clamp<int64_t>(static_cast<int64_t>(std::ceil(step)), 1, all[d]);
+        share *= std::min(1.0, step);
       }
     }
     return with_box(run.id, box);
+  }
+
+  // How often a loop around other Funcs runs where no border cuts it short. Its covers are those of such a run, too.
+  double full_trips(int loop, size_t count) const {
+    const StageRun& run = runs_.at(node(loop).loop.stage);
+    double trips = 1;
+    for (size_t i = 0; i < run.cover[count].size(); ++i)
+      trips *= std::ceil(double(run.cover[count][i]) / double(run.cover[count + 1][i]));
+    return trips;
   }
 
   size_t store_place(const StageRun& run) const {

@@ -9,12 +9,13 @@ namespace retrograde::planning {
 
 namespace {
 
-// The iterators of a recurrence: those that move an index in which the read differs from the write.
+// The iterators of a recurrence: those that move an index in which the read differs from the write, also inside of clamps.
 IteratorSet carried_by(const Access& read, const Access& write) {
   IteratorSet result = 0;
   for (size_t d = 0; d < read.index.size(); ++d) {
     const IndexForm &from = read.index[d], &to = write.index[d];
-    if (!(from == to)) result |= from.moved_by() | to.moved_by();
+    const bool is_same = from.same_parts(to) && from.low == to.low && from.high == to.high;
+    if (!is_same) result |= from.moved_by() | to.moved_by();
   }
   return result;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <set>
 
 #include "autoschedule/cost/assumptions.h"
@@ -95,6 +96,30 @@ double touched_lines(const Touch& touch, const Layout& layout, const Cover& cove
   return lines * by_data * touch.components;
 }
 
+double bytes_by_sets(const Touch& touch, const Layout& layout, const Cover& cover,
+                     int64_t set_stride) {
+  const auto all = static_cast<double>(set_stride), line = static_cast<double>(line_bytes);
+  double touched = line, sets = line;  // bytes; of these, in different sets
+  double stride = touch.element_bytes;
+  for (const int16_t dimension : layout.order) {
+    const Span span = span_of(touch.sides[static_cast<size_t>(dimension)], cover);
+    if (touch.sides[static_cast<size_t>(dimension)].data != 0) return 0;
+    if (stride * span.reach <= touched) {
+      // Inside of the line, or of the rows so far.
+    } else if (stride < touched) {
+      touched = sets = stride * span.reach;
+    } else {
+      const auto step = static_cast<int64_t>(stride);
+      const double places = all / double(std::max(std::gcd(step, set_stride), line_bytes));
+      touched *= span.points;
+      sets *= std::min(span.points, places);
+    }
+    sets = std::min(sets, all);
+    stride *= layout.extents[static_cast<size_t>(dimension)];
+  }
+  return touched / sets * all;
+}
+
 LaneMoves lane_moves(const Touch& touch, const Layout& layout, const LaneLoop& lanes,
                      double vectors) {
   LaneMoves result;
@@ -108,8 +133,9 @@ LaneMoves lane_moves(const Touch& touch, const Layout& layout, const LaneLoop& l
       const double slope = move.slope / side.divisor * row;
       if (move.iterator == lanes.outer) outer_stride += slope;
       if (move.iterator != lanes.iterator) continue;
-      if (side.is_clamped) {  // the first and the last vector of a row
-        const double reach = lanes.count * std::abs(move.slope * lanes.step) / side.divisor;
+      if (side.is_clamped) {  // the first and the last block of a row
+        const double points = std::max(lanes.block, lanes.inner * lanes.step);
+        const double reach = points * std::abs(move.slope) / side.divisor;
         result.border_share = std::max(result.border_share, std::min(1.0, 2 * reach / side.most));
       }
       is_bent = is_bent || (side.is_bent && std::fmod(move.slope * lanes.step, side.divisor) != 0);

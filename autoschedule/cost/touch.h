@@ -53,6 +53,9 @@ struct LaneLoop {
   int depth = 0;  // of the loop
   double count = 1, inner = 1, step = 1;
   IteratorSet moves = 0;
+  // The points of the iterator in one iteration of the innermost loop along it that is no lane and no copy. Lowering
+  // gives whole iterations of that loop to a border.
+  double block = 1;
 };
 
 // Instructions of a load or store of all lanes.
@@ -60,11 +63,15 @@ struct LaneMoves {
   double vectors = 1, shuffles = 0;
   bool is_by_lane = false;    // an element at a time
   bool is_unaligned = false;  // vectors begin anywhere in a cache line
-  double border_share = 0;    // of vectors, some lanes of which are clamped to one element
+  double border_share = 0;    // of vectors, whose lanes are clamped one by one
 };
 
 // Cache lines while the loops run over these points.
 double touched_lines(const Touch& touch, const Layout& layout, const Cover& cover);
+// The bytes of a cache that would have to be touched evenly for as many lines in each set as the fullest sets have now.
+// `set_stride`: bytes from a line to the next one of its set.
+double bytes_by_sets(const Touch& touch, const Layout& layout, const Cover& cover,
+                     int64_t set_stride);
 // `vectors`: of the machine, that the lanes fill.
 LaneMoves lane_moves(const Touch& touch, const Layout& layout, const LaneLoop& lanes,
                      double vectors);

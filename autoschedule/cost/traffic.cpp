@@ -14,10 +14,15 @@ namespace retrograde::planning {
 
 namespace {
 
+// The bytes between lines of one set of a core's own caches. Processors scatter lines over the sets of the last cache.
+constexpr std::array<int64_t, Machine::last_cache> set_strides{page_bytes, second_cache_set_stride};
+
 // The part of a buffer that is touched.
 struct Region {
   int buffer = 0, run = 0;
   double bytes = 0;
+  std::array<double, set_strides.size()> by_sets =
+      {};  // a stride that leaves sets out fills others
   bool is_stored = false;
   double moved_bytes() const {
     return bytes * (is_stored ? 2 : 1);
@@ -92,12 +97,18 @@ class RegionFinder {
           is_same ? std::max(region.bytes, bytes)
                   : std::min(region.bytes + bytes, share * most * touch.components * line_bytes);
       region.is_stored = region.is_stored || touch.writes;
+      for (size_t c = 0; c < set_strides.size(); ++c) {
+        const double by_sets = bytes_by_sets(touch, stored.layout, cover, set_strides[c]);
+        region.by_sets[c] = std::max(region.by_sets[c], share * by_sets);
+      }
     }
     for (const Region& region : own) {
       Region& all = of_buffer(regions, region.buffer);
       if (region.bytes > all.bytes) all.run = region.run;
       all.bytes = std::max(all.bytes, region.bytes);
       all.is_stored = all.is_stored || region.is_stored;
+      for (size_t c = 0; c < set_strides.size(); ++c)
+        all.by_sets[c] = std::max(all.by_sets[c], region.by_sets[c]);
     }
   }
 
@@ -145,23 +156,34 @@ class TrafficWalk {
     return is_shared ? bytes / machine_.threads : bytes;
   }
 
+  bool has_sets(const Region& region, double room) const {
+    return level_ >= set_strides.size() || region.by_sets[level_] <= room;
+  }
+  bool fit(const Regions& regions, double room) const {
+    return bytes_of(regions) <= room &&
+           std::ranges::all_of(regions, [&](const Region& r) { return has_sets(r, room); });
+  }
+
   void visit(int n, double times) {
     const LoopNode& node = group_.nodes[static_cast<size_t>(n)];
     const bool outside =
         node.parent < 0 || !group_.nodes[static_cast<size_t>(node.parent)].in_parallel;
     const bool is_loop = node.parent >= 0;
-    if (bytes_of(regions_.run(n)) <= room(!outside) ||
-        (is_loop && bytes_of(regions_.iteration(n)) <= room(node.in_parallel)))
-      return load(regions_.run(n), times, n);
+    if (fit(regions_.run(n), room(!outside)) ||
+        (is_loop && fit(regions_.iteration(n), room(node.in_parallel))))
+      return load(regions_.run(n), times * std::min(1.0, node.trips), n);
     times *= node.trips;
     for (const int child : node.children) visit(child, times);
     if (!node.stages.empty()) load(regions_.own(n), times, n);
+    // All iterations have passed, not only those that were looked at.
+    for (const Region& region : regions_.run(n)) recent_.touch(region.buffer, region.bytes);
   }
 
   void load(const Regions& regions, double times, int n) {
     const double most = room(group_.nodes[static_cast<size_t>(n)].in_parallel);
     for (const Region& region : regions) {
-      if (recent_.distance(region.buffer, region.bytes, most) <= most) continue;
+      if (has_sets(region, most) && recent_.distance(region.buffer, region.bytes, most) <= most)
+        continue;
       const StageRun& run = group_.runs[static_cast<size_t>(region.run)];
       const bool in_parallel = group_.nodes[static_cast<size_t>(run.path.back())].in_parallel;
       found_.push_back({region.run, region.buffer, times * region.moved_bytes(), 0, in_parallel});

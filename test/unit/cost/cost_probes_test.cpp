@@ -101,6 +101,43 @@ TEST_F(StencilProbes, StripsRecomputeTheirBorders) {
   EXPECT_GT(compute_seconds(inlined), compute_seconds(sliding));
 }
 
+TEST_F(CostProbes, AWindowMovesByWholeRows) {
+  rows_sum(x, y) = exp(in(x, y));
+  out(x, y) = rows_sum(x, y - 1) + rows_sum(x, y) + rows_sum(x, y + 1);
+  const auto seconds_of = [&](const std::string& strip, const std::string& tail) {
+    return cost_of("out  root  y:" + strip + tail + ", y, x:16, vector x\n" +
+                   "rows_sum  at out/y  store at out/y:" + strip + "  y, x:16, vector x\n")
+        .stages[0]
+        .compute_seconds;
+  };
+  EXPECT_NEAR(seconds_of("640", " GuardWithIf") / seconds_of("512", ""), 1, 0.05);
+}
+
+TEST_F(CostProbes, AWindowStaysForIterationsThatNeedNoNewRow) {
+  rows_sum(x, y) = exp(in(x, y));
+  out(x, y) = rows_sum(x, y / 2) + rows_sum(x, y / 2 + 1);
+  const auto cost_at = [&](const std::string& place) {
+    return cost_of("out  root  y:512, y, x:16, vector x\nrows_sum  at out/" + place +
+                   "  y, x:16, vector x\n")
+        .stages[0];
+  };
+  const StageCost window = cost_at("y  store at out/y:512"), strips = cost_at("y:512");
+  EXPECT_NEAR(window.compute_seconds / strips.compute_seconds, 1, 0.05);
+  EXPECT_LT(window.bytes.back(), 1.1 * strips.bytes.back());
+}
+
+// Rows that all together exceed the first cache.
+TEST_F(CostProbes, BlocksOfAProducerLeaveAllOfItBehind) {
+  rows_sum(x, y) = in(x, y) + in(x, y + 1);
+  out(x, y) = rows_sum(x, y) + rows_sum(x, y + 1);
+  const auto bytes_of = [&](const std::string& loops) {
+    return cost_of("out  root  y:32, y, x:16, vector x\nrows_sum  at out/y:32  " + loops + "\n")
+        .stages[1]
+        .bytes[1];
+  };
+  EXPECT_NEAR(bytes_of("y:128, x:128, y, x:16, vector x") / bytes_of("y, x:16, vector x"), 1, 0.1);
+}
+
 TEST_F(StencilProbes, StripsAreFasterThanTheDetourThroughMemory) {
   EXPECT_LT(sliding.seconds, 0.7 * root.seconds);
   EXPECT_LT(sliding.seconds, strips.seconds);
@@ -115,7 +152,7 @@ TEST_F(StencilProbes, ThePeakIsWhatIsAliveAtOnce) {
 
 TEST_F(CostProbes, ATransposeLoadsALineForEachElement) {
   out(x, y) = in(y, x);
-  in.dim(0).set_estimate(0, 2048);
+  in.dim(0).set_estimate(0, 2064);  // rows in different sets
   in.dim(1).set_estimate(0, 4096);
   const StageCost rows_first = cost_of("out  root  y, x:16, vector x\n").stages[0];
   const StageCost tiles = cost_of("out  root  y:16, x:16, y, vector x\n").stages[0];
@@ -125,12 +162,82 @@ TEST_F(CostProbes, ATransposeLoadsALineForEachElement) {
   EXPECT_EQ(rows_first.bytes.back(), 3 * image_bytes);
 }
 
+// Sixteen rows whose lines are all in one set of L1.
+TEST_F(CostProbes, RowsThatShareSetsEvictEachOther) {
+  const auto lines_of = [&](int width) {
+    Func copy("copy");
+    copy(x, y) = in(x, y);
+    copy.set_estimate(x, 0, width).set_estimate(y, 0, 512);
+    in.dim(0).set_estimate(0, width);
+    in.dim(1).set_estimate(0, 512);
+    const Cost cost = priced(copy, "copy  root  y:16, x, vector y\n");
+    return cost.stages[0].bytes[1] / (width * 512);
+  };
+  EXPECT_GT(lines_of(1024), 5 * lines_of(1040));
+}
+
+// Rows of a recurrence along x wait for nothing but themselves, whether a read of the same row is clamped or not.
+TEST_F(CostProbes, AClampOfTheSameRowCarriesNothing) {
+  RDom r(1, 4095, 0, 2048, "r");
+  const auto chain_of = [&](const Expr& row) {
+    Func scan("scan");
+    scan(x, y) = in(x, y);
+    scan(r.x, r.y) += scan(r.x - 1, row) * 0.5f;
+    scan.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+    return priced(scan, "scan  root\n  .0  y, x:16, vector x\n  .1  r.y:8, r.x, unroll r.y\n")
+        .stages[1]
+        .compute_seconds;
+  };
+  EXPECT_NEAR(chain_of(clamp(r.y, 0, 2047)) / chain_of(r.y), 1, 0.01);
+}
+
+// The conditions of borders hold for all but a few iterations.
+TEST_F(CostProbes, ConditionsOfBordersAreFree) {
+  const auto seconds_of = [&](bool is_masked) {
+    Func sum("sum");
+    RDom r(0, 64, "r");
+    if (is_masked) r.where(likely(x > 2) && likely(y > 2) && likely(x < 4000));
+    sum(x, y) += in(x, y + r);
+    sum.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+    return priced(sum, "sum  root\n  .0  y, x:16, vector x\n  .1  y, r.x, x:16, vector x\n")
+        .stages[1]
+        .compute_seconds;
+  };
+  EXPECT_NEAR(seconds_of(true) / seconds_of(false), 1, 0.01);
+}
+
 // ---- arithmetic ----
 
 TEST_F(CostProbes, FunctionsCountByVectors) {
   out(x, y) = exp(in(x, y));
   const double seconds = compute_seconds(cost_of("out  root  y, x:16, vector x\n"));
   EXPECT_NEAR(seconds, columns * rows / 16 * (4 + 0.25 * 0.85) * 1e-9, 0.02 * seconds);
+}
+
+// Registers hold the vectors of a small array only if all loads are of the vectors that were stored.
+TEST_F(CostProbes, ShiftedVectorsComeFromMemory) {
+  rows_sum(x, y) = in(x, y) * 2;
+  const auto loads_of = [&](const Expr& value) {
+    Func sum("sum");
+    sum(x, y) = value;
+    sum.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+    const Cost cost = priced(sum,
+                             "sum  root  y, x:16, vector x\n"
+                             "rows_sum  at sum/x:16  y, unroll x:16, vector x\n");
+    return cost.stages[1].compute_seconds;
+  };
+  EXPECT_GT(loads_of(rows_sum(x, y) + rows_sum(x + 1, y)),
+            loads_of(rows_sum(x, y) + 1) + columns * rows / 16 * 0.4e-9);
+}
+
+// Lowering gives whole blocks to a border, and loads their elements one by one.
+TEST_F(CostProbes, ABorderIsABlock) {
+  out(x, y) = in(clamp(x - 1, 0, 4095), y) + in(clamp(x + 1, 0, 4095), y);
+  const double vectors = compute_seconds(cost_of("out  root  y, x:16, vector x\n"));
+  const double blocks = compute_seconds(cost_of("out  root  y, x:1024, unroll x:16, vector x\n"));
+  const double loops = compute_seconds(cost_of("out  root  y, x:1024, x:16, vector x\n"));
+  EXPECT_GT(blocks, 2 * vectors) << "half of the points are in the blocks of the borders";
+  EXPECT_NEAR(loops / vectors, 1, 0.05);
 }
 
 TEST_F(CostProbes, WhatALoopDoesNotChangeIsComputedOutsideOfIt) {
