@@ -14,6 +14,7 @@ constexpr double worth_another_sweep = 0.98;  // of the time before the last one
 constexpr int moves_of_a_func = 3;            // one after another, in one visit
 constexpr double smallest_share = 0.01;       // of the whole time: a Func with less is not visited
 constexpr double least_gain = 0.1;            // of the time of the stages that change
+constexpr double least_gain_of_all = 0.01;    // of the whole time
 constexpr int64_t prices_per_func = 200;      // for each plan of the beam
 
 // A plan of the beam. Steps are a list that plans share, the last first.
@@ -40,7 +41,8 @@ bool is_worth_it(const Cost& before, const Cost& after) {
     if (was != stage.seconds) changed += std::max(was, stage.seconds);
   }
   for (const auto& [stage, was] : seconds) changed += was;
-  return after.seconds < before.seconds - least_gain * changed;
+  const double least = std::max(least_gain * changed, least_gain_of_all * before.seconds);
+  return after.seconds < before.seconds - least;
 }
 
 FoundPlan found_of(const State& state) {
@@ -58,7 +60,7 @@ class Beam {
        int width)
       : context_(context),
         cost_(cost),
-        kept_(options.kept),
+        options_(options),
         width_(static_cast<size_t>(width)),
         left_(prices_per_func * static_cast<int64_t>(start.funcs.size()) * width) {
     states_.push_back({start, cost_.price(start), nullptr});
@@ -82,7 +84,7 @@ class Beam {
  private:
   const Context& context_;
   CostModel& cost_;
-  const std::vector<bool>& kept_;
+  const SearchOptions& options_;
   const size_t width_;
   int64_t left_;
   double most_bytes_;
@@ -102,7 +104,7 @@ class Beam {
   }
   bool is_worth_visiting(FuncId f) const {
     const auto i = static_cast<size_t>(f);
-    if (i < kept_.size() && kept_[i]) return false;
+    if (i < options_.kept.size() && options_.kept[i]) return false;
     return share_of(f) >= smallest_share * states_[0].cost.seconds;
   }
 
@@ -136,6 +138,7 @@ class Beam {
 
   void add_neighbours(const Candidate& from, FuncId f, std::vector<Candidate>& next) {
     for (const Move& move : all_moves()) {
+      if (options_.without.contains(move.name)) continue;
       for (Plan& plan : move.apply(from.plan, f, context_)) {
         if (left_ == 0) return;
         if (!seen_.insert(hash_of(plan)).second) continue;

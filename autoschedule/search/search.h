@@ -14,6 +14,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,7 @@ struct SearchOptions {
   double spare_bytes =
       std::numeric_limits<double>::infinity();  // alive at once, beyond those of the start
   std::vector<bool> kept;                       // by Func: no move changes how it runs
+  std::set<std::string> without;                // names of moves that are not made
 };
 
 struct SearchStep {

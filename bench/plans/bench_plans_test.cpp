@@ -131,7 +131,7 @@ TEST(Samples, BeginWithTheDefaultScheduleAndHaveEachPlanOnce) {
     sources.insert(plan.source.substr(0, plan.source.find_first_of(" ,")));
     beams += plan.source.find("beam 1") != std::string::npos;
   }
-  EXPECT_TRUE(sources.contains("search") && sources.contains("walk"));
+  EXPECT_TRUE(sources.contains("without") && sources.contains("walk"));
   EXPECT_EQ(beams, 1);
 }
 

@@ -2,17 +2,15 @@
 
 #include <algorithm>
 #include <limits>
-#include <mutex>
 #include <numeric>
 #include <random>
 #include <set>
 
 #include "autoschedule/memory_budget.h"
 #include "autoschedule/moves/move.h"
-#include "autoschedule/schedule_search.h"
 #include "diagnostics/text_hash.h"
 #include "driver/plan_search.h"
-#include "driver/schedule.h"
+#include "driver/schedule_difference.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/directives/wrappers.h"
 
@@ -34,7 +32,7 @@ std::set<std::string> names_of(const std::vector<FuncPtr>& outputs) {
 // Funcs that a schedule makes have other names in each process; the key does not depend on them.
 std::string key_of(const planning::Plan& plan, const std::set<std::string>& known) {
   const auto log = graph::schedule_log(planning::emit_plan(plan));
-  const uint64_t hash = text_hash(autoschedule::with_stable_names(log, known));
+  const uint64_t hash = text_hash(driver::with_stable_names(log, known));
   char key[17];
   std::snprintf(key, sizeof key, "%016llx", static_cast<unsigned long long>(hash));
   return key;
@@ -51,24 +49,25 @@ autoschedule::ScheduleRequest request_of(const SampleOptions& options) {
   return autoschedule::request_for(options.target, {});
 }
 
-// The plans that the search over the rules' decisions tries.
-std::vector<SampledPlan> plans_of_search(const std::vector<FuncPtr>& outputs,
-                                         const SampleOptions& options, const StandardPlan&) {
-  if (options.rules == 0) return {};
-  std::mutex mutex;
-  std::vector<std::vector<FuncPtr>> tried;
-  const auto cost = [&](const std::vector<FuncPtr>& scheduled) {
-    const double seconds = driver::predicted_seconds(scheduled, options.target, 0);
-    const std::lock_guard lock(mutex);
-    tried.push_back(scheduled);
-    return seconds;
-  };
-  autoschedule::search_schedule(outputs, request_of(options), Scheduling::Everything, cost,
-                                options.rules);
+// The plans of the rules without one or two of their decisions.
+std::vector<SampledPlan> plans_of_decisions(const std::vector<FuncPtr>& outputs,
+                                            const SampleOptions& options, const StandardPlan&) {
   std::vector<SampledPlan> result;
   const std::set<std::string> known = names_of(outputs);
-  for (const auto& scheduled : tried) result.push_back(imported("search", scheduled, known));
-  std::ranges::sort(result, {}, &SampledPlan::key);  // threads of the search finish in any order
+  const auto add = [&](const std::set<Decision>& without) {
+    autoschedule::ScheduleRequest request = request_of(options);
+    request.options.without = without;
+    if (result.size() < options.rules)
+      result.push_back(imported(
+          "without",
+          autoschedule::schedule_within_budget(outputs, request, Scheduling::Everything).outputs,
+          known));
+  };
+  for (const Decision first : all_decisions()) add({first});
+  for (const Decision first : all_decisions()) {
+    for (const Decision second : all_decisions())
+      if (first < second) add({first, second});
+  }
   return result;
 }
 
@@ -132,8 +131,8 @@ std::vector<SampledPlan> plans_of_beams(const std::vector<FuncPtr>& outputs,
   const std::set<std::string> known = names_of(outputs);
   std::vector<SampledPlan> result;
   for (const int width : options.widths) {
-    const auto found = driver::search_plans(standard.scheduled, outputs, options.machine,
-                                            std::numeric_limits<int64_t>::max(), width);
+    const auto found = driver::search_plans(standard.scheduled, outputs, {}, options.machine,
+                                            {width, std::numeric_limits<int64_t>::max()});
     const planning::Plan& plan = found.result.found.at(0).plan;
     result.push_back({"beam " + std::to_string(width), key_of(plan, known), plan});
   }
@@ -144,7 +143,7 @@ std::vector<SampledPlan> plans_of_beams(const std::vector<FuncPtr>& outputs,
 
 std::vector<SampledPlan> sample_plans(const std::vector<FuncPtr>& outputs,
                                       const SampleOptions& options) {
-  const PlanSource sources[] = {plans_of_beams, plans_of_search, plans_of_walks};
+  const PlanSource sources[] = {plans_of_beams, plans_of_decisions, plans_of_walks};
   StandardPlan standard;
   standard.scheduled =
       autoschedule::schedule_within_budget(outputs, request_of(options), Scheduling::Everything)

@@ -17,7 +17,7 @@ using retrograde::Target;
 namespace planning = retrograde::planning;
 
 struct SampledPlan {
-  // Where it comes from: "rules", "search", "walk tile root", "beam 1". If searches over moves take it, too, they
+  // Where it comes from: "rules", "without", "walk tile root", "beam 1". If searches over moves take it, too, they
   // are named: "rules, beam 1, beam 4".
   std::string source;
   std::string key;  // equal for equal plans, in each run
@@ -27,7 +27,7 @@ struct SampledPlan {
 struct SampleOptions {
   Target target;
   planning::Machine machine;      // for which plans are searched
-  size_t rules = 16;              // plans of a search over the rules' decisions
+  size_t rules = 16;              // plans of the rules without one or two decisions
   size_t walks = 16;              // plans of random moves from the default plan
   uint32_t seed = 1;              // of the moves
   std::vector<int> widths = {1};  // searches over moves, a plan each

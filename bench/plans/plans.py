@@ -216,7 +216,7 @@ def read_options():
     parser.add_argument("build")
     parser.add_argument("--long", action="store_true", help="all programs and more plans")
     parser.add_argument("--program", action="append")
-    parser.add_argument("--rules", type=int, help="plans of a search over the rules' decisions")
+    parser.add_argument("--rules", type=int, help="plans of the rules without one or two decisions")
     parser.add_argument("--walks", type=int, help="plans of random moves")
     parser.add_argument("--widths", default="1,4", help="of searches over moves, a plan each")
     parser.add_argument("--seed", type=int, default=1, help="of the moves")

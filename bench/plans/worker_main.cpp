@@ -246,7 +246,7 @@ int run(int argc, char** argv) {
   CLI::App app{"prices and measures plans of one program"};
   app.add_option("graph", options.graph)->required();
   app.add_option("--rules", options.sample.rules,
-                 "plans of a search over the rules' decisions, at the most");
+                 "plans of the rules without one or two decisions, at the most");
   app.add_option("--walks", options.sample.walks, "plans of random moves, at the most");
   app.add_option("--widths", options.sample.widths, "of searches over moves")->delimiter(',');
   app.add_option("--seed", options.sample.seed, "of the moves");

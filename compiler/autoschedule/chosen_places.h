@@ -14,8 +14,8 @@ namespace retrograde::autoschedule {
 
 struct ChosenPlaces {
   std::unordered_set<const Symbol*> store, inlined;
-  // Inlined or stored where that can be: see ScheduleRequest.
-  std::unordered_set<const Symbol*> recomputed, preferred;
+  // Inlined where that can be: see ScheduleRequest.
+  std::unordered_set<const Symbol*> recomputed;
 };
 
 bool has_chosen_places(const AutoscheduleOptions& options);

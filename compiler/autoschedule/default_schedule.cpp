@@ -1,7 +1,6 @@
 #include "autoschedule/default_schedule.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <unordered_set>
 
@@ -137,8 +136,7 @@ void move_and_join(Movable funcs, const ScheduleRequest& request, const GiveLoop
   // Of chains of stencils, before these are put into strips of their own.
   if (slices) compute_in_reductions(outputs, readers, pure_primal(stored), whole, sizes);
   if (request.makes(Decision::Strips)) {
-    const double row_scale = std::ldexp(1.0, request.scales.strip_rows);
-    compute_in_strips(outputs, given, whole, sizes, row_scale, give_rows);
+    compute_in_strips(outputs, given, whole, sizes, give_rows);
   }
   if (slices) compute_sums_in_blocks(outputs, before, given, together, sizes);
   if (slices) compute_in_slices(readers, stored, whole, sizes);
@@ -210,7 +208,6 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
     limits = placement_limits(order);
   ChosenPlaces chosen = chosen_places(outputs, limits, request.options);
   chosen.recomputed = with_names(outputs, request.recomputed);
-  chosen.preferred = with_names(outputs, request.stored);
   if (what != Scheduling::Everything) limits = PlacementLimits();
   std::unordered_set<const Symbol*> whole = limits.stay;
   whole.insert(limits.levels.begin(), limits.levels.end());

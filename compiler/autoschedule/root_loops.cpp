@@ -393,9 +393,7 @@ class LoopChooser {
   std::optional<RegisterTile> tile_of(const FuncContents& f, const Definition& reduction) const {
     if (!makes(Decision::RegisterTiles)) return std::nullopt;
     const bool has_lanes = f.made && f.made->lanes > 0;
-    planning::Machine machine = request_.machine;
-    machine.accumulator_share =
-        std::ldexp(machine.accumulator_share, request_.scales.register_tile);
+    const planning::Machine& machine = request_.machine;
     const int64_t phases = phases_of_tile(f, reduction, schedule_lanes, sizes_);
     if (phases > 1) {
       if (auto tile = register_tile(f, reduction, schedule_lanes, 2, machine, sizes_, phases))

@@ -1,7 +1,6 @@
 #include "autoschedule/schedule_request.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace retrograde::autoschedule {
 
@@ -18,9 +17,6 @@ ScheduleRequest request_for(const Target& target, const AutoscheduleOptions& opt
 planning::Machine machine_of(const ScheduleRequest& request) {
   planning::Machine machine = request.machine;
   if (request.options.threads > 0) machine.threads = request.options.threads;
-  machine.parallel_tasks = std::ldexp(machine.parallel_tasks, request.scales.tasks);
-  double& bytes = machine.levels[planning::Machine::last_cache].bytes;
-  bytes = std::ldexp(bytes, request.scales.caches);
   return machine;
 }
 

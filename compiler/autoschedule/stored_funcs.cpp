@@ -97,7 +97,6 @@ class StorageChooser {
       bool stored =
           is_worth_storing(uses_[f.get()], left_inline && f->is_pure() ? explosion : cheap);
       stored |= left_inline ? computes_more_than_is_read(*f) : is_output(*f) || !f->is_pure();
-      stored |= chosen_.preferred.contains(f.get());
       stored |= is_worth_choosing_once(uses_[f.get()]);
       stored |= uses_[f.get()].reads > 1.5 && interleaves_rows(*f);
       stored |= is_stored_running_sum(f);

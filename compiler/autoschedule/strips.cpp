@@ -129,8 +129,7 @@ double operations_of_all_stages(const FuncContents& f) {
 
 class Group {
  public:
-  Group(FuncPtr last, const SizeEstimate& sizes, double row_scale)
-      : last_(std::move(last)), sizes_(sizes), row_scale_(row_scale) {
+  Group(FuncPtr last, const SizeEstimate& sizes) : last_(std::move(last)), sizes_(sizes) {
     for (size_t d = 0; d < last_->args.size(); ++d) own_.push_back({d, 1, 0, 0, 0, {}});
   }
 
@@ -310,7 +309,7 @@ class Group {
     const int64_t strips = has_sums() ? sizes_.machine().enough_tasks() : enough_strips;
     const double most = std::max(least_rows, all * static_cast<double>(tasks) / strips);
     const double rows = has_sums() ? most : std::clamp(halo * rows_a_halo, least_rows, most);
-    return static_cast<int64_t>(std::ceil(rows * row_scale_));
+    return static_cast<int64_t>(std::ceil(rows));
   }
 
   double bytes_of_windows(const StripLoops& loops) const {
@@ -368,7 +367,6 @@ class Group {
 
   const FuncPtr last_;
   const SizeEstimate& sizes_;
-  const double row_scale_;
   Windows own_;
   std::vector<FuncPtr> members_;
   std::unordered_map<const Symbol*, Windows> windows_;
@@ -411,14 +409,8 @@ class Grouping {
  public:
   // `but`: none of these, as the last of a group neither.
   Grouping(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& given,
-           const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes,
-           double row_scale)
-      : given_(given),
-        readers_(outputs),
-        hosts_(outputs, given),
-        but_(but),
-        sizes_(sizes),
-        row_scale_(row_scale) {}
+           const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes)
+      : given_(given), readers_(outputs), hosts_(outputs, given), but_(but), sizes_(sizes) {}
 
   // `apart`: Funcs that join no others.
   std::vector<std::unique_ptr<Group>> groups(const std::unordered_set<const Symbol*>& apart) {
@@ -432,7 +424,7 @@ class Grouping {
       Group* group = is_alone ? nullptr : group_that_reads(reads);
       if (!group || !group->join(f, reads)) {
         if (!f->is_pure()) continue;
-        groups.push_back(std::make_unique<Group>(f, sizes_, row_scale_));
+        groups.push_back(std::make_unique<Group>(f, sizes_));
         group = groups.back().get();
       }
       group_of_[f.get()] = group;
@@ -478,7 +470,6 @@ class Grouping {
   const Readers hosts_;
   const std::unordered_set<const Symbol*>& but_;
   const SizeEstimate& sizes_;
-  const double row_scale_;
   std::unordered_map<const Symbol*, Group*> group_of_;
 };
 
@@ -486,8 +477,8 @@ class Grouping {
 
 void compute_in_strips(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& given,
                        const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes,
-                       double row_scale, const GiveLoopsOfRows& give_rows) {
-  Grouping grouping(outputs, given, but, sizes, row_scale);
+                       const GiveLoopsOfRows& give_rows) {
+  Grouping grouping(outputs, given, but, sizes);
   auto groups = grouping.groups({});
   const auto apart = grouping.that_keep_others(groups);
   if (!apart.empty()) groups = grouping.groups(apart);

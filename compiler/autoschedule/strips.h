@@ -28,10 +28,9 @@ using GiveLoopsOfRows =
 
 // Moves those of `given`, which this scheduler has computed at root and given loops, into the strips
 // of the only group of such Funcs that reads them, where that is less work than a way to memory.
-// `but`: none of these, as the last of a group neither. `row_scale`: strips have so many times the rows that the rules
-// choose.
+// `but`: none of these, as the last of a group neither.
 void compute_in_strips(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr>& given,
                        const std::unordered_set<const Symbol*>& but, const SizeEstimate& sizes,
-                       double row_scale, const GiveLoopsOfRows& give_rows);
+                       const GiveLoopsOfRows& give_rows);
 
 }  // namespace retrograde::autoschedule

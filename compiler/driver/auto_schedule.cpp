@@ -2,7 +2,6 @@
 //
 // It gives a schedule (choose_schedule.h) to a copy of the graph. The directives that the log of the copy has beyond
 // that of the pipeline are then given to the pipeline, and are the source.
-#include "autoschedule/choose_schedule.h"
 #include "autoschedule/keep_graph.h"
 #include "diagnostics/large_stack.h"
 #include "driver/schedule.h"
@@ -35,8 +34,8 @@ void schedule_all(const Pipeline& pipeline, const Target& target, const MachineP
     autoschedule::ScheduleRequest request =
         autoschedule::request_for(target, spec.autoschedule, machine);
     request.on_gpu = is_for_gpu(target);
-    ChosenSchedule chosen = autoschedule::choose_schedule(
-        wrapped, request, autoschedule::Scheduling::Everything, search_cost(request, target));
+    ChosenSchedule chosen =
+        choose_schedule(wrapped, request, autoschedule::Scheduling::Everything, target);
     const autoschedule::ScheduledGraph& scheduled = chosen.graph;
     ScheduleLog log = schedule_log(scheduled.outputs);
     log.entries.erase(log.entries.begin(), log.entries.begin() + given);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <unordered_set>
 
+#include "autoschedule/machine/kept_machine.h"
 #include "graph/directives/give_directive.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/directives/wrappers.h"
@@ -16,10 +17,14 @@ using planning::Plan;
 namespace {
 
 // Funcs that no move changes, by number.
-std::vector<bool> kept_funcs(const Plan& plan, const std::vector<FuncPtr>& unscheduled) {
+std::vector<bool> kept_funcs(const Plan& plan, const std::vector<FuncPtr>& unscheduled,
+                             const AutoscheduleOptions& options) {
   std::unordered_set<std::string> of_user;
   for (const FuncPtr& f : topological_order(unscheduled)) {
     if (graph::has_directives(*f)) of_user.insert(f->name);
+  }
+  for (const auto* named : {&options.store, &options.inlined}) {
+    for (const FuncName& f : *named) of_user.insert(f.name);
   }
   const auto makes_func = [](const graph::LoggedDirective& logged) {
     return logged.stage >= 0 && !graph::made_by(logged.directive).empty();
@@ -29,28 +34,61 @@ std::vector<bool> kept_funcs(const Plan& plan, const std::vector<FuncPtr>& unsch
   });
 }
 
+// The moves that make a decision.
+std::vector<const char*> moves_of(Decision decision) {
+  switch (decision) {
+    case Decision::ScatterStrategy:
+      return {"scatter_lanes"};
+    case Decision::RegisterTiles:
+      return {"register_tile"};
+    case Decision::LayoutStaging:
+      return {"permute_storage"};
+    case Decision::JoinSweeps:
+      return {"fuse_stages"};
+    case Decision::Slices:
+    case Decision::Strips:
+      return {"compute_at"};
+    case Decision::TaskSizes:
+      return {"parallelise"};
+    case Decision::Choices:
+      return {"unroll"};
+    case Decision::CutReductions:
+      break;
+  }
+  return {};
+}
+
 }  // namespace
 
 std::vector<FuncPtr> PlanSearch::emitted(const FoundPlan& found) const {
   return planning::emit_changes(found.plan, rules);
 }
 
+planning::Machine search_machine(const AutoscheduleOptions& options, const Target& target) {
+  planning::Machine machine = planning::machine_for(target);
+  if (options.threads > 0) machine.threads = options.threads;
+  return machine;
+}
+
 PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
-                        const std::vector<FuncPtr>& unscheduled, const planning::Machine& machine,
-                        int64_t spare_bytes, int width) {
+                        const std::vector<FuncPtr>& unscheduled, const AutoscheduleOptions& options,
+                        const planning::Machine& machine, const PlanSearchOptions& search) {
   const std::vector<FuncPtr> outputs = graph::apply_wrappers(scheduled);
-  PlanSearch search{{}, planning::import_plan(outputs)};
+  PlanSearch result{{}, planning::import_plan(outputs)};
   const planning::AccessGraph accesses(outputs);
   const planning::SizeModel sizes(accesses, {planning::unknown_extent});
   planning::Dependences dependences(accesses);
   planning::CostModel cost(accesses, sizes, machine);
-  planning::SearchOptions options;
-  options.width = width;
-  options.spare_bytes = static_cast<double>(spare_bytes);
-  options.kept = kept_funcs(search.rules, unscheduled);
-  search.result =
-      planning::search(search.rules, {accesses, sizes, machine, dependences}, cost, options);
-  return search;
+  planning::SearchOptions beam;
+  beam.width = search.width;
+  beam.spare_bytes = static_cast<double>(search.spare_bytes);
+  beam.kept = kept_funcs(result.rules, unscheduled, options);
+  for (const Decision decision : options.without) {
+    for (const char* move : moves_of(decision)) beam.without.insert(move);
+  }
+  result.result =
+      planning::search(result.rules, {accesses, sizes, machine, dependences}, cost, beam);
+  return result;
 }
 
 }  // namespace retrograde::driver

@@ -4,6 +4,8 @@
 #pragma once
 
 #include "autoschedule/search/search.h"
+#include "frontend/schedule/autoschedule_options.h"
+#include "ir/target.h"
 
 namespace retrograde::driver {
 
@@ -15,10 +17,19 @@ struct PlanSearch {
   std::vector<FuncPtr> emitted(const planning::FoundPlan& found) const;
 };
 
-// `scheduled`: the graph with the schedule of the rules; `unscheduled`: before. What its user scheduled stays as it is, and
-// so do Funcs whose directives made others. `spare_bytes`: that may be alive at once beyond those of `scheduled`.
+struct PlanSearchOptions {
+  int width = 1;            // of the beam
+  int64_t spare_bytes = 0;  // that may be alive at once beyond those of `scheduled`
+};
+
+// The machine that the cost of a search is for: that of the cost model, with the threads of the options.
+planning::Machine search_machine(const AutoscheduleOptions& options, const Target& target);
+
+// `scheduled`: the graph with the schedule of the rules; `unscheduled`: before. What its user scheduled or named in the
+// options stays as it is, and so do Funcs whose directives made others. Decisions that the options leave out forbid the
+// moves that make them.
 PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
-                        const std::vector<FuncPtr>& unscheduled, const planning::Machine& machine,
-                        int64_t spare_bytes, int width);
+                        const std::vector<FuncPtr>& unscheduled, const AutoscheduleOptions& options,
+                        const planning::Machine& machine, const PlanSearchOptions& search);
 
 }  // namespace retrograde::driver

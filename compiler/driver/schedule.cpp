@@ -33,23 +33,23 @@ bool is_scheduled(const std::vector<FuncPtr>& outputs) {
 
 // `searches`: by `cost`.
 ChosenSchedule schedule_graph(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
-                              const autoschedule::ScheduleCost& cost, bool wants_runner_up) {
+                              const Target& target, bool wants_runner_up) {
   const bool searches = request.options.search || wants_runner_up;
   const std::vector<FuncPtr> wrapped = apply_wrappers(outputs);
   ChosenSchedule result;
   if (!autoschedule::is_differentiated(wrapped)) {
     result.graph.outputs = autoschedule::with_large_funcs_at_root(wrapped, request);
     if (searches) {
-      result.search.note = autoschedule::note_against_search(
-          wrapped, "compiling searches schedules of gradients", "none of its Funcs is one",
-          "Call auto_schedule() with these options");
+      result.search.note = note_against_search(wrapped, "compiling searches schedules of gradients",
+                                               "none of its Funcs is one",
+                                               "Call auto_schedule() with these options");
     }
     return result;
   }
   result.graph.outputs = autoschedule::with_graph_rewrites(wrapped, /*on_gpu=*/false);
   if (!searches && is_scheduled(result.graph.outputs)) return result;
-  return autoschedule::choose_schedule(result.graph.outputs, request, Scheduling::Gradients, cost,
-                                       wants_runner_up);
+  return choose_schedule(result.graph.outputs, request, Scheduling::Gradients, target,
+                         wants_runner_up);
 }
 
 }  // namespace
@@ -60,8 +60,7 @@ ChosenSchedule schedule(const PipelineSpec& pipeline, const Target& target, bool
   ChosenSchedule result;
   run_on_large_stack([&] {
     const graph::FirstReadsMemo memo;
-    result =
-        schedule_graph(pipeline.outputs, request, search_cost(request, target), wants_runner_up);
+    result = schedule_graph(pipeline.outputs, request, target, wants_runner_up);
   });
   return result;
 }
@@ -74,7 +73,7 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
   std::vector<FuncPtr> result;
   run_on_large_stack([&] {
     const graph::FirstReadsMemo memo;
-    result = schedule_graph(outputs, request, {}, /*wants_runner_up=*/false).graph.outputs;
+    result = schedule_graph(outputs, request, Target(), /*wants_runner_up=*/false).graph.outputs;
   });
   return result;
 }
@@ -102,13 +101,6 @@ double predicted_seconds(const std::vector<FuncPtr>& scheduled, const Target& ta
   return tuning::predicted_seconds(
       function, tuning::program_sizes(function, tuning::output_shapes(scheduled)),
       planning::machine_for(target), threads);
-}
-
-autoschedule::ScheduleCost search_cost(const ScheduleRequest& request, const Target& target) {
-  return
-      [target, threads = autoschedule::threads_of(request)](const std::vector<FuncPtr>& scheduled) {
-        return predicted_seconds(scheduled, target, threads);
-      };
 }
 
 }  // namespace retrograde::driver

@@ -3,19 +3,17 @@
 //   Funcs => wrappers applied => graph rewrites => directives of the autoscheduler => lowering
 //
 // Only this file and auto_schedule.cpp know the order of these steps. They need every layer from `autoschedule` to
-// `tuning`, so they stand above all of them; the cost of a search goes down as a function.
+// `tuning`, so they stand above all of them.
 #pragma once
 
 #include <vector>
 
-#include "autoschedule/choose_schedule.h"
 #include "autoschedule/machine/machine.h"
+#include "driver/choose_schedule.h"
 #include "frontend/run/compiled_pipeline.h"
 #include "frontend/run/pipeline.h"
 
 namespace retrograde::driver {
-
-using autoschedule::ChosenSchedule;
 
 // The graph that is lowered: the pipeline's outputs with their wrappers applied or, if there are adjoints or Funcs whose
 // inlining would explode code size, those of a copy that has its schedule. `wants_runner_up`: searches without being
@@ -33,11 +31,8 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
 // and the target has no GPU, the copy keeps those instead.
 Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target);
 
-// Predicted run time of a scheduled graph, the cost of a search. Sizes are the estimates; 0 threads means those of the
-// machine. Throws what lowering throws.
+// Predicted run time of a scheduled graph. Sizes are the estimates; 0 threads means those of the machine. Throws what
+// lowering throws.
 double predicted_seconds(const std::vector<FuncPtr>& scheduled, const Target& target, int threads);
-// The cost of a search for the target and the request's threads.
-autoschedule::ScheduleCost search_cost(const autoschedule::ScheduleRequest& request,
-                                       const Target& target);
 
 }  // namespace retrograde::driver

@@ -1,6 +1,6 @@
 // Tests schedules that a search finds by predicted time: they are legal, right, and never predicted to be slower than
 // the schedules of the rules. Also tests the report on the runner-up, and on programs that cannot be searched.
-#include "autoschedule/choose_schedule.h"
+#include "driver/choose_schedule.h"
 
 #include <gtest/gtest.h>
 

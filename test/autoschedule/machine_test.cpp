@@ -77,15 +77,6 @@ TEST(Machine, ParametersOfAUserReplaceThreadsAndTheLastCache) {
   EXPECT_EQ(made_for(MachineParams(-1, 1 << 16, 40)).threads, planning::reference_threads);
 }
 
-TEST(Machine, ASearchScalesIt) {
-  autoschedule::ScheduleRequest request;
-  request.options.threads = 3;
-  request.scales.tasks = -2;
-  request.scales.caches = 1;
-  EXPECT_EQ(autoschedule::machine_of(request).enough_tasks(), 3);
-  EXPECT_EQ(autoschedule::machine_of(request).last_cache_bytes(), 32 << 20);
-}
-
 // ---- the text form ----
 
 TEST(Machine, RoundTripsAsJson) {

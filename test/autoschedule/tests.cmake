@@ -17,7 +17,6 @@ retrograde_test(
   row_reductions_test
   row_scans_test
   row_sweeps_test
-  schedule_search_test
   step_loops_test
   strided_terms_test
   sum_blocks_test

@@ -41,8 +41,8 @@ class Layers(unittest.TestCase):
                          ["compiler/autoschedule/a.cpp:2: autoschedule may not include driver/schedule.h"])
 
     def test_code_in_process_may_not_include_the_autoscheduler(self):
-        self.assertEqual(found({"compiler/jit/a.h": '#include "autoschedule/choose_schedule.h"\n'}, LAYERS),
-                         ["compiler/jit/a.h:1: jit may not include autoschedule/choose_schedule.h"])
+        self.assertEqual(found({"compiler/jit/a.h": '#include "autoschedule/default_schedule.h"\n'}, LAYERS),
+                         ["compiler/jit/a.h:1: jit may not include autoschedule/default_schedule.h"])
 
     def test_only_the_front_end_calls_the_driver_through_its_interface(self):
         include = f'#include "{check_layers.INTERFACE}"\n'

@@ -181,8 +181,9 @@ void tune_command(const CommandLine& line) {
   const Folder folder;
   run_command(line.command, folder.path());
   std::vector<std::string> files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder.path()))
-    files.push_back(entry.path());
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+    if (entry.path().extension() == ".graph") files.push_back(entry.path());
+  }
   if (files.empty())
     user_error("tune what " + retrograde::quoted(line.command[0]) + " compiles",
                "it compiles a gradient, or calls auto_schedule()", "it did neither",

@@ -5,18 +5,17 @@
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
-#include <mutex>
 #include <ostream>
 #include <set>
 #include <system_error>
 #include <thread>
-#include <tuple>
 
 #include "autoschedule/machine/kept_machine.h"
-#include "autoschedule/schedule_search.h"
+#include "autoschedule/memory_budget.h"
 #include "diagnostics/error.h"
 #include "diagnostics/large_stack.h"
-#include "driver/schedule.h"
+#include "driver/plan_search.h"
+#include "driver/schedule_difference.h"
 #include "graph/directives/wrappers.h"
 #include "graph/graph.h"
 #include "tuning/measure_schedule.h"
@@ -29,6 +28,7 @@ using graph::FuncPtr;
 using Clock = std::chrono::steady_clock;
 constexpr double warm_up = 4;   // times a schedule's run time, before the first measurement
 constexpr double hopeless = 3;  // times the best time: not worth a second run
+constexpr int most_candidates = 32;
 
 struct Candidate {
   std::vector<FuncPtr> outputs;
@@ -36,41 +36,32 @@ struct Candidate {
   double predicted_seconds = 0;
 };
 
-// Collects the candidates that the search evaluates: the rules' schedule first, then by predicted time. Several threads
-// of the search may add at once.
-class Candidates {
- public:
-  explicit Candidates(const std::vector<FuncPtr>& outputs) : outputs_(outputs) {
-    for (const FuncPtr& f : graph::topological_order(outputs)) known_.insert(f->name);
+// The rules' schedule first, then what a wide search over moves finds, by predicted time.
+std::vector<Candidate> find_candidates(const std::vector<FuncPtr>& outputs, const Target& target,
+                                       int threads) {
+  std::set<std::string> known;  // names of the unscheduled graph
+  for (const FuncPtr& f : graph::topological_order(outputs)) known.insert(f->name);
+  AutoscheduleOptions options;
+  options.threads = threads;
+  const autoschedule::ScheduledGraph rules = autoschedule::schedule_within_budget(
+      outputs, autoschedule::request_for(target, options), autoschedule::Scheduling::Everything);
+  driver::PlanSearchOptions wide;
+  wide.width = most_candidates;
+  wide.spare_bytes = std::max<int64_t>(rules.memory.budget_bytes - rules.memory.bytes, 0);
+  const driver::PlanSearch search = driver::search_plans(
+      rules.outputs, outputs, options, driver::search_machine(options, target), wide);
+  std::vector<Candidate> candidates;
+  const auto add = [&](const planning::FoundPlan& found) {
+    std::vector<FuncPtr> scheduled = search.emitted(found);
+    std::string log = driver::with_stable_names(graph::schedule_log(scheduled), known);
+    candidates.push_back({std::move(scheduled), std::move(log), found.cost.seconds});
+  };
+  add(search.result.start);
+  for (const planning::FoundPlan& found : search.result.found) {
+    if (!(found.plan == search.result.start.plan)) add(found);
   }
-
-  std::vector<Candidate> find(const Target& target, int threads) {
-    autoschedule::ScheduleRequest request = autoschedule::request_for(target, {});
-    request.options.threads = threads;
-    const auto cost = [&](const std::vector<FuncPtr>& scheduled) {
-      const double seconds = driver::predicted_seconds(scheduled, target, threads);
-      add(scheduled, seconds);
-      return seconds;
-    };
-    autoschedule::search_schedule(outputs_, request, autoschedule::Scheduling::Everything, cost);
-    std::sort(found_.begin() + 1, found_.end(), [](const Candidate& a, const Candidate& b) {
-      return std::tie(a.predicted_seconds, a.log) < std::tie(b.predicted_seconds, b.log);
-    });
-    return std::move(found_);
-  }
-
- private:
-  const std::vector<FuncPtr>& outputs_;
-  std::set<std::string> known_;  // names of the unscheduled graph
-  std::mutex mutex_;
-  std::vector<Candidate> found_;
-
-  void add(const std::vector<FuncPtr>& scheduled, double seconds) {
-    std::string log = autoschedule::with_stable_names(graph::schedule_log(scheduled), known_);
-    const std::lock_guard lock(mutex_);
-    found_.push_back({scheduled, std::move(log), seconds});
-  }
-};
+  return candidates;
+}
 
 Measurement measure(const Candidate& candidate, const Target& target, const Options& options,
                     double best_seconds) {
@@ -122,7 +113,7 @@ class Session {
   }
 
   void run() {
-    const std::vector<Candidate> all = Candidates(outputs_).find(target_, threads_of(options_));
+    const std::vector<Candidate> all = find_candidates(outputs_, target_, threads_of(options_));
     out_ << name_ << ": " << all.size() << " schedules\n";
     const auto begin = Clock::now();
     for (size_t i = 0; i < all.size(); i++) {

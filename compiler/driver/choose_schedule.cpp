@@ -1,0 +1,162 @@
+#include "driver/choose_schedule.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "autoschedule/size_estimate.h"
+#include "diagnostics/error.h"
+#include "driver/plan_search.h"
+#include "driver/schedule.h"
+#include "driver/schedule_difference.h"
+#include "graph/definitions/parameter_contents.h"
+#include "graph/directives/give_directive.h"
+#include "graph/directives/schedule_log.h"
+#include "ir/build.h"
+#include "simplify/simplify.h"
+
+namespace retrograde::driver {
+
+using autoschedule::ScheduleRequest;
+using autoschedule::Scheduling;
+using planning::FoundPlan;
+
+namespace {
+
+constexpr int width = 4;                // of the beam
+constexpr double worth_leaving = 0.95;  // of the cost of the rules' plan
+
+std::string words_for(const std::vector<FuncPtr>& outputs) {
+  return listed(outputs, [](const FuncPtr& f) { return quoted(f->name); });
+}
+
+// The size of an image or of an output that nobody told; empty: all are known.
+std::string unknown_size(const std::vector<FuncPtr>& outputs) {
+  const auto says = [](const Expr& e) { return e.defined() && as_const_int(simplify(e)); };
+  for (const auto& p : parameters_of(outputs)) {
+    for (size_t d = 0; p->is_buffer && !p->buffer && d < static_cast<size_t>(p->dimensions); ++d) {
+      const BufferConstraint c = d < p->constraints.size() ? p->constraints[d] : BufferConstraint();
+      if (!says(c.extent) && !says(c.extent_estimate))
+        return text("the extent of dimension ", d, " of ", quoted(p->name), " is not known");
+    }
+  }
+  const autoschedule::SizeEstimate sizes(outputs);
+  for (const FuncPtr& f : outputs) {
+    for (size_t d = 0; d < f->args.size(); ++d) {
+      if (!sizes.extent(*f, d))
+        return text("the extent of ", quoted(f->args[d]), " of ", quoted(f->name), " is not known");
+    }
+  }
+  return "";
+}
+
+// Why there is nothing to search; empty: there is.
+std::string reason_against(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request) {
+  if (request.on_gpu) {
+    return note_against_search(outputs, "a search predicts times of processors",
+                               "the target has a GPU",
+                               "Search for a target without one, or leave the search out");
+  }
+  const std::vector<FuncPtr> order = topological_order(outputs);
+  const auto is_left = [](const FuncPtr& f) { return !f->is_extern() && !has_directives(*f); };
+  if (std::ranges::none_of(order, is_left)) {
+    return note_against_search(outputs, "a search is for what nobody scheduled",
+                               "every Func has a directive",
+                               "Search before anything else schedules them");
+  }
+  const std::string unknown = unknown_size(outputs);
+  if (unknown.empty()) return "";
+  return note_against_search(outputs, "sizes of images and outputs are known or estimated", unknown,
+                             "Give set_estimates() or bind the image");
+}
+
+double milliseconds(double seconds) { return 1e3 * seconds; }
+
+// A schedule with its prediction. That of the lowered program knows borders and guards as they are.
+struct Lowered {
+  std::vector<FuncPtr> outputs;
+  double seconds = 0;
+};
+
+// The search's plans by their cost, of which the first is taken that the lowered program confirms.
+class Choice {
+ public:
+  Choice(const PlanSearch& found, const Target& target, int threads)
+      : found_(found), target_(target), threads_(threads), rules_(lowered(found.result.start)) {}
+
+  ChosenSchedule run(ChosenSchedule rules, bool may_leave_rules) const {
+    const planning::SearchResult& result = found_.result;
+    std::optional<Lowered> taken, other;
+    for (const FoundPlan& plan : result.found) {
+      if (plan.plan == result.start.plan || (taken && other)) continue;
+      std::optional<Lowered> candidate = lowered_if_it_can_be(plan);
+      if (!candidate) continue;
+      const bool is_faster = plan.cost.seconds < worth_leaving * result.start.cost.seconds &&
+                             candidate->seconds < rules_.seconds;
+      (may_leave_rules && is_faster && !taken ? taken : other) = std::move(candidate);
+    }
+    if (taken && !other) other = rules_;
+    const Lowered& chosen = taken ? *taken : rules_;
+    rules.graph.outputs = chosen.outputs;
+    rules.search.tried = static_cast<size_t>(result.priced);
+    rules.search.rules_ms = milliseconds(rules_.seconds);
+    rules.search.predicted_ms = milliseconds(chosen.seconds);
+    if (other) {
+      rules.search.runner_up_ms = milliseconds(other->seconds);
+      rules.search.runner_up =
+          difference_of(graph::schedule_log(chosen.outputs), graph::schedule_log(other->outputs));
+    }
+    return rules;
+  }
+
+ private:
+  const PlanSearch& found_;
+  const Target& target_;
+  const int threads_;
+  const Lowered rules_;
+
+  Lowered lowered(const FoundPlan& plan) const {
+    Lowered result{found_.emitted(plan)};
+    result.seconds = predicted_seconds(result.outputs, target_, threads_);
+    return result;
+  }
+  std::optional<Lowered> lowered_if_it_can_be(const FoundPlan& plan) const {
+    try {
+      return lowered(plan);
+    } catch (const Error&) {
+      return std::nullopt;
+    }
+  }
+};
+
+}  // namespace
+
+// "cannot ..." as errors say it, though nothing fails.
+std::string note_against_search(const std::vector<FuncPtr>& outputs, const std::string& rule,
+                                const std::string& evidence, const std::string& instead) {
+  return Message{"search for a schedule of " + words_for(outputs), rule,
+                 evidence + ", so that what the rules choose is taken", instead}
+      .render();
+}
+
+ChosenSchedule choose_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
+                               Scheduling what, const Target& target, bool wants_runner_up) {
+  ChosenSchedule rules{autoschedule::schedule_within_budget(outputs, request, what), {}};
+  if (!request.options.search && !wants_runner_up) return rules;
+  rules.search.note = reason_against(outputs, request);
+  if (!rules.search.note.empty()) return rules;
+  const autoschedule::MemoryUse& memory = rules.graph.memory;
+  PlanSearchOptions options;
+  options.spare_bytes = std::max<int64_t>(memory.budget_bytes - memory.bytes, 0);
+  options.width = width;
+  try {
+    const PlanSearch found = search_plans(rules.graph.outputs, outputs, request.options,
+                                          search_machine(request.options, target), options);
+    return Choice(found, target, request.options.threads).run(rules, request.options.search);
+  } catch (const Error& error) {  // lowering the rules' schedule says so where it matters
+    rules.search.note = note_against_search(outputs, "the schedule of the rules can be lowered",
+                                            error.what(), "Correct the program or its schedule");
+    return rules;
+  }
+}
+
+}  // namespace retrograde::driver
