@@ -133,6 +133,16 @@ Cover whole_cover(StageId stage, const SizeModel& sizes) {
   });
 }
 
+Cover cover_of_box(StageId stage, const std::vector<int64_t>& box, const SizeModel& sizes) {
+  Cover cover = whole_cover(stage, sizes);
+  const std::vector<Iterator>& iterators = sizes.graph().stage(stage).iterators;
+  for (size_t i = 0; i < cover.size(); ++i) {
+    if (iterators[i].kind == Iterator::Kind::Pure)
+      cover[i] = box[static_cast<size_t>(iterators[i].dimension)];
+  }
+  return cover;
+}
+
 std::vector<int64_t> extents(const Access& access, const Cover& cover, const SizeModel& sizes) {
   return extents(std::vector{&access}, cover, sizes);
 }

@@ -20,6 +20,8 @@ using Cover = std::vector<int64_t>;
 
 // All points of all iterators, at least 1 of each.
 Cover whole_cover(StageId stage, const SizeModel& sizes);
+// The same, with a box of elements, by dimension of the Func, for the pure iterators.
+Cover cover_of_box(StageId stage, const std::vector<int64_t>& box, const SizeModel& sizes);
 
 // The extents in elements, by dimension of what is accessed, of the box that the access needs. A data-dependent part of
 // an index takes all values of its range. No extent is larger than that of the whole dimension.

@@ -160,16 +160,6 @@ class GroupBuilder {
 
   // ---- points ----
 
-  Cover with_box(StageId stage, const std::vector<int64_t>& box) const {
-    Cover cover = whole_cover(stage, sizes_);
-    const std::vector<Iterator>& iterators = sizes_.graph().stage(stage).iterators;
-    for (size_t i = 0; i < cover.size(); ++i) {
-      if (iterators[i].kind == Iterator::Kind::Pure)
-        cover[i] = box[static_cast<size_t>(iterators[i].dimension)];
-    }
-    return cover;
-  }
-
   // The box of a Func that is computed in loops, in one iteration of the last of `count` nodes of a path; of the root,
   // the whole Func.
   std::vector<int64_t> box_in(FuncId func, const std::vector<int>& path, size_t count) {
@@ -203,7 +193,7 @@ class GroupBuilder {
         share *= std::min(1.0, step);
       }
     }
-    return with_box(run.id, box);
+    return cover_of_box(run.id, box, sizes_);
   }
 
   // How often a loop around other Funcs runs where no border cuts it short. Its covers are those of such a run, too.
@@ -228,7 +218,8 @@ class GroupBuilder {
     std::vector<Cover> result{whole_cover(run.id, sizes_)};
     const bool at = is_at(run.id.func);
     for (size_t count = 1; count < run.place; ++count)
-      result.push_back(at ? with_box(run.id, box_in(run.id.func, run.path, count)) : result[0]);
+      result.push_back(at ? cover_of_box(run.id, box_in(run.id.func, run.path, count), sizes_)
+                          : result[0]);
     result.push_back(extents);
     const bool is_opaque = plan_.of(run.id.func).opacity != Opacity::None;
     for (size_t depth = 0; depth < nest.loops.size(); ++depth) {

@@ -16,12 +16,10 @@ bool insert_once(std::vector<FuncId>& list, FuncId func) {
   return is_new;
 }
 
-// The Func stands for its value: undecided Funcs, too, but no outputs.
-bool is_inlined(const Plan& plan, const FuncNode& node, FuncId func) {
-  const FuncPlan& of = plan.of(func);
-  const Level::Kind kind = of.placement.compute.kind;
-  return !node.is_output && of.opacity == Opacity::None && node.stages.size() == 1 &&
-         (kind == Level::Kind::Inline || kind == Level::Kind::Undecided);
+// Whether the Func is inlined and has one value, which composed reads can replace.
+bool is_value(const Plan& plan, const FuncNode& node, FuncId func) {
+  return is_inlined(plan, func) && plan.of(func).opacity == Opacity::None &&
+         node.stages.size() == 1;
 }
 
 // The Func in whose loops it runs; itself if there is none.
@@ -62,7 +60,7 @@ std::vector<PlannedGroup> groups_of(const Plan& plan, const AccessGraph& graph) 
   std::vector<bool> inlined(count);
   for (size_t f = 0; f < count; ++f) {
     const auto func = static_cast<FuncId>(f);
-    inlined[f] = is_inlined(plan, graph.func(func), func);
+    inlined[f] = is_value(plan, graph.func(func), func);
     if (inlined[f]) continue;
     const FuncId a = root(func), b = root(host_of(plan, func));
     group[static_cast<size_t>(std::min(a, b))] = std::max(a, b);

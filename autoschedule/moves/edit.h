@@ -21,8 +21,6 @@ bool has_loops(const Plan& plan, FuncId func);
 bool is_free(const Context& context, StageId stage, int iterator);
 // The same for iterations of one loop of a nest, which agree in the iterators whose loops are all around it.
 bool may_run_at_once(const Context& context, StageId stage, const Nest& nest, size_t depth);
-// Whether the values of the Func are computed wherever they are read.
-bool is_inlined(const Plan& plan, FuncId func);
 // The stages that read the Func, also through inlined Funcs; those of inlined Funcs, too.
 std::vector<StageId> all_readers(const Plan& plan, const Context& context, FuncId func);
 // Whether the region that is read of the Func is bounded (L3), also through inlined Funcs: data decide no index without a

@@ -81,13 +81,6 @@ bool has_loops(const Plan& plan, FuncId func) {
   return is_editable(plan, func) && (kind == Level::Kind::Root || kind == Level::Kind::At);
 }
 
-bool is_inlined(const Plan& plan, FuncId func) {
-  const FuncPlan& own = plan.of(func);
-  const Level::Kind kind = own.placement.compute.kind;
-  const bool is_left = kind == Level::Kind::Undecided && own.opacity == Opacity::None;
-  return (kind == Level::Kind::Inline || is_left) && !is_output(*plan.program, func);
-}
-
 std::vector<StageId> all_readers(const Plan& plan, const Context& context, FuncId func) {
   std::vector<StageId> result;
   std::vector<FuncId> read{func};

@@ -155,7 +155,7 @@ std::vector<int64_t> Covers::box(FuncId func, const Level& level) {
   for (size_t s = stages.size(); s-- > 1;) {
     std::vector<const Access*> accesses = reads_of(stages[s], func);
     accesses.push_back(&stages[s].write);
-    box.grow(extents(accesses, cover_of_box(stages[s].id, box.extents_of_all()), sizes_));
+    box.grow(extents(accesses, cover_of_box(stages[s].id, box.extents_of_all(), sizes_), sizes_));
   }
   return boxes_.emplace(key, box.extents_of_all()).first->second;
 }
@@ -163,7 +163,7 @@ std::vector<int64_t> Covers::box(FuncId func, const Level& level) {
 Cover Covers::all_of(StageId stage) {
   const Level& compute = plan_.of(stage.func).placement.compute;
   if (compute.kind != Level::Kind::At) return whole_cover(stage, sizes_);
-  return cover_of_box(stage, box(stage.func, compute));
+  return cover_of_box(stage, box(stage.func, compute), sizes_);
 }
 
 // The points of a stage in one iteration of a loop around it.
@@ -173,17 +173,7 @@ Cover Covers::cover_in(StageId stage, const Level& level) {
   const Level::Kind kind = plan_.of(stage.func).placement.compute.kind;
   if (kind == Level::Kind::Root || sizes_.graph().func(stage.func).is_output)
     return whole_cover(stage, sizes_);
-  return cover_of_box(stage, box(stage.func, level));
-}
-
-Cover Covers::cover_of_box(StageId stage, const std::vector<int64_t>& box) const {
-  Cover cover = whole_cover(stage, sizes_);
-  const std::vector<Iterator>& iterators = sizes_.graph().stage(stage).iterators;
-  for (size_t i = 0; i < iterators.size(); ++i) {
-    if (iterators[i].kind == Iterator::Kind::Pure)
-      cover[i] = box[static_cast<size_t>(iterators[i].dimension)];
-  }
-  return cover;
+  return cover_of_box(stage, box(stage.func, level), sizes_);
 }
 
 }  // namespace retrograde::planning

@@ -37,7 +37,6 @@ class Covers {
 
   Cover all_of(StageId stage);
   Cover cover_in(StageId stage, const Level& level);
-  Cover cover_of_box(StageId stage, const std::vector<int64_t>& box) const;
 };
 
 // Requires: as above. Many questions about one plan are cheaper to one `Covers`.

@@ -93,6 +93,13 @@ uint64_t hash_of(const Plan& plan) {
   return hash.value();
 }
 
+bool is_inlined(const Plan& plan, FuncId func) {
+  const FuncPlan& own = plan.of(func);
+  const Level::Kind kind = own.placement.compute.kind;
+  const bool is_left = kind == Level::Kind::Undecided && own.opacity == Opacity::None;
+  return (kind == Level::Kind::Inline || is_left) && !is_output(*plan.program, func);
+}
+
 Plan undecided_plan(const ProgramPtr& program) {
   Plan plan{program, {}};
   for (const graph::FuncPtr& f : program->funcs) {

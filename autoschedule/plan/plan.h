@@ -169,6 +169,9 @@ struct Plan {
 bool operator==(const Plan& a, const Plan& b);
 uint64_t hash_of(const Plan& plan);
 
+// Whether the values of the Func are computed wherever they are read: also if nothing is decided, but not for outputs.
+bool is_inlined(const Plan& plan, FuncId func);
+
 // The plan of a program without directives.
 Plan undecided_plan(const ProgramPtr& program);
 

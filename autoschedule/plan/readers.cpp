@@ -56,18 +56,9 @@ std::vector<std::vector<StageId>> readers_of(const std::vector<graph::FuncPtr>& 
   return readers;
 }
 
-// Whether the values of the Func are computed wherever they are read.
-bool Readers::is_computed_at_reads(FuncId id) const {
-  const FuncPlan& plan = plan_.of(id);
-  const Level::Kind kind = plan.placement.compute.kind;
-  return !is_output(*plan_.program, id) &&
-         (kind == Level::Kind::Inline ||
-          (kind == Level::Kind::Undecided && plan.opacity == Opacity::None));
-}
-
 std::optional<StageId> Readers::find_outside(FuncId id, const Level& level) const {
   for (const StageId reader : plan_.program->readers[static_cast<size_t>(id)]) {
-    if (is_computed_at_reads(reader.func)) {
+    if (is_inlined(plan_, reader.func)) {
       if (const auto outside = find_outside(reader.func, level)) return outside;
     } else if (!is_inside(reader, level)) {
       return reader;

@@ -27,7 +27,6 @@ class Readers {
   const graph::FuncContents& func(FuncId id) const {
     return *plan_.program->funcs[static_cast<size_t>(id)];
   }
-  bool is_computed_at_reads(FuncId id) const;
   bool is_inside(StageId stage, const Level& level) const;
   bool is_place_inside(const LoopRef& loop, const Level& level) const;
 };
