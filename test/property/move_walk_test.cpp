@@ -64,10 +64,11 @@ TEST_P(ScheduledGraph, KeepsLoweringAfterMoves) {
   const std::vector<graph::FuncPtr> outputs =
       graph::apply_wrappers(driver::schedule_unscheduled(graph.outputs));
   planning::Plan plan = planning::import_plan(outputs);
-  if (!broken_invariant(plan).empty()) GTEST_SKIP() << broken_invariant(plan);
+  ASSERT_EQ(broken_invariant(plan), "");
+  // Some programs have an index without a range, which bounds inference refuses.
   if (!lowering_error(plan).empty()) GTEST_SKIP() << lowering_error(plan);
   const planning::AccessGraph accesses(outputs);
-  const planning::SizeModel sizes(accesses, {1000});
+  const planning::SizeModel sizes(accesses, {planning::unknown_extent});
   planning::Dependences dependences(accesses);
   const planning::Machine machine;
   const auto moves = planning::all_moves();
