@@ -13,8 +13,6 @@ constexpr int sweeps = 2;
 constexpr double worth_another_sweep = 0.98;  // of the time before the last one
 constexpr int moves_of_a_func = 3;            // one after another, in one visit
 constexpr double smallest_share = 0.01;       // of the whole time: a Func with less is not visited
-constexpr double least_gain = 0.1;            // of the time of the stages that change
-constexpr double least_gain_of_all = 0.01;    // of the whole time
 constexpr int64_t prices_per_func = 200;      // for each plan of the beam
 
 // A plan of the beam. Steps are a list that plans share, the last first.
@@ -31,7 +29,7 @@ struct State {
 bool is_faster(const State& a, const State& b) { return a.cost.seconds < b.cost.seconds; }
 
 // Whether the gain exceeds the error of the model, which is about the stages whose times differ.
-bool is_worth_it(const Cost& before, const Cost& after) {
+bool is_worth_it(const Cost& before, const Cost& after, const SearchOptions& options) {
   std::map<StageId, double> seconds;
   for (const StageCost& stage : before.stages) seconds[stage.stage] = stage.seconds;
   double changed = 0;
@@ -41,7 +39,8 @@ bool is_worth_it(const Cost& before, const Cost& after) {
     if (was != stage.seconds) changed += std::max(was, stage.seconds);
   }
   for (const auto& [stage, was] : seconds) changed += was;
-  const double least = std::max(least_gain * changed, least_gain_of_all * before.seconds);
+  const double least =
+      std::max(options.least_gain * changed, options.least_gain_of_all * before.seconds);
   return after.seconds < before.seconds - least;
 }
 
@@ -124,7 +123,7 @@ class Beam {
       if (next.size() > width_) next.resize(width_);
       bool is_better = false;
       for (const Candidate& candidate : next) {
-        if (!is_worth_it(before[candidate.from].cost, candidate.cost)) continue;
+        if (!is_worth_it(before[candidate.from].cost, candidate.cost, options_)) continue;
         is_better |= candidate.cost.seconds < states_[0].cost.seconds;
         states_.push_back(candidate);
       }

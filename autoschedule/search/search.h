@@ -29,6 +29,9 @@ struct SearchOptions {
       std::numeric_limits<double>::infinity();  // alive at once, beyond those of the start
   std::vector<bool> kept;                       // by Func: no move changes how it runs
   std::set<std::string> without;                // names of moves that are not made
+  // A change must gain this part of the time of the stages that change, and of the whole time: as much as the model may be
+  // wrong where the time of the start is known to be good.
+  double least_gain = 0.1, least_gain_of_all = 0.01;
 };
 
 struct SearchStep {
