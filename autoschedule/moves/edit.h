@@ -28,6 +28,9 @@ std::vector<StageId> all_readers(const Plan& plan, const Context& context, FuncI
 bool has_bounded_region(const Plan& plan, const Context& context, FuncId func);
 // Whether no loop needs a dimension of constant extent (L4).
 bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func);
+// Whether the Func may be computed in loops of its consumers: it is none of the outputs, and needs the elements that are
+// read and no others (L3, L8).
+bool may_move_inside(const Plan& plan, FuncId func, const Context& context);
 bool is_reduction(const Context& context, StageId stage, int iterator);
 // The depth of a loop; of the loop with step 1, which exists in plans.
 std::optional<size_t> find_loop(const Nest& nest, int iterator, int64_t step);
@@ -73,6 +76,12 @@ void drop_loop(Nest& nest, size_t depth);
 std::optional<Nest> without_body(const Nest& nest, const Context& context, StageId stage);
 // Runs so many points of the iterator inside of all other loops. Requires: no step is smaller, except 1.
 void run_inside(Nest& nest, int iterator, int64_t points, ForType kind);
+// The elements that are computed in all iterations of the level's stage if its loop needs a box of these extents each time.
+double computed_elements(const Plan& plan, const Context& context, const Level& level,
+                         const std::vector<int64_t>& box);
+double product_of(const std::vector<int64_t>& extents);
+// The Func in this loop, with loops of its own as before, none of them parallel.
+FuncPlan moved_inside(FuncPlan plan, const Level& level);
 // Loops for all stages of a changed Func of the plan, whose dimensions have these extents, along rows as they are stored:
 // lanes of the first dimension inside, then the reduction, then the other dimensions; in parallel at root. `min_lanes`:
 // fewer aren't used.
@@ -102,6 +111,16 @@ struct StageLoops {
 // The legal plans in which one stage of the Func has one of these nests instead.
 std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& context,
                              std::vector<Nest> (*nests)(const StageLoops&));
+// The elements in memory from lane to lane of a vector along the iterator, in the storage of the Func that is read or, if it
+// can be stored otherwise, in the best one; 0: no such number.
+int64_t lane_stride(const Plan& plan, const Context& context, const Access& read, int iterator);
+// The plan in which a dimension of the Func is innermost in memory and all stages have lanes along it; so do Funcs that
+// read it at their own places. nullopt: it isn't a legal one. Outputs keep their layout.
+std::optional<Plan> with_turned_results(const Plan& plan, FuncId func, int dimension,
+                                        const Context& context);
+// The plan in which the lanes of the stage read neighbours in memory, of Funcs that can be stored so; nullopt: they do, or
+// none can.
+std::optional<Plan> with_turned_operands(const Plan& plan, StageId stage, const Context& context);
 // Adds a plan that isn't in the list yet.
 void add(std::vector<Plan>& plans, std::optional<Plan> plan);
 

@@ -38,6 +38,21 @@ bool has_window(const FuncPlan& func) {
          hoist.kind != Kind::Undecided || (store.kind != Kind::Undecided && !(store == compute));
 }
 
+// Whether each update writes the elements that its pure variables name, and reads no others of the Func.
+bool stays_in_place(const Context& context, FuncId func) {
+  for (const StageNode& stage : context.accesses.func(func).stages) {
+    const auto is_pure = [&](const IndexForm& form) {
+      return form.is_affine() && form.terms.size() == 1 &&
+             !is_reduction(context, stage.id, form.terms[0].iterator);
+    };
+    if (!std::ranges::all_of(stage.write.index, is_pure)) return false;
+    for (const Access& read : stage.reads) {
+      if (read.of == func && read.index != stage.write.index) return false;
+    }
+  }
+  return true;
+}
+
 // One change of a Func in a plan.
 class FuncChange {
  public:
@@ -219,6 +234,38 @@ class FuncChange {
 };
 
 }  // namespace
+
+bool may_move_inside(const Plan& plan, FuncId func, const Context& context) {
+  return is_editable(plan, func) && !is_output(*plan.program, func) &&
+         has_bounded_region(plan, context, func) && stays_in_place(context, func);
+}
+
+double product_of(const std::vector<int64_t>& extents) {
+  double product = 1;
+  for (const int64_t extent : extents) product *= static_cast<double>(extent);
+  return product;
+}
+
+double computed_elements(const Plan& plan, const Context& context, const Level& level,
+                         const std::vector<int64_t>& box) {
+  const auto [stage, depth] = level.loop;
+  const Cover extents = whole_cover(stage, context.sizes);
+  double computed = product_of(box);
+  for (size_t d = 0; d <= static_cast<size_t>(depth); ++d)
+    computed *= static_cast<double>(trips(extents, plan.nest(stage), d));
+  return computed;
+}
+
+FuncPlan moved_inside(FuncPlan plan, const Level& level) {
+  plan.placement = {};
+  plan.placement.compute = level;
+  plan.storage.folds.clear();
+  for (Nest& nest : plan.nests) {
+    for (Loop& loop : nest.loops)
+      if (loop.kind == ForType::Parallel) loop.kind = ForType::Serial;
+  }
+  return plan;
+}
 
 bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func) {
   if (plan.opacity != Opacity::None ||
