@@ -56,9 +56,12 @@ std::vector<Side> sides_of_tile(const Plan& plan, const Context& context, FuncId
 // The reader's loops around the tile and in it; nullopt if they have a tile already.
 std::optional<Nest> tiled(const StageLoops& loops, const std::vector<Side>& sides) {
   const std::optional<size_t> lanes = vector_loop(loops.nest);
-  const size_t body = body_depth(loops.nest), shared = shared_loops(loops.plan, loops.stage);
-  if (shared > 0 || (lanes && body != *lanes)) return std::nullopt;
+  const std::optional<LoopRef>& host = loops.nest.shared_with;
+  const bool is_shared =
+      host ? host->stage.func != loops.stage.func : shared_loops(loops.plan, loops.stage) > 0;
+  if (is_shared || (lanes && body_depth(loops.nest) != *lanes)) return std::nullopt;
   Nest nest = loops.nest;
+  nest.shared_with.reset();
   for (const auto& [iterator, size] : sides) {
     const bool has_lanes = lanes && loops.nest.loops[*lanes].iterator == iterator;
     const int64_t inner = has_lanes ? outer_step(nest, iterator, 1) : 1;
@@ -95,6 +98,26 @@ void add_plan(std::vector<Plan>& plans, const StageLoops& reader, FuncId func, N
   add(plans, with_func(*host, func, moved_inside(plan.of(func), best), context));
 }
 
+void add_plans(std::vector<Plan>& plans, const Plan& plan, FuncId func, StageId stage,
+               const Context& context) {
+  const StageLoops reader{plan, context, stage, plan.nest(stage),
+                          loop_extents(plan, context, stage)};
+  const std::vector<Side> sides = sides_of_tile(plan, context, func, reader);
+  if (sides.size() < 2) return;
+  std::optional<Nest> nest = tiled(reader, sides);
+  if (!nest || body_depth(*nest) == 0) return;
+  add_plan(plans, reader, func, *nest);
+  // The steps of the tile, its reduction, and the other loops.
+  const auto rank = [&](const Loop& loop) {
+    const bool is_side =
+        loop.step > 1 && std::ranges::find(sides, loop.iterator, &Side::iterator) != sides.end();
+    return is_side ? 0 : is_reduction(context, stage, loop.iterator) ? 1 : 2;
+  };
+  const auto body = nest->loops.begin() + static_cast<std::ptrdiff_t>(body_depth(*nest));
+  std::ranges::stable_sort(nest->loops.begin(), body, std::less(), rank);
+  add_plan(plans, reader, func, *nest);
+}
+
 }  // namespace
 
 std::vector<Plan> compute_in_tile(const Plan& plan, FuncId func, const Context& context) {
@@ -102,24 +125,14 @@ std::vector<Plan> compute_in_tile(const Plan& plan, FuncId func, const Context& 
   if (!has_loops(plan, func) || !may_move_inside(plan, func, context) ||
       !runs_at_any_size(plan.of(func), context, func))
     return plans;
-  const std::optional<StageId> stage = only_reader(plan, context, func);
-  if (!stage) return plans;
-  const StageLoops reader{plan, context, *stage, plan.nest(*stage),
-                          loop_extents(plan, context, *stage)};
-  const std::vector<Side> sides = sides_of_tile(plan, context, func, reader);
-  if (sides.size() < 2) return plans;
-  std::optional<Nest> nest = tiled(reader, sides);
-  if (!nest || body_depth(*nest) == 0) return plans;
-  add_plan(plans, reader, func, *nest);
-  // The steps of the tile, its reduction, and the other loops.
-  const auto rank = [&](const Loop& loop) {
-    const bool is_side =
-        loop.step > 1 && std::ranges::find(sides, loop.iterator, &Side::iterator) != sides.end();
-    return is_side ? 0 : is_reduction(context, *stage, loop.iterator) ? 1 : 2;
-  };
-  const auto body = nest->loops.begin() + static_cast<std::ptrdiff_t>(body_depth(*nest));
-  std::ranges::stable_sort(nest->loops.begin(), body, std::less(), rank);
-  add_plan(plans, reader, func, *nest);
+  const std::optional<StageId> reader = only_reader(plan, context, func);
+  if (!reader) return plans;
+  add_plans(plans, plan, func, *reader, context);
+  // In a loop of another Func the consumer may have no room for a tile.
+  if (plans.empty()) {
+    for (const Plan& other : find_move("root")->apply(plan, reader->func, context))
+      add_plans(plans, other, func, *reader, context);
+  }
   return plans;
 }
 
