@@ -16,6 +16,7 @@
 #include <cmath>
 #include <compare>
 
+#include "autoschedule/cost/assumptions.h"
 #include "autoschedule/moves/edit.h"
 
 namespace retrograde::planning::moves {
@@ -47,8 +48,10 @@ class RegisterTiles {
     std::ranges::sort(tiles_);
     return true;
   }
-  // One term takes this long in the best tile.
-  double cycles() const { return tiles_.empty() ? INFINITY : tiles_[0].cycles; }
+  // One term of an element takes so many cycles in the best tile; infinitely many if there is none.
+  double cycles() const {
+    return tiles_.empty() ? INFINITY : tiles_[0].cycles / static_cast<double>(lanes_);
+  }
   // `is_turned`: operands that lie across the lanes are turned, too.
   void add_plans(std::vector<Plan>& plans, bool is_turned) const {
     std::vector<Nest> nests;
@@ -102,7 +105,7 @@ class RegisterTiles {
     return points_inside(loops_.extents, nest, depth - 1, iterator);
   }
 
-  // A second side only where one leaves more to load than to multiply.
+  // A second side only where it is faster than one.
   void find_tiles() {
     std::vector<Side> sides;
     for (int i = 0; i < static_cast<int>(node_.iterators.size()); ++i) {
@@ -115,8 +118,7 @@ class RegisterTiles {
     }
     for (const Side& side : sides) add_tiles({Side{}, side});
     const auto fastest = std::ranges::min_element(tiles_);
-    if (fastest == tiles_.end() || fastest->cycles <= 1 / core.products_per_cycle) return;
-    const double limit = fastest->cycles;
+    const double limit = fastest == tiles_.end() ? INFINITY : fastest->cycles;
     for (const Side& outer : sides) {
       for (const Side& inner : sides)
         if (outer.iterator > inner.iterator) add_tiles({outer, inner}, limit);
@@ -162,7 +164,9 @@ class RegisterTiles {
           count *= static_cast<double>(side.size);
       loads += count;
     }
-    return std::max({loads / sums / core.loads_per_cycle, 1 / core.products_per_cycle,
+    const double loading = loads / sums / core.loads_per_cycle,
+                 adding = 1 / core.products_per_cycle;
+    return std::max({loading + not_overlapped * adding, adding + not_overlapped * loading,
                      core.float_latency / sums});
   }
 
@@ -204,9 +208,8 @@ void add_tiles_of(const Plan& plan, StageId stage, const Context& context,
   straight.add_plans(plans, false);
   double fewest = straight.cycles();
   std::vector<Plan> best;
-  for (int d = 0; fewest > 1 / core.products_per_cycle &&
-                  d < context.accesses.func(stage.func).func->dimensions();
-       ++d) {
+  const int dimensions = context.accesses.func(stage.func).func->dimensions();
+  for (int d = 0; d < dimensions; ++d) {
     if (plan.of(stage.func).storage.order[0] == d) continue;
     const std::optional<Plan> turned = with_turned_results(plan, stage.func, d, context);
     if (!turned) continue;
