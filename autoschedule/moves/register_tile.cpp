@@ -2,6 +2,7 @@
 // the reduction runs, so that what it loads is used several times.
 //
 //   c, y, x:16, r.y, r.x, vector x     =>     c:4, y, x:32, r.y, r.x, unroll c, unroll x:16, vector x
+//                                      =>     y, x:32, c:4, r.y, r.x, unroll c, unroll x:16, vector x
 //   j, i, l:16, r, vector l            =>     j:4, i:4, l:16, r, unroll j, unroll i, vector l
 //
 // Operands that lanes would read across rows are stored along the lanes in further plans. Where lanes along another
@@ -55,8 +56,13 @@ class RegisterTiles {
   // `is_turned`: operands that lie across the lanes are turned, too.
   void add_plans(std::vector<Plan>& plans, bool is_turned) const {
     std::vector<Nest> nests;
+    size_t given = 0;
     for (const Tile& tile : tiles_) {
-      if (nests.size() < most_tiles) give(tile, nests);
+      const std::optional<Nest> nest = given < most_tiles ? tiled(tile) : std::nullopt;
+      if (!nest) continue;
+      ++given;
+      nests.push_back(*nest);
+      if (const auto other = with_sides_inside(*nest, tile)) nests.push_back(*other);
     }
     for (Nest& nest : nests) {
       FuncPlan changed = loops_.plan.of(stage_.func);
@@ -170,7 +176,7 @@ class RegisterTiles {
                      core.float_latency / sums});
   }
 
-  void give(const Tile& tile, std::vector<Nest>& nests) const {
+  std::optional<Nest> tiled(const Tile& tile) const {
     Nest nest = plain_;
     const auto is_sum_loop = [&](const Loop& loop) {
       return is_reduction(context_, stage_, loop.iterator);
@@ -178,20 +184,40 @@ class RegisterTiles {
     std::ranges::stable_partition(nest.loops, [&](const Loop& l) { return !is_sum_loop(l); });
     for (const Side& side : tile.sides) {
       if (side.size == 1) continue;
-      if (side.size > points_of(nest, side.iterator)) return;
+      if (side.size > points_of(nest, side.iterator)) return std::nullopt;
       run_inside(nest, side.iterator, side.size, ForType::Unrolled);
     }
     if (tile.vectors > 1) {
       const int64_t larger = outer_step(nest, x_, 1);
-      if (larger > 0 && larger <= tile.vectors * lanes_) return;
+      if (larger > 0 && larger <= tile.vectors * lanes_) return std::nullopt;
       nest.loops[innermost_loop(nest, x_)].step = tile.vectors * lanes_;
       insert_step(nest, x_, lanes_, nest.loops.size(), ForType::Unrolled);
       insert_step(nest, x_, 1, nest.loops.size(), ForType::Vectorized);
     } else {
       run_inside(nest, x_, lanes_, ForType::Vectorized);
     }
-    if (operations(loops_.plan, context_, stage_) * tile.sums <= most_body_operations)
-      nests.push_back(std::move(nest));
+    if (operations(loops_.plan, context_, stage_) * tile.sums > most_body_operations)
+      return std::nullopt;
+    return nest;
+  }
+
+  // The loops over the sides inside of those along rows, so that a few rows of operands serve all of them.
+  std::optional<Nest> with_sides_inside(const Nest& nest, const Tile& tile) const {
+    Nest inside = nest;
+    const auto is_outside = [&](const Loop& loop) {
+      return loop.iterator != tile.sides[0].iterator && loop.iterator != tile.sides[1].iterator;
+    };
+    const auto pure_end = std::ranges::find_if(inside.loops, [&](const Loop& loop) {
+      return is_reduction(context_, stage_, loop.iterator);
+    });
+    std::stable_partition(inside.loops.begin(), pure_end, is_outside);
+    if (has_same_order(nest, inside, loops_.extents)) return std::nullopt;
+    const auto is_parallel = [](const Loop& loop) { return loop.kind == ForType::Parallel; };
+    const bool was_parallel = std::ranges::any_of(inside.loops, is_parallel);
+    for (Loop& loop : inside.loops)
+      if (is_parallel(loop)) loop.kind = ForType::Serial;
+    if (was_parallel) run_in_parallel(inside, context_, stage_);
+    return inside;
   }
 };
 
