@@ -2,12 +2,14 @@
 //
 //   y, x:16, vector x     =>     y:16, x, vector y      and      y, x
 //   y, r.x                =>     y:8, r.x, unroll y     and      y:4, r.x, vector y     if f(r.x, y) needs f(r.x - 1, y)
+//   x, r.y                =>     x:128, r.y, x:16, vector x                               if f(x, r.y) needs f(x, r.y - 1)
 //
-// The chains of a recurrence whose rows lie apart in memory run side by side, as few as hide their latency.
+// The chains of a recurrence run side by side, as few as hide their latency: blocks of columns, or rows that lie apart.
 //
 // Legal: L1: iterations of pure loops never meet, and those of a reduction are lanes only if they don't; L4: a step of as
 // many points as there are lanes stands outside. Lanes of a sum stay: removing them would make its chains of additions longer.
 #include <algorithm>
+#include <utility>
 
 #include "autoschedule/access/lane_form.h"
 #include "autoschedule/moves/edit.h"
@@ -34,16 +36,31 @@ int together(const Context& context, StageId stage, int iterator) {
   return count;
 }
 
-// Whether elements of the stage wait for others along the iterators that they don't have in common, and rows of them lie
-// apart.
-bool has_chains_apart(const Context& context, StageId stage, int iterator) {
-  const StageNode& node = context.accesses.stage(stage);
-  const bool waits = std::ranges::any_of(node.reads, [&](const Access& read) {
-    return read.of == stage.func && read.index != node.write.index;
+// Whether elements of the stage wait for others.
+bool is_recurrence(const StageNode& node) {
+  return std::ranges::any_of(node.reads, [&](const Access& read) {
+    return read.of == node.id.func && read.index != node.write.index;
   });
-  return waits &&
-         lane_form(node.write, iterator, schedule_lanes, context.sizes, {line_elements}).kind ==
-             LaneForm::Kind::Strided;
+}
+
+// The chains of a recurrence that hide its latency.
+constexpr auto chains = static_cast<int64_t>(core.float_latency * core.products_per_cycle);
+
+// The nest in which a block of vectors takes each step of the reduction, not one vector all steps.
+std::optional<Nest> in_block(const StageLoops& loops, Nest nest, int iterator, int64_t lanes) {
+  const size_t depth = *find_loop(nest, iterator, lanes), body = body_depth(nest);
+  const int64_t points = points_inside(loops.extents, nest, static_cast<int>(depth) - 1, iterator);
+  bool has_steps = false;
+  for (size_t d = depth + 1; d < body; ++d)
+    has_steps |= is_reduction(loops.context, loops.stage, nest.loops[d].iterator);
+  if (!has_steps || 2 * chains * lanes > points) return std::nullopt;
+  const ForType kind = std::exchange(nest.loops[depth].kind, ForType::Serial);
+  const auto first = nest.loops.begin();
+  std::rotate(first + static_cast<std::ptrdiff_t>(depth),
+              first + static_cast<std::ptrdiff_t>(depth + 1),
+              first + static_cast<std::ptrdiff_t>(body));
+  insert_step(nest, iterator, chains * lanes, depth, kind);
+  return nest;
 }
 
 std::vector<Nest> with_lanes(const StageLoops& loops) {
@@ -64,6 +81,7 @@ std::vector<Nest> with_lanes(const StageLoops& loops) {
     if (may) nests.push_back(std::move(along));
     return may;
   };
+  const StageNode& node = context.accesses.stage(stage);
   size_t tried = 0;
   for (const int i : iterators) {
     const auto depth = static_cast<int>(innermost_loop(*plain, i));
@@ -72,10 +90,14 @@ std::vector<Nest> with_lanes(const StageLoops& loops) {
     if (lanes == 1 || tried == most_iterators) continue;
     if (!add(i, lanes, ForType::Vectorized)) continue;
     ++tried;
-    if (!has_chains_apart(context, stage, i)) continue;
-    const auto rows = static_cast<int64_t>(core.float_latency * core.products_per_cycle);
-    if (fits(rows, points)) add(i, rows, ForType::Unrolled);
-    if (fits(lanes / 4, points)) add(i, lanes / 4, ForType::Vectorized);
+    if (!is_recurrence(node)) continue;
+    const LaneForm form = lane_form(node.write, i, schedule_lanes, context.sizes, {line_elements});
+    if (form.kind == LaneForm::Kind::Strided) {
+      if (fits(chains, points)) add(i, chains, ForType::Unrolled);
+      if (fits(lanes / 4, points)) add(i, lanes / 4, ForType::Vectorized);
+    } else if (std::optional<Nest> block = in_block(loops, nests.back(), i, lanes)) {
+      nests.push_back(std::move(*block));
+    }
   }
   nests.push_back(*plain);
   return nests;

@@ -100,8 +100,8 @@ class GrowingBox {
     for (size_t d = 0; d < box.size(); ++d)
       sides_[d].add(range_of(accesses, d, sizes), box[d], most_of(*accesses[0], d, sizes));
   }
-  // What an update accesses: where its pure variables decide, it goes on with the box; elsewhere it stands, so that the
-  // box reaches to it.
+  // Accesses of an update. Where its pure variables decide, they go on with the box; elsewhere they stand, and the box
+  // reaches to them.
   void add_update(const std::vector<const Access*>& accesses, const Cover& cover,
                   const SizeModel& sizes) {
     const std::vector<int64_t> box = extents(accesses, cover, sizes);
