@@ -111,43 +111,13 @@ class LevelFinder {
   }
 };
 
-// Whether each update writes the elements that its pure variables name, and reads no others of the Func.
-bool stays_in_place(const Context& context, FuncId func) {
-  for (const StageNode& stage : context.accesses.func(func).stages) {
-    const auto is_pure = [&](const IndexForm& form) {
-      return form.is_affine() && form.terms.size() == 1 &&
-             !is_reduction(context, stage.id, form.terms[0].iterator);
-    };
-    if (!std::ranges::all_of(stage.write.index, is_pure)) return false;
-    for (const Access& read : stage.reads) {
-      if (read.of == func && read.index != stage.write.index) return false;
-    }
-  }
-  return true;
-}
-
 }  // namespace
 
 std::vector<Plan> compute_at(const Plan& plan, FuncId func, const Context& context) {
   std::vector<Plan> plans;
-  if (!is_editable(plan, func) || is_output(*plan.program, func) ||
-      !has_bounded_region(plan, context, func) || !stays_in_place(context, func))
-    return plans;
-  for (const auto& [level, box] : LevelFinder(plan, func, context).run()) {
-    FuncPlan changed = plan.of(func);
-    changed.placement = {};
-    changed.placement.compute = level;
-    changed.storage.folds.clear();
-    for (Nest& nest : changed.nests) {
-      for (Loop& loop : nest.loops) {
-        if (loop.kind == ForType::Parallel) loop.kind = ForType::Serial;
-      }
-    }
-    const bool has_own_loops = has_loops(plan, func) && runs_at_any_size(changed, context, func);
-    if (has_own_loops) add(plans, with_func(plan, func, changed, context));
-    run_along_rows(changed, plan, context, func, box, lanes_for(plan, {func, 0}, INT64_MAX) / 2);
-    add(plans, with_func(plan, func, std::move(changed), context));
-  }
+  if (!may_run_in_loops(plan, context, func)) return plans;
+  for (const auto& [level, box] : LevelFinder(plan, func, context).run())
+    add_placed(plans, plan, func, {level, {}, {}}, box, context);
   return plans;
 }
 
