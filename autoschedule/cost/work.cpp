@@ -1,5 +1,6 @@
 // Values that a loop does not change are computed outside of it, and those that unrolled copies have in common once. So an
 // operation is executed as often as the loops run that are outside of the innermost loop that changes it, and that loop.
+// Functions in arms of selects run behind branches: each copy has its own.
 #include "autoschedule/cost/terms.h"
 
 #include <algorithm>
@@ -100,7 +101,8 @@ class StageWork {
   }
 
   void add_operation(const OperationRow& row) {
-    const double count = row.count * times(row.depends);
+    const double shared = row.behind_branch ? copies(row.depends, false) : 1;
+    const double count = row.count * times(row.depends) * shared;
     instructions_ += count * vectors(row.element_bytes, row.depends);
     if (is_vector(row.depends))
       units_.arithmetic += count * vectors(row.element_bytes, row.depends) * row.time.vector_ns;

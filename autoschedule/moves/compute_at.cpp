@@ -113,38 +113,13 @@ class LevelFinder {
   }
 };
 
-// Whether what updates write and read of the Func has ends, too: it's computed with what is read.
-bool has_bounded_updates(const Context& context, FuncId func) {
-  return std::ranges::all_of(context.accesses.func(func).stages, [&](const StageNode& stage) {
-    return has_range(stage.write, context.sizes) &&
-           std::ranges::all_of(stage.reads, [&](const Access& read) {
-             return read.of != func || has_range(read, context.sizes);
-           });
-  });
-}
-
 }  // namespace
 
 std::vector<Plan> compute_at(const Plan& plan, FuncId func, const Context& context) {
   std::vector<Plan> plans;
-  if (!is_editable(plan, func) || is_output(*plan.program, func) ||
-      !has_bounded_region(plan, context, func) || !has_bounded_updates(context, func))
-    return plans;
-  for (const auto& [level, box] : LevelFinder(plan, func, context).run()) {
-    FuncPlan changed = plan.of(func);
-    changed.placement = {};
-    changed.placement.compute = level;
-    changed.storage.folds.clear();
-    for (Nest& nest : changed.nests) {
-      for (Loop& loop : nest.loops) {
-        if (loop.kind == ForType::Parallel) loop.kind = ForType::Serial;
-      }
-    }
-    const bool has_own_loops = has_loops(plan, func) && runs_at_any_size(changed, context, func);
-    if (has_own_loops) add(plans, with_func(plan, func, changed, context));
-    run_along_rows(changed, plan, context, func, box, lanes_for(plan, {func, 0}, INT64_MAX) / 2);
-    add(plans, with_func(plan, func, std::move(changed), context));
-  }
+  if (!may_run_in_loops(plan, context, func)) return plans;
+  for (const auto& [level, box] : LevelFinder(plan, func, context).run())
+    add_placed(plans, plan, func, {level, {}, {}}, box, context);
   return plans;
 }
 

@@ -27,6 +27,10 @@ std::vector<StageId> all_readers(const Plan& plan, const Context& context, FuncI
 bool has_range(const Access& access, const SizeModel& sizes);
 // Whether the region that is read of the Func is bounded (L3), also through inlined Funcs.
 bool has_bounded_region(const Plan& plan, const Context& context, FuncId func);
+// Whether a Func may be computed in a loop of a stage that reads it (L3, L8): its updates need no more than is read.
+bool may_run_in_loops(const Plan& plan, const Context& context, FuncId func);
+// Whether each update writes the elements that its pure variables name, and reads no others of the Func.
+bool stays_in_place(const Context& context, FuncId func);
 // Whether no loop needs a dimension of constant extent (L4).
 bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func);
 bool is_reduction(const Context& context, StageId stage, int iterator);
@@ -105,5 +109,9 @@ std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& conte
                              std::vector<Nest> (*nests)(const StageLoops&));
 // Adds a plan that isn't in the list yet.
 void add(std::vector<Plan>& plans, std::optional<Plan> plan);
+// Adds the plans in which the Func is computed at this place in loops of others, where this box of it is needed: with its
+// own loops, and along rows.
+void add_placed(std::vector<Plan>& plans, const Plan& plan, FuncId func, const Placement& placement,
+                const std::vector<int64_t>& box, const Context& context);
 
 }  // namespace retrograde::planning::moves

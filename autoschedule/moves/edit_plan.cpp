@@ -218,6 +218,16 @@ class FuncChange {
   }
 };
 
+// Whether what updates write and read of the Func has ends, too: it's computed with what is read.
+bool has_bounded_updates(const Context& context, FuncId func) {
+  return std::ranges::all_of(context.accesses.func(func).stages, [&](const StageNode& stage) {
+    return has_range(stage.write, context.sizes) &&
+           std::ranges::all_of(stage.reads, [&](const Access& read) {
+             return read.of != func || has_range(read, context.sizes);
+           });
+  });
+}
+
 }  // namespace
 
 bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func) {
@@ -235,6 +245,25 @@ bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func)
     }
   }
   return true;
+}
+
+bool stays_in_place(const Context& context, FuncId func) {
+  for (const StageNode& stage : context.accesses.func(func).stages) {
+    const auto is_pure = [&](const IndexForm& form) {
+      return form.is_affine() && form.terms.size() == 1 &&
+             !is_reduction(context, stage.id, form.terms[0].iterator);
+    };
+    if (!std::ranges::all_of(stage.write.index, is_pure)) return false;
+    for (const Access& read : stage.reads) {
+      if (read.of == func && read.index != stage.write.index) return false;
+    }
+  }
+  return true;
+}
+
+bool may_run_in_loops(const Plan& plan, const Context& context, FuncId func) {
+  return is_editable(plan, func) && !is_output(*plan.program, func) &&
+         has_bounded_region(plan, context, func) && has_bounded_updates(context, func);
 }
 
 std::optional<Plan> with_func(const Plan& plan, FuncId func, FuncPlan changed,
@@ -261,6 +290,22 @@ std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& conte
 
 void add(std::vector<Plan>& plans, std::optional<Plan> plan) {
   if (plan && std::ranges::find(plans, *plan) == plans.end()) plans.push_back(std::move(*plan));
+}
+
+void add_placed(std::vector<Plan>& plans, const Plan& plan, FuncId func, const Placement& placement,
+                const std::vector<int64_t>& box, const Context& context) {
+  FuncPlan changed = plan.of(func);
+  changed.placement = placement;
+  changed.storage.folds.clear();
+  for (Nest& nest : changed.nests) {
+    for (Loop& loop : nest.loops) {
+      if (loop.kind == ForType::Parallel) loop.kind = ForType::Serial;
+    }
+  }
+  const bool has_own_loops = has_loops(plan, func) && runs_at_any_size(changed, context, func);
+  if (has_own_loops) add(plans, with_func(plan, func, changed, context));
+  run_along_rows(changed, plan, context, func, box, lanes_for(plan, {func, 0}, INT64_MAX) / 2);
+  add(plans, with_func(plan, func, std::move(changed), context));
 }
 
 }  // namespace retrograde::planning::moves

@@ -248,6 +248,20 @@ TEST_F(CostProbes, WhatALoopDoesNotChangeIsComputedOutsideOfIt) {
   EXPECT_GT(each, columns * rows / 16 * 4e-9);
 }
 
+TEST_F(CostProbes, UnrolledCopiesShareAFunctionUnlessItIsInAnArm) {
+  const auto seconds = [&](const Expr& value) {
+    Func sum("sum");
+    sum(x, y) = value + other(x, y);
+    sum.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+    return compute_seconds(priced(sum, "sum  root  y:4, x:16, unroll y, vector x\n"));
+  };
+  const double vectors = columns * rows / 16;
+  const double shared = seconds(exp(in(x, 0)));
+  const double in_arm = seconds(select(in(x, 0) > 0, exp(in(x, 0)), 0));
+  EXPECT_LT(shared, vectors * 2e-9);
+  EXPECT_NEAR(in_arm - shared, vectors * 3e-9, vectors * 0.4e-9);
+}
+
 TEST_F(CostProbes, InlinedFuncsAreComputedForEachElement) {
   rows_sum(x, y) = exp(in(x, y));
   out(x, y) = rows_sum(x, y) + rows_sum(x + 1, y);
