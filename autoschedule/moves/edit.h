@@ -78,6 +78,12 @@ void drop_loop(Nest& nest, size_t depth);
 std::optional<Nest> without_body(const Nest& nest, const Context& context, StageId stage);
 // Runs so many points of the iterator inside of all other loops. Requires: no step is smaller, except 1.
 void run_inside(Nest& nest, int iterator, int64_t points, ForType kind);
+// The elements that are computed in all iterations of the level's stage if its loop needs a box of these extents each time.
+double computed_elements(const Plan& plan, const Context& context, const Level& level,
+                         const std::vector<int64_t>& box);
+double product_of(const std::vector<int64_t>& extents);
+// The Func in a loop, with loops of its own as before, none of them parallel.
+FuncPlan moved_inside(FuncPlan plan, const Placement& placement);
 // Loops for all stages of a changed Func of the plan, whose dimensions have these extents, along rows as they are stored:
 // lanes of the first dimension inside, then the reduction, then the other dimensions; in parallel at root. `min_lanes`:
 // fewer aren't used.
@@ -107,6 +113,16 @@ struct StageLoops {
 // The legal plans in which one stage of the Func has one of these nests instead.
 std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& context,
                              std::vector<Nest> (*nests)(const StageLoops&));
+// The elements in memory from lane to lane of a vector along the iterator, in the storage of the Func that is read or, if it
+// can be stored otherwise, in the best one; 0: no such number.
+int64_t lane_stride(const Plan& plan, const Context& context, const Access& read, int iterator);
+// The plan in which a dimension of the Func is innermost in memory and all stages have lanes along it; so do Funcs that
+// read it at their own places. nullopt: it isn't a legal one. Outputs keep their layout.
+std::optional<Plan> with_turned_results(const Plan& plan, FuncId func, int dimension,
+                                        const Context& context);
+// The plan in which the lanes of the stage read neighbours in memory, of Funcs that can be stored so; nullopt: they do, or
+// none can.
+std::optional<Plan> with_turned_operands(const Plan& plan, StageId stage, const Context& context);
 // Adds a plan that isn't in the list yet.
 void add(std::vector<Plan>& plans, std::optional<Plan> plan);
 // Adds the plans in which the Func is computed at this place in loops of others, where this box of it is needed: with its
