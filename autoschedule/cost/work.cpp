@@ -77,11 +77,13 @@ class StageWork {
     }
     return result;
   }
-  // Iterations of the innermost serial loop.
+  // Iterations of the innermost serial loop, of which each copy that is unrolled around it has its own.
   double iterations() const {
     double result = place_times();
-    for (size_t d = 0; d < depth(); ++d)
-      if (is_serial(d)) result *= run_.nest.trips[d];
+    for (size_t d = 0; d < depth(); ++d) {
+      const bool is_copied = kind(d) == ForType::Unrolled && static_cast<int>(d) < innermost_;
+      if (is_serial(d) || is_copied) result *= run_.nest.trips[d];
+    }
     return result;
   }
   // The unrolled copies that these iterators tell apart.

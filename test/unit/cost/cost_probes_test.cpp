@@ -315,6 +315,17 @@ TEST_F(CostProbes, ASumOfScalarsIsAChain) {
   EXPECT_NEAR(cost.stages[1].compute_seconds, 1.3e-3, 20 * micro);
 }
 
+TEST_F(CostProbes, CopiesOfALoopWaitOneAfterTheOther) {
+  RDom r(0, 1000000, 0, 2, "r");
+  out() += in(r.x, r.y);
+  is_sized = true;
+  const auto seconds_of = [&](const std::string& loops) {
+    return cost_of("out  root\n  .0\n  .1  " + loops + "\n").stages[1].compute_seconds;
+  };
+  EXPECT_NEAR(seconds_of("r.y, r.x"), 2.6e-3, 40 * micro);
+  EXPECT_NEAR(seconds_of("unroll r.y, r.x"), 2.6e-3, 40 * micro);
+}
+
 TEST_F(CostProbes, ShortSumsOverlap) {
   RDom r(0, 4, "r");
   out(x, y) = 0.0f;
