@@ -211,12 +211,20 @@ class StageWork {
       add_chain(copies(touch.moved, false) * m_.latency_ns, from);
     }
   }
+  // Whether lanes that lie apart compete for a few sets of the first cache, so that their lines are gone from one
+  // iteration to the next.
+  bool loses_lines(const Touch& touch) const {
+    const Layout& layout = group_.buffers.at(touch.buffer).layout;
+    const Cover& lanes = run_.cover[run_.place + static_cast<size_t>(innermost_) + 1];
+    return lane_moves(touch, layout, lanes_, 1).is_by_lane &&
+           bytes_by_sets(touch, layout, lanes, page_bytes) > m_.levels[0].bytes;
+  }
   // An element waits for the one before, which the last iteration stored.
   void add_recurrence(const Touch& touch) {
     if (innermost_ < 0 || !moves(static_cast<size_t>(innermost_), touch.carried)) return;
     size_t from = 0;
     while (!moves(from, touch.carried)) ++from;
-    double in_iteration = 1;
+    double in_iteration = loses_lines(touch) ? lanes_.count : 1;
     for (size_t d = static_cast<size_t>(innermost_) + 1; d < depth(); ++d)
       if (kind(d) == ForType::Unrolled && moves(d, touch.carried))
         in_iteration *= run_.nest.trips[d];

@@ -4,8 +4,10 @@
 //   =>    blur  at out/y:8   y, x:16, vector x
 //         blur  at out/x:16  y, vector-sized rows
 //
-// Legal: L3: the loop is around all reads, also through inlined Funcs, and what data decides has a range; L5; L8. A Func
-// whose updates write or read other elements than their own would need more than is read, so it isn't moved.
+//   =>    scan  at out/y:8   y, x:16, vector x;  y, r.x
+//
+// Legal: L3: the loop is around all reads, also through inlined Funcs, and what data decides has a range; L5; L8. Along
+// dimensions that a reduction moves, all that updates access is computed each time.
 // Method: the loops around the first read, of which any legal one is one. For each of the registers and the caches the
 // outermost loop in which the elements that are needed fit.
 #include <algorithm>
@@ -111,19 +113,14 @@ class LevelFinder {
   }
 };
 
-// Whether each update writes the elements that its pure variables name, and reads no others of the Func.
-bool stays_in_place(const Context& context, FuncId func) {
-  for (const StageNode& stage : context.accesses.func(func).stages) {
-    const auto is_pure = [&](const IndexForm& form) {
-      return form.is_affine() && form.terms.size() == 1 &&
-             !is_reduction(context, stage.id, form.terms[0].iterator);
-    };
-    if (!std::ranges::all_of(stage.write.index, is_pure)) return false;
-    for (const Access& read : stage.reads) {
-      if (read.of == func && read.index != stage.write.index) return false;
-    }
-  }
-  return true;
+// Whether what updates write and read of the Func has ends, too: it's computed with what is read.
+bool has_bounded_updates(const Context& context, FuncId func) {
+  return std::ranges::all_of(context.accesses.func(func).stages, [&](const StageNode& stage) {
+    return has_range(stage.write, context.sizes) &&
+           std::ranges::all_of(stage.reads, [&](const Access& read) {
+             return read.of != func || has_range(read, context.sizes);
+           });
+  });
 }
 
 }  // namespace
@@ -131,7 +128,7 @@ bool stays_in_place(const Context& context, FuncId func) {
 std::vector<Plan> compute_at(const Plan& plan, FuncId func, const Context& context) {
   std::vector<Plan> plans;
   if (!is_editable(plan, func) || is_output(*plan.program, func) ||
-      !has_bounded_region(plan, context, func) || !stays_in_place(context, func))
+      !has_bounded_region(plan, context, func) || !has_bounded_updates(context, func))
     return plans;
   for (const auto& [level, box] : LevelFinder(plan, func, context).run()) {
     FuncPlan changed = plan.of(func);

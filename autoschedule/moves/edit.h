@@ -23,8 +23,9 @@ bool is_free(const Context& context, StageId stage, int iterator);
 bool may_run_at_once(const Context& context, StageId stage, const Nest& nest, size_t depth);
 // The stages that read the Func, also through inlined Funcs; those of inlined Funcs, too.
 std::vector<StageId> all_readers(const Plan& plan, const Context& context, FuncId func);
-// Whether the region that is read of the Func is bounded (L3), also through inlined Funcs: data decide no index without a
-// range.
+// Whether data decide no index of the access without a range.
+bool has_range(const Access& access, const SizeModel& sizes);
+// Whether the region that is read of the Func is bounded (L3), also through inlined Funcs.
 bool has_bounded_region(const Plan& plan, const Context& context, FuncId func);
 // Whether no loop needs a dimension of constant extent (L4).
 bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func);
@@ -80,8 +81,8 @@ void run_along_rows(FuncPlan& changed, const Plan& plan, const Context& context,
                     const Cover& extents, int64_t min_lanes);
 // Makes a dimension the innermost one in memory.
 void store_first(Storage& storage, int dimension);
-// Makes the outermost loops of a stage at root parallel until there are enough chunks of work for the threads; none for
-// one thread.
+// Makes the outermost loops of a stage at root parallel until there are enough chunks of work for the threads, inside of
+// those that have to be serial; none for one thread.
 void run_in_parallel(Nest& nest, const Context& context, StageId stage);
 
 // ---- changes of a plan ----

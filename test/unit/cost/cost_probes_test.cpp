@@ -341,6 +341,9 @@ TEST_F(CostProbes, ARecurrenceAlongALineWaitsForMemory) {
   const auto update = [&](const std::string& loops) { return update_cost(loops).compute_seconds; };
   EXPECT_NEAR(update("y, r.x"), 4095 * rows * 2.5e-9, 100 * micro);
   EXPECT_LT(update("y:16, r.x, unroll y"), 4095 * rows * 1.5e-9);
+  EXPECT_LT(update("y:4, r.x, vector y"), 4095 * rows * 1.2e-9);
+  EXPECT_NEAR(update("y:16, r.x, vector y"), 4095 * rows * 2.5e-9, 100 * micro)
+      << "16 lines of one set of the first cache";
 }
 
 // ---- data-dependent indices ----
