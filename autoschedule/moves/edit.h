@@ -99,9 +99,11 @@ void run_in_parallel(Nest& nest, const Context& context, StageId stage);
 
 // The plan in which the Func runs like this; nullopt if it's no other plan or not a legal one: a loop is gone in which
 // something is placed, its region changes though it needs constant extents (L4), a window changes (L9), loops that
-// stages share differ (L11), or iterations of an update that access one element change their order (L1, L2).
+// stages share differ (L11), or iterations of an update that access one element change their order (L1, L2), unless any
+// order is asked for.
+enum class Terms : uint8_t { InOrder, InAnyOrder };
 std::optional<Plan> with_func(const Plan& plan, FuncId func, FuncPlan changed,
-                              const Context& context);
+                              const Context& context, Terms terms = Terms::InOrder);
 // The loops of a stage of a plan.
 struct StageLoops {
   const Plan& plan;
@@ -112,7 +114,8 @@ struct StageLoops {
 };
 // The legal plans in which one stage of the Func has one of these nests instead.
 std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& context,
-                             std::vector<Nest> (*nests)(const StageLoops&));
+                             std::vector<Nest> (*nests)(const StageLoops&),
+                             Terms terms = Terms::InOrder);
 // The elements in memory from lane to lane of a vector along the iterator, in the storage of the Func that is read or, if it
 // can be stored otherwise, in the best one; 0: no such number.
 int64_t lane_stride(const Plan& plan, const Context& context, const Access& read, int iterator);

@@ -329,6 +329,17 @@ TEST_F(CostProbes, ASumOfScalarsIsAChain) {
   EXPECT_NEAR(cost.stages[1].compute_seconds, 1.3e-3, 20 * micro);
 }
 
+TEST_F(CostProbes, CopiesOfALoopWaitOneAfterTheOther) {
+  RDom r(0, 1000000, 0, 2, "r");
+  out() += in(r.x, r.y);
+  is_sized = true;
+  const auto seconds_of = [&](const std::string& loops) {
+    return cost_of("out  root\n  .0\n  .1  " + loops + "\n").stages[1].compute_seconds;
+  };
+  EXPECT_NEAR(seconds_of("r.y, r.x"), 2.6e-3, 40 * micro);
+  EXPECT_NEAR(seconds_of("unroll r.y, r.x"), 2.6e-3, 40 * micro);
+}
+
 TEST_F(CostProbes, ShortSumsOverlap) {
   RDom r(0, 4, "r");
   out(x, y) = 0.0f;
@@ -387,6 +398,25 @@ TEST_F(CostProbes, ARotatedImageIsReadInManyLinesAVector) {
   const StageCost rotated = cost_of("out  root  y, x:16, vector x\n").stages[0];
   EXPECT_GT(rotated.bytes[1], 10 * image_bytes);
   EXPECT_LT(rotated.bytes.back(), 4 * image_bytes) << "the next row finds the lines in L2";
+}
+
+TEST_F(CostProbes, StagesInOneLoopLoadOnceWhatBothGather) {
+  RDom r(0, 4, "r");
+  const Expr gathered = in(clamp(cast<int>(x + other(x, y)), 0, 4095), y + r);
+  Func second("second");
+  out(x, y) += gathered * r;
+  second(x, y) += gathered * (r + 1);
+  second.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+  out.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+  const std::string loops = "y, x:16, r.x, vector x\n",
+                    zeros = "  root\n  .0  y, x:16, vector x\n  .1  ";
+  const auto seconds_of = [&](const std::string& shared) {
+    const Cost cost =
+        Pricing({out, second}).price("out" + zeros + loops + "second" + zeros + shared + loops);
+    return compute_seconds(cost);
+  };
+  const double gathers = 4 * columns * rows * 0.35e-9;
+  EXPECT_NEAR(seconds_of("") - seconds_of("shared with out.1/r.x  "), gathers, 0.3 * gathers);
 }
 
 TEST_F(CostProbes, TheBinsOfACellAreOneLine) {
