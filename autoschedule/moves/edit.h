@@ -60,6 +60,9 @@ int64_t operations(const Plan& plan, const Context& context, StageId stage);
 // The lanes of a vector of the stage's values along a loop of this extent: a vector, or for a shorter loop the half or
 // quarter of one. 1: the loop is too short.
 int64_t lanes_for(const Plan& plan, StageId stage, int64_t extent);
+// How many accesses have lanes along the iterator that lie together; those that need an access for each lane count against
+// it.
+int lanes_together(const Context& context, StageId stage, int iterator);
 
 // ---- changes of a nest ----
 
@@ -88,9 +91,11 @@ void run_in_parallel(Nest& nest, const Context& context, StageId stage);
 
 // The plan in which the Func runs like this; nullopt if it's no other plan or not a legal one: a loop is gone in which
 // something is placed, its region changes though it needs constant extents (L4), a window changes (L9), loops that
-// stages share differ (L11), or iterations of an update that access one element change their order (L1, L2).
+// stages share differ (L11), or iterations of an update that access one element change their order (L1, L2), unless any
+// order is asked for.
+enum class Terms : uint8_t { InOrder, InAnyOrder };
 std::optional<Plan> with_func(const Plan& plan, FuncId func, FuncPlan changed,
-                              const Context& context);
+                              const Context& context, Terms terms = Terms::InOrder);
 // The loops of a stage of a plan.
 struct StageLoops {
   const Plan& plan;
@@ -101,7 +106,8 @@ struct StageLoops {
 };
 // The legal plans in which one stage of the Func has one of these nests instead.
 std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& context,
-                             std::vector<Nest> (*nests)(const StageLoops&));
+                             std::vector<Nest> (*nests)(const StageLoops&),
+                             Terms terms = Terms::InOrder);
 // Adds a plan that isn't in the list yet.
 void add(std::vector<Plan>& plans, std::optional<Plan> plan);
 

@@ -41,8 +41,8 @@ bool has_window(const FuncPlan& func) {
 // One change of a Func in a plan.
 class FuncChange {
  public:
-  FuncChange(const Plan& plan, FuncId func, FuncPlan changed, const Context& context)
-      : before_(plan), context_(context), func_(func), changed_(std::move(changed)) {
+  FuncChange(const Plan& plan, FuncId func, FuncPlan changed, const Context& context, Terms terms)
+      : before_(plan), context_(context), func_(func), changed_(std::move(changed)), terms_(terms) {
     is_moved_ = !(changed_.placement == before().placement);
   }
 
@@ -66,6 +66,7 @@ class FuncChange {
   const Context& context_;
   const FuncId func_;
   const FuncPlan changed_;
+  const Terms terms_;
   bool is_moved_ = false;
 
   const FuncPlan& before() const { return before_.of(func_); }
@@ -115,6 +116,7 @@ class FuncChange {
     return true;
   }
   bool keeps_order() const {
+    if (terms_ == Terms::InAnyOrder) return true;
     for (size_t s = 0; s < changed_.nests.size(); ++s) {
       const StageId stage{func_, static_cast<int16_t>(s)};
       if (old_nest(stage) == new_nest(stage)) continue;
@@ -238,13 +240,13 @@ bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func)
 }
 
 std::optional<Plan> with_func(const Plan& plan, FuncId func, FuncPlan changed,
-                              const Context& context) {
+                              const Context& context, Terms terms) {
   if (changed == plan.of(func)) return std::nullopt;
-  return FuncChange(plan, func, std::move(changed), context).run();
+  return FuncChange(plan, func, std::move(changed), context, terms).run();
 }
 
 std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& context,
-                             std::vector<Nest> (*nests)(const StageLoops&)) {
+                             std::vector<Nest> (*nests)(const StageLoops&), Terms terms) {
   std::vector<Plan> plans;
   if (!has_loops(plan, func)) return plans;
   for (const StageNode& node : context.accesses.func(func).stages) {
@@ -253,7 +255,7 @@ std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& conte
     for (Nest& nest : nests(loops)) {
       FuncPlan changed = plan.of(func);
       changed.nests[static_cast<size_t>(node.id.stage)] = std::move(nest);
-      add(plans, with_func(plan, func, std::move(changed), context));
+      add(plans, with_func(plan, func, std::move(changed), context, terms));
     }
   }
   return plans;
