@@ -63,7 +63,6 @@ class Beam {
         width_(static_cast<size_t>(width)),
         left_(prices_per_func * static_cast<int64_t>(start.funcs.size()) * width) {
     states_.push_back({start, cost_.price(start), nullptr});
-    most_bytes_ = states_[0].cost.peak_bytes + options.spare_bytes;
     seen_.insert(hash_of(start));
   }
 
@@ -86,7 +85,6 @@ class Beam {
   const SearchOptions& options_;
   const size_t width_;
   int64_t left_;
-  double most_bytes_;
   std::unordered_set<uint64_t> seen_;
   std::vector<State> states_;  // the fastest first; never empty
 
@@ -143,7 +141,7 @@ class Beam {
         if (!seen_.insert(hash_of(plan)).second) continue;
         --left_;
         Cost cost = cost_.price(plan);
-        if (cost.peak_bytes > most_bytes_) continue;
+        if (cost.peak_bytes > std::max(options_.most_bytes, from.cost.peak_bytes)) continue;
         const SearchStep step{f, move.name, cost.seconds};
         const auto last = std::make_shared<const State::Step>(State::Step{step, from.last});
         next.push_back({{std::move(plan), std::move(cost), last}, from.from});
@@ -168,10 +166,25 @@ SearchResult search(const Plan& start, const Context& context, CostModel& cost,
   };
   add(1);
   if (options.width > 1) add(options.width);
-  std::ranges::stable_sort(found, is_faster);
   result.start = {start, cost.price(start), {}};
+  // With less memory than is allowed; the start alone may have more.
+  const bool has_much = result.start.cost.peak_bytes > options.most_bytes;
+  std::erase_if(found, [&](const State& state) {
+    return state.cost.peak_bytes > options.most_bytes && !(has_much && state.plan == start);
+  });
+  std::ranges::stable_sort(found, is_faster);
   for (const State& state : found) result.found.push_back(found_of(state));
   return result;
+}
+
+void merge(SearchResult& result, SearchResult other) {
+  for (FoundPlan& found : other.found) {
+    const auto is_it = [&](const FoundPlan& known) { return known.plan == found.plan; };
+    if (std::ranges::none_of(result.found, is_it)) result.found.push_back(std::move(found));
+  }
+  const auto seconds = [](const FoundPlan& found) { return found.cost.seconds; };
+  std::ranges::stable_sort(result.found, std::less(), seconds);
+  result.priced += other.priced;
 }
 
 }  // namespace retrograde::planning

@@ -1,4 +1,4 @@
-// plan_search.h -- a search over plans that begins with the schedule of the rules.
+// plan_search.h -- a search over plans that begins with the schedule of the rules, and with no decisions.
 //
 //   scheduled graph => plan => moves, by predicted time => plan => directives of what changed
 #pragma once
@@ -18,8 +18,9 @@ struct PlanSearch {
 };
 
 struct PlanSearchOptions {
-  int width = 1;            // of the beam
-  int64_t spare_bytes = 0;  // that may be alive at once beyond those of `scheduled`
+  int width = 1;             // of the beam
+  int64_t spare_bytes = 0;   // that may be alive at once beyond those of `scheduled`
+  bool from_nothing = true;  // searches from a plan without decisions, too
 };
 
 // The machine that the cost of a search is for: that of the cost model, with the threads of the options.

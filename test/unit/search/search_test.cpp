@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "autoschedule/search/start.h"
 #include "unit/plan/plan_testing.h"
 
 namespace retrograde::planning {
@@ -87,10 +88,44 @@ TEST_F(SearchTest, PlansKeepWithinTheMemoryOfTheStart) {
   // Without `rows` at root, which the search stores again.
   start = parsed("out  root\nrows  inline\nheavy  root\n", start.program);
   SearchOptions options;
-  options.spare_bytes = 0;
+  options.most_bytes = CostModel(*accesses, *sizes, machine).price(start).peak_bytes;
   const SearchResult result = found(options);
   for (const FoundPlan& found : result.found)
     EXPECT_LE(found.cost.peak_bytes, result.start.cost.peak_bytes);
+}
+
+TEST_F(SearchTest, ASearchFromNothingKeepsWhatItMust) {
+  start = parsed("out  root  y:8, y, x\nrows  at out/y:8  y, x\nheavy  at rows/y  y, x\n",
+                 start.program);
+  Dependences dependences(*accesses);
+  const Context context{*accesses, *sizes, machine, dependences};
+  std::vector<bool> kept(start.funcs.size(), false);
+  const Plan nothing = plan_from_nothing(start, kept, context);
+  EXPECT_EQ(plain_text(nothing),
+            "out  root  parallel y, x:16 GuardWithIf, vector x\n"
+            "rows  root  parallel y, x:16 GuardWithIf, vector x\n"
+            "heavy  root  parallel y, x:16 GuardWithIf, vector x\n");
+  kept[static_cast<size_t>(id("rows"))] = true;  // with the loop in which it is computed
+  EXPECT_EQ(plain_text(plan_from_nothing(start, kept, context)),
+            "out  root  y:8, y, x\n"
+            "rows  at out/y:8\n"
+            "heavy  root  parallel y, x:16 GuardWithIf, vector x\n");
+}
+
+TEST_F(SearchTest, ResultsOfTwoStartsAreInOrder) {
+  SearchResult both = found({});
+  const size_t count = both.found.size();
+  merge(both, found({}));  // nothing new
+  EXPECT_EQ(both.found.size(), count);
+  const SearchResult known = both;
+  start = both.found[0].plan;
+  start.funcs = parsed("out  root\nrows  inline\nheavy  root\n", start.program).funcs;
+  merge(both, found({}));
+  EXPECT_GT(both.found.size(), count);
+  EXPECT_TRUE(both.start.plan == known.start.plan);
+  EXPECT_GT(both.priced, known.priced);
+  EXPECT_TRUE(std::ranges::is_sorted(both.found, {},
+                                     [](const FoundPlan& plan) { return plan.cost.seconds; }));
 }
 
 }  // namespace
