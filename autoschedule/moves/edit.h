@@ -65,6 +65,9 @@ int64_t operations(const Plan& plan, const Context& context, StageId stage);
 // The lanes of a vector of the stage's values along a loop of this extent: a vector, or for a shorter loop the half or
 // quarter of one. 1: the loop is too short.
 int64_t lanes_for(const Plan& plan, StageId stage, int64_t extent);
+// How many accesses have lanes along the iterator that lie together; those that need an access for each lane count against
+// it.
+int lanes_together(const Context& context, StageId stage, int iterator);
 
 // ---- changes of a nest ----
 

@@ -348,6 +348,22 @@ TEST_F(CostProbes, ShortSumsOverlap) {
   EXPECT_LT(update_cost("y, x:16, r.x, vector x").compute_seconds, chain / 1.2);
 }
 
+TEST_F(CostProbes, LanesOfASumAreCombinedOnce) {
+  const auto update = [&](int terms) {
+    Func total("total");
+    RDom r(0, terms, "r");
+    total(y) = 0.0f;
+    total(y) += in(r, y);
+    total.bound(y, 0, 2048);
+    return priced(total, "total  root\n  .0  y\n  .1  racing  y, r.x:16, vector r.x\n").stages[1];
+  };
+  // Four steps of a shuffle and a sum for each element.
+  const double ends = rows * 4 * 2 * 0.45e-9;
+  EXPECT_GT(update(16).compute_seconds, ends);
+  EXPECT_LT(update(16).compute_seconds, 1.3 * ends);
+  EXPECT_NEAR(update(4096).compute_seconds, rows * 256 * 1.3e-9, 1.5 * ends) << "hidden";
+}
+
 TEST_F(CostProbes, ARecurrenceAlongALineWaitsForMemory) {
   RDom r(1, 4095, "r");
   out(x, y) = 0.0f;
