@@ -4,8 +4,10 @@
 //   =>    blur  at out/y:8   y, x:16, vector x
 //         blur  at out/x:16  y, vector-sized rows
 //
-// Legal: L3: the loop is around all reads, also through inlined Funcs, and what data decides has a range; L5; L8. A Func
-// whose updates write or read other elements than their own would need more than is read, so it isn't moved.
+//   =>    scan  at out/y:8   y, x:16, vector x;  y, r.x
+//
+// Legal: L3: the loop is around all reads, also through inlined Funcs, and what data decides has a range; L5; L8. Along
+// dimensions that a reduction moves, all that updates access is computed each time.
 // Method: the loops around the first read, of which any legal one is one. For each of the registers and the caches the
 // outermost loop in which the elements that are needed fit.
 #include <algorithm>
@@ -105,14 +107,9 @@ class LevelFinder {
 
 std::vector<Plan> compute_at(const Plan& plan, FuncId func, const Context& context) {
   std::vector<Plan> plans;
-  if (!may_move_inside(plan, func, context)) return plans;
-  for (const auto& [level, box] : LevelFinder(plan, func, context).run()) {
-    FuncPlan changed = moved_inside(plan.of(func), level);
-    const bool has_own_loops = has_loops(plan, func) && runs_at_any_size(changed, context, func);
-    if (has_own_loops) add(plans, with_func(plan, func, changed, context));
-    run_along_rows(changed, plan, context, func, box, lanes_for(plan, {func, 0}, INT64_MAX) / 2);
-    add(plans, with_func(plan, func, std::move(changed), context));
-  }
+  if (!may_run_in_loops(plan, context, func)) return plans;
+  for (const auto& [level, box] : LevelFinder(plan, func, context).run())
+    add_placed(plans, plan, func, {level, {}, {}}, box, context);
   return plans;
 }
 

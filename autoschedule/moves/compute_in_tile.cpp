@@ -95,7 +95,7 @@ void add_plan(std::vector<Plan>& plans, const StageLoops& reader, FuncId func, N
     fewest = computed;
     best = level;
   }
-  add(plans, with_func(*host, func, moved_inside(plan.of(func), best), context));
+  add(plans, with_func(*host, func, moved_inside(plan.of(func), {best, {}, {}}), context));
 }
 
 void add_plans(std::vector<Plan>& plans, const Plan& plan, FuncId func, StageId stage,
@@ -122,7 +122,7 @@ void add_plans(std::vector<Plan>& plans, const Plan& plan, FuncId func, StageId 
 
 std::vector<Plan> compute_in_tile(const Plan& plan, FuncId func, const Context& context) {
   std::vector<Plan> plans;
-  if (!has_loops(plan, func) || !may_move_inside(plan, func, context) ||
+  if (!has_loops(plan, func) || !may_run_in_loops(plan, context, func) ||
       !runs_at_any_size(plan.of(func), context, func))
     return plans;
   const std::optional<StageId> reader = only_reader(plan, context, func);

@@ -3,6 +3,7 @@
 #include <map>
 #include <tuple>
 
+#include "autoschedule/access/lane_form.h"
 #include "autoschedule/moves/edit.h"
 #include "autoschedule/plan/covers.h"
 #include "autoschedule/plan/nest.h"
@@ -24,13 +25,6 @@ bool is_plain(const Nest& nest) {
     if (runs_on_device(nest.loops[d]) || nest.loops[d].in_blocks || is_phase(nest, d)) return false;
   }
   return true;
-}
-
-bool has_range(const IndexForm& form, const SizeModel& sizes) {
-  return sizes.range(form.within).is_bounded() ||
-         std::ranges::all_of(form.opaque, [&](const OpaqueTerm& term) {
-           return !term.value.from_data || term.range.is_bounded();
-         });
 }
 
 // Steps that divide the next larger one have no tail. Where a tail would compute more than is asked for, regions of
@@ -94,6 +88,15 @@ std::vector<StageId> all_readers(const Plan& plan, const Context& context, FuncI
   return result;
 }
 
+bool has_range(const Access& access, const SizeModel& sizes) {
+  return std::ranges::all_of(access.index, [&](const IndexForm& form) {
+    return sizes.range(form.within).is_bounded() ||
+           std::ranges::all_of(form.opaque, [](const OpaqueTerm& term) {
+             return !term.value.from_data || term.range.is_bounded();
+           });
+  });
+}
+
 bool has_bounded_region(const Plan& plan, const Context& context, FuncId func) {
   const std::vector<StageId> readers = all_readers(plan, context, func);
   const auto leads_to = [&](FuncId read) {
@@ -104,10 +107,7 @@ bool has_bounded_region(const Plan& plan, const Context& context, FuncId func) {
     const std::vector<Access>& reads = context.accesses.stage(reader).reads;
     return plan.of(reader.func).opacity == Opacity::None &&
            std::ranges::all_of(reads, [&](const Access& read) {
-             return !leads_to(read.of) ||
-                    std::ranges::all_of(read.index, [&](const IndexForm& form) {
-                      return has_range(form, context.sizes);
-                    });
+             return !leads_to(read.of) || has_range(read, context.sizes);
            });
   });
 }
@@ -283,6 +283,21 @@ int64_t lanes_for(const Plan& plan, StageId stage, int64_t extent) {
   return lanes <= extent && 4 * lanes >= full ? lanes : 1;
 }
 
+int lanes_together(const Context& context, StageId stage, int iterator) {
+  const StageNode& node = context.accesses.stage(stage);
+  int count = 0;
+  const auto note = [&](const Access& access, int weight) {
+    const LaneForm form =
+        lane_form(access, iterator, schedule_lanes, context.sizes, {line_elements});
+    if (form.kind == LaneForm::Kind::Contiguous) count += weight;
+    if (form.kind == LaneForm::Kind::Strided || form.kind == LaneForm::Kind::Gather)
+      count -= weight;
+  };
+  note(node.write, 2);
+  for (const Access& read : node.reads) note(read, 1);
+  return count;
+}
+
 // ---- changes ----
 
 void insert_step(Nest& nest, int iterator, int64_t step, size_t depth, ForType kind) {
@@ -349,7 +364,10 @@ void run_in_parallel(Nest& nest, const Context& context, StageId stage) {
   const Cover extents = whole_cover(stage, context.sizes);
   int64_t chunks = 1;
   for (size_t d = 0; d < body_depth(nest) && chunks < context.machine.enough_tasks(); ++d) {
-    if (!may_run_at_once(context, stage, nest, d)) return;
+    if (!may_run_at_once(context, stage, nest, d)) {
+      if (chunks > 1) return;
+      continue;  // serial, around parallel ones
+    }
     nest.loops[d].kind = ForType::Parallel;
     chunks *= trips(extents, nest, d);
   }

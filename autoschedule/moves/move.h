@@ -11,7 +11,7 @@
 // The conditions under which a plan is legal have numbers, which code and tests mention:
 //
 //   L1   no dependence is carried by loops that change their order or kind
-//   L2   the order in which one element takes its terms stays, so that its bits do
+//   L2   the order in which one element takes its terms stays, so that its bits do; moves that change it say so
 //   L3   all reads are inside of the loop in which a Func is placed (P2), and the region that they need is bounded
 //   L4   extents of vectors and of unrolled loops are constant
 //   L5   the code that inlining and unrolling make is bounded
@@ -47,6 +47,7 @@ using MoveFunction = std::vector<Plan> (*)(const Plan& plan, FuncId func, const 
 struct Move {
   const char* name;
   MoveFunction apply;
+  bool changes_bits;  // terms may be added in another order, in shorter chains
 };
 std::span<const Move> all_moves();               // list.def
 const Move* find_move(const std::string& name);  // null: there is none
