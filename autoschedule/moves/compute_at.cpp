@@ -113,16 +113,6 @@ class LevelFinder {
   }
 };
 
-// Whether what updates write and read of the Func has ends, too: it's computed with what is read.
-bool has_bounded_updates(const Context& context, FuncId func) {
-  return std::ranges::all_of(context.accesses.func(func).stages, [&](const StageNode& stage) {
-    return has_range(stage.write, context.sizes) &&
-           std::ranges::all_of(stage.reads, [&](const Access& read) {
-             return read.of != func || has_range(read, context.sizes);
-           });
-  });
-}
-
 }  // namespace
 
 std::vector<Plan> compute_at(const Plan& plan, FuncId func, const Context& context) {

@@ -25,8 +25,14 @@ bool may_run_at_once(const Context& context, StageId stage, const Nest& nest, si
 std::vector<StageId> all_readers(const Plan& plan, const Context& context, FuncId func);
 // Whether data decide no index of the access without a range.
 bool has_range(const Access& access, const SizeModel& sizes);
+// Visits what a stage reads, also through inlined Funcs, with the iterators of the stage that move each index.
+using MovedIndices = std::vector<IteratorSet>;
+void for_each_read(const Plan& plan, const Context& context, StageId stage,
+                   ir::FunctionRef<void(const Access&, const MovedIndices&)> visit);
 // Whether the region that is read of the Func is bounded (L3), also through inlined Funcs.
 bool has_bounded_region(const Plan& plan, const Context& context, FuncId func);
+// Whether what updates write and read of the Func has ends, too: it's computed with what is read.
+bool has_bounded_updates(const Context& context, FuncId func);
 // Whether no loop needs a dimension of constant extent (L4).
 bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func);
 bool is_reduction(const Context& context, StageId stage, int iterator);

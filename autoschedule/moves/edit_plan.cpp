@@ -222,6 +222,15 @@ class FuncChange {
 
 }  // namespace
 
+bool has_bounded_updates(const Context& context, FuncId func) {
+  return std::ranges::all_of(context.accesses.func(func).stages, [&](const StageNode& stage) {
+    return has_range(stage.write, context.sizes) &&
+           std::ranges::all_of(stage.reads, [&](const Access& read) {
+             return read.of != func || has_range(read, context.sizes);
+           });
+  });
+}
+
 bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func) {
   if (plan.opacity != Opacity::None ||
       (plan.storage.memory != MemoryType::Auto && plan.storage.memory != MemoryType::Heap))
