@@ -40,6 +40,9 @@ struct StageRun {
   StageId id;
   const StageFacts* facts = nullptr;
   NestTrips nest;
+  // By dimension of a Func that is stored outside of its loops: the elements that lowering keeps, in a circular window whose
+  // extent is a power of two; 0: all of the box.
+  std::vector<int64_t> kept;
   std::vector<int> path;     // nodes from the root to the innermost loop
   size_t place = 1;          // how many of them are around the stage's own nest
   size_t storage_place = 1;  // and around the storage of its Func

@@ -262,6 +262,21 @@ TEST_F(CostProbes, UnrolledCopiesShareAFunctionUnlessItIsInAnArm) {
   EXPECT_NEAR(in_arm - shared, vectors * 3e-9, vectors * 0.4e-9);
 }
 
+// Rows of 16 KB: lowering keeps four of a window over three rows, whatever the height of the strip.
+TEST_F(CostProbes, AWindowKeepsAFewRowsOfAStrip) {
+  rows_sum(x, y) = in(x, y) + in(x + 1, y);
+  out(x, y) = rows_sum(x, y) + rows_sum(x, y + 2);
+  const auto in_strips_of = [&](const std::string& height) {
+    return cost_of("out  root  y:" + height +
+                   ", y, x:16, vector x\nrows_sum  at out/y  store at out/y:" + height +
+                   "  y, x:16, vector x\n");
+  };
+  const Cost low = in_strips_of("64"), high = in_strips_of("512");
+  EXPECT_NEAR(low.peak_bytes, 4 * 16384, 1024);
+  EXPECT_EQ(high.peak_bytes, low.peak_bytes);
+  EXPECT_LT(high.seconds, low.seconds) << "fewer rows at the ends of strips";
+}
+
 TEST_F(CostProbes, InlinedFuncsAreComputedForEachElement) {
   rows_sum(x, y) = exp(in(x, y));
   out(x, y) = rows_sum(x, y) + rows_sum(x + 1, y);
