@@ -136,10 +136,11 @@ class GroupBuilder {
     child.times = outer.times * trips;
     child.in_parallel = outer.in_parallel || runs_at_once(kind);
     child.speedup = outer.speedup;
+    child.chunks = outer.chunks;
     if (runs_at_once(kind)) {
-      // The last round may leave threads without a chunk.
-      const double threads = std::max(1.0, std::floor(machine_.threads / outer.speedup));
-      child.speedup *= trips / std::ceil(trips / threads);
+      // Threads take chunks of all loops around. The last round may leave some without a chunk.
+      child.chunks *= trips;
+      child.speedup = child.chunks / std::ceil(child.chunks / machine_.threads);
     }
     const int index = static_cast<int>(group_.nodes.size());
     group_.nodes.push_back(std::move(child));

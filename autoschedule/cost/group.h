@@ -31,6 +31,7 @@ struct LoopNode {
   ForType kind = ForType::Serial;
   double trips = 1, times = 1;  // iterations in one run of the loops around it, and in all
   double speedup = 1;           // by threads
+  double chunks = 1;            // iterations of the parallel loops, with those around
   bool in_parallel = false;     // it, or a loop around it
   std::vector<int> children;    // in the order in which they run
   std::vector<int> stages;      // of which it is the innermost loop

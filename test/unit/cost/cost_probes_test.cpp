@@ -57,6 +57,15 @@ TEST_F(CostProbes, ThreadsShareTheBandwidthOfMemory) {
   EXPECT_NEAR(cost.stages[0].launch_seconds, 5 * micro, 0.1 * micro);
 }
 
+TEST_F(CostProbes, ThreadsTakeChunksOfAllParallelLoops) {
+  out(x, y, c) = exp(in(x, y)) + c;
+  out.set_estimate(c, 0, 3);
+  const double serial = compute_seconds(cost_of("out  root  c, y, x:16, vector x\n"));
+  const double parallel =
+      compute_seconds(cost_of("out  root  parallel c, parallel y, x:16, vector x\n"));
+  EXPECT_NEAR(parallel / serial, 0.5, 0.01);
+}
+
 TEST_F(CostProbes, TheLastRoundOfChunksLeavesAThreadIdle) {
   out(x, y) = exp(in(x, y));
   out.bound(y, 0, 3);
