@@ -4,8 +4,10 @@
 //   =>    blur  at out/y:8   y, x:16, vector x
 //         blur  at out/x:16  y, vector-sized rows
 //
-// Legal: L3: the loop is around all reads, also through inlined Funcs, and what data decides has a range; L5; L8. A Func
-// whose updates write or read other elements than their own would need more than is read, so it isn't moved.
+//   =>    scan  at out/y:8   y, x:16, vector x;  y, r.x
+//
+// Legal: L3: the loop is around all reads, also through inlined Funcs, and what data decides has a range; L5; L8. Along
+// dimensions that a reduction moves, all that updates access is computed each time.
 // Method: the loops around the first read, of which any legal one is one. For each of the registers and the caches the
 // outermost loop in which the elements that are needed fit.
 #include <algorithm>
@@ -88,26 +90,16 @@ class LevelFinder {
   bool encloses_reads(const Level& level) const { return !readers_.find_outside(func_, level); }
 
   double bytes_of(const std::vector<int64_t>& box) const {
-    double bytes = elements_of(box);
+    double bytes = product_of(box);
     for (const Type& type : context_.accesses.func(func_).func->types) bytes *= type.bytes();
     return bytes;
   }
-  static double elements_of(const std::vector<int64_t>& box) {
-    double elements = 1;
-    for (const int64_t extent : box) elements *= static_cast<double>(extent);
-    return elements;
-  }
-
   // L5: how often an element is computed.
   bool is_worth(const Level& level, const std::vector<int64_t>& box) const {
-    const auto [stage, depth] = level.loop;
-    const Cover extents = whole_cover(stage, context_.sizes);
-    double computed = elements_of(box), all = 1;
-    for (size_t d = 0; d <= static_cast<size_t>(depth); ++d)
-      computed *= static_cast<double>(trips(extents, plan_.nest(stage), d));
+    double all = 1;
     for (size_t d = 0; d < box.size(); ++d)
       all *= static_cast<double>(std::max<int64_t>(context_.sizes.of(func_, d).estimate, 1));
-    return computed <= most_recomputation * all;
+    return computed_elements(plan_, context_, level, box) <= most_recomputation * all;
   }
 };
 

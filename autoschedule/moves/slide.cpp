@@ -159,7 +159,7 @@ std::optional<Window> window_in(StripFinder::Strip strip, StageId host, FuncId f
 
 std::vector<Plan> slide(const Plan& plan, FuncId func, const Context& context) {
   std::vector<Plan> plans;
-  if (!may_run_in_loops(plan, context, func)) return plans;
+  if (!may_run_in_loops(plan, context, func) || !stays_in_place(context, func)) return plans;
   const std::optional<StageId> host = stage_around_reads(plan, context, func);
   if (!host || host->func == func) return plans;
   const StripFinder strips(plan, *host, context);

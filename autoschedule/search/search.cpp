@@ -136,6 +136,16 @@ class Beam {
     }
   }
 
+  // Whether a move of another Func changes one that is to be kept. Loops that places refer to may get other numbers.
+  bool keeps_funcs(const Plan& before, const Plan& after) const {
+    for (size_t f = 0; f < options_.kept.size(); ++f) {
+      if (!options_.kept[f] || before.funcs[f] == after.funcs[f]) continue;
+      const FuncPlan &was = *before.funcs[f], &is = *after.funcs[f];
+      if (!(was.storage == is.storage) || !(was.nests == is.nests)) return false;
+    }
+    return true;
+  }
+
   void add_neighbours(const Candidate& from, FuncId f, std::vector<Candidate>& next) {
     const bool only_places = is_small(f);
     for (const Move& move : all_moves()) {
@@ -143,7 +153,7 @@ class Beam {
       for (Plan& plan : move.apply(from.plan, f, context_)) {
         if (left_ == 0) return;
         if (only_places && plan.of(f).placement == from.plan.of(f).placement) continue;
-        if (!seen_.insert(hash_of(plan)).second) continue;
+        if (!keeps_funcs(from.plan, plan) || !seen_.insert(hash_of(plan)).second) continue;
         --left_;
         Cost cost = cost_.price(plan);
         if (cost.peak_bytes > std::max(options_.most_bytes, from.cost.peak_bytes)) continue;

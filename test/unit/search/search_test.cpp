@@ -84,6 +84,37 @@ TEST_F(SearchTest, KeptFuncsRunAsBefore) {
   }
 }
 
+// A product of matrices, one of which lies across the lanes of the tile.
+TEST(SearchOperands, AreStoredAlongLanesUnlessTheyAreKept) {
+  Var x{"x"}, y{"y"}, z{"z"};
+  RDom r(0, 64);
+  Func a("a"), rows("rows"), out("out");
+  a(z, y) = cast<float>(z + y);
+  rows(z, x) = cast<float>(z * x);
+  out(x, y) = 0.0f;
+  out(x, y) += a(r, y) * rows(r, x);
+  out.set_estimates({{0, 512}, {0, 512}});
+  for (Func* f : {&a, &rows, &out}) f->compute_root();
+  const Plan start = imported({out});
+  const AccessGraph accesses(start.program->outputs);
+  const SizeModel sizes(accesses, {unknown_extent});
+  const Machine machine = {};
+  Dependences dependences(accesses);
+  const auto& funcs = start.program->funcs;
+  const auto kept = static_cast<FuncId>(std::ranges::find(funcs, rows.function()) - funcs.begin());
+  const auto order = [&](const SearchOptions& options) {
+    CostModel cost(accesses, sizes, machine);
+    const SearchResult result =
+        search(start, {accesses, sizes, machine, dependences}, cost, options);
+    return result.found[0].plan.of(kept).storage.order;
+  };
+  EXPECT_EQ(order({}), (std::vector<int16_t>{1, 0}));
+  SearchOptions options;
+  options.kept.assign(start.funcs.size(), false);
+  options.kept[static_cast<size_t>(kept)] = true;
+  EXPECT_EQ(order(options), start.of(kept).storage.order);
+}
+
 TEST_F(SearchTest, PlansKeepWithinTheMemoryOfTheStart) {
   // Without `rows` at root, which the search stores again.
   start = parsed("out  root\nrows  inline\nheavy  root\n", start.program);
