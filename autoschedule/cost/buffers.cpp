@@ -61,6 +61,10 @@ class BufferFinder {
     const Cover& box = own->cover[own->storage_place];
     result.layout.extents.assign(box.begin(), box.end());
     fold(result.layout.extents, plan.storage);
+    for (size_t d = 0; d < own->kept.size(); ++d) {
+      double& extent = result.layout.extents[d];
+      if (own->kept[d] > 0) extent = std::min(extent, static_cast<double>(own->kept[d]));
+    }
     result.inside = own->storage_place;
     allocate(result, touch, *own);
     result.register_share = register_share(result, touch);

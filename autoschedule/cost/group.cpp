@@ -1,6 +1,7 @@
 #include "autoschedule/cost/group.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "autoschedule/cost/assumptions.h"
@@ -76,7 +77,7 @@ class GroupBuilder {
     run.path = path_around(stage, nest, run.place);
     run.storage_place = is_at(stage.func) ? store_place(run) : 1;
     double share = 1;
-    const Cover extents = extents_of(run, share);
+    const Cover extents = extents_of(run, share, run.kept);
     run.nest = nest_trips(nest, extents);
     const size_t first = run.path.size() - run.place;
     if (first < run.nest.trips.size() && !is_lane_loop(run, first)) run.nest.trips[first] *= share;
@@ -135,10 +136,11 @@ class GroupBuilder {
     child.times = outer.times * trips;
     child.in_parallel = outer.in_parallel || runs_at_once(kind);
     child.speedup = outer.speedup;
+    child.chunks = outer.chunks;
     if (runs_at_once(kind)) {
-      // The last round may leave threads without a chunk.
-      const double threads = std::max(1.0, std::floor(machine_.threads / outer.speedup));
-      child.speedup *= trips / std::ceil(trips / threads);
+      // Threads take chunks of all loops around. The last round may leave some without a chunk.
+      child.chunks *= trips;
+      child.speedup = child.chunks / std::ceil(child.chunks / machine_.threads);
     }
     const int index = static_cast<int>(group_.nodes.size());
     group_.nodes.push_back(std::move(child));
@@ -177,17 +179,17 @@ class GroupBuilder {
 
   // The points of all loops of the nest. Where a Func is stored outside of the loop in which it is computed, an iteration
   // computes only what the iteration before has not. `share`: the iterations that compute anything.
-  Cover extents_of(const StageRun& run, double& share) {
+  Cover extents_of(const StageRun& run, double& share, std::vector<int64_t>& kept) {
     if (!is_at(run.id.func) || run.place <= 1) return whole_cover(run.id, sizes_);
     std::vector<int64_t> box = box_in(run.id.func, run.path, run.place);
     const std::vector<int64_t> all = box;
-    std::vector<bool> is_window(box.size());
+    kept.assign(box.size(), 0);
     for (size_t count = run.place - 1; count >= run.storage_place; --count) {
       const std::vector<int64_t> outer = box_in(run.id.func, run.path, count);
       const double trips = full_trips(run.path[count], count);
       for (size_t d = 0; d < box.size(); ++d) {
-        if (outer[d] <= all[d] || is_window[d] || trips <= 1) continue;
-        is_window[d] = true;
+        if (outer[d] <= all[d] || kept[d] > 0 || trips <= 1) continue;
+        kept[d] = static_cast<int64_t>(std::bit_ceil(static_cast<uint64_t>(all[d])));
         const double step = double(outer[d] - all[d]) / (trips - 1);
         box[d] = std::clamp<int64_t>(static_cast<int64_t>(std::ceil(step)), 1, all[d]);
         share *= std::min(1.0, step);

@@ -31,6 +31,7 @@ struct LoopNode {
   ForType kind = ForType::Serial;
   double trips = 1, times = 1;  // iterations in one run of the loops around it, and in all
   double speedup = 1;           // by threads
+  double chunks = 1;            // iterations of the parallel loops, with those around
   bool in_parallel = false;     // it, or a loop around it
   std::vector<int> children;    // in the order in which they run
   std::vector<int> stages;      // of which it is the innermost loop
@@ -40,6 +41,9 @@ struct StageRun {
   StageId id;
   const StageFacts* facts = nullptr;
   NestTrips nest;
+  // By dimension of a Func that is stored outside of its loops: the elements that lowering keeps, in a circular window whose
+  // extent is a power of two; 0: all of the box.
+  std::vector<int64_t> kept;
   std::vector<int> path;     // nodes from the root to the innermost loop
   size_t place = 1;          // how many of them are around the stage's own nest
   size_t storage_place = 1;  // and around the storage of its Func

@@ -9,8 +9,8 @@
 //
 // Legal: L3, L8, and of the consumer L1; L9: a consumer in whose loops another Func has a window has its strips already.
 // Method: rows go along the outermost dimension of the consumer in which rows overlap or, without one, along the
-// innermost that moves the Func. Strips are as high as enough tasks allow. Dimensions of few values run inside of a row, so
-// that all of them share it.
+// innermost that moves the Func. Strips are as high as enough tasks allow, and as wide as rows: each end of a row in a tile
+// takes long. Dimensions of few values run inside of a row, so that all of them share it.
 #include <algorithm>
 
 #include "autoschedule/moves/edit.h"
@@ -43,22 +43,25 @@ class StripFinder {
         host_(host),
         context_(context),
         nest_(plan.nest(host)),
-        extents_(whole_cover(host, context.sizes)) {}
+        extents_(whole_cover(host, context.sizes)) {
+    const std::optional<size_t> lanes = vector_loop(nest_);
+    if (lanes) lane_ = nest_.loops[*lanes].iterator;
+  }
 
   struct Strip {
     Plan plan;
     size_t row = 0;  // the depth of the loop over rows; storage is in the loop around it
   };
-  // The strips that are there, or new ones. None along the iterator of the lanes: a row would be a vector.
+  // The strips that are there if they have whole rows, or new ones. None along the iterator of the lanes: a row would be a
+  // vector.
   std::optional<Strip> along(int iterator) const {
-    const std::optional<size_t> lanes = vector_loop(nest_);
-    if (lanes && nest_.loops[*lanes].iterator == iterator) return std::nullopt;
-    for (size_t d = body_depth(nest_); d-- > 0;) {
-      if (nest_.loops[d].iterator != iterator) continue;
-      const bool is_in_strip = outer_step(nest_, iterator, nest_.loops[d].step) > 0;
-      return is_in_strip ? std::optional(Strip{plan_, d}) : new_strip(d);
-    }
-    return std::nullopt;
+    const std::optional<size_t> row = row_of(nest_, iterator);
+    if (lane_ == iterator || !row) return std::nullopt;
+    const auto outside = nest_.loops.begin() + static_cast<std::ptrdiff_t>(*row);
+    const bool are_whole =
+        std::ranges::find(nest_.loops.begin(), outside, lane_, &Loop::iterator) == outside;
+    const bool are_there = outer_step(nest_, iterator, nest_.loops[*row].step) > 0;
+    return are_there && are_whole ? std::optional(Strip{plan_, *row}) : new_strip(iterator);
   }
 
  private:
@@ -67,23 +70,40 @@ class StripFinder {
   const Context& context_;
   const Nest& nest_;
   const Cover extents_;
+  int lane_ = once;  // the iterator of the lanes
 
-  // Outside of the strips are the loops that are outside of the rows, unless they have few values.
-  std::optional<Strip> new_strip(size_t at) const {
+  // The innermost loop of an iterator around the body.
+  static std::optional<size_t> row_of(const Nest& nest, int iterator) {
+    for (size_t d = body_depth(nest); d-- > 0;)
+      if (nest.loops[d].iterator == iterator) return d;
+    return std::nullopt;
+  }
+  // One loop for each iterator, and the body.
+  Nest without_tiles() const {
     Nest nest = nest_;
+    for (size_t d = body_depth(nest); d-- > 0;) {
+      const Loop& loop = nest.loops[d];
+      if (outer_step(nest, loop.iterator, loop.step) > 0) drop_loop(nest, d);
+    }
+    return nest;
+  }
+
+  // Outside of the strips are the loops that are outside of the rows, without those of the lanes and of few values.
+  std::optional<Strip> new_strip(int iterator) const {
+    const Nest plain = without_tiles();
+    const size_t at = *row_of(plain, iterator);
+    Nest nest = plain;
     std::vector<Loop> outside, inside;
     int64_t tasks = 1;
-    for (size_t d = 0; d < nest_.loops.size(); ++d) {
-      if (d < at && !may_run_at_once(context_, host_, nest_, d)) return std::nullopt;
-      const int64_t count = trips(extents_, nest_, d);
-      const bool is_around =
-          d < at && count > few_values &&
-          std::ranges::find(inside, nest_.loops[d].iterator, &Loop::iterator) == inside.end();
+    for (size_t d = 0; d < plain.loops.size(); ++d) {
+      if (d < at && !may_run_at_once(context_, host_, plain, d)) return std::nullopt;
+      const int64_t count = trips(extents_, plain, d);
+      const bool is_around = d < at && count > few_values && plain.loops[d].iterator != lane_;
       if (is_around) tasks *= count;
-      if (d != at) (is_around ? outside : inside).push_back(nest_.loops[d]);
+      if (d != at) (is_around ? outside : inside).push_back(plain.loops[d]);
     }
-    const Loop& rows = nest_.loops[at];
-    const int64_t count = trips(extents_, nest_, at);
+    const Loop& rows = plain.loops[at];
+    const int64_t count = trips(extents_, plain, at);
     const int64_t height =
         std::min(count * tasks / context_.machine.enough_tasks(), count) * rows.step;
     nest.loops = outside;

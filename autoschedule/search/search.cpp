@@ -12,7 +12,7 @@ namespace {
 constexpr int sweeps = 2;
 constexpr double worth_another_sweep = 0.98;  // of the time before the last one
 constexpr int moves_of_a_func = 3;            // one after another, in one visit
-// Of the whole time: a Func with a small share is only computed elsewhere, one with less is not visited.
+// A Func with a small share of the whole time is only computed elsewhere; one with less is not visited.
 constexpr double small_share = 0.01, smallest_share = 0.002;
 constexpr int64_t prices_per_func = 200;  // for each plan of the beam
 

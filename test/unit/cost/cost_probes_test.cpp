@@ -57,6 +57,15 @@ TEST_F(CostProbes, ThreadsShareTheBandwidthOfMemory) {
   EXPECT_NEAR(cost.stages[0].launch_seconds, 5 * micro, 0.1 * micro);
 }
 
+TEST_F(CostProbes, ThreadsTakeChunksOfAllParallelLoops) {
+  out(x, y, c) = exp(in(x, y)) + c;
+  out.set_estimate(c, 0, 3);
+  const double serial = compute_seconds(cost_of("out  root  c, y, x:16, vector x\n"));
+  const double parallel =
+      compute_seconds(cost_of("out  root  parallel c, parallel y, x:16, vector x\n"));
+  EXPECT_NEAR(parallel / serial, 0.5, 0.01);
+}
+
 TEST_F(CostProbes, TheLastRoundOfChunksLeavesAThreadIdle) {
   out(x, y) = exp(in(x, y));
   out.bound(y, 0, 3);
@@ -260,6 +269,21 @@ TEST_F(CostProbes, UnrolledCopiesShareAFunctionUnlessItIsInAnArm) {
   const double in_arm = seconds(select(in(x, 0) > 0, exp(in(x, 0)), 0));
   EXPECT_LT(shared, vectors * 2e-9);
   EXPECT_NEAR(in_arm - shared, vectors * 3e-9, vectors * 0.4e-9);
+}
+
+// Rows of 16 KB: lowering keeps four of a window over three rows, whatever the height of the strip.
+TEST_F(CostProbes, AWindowKeepsAFewRowsOfAStrip) {
+  rows_sum(x, y) = in(x, y) + in(x + 1, y);
+  out(x, y) = rows_sum(x, y) + rows_sum(x, y + 2);
+  const auto in_strips_of = [&](const std::string& height) {
+    return cost_of("out  root  y:" + height +
+                   ", y, x:16, vector x\nrows_sum  at out/y  store at out/y:" + height +
+                   "  y, x:16, vector x\n");
+  };
+  const Cost low = in_strips_of("64"), high = in_strips_of("512");
+  EXPECT_NEAR(low.peak_bytes, 4 * 16384, 1024);
+  EXPECT_EQ(high.peak_bytes, low.peak_bytes);
+  EXPECT_LT(high.seconds, low.seconds) << "fewer rows at the ends of strips";
 }
 
 TEST_F(CostProbes, InlinedFuncsAreComputedForEachElement) {
