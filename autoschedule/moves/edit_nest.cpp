@@ -27,13 +27,6 @@ bool is_plain(const Nest& nest) {
   return true;
 }
 
-bool has_range(const IndexForm& form, const SizeModel& sizes) {
-  return sizes.range(form.within).is_bounded() ||
-         std::ranges::all_of(form.opaque, [&](const OpaqueTerm& term) {
-           return !term.value.from_data || term.range.is_bounded();
-         });
-}
-
 // Steps that divide the next larger one have no tail. Where a tail would compute more than is asked for, regions of
 // other Funcs would change, so all others are guards.
 void set_tails(Nest& nest, int iterator) {
@@ -95,6 +88,15 @@ std::vector<StageId> all_readers(const Plan& plan, const Context& context, FuncI
   return result;
 }
 
+bool has_range(const Access& access, const SizeModel& sizes) {
+  return std::ranges::all_of(access.index, [&](const IndexForm& form) {
+    return sizes.range(form.within).is_bounded() ||
+           std::ranges::all_of(form.opaque, [](const OpaqueTerm& term) {
+             return !term.value.from_data || term.range.is_bounded();
+           });
+  });
+}
+
 bool has_bounded_region(const Plan& plan, const Context& context, FuncId func) {
   const std::vector<StageId> readers = all_readers(plan, context, func);
   const auto leads_to = [&](FuncId read) {
@@ -105,10 +107,7 @@ bool has_bounded_region(const Plan& plan, const Context& context, FuncId func) {
     const std::vector<Access>& reads = context.accesses.stage(reader).reads;
     return plan.of(reader.func).opacity == Opacity::None &&
            std::ranges::all_of(reads, [&](const Access& read) {
-             return !leads_to(read.of) ||
-                    std::ranges::all_of(read.index, [&](const IndexForm& form) {
-                      return has_range(form, context.sizes);
-                    });
+             return !leads_to(read.of) || has_range(read, context.sizes);
            });
   });
 }
@@ -365,7 +364,10 @@ void run_in_parallel(Nest& nest, const Context& context, StageId stage) {
   const Cover extents = whole_cover(stage, context.sizes);
   int64_t chunks = 1;
   for (size_t d = 0; d < body_depth(nest) && chunks < context.machine.enough_tasks(); ++d) {
-    if (!may_run_at_once(context, stage, nest, d)) return;
+    if (!may_run_at_once(context, stage, nest, d)) {
+      if (chunks > 1) return;
+      continue;  // serial, around parallel ones
+    }
     nest.loops[d].kind = ForType::Parallel;
     chunks *= trips(extents, nest, d);
   }

@@ -4,14 +4,18 @@
 //                                  =>     parallel y:8, x:64, y, x:16, vector x       tiles
 //   r.t, x:16, vector x            =>     x:256, r.t, x:16, vector x                  columns, over a whole reduction
 //   y:8, y, x:16, vector x         =>     y:16, y, x:16, vector x and y:4, y, x:16, vector x
+//   parallel c, y, x:16, vector x  =>     parallel c:16, y, x:16, c, vector x         lines along c, if c is innermost in
+//                                                                                    memory of what is read across lanes
 //
 // Legal: L1: iterations of pure loops never meet, and steps of a reduction keep the order of those that do.
 // Sizes are powers of two; the first ones fill the first or the second cache with what the stage accesses.
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <set>
 
 #include "autoschedule/moves/edit.h"
+#include "ir/lists.h"
 
 namespace retrograde::planning::moves {
 
@@ -20,6 +24,46 @@ namespace {
 int64_t power_of_two_below(double size) {
   return size < 1 ? 1 : static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(size)));
 }
+
+// The iterators that move the innermost dimension in memory of what is read across the lanes, also through inlined Funcs.
+class IteratorsAcross {
+ public:
+  IteratorsAcross(const StageLoops& loops, int lanes) : loops_(loops), lanes_(set_of(lanes)) {}
+
+  IteratorSet run() {
+    for (const Access& read : loops_.context.accesses.stage(loops_.stage).reads)
+      note(read, ir::mapped(read.index, &IndexForm::moved_by));
+    return found_;
+  }
+
+ private:
+  const StageLoops& loops_;
+  const IteratorSet lanes_;
+  IteratorSet found_ = 0;
+  std::set<std::pair<FuncId, std::vector<IteratorSet>>> seen_;
+
+  // `moved`: the iterators of the stage that move each index.
+  void note(const Access& read, const std::vector<IteratorSet>& moved) {
+    const bool is_across =
+        std::ranges::any_of(moved, [&](IteratorSet set) { return (set & lanes_) != 0; });
+    if (!is_across || read.of == loops_.stage.func) return;
+    const bool is_stored = read.of < 0 || !is_inlined(loops_.plan, read.of);
+    if (is_stored) {
+      const auto first = read.of < 0 ? 0 : size_t(loops_.plan.of(read.of).storage.order[0]);
+      if ((moved[first] & lanes_) == 0) found_ |= moved[first];
+      return;
+    }
+    if (!seen_.emplace(read.of, moved).second) return;
+    const StageNode& inlined = loops_.context.accesses.stage({read.of, 0});
+    const auto moved_through = [&](const IndexForm& form) {
+      IteratorSet set = 0;
+      for (size_t i = 0; i < inlined.iterators.size(); ++i)
+        if (form.moved_by() & set_of(int(i))) set |= moved[size_t(inlined.iterators[i].dimension)];
+      return set;
+    };
+    for (const Access& own : inlined.reads) note(own, ir::mapped(own.index, moved_through));
+  }
+};
 
 class Tiler {
  public:
@@ -50,6 +94,12 @@ class Tiler {
       if (is_in_reduction) tile({{inner_[0], power_of_two_below(points)}}, outside);
     }
     for (const Inner& inner : inner_) resize(inner);
+    if (const auto lanes = vector_loop(nest_)) {
+      const IteratorSet across = IteratorsAcross(loops_, nest_.loops[*lanes].iterator).run();
+      for (const Inner& inner : inner_) {
+        if (across & set_of(inner.iterator)) tile_across(inner);
+      }
+    }
     return std::move(nests_);
   }
 
@@ -110,6 +160,20 @@ class Tiler {
       insert_step(nest, inner.iterator, size, depth, kind);
       nests_.push_back(std::move(nest));
     }
+  }
+
+  // Runs the points of a cache line inside of all loops around the body.
+  void tile_across(const Inner& inner) {
+    const Loop loop = nest_.loops[inner.depth];
+    const int64_t points = points_of(inner), size = std::min(line_elements, points);
+    if (loop.step != 1 || inner.depth + 1 == body_depth(nest_) || !fits(size, points) ||
+        inner.depth < shared_loops(loops_.plan, loops_.stage))
+      return;
+    Nest nest = nest_;
+    nest.loops.erase(nest.loops.begin() + static_cast<std::ptrdiff_t>(inner.depth));
+    insert_step(nest, inner.iterator, 1, body_depth(nest));
+    if (size < points) insert_step(nest, inner.iterator, size, inner.depth, loop.kind);
+    nests_.push_back(std::move(nest));
   }
 };
 

@@ -17,20 +17,27 @@ using planning::Plan;
 
 namespace {
 
-// Of a change in a search from nothing: of the stages that change, and of all.
+// The least gain of a change in a search from nothing: a part of the stages that change, and of all.
 constexpr double least_gain_from_nothing = 0.02, least_gain_of_all_from_nothing = 0.001;
+
+bool is_adjoint(const FuncPtr& f) { return f->made.has_value(); }
 
 // Funcs that no move changes, by number.
 std::vector<bool> kept_funcs(const Plan& plan, const std::vector<FuncPtr>& unscheduled,
-                             const AutoscheduleOptions& options) {
+                             const AutoscheduleOptions& options, autoschedule::Scheduling what) {
   std::unordered_set<std::string> kept;
-  for (const FuncPtr& f : topological_order(unscheduled)) {
-    if (graph::has_directives(*f)) kept.insert(f->name);
+  const std::vector<FuncPtr> order = topological_order(unscheduled);
+  const bool by_hand = what == autoschedule::Scheduling::Gradients &&
+                       std::ranges::any_of(order, [](const FuncPtr& f) {
+                         return !is_adjoint(f) && has_directives(*f);
+                       });
+  for (const FuncPtr& f : order) {
+    if (graph::has_directives(*f) || (by_hand && !is_adjoint(f))) kept.insert(f->name);
   }
   for (const auto* named : {&options.store, &options.inlined}) {
     for (const FuncName& f : *named) kept.insert(f.name);
   }
-  // Those that keep directives before an rfactor, and those that it made from their loops.
+  // Funcs that keep directives before an rfactor, and what it made from their loops.
   for (const FuncPtr& f : plan.program->funcs) {
     if (graph::can_reset_loops(*f)) continue;
     kept.insert(f->name);
@@ -53,7 +60,7 @@ std::vector<const char*> moves_of(Decision decision) {
       return {"fuse_stages"};
     case Decision::Slices:
     case Decision::Strips:
-      return {"compute_at"};
+      return {"compute_at", "compute_in_tile"};
     case Decision::TaskSizes:
       return {"parallelise"};
     case Decision::Choices:
@@ -89,7 +96,7 @@ PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
   planning::SearchOptions beam;
   beam.width = search.width;
   beam.most_bytes = cost.price(result.rules).peak_bytes + static_cast<double>(search.spare_bytes);
-  beam.kept = kept_funcs(result.rules, unscheduled, options);
+  beam.kept = kept_funcs(result.rules, unscheduled, options, search.what);
   for (const Decision decision : options.without) {
     for (const char* move : moves_of(decision)) beam.without.insert(move);
   }
