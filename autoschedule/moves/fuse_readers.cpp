@@ -169,7 +169,7 @@ class ReaderFusion {
     }
     return change(plan, func, std::move(changed));
   }
-  // What is computed in loops that a stage no longer owns.
+  // Moves a Func out of loops that its stage no longer owns.
   bool move_to_owner(Plan& plan, FuncId func, const LoopRef& inside) const {
     const auto& [compute, store, hoist] = plan.of(func).placement;
     const bool is_shared = compute.kind == Level::Kind::At && compute.loop.depth <= inside.depth &&

@@ -4,7 +4,7 @@
 //   copy  root  x, y:16, vector y     =>     copy  root  (y, x)  x, y:16, vector y
 //
 //   out   root  y:16, x, vector y            out   root  y:16, x, vector y
-//   copy  root  y, x                  =>     copy  root  (y, x)  y, x
+//   copy  root  y, x:16, vector x     =>     copy  root  (y, x)  x, y:16, vector y
 //
 // Legal: L8. Outputs keep their layout, and so do Funcs that an opaque Func reads.
 #include <algorithm>
@@ -23,43 +23,19 @@ int16_t lanes_of(const Plan& plan, StageId stage) {
   return depth ? plan.nest(stage).loops[*depth].iterator : once;
 }
 
-bool may_permute(const Plan& plan, FuncId func, const Context& context) {
-  const auto is_opaque = [&](StageId reader) {
-    return plan.of(reader.func).opacity != Opacity::None;
-  };
-  return has_loops(plan, func) && !is_output(*plan.program, func) &&
-         std::ranges::none_of(context.accesses.consumers(func), is_opaque);
-}
-
-// The plan in which all that the Func reads is stored along its lanes.
-std::optional<Plan> with_operands(const Plan& plan, FuncId func, const Context& context) {
-  std::optional<Plan> result;
-  for (const StageNode& stage : context.accesses.func(func).stages) {
-    const int16_t lanes = lanes_of(plan, stage.id);
-    for (const Access& read : stage.reads) {
-      if (lanes == once || read.of < 0 || read.of == func || !may_permute(plan, read.of, context))
-        continue;
-      const auto moved = std::ranges::find_if(read.index, [&](const IndexForm& form) {
-        return (form.moved_by() & set_of(lanes)) != 0;
-      });
-      if (moved == read.index.end()) continue;
-      const Plan& before = result ? *result : plan;
-      FuncPlan operand = before.of(read.of);
-      store_first(operand.storage, static_cast<int>(moved - read.index.begin()));
-      std::optional<Plan> next = with_func(before, read.of, std::move(operand), context);
-      if (next) result = std::move(next);
-    }
-  }
-  return result;
-}
-
 }  // namespace
 
 std::vector<Plan> permute_storage(const Plan& plan, FuncId func, const Context& context) {
   std::vector<Plan> plans;
   if (!has_loops(plan, func)) return plans;
-  add(plans, with_operands(plan, func, context));
-  if (!may_permute(plan, func, context)) return plans;
+  for (const StageNode& stage : context.accesses.func(func).stages)
+    add(plans, with_turned_operands(plan, stage.id, context));
+  const auto is_opaque = [&](StageId reader) {
+    return plan.of(reader.func).opacity != Opacity::None;
+  };
+  if (is_output(*plan.program, func) ||
+      std::ranges::any_of(context.accesses.consumers(func), is_opaque))
+    return plans;
   std::set<int> wanted;
   const auto note = [&](const Access& access, int iterator) {
     if (access.of != func || iterator == once) return;
