@@ -13,7 +13,7 @@ namespace retrograde::planning {
 double UnitTimes::all() const {
   const double slowest = std::max({arithmetic, loads, stores, scalars, loops});
   const double sum = arithmetic + loads + stores + scalars + loops;
-  return std::max(slowest + not_overlapped * (sum - slowest), chain);
+  return std::max(slowest + not_overlapped * (sum - slowest), chain) + slices;
 }
 
 namespace {
@@ -37,6 +37,7 @@ class StageWork {
                                     &UnitTimes::scalars, &UnitTimes::chain})
       units_.*part *= taken;
     add_loops();
+    add_slices();
     return units_;
   }
 
@@ -128,12 +129,11 @@ class StageWork {
     const LaneMoves moved =
         lane_moves(touch, stored.layout, lanes_, vectors(touch.element_bytes, touch.moved));
     double& units = touch.writes ? units_.stores : units_.loads;
+    // The lanes of a gather are taken out of a vector of places and put into another one, which is arithmetic.
     const double by_lane = lanes_.count * (touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns);
-    if (moved.is_by_lane) {
-      units += count * by_lane;
-      return;
-    }
-    units += count * by_lane * moved.border_share;
+    (touch.writes ? units : units_.arithmetic) +=
+        count * by_lane * (moved.is_by_lane ? 1 : moved.border_share);
+    if (moved.is_by_lane) return;
     const double crossing = moved.is_unaligned ? 1 + m_.vector_bytes / double(line_bytes) : 1;
     units += count * moved.vectors * crossing * (touch.writes ? m_.store_ns : m_.load_ns);
     units_.arithmetic += count * moved.shuffles * m_.shuffle_ns;
@@ -199,6 +199,13 @@ class StageWork {
     }
   }
 
+  // A Func that is computed in the loops of its consumer, in memory: vectors of the consumer lie across those that were just
+  // stored.
+  void add_slices() {
+    const bool is_slice = run_.place > 1 && run_.id.stage == 0;
+    const double in_memory = 1 - group_.buffers.at(run_.id.func).register_share;
+    if (is_slice) units_.slices += place_times() * in_memory * slice_iterations * m_.iteration_ns;
+  }
   void add_loops() {
     for (size_t d = 0; d < depth(); ++d) {
       const bool is_own = node(d).loop.stage == run_.id;
