@@ -17,6 +17,7 @@ struct TouchedSide {
   struct Move {
     int16_t iterator;
     double slope;  // elements from one point to the next
+    bool operator==(const Move&) const = default;
   };
   double taps = 1, reach = 1;  // of one iteration: elements, and from the first to the last
   std::vector<Move> moves;     // the smallest slope first
@@ -26,6 +27,7 @@ struct TouchedSide {
   double divisor = 1;          // of taps, reach and slopes
   double modulus = 0;          // 0: it does not wrap
   double most = 1;             // elements between the ends of the index
+  bool operator==(const TouchedSide&) const = default;
 };
 
 struct Touch {
@@ -38,6 +40,7 @@ struct Touch {
   double count = 1;       // loads or stores of an iteration
   std::vector<TouchedSide> sides;
   IteratorSet moved = 0, data = 0;
+  bool operator==(const Touch&) const = default;
 };
 
 // How a buffer is stored.

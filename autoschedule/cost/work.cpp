@@ -1,5 +1,6 @@
 // Values that a loop does not change are computed outside of it, and those that unrolled copies have in common once. So an
 // operation is executed as often as the loops run that are outside of the innermost loop that changes it, and that loop.
+// Functions in arms of selects run behind branches: each copy has its own.
 #include "autoschedule/cost/terms.h"
 
 #include <algorithm>
@@ -29,7 +30,9 @@ class StageWork {
 
   UnitTimes find() {
     for (const OperationRow& row : run_.facts->operations) add_operation(row);
-    for (const Touch& touch : run_.facts->touches) add_touch(touch);
+    for (const Touch& touch : run_.facts->touches) {
+      if (!is_loaded_before(touch)) add_touch(touch);
+    }
     add_spills();
     add_chains();
     const double taken = run_.facts->taken;
@@ -78,11 +81,13 @@ class StageWork {
     }
     return result;
   }
-  // Iterations of the innermost serial loop.
+  // Iterations of the innermost serial loop, of which each copy that is unrolled around it has its own.
   double iterations() const {
     double result = place_times();
-    for (size_t d = 0; d < depth(); ++d)
-      if (is_serial(d)) result *= run_.nest.trips[d];
+    for (size_t d = 0; d < depth(); ++d) {
+      const bool is_copied = kind(d) == ForType::Unrolled && static_cast<int>(d) < innermost_;
+      if (is_serial(d) || is_copied) result *= run_.nest.trips[d];
+    }
     return result;
   }
   // The unrolled copies that these iterators tell apart.
@@ -101,7 +106,8 @@ class StageWork {
   }
 
   void add_operation(const OperationRow& row) {
-    const double count = row.count * times(row.depends);
+    const double shared = row.behind_branch ? copies(row.depends, false) : 1;
+    const double count = row.count * times(row.depends) * shared;
     instructions_ += count * vectors(row.element_bytes, row.depends);
     if (is_vector(row.depends))
       units_.arithmetic += count * vectors(row.element_bytes, row.depends) * row.time.vector_ns;
@@ -111,11 +117,40 @@ class StageWork {
 
   // ---- memory ----
 
+  int innermost_serial_node(const StageRun& run) const {
+    const auto is_body = [&](int n) {
+      const ForType kind = group_.nodes[static_cast<size_t>(n)].kind;
+      return kind == ForType::Unrolled || kind == ForType::Vectorized;
+    };
+    return *std::ranges::find_if_not(run.path.rbegin(), run.path.rend(), is_body);
+  }
+  // Whether both move alike, though they end at other borders.
+  static bool is_alike(Touch a, const Touch& b) {
+    if (a.sides.size() != b.sides.size()) return false;
+    for (size_t d = 0; d < a.sides.size(); ++d) a.sides[d].most = b.sides[d].most;
+    return a == b;
+  }
+  // Whether an earlier stage loads the same in the same iteration of all loops.
+  bool is_loaded_before(const Touch& touch) const {
+    if (touch.writes || touch.is_own || touch.carried) return false;
+    const int loop = innermost_serial_node(run_);
+    const auto end = std::ranges::find(group_.runs, run_.id, &StageRun::id);
+    return std::any_of(group_.runs.begin(), end, [&](const StageRun& other) {
+      return loop > 0 && innermost_serial_node(other) == loop &&
+             other.nest.lanes.count == lanes_.count && other.nest.lanes.moves == lanes_.moves &&
+             std::ranges::any_of(other.facts->touches,
+                                 [&](const Touch& known) { return is_alike(known, touch); });
+    });
+  }
+
   void add_touch(const Touch& touch) {
     const StoredBuffer& stored = group_.buffers.at(touch.buffer);
     const bool is_sum = touch.is_own || (touch.writes && has_own_read());
     note_registers(touch, is_sum);
-    if (touch.is_own) add_sum(touch);
+    if (touch.is_own) {
+      add_sum(touch);
+      add_end_of_lanes(touch);
+    }
     if (touch.carried) add_recurrence(touch);
     const double count = touch.count * times(touch.moved) * (1 - stored.register_share);
     instructions_ += count * vectors(touch.element_bytes, touch.moved);
@@ -142,8 +177,10 @@ class StageWork {
   // Elements that the innermost loop does not move stay in registers.
   void note_registers(const Touch& touch, bool is_sum) {
     if (innermost_ < 0 || moves(static_cast<size_t>(innermost_), touch.moved)) return;
+    // Lanes of a sum are partial results.
+    const IteratorSet lanes = touch.is_own ? touch.moved | lanes_.moves : touch.moved;
     const double needed =
-        touch.count * copies(touch.moved, true) * vectors(touch.element_bytes, touch.moved);
+        touch.count * copies(touch.moved, true) * vectors(touch.element_bytes, lanes);
     if (is_sum && touch.is_own)
       accumulators_ += needed;
     else if (!touch.writes && touch.data == 0)
@@ -181,12 +218,28 @@ class StageWork {
       add_chain(copies(touch.moved, false) * m_.latency_ns, from);
     }
   }
+  // Whether lanes that lie apart compete for a few sets of the first cache, so that their lines are gone from one
+  // iteration to the next.
+  bool loses_lines(const Touch& touch) const {
+    const Layout& layout = group_.buffers.at(touch.buffer).layout;
+    const Cover& lanes = run_.cover[run_.place + static_cast<size_t>(innermost_) + 1];
+    return lane_moves(touch, layout, lanes_, 1).is_by_lane &&
+           bytes_by_sets(touch, layout, lanes, page_bytes) > m_.levels[0].bytes;
+  }
+  // Partial results of lanes are combined after the loops of the reduction: those of a register in halves.
+  void add_end_of_lanes(const Touch& touch) {
+    if (lanes_.iterator < 0 || is_vector(touch.moved)) return;
+    const double registers = vectors(touch.element_bytes, lanes_.moves);
+    const double halves = std::log2(std::max(1.0, lanes_.count / registers));
+    const double count = touch.count * times(touch.moved);
+    units_.arithmetic += count * (registers - 1 + 2 * halves) * m_.shuffle_ns;
+  }
   // An element waits for the one before, which the last iteration stored.
   void add_recurrence(const Touch& touch) {
     if (innermost_ < 0 || !moves(static_cast<size_t>(innermost_), touch.carried)) return;
     size_t from = 0;
     while (!moves(from, touch.carried)) ++from;
-    double in_iteration = 1;
+    double in_iteration = loses_lines(touch) ? lanes_.count : 1;
     for (size_t d = static_cast<size_t>(innermost_) + 1; d < depth(); ++d)
       if (kind(d) == ForType::Unrolled && moves(d, touch.carried))
         in_iteration *= run_.nest.trips[d];

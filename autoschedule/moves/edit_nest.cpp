@@ -3,6 +3,7 @@
 #include <map>
 #include <tuple>
 
+#include "autoschedule/access/lane_form.h"
 #include "autoschedule/moves/edit.h"
 #include "autoschedule/plan/covers.h"
 #include "autoschedule/plan/nest.h"
@@ -283,6 +284,21 @@ int64_t lanes_for(const Plan& plan, StageId stage, int64_t extent) {
   return lanes <= extent && 4 * lanes >= full ? lanes : 1;
 }
 
+int lanes_together(const Context& context, StageId stage, int iterator) {
+  const StageNode& node = context.accesses.stage(stage);
+  int count = 0;
+  const auto note = [&](const Access& access, int weight) {
+    const LaneForm form =
+        lane_form(access, iterator, schedule_lanes, context.sizes, {line_elements});
+    if (form.kind == LaneForm::Kind::Contiguous) count += weight;
+    if (form.kind == LaneForm::Kind::Strided || form.kind == LaneForm::Kind::Gather)
+      count -= weight;
+  };
+  note(node.write, 2);
+  for (const Access& read : node.reads) note(read, 1);
+  return count;
+}
+
 // ---- changes ----
 
 void insert_step(Nest& nest, int iterator, int64_t step, size_t depth, ForType kind) {
@@ -349,7 +365,10 @@ void run_in_parallel(Nest& nest, const Context& context, StageId stage) {
   const Cover extents = whole_cover(stage, context.sizes);
   int64_t chunks = 1;
   for (size_t d = 0; d < body_depth(nest) && chunks < context.machine.enough_tasks(); ++d) {
-    if (!may_run_at_once(context, stage, nest, d)) return;
+    if (!may_run_at_once(context, stage, nest, d)) {
+      if (chunks > 1) return;
+      continue;  // serial, around parallel ones
+    }
     nest.loops[d].kind = ForType::Parallel;
     chunks *= trips(extents, nest, d);
   }

@@ -38,11 +38,26 @@ bool has_window(const FuncPlan& func) {
          hoist.kind != Kind::Undecided || (store.kind != Kind::Undecided && !(store == compute));
 }
 
+// Whether each update writes the elements that its pure variables name, and reads no others of the Func.
+bool stays_in_place(const Context& context, FuncId func) {
+  for (const StageNode& stage : context.accesses.func(func).stages) {
+    const auto is_pure = [&](const IndexForm& form) {
+      return form.is_affine() && form.terms.size() == 1 &&
+             !is_reduction(context, stage.id, form.terms[0].iterator);
+    };
+    if (!std::ranges::all_of(stage.write.index, is_pure)) return false;
+    for (const Access& read : stage.reads) {
+      if (read.of == func && read.index != stage.write.index) return false;
+    }
+  }
+  return true;
+}
+
 // One change of a Func in a plan.
 class FuncChange {
  public:
-  FuncChange(const Plan& plan, FuncId func, FuncPlan changed, const Context& context)
-      : before_(plan), context_(context), func_(func), changed_(std::move(changed)) {
+  FuncChange(const Plan& plan, FuncId func, FuncPlan changed, const Context& context, Terms terms)
+      : before_(plan), context_(context), func_(func), changed_(std::move(changed)), terms_(terms) {
     is_moved_ = !(changed_.placement == before().placement);
   }
 
@@ -66,6 +81,7 @@ class FuncChange {
   const Context& context_;
   const FuncId func_;
   const FuncPlan changed_;
+  const Terms terms_;
   bool is_moved_ = false;
 
   const FuncPlan& before() const { return before_.of(func_); }
@@ -115,6 +131,7 @@ class FuncChange {
     return true;
   }
   bool keeps_order() const {
+    if (terms_ == Terms::InAnyOrder) return true;
     for (size_t s = 0; s < changed_.nests.size(); ++s) {
       const StageId stage{func_, static_cast<int16_t>(s)};
       if (old_nest(stage) == new_nest(stage)) continue;
@@ -220,6 +237,32 @@ class FuncChange {
 
 }  // namespace
 
+double product_of(const std::vector<int64_t>& extents) {
+  double product = 1;
+  for (const int64_t extent : extents) product *= static_cast<double>(extent);
+  return product;
+}
+
+double computed_elements(const Plan& plan, const Context& context, const Level& level,
+                         const std::vector<int64_t>& box) {
+  const auto [stage, depth] = level.loop;
+  const Cover extents = whole_cover(stage, context.sizes);
+  double computed = product_of(box);
+  for (size_t d = 0; d <= static_cast<size_t>(depth); ++d)
+    computed *= static_cast<double>(trips(extents, plan.nest(stage), d));
+  return computed;
+}
+
+FuncPlan moved_inside(FuncPlan plan, const Placement& placement) {
+  plan.placement = placement;
+  plan.storage.folds.clear();
+  for (Nest& nest : plan.nests) {
+    for (Loop& loop : nest.loops)
+      if (loop.kind == ForType::Parallel) loop.kind = ForType::Serial;
+  }
+  return plan;
+}
+
 bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func) {
   if (plan.opacity != Opacity::None ||
       (plan.storage.memory != MemoryType::Auto && plan.storage.memory != MemoryType::Heap))
@@ -237,14 +280,33 @@ bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func)
   return true;
 }
 
+bool stays_in_place(const Context& context, FuncId func) {
+  for (const StageNode& stage : context.accesses.func(func).stages) {
+    const auto is_pure = [&](const IndexForm& form) {
+      return form.is_affine() && form.terms.size() == 1 &&
+             !is_reduction(context, stage.id, form.terms[0].iterator);
+    };
+    if (!std::ranges::all_of(stage.write.index, is_pure)) return false;
+    for (const Access& read : stage.reads) {
+      if (read.of == func && read.index != stage.write.index) return false;
+    }
+  }
+  return true;
+}
+
+bool may_run_in_loops(const Plan& plan, const Context& context, FuncId func) {
+  return is_editable(plan, func) && !is_output(*plan.program, func) &&
+         has_bounded_region(plan, context, func);
+}
+
 std::optional<Plan> with_func(const Plan& plan, FuncId func, FuncPlan changed,
-                              const Context& context) {
+                              const Context& context, Terms terms) {
   if (changed == plan.of(func)) return std::nullopt;
-  return FuncChange(plan, func, std::move(changed), context).run();
+  return FuncChange(plan, func, std::move(changed), context, terms).run();
 }
 
 std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& context,
-                             std::vector<Nest> (*nests)(const StageLoops&)) {
+                             std::vector<Nest> (*nests)(const StageLoops&), Terms terms) {
   std::vector<Plan> plans;
   if (!has_loops(plan, func)) return plans;
   for (const StageNode& node : context.accesses.func(func).stages) {
@@ -253,7 +315,7 @@ std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& conte
     for (Nest& nest : nests(loops)) {
       FuncPlan changed = plan.of(func);
       changed.nests[static_cast<size_t>(node.id.stage)] = std::move(nest);
-      add(plans, with_func(plan, func, std::move(changed), context));
+      add(plans, with_func(plan, func, std::move(changed), context, terms));
     }
   }
   return plans;
@@ -261,6 +323,15 @@ std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& conte
 
 void add(std::vector<Plan>& plans, std::optional<Plan> plan) {
   if (plan && std::ranges::find(plans, *plan) == plans.end()) plans.push_back(std::move(*plan));
+}
+
+void add_placed(std::vector<Plan>& plans, const Plan& plan, FuncId func, const Placement& placement,
+                const std::vector<int64_t>& box, const Context& context) {
+  FuncPlan changed = moved_inside(plan.of(func), placement);
+  const bool has_own_loops = has_loops(plan, func) && runs_at_any_size(changed, context, func);
+  if (has_own_loops) add(plans, with_func(plan, func, changed, context));
+  run_along_rows(changed, plan, context, func, box, lanes_for(plan, {func, 0}, INT64_MAX) / 2);
+  add(plans, with_func(plan, func, std::move(changed), context));
 }
 
 }  // namespace retrograde::planning::moves

@@ -4,13 +4,14 @@
 //                                                            out  root  y:8, x:64, y, x:16, vector x
 //
 // A move is a pure function. It only gives legal plans, so a search needs no checks of its own. It gives few of them,
-// with sizes at which something changes: the cost decides which of them are good. The loops of other Funcs stay;
-// placements in a loop that moves follow it, and a plan in which such a loop is gone isn't given.
+// with sizes at which something changes: the cost decides which of them are good. The loops of other Funcs stay, except that
+// register_tile may store operands and consumers in another order, and compute_in_tile tiles the consumer. Placements in
+// a loop that moves follow it, and a plan in which such a loop is gone isn't given.
 //
 // The conditions under which a plan is legal have numbers, which code and tests mention:
 //
 //   L1   no dependence is carried by loops that change their order or kind
-//   L2   the order in which one element takes its terms stays, so that its bits do
+//   L2   the order in which one element takes its terms stays, so that its bits do; moves that change it say so
 //   L3   all reads are inside of the loop in which a Func is placed (P2), and the region that they need is bounded
 //   L4   extents of vectors and of unrolled loops are constant
 //   L5   the code that inlining and unrolling make is bounded
@@ -41,11 +42,12 @@ struct Context {
   Dependences& dependences;  // of the same access graph
 };
 
-// Plans that differ from `plan` in how `func` runs; `plan` keeps all invariants, and they do, too.
+// Plans that differ from `plan` in how `func` runs, and perhaps its operands and consumers; `plan` keeps all invariants, and they do, too.
 using MoveFunction = std::vector<Plan> (*)(const Plan& plan, FuncId func, const Context& context);
 struct Move {
   const char* name;
   MoveFunction apply;
+  bool changes_bits;  // terms may be added in another order, in shorter chains
 };
 std::span<const Move> all_moves();               // list.def
 const Move* find_move(const std::string& name);  // null: there is none

@@ -14,7 +14,8 @@ namespace moves {
 #undef RETROGRADE_MOVE
 
 std::span<const Move> all_moves() {
-#define RETROGRADE_MOVE(name) Move{#name, moves::name},
+#define RETROGRADE_MOVE(name) Move{#name, moves::name, false},
+#define RETROGRADE_MOVE_OF_BITS(name) Move{#name, moves::name, true},
   static constexpr auto all = std::to_array<Move>({
 #include "autoschedule/moves/list.def"
   });

@@ -3,8 +3,10 @@
 //   y, x:16, vector x     =>     parallel y, x:16, vector x
 //                         =>     parallel y:64, y, x:16, vector x       with as many rows as make enough tasks
 //   parallel y, ...       =>     y, ...                                 too little work for a launch, or one thread
+//   r.t, r.y, r.x         =>     r.t, parallel r.y, r.x                 each step of a recurrence, its rows at once
 //
-// Legal: L1, L6, since iterations of pure loops write different elements. A window that is stored outside of a loop is
+// Legal: L1, L6, since iterations of pure loops write different elements, and those of a reduction only run at once if they
+// don't meet while the loops around them stand still. A window that is stored outside of a loop is
 // dropped with the plan if the loop becomes parallel (P3).
 #include <algorithm>
 #include <bit>
@@ -25,14 +27,17 @@ std::vector<Nest> in_parallel(const StageLoops& loops) {
   Nest outermost = serial;
   run_in_parallel(outermost, context, stage);
   std::vector<Nest> nests{outermost};
-  if (body_depth(serial) > 0 && may_run_at_once(context, stage, serial, 0)) {
+  size_t d = 0;
+  while (d < body_depth(serial) && !may_run_at_once(context, stage, serial, d)) ++d;
+  if (d < body_depth(serial)) {
     Nest chunks = serial;
-    const int16_t first = chunks.loops[0].iterator;
-    if (chunks.loops.size() > 1 && chunks.loops[1].iterator == first) drop_loop(chunks, 1);
-    const int64_t each = trips(extents, chunks, 0) / context.machine.enough_tasks();
+    const int16_t first = chunks.loops[d].iterator;
+    if (d + 1 < chunks.loops.size() && chunks.loops[d + 1].iterator == first)
+      drop_loop(chunks, d + 1);
+    const int64_t each = trips(extents, chunks, d) / context.machine.enough_tasks();
     if (each > 1) {
       const auto rows = static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(each)));
-      insert_step(chunks, first, rows * chunks.loops[0].step, 0, ForType::Parallel);
+      insert_step(chunks, first, rows * chunks.loops[d].step, d, ForType::Parallel);
       nests.push_back(std::move(chunks));
     }
   }

@@ -4,6 +4,8 @@
 //                                  =>     parallel y:8, x:64, y, x:16, vector x       tiles
 //   r.t, x:16, vector x            =>     x:256, r.t, x:16, vector x                  columns, over a whole reduction
 //   y:8, y, x:16, vector x         =>     y:16, y, x:16, vector x and y:4, y, x:16, vector x
+//   parallel c, y, x:16, vector x  =>     parallel c:16, y, x:16, c, vector x         lines along c, if c is innermost in
+//                                                                                    memory of what is read across lanes
 //
 // Legal: L1: iterations of pure loops never meet, and steps of a reduction keep the order of those that do.
 // Sizes are powers of two; the first ones fill the first or the second cache with what the stage accesses.
@@ -19,6 +21,20 @@ namespace {
 
 int64_t power_of_two_below(double size) {
   return size < 1 ? 1 : static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(size)));
+}
+
+// The iterators that move the innermost dimension in memory of what is read across the lanes.
+IteratorSet iterators_across(const StageLoops& loops, IteratorSet lanes) {
+  IteratorSet found = 0;
+  const auto note = [&](const Access& read, const MovedIndices& moved) {
+    const auto moves_lanes = [&](IteratorSet set) { return (set & lanes) != 0; };
+    if (read.of == loops.stage.func || std::ranges::none_of(moved, moves_lanes)) return;
+    const auto first =
+        read.of < 0 ? 0 : static_cast<size_t>(loops.plan.of(read.of).storage.order[0]);
+    if (!moves_lanes(moved[first])) found |= moved[first];
+  };
+  for_each_read(loops.plan, loops.context, loops.stage, note);
+  return found;
 }
 
 class Tiler {
@@ -50,6 +66,12 @@ class Tiler {
       if (is_in_reduction) tile({{inner_[0], power_of_two_below(points)}}, outside);
     }
     for (const Inner& inner : inner_) resize(inner);
+    if (const auto lanes = vector_loop(nest_)) {
+      const IteratorSet across = iterators_across(loops_, set_of(nest_.loops[*lanes].iterator));
+      for (const Inner& inner : inner_) {
+        if (across & set_of(inner.iterator)) tile_across(inner);
+      }
+    }
     return std::move(nests_);
   }
 
@@ -110,6 +132,20 @@ class Tiler {
       insert_step(nest, inner.iterator, size, depth, kind);
       nests_.push_back(std::move(nest));
     }
+  }
+
+  // Runs the points of a cache line inside of all loops around the body.
+  void tile_across(const Inner& inner) {
+    const Loop loop = nest_.loops[inner.depth];
+    const int64_t points = points_of(inner), size = std::min(line_elements, points);
+    if (loop.step != 1 || inner.depth + 1 == body_depth(nest_) || !fits(size, points) ||
+        inner.depth < shared_loops(loops_.plan, loops_.stage))
+      return;
+    Nest nest = nest_;
+    nest.loops.erase(nest.loops.begin() + static_cast<std::ptrdiff_t>(inner.depth));
+    insert_step(nest, inner.iterator, 1, body_depth(nest));
+    if (size < points) insert_step(nest, inner.iterator, size, inner.depth, loop.kind);
+    nests_.push_back(std::move(nest));
   }
 };
 

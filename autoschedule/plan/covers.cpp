@@ -80,6 +80,16 @@ class NestCover {
   }
 };
 
+ir::ConstantRange range_of(const std::vector<const Access*>& accesses, size_t dimension,
+                           const SizeModel& sizes) {
+  ir::ConstantRange all{INT64_MAX, INT64_MIN};
+  for (const Access* access : accesses)
+    all = hull(all, sizes.range(access->index[dimension], access->by));
+  return all;
+}
+
+bool is_pure(const Iterator& iterator) { return iterator.kind == Iterator::Kind::Pure; }
+
 // A box that holds those of several stages. As the loops around all of them go on, each box moves from one end of what
 // its stage accesses in the whole program to the other one; at one of the ends they are furthest apart.
 class GrowingBox {
@@ -87,17 +97,25 @@ class GrowingBox {
   void add(const std::vector<const Access*>& accesses, const Cover& cover, const SizeModel& sizes) {
     const std::vector<int64_t> box = extents(accesses, cover, sizes);
     sides_.resize(box.size());
-    for (size_t d = 0; d < box.size(); ++d) {
-      ir::ConstantRange all{INT64_MAX, INT64_MIN};
-      for (const Access* access : accesses)
-        all = hull(all, sizes.range(access->index[d], access->by));
-      const int64_t most = std::max<int64_t>(sizes.of(*accesses[0], d).estimate, 1);
-      sides_[d].add(all, box[d], most);
-    }
+    for (size_t d = 0; d < box.size(); ++d)
+      sides_[d].add(range_of(accesses, d, sizes), box[d], most_of(*accesses[0], d, sizes));
   }
-  // Another box that holds this one.
-  void grow(const std::vector<int64_t>& box) {
-    for (size_t d = 0; d < box.size(); ++d) sides_[d].length = std::max(sides_[d].length, box[d]);
+  // Accesses of an update. Where its pure variables decide, they go on with the box; elsewhere they stand, and the box
+  // reaches to them.
+  void add_update(const std::vector<const Access*>& accesses, const Cover& cover,
+                  const SizeModel& sizes) {
+    const std::vector<int64_t> box = extents(accesses, cover, sizes);
+    const auto& iterators = sizes.graph().stage(accesses[0]->by).iterators;
+    for (size_t d = 0; d < box.size(); ++d) {
+      sides_[d].length = std::max(sides_[d].length, box[d]);
+      IteratorSet moves = 0;
+      for (const Access* access : accesses) moves |= access->index[d].moved_by();
+      bool goes_on = false;
+      for (size_t i = 0; i < iterators.size(); ++i)
+        goes_on |= is_pure(iterators[i]) && (moves & set_of(static_cast<int>(i)));
+      const ir::ConstantRange all = range_of(accesses, d, sizes);
+      if (!goes_on) sides_[d].hold(all, all, most_of(*accesses[0], d, sizes));
+    }
   }
   std::vector<int64_t> extents_of_all() const { return ir::mapped(sides_, &Side::length); }
 
@@ -108,12 +126,19 @@ class GrowingBox {
 
     void add(const ir::ConstantRange& all, int64_t extent, int64_t most) {
       length = std::max(length, extent);
-      if (!all.is_bounded()) return;
-      first = hull(first, {all.min, all.min + extent - 1});
-      last = hull(last, {all.max - extent + 1, all.max});
+      if (all.is_bounded())
+        hold({all.min, all.min + extent - 1}, {all.max - extent + 1, all.max}, most);
+    }
+    void hold(const ir::ConstantRange& at_first, const ir::ConstantRange& at_last, int64_t most) {
+      if (!at_first.is_bounded()) return;
+      first = hull(first, at_first);
+      last = hull(last, at_last);
       length = std::min(std::max({length, first.extent(), last.extent()}), most);
     }
   };
+  static int64_t most_of(const Access& access, size_t dimension, const SizeModel& sizes) {
+    return std::max<int64_t>(sizes.of(access, dimension).estimate, 1);
+  }
   std::vector<Side> sides_;
 };
 
@@ -155,7 +180,7 @@ std::vector<int64_t> Covers::box(FuncId func, const Level& level) {
   for (size_t s = stages.size(); s-- > 1;) {
     std::vector<const Access*> accesses = reads_of(stages[s], func);
     accesses.push_back(&stages[s].write);
-    box.grow(extents(accesses, cover_of_box(stages[s].id, box.extents_of_all(), sizes_), sizes_));
+    box.add_update(accesses, cover_of_box(stages[s].id, box.extents_of_all(), sizes_), sizes_);
   }
   return boxes_.emplace(key, box.extents_of_all()).first->second;
 }

@@ -61,7 +61,10 @@ void clear_storage(FuncContents& f) {
 class NestEmitter {
  public:
   NestEmitter(const FuncPtr& f, int stage, const Nest& nest)
-      : place_{f, stage}, nest_(nest), names_(loop_names(*f, stage, nest)) {}
+      : place_{f, stage},
+        nest_(nest),
+        names_(loop_names(*f, stage, nest)),
+        is_factored_(!graph::factored_names(*f, stage).empty()) {}
 
   void run() const {
     const Concurrency how = nest_.concurrency;
@@ -85,6 +88,8 @@ class NestEmitter {
   const graph::SchedulePlace place_;
   const Nest& nest_;
   const LoopNames names_;
+  // Directives before an rfactor, which the log keeps, may have put its loops into another order than they have here.
+  const bool is_factored_;
 
   template <typename D>
   void give(D directive) const {
@@ -100,7 +105,7 @@ class NestEmitter {
     }
     for (const Loop& loop : nest_.loops) add_variables(loop, now, wanted);
     std::ranges::reverse(wanted);
-    if (wanted != now) give(graph::ReorderLoops{wanted});
+    if (!wanted.empty() && (wanted != now || is_factored_)) give(graph::ReorderLoops{wanted});
   }
   // Adds the variables of a part that are not in the list yet, those of the outer loop first.
   void add_variables(const Part& part, const std::vector<graph::NamedLoop>& variables,
@@ -143,7 +148,7 @@ class NestEmitter {
       if (nest_.loops[d].iterator != once) wanted.emplace_back(names_.loops[d]);
     }
     for (const graph::Dim& dim : place_.schedule().dims) now.emplace_back(dim.var);
-    if (wanted != now) give(graph::ReorderLoops{wanted});
+    if (wanted != now || is_factored_) give(graph::ReorderLoops{wanted});
   }
 };
 

@@ -5,6 +5,7 @@
 
 #include "autoschedule/plan/nest.h"
 #include "diagnostics/error.h"
+#include "graph/directives/give_directive.h"
 #include "graph/names.h"
 
 namespace retrograde::planning {
@@ -17,7 +18,9 @@ std::string LoopNames::of(const Nest& nest, const Part& part) const {
 }
 
 LoopNames loop_names(const graph::FuncContents& f, int stage, const Nest& nest) {
-  const std::vector<std::string> iterators = iterators_of(f, stage);
+  std::vector<std::string> iterators = iterators_of(f, stage);
+  for (const graph::Split& name : graph::factored_names(f, stage))
+    std::ranges::replace(iterators, name.old_var, name.outer);
   LoopNames names;
   std::set<std::string> used(iterators.begin(), iterators.end());
   for (size_t i = 0; i < iterators.size() + nest.fusions.size(); ++i) {

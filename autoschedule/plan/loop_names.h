@@ -8,7 +8,7 @@
 
 namespace retrograde::planning {
 
-// The largest step of an iterator has its name, the others have numbers: x, x_1, x_2. A fusion has the name of its
+// The largest step of an iterator has its name or the one that rfactor gave it, the others have numbers: x, x_1, x_2. A fusion has the name of its
 // inner loop. So loops of two stages of a Func have equal names if their iterators do and have equally many steps.
 struct LoopNames {
   std::vector<std::string> loops;               // outermost first

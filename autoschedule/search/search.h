@@ -25,10 +25,10 @@ namespace retrograde::planning {
 
 struct SearchOptions {
   int width = 1;  // plans that go on from each step
-  double spare_bytes =
-      std::numeric_limits<double>::infinity();  // alive at once, beyond those of the start
-  std::vector<bool> kept;                       // by Func: no move changes how it runs
-  std::set<std::string> without;                // names of moves that are not made
+  // Alive at once. A plan with more is left for one with less, and is never the result unless it is the start.
+  double most_bytes = std::numeric_limits<double>::infinity();
+  std::vector<bool> kept;         // by Func: no move changes how it runs
+  std::set<std::string> without;  // names of moves that are not made
   // A change must gain this part of the time of the stages that change, and of the whole time: as much as the model may be
   // wrong where the time of the start is known to be good.
   double least_gain = 0.1, least_gain_of_all = 0.01;
@@ -53,8 +53,11 @@ struct SearchResult {
   int64_t priced = 0;  // different plans
 };
 
-// The first of those found is never predicted to be slower than the start, nor than that of a narrower search.
+// The first of those found is never predicted to be slower than the start, if that has not too many bytes, nor than that
+// of a narrower search.
 SearchResult search(const Plan& start, const Context& context, CostModel& cost,
                     const SearchOptions& options);
+// Adds what a search from another start of the same program found; the start stays.
+void merge(SearchResult& result, SearchResult other);
 
 }  // namespace retrograde::planning

@@ -4,6 +4,7 @@
 #include <unordered_set>
 
 #include "autoschedule/machine/kept_machine.h"
+#include "autoschedule/search/start.h"
 #include "graph/directives/give_directive.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/directives/wrappers.h"
@@ -16,22 +17,34 @@ using planning::Plan;
 
 namespace {
 
+// The least gain of a change in a search from nothing: a part of the stages that change, and of all.
+constexpr double least_gain_from_nothing = 0.02, least_gain_of_all_from_nothing = 0.001;
+
+bool is_adjoint(const FuncPtr& f) { return f->made.has_value(); }
+
 // Funcs that no move changes, by number.
 std::vector<bool> kept_funcs(const Plan& plan, const std::vector<FuncPtr>& unscheduled,
-                             const AutoscheduleOptions& options) {
-  std::unordered_set<std::string> of_user;
-  for (const FuncPtr& f : topological_order(unscheduled)) {
-    if (graph::has_directives(*f)) of_user.insert(f->name);
+                             const AutoscheduleOptions& options, autoschedule::Scheduling what) {
+  std::unordered_set<std::string> kept;
+  const std::vector<FuncPtr> order = topological_order(unscheduled);
+  const bool by_hand = what == autoschedule::Scheduling::Gradients &&
+                       std::ranges::any_of(order, [](const FuncPtr& f) {
+                         return !is_adjoint(f) && has_directives(*f);
+                       });
+  for (const FuncPtr& f : order) {
+    if (graph::has_directives(*f) || (by_hand && !is_adjoint(f))) kept.insert(f->name);
   }
   for (const auto* named : {&options.store, &options.inlined}) {
-    for (const FuncName& f : *named) of_user.insert(f.name);
+    for (const FuncName& f : *named) kept.insert(f.name);
   }
-  const auto makes_func = [](const graph::LoggedDirective& logged) {
-    return logged.stage >= 0 && !graph::made_by(logged.directive).empty();
-  };
-  return ir::mapped(plan.program->funcs, [&](const FuncPtr& f) {
-    return of_user.contains(f->name) || std::ranges::any_of(f->log, makes_func);
-  });
+  // Funcs that keep directives before an rfactor, and what it made from their loops.
+  for (const FuncPtr& f : plan.program->funcs) {
+    if (graph::can_reset_loops(*f)) continue;
+    kept.insert(f->name);
+    for (const graph::LoggedDirective& logged : f->log)
+      kept.insert(graph::made_by(logged.directive));
+  }
+  return ir::mapped(plan.program->funcs, [&](const FuncPtr& f) { return kept.contains(f->name); });
 }
 
 // The moves that make a decision.
@@ -47,7 +60,7 @@ std::vector<const char*> moves_of(Decision decision) {
       return {"fuse_stages"};
     case Decision::Slices:
     case Decision::Strips:
-      return {"compute_at"};
+      return {"compute_at", "compute_in_tile"};
     case Decision::TaskSizes:
       return {"parallelise"};
     case Decision::Choices:
@@ -79,15 +92,23 @@ PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
   const planning::SizeModel sizes(accesses, {planning::unknown_extent});
   planning::Dependences dependences(accesses);
   planning::CostModel cost(accesses, sizes, machine);
+  const planning::Context context{accesses, sizes, machine, dependences};
   planning::SearchOptions beam;
   beam.width = search.width;
-  beam.spare_bytes = static_cast<double>(search.spare_bytes);
-  beam.kept = kept_funcs(result.rules, unscheduled, options);
+  beam.most_bytes = cost.price(result.rules).peak_bytes + static_cast<double>(search.spare_bytes);
+  beam.kept = kept_funcs(result.rules, unscheduled, options, search.what);
   for (const Decision decision : options.without) {
     for (const char* move : moves_of(decision)) beam.without.insert(move);
   }
-  result.result =
-      planning::search(result.rules, {accesses, sizes, machine, dependences}, cost, beam);
+  result.result = planning::search(result.rules, context, cost, beam);
+  if (!search.from_nothing) return result;
+  // Nobody knows the time of this start, so that every gain is one.
+  beam.least_gain = least_gain_from_nothing;
+  beam.least_gain_of_all = least_gain_of_all_from_nothing;
+  const Plan nothing = planning::plan_from_nothing(result.rules, beam.kept, context);
+  planning::SearchResult other = planning::search(nothing, context, cost, beam);
+  std::erase_if(other.found, [&](const FoundPlan& found) { return found.plan == nothing; });
+  planning::merge(result.result, std::move(other));
   return result;
 }
 

@@ -1,8 +1,9 @@
-// plan_search.h -- a search over plans that begins with the schedule of the rules.
+// plan_search.h -- a search over plans that begins with the schedule of the rules, and with no decisions.
 //
 //   scheduled graph => plan => moves, by predicted time => plan => directives of what changed
 #pragma once
 
+#include "autoschedule/default_schedule.h"
 #include "autoschedule/search/search.h"
 #include "frontend/schedule/autoschedule_options.h"
 #include "ir/target.h"
@@ -20,13 +21,16 @@ struct PlanSearch {
 struct PlanSearchOptions {
   int width = 1;            // of the beam
   int64_t spare_bytes = 0;  // that may be alive at once beyond those of `scheduled`
+  autoschedule::Scheduling what = autoschedule::Scheduling::Everything;
+  bool from_nothing = true;  // searches from a plan without decisions, too
 };
 
 // The machine that the cost of a search is for: that of the cost model, with the threads of the options.
 planning::Machine search_machine(const AutoscheduleOptions& options, const Target& target);
 
 // `scheduled`: the graph with the schedule of the rules; `unscheduled`: before. What its user scheduled or named in the
-// options stays as it is, and so do Funcs whose directives made others. Decisions that the options leave out forbid the
+// options stays as it is, and so does the rest of a primal of which they scheduled a part, where gradients are scheduled:
+// they leave the rest inline. Decisions that the options leave out forbid the
 // moves that make them.
 PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
                         const std::vector<FuncPtr>& unscheduled, const AutoscheduleOptions& options,

@@ -21,6 +21,7 @@
 #include "ir/target.h"
 #include "support/errors.h"
 #include "support/loop_nest.h"
+#include "support/rules_schedule.h"
 #include "support/same_numbers.h"
 
 namespace retrograde {
@@ -372,7 +373,7 @@ TEST_F(Places, LoopsAreTasksForSoManyThreads) {
     planes(x, y, c, n) = exp(image(x, y)) * cast<float>(c + n);
     planes.set_estimates({{0, 40}, {0, 40}, {0, 4}, {0, 3}});
     Pipeline pipeline(planes);
-    pipeline.auto_schedule(get_host_target(), options, machine);
+    schedule_by_rules(pipeline, get_host_target(), options, machine);
     return count_of("parallel", pipeline.loop_nest());
   };
   const MachineParams generic = MachineParams::generic();
@@ -414,13 +415,17 @@ TEST(AutoscheduleOptions, RefuseTruthInOtherWords) {
 }
 
 // A program is recompiled if its options change.
-TEST_F(Places, OptionsOfAGradientTakeEffectWhenItIsCompiledNext) {
-  Func gradient = propagate_adjoints(gradient::weighted_sum(sums, {30}))(image);
+TEST(AutoscheduleOptionsOfGradients, TakeEffectWhenItIsCompiledNext) {
+  const Buffer<float> image = random_image({500, 400}, -1, 1, 1);
+  Var x("x"), y("y");
+  Func values("values");
+  values(x, y) = exp(image(x, y)) * sin(image(x, y));
+  Func gradient = propagate_adjoints(gradient::weighted_sum(values, {500, 400}))(image);
   EXPECT_FALSE(names_in_nest(gradient.loop_nest(), "parallel").empty());
-  const Buffer<float> first = gradient.realize({40, 40});
+  const Buffer<float> first = gradient.realize({500, 400});
   gradient.set_autoschedule({.threads = 1});
   EXPECT_EQ(names_in_nest(gradient.loop_nest(), "parallel"), std::vector<std::string>());
-  const Buffer<float> second = gradient.realize({40, 40});
+  const Buffer<float> second = gradient.realize({500, 400});
   second.for_each_element([&](int i, int j) {
     EXPECT_NEAR(first(i, j), second(i, j), 1e-4 * (1 + std::abs(first(i, j))));
   });

@@ -14,6 +14,7 @@
 #include "ir/target.h"
 #include "support/errors.h"
 #include "support/loop_nest.h"
+#include "support/rules_schedule.h"
 
 namespace retrograde {
 namespace {
@@ -28,7 +29,7 @@ struct BuiltInScheduler : ::testing::Test {
     out(x) = sums(x) * 2.0f;
     out.set_estimate(x, 0, 1000);
   }
-  std::string schedule() { return Pipeline(out).auto_schedule(get_host_target()).schedule_source; }
+  std::string schedule() { return schedule_by_rules(Pipeline(out)).to_cpp(); }
   static bool is_at_root(const Func& f) {
     return f.function()->schedule.compute_level.kind == graph::LoopLevel::Kind::Root;
   }
@@ -70,7 +71,7 @@ struct Shifted {
     }
   }
   graph::LoopLevel place_of_rows() {
-    Pipeline(out).auto_schedule(get_host_target());
+    schedule_by_rules(Pipeline(out));
     return rows.function()->schedule.compute_level;
   }
   Var x{"x"}, y{"y"}, d{"d"};
@@ -129,7 +130,7 @@ struct BlurredHistograms {
 TEST(SlicesOfAFunc, AreNotWhereWhatIsInsideThemWouldBeComputedAgain) {
   BlurredHistograms scheduled, plain;
   scheduled.out.set_estimates({{0, 12}, {0, 12}, {0, 24}, {0, 16}});
-  Pipeline(scheduled.out).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(scheduled.out));
   const auto place = [](const Func& f) { return f.function()->schedule.compute_level; };
   ASSERT_EQ(place(scheduled.counts).kind, graph::LoopLevel::Kind::At);
   EXPECT_EQ(place(scheduled.counts).var, "n");
@@ -159,7 +160,7 @@ struct ShiftedWindows {
     }
   }
   graph::LoopLevel place_of_windows() {
-    Pipeline(out).auto_schedule(get_host_target());
+    schedule_by_rules(Pipeline(out));
     return windows.function()->schedule.compute_level;
   }
   static constexpr int side = 264;
@@ -219,7 +220,7 @@ struct TwoSums {
     }
   }
   bool run_together() {
-    Pipeline(out).auto_schedule(get_host_target());
+    schedule_by_rules(Pipeline(out));
     return weighted.function()->stage(1).schedule.fuse_level.func == plain.name();
   }
   static constexpr int side = 264;
@@ -262,7 +263,7 @@ struct Planes {
   }
   // For each loop, innermost first: whether it runs over planes.
   std::vector<bool> loops_of_sums() {
-    Pipeline(out).auto_schedule(get_host_target());
+    schedule_by_rules(Pipeline(out));
     std::vector<bool> result;
     for (const graph::Dim& loop : sums.update().get_schedule().dims)
       result.push_back(loop.is_reduction);
@@ -309,7 +310,7 @@ struct Rows {
     }
   }
   graph::LoopLevel place_of_image() {
-    Pipeline(out).auto_schedule(get_host_target());
+    schedule_by_rules(Pipeline(out));
     return image.function()->schedule.compute_level;
   }
   Var x{"x"}, y{"y"};
@@ -394,7 +395,7 @@ TEST(StripsOfRows, AreThoseOfAChainAsLongAsItsWindowsFit) {
     stages[s](x, y) = exp(f(x - 1, y) + f(x + 1, y) + f(x, y - 1) + f(x, y + 1));
   }
   stages.back().set_estimate(x, 0, 2048).set_estimate(y, 0, 2048);
-  Pipeline(stages.back()).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(stages.back()));
   int at_root = 0;
   for (const Func& f : stages)
     at_root += f.function()->schedule.compute_level.kind == graph::LoopLevel::Kind::Root;
@@ -423,7 +424,7 @@ struct WindowSums {
         picture(px, py) = static_cast<float>((px * 7 + py * 13) % 11) / 16;
     }
   }
-  void schedule() { Pipeline(out).auto_schedule(get_host_target()); }
+  void schedule() { schedule_by_rules(Pipeline(out)); }
   bool is_in_strips(const Func& f) const {
     const auto& placed = f.function()->schedule;
     return placed.store_level.kind == graph::LoopLevel::Kind::At &&
@@ -473,7 +474,7 @@ TEST(StripsOfRows, ComputeSumsOneElementOfAllThatIsOutsideAtATime) {
   };
   Func around("around"), plain("plain");
   Func out = stencil_of(around), expected = stencil_of(plain);
-  Pipeline(out).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(out));
   EXPECT_EQ(around.function()->schedule.compute_level.func, out.name());
   for (const graph::Split& split : around.function()->updates[0].schedule.splits)
     EXPECT_EQ(split.old_var, "x");
@@ -526,7 +527,7 @@ struct Steps {
 
 void expect_adjoints_in_strips(int steps, int least, const Steps::Step& step) {
   Steps scheduled(steps, step), plain(steps, step);
-  Pipeline(scheduled.gradient).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(scheduled.gradient));
   int in_strips = 0;
   for (const graph::FuncPtr& f : scheduled.funcs())
     in_strips += f->made && f->schedule.store_level.kind == graph::LoopLevel::Kind::At;
@@ -570,7 +571,7 @@ struct TurnedScan {
     turned.set_estimate(x, 0, rows).set_estimate(y, 0, columns).set_estimate(c, 0, 3);
   }
   graph::LoopLevel place_of_sums() {
-    Pipeline(turned).auto_schedule(get_host_target());
+    schedule_by_rules(Pipeline(turned));
     return sums.function()->schedule.compute_level;
   }
   Var x{"x"}, y{"y"}, c{"c"};
@@ -601,7 +602,7 @@ TEST(BlocksOfColumns, AreNotOfSums) {
   means(x, y) += cast<float>(x + r) * y;
   out(x, y) = means(y, x);
   out.set_estimate(x, 0, 2000).set_estimate(y, 0, 2000);
-  Pipeline(out).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(out));
   EXPECT_EQ(means.function()->schedule.compute_level.kind, graph::LoopLevel::Kind::Root);
 }
 
@@ -618,7 +619,7 @@ TEST(BlocksOfColumns, AreNotWhereSeveralReadThem) {
       .set_estimate(program.y, 0, 900)
       .set_estimate(program.c, 0, 3);
   program.turned.compute_root();
-  Pipeline(both).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(both));
   EXPECT_EQ(program.sums.function()->schedule.compute_level.kind, graph::LoopLevel::Kind::Root);
 }
 
@@ -639,7 +640,7 @@ TEST_F(BuiltInScheduler, MovesNothingOutOfTheLoopsThatItNeeds) {
   between(x) = exp(inside(x)) * sin(inside(x));
   last(x) = between(x) + between(x + 1) + between(x + 2);
   inside.compute_at(last, x);
-  Pipeline(last).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(last));
   EXPECT_FALSE(is_at_root(between));
   EXPECT_NO_THROW(Pipeline(last).loop_nest());
 }
@@ -649,7 +650,7 @@ TEST_F(BuiltInScheduler, LeavesInlineWhatIsReadAtPlacesWithoutBounds) {
   Func computed("computed"), read("read");
   computed(x) = exp(cast<float>(x)) * sin(cast<float>(x));
   read(x) = computed(place(x)) + computed(place(x) + 1) + computed(place(x) + 2);
-  Pipeline(read).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(read));
   EXPECT_FALSE(is_at_root(computed));
   EXPECT_NO_THROW(Pipeline(read).compile_jit());
 }

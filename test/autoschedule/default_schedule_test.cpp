@@ -18,6 +18,7 @@
 #include "ir/visit.h"
 #include "support/errors.h"
 #include "support/facts.h"
+#include "support/rules_schedule.h"
 #include "support/schedule_log.h"
 
 namespace retrograde {
@@ -524,7 +525,7 @@ ScheduleLog log_of(const Func& output, const std::vector<int32_t>& sizes,
   const Buffer<float> expected = plain.realize(sizes)[0];
   for (size_t d = 0; d < sizes.size(); ++d)
     Func(output).set_estimate(output.args()[d], 0, sizes[d]);
-  pipeline.auto_schedule(target);
+  schedule_by_rules(pipeline, target);
   const Buffer<float> found = pipeline.realize(sizes)[0];
   found.for_each_element([&](const int* at) {
     EXPECT_NEAR(found(at), expected(at), 1e-5 * (1 + std::abs(expected(at))));
@@ -626,7 +627,7 @@ TEST_F(DefaultSchedule, TilesOfManyTermsAreAddedInBlocks) {
   Func windows = windows_under_filters(signal, filters, 8);
   windows.set_estimates({{0, kinds}, {0, frames}});
   Pipeline pipeline(windows);
-  pipeline.auto_schedule(get_host_target());
+  schedule_by_rules(pipeline);
   const ScheduleLog log = without_numbers(pipeline.schedule_log());
   EXPECT_TRUE(any_directive<graph::CopyInput>(log)) << log.to_text();
   EXPECT_TRUE(any_directive<graph::FactorOut>(log)) << log.to_text();
@@ -787,7 +788,7 @@ TEST_F(DefaultSchedule, SumsThatLookTheSamePlacesUpShareTheirLoops) {
   together.for_each_element([&](int a, int b, int k) {
     EXPECT_NEAR(together(a, b, k), apart(a, b, k), 1e-5 * (1 + std::abs(apart(a, b, k))));
   });
-  Pipeline(by_flow).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(by_flow));
   const ScheduleLog log = without_numbers(Pipeline(by_flow).schedule_log());
   const bool shares_loops = any_directive<graph::ComputeWith>(
       log, [](const ScheduleLog::Entry& entry, const graph::ComputeWith& with) {
@@ -884,7 +885,7 @@ TEST_F(DefaultSchedule, SumsToAFewElementsAreCut) {
   energy(x) += image(r.x, r.y, x) * image(r.x, r.y, x);
   energy.set_estimate(x, 0, 5);
   const Pipeline pipeline(energy);
-  pipeline.auto_schedule(get_host_target());
+  schedule_by_rules(pipeline);
   EXPECT_TRUE(any_directive<graph::FactorOut>(pipeline.schedule_log()));
   const Buffer<float> sums = energy.realize({5});
   for (int c = 0; c < 5; ++c) {

@@ -10,6 +10,7 @@
 
 #include "graph/graph.h"
 #include "ir/target.h"
+#include "support/rules_schedule.h"
 
 namespace retrograde {
 namespace {
@@ -46,9 +47,7 @@ struct Layer {
     return level().kind == graph::LoopLevel::Kind::At && level().func == result.name() &&
            level().var == "x";
   }
-  std::string schedule() {
-    return Pipeline(result).auto_schedule(get_host_target()).schedule_source;
-  }
+  std::string schedule() { return schedule_by_rules(Pipeline(result)).to_cpp(); }
   Buffer<float> found(const std::vector<int>& sizes) { return result.realize(sizes); }
 
   LayerSizes of;
@@ -111,7 +110,7 @@ TEST(Epilogues, OfASumOfFewTerms) {
   second(first.x, first.y, first.c, first.n) +=
       first.result(first.x, first.y, k.x, first.n) * cast<float>(k.y + first.c);
   second.set_estimates({{0, 60}, {0, 40}, {0, 3}, {0, 3}});
-  Pipeline(second).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(second));
   EXPECT_TRUE(first.is_in_tiles());
 }
 
@@ -128,7 +127,7 @@ TEST(Epilogues, AreNotOfSumsOfFewTermsBehindWhichAStencilGoesOn) {
   edges(layer.x, layer.y, layer.c, layer.n) = layer.result(layer.x, layer.y + 1, layer.c, layer.n) -
                                               layer.result(layer.x, layer.y, layer.c, layer.n);
   edges.set_estimates({{0, 299}, {0, 299}, {0, 3}, {0, 3}});
-  Pipeline(edges).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(edges));
   EXPECT_FALSE(layer.is_in_tiles());
   EXPECT_EQ(layer.level().func, edges.name());
 }
@@ -145,7 +144,7 @@ TEST(Epilogues, AreNotOfStencilsThatReadWhatIsComputed) {
   rows(x, y) += columns(x + r, y) / 41;
   sharp(x, y) = 2 * image(x, y) - rows(x, y);
   sharp.set_estimates({{0, 300}, {0, 300}});
-  Pipeline(sharp).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(sharp));
   const graph::LoopLevel& level = rows.function()->schedule.compute_level;
   EXPECT_FALSE(level.kind == graph::LoopLevel::Kind::At && level.var == "x");
 }
@@ -165,7 +164,7 @@ TEST(Epilogues, AreNotWhereTwoReadThem) {
   Func other("other");
   other(layer.x, layer.y, layer.c, layer.n) = exp(layer.here());
   other.set_estimates({{0, 70}, {0, 50}, {0, 12}, {0, 3}});
-  Pipeline({layer.result, other}).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline({layer.result, other}));
   EXPECT_EQ(layer.level().kind, graph::LoopLevel::Kind::Root);
 }
 
@@ -185,7 +184,7 @@ TEST(Epilogues, OfTwoSumsThatOneReads) {
   };
   Layer layer(positive), plain(positive);
   Func found = both(layer), expected = both(plain);
-  Pipeline(found).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(found));
   expect_same(found.realize({70, 50, 12, 3}), expected.realize({70, 50, 12, 3}), "product");
 }
 
@@ -205,7 +204,7 @@ TEST(Epilogues, OfAProductOfMatrices) {
   };
   Func product("product"), plain("product");
   Func found = product_of(product), expected = product_of(plain);
-  Pipeline(found).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(found));
   plain.compute_root();
   expect_same(found.realize({n, n}), expected.realize({n, n}), "product");
 }
@@ -225,7 +224,7 @@ TEST(Epilogues, AreThoseOfAGradientThroughABoundaryCondition) {
     return result;
   };
   Func found = gradient(layer), expected = gradient(plain);
-  Pipeline(found).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(found));
   int in_tiles = 0;
   for (const graph::FuncPtr& f : graph::topological_order({found.function()}))
     in_tiles += f->schedule.compute_level.func == found.name() &&

@@ -11,6 +11,7 @@
 
 #include "graph/graph.h"
 #include "ir/build.h"
+#include "support/rules_schedule.h"
 
 namespace retrograde {
 namespace {
@@ -34,7 +35,7 @@ struct Source {
 // A program without a schedule and under the autoscheduler.
 template <class Program>
 struct Scheduled {
-  Scheduled() { Pipeline(program.out).auto_schedule(get_host_target()); }
+  Scheduled() { schedule_by_rules(Pipeline(program.out)); }
 
   void expect_same_values(const std::vector<int>& sizes) {
     Program plain;
@@ -120,7 +121,7 @@ TEST(Choices, StayWhereSizesDecideHowManyThereAre) {
   Func all("all");
   all(program.x, program.y, program.c) = program.opponent(program.x, program.y, program.c);
   all.set_estimate(program.c, 0, 3);
-  Pipeline({program.out, all}).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline({program.out, all}));
   EXPECT_FALSE(is_unrolled(program.opponent, "c"));
 }
 
@@ -174,7 +175,7 @@ TEST(LaneDimensions, AreOfWhatASumOfAllReadsToo) {
     RDom r(0, 100, 0, 50);
     total() = 0.0f;
     total() += program.slope(0, r.x, r.y) * program.slope(1, r.x, r.y) + program.slope(0, r.y, r.x);
-    if (is_scheduled) Pipeline(total).auto_schedule(get_host_target());
+    if (is_scheduled) schedule_by_rules(Pipeline(total));
     return Buffer<float>(total.realize())();
   };
   EXPECT_NEAR(sum_of(true) / sum_of(false), 1, 1e-4);
@@ -185,7 +186,7 @@ TEST(LaneDimensions, AreTheFirstWhereReadersRunAlongIt) {
   Func all("all");
   all(program.k, program.x) = program.taps(program.k, program.x) * 2.0f;
   all.set_estimate(program.k, 0, 4).set_estimate(program.x, 0, 250);
-  Pipeline({program.out, all}).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline({program.out, all}));
   EXPECT_EQ(program.taps.function()->schedule.storage_dims[0], "k");
 }
 
@@ -343,7 +344,7 @@ class RowCopies : public ::testing::Test {
     Func scheduled = layer_of(layer, image, weights);
     if (layer.has_known_sizes) scheduled.set_estimates({{0, 48}, {0, 64}, {0, layer.outputs}});
     Pipeline pipeline(scheduled);
-    pipeline.auto_schedule(get_host_target(), layer.options);
+    schedule_by_rules(pipeline, get_host_target(), layer.options);
     for (const auto& [width, height] : {std::pair{48, 64}, std::pair{37, 13}, std::pair{1, 2}}) {
       image.set(some_values({width, height, planes}));
       weights.set(some_values({layer.taps, layer.taps, planes, layer.outputs}));
@@ -439,7 +440,7 @@ struct TupleChain {
 
 TEST(LongProgram, WhatOneStageReadsAtOneElementIsInlined) {
   TupleChain program(10), plain(10);
-  Pipeline(program.out).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(program.out));
   for (const Func& f : program.chain)
     EXPECT_NE(f.function()->schedule.compute_level.kind, graph::LoopLevel::Kind::Root) << f.name();
   // Ten levels of five values would make ten million nodes if these did not share what they read.
@@ -450,12 +451,12 @@ TEST(LongProgram, WhatOneStageReadsAtOneElementIsInlined) {
 
 TEST(LongProgram, TheOnlyLoopRunsInParallelPieces) {
   TupleChain program(2);
-  Pipeline(program.out).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(program.out));
   EXPECT_TRUE(runs_in_parallel(program.out));
   Func cheap("cheap");
   cheap(program.i) = program.i + 1;
   cheap.set_estimate(program.i, 0, 1000);
-  Pipeline(cheap).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(cheap));
   EXPECT_FALSE(runs_in_parallel(cheap));
 }
 
@@ -467,7 +468,7 @@ TEST(LongProgram, LongChainsRunInSeveralVectorsAtOnce) {
     Func out("out");
     out(i) = at;
     out.set_estimate(i, 0, points);
-    Pipeline(out).auto_schedule(get_host_target());
+    schedule_by_rules(Pipeline(out));
     return lanes_of(out);
   };
   EXPECT_EQ(lanes_with(2), 16) << "iterations overlap";

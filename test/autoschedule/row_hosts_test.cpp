@@ -8,6 +8,7 @@
 
 #include "gradient/gradient_check.h"
 #include "graph/graph.h"
+#include "support/rules_schedule.h"
 #include "support/variables.h"
 
 namespace retrograde {
@@ -54,7 +55,7 @@ struct Normalisation {
 TEST(RowHosts, HaveMeanAndVarianceOfTheirRows) {
   Normalisation scheduled, declared;
   Pipeline pipeline(scheduled.out);
-  pipeline.auto_schedule(get_host_target());
+  schedule_by_rules(pipeline);
   EXPECT_TRUE(is_hosted_by(scheduled.mean, scheduled.out));
   EXPECT_TRUE(is_hosted_by(scheduled.variance, scheduled.out));
   declared.mean.compute_root();
@@ -76,7 +77,7 @@ TEST(RowHosts, ShareTheirLoopWithCopiesThatLeaveThePipeline) {
   kept.bound(n, 0, 601);
   also.bound(y, 0, 601);
   Pipeline pipeline({scheduled.out, kept, also});
-  pipeline.auto_schedule(get_host_target());
+  schedule_by_rules(pipeline);
   EXPECT_TRUE(is_hosted_by(scheduled.mean, scheduled.out));
   EXPECT_TRUE(is_hosted_by(scheduled.variance, scheduled.out));
   Buffer<float> out(1000, 601), mean(601), variance(601);
@@ -93,7 +94,7 @@ TEST(RowHosts, LeaveSumsAloneThatOthersRead) {
   Func other("other");
   other(y) = scheduled.mean(y) * scheduled.mean(600 - y);
   other.bound(y, 0, 601);
-  Pipeline({scheduled.out, other}).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline({scheduled.out, other}));
   EXPECT_FALSE(is_hosted_by(scheduled.mean, scheduled.out));
   EXPECT_TRUE(is_hosted_by(scheduled.variance, scheduled.out));
 }
@@ -101,7 +102,7 @@ TEST(RowHosts, LeaveSumsAloneThatOthersRead) {
 TEST(RowHosts, NeedLargeFuncs) {
   Normalisation scheduled;
   scheduled.out.bound(y, 0, 100);
-  Pipeline(scheduled.out).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(scheduled.out));
   EXPECT_FALSE(is_hosted_by(scheduled.mean, scheduled.out));
 }
 
@@ -128,7 +129,7 @@ TEST(RowHosts, MayNameRowsByQuotients) {
   kept(g, n) = scheduled.mean(g, n);
   kept.bound(g, 0, 6).bound(n, 0, 9);
   Pipeline pipeline({scheduled.out, kept});
-  pipeline.auto_schedule(get_host_target());
+  schedule_by_rules(pipeline);
   EXPECT_TRUE(is_hosted_by(scheduled.mean, scheduled.out));
   EXPECT_TRUE(is_hosted_by(scheduled.square, scheduled.out));
   Buffer<float> out(70, 50, 24, 9), mean(6, 9);
@@ -151,7 +152,7 @@ TEST(RowHosts, HaveSumsThatAreReadThroughWhatIsInlined) {
   };
   const Func active = activated(scheduled.out);
   Pipeline pipeline(active);
-  pipeline.auto_schedule(get_host_target());
+  schedule_by_rules(pipeline);
   EXPECT_EQ(scheduled.out.function()->schedule.compute_level.kind, graph::LoopLevel::Kind::Inlined);
   EXPECT_TRUE(is_hosted_by(scheduled.mean, active));
   EXPECT_TRUE(is_hosted_by(scheduled.square, active));

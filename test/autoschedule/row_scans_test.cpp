@@ -11,6 +11,7 @@
 #include "graph/names.h"
 #include "ir/print.h"
 #include "ir/visit.h"
+#include "support/rules_schedule.h"
 
 namespace retrograde {
 namespace {
@@ -58,7 +59,7 @@ struct RowScans : ::testing::Test {
   }
   void schedule() {
     f.bound(x, 0, region.extents[0]).bound(y, 0, region.extents[1]);
-    Pipeline(f).auto_schedule(get_host_target());
+    schedule_by_rules(Pipeline(f));
   }
 
   void expect_results() {
@@ -174,7 +175,7 @@ TEST_F(RowScans, OfUnknownSizeAreEqualToTheInterpreter) {
     const oracle::Array expected = oracle::Interpreter({.rounding = oracle::Rounding::Contraction})
                                        .realize(f.function(), region)
                                        .front();
-    Pipeline(f).auto_schedule(get_host_target());
+    schedule_by_rules(Pipeline(f));
     const Buffer<float> found = gradient::run_on_threads(f, region, 2, false);
     const auto comparison =
         oracle::compare(expected, *const_cast<Buffer<float>&>(found).raw_buffer(), 16);

@@ -9,6 +9,7 @@
 #include "gradient/gradient_check.h"
 #include "graph/names.h"
 #include "support/errors.h"
+#include "support/rules_schedule.h"
 
 namespace retrograde {
 namespace {
@@ -26,7 +27,7 @@ std::string loops_of(const graph::FuncContents& f, size_t update = 0) {
   return result;
 }
 std::string scheduled_loops(Func& f) {
-  Pipeline(f).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(f));
   return loops_of(*f.function());
 }
 
@@ -36,7 +37,7 @@ void expect_results(const Func& f, const std::vector<int>& sizes) {
                                      .realize(f.function(), region)
                                      .front();
   Func g = f;
-  Pipeline(g).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(g));
   const Buffer<float> first = gradient::run_on_threads(g, region, 1, false);
   const auto comparison =
       oracle::compare(expected, *const_cast<Buffer<float>&>(first).raw_buffer(), 4);

@@ -16,6 +16,7 @@
 #include "lower/lower.h"
 #include "simplify/simplify.h"
 #include "support/costly_vectors.h"
+#include "support/rules_schedule.h"
 
 namespace retrograde {
 namespace {
@@ -222,7 +223,7 @@ TEST(StridedTerms, HaveTilesOfPhases) {
   for (const int taps : {3, 4}) {
     const Doubled plain(taps);
     Func out = without_zeros(plain.out);
-    Pipeline(out).auto_schedule(get_host_target());
+    schedule_by_rules(Pipeline(out));
     const auto& loops = out.function()->updates[0].schedule.dims;
     EXPECT_TRUE(std::any_of(loops.begin(), loops.end(), [](const graph::Dim& loop) {
       return loop.var == "phase" && loop.runs == ForType::Unrolled;
@@ -255,7 +256,7 @@ TEST(StridedTerms, HaveTilesOfThreePhases) {
     return out.bound(t, 0, 3 * width + 1).bound(c, 0, filters);
   };
   Func out = without_zeros(program());
-  Pipeline(out).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(out));
   const auto& loops = out.function()->updates[0].schedule.dims;
   const auto unrolled = std::count_if(loops.begin(), loops.end(), [](const graph::Dim& loop) {
     return loop.runs == ForType::Unrolled;
@@ -271,7 +272,7 @@ TEST(StridedTerms, HaveTilesOfThreePhases) {
 // No vector in a loop over terms divides, takes remainders or compares.
 TEST(StridedTerms, VectorsDoNotDivide) {
   Func out = without_zeros(Doubled().out);
-  Pipeline(out).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(out));
   const Stmt code =
       lower::lower("doubled", {out.function()}, lower::infer_arguments({out.function()}), {}).body;
   const CostlyVectors found = costly_vectors(code, ".s1.r");

@@ -11,6 +11,7 @@
 
 #include "graph/graph.h"
 #include "ir/target.h"
+#include "support/rules_schedule.h"
 
 namespace retrograde {
 namespace {
@@ -43,7 +44,7 @@ struct Layer {
     return level(f).kind == graph::LoopLevel::Kind::At && level(f).func == result.name() &&
            level(f).var == "y";  // a slice is one channel
   }
-  void schedule() { Pipeline(result).auto_schedule(get_host_target()); }
+  void schedule() { schedule_by_rules(Pipeline(result)); }
   Buffer<float> found(int rows) { return result.realize({size, rows, image.channels()}); }
 
   int size;
@@ -82,7 +83,7 @@ TEST(SumBlocks, AreInTheLoopsOfTheOnlyReader) {
 
 TEST(SumBlocks, ArePartOfTheSchedulesText) {
   Layer layer(largest);
-  const std::string text = Pipeline(layer.result).auto_schedule(get_host_target()).schedule_source;
+  const std::string text = schedule_by_rules(Pipeline(layer.result)).to_cpp();
   EXPECT_NE(text.find("convolved.compute_at(LoopLevel(result, y))"), std::string::npos) << text;
 }
 
@@ -105,7 +106,7 @@ TEST(SumBlocks, AreNotWhereTwoReadThem) {
   Func other("other");
   other(layer.x, layer.y, layer.c) = exp(layer.convolved(layer.x, layer.y, layer.c));
   other.set_estimates({{0, 200}, {0, 200}, {0, 16}});
-  Pipeline({layer.result, other}).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline({layer.result, other}));
   EXPECT_EQ(Layer::level(layer.convolved).kind, graph::LoopLevel::Kind::Root);
 }
 
@@ -126,7 +127,7 @@ TEST(SumBlocks, OfTwoSumsThatOneReads) {
   Layer layer(largest), plain(largest);
   Func second("second"), plain_second("second");
   Func product = both(layer, second), plain_product = both(plain, plain_second);
-  Pipeline(product).auto_schedule(get_host_target());
+  schedule_by_rules(Pipeline(product));
   EXPECT_EQ(Layer::level(layer.convolved).func, product.name());
   EXPECT_EQ(Layer::level(layer.convolved).var, "y");
   plain.convolved.compute_root();

@@ -28,6 +28,7 @@ class Chain {
         RDom r(0, choices.between(1, 4), "r");
         next(x_, y_) += funcs_[i - 1](x_ + r, y_ - r);
       }
+      if (choices.chance(10)) next(x_, choices.between(0, 3)) += 1.0f;
       funcs_.push_back(next);
     }
     funcs_.back().bound(x_, 0, 64).bound(y_, 0, 32);

@@ -1,6 +1,8 @@
 #include "graph/directives/give_directive.h"
 
+#include <algorithm>
 #include <atomic>
+#include <set>
 
 namespace retrograde::graph {
 
@@ -148,12 +150,72 @@ RETROGRADE_GIVE(AddTraceTag)
 RETROGRADE_GIVE(DebugToFile)
 #undef RETROGRADE_GIVE
 
+namespace {
+
+// Whether directives, by position in the log, come before an rfactor of their stage or are one.
+std::vector<bool> are_before_factor(const FuncContents& f) {
+  std::vector<bool> result(f.log.size());
+  std::set<int> factored;  // stages
+  for (size_t i = f.log.size(); i-- > 0;) {
+    if (std::holds_alternative<FactorOut>(f.log[i].directive)) factored.insert(f.log[i].stage);
+    result[i] = factored.contains(f.log[i].stage);
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<Split> factored_names(const FuncContents& f, int stage) {
+  const Definition& definition = f.stage(stage);
+  const std::vector<Dim> loops = first_loops(f, definition);
+  const auto is_directive = [&](const Split& split) {
+    return std::ranges::any_of(f.log, [&](const LoggedDirective& logged) {
+      const auto* rename = std::get_if<RenameLoop>(&logged.directive);
+      return logged.stage == stage && rename && rename->old == split.old_var &&
+             rename->renamed == split.outer;
+    });
+  };
+  std::vector<Split> names;
+  for (const Split& split : definition.schedule.splits) {
+    if (split.kind != Split::Kind::Rename || is_directive(split) ||
+        std::ranges::find(loops, split.old_var, &Dim::var) == loops.end())
+      break;
+    names.push_back(split);
+  }
+  return names;
+}
+
+bool can_reset_loops(const FuncContents& f) {
+  const std::vector<bool> stays = are_before_factor(f);
+  for (size_t i = 0; i < f.log.size(); ++i) {
+    const auto& [stage, special, directive, order] = f.log[i];
+    const bool shapes_loops = std::holds_alternative<SplitLoop>(directive) ||
+                              std::holds_alternative<ReorderLoops>(directive) ||
+                              std::holds_alternative<FactorOut>(directive);
+    // Splits of pure loops stand before the names.
+    if (stays[i] &&
+        (!shapes_loops || factored_names(f, stage).size() != f.stage(stage).rvars.size()))
+      return false;
+  }
+  return true;
+}
+
 void reset_loops(FuncContents& f) {
-  std::erase_if(f.log, [](const LoggedDirective& logged) { return logged.stage >= 0; });
+  std::vector<std::vector<Split>> names;
+  for (int s = 0; s < f.stage_count(); ++s) names.push_back(factored_names(f, s));
+  const std::vector<bool> stays = are_before_factor(f);
+  size_t at = 0;
+  std::erase_if(f.log, [&](const LoggedDirective& logged) {
+    const bool is_before = stays[at++];
+    return logged.stage >= 0 && !is_before;
+  });
   for (int s = 0; s < f.stage_count(); ++s) {
     Definition& stage = f.stage(s);
     stage.schedule = StageLoops();
     stage.schedule.dims = first_loops(f, stage);
+    for (const Split& name : names[static_cast<size_t>(s)])
+      std::ranges::find(stage.schedule.dims, name.old_var, &Dim::var)->var = name.outer;
+    stage.schedule.splits = std::move(names[static_cast<size_t>(s)]);
   }
   f.version++;
 }

@@ -37,8 +37,14 @@ void give_directive(const SchedulePlace& place, D directive);
 void log_directive(const SchedulePlace& place, Directive directive);
 
 // Resets the schedules of all stages to the loops of their definitions. No Func may be computed in
-// these loops or fused with them.
+// these loops or fused with them. Where rfactor changed a definition, its loops keep the names that rfactor gave them, and
+// the log keeps the directives up to that.
 void reset_loops(FuncContents& f);
+// The names that rfactor gave to loops of the stage's definition.
+std::vector<Split> factored_names(const FuncContents& f, int stage);
+// Whether directives that follow on a reset make the log of the Func, and those of the Funcs that it made, a log of their
+// schedules: no directive before an rfactor did more than split and order the loops of its reduction.
+bool can_reset_loops(const FuncContents& f);
 
 // Whether the Func or one of its stages has directives, apart from those about sizes (bounds,
 // alignments of bounds, estimates).

@@ -288,6 +288,20 @@ TEST_F(CostProbes, WhatALoopDoesNotChangeIsComputedOutsideOfIt) {
   EXPECT_GT(each, columns * rows / 16 * 4e-9);
 }
 
+TEST_F(CostProbes, UnrolledCopiesShareAFunctionUnlessItIsInAnArm) {
+  const auto seconds = [&](const Expr& value) {
+    Func sum("sum");
+    sum(x, y) = value + other(x, y);
+    sum.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+    return compute_seconds(priced(sum, "sum  root  y:4, x:16, unroll y, vector x\n"));
+  };
+  const double vectors = columns * rows / 16;
+  const double shared = seconds(exp(in(x, 0)));
+  const double in_arm = seconds(select(in(x, 0) > 0, exp(in(x, 0)), 0));
+  EXPECT_LT(shared, vectors * 2e-9);
+  EXPECT_NEAR(in_arm - shared, vectors * 3e-9, vectors * 0.4e-9);
+}
+
 TEST_F(CostProbes, InlinedFuncsAreComputedForEachElement) {
   rows_sum(x, y) = exp(in(x, y));
   out(x, y) = rows_sum(x, y) + rows_sum(x + 1, y);
@@ -368,12 +382,39 @@ TEST_F(CostProbes, ASumOfScalarsIsAChain) {
   EXPECT_NEAR(cost.stages[1].compute_seconds, 1.3e-3, 20 * micro);
 }
 
+TEST_F(CostProbes, CopiesOfALoopWaitOneAfterTheOther) {
+  RDom r(0, 1000000, 0, 2, "r");
+  out() += in(r.x, r.y);
+  is_sized = true;
+  const auto seconds_of = [&](const std::string& loops) {
+    return cost_of("out  root\n  .0\n  .1  " + loops + "\n").stages[1].compute_seconds;
+  };
+  EXPECT_NEAR(seconds_of("r.y, r.x"), 2.6e-3, 40 * micro);
+  EXPECT_NEAR(seconds_of("unroll r.y, r.x"), 2.6e-3, 40 * micro);
+}
+
 TEST_F(CostProbes, ShortSumsOverlap) {
   RDom r(0, 4, "r");
   out(x, y) = 0.0f;
   out(x, y) += in(x + r, y);
   const double chain = columns * rows / 16 * 4 * 1.3e-9;
   EXPECT_LT(update_cost("y, x:16, r.x, vector x").compute_seconds, chain / 1.2);
+}
+
+TEST_F(CostProbes, LanesOfASumAreCombinedOnce) {
+  const auto update = [&](int terms) {
+    Func total("total");
+    RDom r(0, terms, "r");
+    total(y) = 0.0f;
+    total(y) += in(r, y);
+    total.bound(y, 0, 2048);
+    return priced(total, "total  root\n  .0  y\n  .1  racing  y, r.x:16, vector r.x\n").stages[1];
+  };
+  // Four steps of a shuffle and a sum for each element.
+  const double ends = rows * 4 * 2 * 0.45e-9;
+  EXPECT_GT(update(16).compute_seconds, ends);
+  EXPECT_LT(update(16).compute_seconds, 1.3 * ends);
+  EXPECT_NEAR(update(4096).compute_seconds, rows * 256 * 1.3e-9, 1.5 * ends) << "hidden";
 }
 
 TEST_F(CostProbes, ARecurrenceAlongALineWaitsForMemory) {
@@ -383,6 +424,9 @@ TEST_F(CostProbes, ARecurrenceAlongALineWaitsForMemory) {
   const auto update = [&](const std::string& loops) { return update_cost(loops).compute_seconds; };
   EXPECT_NEAR(update("y, r.x"), 4095 * rows * 2.5e-9, 100 * micro);
   EXPECT_LT(update("y:16, r.x, unroll y"), 4095 * rows * 1.5e-9);
+  EXPECT_LT(update("y:4, r.x, vector y"), 4095 * rows * 1.2e-9);
+  EXPECT_NEAR(update("y:16, r.x, vector y"), 4095 * rows * 2.5e-9, 100 * micro)
+      << "16 lines of one set of the first cache";
 }
 
 // ---- data-dependent indices ----
@@ -459,6 +503,25 @@ TEST_F(CostProbes, ARotatedImageIsReadInManyLinesAVector) {
   const StageCost rotated = cost_of("out  root  y, x:16, vector x\n").stages[0];
   EXPECT_GT(rotated.bytes[1], 10 * image_bytes);
   EXPECT_LT(rotated.bytes.back(), 4 * image_bytes) << "the next row finds the lines in L2";
+}
+
+TEST_F(CostProbes, StagesInOneLoopLoadOnceWhatBothGather) {
+  RDom r(0, 4, "r");
+  const Expr gathered = in(clamp(cast<int>(x + other(x, y)), 0, 4095), y + r);
+  Func second("second");
+  out(x, y) += gathered * r;
+  second(x, y) += gathered * (r + 1);
+  second.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+  out.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+  const std::string loops = "y, x:16, r.x, vector x\n",
+                    zeros = "  root\n  .0  y, x:16, vector x\n  .1  ";
+  const auto seconds_of = [&](const std::string& shared) {
+    const Cost cost =
+        Pricing({out, second}).price("out" + zeros + loops + "second" + zeros + shared + loops);
+    return compute_seconds(cost);
+  };
+  const double gathers = 4 * columns * rows * 0.35e-9;
+  EXPECT_NEAR(seconds_of("") - seconds_of("shared with out.1/r.x  "), gathers, 0.3 * gathers);
 }
 
 TEST_F(CostProbes, TheBinsOfACellAreOneLine) {

@@ -129,6 +129,19 @@ TEST_F(PlanCovers, HoldWhatUpdatesAccess) {
   EXPECT_EQ(covers({out}, placed, scan)[0], (Cover{16, 20}));
 }
 
+TEST_F(PlanCovers, ReachToWhereUpdatesStand) {
+  Func rows("rows"), out("out");
+  rows(x, y) = x + y;
+  rows(x, 3) += 1;
+  out(x, y) = rows(x, y);
+  out.bound(x, 0, 128).bound(y, 0, 64);
+  const std::string placed =
+      "out  root  y, x:16, x\n"
+      "rows  at out/x:16\n";
+  EXPECT_EQ(covers({out}, placed, rows)[0], (Cover{16, 61})) << "in row 63, rows 3 to 63";
+  EXPECT_EQ(covers({out}, placed, rows, 1)[0], (Cover{16}));
+}
+
 TEST_F(PlanCovers, FollowLoopsThatStagesShare) {
   Func rows("rows"), sum("sum"), out("out");
   RDom r(0, 4, 0, 3, "r");

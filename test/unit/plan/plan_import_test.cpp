@@ -284,6 +284,53 @@ TEST_F(PlanImport, FuncsThatRunAsBeforeKeepTheirDirectives) {
             "producer.compute_at(loop(out, y_1, 0))\n");
 }
 
+// A sum of sums, with an rfactor between two other directives of its stage.
+std::vector<Func> factored(bool scheduled) {
+  Var x("x"), u("u"), v("v");
+  RVar lane("lane"), row("row"), block("block");
+  Func data("data"), sum("sum");
+  RDom r({{0, 64}, {0, 40}}, "r");
+  data(x) = x * x;
+  sum(x) = 0;
+  sum(x) += data(x + r.x) * r.y;
+  if (!scheduled) return {sum};
+  data.compute_root();
+  sum.compute_root().update().split(r.x, r.x, lane, 16).reorder(lane, r.y, r.x);
+  Func parts = sum.update().rfactor({{lane, u}, {r.y, v}});
+  parts.compute_root().parallel(v).update().parallel(v).vectorize(u);
+  sum.update().split(r.y, r.y, block, 8);
+  Func blocks = sum.update().rfactor({{lane, u}, {block, v}});
+  blocks.compute_root().vectorize(u, 16);
+  return {sum};
+}
+
+TEST_F(PlanImport, ChangedFuncsKeepWhatMadeOthers) {
+  const std::vector<Func> outputs = factored(true);
+  const Plan kept = imported(outputs);
+  for (const graph::FuncPtr& f : kept.program->funcs) EXPECT_TRUE(graph::can_reset_loops(*f));
+  Plan changed = kept;
+  for (std::shared_ptr<const FuncPlan>& func : changed.funcs) {
+    FuncPlan own = *func;
+    for (Nest& nest : own.nests) {
+      ForType& kind = nest.loops.front().kind;
+      kind = kind == ForType::Serial ? ForType::Parallel : ForType::Serial;
+    }
+    func = std::make_shared<const FuncPlan>(own);
+  }
+  const std::vector<graph::FuncPtr> emitted = emit_changes(changed, kept);
+  const std::string text = plain_text(changed);
+  EXPECT_EQ(plain_text(import_plan(emitted)), text);
+  const ScheduleLog log = graph::schedule_log(emitted);
+  EXPECT_EQ(graph::without_numbers(log.first(5).to_text()),
+            "sum.update(0).split(r.x, r.x, lane, 16, Auto)\n"
+            "sum.update(0).reorder(lane, r.y, r.x)\n"
+            "sum.update(0).rfactor(sum_intm, lane, u, r.y, v)\n"
+            "sum.update(0).split(r.y, r.y, block, 8, Auto)\n"
+            "sum.update(0).rfactor(sum_intm, lane, u, block, v)\n");
+  const std::vector<Func> again = factored(false);
+  EXPECT_EQ(plain_text(import_plan(graph::with_log(log, {again[0].function()}))), text);
+}
+
 TEST_F(PlanImport, FuncsThatShareChangedLoopsChange) {
   Func other("other"), both("both");
   other(x, y) = x - y;
