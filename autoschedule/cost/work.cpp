@@ -19,6 +19,18 @@ double UnitTimes::all() const {
 
 namespace {
 
+bool has_own_read(const StageFacts& facts) {
+  return std::ranges::any_of(facts.touches, [](const Touch& t) { return t.is_own; });
+}
+
+// A Func that is computed in the loops of its consumer, in memory: vectors of the consumer lie across those that were just
+// stored.
+double slice_ns(const StageRun& run, const Group& group, const Machine& m) {
+  const bool is_slice = run.place > 1 && run.id.stage == 0;
+  const double in_memory = 1 - group.buffers.at(run.id.func).register_share;
+  return is_slice ? in_memory * slice_iterations * m.iteration_ns : 0;
+}
+
 class StageWork {
  public:
   StageWork(const StageRun& run, const Group& group, const Machine& machine)
@@ -40,7 +52,7 @@ class StageWork {
                                     &UnitTimes::scalars, &UnitTimes::chain})
       units_.*part *= taken;
     add_loops();
-    add_slices();
+    units_.slices = place_times() * slice_ns(run_, group_, m_);
     return units_;
   }
 
@@ -145,7 +157,7 @@ class StageWork {
 
   void add_touch(const Touch& touch) {
     const StoredBuffer& stored = group_.buffers.at(touch.buffer);
-    const bool is_sum = touch.is_own || (touch.writes && has_own_read());
+    const bool is_sum = touch.is_own || (touch.writes && has_own_read(*run_.facts));
     note_registers(touch, is_sum);
     if (touch.is_own) {
       add_sum(touch);
@@ -155,9 +167,6 @@ class StageWork {
     const double count = touch.count * times(touch.moved) * (1 - stored.register_share);
     instructions_ += count * vectors(touch.element_bytes, touch.moved);
     if (count > 0) add_moves(touch, stored, count);
-  }
-  bool has_own_read() const {
-    return std::ranges::any_of(run_.facts->touches, [](const Touch& t) { return t.is_own; });
   }
 
   void add_moves(const Touch& touch, const StoredBuffer& stored, double count) {
@@ -252,13 +261,6 @@ class StageWork {
     }
   }
 
-  // A Func that is computed in the loops of its consumer, in memory: vectors of the consumer lie across those that were just
-  // stored.
-  void add_slices() {
-    const bool is_slice = run_.place > 1 && run_.id.stage == 0;
-    const double in_memory = 1 - group_.buffers.at(run_.id.func).register_share;
-    if (is_slice) units_.slices += place_times() * in_memory * slice_iterations * m_.iteration_ns;
-  }
   void add_loops() {
     for (size_t d = 0; d < depth(); ++d) {
       const bool is_own = node(d).loop.stage == run_.id;
