@@ -129,6 +129,10 @@ class CostModel::Prices {
 
   // ---- memory ----
 
+  static double overlapped(double a, double b) {
+    return std::max(a, b) + not_overlapped * std::min(a, b);
+  }
+
   static void leave(const GroupPrice& price, RecentBuffers& recent) {
     for (const auto& [buffer, bytes] : price.traffic.touched) recent.touch(buffer, bytes);
   }
@@ -137,6 +141,7 @@ class CostModel::Prices {
   void add_stages(const GroupPrice& price, const RecentBuffers& recent, Cost& cost) const {
     struct Bytes {
       double serial = 0, parallel = 0;
+      double waiting_ns = 0;  // of each thread
     };
     std::vector<std::array<Bytes, Machine::level_count>> behind(price.stages.size());
     const double most = machine_.levels[Machine::last_cache].bytes;
@@ -150,6 +155,8 @@ class CostModel::Prices {
         const double bytes = traffic.bytes - (is_there ? traffic.first_bytes : 0);
         Bytes& all = behind[static_cast<size_t>(traffic.run)][level];
         (traffic.in_parallel ? all.parallel : all.serial) += bytes;
+        const double threads = traffic.in_parallel ? machine_.threads : 1;
+        if (bytes > 0) all.waiting_ns += traffic.waiting_ns * bytes / traffic.bytes / threads;
       }
     }
     for (size_t s = 0; s < price.stages.size(); ++s) {
@@ -161,12 +168,11 @@ class CostModel::Prices {
         const Machine::Level& from = machine_.levels[level];
         const double shared = machine_.threads == 1 ? from.one_thread : from.all_threads;
         stage.bytes[level] = serial + parallel;
-        stage.memory_seconds[level] = (serial / from.one_thread + parallel / shared) * ns;
+        const double moving_ns = serial / from.one_thread + parallel / shared;
+        stage.memory_seconds[level] = overlapped(moving_ns, in.waiting_ns) * ns;
       }
       const double memory = stage.all_memory_seconds();
-      stage.seconds = std::max(stage.compute_seconds, memory) +
-                      not_overlapped * std::min(stage.compute_seconds, memory) +
-                      stage.launch_seconds;
+      stage.seconds = overlapped(stage.compute_seconds, memory) + stage.launch_seconds;
       cost.stages.push_back(stage);
     }
   }

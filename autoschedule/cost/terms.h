@@ -12,10 +12,20 @@ struct UnitTimes {
   double arithmetic = 0, loads = 0, stores = 0, scalars = 0;
   double loops = 0;    // counts iterations
   double chain = 0;    // operations of which each waits for the one before
+  double slices = 0;   // the first loads from each slice wait for the stores to it
   double all() const;  // with what they cannot overlap
 };
 // All iterations of a stage on one thread, if all its data are in the first cache.
 UnitTimes work_of(const StageRun& run, const Group& group, const Machine& machine);
+
+// The addresses that a stage walks along in a buffer, one beside the other.
+struct Streams {
+  double count = 1;
+  double lines = 1;   // of cache, that follow each other until the next stream has its turn
+  double visits = 1;  // of a line, with those of the other streams between them
+};
+Streams streams_of(const StageRun& run, const Touch& touch, const StoredBuffer& stored,
+                   const Group& group);
 
 // The bytes of a buffer that a stage fetches from behind a cache, and writes back.
 struct BufferTraffic {
@@ -23,6 +33,7 @@ struct BufferTraffic {
   double bytes = 0;
   double first_bytes =
       0;  // of these, what would not have to be moved if the buffer were in the cache before
+  double waiting_ns = 0;  // for lines that nothing fetched ahead, all together
   bool in_parallel = false;
 };
 struct GroupTraffic {

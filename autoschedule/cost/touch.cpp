@@ -65,10 +65,11 @@ double Layout::elements() const {
 }
 
 // Regular dimensions multiply. A data-dependent dimension is touched anywhere between its ends, but by no more lines
-// than there are iterations.
+// than there are iterations. Neither are all of them together: table(index(y), y) is a line for each y.
 double touched_lines(const Touch& touch, const Layout& layout, const Cover& cover) {
   const double in_line = static_cast<double>(line_bytes) / touch.element_bytes;
   double lines = 1, by_data = 1, data_taps = 1, lines_a_point = 1;
+  double points = iterations_of(touch.moved, cover);
   double run = 1;        // elements that lie together
   bool is_whole = true;  // all dimensions so far are touched from end to end
   for (size_t place = 0; place < layout.order.size(); ++place) {
@@ -76,6 +77,7 @@ double touched_lines(const Touch& touch, const Layout& layout, const Cover& cove
     const TouchedSide& side = touch.sides[d];
     const Span span = span_of(side, cover);
     const bool has_data = side.data != 0;
+    points *= side.taps;
     const double count =
         place > 0 ? span.points : std::min(span.points, std::ceil(span.reach / in_line));
     (has_data ? by_data : lines) *= count;
@@ -93,7 +95,7 @@ double touched_lines(const Touch& touch, const Layout& layout, const Cover& cove
   }
   if (touch.data != 0)
     by_data = std::min(by_data, (iterations_of(touch.data, cover) - 1) * lines_a_point + data_taps);
-  return lines * by_data * touch.components;
+  return std::min(lines * by_data, points) * touch.components;
 }
 
 double bytes_by_sets(const Touch& touch, const Layout& layout, const Cover& cover,
@@ -120,6 +122,24 @@ double bytes_by_sets(const Touch& touch, const Layout& layout, const Cover& cove
   return touched / sets * all;
 }
 
+namespace {
+
+// Where the lanes of a divided or wrapped index lie. Vectors have a form if a period of the index ends with each of them,
+// or holds all of it: x / 2, x / 16 and x % 32 do with 16 lanes, but x / 3 and x % 20 do not.
+enum class Bend { None, EachVector, Anywhere };
+Bend bend_of(const TouchedSide& side, double slope, const LaneLoop& lanes) {
+  const auto divides = [](double a, double b) { return std::fmod(b, a) == 0; };
+  const double step = std::abs(slope * lanes.step), all = step * lanes.inner;
+  const double quotient = all / side.divisor;
+  if (side.modulus != 0 && !divides(side.modulus, quotient) && !divides(quotient, side.modulus))
+    return Bend::Anywhere;
+  if (divides(side.divisor, step)) return Bend::None;
+  return divides(side.divisor, all) || divides(all, side.divisor) ? Bend::EachVector
+                                                                  : Bend::Anywhere;
+}
+
+}  // namespace
+
 LaneMoves lane_moves(const Touch& touch, const Layout& layout, const LaneLoop& lanes,
                      double vectors) {
   LaneMoves result;
@@ -138,7 +158,9 @@ LaneMoves lane_moves(const Touch& touch, const Layout& layout, const LaneLoop& l
         const double reach = points * std::abs(move.slope) / side.divisor;
         result.border_share = std::max(result.border_share, std::min(1.0, 2 * reach / side.most));
       }
-      is_bent = is_bent || (side.is_bent && std::fmod(move.slope * lanes.step, side.divisor) != 0);
+      const Bend bend = bend_of(side, move.slope, lanes);
+      is_bent = is_bent || bend != Bend::None;
+      result.is_by_lane = result.is_by_lane || bend == Bend::Anywhere;
       stride += slope * lanes.step;
     }
     row *= layout.extents[static_cast<size_t>(dimension)];
@@ -231,7 +253,7 @@ class TouchReader {
     side.reach = static_cast<double>(high - low + 1);
     side.taps = std::min(side.taps, side.reach);
     side.divisor = static_cast<double>(form.divisor);
-    side.is_bent = form.divisor != 1 || form.modulus != 0;
+    side.modulus = static_cast<double>(form.modulus);
     side.most = static_cast<double>(std::max<int64_t>(sizes_.of(*accesses[0], d).estimate, 1));
     const ir::ConstantRange within = sizes_.range(form.within);
     if (within.is_bounded())

@@ -24,8 +24,8 @@ struct TouchedSide {
   IteratorSet data = 0;        // the iterators that move a data-dependent part
   bool is_displaced = false;   // the data only displace the index
   bool is_clamped = false;     // at borders
-  bool is_bent = false;        // divided or wrapped: neighbours may have one element
   double divisor = 1;          // of taps, reach and slopes
+  double modulus = 0;          // 0: it does not wrap
   double most = 1;             // elements between the ends of the index
   bool operator==(const TouchedSide&) const = default;
 };

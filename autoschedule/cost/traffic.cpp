@@ -24,9 +24,11 @@ struct Region {
   std::array<double, set_strides.size()> by_sets =
       {};  // a stride that leaves sets out fills others
   bool is_stored = false;
-  double moved_bytes() const {
-    return bytes * (is_stored ? 2 : 1);
-  }  // lines that are stored are loaded before
+  // Lines that nothing fetches ahead, and of these, those that begin a page.
+  double far_lines = 0, far_pages = 0;
+  double revisited_lines = 0;  // that are stored to again, after the lines of all other streams
+  // Lines that are stored are loaded before.
+  double moved_bytes() const { return bytes * (is_stored ? 2 : 1); }
 };
 using Regions = std::vector<Region>;
 
@@ -40,7 +42,11 @@ class RegionFinder {
  public:
   explicit RegionFinder(const Group& group) : group_(group), below_(group.nodes.size()) {
     for (size_t r = 0; r < group.runs.size(); ++r) {
-      for (const int node : group.runs[r].path) below_[static_cast<size_t>(node)].push_back(r);
+      const StageRun& run = group.runs[r];
+      for (const int node : run.path) below_[static_cast<size_t>(node)].push_back(r);
+      streams_.push_back(ir::mapped(run.facts->touches, [&](const Touch& touch) {
+        return streams_of(run, touch, group.buffers.at(touch.buffer), group);
+      }));
     }
     for (size_t n = 0; n < group.nodes.size(); ++n) {
       iterations_.push_back(find(n, 1));
@@ -62,6 +68,7 @@ class RegionFinder {
   const Group& group_;
   std::vector<std::vector<size_t>> below_;  // the stages in a node
   std::vector<Regions> runs_, iterations_;
+  std::vector<std::vector<Streams>> streams_;  // of each touch of each stage
 
   Regions find(size_t n, size_t inside) const {
     Regions result;
@@ -82,7 +89,8 @@ class RegionFinder {
   void add(Regions& regions, size_t r, size_t from) const {
     const StageRun& run = group_.runs[r];
     Regions own;
-    for (const Touch& touch : run.facts->touches) {
+    for (size_t t = 0; t < run.facts->touches.size(); ++t) {
+      const Touch& touch = run.facts->touches[t];
       const StoredBuffer& stored = group_.buffers.at(touch.buffer);
       const double share = 1 - stored.register_share;
       if (share <= 0) continue;
@@ -97,6 +105,13 @@ class RegionFinder {
           is_same ? std::max(region.bytes, bytes)
                   : std::min(region.bytes + bytes, share * most * touch.components * line_bytes);
       region.is_stored = region.is_stored || touch.writes;
+      const Streams& streams = streams_[r][t];
+      if (touch.writes) region.revisited_lines = bytes / line_bytes * (1 - 1 / streams.visits);
+      if (streams.count > prefetched_streams) {
+        const double far = bytes / line_bytes / streams.lines;
+        region.far_lines = std::max(region.far_lines, far);
+        if (streams.count > remembered_pages) region.far_pages = std::max(region.far_pages, far);
+      }
       for (size_t c = 0; c < set_strides.size(); ++c) {
         const double by_sets = bytes_by_sets(touch, stored.layout, cover, set_strides[c]);
         region.by_sets[c] = std::max(region.by_sets[c], share * by_sets);
@@ -107,6 +122,9 @@ class RegionFinder {
       if (region.bytes > all.bytes) all.run = region.run;
       all.bytes = std::max(all.bytes, region.bytes);
       all.is_stored = all.is_stored || region.is_stored;
+      all.far_lines = std::max(all.far_lines, region.far_lines);
+      all.far_pages = std::max(all.far_pages, region.far_pages);
+      all.revisited_lines = std::max(all.revisited_lines, region.revisited_lines);
       for (size_t c = 0; c < set_strides.size(); ++c)
         all.by_sets[c] = std::max(all.by_sets[c], region.by_sets[c]);
     }
@@ -156,12 +174,19 @@ class TrafficWalk {
     return is_shared ? bytes / machine_.threads : bytes;
   }
 
-  bool has_sets(const Region& region, double room) const {
-    return level_ >= set_strides.size() || region.by_sets[level_] <= room;
+  // The buffers may begin in different sets. One line of each has room anyway.
+  bool have_sets(const Regions& regions) const {
+    if (level_ >= set_strides.size()) return true;
+    double sum = 0;
+    for (const Region& region : regions)
+      sum += std::max(0.0, region.by_sets[level_] - double(set_strides[level_]));
+    return sum < machine_.levels[level_].bytes;
+  }
+  bool has_sets(const Region& region) const {
+    return level_ >= set_strides.size() || region.by_sets[level_] <= machine_.levels[level_].bytes;
   }
   bool fit(const Regions& regions, double room) const {
-    return bytes_of(regions) <= room &&
-           std::ranges::all_of(regions, [&](const Region& r) { return has_sets(r, room); });
+    return bytes_of(regions) <= room && have_sets(regions);
   }
 
   void visit(int n, double times) {
@@ -179,14 +204,24 @@ class TrafficWalk {
     for (const Region& region : regions_.run(n)) recent_.touch(region.buffer, region.bytes);
   }
 
+  // `are_evicted`: lines are before they are touched again.
+  double waiting_ns(const Region& region, bool are_evicted) const {
+    double ns = region.far_lines * far_line_ns[level_];
+    if (level_ == 0) ns += region.far_pages * page_walk_ns;
+    if (level_ == 0 && are_evicted) ns += region.revisited_lines * evicted_store_ns;
+    return ns;
+  }
+
   void load(const Regions& regions, double times, int n) {
     const double most = room(group_.nodes[static_cast<size_t>(n)].in_parallel);
+    const bool are_evicted = !have_sets(regions);
     for (const Region& region : regions) {
-      if (has_sets(region, most) && recent_.distance(region.buffer, region.bytes, most) <= most)
-        continue;
+      if (has_sets(region) && recent_.distance(region.buffer, region.bytes, most) <= most) continue;
       const StageRun& run = group_.runs[static_cast<size_t>(region.run)];
       const bool in_parallel = group_.nodes[static_cast<size_t>(run.path.back())].in_parallel;
-      found_.push_back({region.run, region.buffer, times * region.moved_bytes(), 0, in_parallel});
+      const double waiting = times * waiting_ns(region, are_evicted);
+      found_.push_back(
+          {region.run, region.buffer, times * region.moved_bytes(), 0, waiting, in_parallel});
     }
     for (const Region& region : regions) recent_.touch(region.buffer, region.bytes);
   }

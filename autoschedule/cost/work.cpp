@@ -14,10 +14,22 @@ namespace retrograde::planning {
 double UnitTimes::all() const {
   const double slowest = std::max({arithmetic, loads, stores, scalars, loops});
   const double sum = arithmetic + loads + stores + scalars + loops;
-  return std::max(slowest + not_overlapped * (sum - slowest), chain);
+  return std::max(slowest + not_overlapped * (sum - slowest), chain) + slices;
 }
 
 namespace {
+
+bool has_own_read(const StageFacts& facts) {
+  return std::ranges::any_of(facts.touches, [](const Touch& t) { return t.is_own; });
+}
+
+// A Func that is computed in the loops of its consumer, in memory: vectors of the consumer lie across those that were just
+// stored.
+double slice_ns(const StageRun& run, const Group& group, const Machine& m) {
+  const bool is_slice = run.place > 1 && run.id.stage == 0;
+  const double in_memory = 1 - group.buffers.at(run.id.func).register_share;
+  return is_slice ? in_memory * slice_iterations * m.iteration_ns : 0;
+}
 
 class StageWork {
  public:
@@ -40,6 +52,7 @@ class StageWork {
                                     &UnitTimes::scalars, &UnitTimes::chain})
       units_.*part *= taken;
     add_loops();
+    units_.slices = place_times() * slice_ns(run_, group_, m_);
     return units_;
   }
 
@@ -144,7 +157,7 @@ class StageWork {
 
   void add_touch(const Touch& touch) {
     const StoredBuffer& stored = group_.buffers.at(touch.buffer);
-    const bool is_sum = touch.is_own || (touch.writes && has_own_read());
+    const bool is_sum = touch.is_own || (touch.writes && has_own_read(*run_.facts));
     note_registers(touch, is_sum);
     if (touch.is_own) {
       add_sum(touch);
@@ -155,20 +168,16 @@ class StageWork {
     instructions_ += count * vectors(touch.element_bytes, touch.moved);
     if (count > 0) add_moves(touch, stored, count);
   }
-  bool has_own_read() const {
-    return std::ranges::any_of(run_.facts->touches, [](const Touch& t) { return t.is_own; });
-  }
 
   void add_moves(const Touch& touch, const StoredBuffer& stored, double count) {
     const LaneMoves moved =
         lane_moves(touch, stored.layout, lanes_, vectors(touch.element_bytes, touch.moved));
     double& units = touch.writes ? units_.stores : units_.loads;
+    // The lanes of a gather are taken out of a vector of places and put into another one, which is arithmetic.
     const double by_lane = lanes_.count * (touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns);
-    if (moved.is_by_lane) {
-      units += count * by_lane;
-      return;
-    }
-    units += count * by_lane * moved.border_share;
+    (touch.writes ? units : units_.arithmetic) +=
+        count * by_lane * (moved.is_by_lane ? 1 : moved.border_share);
+    if (moved.is_by_lane) return;
     const double crossing = moved.is_unaligned ? 1 + m_.vector_bytes / double(line_bytes) : 1;
     units += count * moved.vectors * crossing * (touch.writes ? m_.store_ns : m_.load_ns);
     units_.arithmetic += count * moved.shuffles * m_.shuffle_ns;

@@ -34,6 +34,16 @@ inline constexpr int64_t second_cache_set_stride = 32 << 10;
 inline constexpr int64_t first_cache_ways = 16;
 // The streams of addresses that a core fetches ahead of their use, rounded up.
 inline constexpr int64_t prefetched_streams = 32;
+// The next line of a stream begins at most this far behind its last one.
+inline constexpr double near_bytes = 512;
+// Nanoseconds of waiting for a line that nothing fetched ahead, beside the time of moving it: if the first cache lacks it,
+// and what is added if the second one lacks it, too. Others are on their way at the same time.
+inline constexpr double far_line_ns[] = {0.7, 2.5, 0};
+// The same for a page whose address the processor does not remember, and how many it does of one buffer.
+inline constexpr double page_walk_ns = 8;
+inline constexpr int64_t remembered_pages = 1024;
+// A store to a line that others of its set evicted waits for it, and all later stores wait for that one.
+inline constexpr double evicted_store_ns = 8;
 
 // ---- Threads ----
 

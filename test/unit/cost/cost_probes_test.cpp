@@ -185,6 +185,46 @@ TEST_F(CostProbes, RowsThatShareSetsEvictEachOther) {
   EXPECT_GT(lines_of(1024), 5 * lines_of(1040));
 }
 
+// Columns of vectors: each iteration jumps to another row of both images.
+TEST_F(CostProbes, LinesThatNothingFetchesAheadTakeLonger) {
+  out(x, y) = in(x, y);
+  in.dim(1).set_estimate(0, 1024);
+  out.set_estimate(x, 0, 4096).set_estimate(y, 0, 1024);
+  is_sized = true;
+  const auto memory_ns = [&](const std::string& loops) {
+    return 1e9 * cost_of("out  root  " + loops + "\n").stages[0].all_memory_seconds();
+  };
+  const double lines = 2 * columns * 1024 / 16, rows_ns = memory_ns("y, x:16, vector x");
+  EXPECT_NEAR(memory_ns("y:16, x:16, y, vector x"), rows_ns, 0.05 * rows_ns) << "16 streams each";
+  const double waiting_ns = lines * (far_line_ns[0] + far_line_ns[1]);
+  EXPECT_NEAR(memory_ns("x:16, y, vector x"), rows_ns + waiting_ns, 0.05 * rows_ns);
+  EXPECT_LT(memory_ns("x:256, y, x:16, vector x"), rows_ns + 0.1 * waiting_ns)
+      << "sixteen lines of each row";
+}
+
+// The same with more rows than the processor remembers addresses of pages.
+TEST_F(CostProbes, ColumnsOfManyPagesLookThemUp) {
+  out(x, y) = in(x, y);
+  const StageCost cost = cost_of("out  root  x:16, y, vector x\n").stages[0];
+  const double lines = 2 * columns * rows / 16;
+  EXPECT_GT(cost.all_memory_seconds(), lines * (page_walk_ns + far_line_ns[0]) * 1e-9);
+}
+
+// Sixteen rows whose lines are all in one set of L1, with one element of each at a time.
+TEST_F(CostProbes, StoresToEvictedLinesWait) {
+  const auto ns_of = [&](int width, int height) {
+    Func copy("copy");
+    copy(x, y) = 1.0f;
+    copy.set_estimate(x, 0, width).set_estimate(y, 0, 1024);
+    const std::string lanes = std::to_string(height);
+    const Cost cost = priced(copy, "copy  root  y:" + lanes + ", x, vector y\n");
+    return 1e9 * cost.seconds / (width * 1024);
+  };
+  EXPECT_GT(ns_of(1024, 16), 15.0 / 16 * evicted_store_ns);
+  EXPECT_LT(ns_of(1024, 4), 2);
+  EXPECT_LT(ns_of(1040, 16), 2);
+}
+
 // Rows of a recurrence along x wait for nothing but themselves, whether a read of the same row is clamped or not.
 TEST_F(CostProbes, AClampOfTheSameRowCarriesNothing) {
   RDom r(1, 4095, 0, 2048, "r");
@@ -303,6 +343,19 @@ TEST_F(CostProbes, InnermostLoopsBecomeVectorsByThemselves) {
   EXPECT_GT(compute_seconds(cost_of("out  root  x, y\n")), 10 * vectors) << "strided stores";
 }
 
+// A slice of one vector and its neighbours.
+TEST_F(CostProbes, TheConsumerOfASliceWaitsForIt) {
+  rows_sum(x, y) = in(x, y) * 2;
+  out(x, y) = rows_sum(x, y) + rows_sum(x + 1, y);
+  const auto compute_ns = [&](const std::string& slice) {
+    return 1e9 * compute_seconds(cost_of("out  root  y, x:256, x:16, vector x\nrows_sum  at out/" +
+                                         slice + "  y, x:16, vector x\n"));
+  };
+  const double slices = columns * rows / 16, slice_ns = slice_iterations * 0.3;
+  EXPECT_GT(compute_ns("x:16"), slices * slice_ns);
+  EXPECT_LT(compute_ns("x:256"), slices * (slice_ns / 16 + 2));
+}
+
 struct ProductProbes : CostProbes {
   ProductProbes() {
     for (ImageParam* image : {&in, &other}) {
@@ -411,6 +464,42 @@ TEST_F(CostProbes, ATableIsReadALineAnElement) {
   const Cost cost = cost_of("out  root  y, x:16, vector x\n");
   EXPECT_GT(memory_bytes(cost), 4.0 * (1 << 26));
   EXPECT_GT(cost.stages[0].compute_seconds, columns * rows * 0.35e-9);
+}
+
+// The lanes of such a vector are a period of the index, or all of them are in one.
+TEST_F(CostProbes, LanesOfDividedIndicesAreVectorsIfTheyDivideEvenly) {
+  const auto vector_ns = [&](const Expr& index) {
+    Func f("f");
+    f(x, y) = in(index, y);
+    f.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+    return 1e9 * compute_seconds(priced(f, "f  root  y, x:16, vector x\n")) / (columns * rows / 16);
+  };
+  const double gather_ns = 16 * 0.35;
+  for (const Expr& index : {x / 2, (3 * x + 1) / 6, x / 32, x % 4, x / 2 % 64, x % 512})
+    EXPECT_LT(vector_ns(index), 0.3 * gather_ns) << index;
+  for (const Expr& index : {x / 3, 2 * x / 3, (4 * x + 3) / 6, x % 500, x / 3 % 64})
+    EXPECT_GT(vector_ns(index), gather_ns) << index;
+}
+
+// A gather occupies the units that compute its places and use its values.
+TEST_F(CostProbes, GathersAreArithmetic) {
+  const auto seconds_of = [&](bool has_function) {
+    Func f("f");
+    const Expr value = in(clamp(cast<int>(x + other(x, y)), 0, 4095), y);
+    f(x, y) = has_function ? exp(value) : value;
+    f.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+    return compute_seconds(priced(f, "f  root  y, x:16, vector x\n"));
+  };
+  EXPECT_NEAR(seconds_of(true) - seconds_of(false), columns * rows / 16 * 4e-9, 100 * micro);
+}
+
+TEST_F(CostProbes, AnElementOfEachRowIsALine) {
+  ImageParam places(Int(32), 1, "places");
+  places.dim(0).set_estimate(0, 2048);
+  Func f("f");
+  f(y) = in(clamp(places(y), 0, 4095), y);
+  f.set_estimate(y, 0, 2048);
+  EXPECT_LT(priced(f, "f  root  y:16, vector y\n").stages[0].bytes[2], 2 * 64 * rows);
 }
 
 TEST_F(CostProbes, ADisplacedImageIsReadAsAWhole) {
