@@ -218,14 +218,6 @@ class StageWork {
       add_chain(copies(touch.moved, false) * m_.latency_ns, from);
     }
   }
-  // Partial results of lanes are combined after the loops of the reduction: those of a register in halves.
-  void add_end_of_lanes(const Touch& touch) {
-    if (lanes_.iterator < 0 || is_vector(touch.moved)) return;
-    const double registers = vectors(touch.element_bytes, lanes_.moves);
-    const double halves = std::log2(std::max(1.0, lanes_.count / registers));
-    const double count = touch.count * times(touch.moved);
-    units_.arithmetic += count * (registers - 1 + 2 * halves) * m_.shuffle_ns;
-  }
   // Whether lanes that lie apart compete for a few sets of the first cache, so that their lines are gone from one
   // iteration to the next.
   bool loses_lines(const Touch& touch) const {
@@ -233,6 +225,14 @@ class StageWork {
     const Cover& lanes = run_.cover[run_.place + static_cast<size_t>(innermost_) + 1];
     return lane_moves(touch, layout, lanes_, 1).is_by_lane &&
            bytes_by_sets(touch, layout, lanes, page_bytes) > m_.levels[0].bytes;
+  }
+  // Partial results of lanes are combined after the loops of the reduction: those of a register in halves.
+  void add_end_of_lanes(const Touch& touch) {
+    if (lanes_.iterator < 0 || is_vector(touch.moved)) return;
+    const double registers = vectors(touch.element_bytes, lanes_.moves);
+    const double halves = std::log2(std::max(1.0, lanes_.count / registers));
+    const double count = touch.count * times(touch.moved);
+    units_.arithmetic += count * (registers - 1 + 2 * halves) * m_.shuffle_ns;
   }
   // An element waits for the one before, which the last iteration stored.
   void add_recurrence(const Touch& touch) {

@@ -7,19 +7,23 @@
 //                                                    .1  c:4, r.y, r.x, unroll tap, vector c
 //                                         =>       sum  root
 //                                                    .1  racing  c, r.y, r.x:16, unroll tap, vector r.x
+//   out  root  parallel c, y, x, vector x           =>   out  root  parallel c:4, y, x:16, c, vector x
+//                                                      sum  at out/c:4  (c, x, y)
 //
 // Legal: L4, L5, L6: iterations of a pure variable write different elements, and lowering runs lanes that may meet in
 // order. L2 holds without short loops: with copies of them, an element takes its terms in another order, so the update
 // commutes. Outputs keep their layout.
 #include <algorithm>
+#include <bit>
 
 #include "autoschedule/moves/edit.h"
+#include "autoschedule/plan/covers.h"
 
 namespace retrograde::planning::moves {
 
 namespace {
 
-constexpr size_t most_dimensions = 2;
+constexpr int most_dimensions = 2;
 
 // Whether the reduction decides where the stage writes.
 bool scatters(const Context& context, const StageNode& stage) {
@@ -114,8 +118,7 @@ std::optional<Plan> in_iterations(const Plan& plan, FuncId func, const Context& 
 }
 
 std::optional<Plan> along_dimension(const Plan& plan, FuncId func, const Context& context,
-                                    int dimension, const Cover& extents) {
-  FuncPlan changed = plan.of(func);
+                                    FuncPlan changed, int dimension, const Cover& extents) {
   store_first(changed.storage, dimension);
   run_along_rows(changed, plan, context, func, extents, 1);
   for (const StageNode& stage : context.accesses.func(func).stages) {
@@ -124,6 +127,78 @@ std::optional<Plan> along_dimension(const Plan& plan, FuncId func, const Context
     if (scatters(context, stage)) copy_short_loops(nest, plan, context, stage.id, 1);
   }
   return with_func(plan, func, std::move(changed), context, Terms::InAnyOrder);
+}
+
+// The stage that reads a Func, also through inlined Funcs; nullopt: there are more.
+std::optional<StageId> only_reader(const Plan& plan, const Context& context, FuncId func) {
+  std::optional<StageId> only;
+  for (const StageId reader : all_readers(plan, context, func)) {
+    if (is_inlined(plan, reader.func)) continue;
+    if (only) return std::nullopt;
+    only = reader;
+  }
+  return only;
+}
+
+// The nest in which a step of an iterator is outside of all loops but those of `around`, and its points just around the
+// body; nullopt: they are no such loops.
+std::optional<Nest> in_slices_along(Nest nest, int iterator, int64_t step, IteratorSet around,
+                                    size_t& depth) {
+  const auto is_own = [&](const Loop& loop) { return loop.iterator == iterator; };
+  const auto is_around = [&](const Loop& loop) { return (set_of(loop.iterator) & around) != 0; };
+  const auto body = nest.loops.begin() + static_cast<std::ptrdiff_t>(body_depth(nest));
+  if (std::ranges::count_if(nest.loops, is_own) != 1 ||
+      std::any_of(body, nest.loops.end(), [&](const Loop& l) { return is_own(l) || is_around(l); }))
+    return std::nullopt;
+  std::erase_if(nest.loops, is_own);
+  for (Loop& loop : nest.loops) {
+    if (loop.kind == ForType::Parallel) loop.kind = ForType::Serial;
+  }
+  depth = static_cast<size_t>(std::ranges::count_if(nest.loops, is_around));
+  const auto end = nest.loops.begin() + static_cast<std::ptrdiff_t>(body_depth(nest));
+  std::stable_partition(nest.loops.begin(), end, is_around);
+  insert_step(nest, iterator, 1, body_depth(nest));
+  insert_step(nest, iterator, step, depth);
+  return nest;
+}
+
+// Slices along the dimension are computed in the loop of the consumer over them.
+std::optional<Plan> in_slices(const Plan& plan, FuncId func, const Context& context,
+                              int dimension) {
+  const auto is_root = [&](FuncId f) {
+    return plan.of(f).placement.compute.kind == Level::Kind::Root;
+  };
+  const std::optional<StageId> reader = only_reader(plan, context, func);
+  if (!reader || !is_root(func) || !is_root(reader->func) || !has_loops(plan, reader->func) ||
+      plan.of(reader->func).nests.size() > 1)
+    return std::nullopt;
+  IteratorSet along = 0, around = 0;
+  for_each_read(plan, context, *reader, [&](const Access& read, const MovedIndices& moved) {
+    for (size_t d = 0; read.of == func && d < moved.size(); ++d) {
+      const bool is_apart = is_pure_in_all_stages(context, func, static_cast<int>(d));
+      if (static_cast<int>(d) == dimension)
+        along |= moved[d];
+      else if (is_apart)
+        around |= moved[d];
+    }
+  });
+  const int iterator = std::countr_zero(along);
+  const int64_t lanes = lanes_for(plan, {func, 0}, schedule_lanes / 4);
+  if (!std::has_single_bit(along) || (along & around) != 0 || lanes == 1 ||
+      !fits(lanes, context.sizes.of(*reader, iterator).estimate))
+    return std::nullopt;
+  size_t depth = 0;
+  FuncPlan consumer = plan.of(reader->func);
+  std::optional<Nest> nest = in_slices_along(consumer.nests[0], iterator, lanes, around, depth);
+  if (!nest) return std::nullopt;
+  run_in_parallel(*nest, context, *reader);
+  consumer.nests[0] = std::move(*nest);
+  const auto sliced = with_func(plan, reader->func, std::move(consumer), context);
+  if (!sliced) return std::nullopt;
+  FuncPlan changed = plan.of(func);
+  changed.placement.compute = {Level::Kind::At, {*reader, static_cast<int16_t>(depth)}};
+  const Cover box = Covers(*sliced, context.sizes).box(func, changed.placement.compute);
+  return along_dimension(*sliced, func, context, std::move(changed), dimension, box);
 }
 
 }  // namespace
@@ -137,11 +212,17 @@ std::vector<Plan> scatter_lanes(const Plan& plan, FuncId func, const Context& co
     return plans;
   add(plans, in_iterations(plan, func, context));
   if (is_output(*plan.program, func) || !has_bounded_region(plan, context, func)) return plans;
-  const size_t most = plans.size() + most_dimensions;
   const Cover extents = loop_extents(plan, context, {func, 0});
-  for (size_t d = 0; d < extents.size() && plans.size() < most; ++d) {
-    if (is_pure_in_all_stages(context, func, static_cast<int>(d)))
-      add(plans, along_dimension(plan, func, context, static_cast<int>(d), extents));
+  // Lanes of a recurrence have nothing in common, so that a few are no better than one.
+  const bool has_slices = std::ranges::any_of(stages, [](const StageNode& stage) {
+    return std::ranges::any_of(stage.write.index, &IndexForm::has_data);
+  });
+  int dimensions = 0;
+  for (int d = 0; d < static_cast<int>(extents.size()) && dimensions < most_dimensions; ++d) {
+    if (!is_pure_in_all_stages(context, func, d)) continue;
+    ++dimensions;
+    add(plans, along_dimension(plan, func, context, plan.of(func), d, extents));
+    if (has_slices) add(plans, in_slices(plan, func, context, d));
   }
   return plans;
 }

@@ -12,10 +12,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <set>
 
 #include "autoschedule/moves/edit.h"
-#include "ir/lists.h"
 
 namespace retrograde::planning::moves {
 
@@ -25,45 +23,19 @@ int64_t power_of_two_below(double size) {
   return size < 1 ? 1 : static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(size)));
 }
 
-// The iterators that move the innermost dimension in memory of what is read across the lanes, also through inlined Funcs.
-class IteratorsAcross {
- public:
-  IteratorsAcross(const StageLoops& loops, int lanes) : loops_(loops), lanes_(set_of(lanes)) {}
-
-  IteratorSet run() {
-    for (const Access& read : loops_.context.accesses.stage(loops_.stage).reads)
-      note(read, ir::mapped(read.index, &IndexForm::moved_by));
-    return found_;
-  }
-
- private:
-  const StageLoops& loops_;
-  const IteratorSet lanes_;
-  IteratorSet found_ = 0;
-  std::set<std::pair<FuncId, std::vector<IteratorSet>>> seen_;
-
-  // `moved`: the iterators of the stage that move each index.
-  void note(const Access& read, const std::vector<IteratorSet>& moved) {
-    const bool is_across =
-        std::ranges::any_of(moved, [&](IteratorSet set) { return (set & lanes_) != 0; });
-    if (!is_across || read.of == loops_.stage.func) return;
-    const bool is_stored = read.of < 0 || !is_inlined(loops_.plan, read.of);
-    if (is_stored) {
-      const auto first = read.of < 0 ? 0 : size_t(loops_.plan.of(read.of).storage.order[0]);
-      if ((moved[first] & lanes_) == 0) found_ |= moved[first];
-      return;
-    }
-    if (!seen_.emplace(read.of, moved).second) return;
-    const StageNode& inlined = loops_.context.accesses.stage({read.of, 0});
-    const auto moved_through = [&](const IndexForm& form) {
-      IteratorSet set = 0;
-      for (size_t i = 0; i < inlined.iterators.size(); ++i)
-        if (form.moved_by() & set_of(int(i))) set |= moved[size_t(inlined.iterators[i].dimension)];
-      return set;
-    };
-    for (const Access& own : inlined.reads) note(own, ir::mapped(own.index, moved_through));
-  }
-};
+// The iterators that move the innermost dimension in memory of what is read across the lanes.
+IteratorSet iterators_across(const StageLoops& loops, IteratorSet lanes) {
+  IteratorSet found = 0;
+  const auto note = [&](const Access& read, const MovedIndices& moved) {
+    const auto moves_lanes = [&](IteratorSet set) { return (set & lanes) != 0; };
+    if (read.of == loops.stage.func || std::ranges::none_of(moved, moves_lanes)) return;
+    const auto first =
+        read.of < 0 ? 0 : static_cast<size_t>(loops.plan.of(read.of).storage.order[0]);
+    if (!moves_lanes(moved[first])) found |= moved[first];
+  };
+  for_each_read(loops.plan, loops.context, loops.stage, note);
+  return found;
+}
 
 class Tiler {
  public:
@@ -95,7 +67,7 @@ class Tiler {
     }
     for (const Inner& inner : inner_) resize(inner);
     if (const auto lanes = vector_loop(nest_)) {
-      const IteratorSet across = IteratorsAcross(loops_, nest_.loops[*lanes].iterator).run();
+      const IteratorSet across = iterators_across(loops_, set_of(nest_.loops[*lanes].iterator));
       for (const Inner& inner : inner_) {
         if (across & set_of(inner.iterator)) tile_across(inner);
       }
