@@ -104,15 +104,11 @@ class ReaderFusion {
       if (std::ranges::find(stages_, stage) == stages_.end()) stages_.push_back(stage);
     }
     const auto rank = [&](StageId stage) {
-      return std::pair(!guests_of(stage).empty(),
-                       context_.accesses.func(stage.func).stages.size() == 1);
+      return std::pair(has_guests(stage), context_.accesses.func(stage.func).stages.size() == 1);
     };
     std::ranges::stable_sort(stages_, {}, rank);
     if (stages_.size() < 2) return false;
-    std::vector<FuncId> funcs = guests_of(stages_.back());
-    for (const StageId stage : stages_) funcs.push_back(stage.func);
-    return std::ranges::none_of(stages_, [&](StageId stage) { return is_bound(stage); }) &&
-           std::ranges::none_of(funcs, [&](FuncId f) { return leads_to(f, funcs); });
+    return std::ranges::none_of(stages_, [&](StageId stage) { return is_bound(stage); });
   }
 
   std::optional<Plan> run(int dimension) {
@@ -180,39 +176,24 @@ class ReaderFusion {
            place(plan, func, inside, runs_at_any_size(plan.of(func), context_, func));
   }
 
-  // Other Funcs that share loops of the stage.
-  std::vector<FuncId> guests_of(StageId stage) const {
-    std::vector<FuncId> guests;
+  // Whether other Funcs share loops of the stage.
+  bool has_guests(StageId stage) const {
     for (size_t f = 0; f < plan_.funcs.size(); ++f) {
-      const auto func = static_cast<FuncId>(f);
-      const auto shares = [&](const Nest& nest) {
-        return nest.shared_with && nest.shared_with->stage == stage;
-      };
-      if (func != stage.func && std::ranges::any_of(plan_.of(func).nests, shares))
-        guests.push_back(func);
+      for (const Nest& nest : plan_.funcs[f]->nests) {
+        const bool is_other = static_cast<FuncId>(f) != stage.func;
+        if (is_other && nest.shared_with && nest.shared_with->stage == stage) return true;
+      }
     }
-    return guests;
+    return false;
   }
   // Whether it shares loops with others than the stage that owns the loops, or another stage of its Func reads the Func.
   bool is_bound(StageId stage) const {
     const std::optional<LoopRef>& shared = plan_.nest(stage).shared_with;
     const bool is_elsewhere =
         shared && shared->stage.func != stage.func && shared->stage != stages_.back();
-    return is_elsewhere || (stage != stages_.back() && !guests_of(stage).empty()) ||
+    return is_elsewhere || (stage != stages_.back() && has_guests(stage)) ||
            std::ranges::count(stages_, stage.func, &StageId::func) > 1;
   }
-  bool leads_to(FuncId func, const std::vector<FuncId>& funcs) const {
-    std::vector<FuncId> reached{func};
-    for (size_t i = 0; i < reached.size(); ++i) {
-      for (const StageId reader : context_.accesses.consumers(reached[i])) {
-        if (std::ranges::find(reached, reader.func) != reached.end()) continue;
-        if (std::ranges::find(funcs, reader.func) != funcs.end()) return true;
-        reached.push_back(reader.func);
-      }
-    }
-    return false;
-  }
-
   int64_t points(StageId stage, int iterator) const {
     return context_.sizes.of(stage, iterator).estimate;
   }

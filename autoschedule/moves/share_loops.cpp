@@ -9,8 +9,6 @@
 // Legal: L1, L2: both keep the order of their reductions in the loops that they get; L3: neither Func depends on the other,
 // and both are at root; L11: the loops are equal, and no Func is computed in those that are given up.
 #include <algorithm>
-#include <functional>
-#include <set>
 
 #include "autoschedule/moves/edit.h"
 
@@ -22,17 +20,6 @@ constexpr size_t most_partners = 2;
 
 bool is_at_root(const Plan& plan, FuncId func) {
   return plan.of(func).placement.compute.kind == Level::Kind::Root;
-}
-
-bool depends_on(const Context& context, FuncId func, FuncId other) {
-  std::set<FuncId> seen;
-  const std::function<bool(FuncId)> leads = [&](FuncId from) {
-    if (from == func) return true;
-    return seen.insert(from).second &&
-           std::ranges::any_of(context.accesses.consumers(from),
-                               [&](StageId reader) { return leads(reader.func); });
-  };
-  return leads(other);
 }
 
 // Whether the stages run over the same points: iterators of the same extents, whose numbers are the same.
@@ -63,8 +50,7 @@ bool is_partner(const Plan& plan, const Context& context, FuncId func, FuncId ot
   const std::vector<StageNode>&own = context.accesses.func(func).stages,
         &others = context.accesses.func(other).stages;
   return own.size() == others.size() && run_alike(context, own.back(), others.back()) &&
-         read_alike(own.back(), others.back()) && !depends_on(context, func, other) &&
-         !depends_on(context, other, func);
+         read_alike(own.back(), others.back());
 }
 
 }  // namespace
