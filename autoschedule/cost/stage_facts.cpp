@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "autoschedule/cost/assumptions.h"
+#include "ir/operators.h"
 
 namespace retrograde::planning {
 
@@ -23,34 +24,37 @@ IteratorSet carried_by(const Access& read, const Access& write) {
 // Operations that depend on the same iterators. Products that are added are one operation with the sum.
 class OperationTable {
  public:
-  void add(const OperationCount& operation, IteratorSet depends, double times) {
+  // `chooses`: the definition has selects.
+  void add(const OperationCount& operation, IteratorSet depends, bool chooses) {
     // Products that ignore infinite factors of 0 are tried as plain ones first.
     const std::string name = operation.name == "strong_mul"   ? "Mul"
                              : operation.name == "strong_div" ? "Div"
                                                               : operation.name;
-    rows_[{name, operation.type, depends}] += operation.count * times;
+    const Op op = op_from_name(name);
+    const bool is_function = op != Op::none && op_info(op).work.functions > 0;
+    rows_[{name, operation.type, depends, chooses && is_function}] += operation.count;
   }
   std::vector<OperationRow> rows(const Machine& machine) {
     for (auto& [key, count] : rows_) {
-      const auto& [name, type, depends] = key;
+      const auto& [name, type, depends, behind_branch] = key;
       if (name == "Mul" && type.is_float())
         count -= std::min(count, count_of("Add", type, depends) + count_of("Sub", type, depends));
     }
     std::vector<OperationRow> result;
     for (const auto& [key, count] : rows_) {
-      const auto& [name, type, depends] = key;
+      const auto& [name, type, depends, behind_branch] = key;
       if (count > 0)
         result.push_back({operation_time(name, type, machine), static_cast<double>(type.bytes()),
-                          depends, count});
+                          depends, count, behind_branch});
     }
     return result;
   }
 
  private:
-  std::map<std::tuple<std::string, Type, IteratorSet>, double> rows_;
+  std::map<std::tuple<std::string, Type, IteratorSet, bool>, double> rows_;
 
   double count_of(const char* name, Type type, IteratorSet depends) const {
-    return ir::value_or(rows_, {name, type, depends}, 0.0);
+    return ir::value_or(rows_, {name, type, depends, false}, 0.0);
   }
 };
 
@@ -102,8 +106,12 @@ std::vector<Touch> FactsOfStages::touches(const StageNode& stage,
 std::vector<OperationRow> FactsOfStages::operations(const StageNode& stage,
                                                     const ReadComposer::Composed& composed) const {
   OperationTable table;
+  const auto chooses = [](const StageNode& node) {
+    return std::ranges::find(node.operations, "Select", &OperationCount::name) !=
+           node.operations.end();
+  };
   for (const OperationCount& operation : stage.operations)
-    table.add(operation, operation.depends, 1);
+    table.add(operation, operation.depends, chooses(stage));
   for (const auto& [func, elements] : composed.elements) {
     const StageNode& inlined = graph_.func(func).stages[0];
     for (const Access& element : elements) {
@@ -112,7 +120,7 @@ std::vector<OperationRow> FactsOfStages::operations(const StageNode& stage,
         for (size_t d = 0; d < element.index.size(); ++d)
           if (operation.depends & set_of(static_cast<int>(d)))
             depends |= element.index[d].moved_by();
-        table.add(operation, depends, 1);
+        table.add(operation, depends, chooses(inlined));
       }
     }
   }

@@ -25,6 +25,7 @@ struct OperationRow {
   double element_bytes = 4;
   IteratorSet depends = 0;
   double count = 0;
+  bool behind_branch = false;  // a function in an arm of a select: unrolled copies don't share it
 };
 
 struct StageFacts {

@@ -1,5 +1,6 @@
 // Values that a loop does not change are computed outside of it, and those that unrolled copies have in common once. So an
 // operation is executed as often as the loops run that are outside of the innermost loop that changes it, and that loop.
+// Functions in arms of selects run behind branches: each copy has its own.
 #include "autoschedule/cost/terms.h"
 
 #include <algorithm>
@@ -104,7 +105,8 @@ class StageWork {
   }
 
   void add_operation(const OperationRow& row) {
-    const double count = row.count * times(row.depends);
+    const double shared = row.behind_branch ? copies(row.depends, false) : 1;
+    const double count = row.count * times(row.depends) * shared;
     instructions_ += count * vectors(row.element_bytes, row.depends);
     if (is_vector(row.depends))
       units_.arithmetic += count * vectors(row.element_bytes, row.depends) * row.time.vector_ns;
@@ -144,7 +146,10 @@ class StageWork {
     const StoredBuffer& stored = group_.buffers.at(touch.buffer);
     const bool is_sum = touch.is_own || (touch.writes && has_own_read());
     note_registers(touch, is_sum);
-    if (touch.is_own) add_sum(touch);
+    if (touch.is_own) {
+      add_sum(touch);
+      add_end_of_lanes(touch);
+    }
     if (touch.carried) add_recurrence(touch);
     const double count = touch.count * times(touch.moved) * (1 - stored.register_share);
     instructions_ += count * vectors(touch.element_bytes, touch.moved);
@@ -172,8 +177,10 @@ class StageWork {
   // Elements that the innermost loop does not move stay in registers.
   void note_registers(const Touch& touch, bool is_sum) {
     if (innermost_ < 0 || moves(static_cast<size_t>(innermost_), touch.moved)) return;
+    // Lanes of a sum are partial results.
+    const IteratorSet lanes = touch.is_own ? touch.moved | lanes_.moves : touch.moved;
     const double needed =
-        touch.count * copies(touch.moved, true) * vectors(touch.element_bytes, touch.moved);
+        touch.count * copies(touch.moved, true) * vectors(touch.element_bytes, lanes);
     if (is_sum && touch.is_own)
       accumulators_ += needed;
     else if (!touch.writes && touch.data == 0)
@@ -218,6 +225,14 @@ class StageWork {
     const Cover& lanes = run_.cover[run_.place + static_cast<size_t>(innermost_) + 1];
     return lane_moves(touch, layout, lanes_, 1).is_by_lane &&
            bytes_by_sets(touch, layout, lanes, page_bytes) > m_.levels[0].bytes;
+  }
+  // Partial results of lanes are combined after the loops of the reduction: those of a register in halves.
+  void add_end_of_lanes(const Touch& touch) {
+    if (lanes_.iterator < 0 || is_vector(touch.moved)) return;
+    const double registers = vectors(touch.element_bytes, lanes_.moves);
+    const double halves = std::log2(std::max(1.0, lanes_.count / registers));
+    const double count = touch.count * times(touch.moved);
+    units_.arithmetic += count * (registers - 1 + 2 * halves) * m_.shuffle_ns;
   }
   // An element waits for the one before, which the last iteration stored.
   void add_recurrence(const Touch& touch) {

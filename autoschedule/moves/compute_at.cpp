@@ -90,26 +90,16 @@ class LevelFinder {
   bool encloses_reads(const Level& level) const { return !readers_.find_outside(func_, level); }
 
   double bytes_of(const std::vector<int64_t>& box) const {
-    double bytes = elements_of(box);
+    double bytes = product_of(box);
     for (const Type& type : context_.accesses.func(func_).func->types) bytes *= type.bytes();
     return bytes;
   }
-  static double elements_of(const std::vector<int64_t>& box) {
-    double elements = 1;
-    for (const int64_t extent : box) elements *= static_cast<double>(extent);
-    return elements;
-  }
-
   // L5: how often an element is computed.
   bool is_worth(const Level& level, const std::vector<int64_t>& box) const {
-    const auto [stage, depth] = level.loop;
-    const Cover extents = whole_cover(stage, context_.sizes);
-    double computed = elements_of(box), all = 1;
-    for (size_t d = 0; d <= static_cast<size_t>(depth); ++d)
-      computed *= static_cast<double>(trips(extents, plan_.nest(stage), d));
+    double all = 1;
     for (size_t d = 0; d < box.size(); ++d)
       all *= static_cast<double>(std::max<int64_t>(context_.sizes.of(func_, d).estimate, 1));
-    return computed <= most_recomputation * all;
+    return computed_elements(plan_, context_, level, box) <= most_recomputation * all;
   }
 };
 
@@ -117,24 +107,9 @@ class LevelFinder {
 
 std::vector<Plan> compute_at(const Plan& plan, FuncId func, const Context& context) {
   std::vector<Plan> plans;
-  if (!is_editable(plan, func) || is_output(*plan.program, func) ||
-      !has_bounded_region(plan, context, func) || !has_bounded_updates(context, func))
-    return plans;
-  for (const auto& [level, box] : LevelFinder(plan, func, context).run()) {
-    FuncPlan changed = plan.of(func);
-    changed.placement = {};
-    changed.placement.compute = level;
-    changed.storage.folds.clear();
-    for (Nest& nest : changed.nests) {
-      for (Loop& loop : nest.loops) {
-        if (loop.kind == ForType::Parallel) loop.kind = ForType::Serial;
-      }
-    }
-    const bool has_own_loops = has_loops(plan, func) && runs_at_any_size(changed, context, func);
-    if (has_own_loops) add(plans, with_func(plan, func, changed, context));
-    run_along_rows(changed, plan, context, func, box, lanes_for(plan, {func, 0}, INT64_MAX) / 2);
-    add(plans, with_func(plan, func, std::move(changed), context));
-  }
+  if (!may_run_in_loops(plan, context, func)) return plans;
+  for (const auto& [level, box] : LevelFinder(plan, func, context).run())
+    add_placed(plans, plan, func, {level, {}, {}}, box, context);
   return plans;
 }
 

@@ -31,8 +31,10 @@ void for_each_read(const Plan& plan, const Context& context, StageId stage,
                    ir::FunctionRef<void(const Access&, const MovedIndices&)> visit);
 // Whether the region that is read of the Func is bounded (L3), also through inlined Funcs.
 bool has_bounded_region(const Plan& plan, const Context& context, FuncId func);
-// Whether what updates write and read of the Func has ends, too: it's computed with what is read.
-bool has_bounded_updates(const Context& context, FuncId func);
+// Whether a Func may be computed in a loop of a stage that reads it (L3, L8): its updates need no more than is read.
+bool may_run_in_loops(const Plan& plan, const Context& context, FuncId func);
+// Whether each update writes the elements that its pure variables name, and reads no others of the Func.
+bool stays_in_place(const Context& context, FuncId func);
 // Whether no loop needs a dimension of constant extent (L4).
 bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func);
 bool is_reduction(const Context& context, StageId stage, int iterator);
@@ -67,6 +69,9 @@ int64_t operations(const Plan& plan, const Context& context, StageId stage);
 // The lanes of a vector of the stage's values along a loop of this extent: a vector, or for a shorter loop the half or
 // quarter of one. 1: the loop is too short.
 int64_t lanes_for(const Plan& plan, StageId stage, int64_t extent);
+// How many accesses have lanes along the iterator that lie together; those that need an access for each lane count against
+// it.
+int lanes_together(const Context& context, StageId stage, int iterator);
 
 // ---- changes of a nest ----
 
@@ -80,6 +85,12 @@ void drop_loop(Nest& nest, size_t depth);
 std::optional<Nest> without_body(const Nest& nest, const Context& context, StageId stage);
 // Runs so many points of the iterator inside of all other loops. Requires: no step is smaller, except 1.
 void run_inside(Nest& nest, int iterator, int64_t points, ForType kind);
+// The elements that are computed in all iterations of the level's stage if its loop needs a box of these extents each time.
+double computed_elements(const Plan& plan, const Context& context, const Level& level,
+                         const std::vector<int64_t>& box);
+double product_of(const std::vector<int64_t>& extents);
+// The Func in a loop, with loops of its own as before, none of them parallel.
+FuncPlan moved_inside(FuncPlan plan, const Placement& placement);
 // Loops for all stages of a changed Func of the plan, whose dimensions have these extents, along rows as they are stored:
 // lanes of the first dimension inside, then the reduction, then the other dimensions; in parallel at root. `min_lanes`:
 // fewer aren't used.
@@ -112,7 +123,21 @@ struct StageLoops {
 std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& context,
                              std::vector<Nest> (*nests)(const StageLoops&),
                              Terms terms = Terms::InOrder);
+// The elements in memory from lane to lane of a vector along the iterator, in the storage of the Func that is read or, if it
+// can be stored otherwise, in the best one; 0: no such number.
+int64_t lane_stride(const Plan& plan, const Context& context, const Access& read, int iterator);
+// The plan in which a dimension of the Func is innermost in memory and all stages have lanes along it; so do Funcs that
+// read it at their own places. nullopt: it isn't a legal one. Outputs keep their layout.
+std::optional<Plan> with_turned_results(const Plan& plan, FuncId func, int dimension,
+                                        const Context& context);
+// The plan in which the lanes of the stage read neighbours in memory, of Funcs that can be stored so; nullopt: they do, or
+// none can.
+std::optional<Plan> with_turned_operands(const Plan& plan, StageId stage, const Context& context);
 // Adds a plan that isn't in the list yet.
 void add(std::vector<Plan>& plans, std::optional<Plan> plan);
+// Adds the plans in which the Func is computed at this place in loops of others, where this box of it is needed: with its
+// own loops, and along rows.
+void add_placed(std::vector<Plan>& plans, const Plan& plan, FuncId func, const Placement& placement,
+                const std::vector<int64_t>& box, const Context& context);
 
 }  // namespace retrograde::planning::moves

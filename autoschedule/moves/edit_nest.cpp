@@ -3,6 +3,7 @@
 #include <map>
 #include <tuple>
 
+#include "autoschedule/access/lane_form.h"
 #include "autoschedule/moves/edit.h"
 #include "autoschedule/plan/covers.h"
 #include "autoschedule/plan/nest.h"
@@ -280,6 +281,21 @@ int64_t lanes_for(const Plan& plan, StageId stage, int64_t extent) {
   int64_t lanes = full;
   while (lanes > extent && 4 * lanes > full) lanes /= 2;
   return lanes <= extent && 4 * lanes >= full ? lanes : 1;
+}
+
+int lanes_together(const Context& context, StageId stage, int iterator) {
+  const StageNode& node = context.accesses.stage(stage);
+  int count = 0;
+  const auto note = [&](const Access& access, int weight) {
+    const LaneForm form =
+        lane_form(access, iterator, schedule_lanes, context.sizes, {line_elements});
+    if (form.kind == LaneForm::Kind::Contiguous) count += weight;
+    if (form.kind == LaneForm::Kind::Strided || form.kind == LaneForm::Kind::Gather)
+      count -= weight;
+  };
+  note(node.write, 2);
+  for (const Access& read : node.reads) note(read, 1);
+  return count;
 }
 
 // ---- changes ----

@@ -38,6 +38,21 @@ bool has_window(const FuncPlan& func) {
          hoist.kind != Kind::Undecided || (store.kind != Kind::Undecided && !(store == compute));
 }
 
+// Whether each update writes the elements that its pure variables name, and reads no others of the Func.
+bool stays_in_place(const Context& context, FuncId func) {
+  for (const StageNode& stage : context.accesses.func(func).stages) {
+    const auto is_pure = [&](const IndexForm& form) {
+      return form.is_affine() && form.terms.size() == 1 &&
+             !is_reduction(context, stage.id, form.terms[0].iterator);
+    };
+    if (!std::ranges::all_of(stage.write.index, is_pure)) return false;
+    for (const Access& read : stage.reads) {
+      if (read.of == func && read.index != stage.write.index) return false;
+    }
+  }
+  return true;
+}
+
 // One change of a Func in a plan.
 class FuncChange {
  public:
@@ -220,8 +235,7 @@ class FuncChange {
   }
 };
 
-}  // namespace
-
+// Whether what updates write and read of the Func has ends, too: it's computed with what is read.
 bool has_bounded_updates(const Context& context, FuncId func) {
   return std::ranges::all_of(context.accesses.func(func).stages, [&](const StageNode& stage) {
     return has_range(stage.write, context.sizes) &&
@@ -229,6 +243,34 @@ bool has_bounded_updates(const Context& context, FuncId func) {
              return read.of != func || has_range(read, context.sizes);
            });
   });
+}
+
+}  // namespace
+
+double product_of(const std::vector<int64_t>& extents) {
+  double product = 1;
+  for (const int64_t extent : extents) product *= static_cast<double>(extent);
+  return product;
+}
+
+double computed_elements(const Plan& plan, const Context& context, const Level& level,
+                         const std::vector<int64_t>& box) {
+  const auto [stage, depth] = level.loop;
+  const Cover extents = whole_cover(stage, context.sizes);
+  double computed = product_of(box);
+  for (size_t d = 0; d <= static_cast<size_t>(depth); ++d)
+    computed *= static_cast<double>(trips(extents, plan.nest(stage), d));
+  return computed;
+}
+
+FuncPlan moved_inside(FuncPlan plan, const Placement& placement) {
+  plan.placement = placement;
+  plan.storage.folds.clear();
+  for (Nest& nest : plan.nests) {
+    for (Loop& loop : nest.loops)
+      if (loop.kind == ForType::Parallel) loop.kind = ForType::Serial;
+  }
+  return plan;
 }
 
 bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func) {
@@ -246,6 +288,25 @@ bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func)
     }
   }
   return true;
+}
+
+bool stays_in_place(const Context& context, FuncId func) {
+  for (const StageNode& stage : context.accesses.func(func).stages) {
+    const auto is_pure = [&](const IndexForm& form) {
+      return form.is_affine() && form.terms.size() == 1 &&
+             !is_reduction(context, stage.id, form.terms[0].iterator);
+    };
+    if (!std::ranges::all_of(stage.write.index, is_pure)) return false;
+    for (const Access& read : stage.reads) {
+      if (read.of == func && read.index != stage.write.index) return false;
+    }
+  }
+  return true;
+}
+
+bool may_run_in_loops(const Plan& plan, const Context& context, FuncId func) {
+  return is_editable(plan, func) && !is_output(*plan.program, func) &&
+         has_bounded_region(plan, context, func) && has_bounded_updates(context, func);
 }
 
 std::optional<Plan> with_func(const Plan& plan, FuncId func, FuncPlan changed,
@@ -272,6 +333,15 @@ std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& conte
 
 void add(std::vector<Plan>& plans, std::optional<Plan> plan) {
   if (plan && std::ranges::find(plans, *plan) == plans.end()) plans.push_back(std::move(*plan));
+}
+
+void add_placed(std::vector<Plan>& plans, const Plan& plan, FuncId func, const Placement& placement,
+                const std::vector<int64_t>& box, const Context& context) {
+  FuncPlan changed = moved_inside(plan.of(func), placement);
+  const bool has_own_loops = has_loops(plan, func) && runs_at_any_size(changed, context, func);
+  if (has_own_loops) add(plans, with_func(plan, func, changed, context));
+  run_along_rows(changed, plan, context, func, box, lanes_for(plan, {func, 0}, INT64_MAX) / 2);
+  add(plans, with_func(plan, func, std::move(changed), context));
 }
 
 }  // namespace retrograde::planning::moves

@@ -4,8 +4,9 @@
 //                                                            out  root  y:8, x:64, y, x:16, vector x
 //
 // A move is a pure function. It only gives legal plans, so a search needs no checks of its own. It gives few of them,
-// with sizes at which something changes: the cost decides which of them are good. The loops of other Funcs stay;
-// placements in a loop that moves follow it, and a plan in which such a loop is gone isn't given.
+// with sizes at which something changes: the cost decides which of them are good. The loops of other Funcs stay, except that
+// register_tile may store operands and consumers in another order, and compute_in_tile tiles the consumer. Placements in
+// a loop that moves follow it, and a plan in which such a loop is gone isn't given.
 //
 // The conditions under which a plan is legal have numbers, which code and tests mention:
 //
@@ -41,7 +42,7 @@ struct Context {
   Dependences& dependences;  // of the same access graph
 };
 
-// Plans that differ from `plan` in how `func` runs; `plan` keeps all invariants, and they do, too.
+// Plans that differ from `plan` in how `func` runs, and perhaps its operands and consumers; `plan` keeps all invariants, and they do, too.
 using MoveFunction = std::vector<Plan> (*)(const Plan& plan, FuncId func, const Context& context);
 struct Move {
   const char* name;

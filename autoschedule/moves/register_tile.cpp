@@ -1,14 +1,19 @@
-// register_tile -- the sums of a few elements of one dimension and a few vectors of another stay in registers while the
-// reduction runs, so that what it loads is used several times.
+// register_tile -- the sums of a few elements of one or two dimensions and a few vectors of another stay in registers while
+// the reduction runs, so that what it loads is used several times.
 //
 //   c, y, x:16, r.y, r.x, vector x     =>     c:4, y, x:32, r.y, r.x, unroll c, unroll x:16, vector x
+//   j, i, l:16, r, vector l            =>     j:4, i:4, l:16, r, unroll j, unroll i, vector l
 //
+// Operands that lanes would read across rows are stored along the lanes in further plans. Where lanes along another
+// dimension load less, the Func and those that read it at their own places are stored along that dimension.
 // Legal: L1, since iterations of pure loops never meet; L2, since loops of the reduction keep their order; L4, since each
 // unrolled loop and the lanes have a step outside; L5.
 // Method: the cycles of one term of a register, after what takes longest: loads, of which the operand of a side is shared
 // by the other side; products; or the latency of a sum. A tile that exceeds a dimension wastes what lies beyond the end.
 // Tiles are few, so all of them are tried, and the best ones are given.
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <compare>
 
 #include "autoschedule/moves/edit.h"
@@ -28,36 +33,56 @@ class RegisterTiles {
         stage_(loops.stage),
         node_(context_.accesses.stage(stage_)) {}
 
-  std::vector<Nest> run() {
-    if (!is_sum()) return {};
+  bool find() {
     const std::optional<Nest> plain = without_body(loops_.nest, context_, stage_);
     const auto row = std::ranges::find(
         node_.iterators, loops_.plan.of(stage_.func).storage.order[0], &Iterator::dimension);
-    if (!plain || row == node_.iterators.end()) return {};
+    if (!is_sum() || !plain || row == node_.iterators.end()) return false;
+    plain_ = *plain;
     x_ = static_cast<int>(row - node_.iterators.begin());
-    lanes_ = lanes_for(loops_.plan, stage_, points_of(*plain, x_));
-    if (lanes_ > 1) find_tiles(*plain);
+    lanes_ = lanes_for(loops_.plan, stage_, points_of(plain_, x_));
+    for (const Type& type : context_.accesses.func(stage_.func).func->types)
+      bytes_ += type.bytes() * lanes_;
+    if (lanes_ > 1) find_tiles();
     std::ranges::sort(tiles_);
+    return true;
+  }
+  // One term takes this long in the best tile.
+  double cycles() const { return tiles_.empty() ? INFINITY : tiles_[0].cycles; }
+  // `is_turned`: operands that lie across the lanes are turned, too.
+  void add_plans(std::vector<Plan>& plans, bool is_turned) const {
     std::vector<Nest> nests;
     for (const Tile& tile : tiles_) {
-      if (nests.size() < most_tiles) give(*plain, tile, nests);
+      if (nests.size() < most_tiles) give(tile, nests);
     }
-    return nests;
+    for (Nest& nest : nests) {
+      FuncPlan changed = loops_.plan.of(stage_.func);
+      changed.nests[static_cast<size_t>(stage_.stage)] = std::move(nest);
+      const auto tiled = with_func(loops_.plan, stage_.func, std::move(changed), context_);
+      add(plans, tiled);
+      if (tiled) add(plans, with_turned_operands(*tiled, stage_, context_));
+    }
   }
 
  private:
+  struct Side {  // copies along a dimension beside the lanes; none if the size is 1
+    int iterator = -1;
+    int64_t size = 1;
+    auto operator<=>(const Side&) const = default;
+  };
   struct Tile {
     double cycles;
-    int64_t sums, vectors, size;
-    int side;
+    int64_t sums, vectors;
+    std::array<Side, 2> sides;  // innermost last
     auto operator<=>(const Tile&) const = default;
   };
   const StageLoops& loops_;
   const Context& context_;
   const StageId stage_;
   const StageNode& node_;
+  Nest plain_;  // without a body
   int x_ = 0;
-  int64_t lanes_ = 1;
+  int64_t lanes_ = 1, bytes_ = 0;  // of a vector
   std::vector<Tile> tiles_;
 
   // Whether the stage adds terms to elements that no loop of the reduction moves, and reads no others of its own.
@@ -77,26 +102,37 @@ class RegisterTiles {
     return points_inside(loops_.extents, nest, depth - 1, iterator);
   }
 
-  void find_tiles(const Nest& plain) {
-    const auto& types = context_.accesses.func(stage_.func).func->types;
-    int64_t bytes = 0;
-    for (const Type& type : types) bytes += type.bytes() * lanes_;
-    const int64_t row = points_of(plain, x_);
+  // A second side only where one leaves more to load than to multiply.
+  void find_tiles() {
+    std::vector<Side> sides;
     for (int i = 0; i < static_cast<int>(node_.iterators.size()); ++i) {
       if (i == x_ || !is_free(context_, stage_, i)) continue;
-      const int64_t points = points_of(plain, i);
-      for (int64_t vectors = 1; vectors <= most_vectors; vectors *= 2) {
-        if (!fits(vectors * lanes_, row)) continue;
-        for (int64_t size = 2; size <= std::min(most_of_side, points); ++size) {
-          const int64_t sums = vectors * size;
-          const bool is_even = size == points || (size & (size - 1)) == 0;
-          if (!is_even || !fits(size, points) ||
-              sums * bytes > context_.machine.accumulator_bytes())
-            continue;
-          const double waste = lost(points, size) * lost(row, vectors * lanes_);
-          tiles_.push_back({cycles(vectors, size, i, bytes) * waste, sums, vectors, size, i});
-        }
+      const int64_t points = points_of(plain_, i);
+      for (int64_t size = 2; size <= std::min(most_of_side, points); ++size) {
+        const bool is_even = size == points || (size & (size - 1)) == 0;
+        if (is_even && fits(size, points)) sides.push_back({i, size});
       }
+    }
+    for (const Side& side : sides) add_tiles({Side{}, side});
+    const auto fastest = std::ranges::min_element(tiles_);
+    if (fastest == tiles_.end() || fastest->cycles <= 1 / core.products_per_cycle) return;
+    const double limit = fastest->cycles;
+    for (const Side& outer : sides) {
+      for (const Side& inner : sides)
+        if (outer.iterator > inner.iterator) add_tiles({outer, inner}, limit);
+    }
+  }
+  void add_tiles(const std::array<Side, 2>& sides, double limit = INFINITY) {
+    const int64_t row = points_of(plain_, x_);
+    for (int64_t vectors = 1; vectors <= most_vectors; vectors *= 2) {
+      const int64_t sums = vectors * sides[0].size * sides[1].size;
+      if (!fits(vectors * lanes_, row) || sums * bytes_ > context_.machine.accumulator_bytes())
+        continue;
+      double waste = lost(row, vectors * lanes_);
+      for (const Side& side : sides)
+        if (side.size > 1) waste *= lost(points_of(plain_, side.iterator), side.size);
+      const double all = cycles(vectors, sides) * waste;
+      if (all < limit) tiles_.push_back({all, sums, vectors, sides});
     }
   }
   static double lost(int64_t points, int64_t size) {
@@ -104,31 +140,43 @@ class RegisterTiles {
     return static_cast<double>(all) / static_cast<double>(points);
   }
 
+  // Loads of a register that lanes read.
+  double row_loads(const Access& read) const {
+    const int64_t stride = lane_stride(loops_.plan, context_, read, x_);
+    const double by_lane = core.gather_lane_operations * static_cast<double>(lanes_);
+    return stride == 0 ? by_lane
+                       : std::min(by_lane, core.unaligned_loads * static_cast<double>(stride));
+  }
   // The cycles of one term in a register.
-  double cycles(int64_t vectors, int64_t size, int side, int64_t bytes) const {
+  double cycles(int64_t vectors, const std::array<Side, 2>& sides) const {
     const double registers =
-        std::max(1.0, static_cast<double>(bytes) / context_.machine.vector_bytes);
-    const double sums = registers * static_cast<double>(vectors * size);
+        std::max(1.0, static_cast<double>(bytes_) / context_.machine.vector_bytes);
+    const double sums = registers * static_cast<double>(vectors * sides[0].size * sides[1].size);
     double loads = 0;
     for (const Access& read : node_.reads) {
       if (read.of == stage_.func) continue;
       const bool is_row = read.moved_by() & set_of(x_);
-      double count = is_row ? core.unaligned_loads * registers * static_cast<double>(vectors) : 1;
-      if (read.moved_by() & set_of(side)) count *= static_cast<double>(size);
+      double count = is_row ? row_loads(read) * registers * static_cast<double>(vectors) : 1;
+      for (const Side& side : sides)
+        if (side.size > 1 && (read.moved_by() & set_of(side.iterator)))
+          count *= static_cast<double>(side.size);
       loads += count;
     }
     return std::max({loads / sums / core.loads_per_cycle, 1 / core.products_per_cycle,
                      core.float_latency / sums});
   }
 
-  void give(const Nest& plain, const Tile& tile, std::vector<Nest>& nests) const {
-    Nest nest = plain;
+  void give(const Tile& tile, std::vector<Nest>& nests) const {
+    Nest nest = plain_;
     const auto is_sum_loop = [&](const Loop& loop) {
       return is_reduction(context_, stage_, loop.iterator);
     };
     std::ranges::stable_partition(nest.loops, [&](const Loop& l) { return !is_sum_loop(l); });
-    if (tile.size > points_of(nest, tile.side)) return;
-    run_inside(nest, tile.side, tile.size, ForType::Unrolled);
+    for (const Side& side : tile.sides) {
+      if (side.size == 1) continue;
+      if (side.size > points_of(nest, side.iterator)) return;
+      run_inside(nest, side.iterator, side.size, ForType::Unrolled);
+    }
     if (tile.vectors > 1) {
       const int64_t larger = outer_step(nest, x_, 1);
       if (larger > 0 && larger <= tile.vectors * lanes_) return;
@@ -143,13 +191,43 @@ class RegisterTiles {
   }
 };
 
-std::vector<Nest> tiles_of_sums(const StageLoops& loops) { return RegisterTiles(loops).run(); }
+// Tiles of the stage, and of the same with lanes along the dimension in which they take the fewest cycles.
+void add_tiles_of(const Plan& plan, StageId stage, const Context& context,
+                  std::vector<Plan>& plans) {
+  const auto loops_in = [&](const Plan& other) {
+    return StageLoops{other, context, stage, other.nest(stage),
+                      loop_extents(other, context, stage)};
+  };
+  const StageLoops loops = loops_in(plan);
+  RegisterTiles straight(loops);
+  if (!straight.find()) return;
+  straight.add_plans(plans, false);
+  double fewest = straight.cycles();
+  std::vector<Plan> best;
+  for (int d = 0; fewest > 1 / core.products_per_cycle &&
+                  d < context.accesses.func(stage.func).func->dimensions();
+       ++d) {
+    if (plan.of(stage.func).storage.order[0] == d) continue;
+    const std::optional<Plan> turned = with_turned_results(plan, stage.func, d, context);
+    if (!turned) continue;
+    const StageLoops along = loops_in(*turned);
+    RegisterTiles tiles(along);
+    if (!tiles.find() || tiles.cycles() >= fewest) continue;
+    fewest = tiles.cycles();
+    best.clear();
+    tiles.add_plans(best, true);
+  }
+  for (Plan& found : best) add(plans, std::move(found));
+}
 
 }  // namespace
 
 std::vector<Plan> register_tile(const Plan& plan, FuncId func, const Context& context) {
-  if (context.accesses.func(func).func->dimensions() < 2) return {};
-  return with_nests(plan, func, context, tiles_of_sums);
+  std::vector<Plan> plans;
+  const FuncNode& node = context.accesses.func(func);
+  if (!has_loops(plan, func) || node.func->dimensions() < 2) return plans;
+  for (const StageNode& stage : node.stages) add_tiles_of(plan, stage.id, context, plans);
+  return plans;
 }
 
 }  // namespace retrograde::planning::moves

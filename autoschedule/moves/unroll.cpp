@@ -3,9 +3,10 @@
 //   c, y, r.z, x:16, vector x     =>     c, y, r.z, x:32, unroll x:16, vector x     if copies share what they load
 //   y, x:16, r.x, vector x        =>     y, x:16, unroll r.x, vector x              if r.x has few iterations
 //   y, unroll r.x, vector x       =>     y, r.x, vector x
+//   c, y, x:16, vector x          =>     y, c:3, x:16, unroll c, vector x           a dimension of few values
 //
-// Legal: L2, since the order of all iterations stays, and L4: the extent of an unrolled loop is a step outside of it, or
-// a constant of the reduction; L5.
+// Legal: L2, since the order of all iterations stays, or that of a pure loop changes (L1), and L4: the extent of an unrolled
+// loop is a step outside of it, or a constant of the reduction; L5.
 // Large bodies cost more than they save: points at borders run outside of them. So copies are few, and many iterations
 // of the loop around remain.
 #include <algorithm>
@@ -61,10 +62,36 @@ std::vector<Nest> with_larger_body(const StageLoops& loops) {
   return steps;
 }
 
+// The nests in which all values of a dimension that has few are part of the body, around its lanes.
+std::vector<Nest> with_short_dimensions(const StageLoops& loops) {
+  const auto& [plan, context, stage, nest, extents] = loops;
+  const size_t shared = shared_loops(plan, stage);
+  std::vector<Nest> nests;
+  for (size_t d = shared; d < body_depth(nest); ++d) {
+    const Loop& loop = nest.loops[d];
+    const int64_t count = extents[static_cast<size_t>(loop.iterator)];
+    const bool is_alone = loop.step == 1 && outer_step(nest, loop.iterator, 1) == 0;
+    if (!is_alone || count < 2 || count > most_copies || body_depth(nest) == 1 ||
+        is_reduction(context, stage, loop.iterator) ||
+        !shares_values(context.accesses.stage(stage), loop.iterator))
+      continue;
+    Nest inside = nest;
+    const bool was_parallel = loop.kind == ForType::Parallel;
+    inside.loops.erase(inside.loops.begin() + static_cast<std::ptrdiff_t>(d));
+    const size_t body = body_depth(inside);
+    insert_step(inside, loop.iterator, 1, body, ForType::Unrolled);
+    insert_step(inside, loop.iterator, count, body - 1);
+    if (was_parallel) run_in_parallel(inside, context, stage);
+    nests.push_back(std::move(inside));
+  }
+  return nests;
+}
+
 std::vector<Nest> unrolled(const StageLoops& loops) {
   const auto& [plan, context, stage, nest, extents] = loops;
   const int64_t most = most_body_operations / operations(plan, context, stage);
   std::vector<Nest> nests = with_larger_body(loops);
+  std::ranges::move(with_short_dimensions(loops), std::back_inserter(nests));
   std::erase_if(nests, [&](const Nest& larger) { return copies(larger, loops.extents) > most; });
   const size_t body = body_depth(nest);
   if (body == nest.loops.size() || nest.loops[body].kind != ForType::Unrolled) return nests;

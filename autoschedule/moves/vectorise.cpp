@@ -20,22 +20,6 @@ namespace {
 
 constexpr size_t most_iterators = 3;
 
-// How many accesses have lanes that lie together, or share one element.
-int together(const Context& context, StageId stage, int iterator) {
-  const StageNode& node = context.accesses.stage(stage);
-  int count = 0;
-  const auto note = [&](const Access& access, int weight) {
-    const LaneForm form =
-        lane_form(access, iterator, schedule_lanes, context.sizes, {line_elements});
-    if (form.kind == LaneForm::Kind::Contiguous) count += weight;
-    if (form.kind == LaneForm::Kind::Strided || form.kind == LaneForm::Kind::Gather)
-      count -= weight;
-  };
-  note(node.write, 2);
-  for (const Access& read : node.reads) note(read, 1);
-  return count;
-}
-
 // Whether elements of the stage wait for others.
 bool is_recurrence(const StageNode& node) {
   return std::ranges::any_of(node.reads, [&](const Access& read) {
@@ -72,7 +56,7 @@ std::vector<Nest> with_lanes(const StageLoops& loops) {
     if (find_loop(*plain, i, 1)) iterators.push_back(i);
   }
   std::ranges::stable_sort(iterators, std::greater(),
-                           [&](int i) { return together(loops.context, loops.stage, i); });
+                           [&](int i) { return lanes_together(loops.context, loops.stage, i); });
   std::vector<Nest> nests;
   const auto add = [&](int i, int64_t points, ForType kind) {
     Nest along = *plain;

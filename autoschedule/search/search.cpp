@@ -12,8 +12,9 @@ namespace {
 constexpr int sweeps = 2;
 constexpr double worth_another_sweep = 0.98;  // of the time before the last one
 constexpr int moves_of_a_func = 3;            // one after another, in one visit
-constexpr double smallest_share = 0.01;       // of the whole time: a Func with less is not visited
-constexpr int64_t prices_per_func = 200;      // for each plan of the beam
+// Of the whole time: a Func with a small share is only computed elsewhere, one with less is not visited.
+constexpr double small_share = 0.01, smallest_share = 0.002;
+constexpr int64_t prices_per_func = 200;  // for each plan of the beam
 
 // A plan of the beam. Steps are a list that plans share, the last first.
 struct State {
@@ -99,6 +100,7 @@ class Beam {
     }
     return seconds;
   }
+  bool is_small(FuncId f) const { return share_of(f) < small_share * states_[0].cost.seconds; }
   bool is_worth_visiting(FuncId f) const {
     const auto i = static_cast<size_t>(f);
     if (i < options_.kept.size() && options_.kept[i]) return false;
@@ -112,9 +114,10 @@ class Beam {
 
   void visit(FuncId f) {
     const std::vector<State> before = states_;
+    const int most = is_small(f) ? 1 : moves_of_a_func;
     std::vector<Candidate> front;
     for (size_t i = 0; i < before.size(); ++i) front.push_back({before[i], i});
-    for (int depth = 0; depth < moves_of_a_func && !front.empty() && left_ > 0; ++depth) {
+    for (int depth = 0; depth < most && !front.empty() && left_ > 0; ++depth) {
       std::vector<Candidate> next;
       for (const Candidate& from : front) add_neighbours(from, f, next);
       std::ranges::stable_sort(next, is_faster);
@@ -133,12 +136,24 @@ class Beam {
     }
   }
 
+  // Whether a move of another Func changes one that is to be kept. Loops that places refer to may get other numbers.
+  bool keeps_funcs(const Plan& before, const Plan& after) const {
+    for (size_t f = 0; f < options_.kept.size(); ++f) {
+      if (!options_.kept[f] || before.funcs[f] == after.funcs[f]) continue;
+      const FuncPlan &was = *before.funcs[f], &is = *after.funcs[f];
+      if (!(was.storage == is.storage) || !(was.nests == is.nests)) return false;
+    }
+    return true;
+  }
+
   void add_neighbours(const Candidate& from, FuncId f, std::vector<Candidate>& next) {
+    const bool only_places = is_small(f);
     for (const Move& move : all_moves()) {
       if (options_.without.contains(move.name)) continue;
       for (Plan& plan : move.apply(from.plan, f, context_)) {
         if (left_ == 0) return;
-        if (!seen_.insert(hash_of(plan)).second) continue;
+        if (only_places && plan.of(f).placement == from.plan.of(f).placement) continue;
+        if (!keeps_funcs(from.plan, plan) || !seen_.insert(hash_of(plan)).second) continue;
         --left_;
         Cost cost = cost_.price(plan);
         if (cost.peak_bytes > std::max(options_.most_bytes, from.cost.peak_bytes)) continue;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "analysis/linear.h"
+#include "autoschedule/access/plain_reduction.h"
 #include "autoschedule/cost_estimate.h"
 #include "autoschedule/inlined_reads.h"
 #include "autoschedule/long_sums.h"
@@ -50,24 +51,6 @@ bool stays_in_place(const FuncContents& f, const Definition& update) {
   return !update.rvars.empty() && !point_number(update) &&
          std::ranges::none_of(update.args, moves) &&
          !(update.predicate.defined() && calls(update.predicate, &f));
-}
-
-// Whether the update is f = f op e op ..., for an operation whose lanes lowering combines.
-bool is_plain_reduction(const FuncContents& f, const Definition& update) {
-  if (update.values.size() != 1) return false;
-  Expr value = without_lets(update.values[0]);
-  const auto kind_of = [](const Expr& e) { return e.kind() == Kind::Sub ? Kind::Add : e.kind(); };
-  const Kind kind = kind_of(value);
-  if (kind != Kind::Add && kind != Kind::Mul && kind != Kind::Min && kind != Kind::Max)
-    return false;
-  while (!is_old_value(value, f, update)) {
-    if (kind_of(value) != kind) return false;
-    const auto* n = value.as<Binary>();
-    const bool in_a = calls(n->a, &f);
-    if (in_a == calls(n->b, &f) || (!in_a && n->kind == Kind::Sub)) return false;
-    value = Expr(in_a ? n->a : n->b);
-  }
-  return true;
 }
 
 // Whether the values of a Tuple may be combined in any order, as an extreme with its place are.
@@ -217,8 +200,8 @@ std::optional<RowReduction> row_reduction(const FuncContents& f, const Definitio
       best = RowReduction{r.var, n, cycles * elements < planning::launch_cycles};
     }
   }
-  const bool is_legal =
-      best && (is_tuple ? is_reduction_of_tuples(f, update) : is_plain_reduction(f, update));
+  const bool is_legal = best && (is_tuple ? is_reduction_of_tuples(f, update)
+                                          : planning::is_plain_reduction(f, update));
   return is_legal ? best : std::nullopt;
 }
 

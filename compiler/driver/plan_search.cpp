@@ -60,7 +60,7 @@ std::vector<const char*> moves_of(Decision decision) {
       return {"fuse_stages"};
     case Decision::Slices:
     case Decision::Strips:
-      return {"compute_at"};
+      return {"compute_at", "compute_in_tile"};
     case Decision::TaskSizes:
       return {"parallelise"};
     case Decision::Choices:

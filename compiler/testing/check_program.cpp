@@ -133,7 +133,8 @@ Judged check_program(const RandomProgram& program, const ScheduleLog& schedule,
 
 Judged check_with_schedule(const RandomProgram& program, const std::function<void()>& schedule,
                            const Target& target,
-                           const std::vector<std::function<void()>>& preparations, Watch watch) {
+                           const std::vector<std::function<void()>>& preparations, Watch watch,
+                           oracle::Rounding rounding) {
   Judged judged;
   const Target watched =
       watch == Watch::Accesses ? target.with_feature(Target::CheckedAccesses) : target;
@@ -143,7 +144,7 @@ Judged check_with_schedule(const RandomProgram& program, const std::function<voi
     compiled.set_custom_trace(ignore_event);
     if (watch == Watch::Pages) compiled.set_custom_allocator(allocate_guarded, free_guarded);
     for (const Regions& regions : program.runs) {
-      oracle::Interpreter interpreter({.rounding = oracle::Rounding::Contraction});
+      oracle::Interpreter interpreter({.rounding = rounding});
       std::optional<std::vector<oracle::Array>> expected;  // of what runs at all
       for (const std::function<void()>& prepare : preparations) {
         prepare();

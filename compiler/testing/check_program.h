@@ -8,6 +8,7 @@
 #include "ir/target.h"
 #include "testing/judgement.h"
 #include "testing/random_schedule.h"
+#include "testing/tracked_value.h"
 
 namespace retrograde::fuzz {
 
@@ -23,11 +24,12 @@ enum class Watch {
 Judged check_program(const RandomProgram& program, const ScheduleLog& schedule,
                      const Target& target, Watch watch = Watch::Accesses);
 // The same, where `schedule` schedules the program. The compiled program runs once after each of `preparations`, which
-// set up how it runs; each run is compared.
+// set up how it runs; each run is compared. `rounding`: what may differ beside the schedule, such as the order of sums.
 Judged check_with_schedule(const RandomProgram& program, const std::function<void()>& schedule,
                            const Target& target,
                            const std::vector<std::function<void()>>& preparations = {[] {}},
-                           Watch watch = Watch::Accesses);
+                           Watch watch = Watch::Accesses,
+                           oracle::Rounding rounding = oracle::Rounding::Contraction);
 
 // Whether a run failed because memory, for example of a device, was too small. That is no finding.
 bool lacks_memory(const RuntimeError&);

@@ -248,6 +248,20 @@ TEST_F(CostProbes, WhatALoopDoesNotChangeIsComputedOutsideOfIt) {
   EXPECT_GT(each, columns * rows / 16 * 4e-9);
 }
 
+TEST_F(CostProbes, UnrolledCopiesShareAFunctionUnlessItIsInAnArm) {
+  const auto seconds = [&](const Expr& value) {
+    Func sum("sum");
+    sum(x, y) = value + other(x, y);
+    sum.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+    return compute_seconds(priced(sum, "sum  root  y:4, x:16, unroll y, vector x\n"));
+  };
+  const double vectors = columns * rows / 16;
+  const double shared = seconds(exp(in(x, 0)));
+  const double in_arm = seconds(select(in(x, 0) > 0, exp(in(x, 0)), 0));
+  EXPECT_LT(shared, vectors * 2e-9);
+  EXPECT_NEAR(in_arm - shared, vectors * 3e-9, vectors * 0.4e-9);
+}
+
 TEST_F(CostProbes, InlinedFuncsAreComputedForEachElement) {
   rows_sum(x, y) = exp(in(x, y));
   out(x, y) = rows_sum(x, y) + rows_sum(x + 1, y);
@@ -332,6 +346,22 @@ TEST_F(CostProbes, ShortSumsOverlap) {
   out(x, y) += in(x + r, y);
   const double chain = columns * rows / 16 * 4 * 1.3e-9;
   EXPECT_LT(update_cost("y, x:16, r.x, vector x").compute_seconds, chain / 1.2);
+}
+
+TEST_F(CostProbes, LanesOfASumAreCombinedOnce) {
+  const auto update = [&](int terms) {
+    Func total("total");
+    RDom r(0, terms, "r");
+    total(y) = 0.0f;
+    total(y) += in(r, y);
+    total.bound(y, 0, 2048);
+    return priced(total, "total  root\n  .0  y\n  .1  racing  y, r.x:16, vector r.x\n").stages[1];
+  };
+  // Four steps of a shuffle and a sum for each element.
+  const double ends = rows * 4 * 2 * 0.45e-9;
+  EXPECT_GT(update(16).compute_seconds, ends);
+  EXPECT_LT(update(16).compute_seconds, 1.3 * ends);
+  EXPECT_NEAR(update(4096).compute_seconds, rows * 256 * 1.3e-9, 1.5 * ends) << "hidden";
 }
 
 TEST_F(CostProbes, ARecurrenceAlongALineWaitsForMemory) {

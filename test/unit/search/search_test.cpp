@@ -84,6 +84,37 @@ TEST_F(SearchTest, KeptFuncsRunAsBefore) {
   }
 }
 
+// A product of matrices, one of which lies across the lanes of the tile.
+TEST(SearchOperands, AreStoredAlongLanesUnlessTheyAreKept) {
+  Var x{"x"}, y{"y"}, z{"z"};
+  RDom r(0, 64);
+  Func a("a"), rows("rows"), out("out");
+  a(z, y) = cast<float>(z + y);
+  rows(z, x) = cast<float>(z * x);
+  out(x, y) = 0.0f;
+  out(x, y) += a(r, y) * rows(r, x);
+  out.set_estimates({{0, 512}, {0, 512}});
+  for (Func* f : {&a, &rows, &out}) f->compute_root();
+  const Plan start = imported({out});
+  const AccessGraph accesses(start.program->outputs);
+  const SizeModel sizes(accesses, {unknown_extent});
+  const Machine machine = {};
+  Dependences dependences(accesses);
+  const auto& funcs = start.program->funcs;
+  const auto kept = static_cast<FuncId>(std::ranges::find(funcs, rows.function()) - funcs.begin());
+  const auto order = [&](const SearchOptions& options) {
+    CostModel cost(accesses, sizes, machine);
+    const SearchResult result =
+        search(start, {accesses, sizes, machine, dependences}, cost, options);
+    return result.found[0].plan.of(kept).storage.order;
+  };
+  EXPECT_EQ(order({}), (std::vector<int16_t>{1, 0}));
+  SearchOptions options;
+  options.kept.assign(start.funcs.size(), false);
+  options.kept[static_cast<size_t>(kept)] = true;
+  EXPECT_EQ(order(options), start.of(kept).storage.order);
+}
+
 TEST_F(SearchTest, PlansKeepWithinTheMemoryOfTheStart) {
   // Without `rows` at root, which the search stores again.
   start = parsed("out  root\nrows  inline\nheavy  root\n", start.program);
@@ -92,6 +123,26 @@ TEST_F(SearchTest, PlansKeepWithinTheMemoryOfTheStart) {
   const SearchResult result = found(options);
   for (const FoundPlan& found : result.found)
     EXPECT_LE(found.cost.peak_bytes, result.start.cost.peak_bytes);
+}
+
+// A few values beside many: 0.4 % of the time.
+TEST_F(SearchTest, FuncsWithASmallShareAreOnlyComputedElsewhere) {
+  Func table("table"), few("few"), many("many");
+  table(x, y) = sin(cast<float>(x + y));
+  few(x, y) = table(x, y) * 2;
+  many(x, y) = exp(sin(cast<float>(x)) * cast<float>(y)) + exp(few(x, y / 200) * cast<float>(y));
+  many.set_estimates({{0, 1600}, {0, 1600}});
+  table.compute_root();
+  few.compute_root();
+  many.compute_root().parallel(y).vectorize(x, 16);
+  start = imported({many});
+  accesses.emplace(start.program->outputs);
+  sizes.emplace(*accesses, SizeDefaults{unknown_extent});
+  const SearchResult result = found({.least_gain_of_all = 0.0001});
+  std::vector<std::string> moves;
+  for (const SearchStep& step : result.found[0].steps)
+    if (step.func == id("table")) moves.push_back(step.move);
+  EXPECT_EQ(moves, std::vector<std::string>{"compute_at"});
 }
 
 TEST_F(SearchTest, ASearchFromNothingKeepsWhatItMust) {
@@ -120,7 +171,7 @@ TEST_F(SearchTest, ResultsOfTwoStartsAreInOrder) {
   const SearchResult known = both;
   start = both.found[0].plan;
   start.funcs = parsed("out  root\nrows  inline\nheavy  root\n", start.program).funcs;
-  merge(both, found({}));
+  merge(both, found({.without = {"compute_at", "slide"}}));
   EXPECT_GT(both.found.size(), count);
   EXPECT_TRUE(both.start.plan == known.start.plan);
   EXPECT_GT(both.priced, known.priced);

@@ -1,0 +1,160 @@
+// slide -- a Func is computed at each row of its consumer and stored for a strip of rows: an iteration computes only the rows
+// that those before it in the strip have not.
+//
+//   out   root  parallel c, parallel y, x:16, vector x
+//   blur  root  parallel y, x:16, vector x
+//   =>
+//   out   root  parallel y:64, y, c, x:16, vector x
+//   blur  at out/y  store at out/y:64   y, x:16, vector x
+//
+// Legal: L3, L8, and of the consumer L1; L9: a consumer in whose loops another Func has a window has its strips already.
+// Method: rows go along the outermost dimension of the consumer in which rows overlap or, without one, along the
+// innermost that moves the Func. Strips are as high as enough tasks allow. Dimensions of few values run inside of a row, so
+// that all of them share it.
+#include <algorithm>
+
+#include "autoschedule/moves/edit.h"
+#include "autoschedule/plan/covers.h"
+
+namespace retrograde::planning::moves {
+
+namespace {
+
+constexpr int64_t few_values = 4;
+
+// The stage at root in whose loops all stages run that the first consumer of a Func is computed in.
+std::optional<StageId> stage_around_reads(const Plan& plan, const Context& context, FuncId func) {
+  const std::vector<StageId> readers = all_readers(plan, context, func);
+  const auto first =
+      std::ranges::find_if(readers, [&](StageId stage) { return !is_inlined(plan, stage.func); });
+  if (first == readers.end()) return std::nullopt;
+  StageId stage = *first;
+  while (plan.of(stage.func).placement.compute.kind == Level::Kind::At)
+    stage = plan.of(stage.func).placement.compute.loop.stage;
+  const bool has_strips = has_loops(plan, stage.func) && shared_loops(plan, stage) == 0;
+  return has_strips ? std::optional(stage) : std::nullopt;
+}
+
+// The loops of a stage at root, with one of them as a loop over the rows of a strip.
+class StripFinder {
+ public:
+  StripFinder(const Plan& plan, StageId host, const Context& context)
+      : plan_(plan),
+        host_(host),
+        context_(context),
+        nest_(plan.nest(host)),
+        extents_(whole_cover(host, context.sizes)) {}
+
+  struct Strip {
+    Plan plan;
+    size_t row = 0;  // the depth of the loop over rows; storage is in the loop around it
+  };
+  // The strips that are there, or new ones. None along the iterator of the lanes: a row would be a vector.
+  std::optional<Strip> along(int iterator) const {
+    const std::optional<size_t> lanes = vector_loop(nest_);
+    if (lanes && nest_.loops[*lanes].iterator == iterator) return std::nullopt;
+    for (size_t d = body_depth(nest_); d-- > 0;) {
+      if (nest_.loops[d].iterator != iterator) continue;
+      const bool is_in_strip = outer_step(nest_, iterator, nest_.loops[d].step) > 0;
+      return is_in_strip ? std::optional(Strip{plan_, d}) : new_strip(d);
+    }
+    return std::nullopt;
+  }
+
+ private:
+  const Plan& plan_;
+  const StageId host_;
+  const Context& context_;
+  const Nest& nest_;
+  const Cover extents_;
+
+  // Outside of the strips are the loops that are outside of the rows, unless they have few values.
+  std::optional<Strip> new_strip(size_t at) const {
+    Nest nest = nest_;
+    std::vector<Loop> outside, inside;
+    int64_t tasks = 1;
+    for (size_t d = 0; d < nest_.loops.size(); ++d) {
+      if (d < at && !may_run_at_once(context_, host_, nest_, d)) return std::nullopt;
+      const int64_t count = trips(extents_, nest_, d);
+      const bool is_around =
+          d < at && count > few_values &&
+          std::ranges::find(inside, nest_.loops[d].iterator, &Loop::iterator) == inside.end();
+      if (is_around) tasks *= count;
+      if (d != at) (is_around ? outside : inside).push_back(nest_.loops[d]);
+    }
+    const Loop& rows = nest_.loops[at];
+    const int64_t count = trips(extents_, nest_, at);
+    const int64_t height =
+        std::min(count * tasks / context_.machine.enough_tasks(), count) * rows.step;
+    nest.loops = outside;
+    nest.loops.push_back(rows);
+    nest.loops.insert(nest.loops.end(), inside.begin(), inside.end());
+    size_t row = outside.size();
+    if (height > rows.step && height < extents_[static_cast<size_t>(rows.iterator)])
+      insert_step(nest, rows.iterator, height, row++);
+    for (size_t d = 0; d < nest.loops.size(); ++d) {
+      ForType& kind = nest.loops[d].kind;
+      const bool is_body = kind == ForType::Vectorized || kind == ForType::Unrolled;
+      if (!is_body) kind = d < row ? ForType::Parallel : ForType::Serial;
+    }
+    if (row == 0 || !may_run_at_once(context_, host_, nest, row - 1)) return std::nullopt;
+    FuncPlan changed = plan_.of(host_.func);
+    changed.nests[static_cast<size_t>(host_.stage)] = std::move(nest);
+    std::optional<Plan> plan = with_func(plan_, host_.func, std::move(changed), context_);
+    return plan ? std::optional(Strip{std::move(*plan), row}) : std::nullopt;
+  }
+};
+
+// A strip in which a Func is computed.
+struct Window {
+  StripFinder::Strip strip;
+  Placement placement;
+  std::vector<int64_t> box;  // of a row
+  bool overlaps = false;     // whether rows share elements
+};
+
+std::optional<Window> window_in(StripFinder::Strip strip, StageId host, FuncId func,
+                                const Context& context) {
+  Window window{std::move(strip), {}, {}};
+  const Level row{Level::Kind::At, {host, static_cast<int16_t>(window.strip.row)}};
+  Level around = row;
+  --around.loop.depth;
+  Covers covers(window.strip.plan, context.sizes);
+  window.box = covers.box(func, row);
+  const std::vector<int64_t> all = covers.box(func, around);
+  const int64_t rows =
+      trips(whole_cover(host, context.sizes), window.strip.plan.nest(host), window.strip.row);
+  int moved = 0;  // dimensions; lowering finds the new elements of a row if there is one
+  for (size_t d = 0; d < all.size(); ++d) {
+    moved += window.box[d] < all[d];
+    window.overlaps |= window.box[d] < all[d] && all[d] < rows * window.box[d];
+  }
+  window.placement.compute = row;
+  if (window.overlaps) window.placement.store = around;
+  return moved == 1 || (moved > 0 && !window.overlaps) ? std::optional(std::move(window))
+                                                       : std::nullopt;
+}
+
+}  // namespace
+
+std::vector<Plan> slide(const Plan& plan, FuncId func, const Context& context) {
+  std::vector<Plan> plans;
+  if (!may_run_in_loops(plan, context, func) || !stays_in_place(context, func)) return plans;
+  const std::optional<StageId> host = stage_around_reads(plan, context, func);
+  if (!host || host->func == func) return plans;
+  const StripFinder strips(plan, *host, context);
+  std::optional<Window> best;
+  const std::vector<Iterator>& iterators = context.accesses.stage(*host).iterators;
+  const std::vector<int16_t>& order = plan.of(host->func).storage.order;
+  for (const int16_t dimension : order) {  // the innermost first
+    const auto i = std::ranges::find(iterators, dimension, &Iterator::dimension);
+    if (i == iterators.end()) continue;
+    auto strip = strips.along(static_cast<int>(i - iterators.begin()));
+    auto window = strip ? window_in(std::move(*strip), *host, func, context) : std::nullopt;
+    if (window && (!best || window->overlaps)) best = std::move(window);
+  }
+  if (best) add_placed(plans, best->strip.plan, func, best->placement, best->box, context);
+  return plans;
+}
+
+}  // namespace retrograde::planning::moves
