@@ -23,13 +23,12 @@ bool is_free(const Context& context, StageId stage, int iterator);
 bool may_run_at_once(const Context& context, StageId stage, const Nest& nest, size_t depth);
 // The stages that read the Func, also through inlined Funcs; those of inlined Funcs, too.
 std::vector<StageId> all_readers(const Plan& plan, const Context& context, FuncId func);
-// Whether data decide no index of the access without a range.
-bool has_range(const Access& access, const SizeModel& sizes);
 // Visits what a stage reads, also through inlined Funcs, with the iterators of the stage that move each index.
 using MovedIndices = std::vector<IteratorSet>;
 void for_each_read(const Plan& plan, const Context& context, StageId stage,
                    ir::FunctionRef<void(const Access&, const MovedIndices&)> visit);
-// Whether the region that is read of the Func is bounded (L3), also through inlined Funcs.
+// Whether the region that is read of the Func is bounded (L3), also through inlined Funcs: data decide no index without a
+// range.
 bool has_bounded_region(const Plan& plan, const Context& context, FuncId func);
 // Whether a Func may be computed in a loop of a stage that reads it (L3, L8): its updates need no more than is read.
 bool may_run_in_loops(const Plan& plan, const Context& context, FuncId func);

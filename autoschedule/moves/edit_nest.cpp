@@ -27,6 +27,13 @@ bool is_plain(const Nest& nest) {
   return true;
 }
 
+bool has_range(const IndexForm& form, const SizeModel& sizes) {
+  return sizes.range(form.within).is_bounded() ||
+         std::ranges::all_of(form.opaque, [&](const OpaqueTerm& term) {
+           return !term.value.from_data || term.range.is_bounded();
+         });
+}
+
 // Steps that divide the next larger one have no tail. Where a tail would compute more than is asked for, regions of
 // other Funcs would change, so all others are guards.
 void set_tails(Nest& nest, int iterator) {
@@ -88,15 +95,6 @@ std::vector<StageId> all_readers(const Plan& plan, const Context& context, FuncI
   return result;
 }
 
-bool has_range(const Access& access, const SizeModel& sizes) {
-  return std::ranges::all_of(access.index, [&](const IndexForm& form) {
-    return sizes.range(form.within).is_bounded() ||
-           std::ranges::all_of(form.opaque, [](const OpaqueTerm& term) {
-             return !term.value.from_data || term.range.is_bounded();
-           });
-  });
-}
-
 bool has_bounded_region(const Plan& plan, const Context& context, FuncId func) {
   const std::vector<StageId> readers = all_readers(plan, context, func);
   const auto leads_to = [&](FuncId read) {
@@ -107,7 +105,10 @@ bool has_bounded_region(const Plan& plan, const Context& context, FuncId func) {
     const std::vector<Access>& reads = context.accesses.stage(reader).reads;
     return plan.of(reader.func).opacity == Opacity::None &&
            std::ranges::all_of(reads, [&](const Access& read) {
-             return !leads_to(read.of) || has_range(read, context.sizes);
+             return !leads_to(read.of) ||
+                    std::ranges::all_of(read.index, [&](const IndexForm& form) {
+                      return has_range(form, context.sizes);
+                    });
            });
   });
 }

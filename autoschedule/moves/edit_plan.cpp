@@ -235,16 +235,6 @@ class FuncChange {
   }
 };
 
-// Whether what updates write and read of the Func has ends, too: it's computed with what is read.
-bool has_bounded_updates(const Context& context, FuncId func) {
-  return std::ranges::all_of(context.accesses.func(func).stages, [&](const StageNode& stage) {
-    return has_range(stage.write, context.sizes) &&
-           std::ranges::all_of(stage.reads, [&](const Access& read) {
-             return read.of != func || has_range(read, context.sizes);
-           });
-  });
-}
-
 }  // namespace
 
 double product_of(const std::vector<int64_t>& extents) {
@@ -306,7 +296,7 @@ bool stays_in_place(const Context& context, FuncId func) {
 
 bool may_run_in_loops(const Plan& plan, const Context& context, FuncId func) {
   return is_editable(plan, func) && !is_output(*plan.program, func) &&
-         has_bounded_region(plan, context, func) && has_bounded_updates(context, func);
+         has_bounded_region(plan, context, func);
 }
 
 std::optional<Plan> with_func(const Plan& plan, FuncId func, FuncPlan changed,

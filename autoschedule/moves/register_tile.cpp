@@ -2,6 +2,7 @@
 // the reduction runs, so that what it loads is used several times.
 //
 //   c, y, x:16, r.y, r.x, vector x     =>     c:4, y, x:32, r.y, r.x, unroll c, unroll x:16, vector x
+//                                      =>     y, x:32, c:4, r.y, r.x, unroll c, unroll x:16, vector x
 //   j, i, l:16, r, vector l            =>     j:4, i:4, l:16, r, unroll j, unroll i, vector l
 //
 // Operands that lanes would read across rows are stored along the lanes in further plans. Where lanes along another
@@ -16,6 +17,7 @@
 #include <cmath>
 #include <compare>
 
+#include "autoschedule/cost/assumptions.h"
 #include "autoschedule/moves/edit.h"
 
 namespace retrograde::planning::moves {
@@ -47,13 +49,20 @@ class RegisterTiles {
     std::ranges::sort(tiles_);
     return true;
   }
-  // One term takes this long in the best tile.
-  double cycles() const { return tiles_.empty() ? INFINITY : tiles_[0].cycles; }
+  // One term of an element takes so many cycles in the best tile; infinitely many if there is none.
+  double cycles() const {
+    return tiles_.empty() ? INFINITY : tiles_[0].cycles / static_cast<double>(lanes_);
+  }
   // `is_turned`: operands that lie across the lanes are turned, too.
   void add_plans(std::vector<Plan>& plans, bool is_turned) const {
     std::vector<Nest> nests;
+    size_t given = 0;
     for (const Tile& tile : tiles_) {
-      if (nests.size() < most_tiles) give(tile, nests);
+      const std::optional<Nest> nest = given < most_tiles ? tiled(tile) : std::nullopt;
+      if (!nest) continue;
+      ++given;
+      nests.push_back(*nest);
+      if (const auto other = with_sides_inside(*nest, tile)) nests.push_back(*other);
     }
     for (Nest& nest : nests) {
       FuncPlan changed = loops_.plan.of(stage_.func);
@@ -102,7 +111,7 @@ class RegisterTiles {
     return points_inside(loops_.extents, nest, depth - 1, iterator);
   }
 
-  // A second side only where one leaves more to load than to multiply.
+  // A second side only where it is faster than one.
   void find_tiles() {
     std::vector<Side> sides;
     for (int i = 0; i < static_cast<int>(node_.iterators.size()); ++i) {
@@ -115,8 +124,7 @@ class RegisterTiles {
     }
     for (const Side& side : sides) add_tiles({Side{}, side});
     const auto fastest = std::ranges::min_element(tiles_);
-    if (fastest == tiles_.end() || fastest->cycles <= 1 / core.products_per_cycle) return;
-    const double limit = fastest->cycles;
+    const double limit = fastest == tiles_.end() ? INFINITY : fastest->cycles;
     for (const Side& outer : sides) {
       for (const Side& inner : sides)
         if (outer.iterator > inner.iterator) add_tiles({outer, inner}, limit);
@@ -162,11 +170,13 @@ class RegisterTiles {
           count *= static_cast<double>(side.size);
       loads += count;
     }
-    return std::max({loads / sums / core.loads_per_cycle, 1 / core.products_per_cycle,
+    const double loading = loads / sums / core.loads_per_cycle,
+                 adding = 1 / core.products_per_cycle;
+    return std::max({loading + not_overlapped * adding, adding + not_overlapped * loading,
                      core.float_latency / sums});
   }
 
-  void give(const Tile& tile, std::vector<Nest>& nests) const {
+  std::optional<Nest> tiled(const Tile& tile) const {
     Nest nest = plain_;
     const auto is_sum_loop = [&](const Loop& loop) {
       return is_reduction(context_, stage_, loop.iterator);
@@ -174,20 +184,40 @@ class RegisterTiles {
     std::ranges::stable_partition(nest.loops, [&](const Loop& l) { return !is_sum_loop(l); });
     for (const Side& side : tile.sides) {
       if (side.size == 1) continue;
-      if (side.size > points_of(nest, side.iterator)) return;
+      if (side.size > points_of(nest, side.iterator)) return std::nullopt;
       run_inside(nest, side.iterator, side.size, ForType::Unrolled);
     }
     if (tile.vectors > 1) {
       const int64_t larger = outer_step(nest, x_, 1);
-      if (larger > 0 && larger <= tile.vectors * lanes_) return;
+      if (larger > 0 && larger <= tile.vectors * lanes_) return std::nullopt;
       nest.loops[innermost_loop(nest, x_)].step = tile.vectors * lanes_;
       insert_step(nest, x_, lanes_, nest.loops.size(), ForType::Unrolled);
       insert_step(nest, x_, 1, nest.loops.size(), ForType::Vectorized);
     } else {
       run_inside(nest, x_, lanes_, ForType::Vectorized);
     }
-    if (operations(loops_.plan, context_, stage_) * tile.sums <= most_body_operations)
-      nests.push_back(std::move(nest));
+    if (operations(loops_.plan, context_, stage_) * tile.sums > most_body_operations)
+      return std::nullopt;
+    return nest;
+  }
+
+  // The loops over the sides inside of those along rows, so that a few rows of operands serve all of them.
+  std::optional<Nest> with_sides_inside(const Nest& nest, const Tile& tile) const {
+    Nest inside = nest;
+    const auto is_outside = [&](const Loop& loop) {
+      return loop.iterator != tile.sides[0].iterator && loop.iterator != tile.sides[1].iterator;
+    };
+    const auto pure_end = std::ranges::find_if(inside.loops, [&](const Loop& loop) {
+      return is_reduction(context_, stage_, loop.iterator);
+    });
+    std::stable_partition(inside.loops.begin(), pure_end, is_outside);
+    if (has_same_order(nest, inside, loops_.extents)) return std::nullopt;
+    const auto is_parallel = [](const Loop& loop) { return loop.kind == ForType::Parallel; };
+    const bool was_parallel = std::ranges::any_of(inside.loops, is_parallel);
+    for (Loop& loop : inside.loops)
+      if (is_parallel(loop)) loop.kind = ForType::Serial;
+    if (was_parallel) run_in_parallel(inside, context_, stage_);
+    return inside;
   }
 };
 
@@ -204,9 +234,8 @@ void add_tiles_of(const Plan& plan, StageId stage, const Context& context,
   straight.add_plans(plans, false);
   double fewest = straight.cycles();
   std::vector<Plan> best;
-  for (int d = 0; fewest > 1 / core.products_per_cycle &&
-                  d < context.accesses.func(stage.func).func->dimensions();
-       ++d) {
+  const int dimensions = context.accesses.func(stage.func).func->dimensions();
+  for (int d = 0; d < dimensions; ++d) {
     if (plan.of(stage.func).storage.order[0] == d) continue;
     const std::optional<Plan> turned = with_turned_results(plan, stage.func, d, context);
     if (!turned) continue;

@@ -214,10 +214,9 @@ std::vector<Plan> scatter_lanes(const Plan& plan, FuncId func, const Context& co
   if (is_output(*plan.program, func) || !has_bounded_region(plan, context, func)) return plans;
   const Cover extents = loop_extents(plan, context, {func, 0});
   // Lanes of a recurrence have nothing in common, so that a few are no better than one.
-  const bool has_slices = may_run_in_loops(plan, context, func) &&
-                          std::ranges::any_of(stages, [](const StageNode& stage) {
-                            return std::ranges::any_of(stage.write.index, &IndexForm::has_data);
-                          });
+  const bool has_slices = std::ranges::any_of(stages, [](const StageNode& stage) {
+    return std::ranges::any_of(stage.write.index, &IndexForm::has_data);
+  });
   int dimensions = 0;
   for (int d = 0; d < static_cast<int>(extents.size()) && dimensions < most_dimensions; ++d) {
     if (!is_pure_in_all_stages(context, func, d)) continue;

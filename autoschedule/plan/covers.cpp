@@ -142,6 +142,20 @@ class GrowingBox {
   std::vector<Side> sides_;
 };
 
+// A dimension with a bound is always computed from end to end, one with an alignment in multiples of it.
+std::vector<int64_t> with_bounds(std::vector<int64_t> box, FuncId func, const SizeModel& sizes) {
+  const graph::FuncContents& f = *sizes.graph().func(func).func;
+  for (const graph::Bound& bound : f.schedule.bounds) {
+    const auto d = static_cast<size_t>(std::ranges::find(f.args, bound.var) - f.args.begin());
+    const auto multiple = as_const_int(bound.modulus);
+    if (bound.extent.defined())
+      box[d] = std::max(box[d], sizes.of(func, d).estimate);
+    else if (multiple)
+      box[d] = rounded_up_quotient(box[d], *multiple) * *multiple;
+  }
+  return box;
+}
+
 // The depth of the level's loop in a stage that shares it with the loop's own stage.
 std::optional<int> shared_depth(const Plan& plan, StageId stage, const Level& level) {
   if (plan.of(stage.func).opacity != Opacity::None) return std::nullopt;
@@ -182,7 +196,7 @@ std::vector<int64_t> Covers::box(FuncId func, const Level& level) {
     accesses.push_back(&stages[s].write);
     box.add_update(accesses, cover_of_box(stages[s].id, box.extents_of_all(), sizes_), sizes_);
   }
-  return boxes_.emplace(key, box.extents_of_all()).first->second;
+  return boxes_.emplace(key, with_bounds(box.extents_of_all(), func, sizes_)).first->second;
 }
 
 Cover Covers::all_of(StageId stage) {

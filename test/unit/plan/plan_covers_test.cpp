@@ -63,6 +63,17 @@ TEST_F(PlanCovers, HoldAllPointsThatOneIterationUpdates) {
             (Covers{{16, 20, 10, 2}, {16, 4, 1, 2}, {1, 4, 1, 2}, {1, 1, 1, 2}}));
 }
 
+TEST_F(PlanCovers, OfADimensionWithABoundAreAllOfIt) {
+  Func rows("rows"), out("out");
+  rows(x, y) = x + y;
+  out(x, y) = rows(x, y) + rows(x + 1, y);
+  out.bound(x, 0, 100).bound(y, 0, 60);
+  const std::string plan = "out  root  y:8, x:16, y, x\nrows  at out/x:16  y, x\n";
+  EXPECT_EQ(covers({out}, plan, rows)[0], (Cover{17, 8}));
+  rows.bound(x, 0, 101).align_bounds(y, 5);
+  EXPECT_EQ(covers({out}, plan, rows)[0], (Cover{101, 10}));
+}
+
 TEST_F(PlanCovers, OfAFuncInALoopAreThePointsThatItsConsumersNeed) {
   Func rows("rows"), blur("blur"), out("out");
   rows(x, y) = x + y;
