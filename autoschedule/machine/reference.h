@@ -65,6 +65,12 @@ inline constexpr double launch_cycles = 20000;
 inline constexpr double atomic_add_operations = 8;
 inline constexpr int64_t uncontended_lines = 1 << 10;
 
+// ---- Accuracy ----
+
+// Terms that one accumulator adds, one after the other, before lanes or blocks of the sum are worth having for the sake of
+// its rounding errors.
+inline constexpr double longest_chain = 512;
+
 // ---- Programs ----
 
 // The extent of a dimension of which nothing is known.

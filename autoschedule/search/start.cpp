@@ -1,12 +1,15 @@
 #include "autoschedule/search/start.h"
 
+#include <algorithm>
+
+#include "autoschedule/moves/edit.h"
+
 namespace retrograde::planning {
 
 namespace {
 
 // The Funcs that run as they do, or in whose loops one of these does.
 std::vector<bool> with_hosts(const Plan& plan, std::vector<bool> kept) {
-  kept.resize(plan.funcs.size());
   const auto keep_host = [&](const Level& level) {
     if (level.kind == Level::Kind::At) kept[static_cast<size_t>(level.loop.stage.func)] = true;
   };
@@ -24,10 +27,35 @@ std::vector<bool> with_hosts(const Plan& plan, std::vector<bool> kept) {
   return kept;
 }
 
+// Whether a stage adds so many terms in lanes that one chain of additions would be less exact.
+bool has_lanes_of_long_sum(const Plan& plan, FuncId func, const Context& context) {
+  for (size_t s = 0; s < plan.of(func).nests.size(); ++s) {
+    const StageId stage{func, static_cast<int16_t>(s)};
+    const auto adds_up = [&](const Loop& loop) {
+      return loop.kind == ForType::Vectorized && loop.iterator >= 0 &&
+             moves::is_reduction(context, stage, loop.iterator);
+    };
+    const Nest& nest = plan.nest(stage);
+    if (!nest.fusions.empty() || std::ranges::none_of(nest.loops, adds_up)) continue;
+    const Cover extents = whole_cover(stage, context.sizes);
+    double terms = 1;
+    for (size_t i = 0; i < extents.size(); ++i) {
+      if (moves::is_reduction(context, stage, static_cast<int>(i)))
+        terms *= static_cast<double>(extents[i]);
+    }
+    if (terms > longest_chain) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 Plan plan_from_nothing(const Plan& plan, const std::vector<bool>& kept, const Context& context) {
-  const std::vector<bool> stays = with_hosts(plan, kept);
+  std::vector<bool> stays = kept;
+  stays.resize(plan.funcs.size());
+  for (size_t i = 0; i < stays.size(); ++i)
+    stays[i] = stays[i] || has_lanes_of_long_sum(plan, static_cast<FuncId>(i), context);
+  stays = with_hosts(plan, std::move(stays));
   const Plan undecided = undecided_plan(plan.program);
   Plan start = plan;
   for (size_t i = 0; i < plan.funcs.size(); ++i) {

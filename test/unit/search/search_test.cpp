@@ -163,6 +163,24 @@ TEST_F(SearchTest, ASearchFromNothingKeepsWhatItMust) {
             "heavy  root  parallel y, x:16 GuardWithIf, vector x\n");
 }
 
+TEST_F(SearchTest, ASearchFromNothingKeepsLanesOfLongSums) {
+  for (const int terms : {500, 600}) {
+    Func sum("sum");
+    RDom r(0, terms, "r");
+    sum(y) = 0.0f;
+    sum(y) += heavy(r.x, y);
+    sum.set_estimate(y, 0, 100);
+    sum.compute_root().update().allow_race_conditions().vectorize(r.x, 16);
+    const Plan plan = imported({sum});
+    const AccessGraph graph(plan.program->outputs);
+    const SizeModel known(graph, SizeDefaults{unknown_extent});
+    Dependences dependences(graph);
+    const std::string text =
+        plain_text(plan_from_nothing(plan, {}, {graph, known, machine, dependences}));
+    EXPECT_EQ(text.find("vector r.x") != std::string::npos, terms == 600) << text;
+  }
+}
+
 TEST_F(SearchTest, ResultsOfTwoStartsAreInOrder) {
   SearchResult both = found({});
   const size_t count = both.found.size();
