@@ -258,6 +258,8 @@ void SizeModel::pass_on(const Access& read) {
 
 // Where the form loses what terms have in common, as in x - x / 2 * 2.
 ConstantRange SizeModel::bounds_in(const Expr& index, StageId stage) const {
+  const auto [known, is_new] = bounds_.try_emplace({stage, index.get()}, index, ConstantRange());
+  if (!is_new) return known->second.second;
   analysis::Scope<Interval> scope(&parameters_);
   const auto& iterators = graph_.stage(stage).iterators;
   for (size_t i = 0; i < iterators.size(); ++i) {
@@ -267,7 +269,7 @@ ConstantRange SizeModel::bounds_in(const Expr& index, StageId stage) const {
         iterators[i].name,
         fits ? Interval{make_const(Int(32), loop.min), make_const(Int(32), loop.max)} : Interval());
   }
-  return range(analysis::bounds_of(index, scope));
+  return known->second.second = range(analysis::bounds_of(index, scope));
 }
 
 ConstantRange SizeModel::range(const IndexForm& form, StageId stage) const {

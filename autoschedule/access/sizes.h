@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <unordered_map>
 #include <utility>
@@ -87,6 +88,9 @@ class SizeModel {
   // The smallest and the largest value of expressions over parameters, which are asked for again and again.
   using KnownEnd = std::pair<Expr, std::optional<int64_t>>;
   mutable std::array<std::unordered_map<const ir::ExprNode*, KnownEnd>, 2> ends_;
+  // The bounds of indices while all iterators of a stage run.
+  mutable std::map<std::pair<StageId, const ir::ExprNode*>, std::pair<Expr, ir::ConstantRange>>
+      bounds_;
   std::vector<std::vector<Known>> funcs_, images_;
   std::vector<std::vector<std::optional<Known>>> regions_;  // of Funcs, by their consumers
   std::vector<std::vector<std::vector<Known>>> iterators_;  // by Func, stage, iterator

@@ -145,13 +145,17 @@ class CostModel::Prices {
     };
     std::vector<std::array<Bytes, Machine::level_count>> behind(price.stages.size());
     const double most = machine_.levels[Machine::last_cache].bytes;
-    std::unordered_map<int, double> distances;
+    std::vector<std::pair<int, double>> distances;
     for (const auto& [buffer, bytes] : price.traffic.touched)
-      distances[buffer] = recent.distance(buffer, bytes, most);
+      distances.emplace_back(buffer, recent.distance(buffer, bytes, most));
+    const auto distance_of = [&](int buffer) {
+      const auto found = std::ranges::find(distances, buffer, &std::pair<int, double>::first);
+      return found == distances.end() ? 0 : found->second;
+    };
     for (size_t level = 0; level < price.traffic.behind.size(); ++level) {
       const double room = usable_share * machine_.levels[level].bytes;
       for (const BufferTraffic& traffic : price.traffic.behind[level]) {
-        const bool is_there = distances[traffic.buffer] <= room;
+        const bool is_there = distance_of(traffic.buffer) <= room;
         const double bytes = traffic.bytes - (is_there ? traffic.first_bytes : 0);
         Bytes& all = behind[static_cast<size_t>(traffic.run)][level];
         (traffic.in_parallel ? all.parallel : all.serial) += bytes;

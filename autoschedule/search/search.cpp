@@ -10,8 +10,10 @@ namespace retrograde::planning {
 namespace {
 
 constexpr int sweeps = 2;
+constexpr size_t many_funcs =
+    64;  // of a program: a descent sweeps once, as compiling takes long anyway
 constexpr double worth_another_sweep = 0.98;  // of the time before the last one
-constexpr int moves_of_a_func = 3;            // one after another, in one visit
+constexpr int moves_of_a_func = 2;            // one after another, in one visit
 // A Func with a small share of the whole time is only computed elsewhere; one with less is not visited.
 constexpr double small_share = 0.01, smallest_share = 0.002;
 constexpr int64_t prices_per_func = 200;  // for each plan of the beam
@@ -69,7 +71,8 @@ class Beam {
 
   // The best plans, the fastest first: one more than the width, so that a descent tells what else was good.
   std::vector<State> run() {
-    for (int sweep = 0; sweep < sweeps; ++sweep) {
+    const bool sweeps_once = width_ == 1 && context_.accesses.funcs().size() > many_funcs;
+    for (int sweep = 0; sweep < (sweeps_once ? 1 : sweeps); ++sweep) {
       const double before = states_[0].cost.seconds;
       for (auto f = static_cast<FuncId>(context_.accesses.funcs().size()); f-- > 0;) {
         if (is_worth_visiting(f)) visit(f);

@@ -163,14 +163,16 @@ ChosenSchedule choose_schedule(const std::vector<FuncPtr>& outputs, const Schedu
   PlanSearchOptions options;
   options.spare_bytes = std::max<int64_t>(memory.budget_bytes - memory.bytes, 0);
   if (is_wide) options.width = wide;
+  options.from_rules = is_wide;
   options.what = what;
   const planning::Machine machine =
       is_wide ? search_machine(request.options, target) : machine_of(request);
   try {
     const PlanSearch found =
         search_plans(rules.graph.outputs, outputs, request.options, machine, options);
-    const FoundPlan& best = found.result.found.front();
-    if (!wants_report && !is_clearly_faster(found.result, best)) return rules;
+    const bool has_faster =
+        !found.result.found.empty() && is_clearly_faster(found.result, found.result.found[0]);
+    if (!wants_report && !has_faster) return rules;
     const Choice choice(found, target, request.options.threads);
     if (wants_report) return choice.with_report(rules);
     if (auto taken = choice.taken()) rules.graph.outputs = std::move(*taken);

@@ -22,7 +22,7 @@ struct PlanSearchOptions {
   int width = 1;            // of the beam
   int64_t spare_bytes = 0;  // that may be alive at once beyond those of `scheduled`
   autoschedule::Scheduling what = autoschedule::Scheduling::Everything;
-  bool from_nothing = true;  // searches from a plan without decisions, too
+  bool from_rules = true;  // searches from their schedule, too, not from nothing alone
 };
 
 // The machine that the cost of a search is for: that of the cost model, with the threads of the options.
