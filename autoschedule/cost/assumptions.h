@@ -25,6 +25,9 @@ inline constexpr double function_call_operations = 50;
 // The iterations of a loop that take as long as the consumer of a slice waits for it, after it was computed in one of its
 // loops.
 inline constexpr double slice_iterations = 25;
+// A block of memory whose size is unknown takes as long as so many scalar operations, each time: the heap gives it and
+// takes it back.
+inline constexpr double heap_block_operations = 400;
 // Operands of a loop that need a register for a while.
 inline constexpr double passing_operands = 2;
 // An array of constant indices is kept in registers if it is no larger than so many times all of them. They hold this share

@@ -67,6 +67,7 @@ class BufferFinder {
     }
     result.inside = own->storage_place;
     allocate(result, touch, *own);
+    if (!is_on_stack(result.layout, touch)) result.heap_blocks = touch.components;
     result.register_share = register_share(result, touch);
   }
 
@@ -76,6 +77,17 @@ class BufferFinder {
       if (runs_at_once(node(own.path[k]).kind)) copies *= node(own.path[k]).trips;
     stored.allocated_bytes = stored.layout.elements() * touch.element_bytes * touch.components *
                              std::min(copies, static_cast<double>(machine_.threads));
+  }
+
+  // Lowering bounds the extents of a box that grows with tiles. A box that has all coordinates of a dimension has as many
+  // as a caller asks for, unless there is a bound. Blocks that are too large for the stack take longer to fill than the
+  // heap takes to find them.
+  bool is_on_stack(const Layout& layout, const Touch& touch) const {
+    for (size_t d = 0; d < layout.extents.size(); ++d) {
+      const Extent all = sizes_.of(touch.buffer, d);
+      if (all.high > all.estimate && layout.extents[d] >= known_extent(all)) return false;
+    }
+    return true;
   }
 
   // A small array becomes registers if its indices are constants, and its vectors are loaded as they were stored: no loop

@@ -60,6 +60,7 @@ struct StoredBuffer {
       0;  // loops of a path around the allocation: its elements are used again in each iteration
   double register_share = 0;   // the part of it that registers hold
   double allocated_bytes = 0;  // in one group at once, for all threads
+  double heap_blocks = 0;      // that are allocated in each iteration of the loop around them
 };
 
 struct Group {

@@ -118,6 +118,7 @@ class CostModel::Prices {
     cost.stage = run.id;
     const LoopNode& innermost = group.nodes[static_cast<size_t>(run.path.back())];
     cost.compute_seconds = work_of(run, group, machine_).all() / innermost.speedup * ns;
+    if (run.id.stage == 0) cost.compute_seconds += heap_seconds(run, group);
     for (const int n : run.path) {
       const LoopNode& node = group.nodes[static_cast<size_t>(n)];
       if (node.loop.stage != run.id || !runs_at_once(node.kind) || node.trips <= 1) continue;
@@ -125,6 +126,13 @@ class CostModel::Prices {
       cost.launch_seconds += outer.times / outer.speedup * machine_.launch_ns * ns;
     }
     return cost;
+  }
+
+  double heap_seconds(const StageRun& run, const Group& group) const {
+    const LoopNode& around = group.nodes[static_cast<size_t>(run.path[run.storage_place - 1])];
+    const StoredBuffer* stored = ir::find_or_null(group.buffers, run.id.func);
+    const double blocks = stored ? stored->heap_blocks * around.times : 0;
+    return blocks * heap_block_operations * machine_.scalar_ns / around.speedup * ns;
   }
 
   // ---- memory ----

@@ -57,6 +57,8 @@ class Facts {
   // The tightest constant bounds found for a sum of an index type. See bounds_of_sums.cpp.
   int64_t upper_bound(const Sum& sum);
   int64_t lower_bound(const Sum& sum);
+  // The same, and it multiplies the sum by divisors to compare quotients of different sums. Takes longer.
+  int64_t upper_bound_of_quotients(const Sum& sum);
   // Drops the memoised ranges; call it when variables or conditions change.
   void forget() {
     ranges_.clear();
@@ -105,12 +107,17 @@ class Facts {
   Congruence congruence_of_node(const Expr& e);
   Congruence congruence_of_variable(const Variable& n);
 
-  int64_t search(const Sum& sum, int& budget);
+  // How many more replacements a search may make, and whether it multiplies sums by divisors.
+  struct Effort {
+    int replacements;
+    bool multiplies;
+  };
+  int64_t search(const Sum& sum, Effort& effort);
   int64_t bound_by_ranges(const Sum& sum);
-  int64_t replace(const Sum& sum, const Term& term, const Expr& by, int& budget);
-  int64_t eliminate_structure(const Sum& sum, int& budget);
-  int64_t eliminate_division(const Sum& sum, const Term& term, const Div& n, int& budget);
-  int64_t eliminate_variable(const Sum& sum, int& budget);
+  int64_t replace(const Sum& sum, const Term& term, const Expr& by, Effort& effort);
+  int64_t eliminate_structure(const Sum& sum, Effort& effort);
+  int64_t eliminate_division(const Sum& sum, const Term& term, const Div& n, Effort& effort);
+  int64_t eliminate_variable(const Sum& sum, Effort& effort);
 
   std::unordered_map<std::string, Bounds> variables_;
   std::vector<Known> known_;

@@ -4,6 +4,7 @@
 #include "ir/print.h"
 #include "ir/visit.h"
 #include "simplify/cse.h"
+#include "simplify/facts.h"
 #include "simplify/simplify.h"
 #include "support/evaluate.h"
 #include "support/random_ir.h"
@@ -167,6 +168,51 @@ TEST(SimplifyRandom, KeepsExpressionsWithinGivenBounds) {
           << "\nat:     " << shown(values);
     }
   }
+}
+
+Expr random_linear(RandomIr& random) {
+  return simplification::simplify(ir::variable("x") * (random.below(9) - 4) +
+                                  ir::variable("y") * (random.below(9) - 4));
+}
+// One end of a box of the last of several Funcs, each of which is read at quotients of the next one's coordinate, with
+// borders now and then.
+Expr random_end(RandomIr& random, Expr at, const std::vector<int>& divisors) {
+  for (const int divisor : divisors) {
+    at = (at + (random.below(40) - 20)) / divisor;
+    if (random.chance(30)) {
+      const Expr border = random_linear(random);
+      at = random.chance(50) ? min(at, border) : max(at, border);
+    }
+  }
+  return at;
+}
+
+// z runs over some values from a quotient on.
+TEST(FactsRandom, DifferencesOfQuotientsStayBelowTheirBounds) {
+  int bounded = 0;
+  for (uint32_t seed = 0; seed < 4000; ++seed) {
+    RandomIr random(seed);
+    const Expr first = simplification::simplify(random_end(random, random_linear(random), {8}));
+    const int extent = 1 + random.below(9);
+    std::vector<int> divisors;
+    for (int n = 1 + random.below(3); n > 0; --n) divisors.push_back(random.pick<int>({2, 3, 4}));
+    const Expr at = random_linear(random) + ir::variable("z") * random.below(3);
+    const Expr size = simplification::simplify(random_end(random, at, divisors) -
+                                               random_end(random, at, divisors));
+    simplification::Facts facts;
+    facts.bind("z", first, simplification::simplify(first + (extent - 1)));
+    const int64_t bound = facts.upper_bound_of_quotients(ir::sum_of(size));
+    bounded += bound < 1000;
+    for (int i = 0; i < 40; ++i) {
+      std::map<std::string, Scalar> values;
+      for (const char* name : {"x", "y"})
+        values[name] = Scalar::of_int(Int(32), random.below(200) - 100);
+      values["z"] = Scalar::of_int(Int(32), Evaluator(values)(first)[0].i + random.below(extent));
+      ASSERT_LE(Evaluator(values)(size)[0].i, bound) << "seed " << seed << ": " << size << "\n"
+                                                     << shown(values);
+    }
+  }
+  EXPECT_GT(bounded, 2000);
 }
 
 TEST(SimplifyRandom, IsStable) {

@@ -7,7 +7,8 @@
 //   }                                                }
 //
 // Storage of constant size is on the stack, which costs nothing. The last tile of a split computes less than the
-// others, and its varying size would otherwise put the storage of all tiles on the heap.
+// others, and its varying size would otherwise put the storage of all tiles on the heap. So would the size of a box
+// whose ends are quotients, as (min + 1) / 2 - min / 2 + 10, which is 11 at most.
 //
 // Method: constant upper bounds of sizes, as for loops (bounded_extents.h), for sizes that mention few names.
 // Not done: storage that is scheduled on the heap or a device; kernels, whose storage is already placed.

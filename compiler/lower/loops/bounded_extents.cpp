@@ -6,6 +6,7 @@
 #include "ir/equal.h"
 #include "ir/markers.h"
 #include "lower/expand_lets_in_scope.h"
+#include "simplify/constant_range.h"
 #include "simplify/simplify.h"
 
 namespace retrograde::lower {
@@ -32,9 +33,25 @@ Expr with_decided_selects(const Expr& e, const Expr& condition, bool value) {
   }));
 }
 
+// An upper bound of an extent, or of a size: sums and products of extents that are converted to 64 bits.
+int64_t bound_without_choices(const Expr& e, Facts& facts) {
+  const int64_t bound = facts.range(e).max;
+  const auto bound_of_part = [&](const Expr& part) { return bound_without_choices(part, facts); };
+  const auto* cast = e.as<Cast>();
+  if (cast && cast->value.type() == Int(32) && e.type() == Int(64))
+    return std::min(bound, bound_of_part(cast->value));
+  const auto* n = e.type() == Int(64) ? e.as<Binary>() : nullptr;
+  if (n && n->kind == Kind::Add)
+    return std::min(bound, add_ends(bound_of_part(n->a), bound_of_part(n->b)));
+  if (n && n->kind == Kind::Mul && facts.range(n->a).min >= 0 && facts.range(n->b).min >= 0)
+    return std::min(bound, saturate(__int128{bound_of_part(n->a)} * bound_of_part(n->b)));
+  if (is_const(e) || !is_index_type(e.type())) return bound;
+  return std::min(bound, facts.upper_bound_of_quotients(sum_of(e)));
+}
+
 int64_t bound_of(const Expr& e, Facts& facts, int choices) {
   const Expr choice = choices > 0 ? find_select(e) : Expr();
-  if (!choice.defined()) return std::min(facts.range(e).max, facts.upper_bound(sum_of(e)));
+  if (!choice.defined()) return bound_without_choices(e, facts);
   const Expr condition = choice.as<Select>()->condition;
   const auto arm = [&](bool value) {
     const Facts::Assumption holds(facts, simplify(value ? condition : logical_not(condition)));

@@ -135,6 +135,28 @@ TEST_F(CostProbes, AWindowStaysForIterationsThatNeedNoNewRow) {
   EXPECT_LT(window.bytes.back(), 1.1 * strips.bytes.back());
 }
 
+TEST_F(CostProbes, RowsOfAnyLengthComeFromTheHeap) {
+  const auto seconds_of = [&](bool is_bounded, bool is_pair, const std::string& place) {
+    Func doubled("doubled"), sum("sum");
+    const Expr value = in(x, y) * 2;
+    doubled(x, y) = is_pair ? Tuple(value, value) : Tuple(value);
+    sum(x, y) = Expr(doubled(x, y)[0]) + (is_pair ? Expr(doubled(x, y)[1]) : Expr(0.0f));
+    sum.set_estimate(x, 0, 512).set_estimate(y, 0, 2048);
+    if (is_bounded) sum.bound(x, 0, 512);
+    return priced(sum, "sum  root  y, x:16, vector x\ndoubled  at sum/" + place +
+                           "  y, x:16, vector x\n")
+        .stages[0]
+        .compute_seconds;
+  };
+  // An allocation takes 400 scalar operations of 0.12 ns.
+  const double block = 400 * 0.12e-9;
+  EXPECT_NEAR(seconds_of(false, false, "y") - seconds_of(true, false, "y"), rows * block,
+              0.1 * micro);
+  EXPECT_NEAR(seconds_of(false, true, "y") - seconds_of(true, true, "y"), 2 * rows * block,
+              0.1 * micro);
+  EXPECT_EQ(seconds_of(false, false, "x:16"), seconds_of(true, false, "x:16")) << "on the stack";
+}
+
 // Rows that all together exceed the first cache.
 TEST_F(CostProbes, BlocksOfAProducerLeaveAllOfItBehind) {
   rows_sum(x, y) = in(x, y) + in(x, y + 1);

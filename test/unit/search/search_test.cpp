@@ -131,7 +131,7 @@ TEST_F(SearchTest, FuncsWithASmallShareAreOnlyComputedElsewhere) {
   table(x, y) = sin(cast<float>(x + y));
   few(x, y) = table(x, y) * 2;
   many(x, y) = exp(sin(cast<float>(x)) * cast<float>(y)) + exp(few(x, y / 200) * cast<float>(y));
-  many.set_estimates({{0, 1600}, {0, 1600}});
+  many.set_estimates({{0, 1600}, {0, 1600}}).bound(x, 0, 1600);
   table.compute_root();
   few.compute_root();
   many.compute_root().parallel(y).vectorize(x, 16);
