@@ -11,6 +11,8 @@ namespace retrograde::planning {
 inline constexpr double not_overlapped = 0.25;
 // The part of a cache that a loop may fill: other data take the rest, or share sets with it.
 inline constexpr double usable_share = 0.8;
+// Data that exceed a cache by this factor find nothing of the last pass in it.
+inline constexpr double most_excess = 4;
 // How often a condition on data holds.
 inline constexpr double taken_branches = 0.5;
 // A coordinate that is a sum of an iterator and values from memory moves with the iterator; the values displace it by so

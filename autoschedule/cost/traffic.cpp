@@ -26,6 +26,7 @@ struct Region {
   bool is_stored = false;
   // Lines that nothing fetches ahead, and of these, those that begin a page.
   double far_lines = 0, far_pages = 0;
+  double late_lines = 0;       // that were not on their way when a core's second cache lacked them
   double revisited_lines = 0;  // that are stored to again, after the lines of all other streams
   // Lines that are stored are loaded before.
   double moved_bytes() const { return bytes * (is_stored ? 2 : 1); }
@@ -108,8 +109,9 @@ class RegionFinder {
       const Streams& streams = streams_[r][t];
       if (touch.writes) region.revisited_lines = bytes / line_bytes * (1 - 1 / streams.visits);
       if (streams.count > prefetched_streams) {
-        const double far = bytes / line_bytes / streams.lines;
+        const double all = bytes / line_bytes, far = all / streams.lines;
         region.far_lines = std::max(region.far_lines, far);
+        region.late_lines = std::max(region.late_lines, std::min(all, unnoticed_lines * far));
         if (streams.count > remembered_pages) region.far_pages = std::max(region.far_pages, far);
       }
       for (size_t c = 0; c < set_strides.size(); ++c) {
@@ -124,6 +126,7 @@ class RegionFinder {
       all.is_stored = all.is_stored || region.is_stored;
       all.far_lines = std::max(all.far_lines, region.far_lines);
       all.far_pages = std::max(all.far_pages, region.far_pages);
+      all.late_lines = std::max(all.late_lines, region.late_lines);
       all.revisited_lines = std::max(all.revisited_lines, region.revisited_lines);
       for (size_t c = 0; c < set_strides.size(); ++c)
         all.by_sets[c] = std::max(all.by_sets[c], region.by_sets[c]);
@@ -189,6 +192,17 @@ class TrafficWalk {
     return bytes_of(regions) <= room && have_sets(regions);
   }
 
+  // The share of lines that are gone when they are used again after all others. A cache that forgets the line of the
+  // longest wait would lose all of them; caches protect themselves, about as if they forgot any line: if each use loses
+  // the share m, a line survives the m x bytes / line_bytes others that are loaded with probability exp(-m x bytes / room).
+  double lost_share(const Regions& regions, double room) const {
+    const double excess = bytes_of(regions) / room;
+    if (!have_sets(regions) || excess > most_excess) return 1;
+    double lost = 1;
+    for (int i = 0; i < 40; ++i) lost = 1 - std::exp(-lost * excess);
+    return lost;
+  }
+
   void visit(int n, double times) {
     const LoopNode& node = group_.nodes[static_cast<size_t>(n)];
     const bool outside =
@@ -197,7 +211,13 @@ class TrafficWalk {
     if (fit(regions_.run(n), room(!outside)) ||
         (is_loop && fit(regions_.iteration(n), room(node.in_parallel))))
       return load(regions_.run(n), times * std::min(1.0, node.trips), n);
-    times *= node.trips;
+    const double kept = is_loop ? 1 - lost_share(regions_.iteration(n), room(node.in_parallel)) : 0;
+    if (kept > 0) {
+      const RecentBuffers before = recent_;
+      load(regions_.run(n), times * kept, n);
+      recent_ = before;
+    }
+    times *= node.trips * (1 - kept);
     for (const int child : node.children) visit(child, times);
     if (!node.stages.empty()) load(regions_.own(n), times, n);
     // All iterations have passed, not only those that were looked at.
@@ -206,7 +226,7 @@ class TrafficWalk {
 
   // `are_evicted`: lines are before they are touched again.
   double waiting_ns(const Region& region, bool are_evicted) const {
-    double ns = region.far_lines * far_line_ns[level_];
+    double ns = (level_ == 0 ? region.far_lines : region.late_lines) * far_line_ns[level_];
     if (level_ == 0) ns += region.far_pages * page_walk_ns;
     if (level_ == 0 && are_evicted) ns += region.revisited_lines * evicted_store_ns;
     return ns;

@@ -227,13 +227,15 @@ class StageWork {
       add_chain(copies(touch.moved, false) * m_.latency_ns, from);
     }
   }
-  // Partial results of lanes are combined after the loops of the reduction: those of a register in halves.
+  // Partial results of lanes are combined after the loops of the reduction: the registers, and then the halves of one. A
+  // shuffle and a sum of a half as many lanes take half as long.
   void add_end_of_lanes(const Touch& touch) {
     if (lanes_.iterator < 0 || is_vector(touch.moved)) return;
     const double registers = vectors(touch.element_bytes, lanes_.moves);
-    const double halves = std::log2(std::max(1.0, lanes_.count / registers));
+    const double halves = 2 - 2 / std::max(1.0, lanes_.count / registers);
     const double count = touch.count * times(touch.moved);
-    units_.arithmetic += count * (registers - 1 + 2 * halves) * m_.shuffle_ns;
+    units_.arithmetic +=
+        count * ((registers - 1) * m_.operation_ns + halves * (m_.shuffle_ns + m_.operation_ns));
   }
   // Whether lanes that lie apart compete for a few sets of the first cache, so that their lines are gone from one
   // iteration to the next.

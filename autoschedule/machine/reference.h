@@ -34,6 +34,8 @@ inline constexpr int64_t second_cache_set_stride = 32 << 10;
 inline constexpr int64_t first_cache_ways = 16;
 // The streams of addresses that a core fetches ahead of their use, rounded up.
 inline constexpr int64_t prefetched_streams = 32;
+// The first lines of a stream: the second cache fetches ahead once it has noticed that it is one.
+inline constexpr double unnoticed_lines = 2;
 // The next line of a stream begins at most this far behind its last one.
 inline constexpr double near_bytes = 512;
 // Nanoseconds of waiting for a line that nothing fetched ahead, beside the time of moving it: if the first cache lacks it,

@@ -110,6 +110,13 @@ KnownValue product_of(const KnownValue& a, const KnownValue& b) {
 
 bool is_integer(const Expr& e) { return !e.type().is_float(); }
 
+// Whether the lanes of an index that is divided or wrapped have a form: a period ends with each vector, or holds all of it.
+bool are_in_periods(const Lanes& lanes, double period) {
+  const double step = std::abs(lanes.step), all = step * lanes.inner;
+  return all == 0 || std::fmod(step, period) == 0 || std::fmod(all, period) == 0 ||
+         std::fmod(period, all) == 0;
+}
+
 KnownValue quotient_of(const KnownValue& a, const KnownValue& b, bool whole) {
   if (b.at == 0) return constant(0);
   const auto divided = [&](double x) {
@@ -122,7 +129,10 @@ KnownValue quotient_of(const KnownValue& a, const KnownValue& b, bool whole) {
   result.high = std::max(divided(a.low), divided(a.high));
   result.slopes = combined(a, 1 / b.at, b, 0);
   result.lanes = b.lanes.is_uniform() ? scaled(a.lanes, 1 / b.at) : any_lanes(a.lanes, b.lanes);
-  if (whole && !result.lanes.is_uniform()) result.lanes.bent = true;
+  if (whole && !result.lanes.is_uniform()) {
+    result.lanes.bent = true;
+    if (!are_in_periods(a.lanes, std::abs(b.at))) result.lanes.any = true;
+  }
   return result;
 }
 
@@ -137,7 +147,10 @@ KnownValue remainder_of(const KnownValue& a, const KnownValue& b) {
   result.high = stays ? rest(a.high) : period - 1;
   for (double& slope : result.slopes)
     if (rest(slope) == 0) slope = 0;
-  if (!a.lanes.is_uniform() && !stays) result.lanes.bent = true;
+  if (!a.lanes.is_uniform() && !stays) {
+    result.lanes.bent = true;
+    if (!are_in_periods(a.lanes, period)) result.lanes.any = true;
+  }
   return result;
 }
 

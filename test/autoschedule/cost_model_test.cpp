@@ -89,6 +89,24 @@ TEST(CostModel, PlacesThatDataDecideAreGatheredLaneByLane) {
   EXPECT_EQ(work.loads, 16);
 }
 
+// The lanes of such a vector are a period of the index, or all of them are in one.
+TEST(CostModel, DividedPlacesAreGatheredUnlessTheyDivideEvenly) {
+  const auto gathered = [](auto index) {
+    ImageParam in(Float(32), 1);
+    Func f;
+    Var x;
+    f(x) = in(index(x));
+    f.vectorize(x, 16);
+    return counted(f, {256}).total().gather_lanes;
+  };
+  EXPECT_EQ(gathered([](Expr x) { return x / 2; }), 0);
+  EXPECT_EQ(gathered([](Expr x) { return x % 4; }), 0);
+  EXPECT_EQ(gathered([](Expr x) { return x % 512; }), 0);
+  EXPECT_EQ(gathered([](Expr x) { return x / 3; }), 256);
+  EXPECT_EQ(gathered([](Expr x) { return 2 * x / 3; }), 256);
+  EXPECT_EQ(gathered([](Expr x) { return x % 20; }), 256);
+}
+
 TEST(CostModel, AScatterThatIsNotVectorizedIsOfScalars) {
   ImageParam places(Int(32), 1);
   Func f;
