@@ -39,6 +39,8 @@ inline constexpr double largest_register_array = 4, operand_share = 0.8;
 inline constexpr double remainder_overhead = 1.1;
 // The reads that inlining may give a stage; beyond them its cost is a lower bound.
 inline constexpr size_t most_composed_reads = 2000;
+// Two half vectors are widened, and their lanes put in turn.
+inline constexpr double interleave_shuffles = 3;
 // An access beyond this stride is an element at a time.
 inline constexpr double longest_vector_stride = 4;
 

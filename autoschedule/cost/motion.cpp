@@ -46,10 +46,14 @@ void Motions::note(const Access& access, Scope& scope) {
   for (const IndexForm& form : access.index) {
     for (const auto& [value, coefficient, range, expr] : form.opaque) {
       if (!expr.defined() || by_number_.contains(value.number)) continue;
-      const Motion all = of(without_lets(expr), scope);
-      by_number_[value.number] = {all.is_table, ir::mapped(value.iterators, [&](int16_t i) {
-                                    return all.slopes[static_cast<size_t>(i)];
-                                  })};
+      const Expr index = without_lets(expr);
+      const Motion all = of(index, scope);
+      Motion& motion = by_number_[value.number];
+      motion.is_table = all.is_table;
+      motion.slopes = ir::mapped(value.iterators,
+                                 [&](int16_t i) { return all.slopes[static_cast<size_t>(i)]; });
+      if (index.kind() == Kind::Mod)
+        motion.period = std::max(0.0, constant_or_unknown(index.as<Binary>()->b));
     }
   }
 }

@@ -17,6 +17,7 @@ namespace retrograde::planning {
 struct Motion {
   bool is_table = false;       // values from an array of integers
   std::vector<double> slopes;  // by iterator; NaN: unknown
+  double period = 0;           // of a remainder, such as (x + 1) % 2: it wraps there; 0: nowhere
 };
 
 class Motions {

@@ -34,7 +34,8 @@ struct Span {
 Span span_of(const TouchedSide& side, const Cover& cover) {
   Span span{side.taps, side.reach};
   for (const TouchedSide::Move& move : side.moves) {
-    const double count = points_in(cover, move.iterator), step = std::abs(move.slope);
+    const double points = points_in(cover, move.iterator), step = std::abs(move.slope);
+    const double count = move.period > 0 ? std::min(points, move.period) : points;
     if (count <= 1) continue;
     const bool joins = span.is_dense() && step <= span.reach;
     span.reach += step * (count - 1);
@@ -127,10 +128,18 @@ namespace {
 // Where the lanes of a divided or wrapped index lie. Vectors have a form if a period of the index ends with each of them,
 // or holds all of it: x / 2, x / 16 and x % 32 do with 16 lanes, but x / 3 and x % 20 do not.
 enum class Bend { None, EachVector, Anywhere };
-Bend bend_of(const TouchedSide& side, double slope, const LaneLoop& lanes) {
-  const auto divides = [](double a, double b) { return std::fmod(b, a) == 0; };
-  const double step = std::abs(slope * lanes.step), all = step * lanes.inner;
-  const double quotient = all / side.divisor;
+bool divides(double a, double b) { return std::fmod(b, a) == 0; }
+// Whether an index that wraps is back where it was from each lane to the next.
+bool wraps_to_itself(const TouchedSide& side, const TouchedSide::Move& move,
+                     const LaneLoop& lanes) {
+  if (move.period > 0) return divides(move.period, lanes.step);
+  return side.modulus > 0 && divides(side.modulus * side.divisor, move.slope * lanes.step);
+}
+Bend bend_of(const TouchedSide& side, const TouchedSide::Move& move, const LaneLoop& lanes) {
+  const double step = std::abs(move.slope * lanes.step), all = step * lanes.inner;
+  const double quotient = all / side.divisor, points = lanes.step * lanes.inner;
+  if (move.period > 0 && !divides(points, move.period))
+    return divides(move.period, points) ? Bend::EachVector : Bend::Anywhere;
   if (side.modulus != 0 && !divides(side.modulus, quotient) && !divides(quotient, side.modulus))
     return Bend::Anywhere;
   if (divides(side.divisor, step)) return Bend::None;
@@ -146,28 +155,26 @@ LaneMoves lane_moves(const Touch& touch, const Layout& layout, const LaneLoop& l
   if ((touch.moved & lanes.moves) == 0) return result;
   result.is_by_lane = (touch.data & lanes.moves) != 0;
   double row = 1, stride = 0, outer_stride = 0;
-  bool is_bent = false;
   for (const int16_t dimension : layout.order) {
     const TouchedSide& side = touch.sides[static_cast<size_t>(dimension)];
     for (const TouchedSide::Move& move : side.moves) {
       const double slope = move.slope / side.divisor * row;
       if (move.iterator == lanes.outer) outer_stride += slope;
-      if (move.iterator != lanes.iterator) continue;
+      if (move.iterator != lanes.iterator || wraps_to_itself(side, move, lanes)) continue;
       if (side.is_clamped) {  // the first and the last block of a row
         const double points = std::max(lanes.block, lanes.inner * lanes.step);
         const double reach = points * std::abs(move.slope) / side.divisor;
         result.border_share = std::max(result.border_share, std::min(1.0, 2 * reach / side.most));
       }
-      const Bend bend = bend_of(side, move.slope, lanes);
-      is_bent = is_bent || bend != Bend::None;
+      const Bend bend = bend_of(side, move, lanes);
+      result.is_bent = result.is_bent || bend != Bend::None;
       result.is_by_lane = result.is_by_lane || bend == Bend::Anywhere;
       stride += slope * lanes.step;
     }
     row *= layout.extents[static_cast<size_t>(dimension)];
   }
-  if (is_bent) {  // neighbours share elements
+  if (result.is_bent) {  // neighbours share elements
     result.vectors = 2 * vectors;
-    result.shuffles = vectors;
   } else if (std::abs(stride) == 1) {  // runs that lie apart are put together
     const TouchedSide& rows = touch.sides[static_cast<size_t>(layout.order[0])];
     const bool is_joined = lanes.outer < 0 || outer_stride == stride * lanes.inner;
@@ -232,9 +239,12 @@ class TouchReader {
     IndexForm free = access.index[d];
     if (!free.clamped) return false;
     const ir::ConstantRange within = sizes_.range(free.within);
+    // It may be clamped at one end alone.
+    const bool is_known = within.has_lower_bound() == free.within.has_lower_bound() &&
+                          within.has_upper_bound() == free.within.has_upper_bound();
     free.within = {};
     free.expr = {};
-    return !within.is_bounded() || !sizes_.range(free, access.by).is_within(within);
+    return !is_known || !sizes_.range(free, access.by).is_within(within);
   }
 
   TouchedSide side_of(const std::vector<const Access*>& accesses, size_t d) const {
@@ -266,10 +276,28 @@ class TouchReader {
     return side;
   }
 
+  // Points after which a remainder begins again.
+  static double period_of(const Motion& motion, double slope) {
+    return motion.period / double(std::gcd(int64_t(motion.period), int64_t(slope)));
+  }
+  static bool is_remainder(const OpaqueTerm& term, const Motion* motion) {
+    return !term.value.from_data && motion && motion->period > 0 &&
+           std::ranges::all_of(motion->slopes, [](double s) { return s == std::floor(s); });
+  }
+
   void add_opaque(TouchedSide& side, const OpaqueTerm& term) const {
     if (term.value.iterators.empty()) return;
-    side.data |= term.value.depends();
     const Motion* motion = motions_.of(term.value);
+    if (is_remainder(term, motion)) {
+      for (size_t i = 0; i < term.value.iterators.size(); ++i) {
+        const double slope = motion->slopes[i];
+        if (slope != 0)
+          side.moves.push_back({term.value.iterators[i], slope * double(term.coefficient),
+                                period_of(*motion, slope)});
+      }
+      return;
+    }
+    side.data |= term.value.depends();
     side.is_displaced = !motion || !motion->is_table;
     if (!side.is_displaced) return;
     for (size_t i = 0; i < term.value.iterators.size(); ++i) {

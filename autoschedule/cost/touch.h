@@ -16,7 +16,8 @@ namespace retrograde::planning {
 struct TouchedSide {
   struct Move {
     int16_t iterator;
-    double slope;  // elements from one point to the next
+    double slope;       // elements from one point to the next
+    double period = 0;  // points after which it begins again; 0: never
     bool operator==(const Move&) const = default;
   };
   double taps = 1, reach = 1;  // of one iteration: elements, and from the first to the last
@@ -65,6 +66,7 @@ struct LaneLoop {
 struct LaneMoves {
   double vectors = 1, shuffles = 0;
   bool is_by_lane = false;    // an element at a time
+  bool is_bent = false;       // lanes are in another order than elements: they are computed apart
   bool is_unaligned = false;  // vectors begin anywhere in a cache line
   double border_share = 0;    // of vectors, whose lanes are clamped one by one
 };

@@ -45,6 +45,7 @@ class StageWork {
     for (const Touch& touch : run_.facts->touches) {
       if (!is_loaded_before(touch)) add_touch(touch);
     }
+    add_interleaving();
     add_spills();
     add_chains();
     const double taken = run_.facts->taken;
@@ -65,6 +66,7 @@ class StageWork {
   UnitTimes units_;
   double accumulators_ = 0, invariants_ = 0;       // registers of the innermost serial loop
   double instructions_ = 0;                        // of all iterations
+  double bent_ = 0;                                // vectors whose lanes are computed in parts
   std::vector<std::pair<double, double>> chains_;  // nanoseconds, and how many independent ones
 
   size_t depth() const { return run_.nest.trips.size(); }
@@ -178,9 +180,18 @@ class StageWork {
     (touch.writes ? units : units_.arithmetic) +=
         count * by_lane * (moved.is_by_lane ? 1 : moved.border_share);
     if (moved.is_by_lane) return;
+    if (moved.is_bent) bent_ = std::max(bent_, vectors(touch.element_bytes, touch.moved));
     const double crossing = moved.is_unaligned ? 1 + m_.vector_bytes / double(line_bytes) : 1;
     units += count * moved.vectors * crossing * (touch.writes ? m_.store_ns : m_.load_ns);
     units_.arithmetic += count * moved.shuffles * m_.shuffle_ns;
+  }
+
+  // Lowering computes every other lane by itself where an index is divided or wraps, and interleaves the results, even
+  // those of copies that share the operand.
+  void add_interleaving() {
+    IteratorSet moved = 0;
+    for (const Touch& touch : run_.facts->touches) moved |= touch.moved;
+    units_.arithmetic += times(moved) * bent_ * interleave_shuffles * m_.shuffle_ns;
   }
 
   // Elements that the innermost loop does not move stay in registers.
@@ -195,11 +206,14 @@ class StageWork {
     else if (!touch.writes && touch.data == 0)
       invariants_ += needed;
   }
+  // Lowering keeps sums in registers if there is room for all of them (compiler/lower/loops/keep_accumulators.cpp).
+  // Otherwise, it leaves all of them in memory.
   void add_spills() {
-    const double excess = accumulators_ + invariants_ + passing_operands - m_.registers;
-    if (excess <= 0) return;
-    const double sums = std::min(excess, accumulators_);
-    units_.loads += iterations() * std::min(excess, accumulators_ + invariants_) * m_.load_ns;
+    const bool are_kept = accumulators_ <= m_.registers;
+    const double kept = (are_kept ? accumulators_ : 0) + invariants_;
+    const double excess = std::clamp(kept + passing_operands - m_.registers, 0.0, kept);
+    const double sums = are_kept ? std::min(excess, accumulators_) : accumulators_;
+    units_.loads += iterations() * (are_kept ? excess : excess + sums) * m_.load_ns;
     units_.stores += iterations() * sums * m_.store_ns;
   }
 

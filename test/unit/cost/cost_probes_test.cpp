@@ -334,6 +334,56 @@ TEST_F(CostProbes, ABorderIsABlock) {
   EXPECT_NEAR(loops / vectors, 1, 0.05);
 }
 
+// A transposed convolution of stride 2: the lanes of a phase of x share a weight, and load neighbours. Without phases, each
+// copy of a tile mixes the products of its even and odd lanes.
+TEST_F(CostProbes, PhasesSpareInterleavedProducts) {
+  const auto ns_of = [&](const std::string& outer, const std::string& lanes, bool is_scaled) {
+    RDom r(0, 64, 0, 2, "r");
+    const Expr at = is_scaled ? (x + 1) / 2 - r.y : x - r.y;
+    const Expr tap = is_scaled ? r.y * 2 + (x + 1) % 2 : r.y;
+    Func sum("sum");
+    sum(x, c) += in(at, r.x) * other(tap, c);
+    sum.set_estimate(x, 0, 4096).set_estimate(c, 0, 4);
+    const Cost cost = priced(sum, "sum  root\n  .0  c, x:16, vector x\n  .1  " + outer +
+                                      ", r.x, r.y, unroll c, " + lanes + "\n");
+    return 1e9 * cost.stages[1].compute_seconds / (columns / 16 * 4 * 64 * 2);
+  };
+  const double plain = ns_of("x:16", "vector x", false);
+  const double phases = ns_of("x:32", "unroll x%2, vector x:2", true);
+  EXPECT_LT(phases, 1.5 * plain);
+  EXPECT_LT(phases, 0.8);
+  EXPECT_GT(ns_of("x:16", "vector x", true), 3 * 0.45);
+}
+
+// Loops that end where the clamp does cross no border, whether it has one end or two.
+TEST_F(CostProbes, AClampThatNoPointReachesIsFree) {
+  const auto seconds_of = [&](const Expr& column) {
+    Func copy("copy");
+    copy(x, y) = in(column, y);
+    copy.bound(x, 0, 4096).set_estimate(y, 0, 2048);
+    return compute_seconds(priced(copy, "copy  root  y, x:16, vector x\n"));
+  };
+  const double plain = seconds_of(x);
+  EXPECT_NEAR(seconds_of(min(x, 4095)), plain, 0.01 * plain);
+  EXPECT_NEAR(seconds_of(clamp(x, 0, 4095)), plain, 0.01 * plain);
+  EXPECT_GT(seconds_of(min(x, 4094)), 1.01 * plain);
+}
+
+// 48 sums exceed 32 registers: each iteration loads and stores all of them. Of 32, it does the two that operands displace.
+TEST_F(CostProbes, SumsBeyondTheRegistersStayInMemory) {
+  const auto ns_of = [&](const std::string& height) {
+    RDom r(0, 1024, "r");
+    Func sum("sum");
+    sum(x, y) += in(x, r) * other(y, r);
+    sum.bound(x, 0, 4096).bound(y, 0, 48);
+    const Cost cost = priced(sum, "sum  root\n  .0  y, x:16, vector x\n  .1  y:" + height +
+                                      ", x:64, r.x, unroll y, unroll x:16, vector x\n");
+    return 1e9 * cost.stages[1].compute_seconds / (columns * 48 / 16 * 1024);
+  };
+  EXPECT_GT(ns_of("12"), 0.35) << "a store for each sum";
+  EXPECT_LT(ns_of("8"), 0.35);
+}
+
 TEST_F(CostProbes, WhatALoopDoesNotChangeIsComputedOutsideOfIt) {
   out(x, y) = in(x, y) + exp(other(0, y));
   const double once = compute_seconds(cost_of("out  root  y, x:16, vector x\n"));
