@@ -85,6 +85,7 @@ struct OperationCount {
   Type type;                // of the operands of a comparison; of the result otherwise
   IteratorSet depends = 0;  // the loops that change the value; it is invariant in all others
   int count = 0;
+  bool in_arm = false;  // all its uses are in arms of selects that one condition decides
 };
 
 struct StageNode {

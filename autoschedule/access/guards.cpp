@@ -98,9 +98,7 @@ class GuardedCalls {
     for (const Expr& root : roots) reach(root, 0);
     for (auto e = order_.rbegin(); e != order_.rend(); ++e) pass_on(*e);
     for (const Expr& e : order_) {
-      const auto* call = e.as<Call>();
-      if (call && (call->call_type == CallType::Func || call->call_type == CallType::Image))
-        on_call(*call, guard(around_.at(e.get())));
+      if (const auto* call = e.as<Call>()) on_call(*call, guard(around_.at(e.get())));
     }
   }
 

@@ -72,7 +72,7 @@ StageNode StageReader::read() {
   std::vector<Expr> roots = args_;
   ir::append(roots, stored_);
   for_each_guarded_call(roots, values_, nodes_,
-                        [&](const Call& call, const Guard& guard) { read_access(call, guard); });
+                        [&](const Call& call, const Guard& guard) { read_call(call, guard); });
   node.reads = std::move(reads_);
   if (f_.is_extern()) read_extern(node);
   count_operations(node);
@@ -97,6 +97,14 @@ Value StageReader::place_of(const std::vector<IndexForm>& index) {
     }
   }
   return places.empty() ? Value() : numbers_.combine(std::move(what), pointers_to(places));
+}
+
+void StageReader::read_call(const Call& call, const Guard& guard) {
+  const bool is_access = call.call_type == CallType::Func || call.call_type == CallType::Image;
+  if (is_access)
+    read_access(call, guard);
+  else if (!guard.others.empty())
+    in_arms_.insert(&call);
 }
 
 void StageReader::read_access(const Call& call, const Guard& guard) {
@@ -158,10 +166,12 @@ void StageReader::count_operations(StageNode& node) {
     for (const OpaqueTerm& term : form.opaque)
       if (term.expr.defined()) count(term.expr);
   }
-  std::map<std::tuple<std::string, Type, IteratorSet>, int> rows;
-  for (const auto& [value, one] : counted_) ++rows[{one.name, one.type, one.depends}];
-  for (const auto& [row, count] : rows)
-    node.operations.push_back({std::get<0>(row), std::get<1>(row), std::get<2>(row), count});
+  std::map<std::tuple<std::string, Type, IteratorSet, bool>, int> rows;
+  for (const auto& [value, one] : counted_) ++rows[{one.name, one.type, one.depends, one.in_arm}];
+  for (const auto& [row, count] : rows) {
+    const auto& [name, type, depends, in_arm] = row;
+    node.operations.push_back({name, type, depends, count, in_arm});
+  }
 }
 
 // Loops run without the conditions of borders but for their first and last iterations.
@@ -205,7 +215,10 @@ void StageReader::count(const Expr& e) {
   if (is_comparison(e.kind())) operand = e.as<Binary>()->a;
   const Value value = values_.value(e);
   const std::string name = call ? call->name : kind_name(e.kind());
-  counted_.try_emplace({name, value}, OperationCount{name, operand.type(), value.depends(), 1});
+  const bool in_arm = in_arms_.contains(e.get());
+  const auto [known, is_new] = counted_.try_emplace(
+      {name, value}, OperationCount{name, operand.type(), value.depends(), 1, in_arm});
+  known->second.in_arm &= in_arm;
 }
 
 }  // namespace retrograde::planning

@@ -62,6 +62,7 @@ class StageReader {
 
  private:
   void read_extern(StageNode& node);
+  void read_call(const Call& call, const Guard& guard);
   void read_access(const Call& call, const Guard& guard);
   void count_operations(StageNode& node);
   void count(const Expr& e);
@@ -79,7 +80,7 @@ class StageReader {
   std::vector<Expr> args_, stored_;  // stored: values and predicate
   std::vector<Access> reads_;
   std::unordered_map<size_t, std::vector<size_t>> reads_by_hash_;
-  std::unordered_set<const ir::ExprNode*> counted_nodes_;
+  std::unordered_set<const ir::ExprNode*> counted_nodes_, in_arms_;
   std::map<std::pair<std::string, Value>, OperationCount> counted_;
   size_t nodes_ = 0;
 };

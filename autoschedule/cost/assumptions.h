@@ -37,6 +37,9 @@ inline constexpr double passing_operands = 2;
 inline constexpr double largest_register_array = 4, operand_share = 0.8;
 // Loops that become vectors although no plan says so take longer than others: their remainders run element by element.
 inline constexpr double remainder_overhead = 1.1;
+// Lowering gives lanes to bodies of so many nodes of expressions at most: an operation and an operand, an access and its
+// index.
+inline constexpr double largest_vector_body = 600, nodes_of_operation = 2, nodes_of_access = 3;
 // The reads that inlining may give a stage; beyond them its cost is a lower bound.
 inline constexpr size_t most_composed_reads = 2000;
 // Two half vectors are widened, and their lanes put in turn.

@@ -40,6 +40,18 @@ bool can_be_lanes(const StageRun& run, const Group& group, const LaneLoop& lanes
   });
 }
 
+// Whether the body, with its unrolled copies, has no more nodes than lowering accepts.
+bool is_small(const StageRun& run, const Group& group) {
+  double nodes = 0;
+  for (const OperationRow& row : run.facts->operations) nodes += row.count * nodes_of_operation;
+  for (const Touch& touch : run.facts->touches) nodes += touch.count * nodes_of_access;
+  for (size_t d = 0; d < run.nest.trips.size(); ++d) {
+    const LoopNode& node = group.nodes[static_cast<size_t>(run.node_of(d))];
+    if (node.kind == ForType::Unrolled) nodes *= run.nest.trips[d];
+  }
+  return nodes <= largest_vector_body;
+}
+
 }  // namespace
 
 void add_inner_lanes(const SizeModel& sizes, const Machine& machine, Group& group) {
@@ -58,7 +70,8 @@ void add_inner_lanes(const SizeModel& sizes, const Machine& machine, Group& grou
     for (const Touch& touch : run.facts->touches) widest = std::max(widest, touch.element_bytes);
     lanes.depth = depth;
     lanes.count = lanes.inner = machine.vector_bytes / widest;
-    if (lanes.iterator < 0 || run.nest.trips[d] < lanes.count || !can_be_lanes(run, group, lanes))
+    if (lanes.iterator < 0 || run.nest.trips[d] < lanes.count || !is_small(run, group) ||
+        !can_be_lanes(run, group, lanes))
       continue;
     run.nest.lanes = lanes;
     run.nest.trips[d] *= remainder_overhead / lanes.count;

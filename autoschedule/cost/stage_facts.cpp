@@ -24,15 +24,14 @@ IteratorSet carried_by(const Access& read, const Access& write) {
 // Operations that depend on the same iterators. Products that are added are one operation with the sum.
 class OperationTable {
  public:
-  // `chooses`: the definition has selects.
-  void add(const OperationCount& operation, IteratorSet depends, bool chooses) {
+  void add(const OperationCount& operation, IteratorSet depends) {
     // Products that ignore infinite factors of 0 are tried as plain ones first.
     const std::string name = operation.name == "strong_mul"   ? "Mul"
                              : operation.name == "strong_div" ? "Div"
                                                               : operation.name;
     const Op op = op_from_name(name);
     const bool is_function = op != Op::none && op_info(op).work.functions > 0;
-    rows_[{name, operation.type, depends, chooses && is_function}] += operation.count;
+    rows_[{name, operation.type, depends, operation.in_arm && is_function}] += operation.count;
   }
   std::vector<OperationRow> rows(const Machine& machine) {
     for (auto& [key, count] : rows_) {
@@ -106,12 +105,7 @@ std::vector<Touch> FactsOfStages::touches(const StageNode& stage,
 std::vector<OperationRow> FactsOfStages::operations(const StageNode& stage,
                                                     const ReadComposer::Composed& composed) const {
   OperationTable table;
-  const auto chooses = [](const StageNode& node) {
-    return std::ranges::find(node.operations, "Select", &OperationCount::name) !=
-           node.operations.end();
-  };
-  for (const OperationCount& operation : stage.operations)
-    table.add(operation, operation.depends, chooses(stage));
+  for (const OperationCount& operation : stage.operations) table.add(operation, operation.depends);
   for (const auto& [func, elements] : composed.elements) {
     const StageNode& inlined = graph_.func(func).stages[0];
     for (const Access& element : elements) {
@@ -120,7 +114,7 @@ std::vector<OperationRow> FactsOfStages::operations(const StageNode& stage,
         for (size_t d = 0; d < element.index.size(); ++d)
           if (operation.depends & set_of(static_cast<int>(d)))
             depends |= element.index[d].moved_by();
-        table.add(operation, depends, chooses(inlined));
+        table.add(operation, depends);
       }
     }
   }

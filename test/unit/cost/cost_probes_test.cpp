@@ -404,6 +404,9 @@ TEST_F(CostProbes, UnrolledCopiesShareAFunctionUnlessItIsInAnArm) {
   const double in_arm = seconds(select(in(x, 0) > 0, exp(in(x, 0)), 0));
   EXPECT_LT(shared, vectors * 2e-9);
   EXPECT_NEAR(in_arm - shared, vectors * 3e-9, vectors * 0.4e-9);
+  // The select chooses between values of a function that both of its arms use.
+  const Expr both = exp(in(x, 0));
+  EXPECT_NEAR(seconds(select(in(x, 0) > 0, both * 2.f, both)), shared, vectors * 0.4e-9);
 }
 
 // Rows of 16 KB: lowering keeps four of a window over three rows, whatever the height of the strip.
@@ -436,6 +439,24 @@ TEST_F(CostProbes, InnermostLoopsBecomeVectorsByThemselves) {
   EXPECT_NEAR(compute_seconds(cost_of("out  root  y, x\n")), remainder_overhead * vectors,
               0.01 * vectors);
   EXPECT_GT(compute_seconds(cost_of("out  root  x, y\n")), 10 * vectors) << "strided stores";
+}
+
+// 200 products with minima are 800 nodes with their operands, and so are two copies of 100.
+TEST_F(CostProbes, LargeBodiesStayScalar) {
+  const auto slowdown = [&](int products, const std::string& scalar) {
+    Func large("large");
+    Expr value = in(x, y);
+    for (int i = 0; i < products; ++i) value = min(value, 3.f) * value;
+    large(x, y) = value;
+    large.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+    const auto seconds = [&](const std::string& loops) {
+      return compute_seconds(priced(large, "large  root  " + loops + "\n"));
+    };
+    return seconds(scalar) / seconds("y, x:16, vector x");
+  };
+  EXPECT_NEAR(slowdown(100, "y, x"), remainder_overhead, 0.05);
+  EXPECT_GT(slowdown(200, "y, x"), 10);
+  EXPECT_GT(slowdown(100, "y:2, x, unroll y"), 10);
 }
 
 // A slice of one vector and its neighbours.
