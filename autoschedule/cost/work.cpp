@@ -31,6 +31,34 @@ double slice_ns(const StageRun& run, const Group& group, const Machine& m) {
   return is_slice ? in_memory * slice_iterations * m.iteration_ns : 0;
 }
 
+// Vectors that each iteration loads and stores as there is no register for them.
+struct Spills {
+  double loads = 0, stores = 0;
+};
+// Lowering keeps sums in registers if there is room for all of them (compiler/lower/loops/keep_accumulators.cpp).
+// Otherwise, it leaves all of them in memory.
+Spills spills_of(double accumulators, double invariants, double registers) {
+  const bool are_kept = accumulators <= registers;
+  const double kept = (are_kept ? accumulators : 0) + invariants;
+  const double excess = std::clamp(kept + passing_operands - registers, 0.0, kept);
+  const double sums = are_kept ? std::min(excess, accumulators) : accumulators;
+  return {are_kept ? excess : excess + sums, sums};
+}
+
+// Operations of which each waits for the one before.
+struct Chain {
+  double ns;
+  double independent;  // chains like it
+};
+double longest(const std::vector<Chain>& chains, double instructions) {
+  double ns = 0;
+  for (const Chain& chain : chains) {
+    const double overlap = core.reorder_window * chain.independent / std::max(instructions, 1.0);
+    ns = std::max(ns, chain.ns / std::max(overlap, 1.0));
+  }
+  return ns;
+}
+
 class StageWork {
  public:
   StageWork(const StageRun& run, const Group& group, const Machine& machine)
@@ -46,8 +74,10 @@ class StageWork {
       if (!is_loaded_before(touch)) add_touch(touch);
     }
     add_interleaving();
-    add_spills();
-    add_chains();
+    const Spills spills = spills_of(accumulators_, invariants_, m_.registers);
+    units_.loads += iterations() * spills.loads * m_.load_ns;
+    units_.stores += iterations() * spills.stores * m_.store_ns;
+    units_.chain = longest(chains_, instructions_);
     const double taken = run_.facts->taken;
     for (double UnitTimes::*part : {&UnitTimes::arithmetic, &UnitTimes::loads, &UnitTimes::stores,
                                     &UnitTimes::scalars, &UnitTimes::chain})
@@ -64,10 +94,10 @@ class StageWork {
   const LaneLoop& lanes_;
   int innermost_ = -1;  // the serial loop that runs innermost
   UnitTimes units_;
-  double accumulators_ = 0, invariants_ = 0;       // registers of the innermost serial loop
-  double instructions_ = 0;                        // of all iterations
-  double bent_ = 0;                                // vectors whose lanes are computed in parts
-  std::vector<std::pair<double, double>> chains_;  // nanoseconds, and how many independent ones
+  double accumulators_ = 0, invariants_ = 0;  // registers of the innermost serial loop
+  double instructions_ = 0;                   // of all iterations
+  double bent_ = 0;                           // vectors whose lanes are computed in parts
+  std::vector<Chain> chains_;
 
   size_t depth() const { return run_.nest.trips.size(); }
   const LoopNode& node(size_t d) const {
@@ -206,17 +236,6 @@ class StageWork {
     else if (!touch.writes && touch.data == 0)
       invariants_ += needed;
   }
-  // Lowering keeps sums in registers if there is room for all of them (compiler/lower/loops/keep_accumulators.cpp).
-  // Otherwise, it leaves all of them in memory.
-  void add_spills() {
-    const bool are_kept = accumulators_ <= m_.registers;
-    const double kept = (are_kept ? accumulators_ : 0) + invariants_;
-    const double excess = std::clamp(kept + passing_operands - m_.registers, 0.0, kept);
-    const double sums = are_kept ? std::min(excess, accumulators_) : accumulators_;
-    units_.loads += iterations() * (are_kept ? excess : excess + sums) * m_.load_ns;
-    units_.stores += iterations() * sums * m_.store_ns;
-  }
-
   // ---- chains ----
 
   // `ns` of each iteration of the innermost serial loop wait for the iteration before, in the loops from `depth` inwards.
@@ -270,13 +289,6 @@ class StageWork {
         in_iteration *= run_.nest.trips[d];
     add_chain(in_iteration * m_.memory_latency_ns, from);
   }
-  void add_chains() {
-    for (const auto& [chain_ns, runs] : chains_) {
-      const double overlap = core.reorder_window * runs / std::max(instructions_, 1.0);
-      units_.chain = std::max(units_.chain, chain_ns / std::max(overlap, 1.0));
-    }
-  }
-
   void add_loops() {
     for (size_t d = 0; d < depth(); ++d) {
       const bool is_own = node(d).loop.stage == run_.id;

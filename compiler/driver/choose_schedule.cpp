@@ -22,8 +22,10 @@ using planning::FoundPlan;
 
 namespace {
 
-constexpr int wide = 4;                 // the beam of a search that was asked for
-constexpr double worth_leaving = 0.95;  // of the cost of the rules' plan
+constexpr int width = 4;  // of the beam
+// A plan is taken if its cost is less than this part of the cost of the rules' plan, and the prediction of the lowered
+// program less than that part of theirs.
+constexpr double worth_leaving = 0.9, confirmed = 0.95;
 
 std::string words_for(const std::vector<FuncPtr>& outputs) {
   return listed(outputs, [](const FuncPtr& f) { return quoted(f->name); });
@@ -77,36 +79,22 @@ struct Lowered {
   double seconds = 0;
 };
 
-bool is_clearly_faster(const planning::SearchResult& result, const FoundPlan& plan) {
-  return plan.cost.seconds < worth_leaving * result.start.cost.seconds;
-}
-
 // The search's plans by their cost, of which the first is taken that the lowered program confirms.
 class Choice {
  public:
   Choice(const PlanSearch& found, const Target& target, int threads)
       : found_(found), target_(target), threads_(threads), rules_(lowered(found.result.start)) {}
 
-  // The outputs of the plan that is taken; nullopt: the rules' plan is.
-  std::optional<std::vector<FuncPtr>> taken() const {
-    for (const FoundPlan& plan : found_.result.found) {
-      if (!is_clearly_faster(found_.result, plan)) break;
-      const std::optional<Lowered> candidate = lowered_if_it_can_be(plan);
-      if (candidate && candidate->seconds < rules_.seconds) return candidate->outputs;
-    }
-    return std::nullopt;
-  }
-
-  // The same with a report about the plan that comes next.
-  ChosenSchedule with_report(ChosenSchedule rules) const {
+  ChosenSchedule run(ChosenSchedule rules, bool may_leave_rules) const {
     const planning::SearchResult& result = found_.result;
     std::optional<Lowered> taken, other;
     for (const FoundPlan& plan : result.found) {
       if (plan.plan == result.start.plan || (taken && other)) continue;
       std::optional<Lowered> candidate = lowered_if_it_can_be(plan);
       if (!candidate) continue;
-      const bool is_faster = is_clearly_faster(result, plan) && candidate->seconds < rules_.seconds;
-      (is_faster && !taken ? taken : other) = std::move(candidate);
+      const bool is_faster = plan.cost.seconds < worth_leaving * result.start.cost.seconds &&
+                             candidate->seconds < confirmed * rules_.seconds;
+      (may_leave_rules && is_faster && !taken ? taken : other) = std::move(candidate);
     }
     if (taken && !other) other = rules_;
     const Lowered& chosen = taken ? *taken : rules_;
@@ -155,34 +143,23 @@ std::string note_against_search(const std::vector<FuncPtr>& outputs, const std::
 ChosenSchedule choose_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
                                Scheduling what, const Target& target, bool wants_runner_up) {
   ChosenSchedule rules{autoschedule::schedule_within_budget(outputs, request, what), {}};
-  const bool is_wide = request.options.search, wants_report = is_wide || wants_runner_up;
-  const std::string reason = reason_against(outputs, request);
-  if (wants_report) rules.search.note = reason;
-  if (!reason.empty()) return rules;
+  if (!request.options.search && !wants_runner_up) return rules;
+  rules.search.note = reason_against(outputs, request);
+  if (!rules.search.note.empty()) return rules;
   const autoschedule::MemoryUse& memory = rules.graph.memory;
   PlanSearchOptions options;
   options.spare_bytes = std::max<int64_t>(memory.budget_bytes - memory.bytes, 0);
-  if (is_wide) options.width = wide;
-  options.from_rules = is_wide;
+  options.width = width;
   options.what = what;
-  const planning::Machine machine =
-      is_wide ? search_machine(request.options, target) : machine_of(request);
   try {
-    const PlanSearch found =
-        search_plans(rules.graph.outputs, outputs, request.options, machine, options);
-    const bool has_faster =
-        !found.result.found.empty() && is_clearly_faster(found.result, found.result.found[0]);
-    if (!wants_report && !has_faster) return rules;
-    const Choice choice(found, target, request.options.threads);
-    if (wants_report) return choice.with_report(rules);
-    if (auto taken = choice.taken()) rules.graph.outputs = std::move(*taken);
+    const PlanSearch found = search_plans(rules.graph.outputs, outputs, request.options,
+                                          search_machine(request.options, target), options);
+    return Choice(found, target, request.options.threads).run(rules, request.options.search);
   } catch (const Error& error) {  // lowering the rules' schedule says so where it matters
-    if (wants_report) {
-      rules.search.note = note_against_search(outputs, "the schedule of the rules can be lowered",
-                                              error.what(), "Correct the program or its schedule");
-    }
+    rules.search.note = note_against_search(outputs, "the schedule of the rules can be lowered",
+                                            error.what(), "Correct the program or its schedule");
+    return rules;
   }
-  return rules;
 }
 
 }  // namespace retrograde::driver

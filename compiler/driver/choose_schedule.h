@@ -1,13 +1,12 @@
-// choose_schedule.h -- the schedule of the rules or, where it is clearly faster, the best plan that a search finds.
+// choose_schedule.h -- the schedule of the rules or, where the options ask for it, the best plan that a search finds.
 //
 //   options            what is taken
-//   (none)             the plan of the least cost to which a descent over moves leads (plan_search.h). It is the same on
-//                      every machine: figures are those of the target
-//   search=true        the same with a wider beam, and with the figures of this machine where it was measured
+//   (none)             what the rules choose (autoschedule/default_schedule.h, memory_budget.h)
+//   search=true        the plan of the least cost to which moves lead, from the rules' plan or from none (plan_search.h);
+//                      the schedule of the rules where nothing is clearly better, or where sizes are not known
 //
-// The schedule of the rules (autoschedule/default_schedule.h, memory_budget.h) stays where nothing is clearly better, or
-// where sizes are not known. A prediction is right within some percent at best, so that a gain of less is none. Two models
-// must agree: the cost of plans, and the prediction of the lowered program.
+// A prediction is right within some percent at best, so that a gain of less is none. Two models must agree: the cost of
+// plans, and the prediction of the lowered program.
 #pragma once
 
 #include <string>

@@ -100,10 +100,7 @@ PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
   for (const Decision decision : options.without) {
     for (const char* move : moves_of(decision)) beam.without.insert(move);
   }
-  if (search.from_rules)
-    result.result = planning::search(result.rules, context, cost, beam);
-  else
-    result.result.start = {result.rules, cost.price(result.rules), {}};
+  result.result = planning::search(result.rules, context, cost, beam);
   // Nobody knows the time of the other start, so that every gain is one.
   beam.least_gain = least_gain_from_nothing;
   beam.least_gain_of_all = least_gain_of_all_from_nothing;

@@ -22,7 +22,6 @@ struct PlanSearchOptions {
   int width = 1;            // of the beam
   int64_t spare_bytes = 0;  // that may be alive at once beyond those of `scheduled`
   autoschedule::Scheduling what = autoschedule::Scheduling::Everything;
-  bool from_rules = true;  // searches from their schedule, too, not from nothing alone
 };
 
 // The machine that the cost of a search is for: that of the cost model, with the threads of the options.
@@ -30,8 +29,7 @@ planning::Machine search_machine(const AutoscheduleOptions& options, const Targe
 
 // `scheduled`: the graph with the schedule of the rules; `unscheduled`: before. What its user scheduled or named in the
 // options stays as it is, and so does the rest of a primal of which they scheduled a part, where gradients are scheduled:
-// they leave the rest inline. Decisions that the options leave out forbid the
-// moves that make them.
+// they leave the rest inline. Decisions that the options leave out forbid the moves that make them.
 PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
                         const std::vector<FuncPtr>& unscheduled, const AutoscheduleOptions& options,
                         const planning::Machine& machine, const PlanSearchOptions& search);

@@ -31,17 +31,15 @@ bool is_scheduled(const std::vector<FuncPtr>& outputs) {
                              [](const FuncPtr& f) { return has_directives(*f); });
 }
 
-// How far from the schedule of the rules one may be taken.
-enum class Choosing : uint8_t { Rules, Search, SearchWithReport };
-
+// `searches`: by `cost`.
 ChosenSchedule schedule_graph(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
-                              const Target& target, Choosing choosing) {
-  const bool wants_report = request.options.search || choosing == Choosing::SearchWithReport;
+                              const Target& target, bool wants_runner_up) {
+  const bool searches = request.options.search || wants_runner_up;
   const std::vector<FuncPtr> wrapped = apply_wrappers(outputs);
   ChosenSchedule result;
   if (!autoschedule::is_differentiated(wrapped)) {
     result.graph.outputs = autoschedule::with_large_funcs_at_root(wrapped, request);
-    if (wants_report) {
+    if (searches) {
       result.search.note = note_against_search(wrapped, "compiling searches schedules of gradients",
                                                "none of its Funcs is one",
                                                "Call auto_schedule() with these options");
@@ -49,14 +47,9 @@ ChosenSchedule schedule_graph(const std::vector<FuncPtr>& outputs, const Schedul
     return result;
   }
   result.graph.outputs = autoschedule::with_graph_rewrites(wrapped, /*on_gpu=*/false);
-  if (!wants_report && is_scheduled(result.graph.outputs)) return result;
-  if (choosing == Choosing::Rules) {
-    result.graph =
-        autoschedule::schedule_within_budget(result.graph.outputs, request, Scheduling::Gradients);
-    return result;
-  }
+  if (!searches && is_scheduled(result.graph.outputs)) return result;
   return choose_schedule(result.graph.outputs, request, Scheduling::Gradients, target,
-                         choosing == Choosing::SearchWithReport);
+                         wants_runner_up);
 }
 
 }  // namespace
@@ -67,8 +60,7 @@ ChosenSchedule schedule(const PipelineSpec& pipeline, const Target& target, bool
   ChosenSchedule result;
   run_on_large_stack([&] {
     const graph::FirstReadsMemo memo;
-    result = schedule_graph(pipeline.outputs, request, target,
-                            wants_runner_up ? Choosing::SearchWithReport : Choosing::Search);
+    result = schedule_graph(pipeline.outputs, request, target, wants_runner_up);
   });
   return result;
 }
@@ -81,7 +73,7 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
   std::vector<FuncPtr> result;
   run_on_large_stack([&] {
     const graph::FirstReadsMemo memo;
-    result = schedule_graph(outputs, request, Target(), Choosing::Rules).graph.outputs;
+    result = schedule_graph(outputs, request, Target(), /*wants_runner_up=*/false).graph.outputs;
   });
   return result;
 }

@@ -21,7 +21,7 @@ namespace retrograde::driver {
 ChosenSchedule schedule(const PipelineSpec& pipeline, const Target& target,
                         bool wants_runner_up = false);
 
-// The schedule of the rules alone, without a search.
+// The same without a search.
 std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
                                           const planning::Machine& machine = {},
                                           const AutoscheduleOptions& options = {});

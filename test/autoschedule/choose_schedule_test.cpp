@@ -105,7 +105,7 @@ TEST(ChooseSchedule, TheReportShowsTheRunnerUp) {
   EXPECT_EQ(plain.to_string().find("runner-up"), std::string::npos);
   const ScheduleReport asked = pipeline.explain_schedule(Target(), {}, {.runner_up = true});
   EXPECT_EQ(without_numbers(asked.schedule), without_numbers(plain.schedule))
-      << "a report changes nothing";
+      << "stays with the rules";
   EXPECT_NEAR(asked.search.predicted_ms, plain.predicted_ms, 1e-9);
   ASSERT_TRUE(asked.search.runner_up_ms.has_value());
   EXPECT_GT(*asked.search.runner_up_ms, 0);
