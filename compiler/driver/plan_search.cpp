@@ -57,16 +57,16 @@ std::vector<const char*> moves_of(Decision decision) {
     case Decision::LayoutStaging:
       return {"permute_storage"};
     case Decision::JoinSweeps:
-      return {"fuse_stages"};
+      return {"fuse_stages", "share_loops", "fuse_readers"};
     case Decision::Slices:
     case Decision::Strips:
-      return {"compute_at", "compute_in_tile"};
+      return {"compute_at", "compute_in_tile", "slide"};
     case Decision::TaskSizes:
       return {"parallelise"};
     case Decision::Choices:
       return {"unroll"};
     case Decision::CutReductions:
-      break;
+      return {"reduction_lanes"};
   }
   return {};
 }
