@@ -38,21 +38,6 @@ bool has_window(const FuncPlan& func) {
          hoist.kind != Kind::Undecided || (store.kind != Kind::Undecided && !(store == compute));
 }
 
-// Whether each update writes the elements that its pure variables name, and reads no others of the Func.
-bool stays_in_place(const Context& context, FuncId func) {
-  for (const StageNode& stage : context.accesses.func(func).stages) {
-    const auto is_pure = [&](const IndexForm& form) {
-      return form.is_affine() && form.terms.size() == 1 &&
-             !is_reduction(context, stage.id, form.terms[0].iterator);
-    };
-    if (!std::ranges::all_of(stage.write.index, is_pure)) return false;
-    for (const Access& read : stage.reads) {
-      if (read.of == func && read.index != stage.write.index) return false;
-    }
-  }
-  return true;
-}
-
 // One change of a Func in a plan.
 class FuncChange {
  public:

@@ -10,8 +10,8 @@ namespace retrograde::planning {
 namespace {
 
 constexpr int sweeps = 2;
-constexpr size_t many_funcs =
-    64;  // of a program: a descent sweeps once, as compiling takes long anyway
+// A search of width 1 sweeps once over a program of more Funcs than this: its time would grow too much.
+constexpr size_t many_funcs = 64;
 constexpr double worth_another_sweep = 0.98;  // of the time before the last one
 constexpr int moves_of_a_func = 2;            // one after another, in one visit
 // A Func with a small share of the whole time is only computed elsewhere; one with less is not visited.

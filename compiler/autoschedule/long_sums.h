@@ -11,13 +11,15 @@
 #include <cstdint>
 #include <vector>
 
+#include "autoschedule/machine/reference.h"
 #include "graph/function.h"
 
 namespace retrograde::autoschedule {
 
 // Terms of a lane from which blocks pay. Where lanes along rows, each of which adds a part of the terms, would be the
 // alternative, blocks are needed to be as exact.
-inline constexpr int64_t long_chain = 512, long_chain_instead_of_rows = 128;
+inline constexpr auto long_chain = static_cast<int64_t>(planning::longest_chain);
+inline constexpr int64_t long_chain_instead_of_rows = 128;
 
 // Whether the update adds numbers that are rounded to less than double, and a lane adds more of them than `most`.
 // `loops`: of the reduction, innermost first; the first is in vectors of so many lanes (1: none).
