@@ -53,8 +53,8 @@ class RegisterTiles {
   double cycles() const {
     return tiles_.empty() ? INFINITY : tiles_[0].cycles / static_cast<double>(lanes_);
   }
-  // `is_turned`: operands that lie across the lanes are turned, too.
-  void add_plans(std::vector<Plan>& plans, bool is_turned) const {
+  // Each tile comes with operands as they are stored and, where they lie across the lanes, along these.
+  void add_plans(std::vector<Plan>& plans) const {
     std::vector<Nest> nests;
     size_t given = 0;
     for (const Tile& tile : tiles_) {
@@ -231,7 +231,7 @@ void add_tiles_of(const Plan& plan, StageId stage, const Context& context,
   const StageLoops loops = loops_in(plan);
   RegisterTiles straight(loops);
   if (!straight.find()) return;
-  straight.add_plans(plans, false);
+  straight.add_plans(plans);
   double fewest = straight.cycles();
   std::vector<Plan> best;
   const int dimensions = context.accesses.func(stage.func).func->dimensions();
@@ -244,7 +244,7 @@ void add_tiles_of(const Plan& plan, StageId stage, const Context& context,
     if (!tiles.find() || tiles.cycles() >= fewest) continue;
     fewest = tiles.cycles();
     best.clear();
-    tiles.add_plans(best, true);
+    tiles.add_plans(best);
   }
   for (Plan& found : best) add(plans, std::move(found));
 }
