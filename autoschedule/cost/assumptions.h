@@ -24,8 +24,7 @@ inline constexpr double unknown_slope = 0.7;
 inline constexpr double equal_neighbours = 0.5;
 // A C function takes as long as so many scalar operations.
 inline constexpr double function_call_operations = 50;
-// The iterations of a loop that take as long as the consumer of a slice waits for it, after it was computed in one of its
-// loops.
+// The wait of a consumer for a Func that is computed in one of its loops, in iterations of an empty loop.
 inline constexpr double slice_iterations = 25;
 // A block of memory whose size is unknown takes as long as so many scalar operations, each time: the heap gives it and
 // takes it back.

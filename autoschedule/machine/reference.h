@@ -69,8 +69,7 @@ inline constexpr int64_t uncontended_lines = 1 << 10;
 
 // ---- Accuracy ----
 
-// Terms that one accumulator adds, one after the other, before lanes or blocks of the sum are worth having for the sake of
-// its rounding errors.
+// The longest chain of additions to one accumulator. Longer sums run in lanes or blocks, whose rounding errors are smaller.
 inline constexpr double longest_chain = 512;
 
 // ---- Programs ----

@@ -30,7 +30,7 @@ void for_each_read(const Plan& plan, const Context& context, StageId stage,
 // Whether the region that is read of the Func is bounded (L3), also through inlined Funcs: data decide no index without a
 // range.
 bool has_bounded_region(const Plan& plan, const Context& context, FuncId func);
-// Whether a Func may be computed in a loop of a stage that reads it (L3, L8): its updates need no more than is read.
+// Whether a Func may be computed in a loop of a stage that reads it (L3, L8).
 bool may_run_in_loops(const Plan& plan, const Context& context, FuncId func);
 // Whether each update writes the elements that its pure variables name, and reads no others of the Func.
 bool stays_in_place(const Context& context, FuncId func);

@@ -42,7 +42,8 @@ struct Context {
   Dependences& dependences;  // of the same access graph
 };
 
-// Plans that differ from `plan` in how `func` runs, and perhaps its operands and consumers; `plan` keeps all invariants, and they do, too.
+// Plans that differ from `plan` in how `func` runs, and in some cases its operands and consumers. All invariants hold for
+// them if they hold for `plan`.
 using MoveFunction = std::vector<Plan> (*)(const Plan& plan, FuncId func, const Context& context);
 struct Move {
   const char* name;

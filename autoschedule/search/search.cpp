@@ -185,7 +185,7 @@ SearchResult search(const Plan& start, const Context& context, CostModel& cost,
   add(1);
   if (options.width > 1) add(options.width);
   result.start = {start, cost.price(start), {}};
-  // With less memory than is allowed; the start alone may have more.
+  // Results keep within the limit of memory. The start need not.
   const bool has_much = result.start.cost.peak_bytes > options.most_bytes;
   std::erase_if(found, [&](const State& state) {
     return state.cost.peak_bytes > options.most_bytes && !(has_much && state.plan == start);

@@ -25,12 +25,13 @@ namespace retrograde::planning {
 
 struct SearchOptions {
   int width = 1;  // plans that go on from each step
-  // Alive at once. A plan with more is left for one with less, and is never the result unless it is the start.
+  // Bytes alive at once. A plan above this limit may only be left for one with fewer bytes, and is no result, except for
+  // the start.
   double most_bytes = std::numeric_limits<double>::infinity();
   std::vector<bool> kept;         // by Func: no move changes how it runs
   std::set<std::string> without;  // names of moves that are not made
-  // A change must gain this part of the time of the stages that change, and of the whole time: as much as the model may be
-  // wrong where the time of the start is known to be good.
+  // A change must gain these parts of the time of the stages that change and of the whole time. The defaults are about the
+  // error of the cost, for a start that is known to be fast.
   double least_gain = 0.1, least_gain_of_all = 0.01;
 };
 

@@ -8,7 +8,7 @@ namespace retrograde::planning {
 
 namespace {
 
-// The Funcs that run as they do, or in whose loops one of these does.
+// The kept Funcs, opaque ones, and the Funcs in whose loops one of these runs.
 std::vector<bool> with_hosts(const Plan& plan, std::vector<bool> kept) {
   const auto keep_host = [&](const Level& level) {
     if (level.kind == Level::Kind::At) kept[static_cast<size_t>(level.loop.stage.func)] = true;
@@ -27,7 +27,7 @@ std::vector<bool> with_hosts(const Plan& plan, std::vector<bool> kept) {
   return kept;
 }
 
-// Whether a stage adds so many terms in lanes that one chain of additions would be less exact.
+// Whether a stage adds more terms in lanes than one chain of additions should.
 bool has_lanes_of_long_sum(const Plan& plan, FuncId func, const Context& context) {
   for (size_t s = 0; s < plan.of(func).nests.size(); ++s) {
     const StageId stage{func, static_cast<int16_t>(s)};

@@ -7,9 +7,9 @@
 
 namespace retrograde::planning {
 
-// Every Func is at root along its rows, or inlined where no stored box suffices: an order of loops that nobody chose, and
-// that no search has to leave by a worse plan. `kept`, by Func: runs as in `plan`, and so do Funcs in whose loops it does, and long sums that `plan` adds in lanes, which are
-// more exact.
+// A plan in which each Func is stored at root and runs along its rows; a Func that has no bounded box to store is inlined.
+// It takes nothing from `plan`, except the Funcs that run as they do there: those that `kept` marks, by Func; long sums
+// that `plan` adds up in lanes, which is more exact than one chain of additions; and Funcs in whose loops one of these runs.
 Plan plan_from_nothing(const Plan& plan, const std::vector<bool>& kept, const Context& context);
 
 }  // namespace retrograde::planning

@@ -101,7 +101,7 @@ PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
     for (const char* move : moves_of(decision)) beam.without.insert(move);
   }
   result.result = planning::search(result.rules, context, cost, beam);
-  // Nobody knows the time of the other start, so that every gain is one.
+  // The second start is known to be slow, so small gains count, too.
   beam.least_gain = least_gain_from_nothing;
   beam.least_gain_of_all = least_gain_of_all_from_nothing;
   const Plan nothing = planning::plan_from_nothing(result.rules, beam.kept, context);

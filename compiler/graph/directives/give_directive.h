@@ -42,8 +42,8 @@ void log_directive(const SchedulePlace& place, Directive directive);
 void reset_loops(FuncContents& f);
 // The names that rfactor gave to loops of the stage's definition.
 std::vector<Split> factored_names(const FuncContents& f, int stage);
-// Whether directives that follow on a reset make the log of the Func, and those of the Funcs that it made, a log of their
-// schedules: no directive before an rfactor did more than split and order the loops of its reduction.
+// Whether the log of the Func, and those of the Funcs that its rfactors made, still replay after reset_loops and other
+// directives: before an rfactor, directives only split and ordered the loops of its reduction.
 bool can_reset_loops(const FuncContents& f);
 
 // Whether the Func or one of its stages has directives, apart from those about sizes (bounds,
