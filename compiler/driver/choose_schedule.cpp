@@ -79,6 +79,7 @@ struct Lowered {
   std::vector<FuncPtr> outputs;
   ir::LoweredFunction function;
   double seconds = 0;
+  double peak_bytes = 0;
 };
 
 bool is_clearly_faster(const planning::SearchResult& result, const FoundPlan& plan) {
@@ -133,7 +134,9 @@ class Choice {
   const planning::Machine& machine_;
   const Lowered rules_;
 
-  static ChosenSchedule with(ChosenSchedule schedule, const Lowered& chosen) {
+  ChosenSchedule with(ChosenSchedule schedule, const Lowered& chosen) const {
+    const double more = chosen.peak_bytes - found_.result.start.cost.peak_bytes;
+    schedule.graph.memory.bytes += static_cast<int64_t>(more);
     schedule.graph.outputs = chosen.outputs;
     schedule.lowered = chosen.function;
     return schedule;
@@ -143,6 +146,7 @@ class Choice {
   }
   Lowered lowered(const FoundPlan& plan) const {
     Lowered result{found_.emitted(plan), {}};
+    result.peak_bytes = plan.cost.peak_bytes;
     result.function = lowering_.lower(result.outputs);
     const auto sizes =
         tuning::program_sizes(result.function, tuning::output_shapes(result.outputs));
