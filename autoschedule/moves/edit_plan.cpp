@@ -47,14 +47,14 @@ class FuncChange {
   }
 
   std::optional<Plan> run() {
-    const auto id = static_cast<size_t>(func_);
-    Plan plan = before_;
-    plan.funcs[id] = std::make_shared<FuncPlan>(changed_);
     if (!keeps_order() || !keeps_shared_loops()) return std::nullopt;
+    Plan plan = before_;
+    plan.funcs[static_cast<size_t>(func_)] = std::make_shared<FuncPlan>(changed_);
     for (size_t other = 0; other < plan.funcs.size(); ++other) {
       const auto guest = static_cast<FuncId>(other);
       if (guest == func_) continue;
       if (is_moved_ && has_window(before_.of(guest)) && is_read(guest)) return std::nullopt;
+      if (!is_bound(before_.of(guest))) continue;
       if (!keeps_region(guest) || !renumber(plan, guest)) return std::nullopt;
     }
     if (joins_others() && !has_independent_company(plan)) return std::nullopt;

@@ -14,6 +14,10 @@ std::vector<std::string> iterators_of(const graph::FuncContents& f, int stage) {
   return mapped(loops, [](const Dim& loop) { return loop.var; });
 }
 
+const std::vector<std::string>& iterators_of(const Program& program, StageId stage) {
+  return program.iterators[static_cast<size_t>(stage.func)][static_cast<size_t>(stage.stage)];
+}
+
 Nest loops_of_definition(const graph::FuncContents& f, int stage) {
   const std::vector<std::string> iterators = iterators_of(f, stage);
   const std::vector<Dim> loops = graph::first_loops(f, f.stage(stage));
@@ -58,6 +62,13 @@ bool is_phase(const Nest& nest, size_t depth) {
   return std::any_of(
       nest.loops.begin() + static_cast<std::ptrdiff_t>(depth) + 1, nest.loops.end(),
       [&](const Loop& inner) { return inner.iterator == loop.iterator && inner.step > loop.step; });
+}
+
+bool is_bound(const FuncPlan& plan) {
+  const auto& [compute, store, hoist] = plan.placement;
+  return compute.kind == Level::Kind::At || store.kind != Level::Kind::Undecided ||
+         hoist.kind != Level::Kind::Undecided ||
+         std::ranges::any_of(plan.nests, [](const Nest& n) { return n.shared_with.has_value(); });
 }
 
 Nest with_ordered_fusions(const Nest& nest, int iterators) {

@@ -10,6 +10,8 @@ namespace retrograde::planning {
 
 // The names of the stage's iterators in the order of their numbers.
 std::vector<std::string> iterators_of(const graph::FuncContents& f, int stage);
+// The same, kept by the program.
+const std::vector<std::string>& iterators_of(const Program& program, StageId stage);
 // One serial loop for each iterator, in the order of the definition.
 Nest loops_of_definition(const graph::FuncContents& f, int stage);
 
@@ -21,6 +23,9 @@ const Part* next_smaller(const std::vector<Part>& parts, int64_t step);
 
 // Whether a loop of the same iterator with a larger step is inside of this one: the loop runs over remainders.
 bool is_phase(const Nest& nest, size_t depth);
+
+// Whether the loops of others decide where the Func runs or is stored.
+bool is_bound(const FuncPlan& plan);
 
 // The same nest with fusions in the order in which the loops mention them, outermost first and the parts of a fusion
 // before it. Nests that differ only in this order become equal.
