@@ -23,6 +23,7 @@ struct GroupPrice {
   double allocated_bytes = 0;  // for Funcs that are computed in its loops
 };
 
+using Touched = std::vector<std::pair<int, double>>;  // buffers with their bytes
 using Key = std::vector<uint64_t>;
 struct KeyHash {
   size_t operator()(const Key& key) const {
@@ -46,7 +47,7 @@ class CostModel::Prices {
         running_(funcs_.size()),
         root_bytes_(funcs_.size()),
         own_bytes_(funcs_.size()),
-        seen_(funcs_.size() + accesses.images().size()) {
+        buffers_(funcs_.size() + accesses.images().size()) {
     for (const FuncNode& func : accesses.funcs()) {
       first_stage_.push_back(seconds_.size());
       seconds_.resize(seconds_.size() + func.stages.size());
@@ -78,8 +79,10 @@ class CostModel::Prices {
   struct RunningGroup {
     const GroupPrice* price = nullptr;  // null: no group has the number
     std::vector<StageCost> stages;      // with memory
-    // The groups from this one to the one before, perhaps those of the call before, decide what the caches hold.
+    // The groups from this one to the one before, perhaps those of the call before, decide what the caches hold. If they
+    // touch fewer bytes more or less, and the same of the group's buffers, it stays.
     size_t since = 0;
+    double spare_bytes = 0;
     bool is_changed = false;
   };
   struct RunningFunc {
@@ -90,6 +93,14 @@ class CostModel::Prices {
   std::vector<RunningFunc> funcs_;
   std::vector<RunningGroup> running_;  // by number
   std::vector<double> root_bytes_, own_bytes_;
+  struct Buffer {
+    uint64_t noted = 0, change = 0;  // the last changes of groups that touch it, and of how they do
+    uint64_t look = 0;               // the last one that found it
+    double most_bytes = 0;           // that any group touched
+  };
+  std::vector<Buffer> buffers_;
+  uint64_t change_ = 0, look_ = 0;
+  double changed_bytes_ = 0;         // of all buffers that changed groups touch
   std::vector<size_t> first_stage_;  // by Func
   std::vector<double> seconds_;      // of all stages
 
@@ -103,16 +114,41 @@ class CostModel::Prices {
     }
     if (changed.empty()) return;
     Covers covers(plan, sizes_);
+    ++change_;
+    changed_bytes_ = 0;
     for (const FuncId number : groups_.update(plan, changed)) {
       RunningGroup& group = running_[static_cast<size_t>(number)];
       for (const StageCost& stage : group.stages) seconds_of(stage.stage) = 0;
       const PlannedGroup& planned = groups_.all()[static_cast<size_t>(number)];
-      group = {planned.funcs.empty() ? nullptr : &price_of(plan, planned, covers), {}, 0, true};
+      const GroupPrice* price = planned.funcs.empty() ? nullptr : &price_of(plan, planned, covers);
+      note_change(group.price, price);
+      note_change(price, group.price);
+      group = {price, {}, 0, 0, true};
       own_bytes_[static_cast<size_t>(number)] = group.price ? group.price->allocated_bytes : 0;
     }
     supply();
     for (const FuncId f : changed)
       funcs_[static_cast<size_t>(f)].plan = plan.funcs[static_cast<size_t>(f)];
+  }
+
+  // Notes the buffers that one price of a group has, and which of them the other one lacks or touches otherwise.
+  void note_change(const GroupPrice* price, const GroupPrice* other) {
+    if (!price) return;
+    for (const auto& touched : price->traffic.touched) {
+      Buffer& buffer = buffers_[static_cast<size_t>(touched.first)];
+      const double more = std::max(0.0, touched.second - buffer.most_bytes);
+      buffer.most_bytes += more;
+      const bool is_noted = std::exchange(buffer.noted, change_) == change_;
+      changed_bytes_ += is_noted ? more : buffer.most_bytes;
+      const bool is_same = other && std::ranges::find(other->traffic.touched, touched) !=
+                                        other->traffic.touched.end();
+      if (!is_same) buffer.change = change_;
+    }
+  }
+  bool touches_changed(const RunningGroup& group) const {
+    return std::ranges::any_of(group.price->traffic.touched, [&](const auto& touched) {
+      return buffers_[static_cast<size_t>(touched.first)].change == change_;
+    });
   }
 
   // Finds what caches supply where that may differ from the last plan.
@@ -123,7 +159,11 @@ class CostModel::Prices {
     for (size_t g = 0; g < running_.size(); ++g) {
       RunningGroup& group = running_[g];
       const bool is_near = group.since < g ? before >= group.since : before || last >= group.since;
-      if (group.price && (group.is_changed || is_near)) {
+      if (is_near) group.spare_bytes -= changed_bytes_;
+      const auto is_other = [&] {
+        return is_near && (group.spare_bytes <= 0 || touches_changed(group));
+      };
+      if (group.price && (group.is_changed || is_other())) {
         group.stages = stages_of(g);
         for (const StageCost& stage : group.stages) seconds_of(stage.stage) = stage.seconds;
       }
@@ -198,10 +238,9 @@ class CostModel::Prices {
 
   // The bytes that were touched since each buffer of a group was, with its own; infinite if most of it was not, or the last
   // cache forgot it. The call is one of many: what the last one left in the caches counts.
-  using Distances = std::vector<std::pair<int, double>>;
-  Distances distances_of(size_t g) {
-    Distances distances = running_[g].price->traffic.touched;
-    const std::vector<std::pair<int, double>>& touched = running_[g].price->traffic.touched;
+  Touched distances_of(size_t g) {
+    const Touched& touched = running_[g].price->traffic.touched;
+    Touched distances = touched;
     for (auto& [buffer, distance] : distances) distance = INFINITY;
     const double most = machine_.levels[Machine::last_cache].bytes;
     size_t left = touched.size();
@@ -212,7 +251,8 @@ class CostModel::Prices {
       running_[g].since = at;
       if (!running_[at].price) continue;
       for (const auto& [buffer, bytes] : std::views::reverse(running_[at].price->traffic.touched)) {
-        const bool is_seen = std::exchange(seen_[static_cast<size_t>(buffer)], look_) == look_;
+        const bool is_seen =
+            std::exchange(buffers_[static_cast<size_t>(buffer)].look, look_) == look_;
         if (is_seen || sum > most) continue;
         sum += bytes;
         const auto own = std::ranges::find(touched, buffer, &std::pair<int, double>::first);
@@ -222,10 +262,15 @@ class CostModel::Prices {
           distances[static_cast<size_t>(own - touched.begin())].second = sum;
       }
     }
+    double& spare = running_[g].spare_bytes;
+    spare = sum > most ? most - room(Machine::last_cache) : INFINITY;
+    for (const auto& [buffer, distance] : distances) {
+      for (size_t level = 0; level <= Machine::last_cache && distance <= most; ++level)
+        spare = std::min(spare, std::abs(distance - room(level)));
+    }
     return distances;
   }
-  std::vector<uint64_t> seen_;  // by buffer: the last look at it
-  uint64_t look_ = 0;
+  double room(size_t level) const { return usable_share * machine_.levels[level].bytes; }
 
   // A cache supplies what the smaller one lacks and it has.
   std::vector<StageCost> stages_of(size_t g) {
@@ -235,15 +280,14 @@ class CostModel::Prices {
     };
     const GroupPrice& price = *running_[g].price;
     std::vector<std::array<Bytes, Machine::level_count>> behind(price.stages.size());
-    const Distances distances = distances_of(g);
+    const Touched distances = distances_of(g);
     const auto distance_of = [&](int buffer) {
       const auto found = std::ranges::find(distances, buffer, &std::pair<int, double>::first);
       return found == distances.end() ? 0 : found->second;
     };
     for (size_t level = 0; level < price.traffic.behind.size(); ++level) {
-      const double room = usable_share * machine_.levels[level].bytes;
       for (const BufferTraffic& traffic : price.traffic.behind[level]) {
-        const bool is_there = distance_of(traffic.buffer) <= room;
+        const bool is_there = distance_of(traffic.buffer) <= room(level);
         const double bytes = traffic.bytes - (is_there ? traffic.first_bytes : 0);
         Bytes& all = behind[static_cast<size_t>(traffic.run)][level];
         (traffic.in_parallel ? all.parallel : all.serial) += bytes;

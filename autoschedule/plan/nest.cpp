@@ -29,25 +29,34 @@ Nest loops_of_definition(const graph::FuncContents& f, int stage) {
   return nest;
 }
 
+namespace {
+
+template <class Visit>
+void for_each_part(const Nest& nest, int iterator, Visit visit) {
+  const auto look_at = [&](const Part& part) {
+    if (part.iterator == iterator) visit(part);
+  };
+  for (const Loop& loop : nest.loops) look_at(loop);
+  for (const Fusion& fusion : nest.fusions) {
+    look_at(fusion.inner);
+    look_at(fusion.outer);
+  }
+}
+
+}  // namespace
+
 std::vector<Part> parts_of(const Nest& nest, int iterator) {
   std::vector<Part> parts;
-  const auto add = [&](const Part& part) {
-    if (part.iterator == iterator) parts.push_back(part);
-  };
-  for (const Loop& loop : nest.loops) add(loop);
-  for (const Fusion& fusion : nest.fusions) {
-    add(fusion.inner);
-    add(fusion.outer);
-  }
+  for_each_part(nest, iterator, [&](const Part& part) { parts.push_back(part); });
   std::ranges::stable_sort(parts, std::greater(), &Part::step);
   return parts;
 }
 
-const Part* next_larger(const std::vector<Part>& parts, int64_t step) {
+const Part* next_larger(const Nest& nest, int iterator, int64_t step) {
   const Part* found = nullptr;
-  for (const Part& part : parts) {
-    if (part.step > step) found = &part;
-  }
+  for_each_part(nest, iterator, [&](const Part& part) {
+    if (part.step > step && (!found || part.step < found->step)) found = &part;
+  });
   return found;
 }
 
@@ -62,13 +71,6 @@ bool is_phase(const Nest& nest, size_t depth) {
   return std::any_of(
       nest.loops.begin() + static_cast<std::ptrdiff_t>(depth) + 1, nest.loops.end(),
       [&](const Loop& inner) { return inner.iterator == loop.iterator && inner.step > loop.step; });
-}
-
-bool is_bound(const FuncPlan& plan) {
-  const auto& [compute, store, hoist] = plan.placement;
-  return compute.kind == Level::Kind::At || store.kind != Level::Kind::Undecided ||
-         hoist.kind != Level::Kind::Undecided ||
-         std::ranges::any_of(plan.nests, [](const Nest& n) { return n.shared_with.has_value(); });
 }
 
 Nest with_ordered_fusions(const Nest& nest, int iterators) {

@@ -207,8 +207,8 @@ class PlanChecker {
   }
   // Extents of pure variables are known only where regions are.
   bool has_known_extent(StageId stage, const Loop& loop) const {
-    const std::vector<Part> parts = parts_of(plan_.nest(stage), loop.iterator);
-    if (loop.iterator == once || next_larger(parts, loop.step)) return true;
+    if (loop.iterator == once || next_larger(plan_.nest(stage), loop.iterator, loop.step))
+      return true;
     const std::vector<std::string>& names = iterators_of(*plan_.program, stage);
     const auto i = static_cast<size_t>(loop.iterator);
     const auto& rvars = func(stage.func).stage(stage.stage).rvars;
