@@ -49,6 +49,8 @@ struct StageRun {
   size_t storage_place = 1;  // and around the storage of its Func
   // The points that the loops from path[k] inwards run over are cover[k]. All 1 at the end.
   std::vector<Cover> cover;
+  // By dimension of a Func that is computed in loops: the share of its runs in which a border of its readers cuts its box.
+  std::vector<double> cut;
 
   int node_of(size_t depth) const { return path[place + depth]; }
 };

@@ -78,7 +78,7 @@ class StageWork {
     units_.loads += iterations() * spills.loads * m_.load_ns;
     units_.stores += iterations() * spills.stores * m_.store_ns;
     units_.chain = longest(chains_, instructions_);
-    const double taken = run_.facts->taken;
+    const double taken = run_.facts->taken * (1 + guarded_copies * guarded_share());
     for (double UnitTimes::*part : {&UnitTimes::arithmetic, &UnitTimes::loads, &UnitTimes::stores,
                                     &UnitTimes::scalars, &UnitTimes::chain})
       units_.*part *= taken;
@@ -157,6 +157,20 @@ class StageWork {
       units_.arithmetic += count * vectors(row.element_bytes, row.depends) * row.time.vector_ns;
     else
       (row.time.is_integer ? units_.scalars : units_.arithmetic) += count * row.time.scalar_ns;
+  }
+
+  // The share of tiles whose copies run behind conditions, as a border cuts them.
+  double guarded_share() const {
+    double share = 0;
+    for (const Touch& touch : run_.facts->touches) {
+      if (!touch.writes) continue;
+      for (size_t d = 0; d < run_.cut.size(); ++d) {
+        for (const TouchedSide::Move& move : touch.sides[d].moves) {
+          if (copies(set_of(move.iterator), true) > 1) share = std::max(share, run_.cut[d]);
+        }
+      }
+    }
+    return share;
   }
 
   // ---- memory ----
