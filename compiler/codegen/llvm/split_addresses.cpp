@@ -7,6 +7,9 @@
 #include <llvm/IR/Module.h>
 #include <llvm/Transforms/Utils/Local.h>
 
+#include <algorithm>
+#include <set>
+#include <utility>
 #include <vector>
 
 namespace retrograde::codegen {
@@ -19,6 +22,8 @@ struct Term {
 
 // Indices have one or two terms per dimension. Everything beyond this count is one term.
 constexpr size_t most_terms = 24;
+// Registers that hold starts of addresses. Counters and bounds take the others.
+constexpr size_t most_starts = 12;
 
 // An index as a sum of terms, split by whether the loop changes them.
 struct Sum {
@@ -88,22 +93,45 @@ Address parts_of(const llvm::GetElementPtrInst& access, const llvm::Loop& loop) 
   return address;
 }
 
-// Finds addresses in the loop whose index sums loop-invariant terms and terms that the loop changes, but not by a
-// constant step.
-std::vector<llvm::GetElementPtrInst*> find_split(const llvm::Loop& loop,
-                                                 llvm::ScalarEvolution& evolution) {
-  std::vector<llvm::GetElementPtrInst*> found;
+using Addresses = std::vector<llvm::GetElementPtrInst*>;
+
+// Finds addresses in the loop whose index sums loop-invariant terms and terms that the loop changes.
+Addresses find_sums(const llvm::Loop& loop) {
+  Addresses found;
   for (llvm::BasicBlock* block : loop.blocks()) {
     for (llvm::Instruction& one : *block) {
       auto* access = llvm::dyn_cast<llvm::GetElementPtrInst>(&one);
       if (!access || access->getNumIndices() != 1 || !access->getType()->isPointerTy()) continue;
       if (!loop.isLoopInvariant(access->getOperand(0))) continue;
-      llvm::Value* index = access->getOperand(1);
-      if (!index->getType()->isIntegerTy(64)) continue;
+      if (!access->getOperand(1)->getType()->isIntegerTy(64)) continue;
       const Sum sum = parts_of(*access, loop).index;
-      if (sum.fixed.empty() || sum.changing.empty()) continue;
-      if (!llvm::isa<llvm::SCEVAddRecExpr>(evolution.getSCEV(index))) found.push_back(access);
+      if (!sum.fixed.empty() && !sum.changing.empty()) found.push_back(access);
     }
+  }
+  return found;
+}
+
+// The loop-invariant parts of all addresses, each once.
+size_t count_starts(const Addresses& addresses, const llvm::Loop& loop) {
+  std::set<std::vector<std::pair<llvm::Value*, bool>>> starts;
+  for (const llvm::GetElementPtrInst* access : addresses) {
+    const Address address = parts_of(*access, loop);
+    std::vector<std::pair<llvm::Value*, bool>> start{{address.start, false}};
+    for (const Term& term : address.index.fixed) start.emplace_back(term.value, term.is_negative);
+    std::sort(start.begin() + 1, start.end());
+    starts.insert(std::move(start));
+  }
+  return starts.size();
+}
+
+// LLVM's strength reduction knows how to step through memory, but it may compute long sums in each iteration rather than
+// keep their invariant parts. So addresses with a constant step are split, too, if there are registers for all starts.
+Addresses find_split(const llvm::Loop& loop, llvm::ScalarEvolution& evolution) {
+  Addresses found = find_sums(loop);
+  if (count_starts(found, loop) > most_starts) {
+    llvm::erase_if(found, [&](llvm::GetElementPtrInst* access) {
+      return llvm::isa<llvm::SCEVAddRecExpr>(evolution.getSCEV(access->getOperand(1)));
+    });
   }
   return found;
 }

@@ -7,8 +7,9 @@
 //                                                      load q[x + 1]
 //
 // Why: an index sums terms in the order of its dimensions. LLVM's code generator splits only sums that grow by a
-// constant step per iteration. Other sums stay as emitted and cost one or two additions per access: indices of vectors
-// that ShiftInwards moves, and data-dependent indices.
+// constant step per iteration, and not all of these where there are many. Other sums stay as emitted and cost one to
+// four additions per access: indices of vectors that ShiftInwards moves, data-dependent indices, and operands of
+// unrolled sums.
 // Source: folklore (reassociation by loop depth), restricted to addresses. LLVM's own pass reorders all integer
 // arithmetic and so breaks sums and products that match machine instructions.
 #pragma once
