@@ -8,20 +8,31 @@ namespace retrograde::planning {
 
 namespace {
 
-// The kept Funcs, opaque ones, and the Funcs in whose loops one of these runs.
-std::vector<bool> with_hosts(const Plan& plan, std::vector<bool> kept) {
-  const auto keep_host = [&](const Level& level) {
-    if (level.kind == Level::Kind::At) kept[static_cast<size_t>(level.loop.stage.func)] = true;
+// The kept Funcs, opaque ones, the Funcs in whose loops one of these runs, and those that read it there.
+std::vector<bool> with_company(const Plan& plan, std::vector<bool> kept, const Context& context) {
+  bool is_more = true;
+  const auto keep = [&](FuncId func) {
+    is_more |= !kept[static_cast<size_t>(func)];
+    kept[static_cast<size_t>(func)] = true;
   };
-  for (size_t i = 0; i < plan.funcs.size(); ++i) {  // producers first
-    const FuncPlan& func = *plan.funcs[i];
-    if (func.opacity != Opacity::None) kept[i] = true;
-    if (!kept[i]) continue;
-    for (const Level* level :
-         {&func.placement.compute, &func.placement.store, &func.placement.hoist})
-      keep_host(*level);
-    for (const Nest& nest : func.nests) {
-      if (nest.shared_with) keep_host({Level::Kind::At, *nest.shared_with});
+  const auto keep_host = [&](const Level& level) {
+    if (level.kind == Level::Kind::At) keep(level.loop.stage.func);
+  };
+  for (size_t i = 0; i < plan.funcs.size(); ++i)
+    kept[i] = kept[i] || plan.funcs[i]->opacity != Opacity::None;
+  while (is_more) {
+    is_more = false;
+    for (size_t i = 0; i < plan.funcs.size(); ++i) {
+      if (!kept[i]) continue;
+      const auto& [compute, store, hoist] = plan.funcs[i]->placement;
+      for (const Level* level : {&compute, &store, &hoist}) keep_host(*level);
+      for (const Nest& nest : plan.funcs[i]->nests) {
+        if (nest.shared_with) keep_host({Level::Kind::At, *nest.shared_with});
+      }
+      if (compute.kind != Level::Kind::At) continue;
+      for (const StageId reader : moves::all_readers(plan, context, static_cast<FuncId>(i))) {
+        if (!is_inlined(plan, reader.func)) keep(reader.func);
+      }
     }
   }
   return kept;
@@ -55,7 +66,7 @@ Plan plan_from_nothing(const Plan& plan, const std::vector<bool>& kept, const Co
   stays.resize(plan.funcs.size());
   for (size_t i = 0; i < stays.size(); ++i)
     stays[i] = stays[i] || has_lanes_of_long_sum(plan, static_cast<FuncId>(i), context);
-  stays = with_hosts(plan, std::move(stays));
+  stays = with_company(plan, std::move(stays), context);
   const Plan undecided = undecided_plan(plan.program);
   Plan start = plan;
   for (size_t i = 0; i < plan.funcs.size(); ++i) {

@@ -2,6 +2,7 @@
 // of the last one computes what the interpreter does.
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -35,9 +36,15 @@ inline std::string price_difference(planning::CostModel& model, const planning::
                                       to_text(expected, plan), to_text(plan));
 }
 
+struct WalkOptions {
+  int most_steps = 8;
+  std::string preferred;  // a move that is taken more often than others
+};
+
 class MoveWalk {
  public:
-  explicit MoveWalk(Choices& choices) : c_(choices), program_(made(choices)) {
+  explicit MoveWalk(Choices& choices, WalkOptions options = {})
+      : c_(choices), options_(std::move(options)), program_(made(choices)) {
     default_extent_ = c_.pick<int64_t>({7, 40, 1000});
     if (c_.chance(50)) machine_.levels[0].bytes = 1 << 10;
     if (c_.chance(50)) machine_.levels[1].bytes = 1 << 12;
@@ -56,7 +63,7 @@ class MoveWalk {
     const planning::Context in_small{accesses, sizes, small, dependences};
     planning::CostModel cost(accesses, sizes, machine_), small_cost(accesses, sizes, small);
     const auto funcs = static_cast<int>(plan_.funcs.size());
-    for (int step = c_.between(0, most_steps); step > 0 && broken_.empty(); --step) {
+    for (int step = c_.between(0, options_.most_steps); step > 0 && broken_.empty(); --step) {
       const auto id = static_cast<planning::FuncId>(c_.below(funcs));
       std::vector<Choice> possible;  // rare moves are as likely as others
       for (const planning::Move& move : planning::all_moves()) {
@@ -64,7 +71,10 @@ class MoveWalk {
         if (!choice.plans.empty()) possible.push_back(std::move(choice));
       }
       if (possible.empty()) continue;
-      const auto [move, plans] = c_.pick(possible);
+      const auto preferred = std::ranges::find(possible, options_.preferred,
+                                               [](const Choice& c) { return c.move->name; });
+      const bool takes_preferred = preferred != possible.end() && c_.chance(50);
+      const auto [move, plans] = takes_preferred ? *preferred : c_.pick(possible);
       for (const planning::Plan& after : plans) {
         check(after, *move, id);
         if (broken_.empty()) broken_ = price_difference(cost, after, context);
@@ -98,8 +108,8 @@ class MoveWalk {
     const planning::Move* move;
     std::vector<planning::Plan> plans;
   };
-  static constexpr int most_steps = 8;
   Choices& c_;
+  const WalkOptions options_;
   const RandomProgram program_;
   std::vector<graph::FuncPtr> unscheduled_;
   int64_t default_extent_ = 0;

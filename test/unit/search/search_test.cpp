@@ -163,6 +163,24 @@ TEST_F(SearchTest, ASearchFromNothingKeepsWhatItMust) {
             "heavy  root  parallel y, x:16 GuardWithIf, vector x\n");
 }
 
+// Two outputs that read a Func in the loops that they share.
+TEST_F(SearchTest, ASearchFromNothingKeepsTheReadersOfAKeptFunc) {
+  Func both("both");
+  both(x, y) = rows(x, y) - 1;
+  both.set_estimates({{0, 1000}, {0, 800}});
+  start = parsed(
+      "both  root  shared with out/y  y, x\nout  root  y, x\nrows  at out/y  y, x\nheavy  root\n",
+      std::vector<Func>{out, both});
+  accesses.emplace(start.program->outputs);
+  sizes.emplace(*accesses, SizeDefaults{unknown_extent});
+  Dependences dependences(*accesses);
+  std::vector<bool> kept(start.funcs.size(), false);
+  kept[static_cast<size_t>(id("rows"))] = true;
+  const Plan nothing = plan_from_nothing(start, kept, {*accesses, *sizes, machine, dependences});
+  EXPECT_TRUE(nothing.of(id("both")) == start.of(id("both"))) << plain_text(nothing);
+  EXPECT_EQ(broken_invariant(nothing), "");
+}
+
 TEST_F(SearchTest, ASearchFromNothingKeepsLanesOfLongSums) {
   for (const int terms : {500, 600}) {
     Func sum("sum");
