@@ -5,6 +5,7 @@
 
 #include "autoschedule/size_estimate.h"
 #include "diagnostics/error.h"
+#include "driver/plan_schedule.h"
 #include "driver/plan_search.h"
 #include "driver/schedule.h"
 #include "driver/schedule_difference.h"
@@ -142,6 +143,9 @@ std::string note_against_search(const std::vector<FuncPtr>& outputs, const std::
 
 ChosenSchedule choose_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
                                Scheduling what, const Target& target, bool wants_runner_up) {
+  const bool searches = request.options.search || wants_runner_up;
+  if (default_schedules == DefaultSchedules::OfPlans && !searches && !request.on_gpu)
+    return {schedule_by_plan(outputs, request, what), {}};
   ChosenSchedule rules{autoschedule::schedule_within_budget(outputs, request, what), {}};
   if (!request.options.search && !wants_runner_up) return rules;
   rules.search.note = reason_against(outputs, request);
