@@ -72,6 +72,12 @@ inline constexpr int64_t uncontended_lines = 1 << 10;
 
 // The longest chain of additions to one accumulator. Longer sums run in lanes or blocks, whose rounding errors are smaller.
 inline constexpr double longest_chain = 512;
+// The terms of a block of a long sum: about as many as there are blocks, between these.
+inline constexpr int64_t least_block_terms = 64, most_block_terms = 256;
+// A sum to few elements is split into lanes and rows if it has this many terms. The terms of a lane, if its rows are parts
+// of a single loop.
+inline constexpr int64_t many_terms = 4096;
+inline constexpr int64_t lane_terms = 256;
 
 // ---- Programs ----
 

@@ -1,6 +1,7 @@
 // The changes of a plan: what refers to loops that changed, and which plans are dropped.
 #include <algorithm>
 
+#include "autoschedule/access/long_sums.h"
 #include "autoschedule/moves/edit.h"
 #include "autoschedule/plan/nest.h"
 
@@ -49,7 +50,7 @@ class FuncChange {
   }
 
   std::optional<Plan> run() {
-    if (!keeps_order() || !keeps_shared_loops()) return std::nullopt;
+    if (!keeps_order() || !keeps_short_chains() || !keeps_shared_loops()) return std::nullopt;
     Plan plan = before_;
     plan.funcs[static_cast<size_t>(func_)] = std::make_shared<FuncPlan>(changed_);
     if (is_moved_ && reads_window()) return std::nullopt;
@@ -130,6 +131,23 @@ class FuncChange {
       if (!is_kept) return false;
     }
     return true;
+  }
+
+  // ---- L7 ----
+
+  // Lanes of terms that make the chains of a long sum short stay.
+  bool keeps_short_chains() const {
+    for (size_t s = 0; s < changed_.nests.size(); ++s) {
+      const StageId stage{func_, static_cast<int16_t>(s)};
+      if (has_lanes_of_terms(stage, old_nest(stage)) &&
+          !has_lanes_of_terms(stage, new_nest(stage)) && is_long_sum(stage, context_.sizes))
+        return false;
+    }
+    return true;
+  }
+  bool has_lanes_of_terms(StageId stage, const Nest& nest) const {
+    const std::optional<size_t> lanes = vector_loop(nest);
+    return lanes && is_reduction(context_, stage, nest.loops[*lanes].iterator);
   }
 
   // ---- L11 ----

@@ -254,6 +254,17 @@ class ReaderFusion {
   }
 };
 
+// The plan in which stages that read the Func, but run in loops of others, are at root. There, rows may be their pure loops,
+// where the others add up what all rows give.
+Plan with_readers_apart(Plan plan, FuncId func, const Context& context) {
+  for (const StageId stage : all_readers(plan, context, func)) {
+    if (plan.of(stage.func).placement.compute.kind != Level::Kind::At) continue;
+    std::vector<Plan> apart = find_move("root")->apply(plan, stage.func, context);
+    if (!apart.empty()) plan = std::move(apart.front());
+  }
+  return plan;
+}
+
 }  // namespace
 
 std::vector<Plan> fuse_readers(const Plan& plan, FuncId func, const Context& context) {
@@ -261,11 +272,16 @@ std::vector<Plan> fuse_readers(const Plan& plan, FuncId func, const Context& con
   if (!is_editable(plan, func) || context.accesses.func(func).stages.size() > 1 ||
       is_output(*plan.program, func) || !has_bounded_region(plan, context, func))
     return plans;
-  ReaderFusion fusion(plan, func, context);
   const std::vector<int16_t>& order = plan.of(func).storage.order;
-  if (order.size() < 2 || !fusion.find_stages()) return plans;
-  for (size_t d = order.size(); d-- > 1 && plans.size() < most_dimensions;)
-    add(plans, fusion.run(order[d]));
+  if (order.size() < 2) return plans;
+  const auto add_fusions = [&](const Plan& from) {
+    ReaderFusion fusion(from, func, context);
+    if (!fusion.find_stages()) return;
+    for (size_t d = order.size(); d-- > 1 && plans.size() < most_dimensions;)
+      add(plans, fusion.run(order[d]));
+  };
+  add_fusions(plan);
+  if (plans.empty()) add_fusions(with_readers_apart(plan, func, context));
   return plans;
 }
 

@@ -144,8 +144,12 @@ class Beam {
     }
   }
 
-  // Whether a move of another Func changes one that is to be kept. Loops that places refer to may get other numbers.
+  // Whether no Func leaves the place that it is to have, and no move of another Func changes one that is to be kept. Loops that places refer to may get other numbers.
   bool keeps_funcs(const Plan& before, const Plan& after) const {
+    for (size_t f = 0; f < options_.at_root.size(); ++f) {
+      if (options_.at_root[f] && after.funcs[f]->placement.compute.kind != Level::Kind::Root)
+        return false;
+    }
     for (size_t f = 0; f < options_.kept.size(); ++f) {
       if (!options_.kept[f] || before.funcs[f] == after.funcs[f]) continue;
       const FuncPlan &was = *before.funcs[f], &is = *after.funcs[f];

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 
-#include "autoschedule/moves/edit.h"
+#include "autoschedule/access/long_sums.h"
+#include "autoschedule/moves/move.h"
 
 namespace retrograde::planning {
 
@@ -38,25 +39,23 @@ std::vector<bool> with_company(const Plan& plan, std::vector<bool> kept, const C
   return kept;
 }
 
-// Whether a stage adds more terms in lanes than one chain of additions should.
-bool has_lanes_of_long_sum(const Plan& plan, FuncId func, const Context& context) {
-  for (size_t s = 0; s < plan.of(func).nests.size(); ++s) {
-    const StageId stage{func, static_cast<int16_t>(s)};
-    const auto adds_up = [&](const Loop& loop) {
-      return loop.kind == ForType::Vectorized && loop.iterator >= 0 &&
-             moves::is_reduction(context, stage, loop.iterator);
-    };
-    const Nest& nest = plan.nest(stage);
-    if (!nest.fusions.empty() || std::ranges::none_of(nest.loops, adds_up)) continue;
-    const Cover extents = whole_cover(stage, context.sizes);
-    double terms = 1;
-    for (size_t i = 0; i < extents.size(); ++i) {
-      if (moves::is_reduction(context, stage, static_cast<int>(i)))
-        terms *= static_cast<double>(extents[i]);
-    }
-    if (terms > longest_chain) return true;
-  }
-  return false;
+// Whether a stage of the Func needs lanes of terms, which no move takes away.
+bool needs_lanes_of_terms(FuncId func, const SizeModel& sizes) {
+  return std::ranges::any_of(sizes.graph().func(func).stages, [&](const StageNode& stage) {
+    return is_long_sum(stage.id, sizes) && is_short_in_lanes(stage.id, sizes);
+  });
+}
+
+// A C function reads memory, of which moves know no region.
+bool is_read_by_extern(const Plan& plan, FuncId func) {
+  return std::ranges::any_of(plan.program->readers[static_cast<size_t>(func)], [&](StageId reader) {
+    return plan.of(reader.func).opacity == Opacity::Extern;
+  });
+}
+void compute_at_root(Plan& plan, FuncId func) {
+  FuncPlan changed = plan.of(func);
+  changed.placement.compute.kind = Level::Kind::Root;
+  plan.funcs[static_cast<size_t>(func)] = std::make_shared<FuncPlan>(std::move(changed));
 }
 
 }  // namespace
@@ -64,8 +63,6 @@ bool has_lanes_of_long_sum(const Plan& plan, FuncId func, const Context& context
 Plan plan_from_nothing(const Plan& plan, const std::vector<bool>& kept, const Context& context) {
   std::vector<bool> stays = kept;
   stays.resize(plan.funcs.size());
-  for (size_t i = 0; i < stays.size(); ++i)
-    stays[i] = stays[i] || has_lanes_of_long_sum(plan, static_cast<FuncId>(i), context);
   stays = with_company(plan, std::move(stays), context);
   const Plan undecided = undecided_plan(plan.program);
   Plan start = plan;
@@ -74,11 +71,19 @@ Plan plan_from_nothing(const Plan& plan, const std::vector<bool>& kept, const Co
   }
   for (auto f = static_cast<FuncId>(plan.funcs.size()); f-- > 0;) {
     if (stays[static_cast<size_t>(f)]) continue;
+    if (is_read_by_extern(plan, f)) {
+      compute_at_root(start, f);
+      continue;
+    }
     for (const char* move : {"root", "inline_func"}) {
       const std::vector<Plan> plans = find_move(move)->apply(start, f, context);
       if (plans.empty()) continue;
       start = plans.front();
       break;
+    }
+    if (needs_lanes_of_terms(f, context.sizes)) {
+      const std::vector<Plan> plans = find_move("reduction_lanes")->apply(start, f, context);
+      if (!plans.empty()) start = plans.back();
     }
   }
   return start;

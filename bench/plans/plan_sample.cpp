@@ -134,7 +134,7 @@ std::vector<SampledPlan> plans_of_searches(const std::vector<FuncPtr>& outputs,
     driver::PlanSearchOptions search;
     search.width = width;
     search.spare_bytes = std::numeric_limits<int64_t>::max();
-    search.from_rules = false;
+    search.start = driver::SearchStart::NothingBesideRules;
     search.without = std::move(without);
     const auto found =
         driver::search_plans(standard.scheduled, outputs, {}, options.machine, search);

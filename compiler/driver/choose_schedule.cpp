@@ -5,6 +5,7 @@
 
 #include "autoschedule/size_estimate.h"
 #include "diagnostics/error.h"
+#include "driver/plan_schedule.h"
 #include "driver/plan_search.h"
 #include "driver/schedule_difference.h"
 #include "graph/definitions/parameter_contents.h"
@@ -181,6 +182,9 @@ std::string note_against_search(const std::vector<FuncPtr>& outputs, const std::
 
 ChosenSchedule choose_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
                                Scheduling what, const Lowering& lowering, Choosing choosing) {
+  if (default_schedules == DefaultSchedules::OfPlans && choosing == Choosing::Search &&
+      !request.options.search && !request.on_gpu)
+    return {schedule_by_plan(outputs, request, what), {}, {}};
   ChosenSchedule rules{autoschedule::schedule_within_budget(outputs, request, what), {}};
   const bool is_wide = request.options.search;
   const bool wants_report = is_wide || choosing == Choosing::SearchWithReport;
@@ -192,7 +196,7 @@ ChosenSchedule choose_schedule(const std::vector<FuncPtr>& outputs, const Schedu
   PlanSearchOptions options;
   options.spare_bytes = std::max<int64_t>(memory.budget_bytes - memory.bytes, 0);
   if (is_wide) options.width = wide;
-  options.from_rules = is_wide;
+  options.start = is_wide ? SearchStart::Both : SearchStart::NothingBesideRules;
   options.what = what;
   const planning::Machine machine = wants_report ? search_machine(request.options, lowering.target)
                                                  : autoschedule::machine_of(request);
