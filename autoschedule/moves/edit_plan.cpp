@@ -57,7 +57,6 @@ class FuncChange {
     for (const FuncId guest : bound_) {
       if (guest != func_ && (!keeps_region(guest) || !renumber(plan, guest))) return std::nullopt;
     }
-    if (joins_others() && !has_independent_company(plan)) return std::nullopt;
     if (!broken_structure(plan, before_).empty()) return std::nullopt;
     return plan;
   }
@@ -172,41 +171,6 @@ class FuncChange {
     return true;
   }
 
-  // Whether Funcs that share loops with this one, also through others, and Funcs that run with them depend on none of them.
-  bool has_independent_company(const Plan& plan) const {
-    std::vector<FuncId> company{func_};
-    const auto is_in = [&](FuncId id) { return std::ranges::find(company, id) != company.end(); };
-    for (size_t known = 0; known != company.size();) {
-      known = company.size();
-      for (size_t id = 0; id < plan.funcs.size(); ++id) {
-        for (const Nest& nest : plan.funcs[id]->nests) {
-          const FuncId own = static_cast<FuncId>(id);
-          const FuncId host = nest.shared_with ? nest.shared_with->stage.func : own;
-          if (is_in(own) != is_in(host)) company.push_back(is_in(own) ? host : own);
-        }
-      }
-    }
-    return company.size() == 1 || std::ranges::none_of(company, [&](FuncId member) {
-             std::vector<FuncId> reached{member};
-             for (size_t i = 0; i < reached.size(); ++i) {
-               for (const StageId reader : context_.accesses.consumers(reached[i])) {
-                 if (std::ranges::find(reached, reader.func) != reached.end()) continue;
-                 if (is_in(reader.func)) return true;
-                 reached.push_back(reader.func);
-               }
-             }
-             return false;
-           });
-  }
-  bool joins_others() const {
-    for (size_t s = 0; s < changed_.nests.size(); ++s) {
-      const std::optional<LoopRef>& shared = changed_.nests[s].shared_with;
-      if (shared && shared->stage.func != func_ && shared != before().nests[s].shared_with)
-        return true;
-    }
-    return false;
-  }
-
   // ---- L4, L9 ----
 
   // The loop of this Func in which another one is computed, perhaps inside of loops of others.
@@ -269,6 +233,9 @@ class FuncChange {
       if (!is_at(*level, func_)) continue;
       if (level->in_each_stage && !(changed_.nests == before().nests)) return false;
       follow(level->loop);
+      const std::optional<LoopRef>& shared = new_nest(level->loop.stage).shared_with;
+      const bool is_owned = shared && shared->stage.func != func_;
+      if (is_owned && level->loop.depth <= shared->depth) level->loop.stage = shared->stage;
     }
     for (Nest& nest : other.nests) {
       if (nest.shared_with && nest.shared_with->stage.func == func_) follow(*nest.shared_with);

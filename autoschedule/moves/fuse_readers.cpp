@@ -130,10 +130,7 @@ class ReaderFusion {
       if (stage != stages_.back()) nest.shared_with = inside;
       if (!change(plan, stage.func, std::move(changed))) return std::nullopt;
     }
-    for (size_t f = 0; f < plan.funcs.size(); ++f) {
-      if (!move_to_owner(plan, static_cast<FuncId>(f), inside)) return std::nullopt;
-    }
-    if (!place(plan, func_, inside, false)) return std::nullopt;
+    if (!place(plan, inside)) return std::nullopt;
     return plan;
   }
 
@@ -153,27 +150,15 @@ class ReaderFusion {
     return next.has_value();
   }
 
-  bool place(Plan& plan, FuncId func, const LoopRef& inside, bool keeps_loops) const {
-    FuncPlan changed = plan.of(func);
+  bool place(Plan& plan, const LoopRef& inside) const {
+    FuncPlan changed = plan.of(func_);
     changed.placement = {};
     changed.placement.compute = {Level::Kind::At, inside};
     changed.storage.folds.clear();
-    if (!keeps_loops) {
-      const std::vector<int64_t> box =
-          Covers(plan, context_.sizes).box(func, changed.placement.compute);
-      run_along_rows(changed, plan, context_, func, box, lanes_for(plan, {func, 0}, INT64_MAX) / 2);
-    }
-    return change(plan, func, std::move(changed));
-  }
-  // Moves a Func out of loops that its stage no longer owns.
-  bool move_to_owner(Plan& plan, FuncId func, const LoopRef& inside) const {
-    const auto& [compute, store, hoist] = plan.of(func).placement;
-    const bool is_shared = compute.kind == Level::Kind::At && compute.loop.depth <= inside.depth &&
-                           compute.loop.stage != inside.stage &&
-                           std::ranges::find(stages_, compute.loop.stage) != stages_.end();
-    if (!is_shared) return true;
-    return store.kind == Level::Kind::Undecided && hoist.kind == Level::Kind::Undecided &&
-           place(plan, func, inside, runs_at_any_size(plan.of(func), context_, func));
+    const std::vector<int64_t> box =
+        Covers(plan, context_.sizes).box(func_, changed.placement.compute);
+    run_along_rows(changed, plan, context_, func_, box, lanes_for(plan, {func_, 0}, INT64_MAX) / 2);
+    return change(plan, func_, std::move(changed));
   }
 
   // Whether other Funcs share loops of the stage.

@@ -8,6 +8,7 @@
 //       nothing is computed inside of it.
 //   P5  Loops that carry a dependence are serial and keep their order, unless the update commutes or is atomic. The
 //       rules of directives decide it (graph/directives/iteration_order.h).
+//   P7  Stages that share loops can run together (sharing.h).
 //
 // Not checked: what depends on the regions that loops access, such as whether a window holds all rows that are read
 // again (P6).
@@ -16,6 +17,7 @@
 #include "autoschedule/plan/nest.h"
 #include "autoschedule/plan/plan.h"
 #include "autoschedule/plan/readers.h"
+#include "autoschedule/plan/sharing.h"
 #include "diagnostics/error.h"
 #include "graph/definitions/define.h"
 #include "ir/build.h"
@@ -48,6 +50,7 @@ class PlanChecker {
     }
     for_each_changed([&](StageId stage) { check_steps(stage); });
     for (const FuncId id : bound_) check_levels(id);
+    if (broken_.empty()) broken_ = broken_sharing(plan_, before_);
     if (!broken_.empty()) return broken_;
     const Readers readers(plan_);
     for (const FuncId id : bound_) check_reads(id, readers);

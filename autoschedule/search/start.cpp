@@ -69,6 +69,16 @@ Plan plan_from_nothing(const Plan& plan, const std::vector<bool>& kept, const Co
   for (size_t i = 0; i < plan.funcs.size(); ++i) {
     if (!stays[i]) start.funcs[i] = undecided.funcs[i];
   }
+  // Operands of those that stay lie as they read them.
+  for (size_t i = 0; i < plan.funcs.size(); ++i) {
+    const std::vector<StageId> readers = moves::all_readers(plan, context, static_cast<FuncId>(i));
+    const bool is_operand = std::ranges::any_of(
+        readers, [&](StageId reader) { return stays[static_cast<size_t>(reader.func)]; });
+    if (stays[i] || !is_operand) continue;
+    FuncPlan stored = *start.funcs[i];
+    stored.storage.order = plan.funcs[i]->storage.order;
+    start.funcs[i] = std::make_shared<FuncPlan>(std::move(stored));
+  }
   for (auto f = static_cast<FuncId>(plan.funcs.size()); f-- > 0;) {
     if (stays[static_cast<size_t>(f)]) continue;
     if (is_read_by_extern(plan, f)) {

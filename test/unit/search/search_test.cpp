@@ -146,7 +146,7 @@ TEST_F(SearchTest, FuncsWithASmallShareAreOnlyComputedElsewhere) {
 }
 
 TEST_F(SearchTest, ASearchFromNothingKeepsWhatItMust) {
-  start = parsed("out  root  y:8, y, x\nrows  at out/y:8  y, x\nheavy  at rows/y  y, x\n",
+  start = parsed("out  root  y:8, y, x\nrows  at out/y:8  y, x\nheavy  at rows/y  (y, x)  y, x\n",
                  start.program);
   Dependences dependences(*accesses);
   const Context context{*accesses, *sizes, machine, dependences};
@@ -160,7 +160,7 @@ TEST_F(SearchTest, ASearchFromNothingKeepsWhatItMust) {
   EXPECT_EQ(plain_text(plan_from_nothing(start, kept, context)),
             "out  root  y:8, y, x\n"
             "rows  at out/y:8\n"
-            "heavy  root  parallel y, x:16 GuardWithIf, vector x\n");
+            "heavy  root  (y, x)  parallel x, y:16 GuardWithIf, vector y\n");  // as it is read
 }
 
 // Two outputs that read a Func in the loops that they share.
