@@ -8,8 +8,10 @@
 //   c*min(p, q) + rest, c > 0       one of the two suffices           (max with c < 0 alike)
 //   c*(p / k) + rest, c > 0, k > 0  p <= k*floor(-rest / c) + k - 1
 //   c*(p / k) + rest, c < 0, k > 0  p >= k*ceil(rest / -c)
+//   c*((min(p, q) + r) / k) + rest  where v is also in rest: both forms or one of them, with p and with q
 //   c*atom + rest                   the atom's largest value, if bounded independently of v
 #include <algorithm>
+#include <utility>
 
 #include "analysis/bounds_engine.h"
 #include "analysis/linear.h"
@@ -74,11 +76,15 @@ class Solver {
     return both;
   }
 
-  // Either solution is correct; one without a further condition is preferred.
+  // Either solution is correct; one without a further condition is preferred, then the one with fewer ends.
   static std::optional<Solution> one_of(const std::optional<Solution>& a,
                                         const std::optional<Solution>& b) {
     if (!a || !b) return a ? a : b;
-    return a->needed.defined() && !b->needed.defined() ? b : a;
+    const auto limits = [](const Solution& s) {
+      const int ends = int{s.interval.min.defined()} + int{s.interval.max.defined()};
+      return std::pair(s.needed.defined(), ends);
+    };
+    return limits(*b) < limits(*a) ? b : a;
   }
 
   std::optional<Solution> solve_comparison(Kind kind, const Expr& a, const Expr& b, bool is_true) {
@@ -120,7 +126,11 @@ class Solver {
     const Term* compound = nullptr;
     for (const Term& term : form.terms) {
       if (!uses_variable(term.atom, variable_)) continue;
-      (term.atom.as<Variable>() ? direct : compound) = &term;
+      if (term.atom.as<Variable>()) {
+        direct = &term;
+      } else if (!compound || !is_extreme(compound->atom)) {
+        compound = &term;
+      }
     }
     if (compound) return isolate_compound(form, *compound, depth);
     return direct ? isolate_variable(form, *direct) : if_nonpositive(form);
@@ -149,15 +159,13 @@ class Solver {
 
   std::optional<Solution> isolate_compound(const Sum& form, const Term& term, int depth) {
     const Binary* op = term.atom.as<Binary>();
-    Kind kind = term.atom.kind();
-    if (op && (kind == Kind::Min || kind == Kind::Max)) {
-      auto a = isolate(with_replaced(form, term, op->a), depth - 1);
-      auto b = isolate(with_replaced(form, term, op->b), depth - 1);
-      bool needs_both = (kind == Kind::Max) == (term.factor > 0);
-      return needs_both ? all_of(a, b) : one_of(a, b);
+    if (is_extreme(term.atom)) {
+      const auto with_arm = [&](const Expr& arm) { return with_replaced(form, term, arm); };
+      return isolate_arms(term.atom, term.factor > 0, with_arm, depth);
     }
-    if (op && kind == Kind::Div) {
+    if (op && term.atom.kind() == Kind::Div) {
       if (auto solution = isolate_division(form, term, *op, depth)) return solution;
+      if (auto solution = isolate_arms_inside(form, term, *op, depth)) return solution;
     }
     Scope<Interval> any_value;
     any_value.push(variable_, Interval::everything());
@@ -165,6 +173,36 @@ class Solver {
     const Expr& worst = term.factor > 0 ? range.max : range.min;
     if (!worst.defined()) return std::nullopt;
     return isolate(with_replaced(form, term, worst), depth - 1);
+  }
+
+  static bool is_extreme(const Expr& e) { return e.kind() == Kind::Min || e.kind() == Kind::Max; }
+
+  // The form grows (`grows`) or falls with a min or max, of which either arm is put in its place.
+  template <class Replace>
+  std::optional<Solution> isolate_arms(const Expr& extreme, bool grows, Replace with_arm,
+                                       int depth) {
+    const auto* op = extreme.as<Binary>();
+    auto a = isolate(with_arm(op->a), depth - 1), b = isolate(with_arm(op->b), depth - 1);
+    const bool needs_both = (extreme.kind() == Kind::Max) == grows;
+    return needs_both ? all_of(a, b) : one_of(a, b);
+  }
+
+  // A min or max in the numerator: quotients by positive numbers grow with it.
+  std::optional<Solution> isolate_arms_inside(const Sum& form, const Term& term, const Binary& op,
+                                              int depth) {
+    const auto k = as_const_int(op.b);
+    const Sum numerator = linear_form(op.a);
+    const auto inner = std::ranges::find_if(numerator.terms, [&](const Term& t) {
+      return is_extreme(t.atom) && uses_variable(t.atom, variable_);
+    });
+    if (!k || *k <= 0 || inner == numerator.terms.end()) return std::nullopt;
+    const auto with_arm = [&](const Expr& arm) {
+      const Expr changed = to_expr(with_replaced(numerator, *inner, arm));
+      Sum result = changed.defined() ? with_replaced(form, term, canonical_div(changed, *k)) : form;
+      result.valid = result.valid && changed.defined();
+      return result;
+    };
+    return isolate_arms(inner->atom, (inner->factor > 0) == (term.factor > 0), with_arm, depth);
   }
 
   std::optional<Solution> isolate_division(const Sum& form, const Term& term, const Binary& op,

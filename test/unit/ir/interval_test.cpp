@@ -247,5 +247,18 @@ TEST_F(IntervalTest, ConditionsAreSolved) {
   EXPECT_FALSE(solve_for(x * n < 3, "x", inner));
 }
 
+// Vectors of 16 over a box that the end n cuts off: all of them are inside if the box of 64 is, x * 64 + 63 <= n.
+TEST_F(IntervalTest, ConditionsOnTheEndOfABoxAreSolved) {
+  const Expr last = min(n, x * 64 + 63);
+  Scope<Interval> inner;
+  inner.push("v", {0, (last - x * 64) / 16});
+  inner.push("lane", {0, 15});
+  const Expr v = variable("v"), lane = variable("lane");
+  const auto solution = solve_for(v * 16 + x * 64 + lane <= last, "x", inner);
+  ASSERT_TRUE(solution);
+  EXPECT_FALSE(solution->interval.min.defined());
+  EXPECT_EQ(print(solution->interval.max), "(n + 1) / 16 * 16 / 64 - 1");  // (n - 63) / 64
+}
+
 }  // namespace
 }  // namespace retrograde::analysis
