@@ -178,6 +178,15 @@ SizeModel::Ends SizeModel::told(const FuncNode& node, size_t dimension) const {
   return ends;
 }
 
+// An estimate of a Func that others read is no limit to what they need.
+void SizeModel::extend(Ends& ends, const ConstantRange& needed) {
+  if (needed.min > needed.max) return;
+  if (ends.min.source == SizeSource::Estimate && ends.min.value)
+    ends.min.value = std::min(*ends.min.value, needed.min);
+  if (ends.max.source == SizeSource::Estimate && ends.max.value)
+    ends.max.value = std::max(*ends.max.value, needed.max);
+}
+
 // An end that nothing gives leaves the other one where it is and takes the default extent.
 SizeModel::Known SizeModel::settled(const Ends& ends, const Known* region) const {
   Ends all = ends;
@@ -205,7 +214,9 @@ void SizeModel::find_func(FuncId id) {
   const FuncNode& node = graph_.func(id);
   for (size_t d = 0; d < node.func->args.size(); ++d) {
     const auto& region = regions_[static_cast<size_t>(id)][d];
-    Known known = settled(told(node, d), region ? &*region : nullptr);
+    Ends ends = told(node, d);
+    if (region && !node.is_output) extend(ends, region->needed);
+    Known known = settled(ends, region ? &*region : nullptr);
     for (const Bound& b : node.func->schedule.bounds) {
       const auto modulus = b.var == node.func->args[d] ? certain_value(b.modulus) : std::nullopt;
       if (modulus && known.multiple_of == 1) known.multiple_of = std::max<int64_t>(*modulus, 1);
@@ -229,6 +240,17 @@ void SizeModel::find_iterators(StageId stage) {
   }
 }
 
+// Whether the loops read all elements that the index has.
+bool SizeModel::is_needed(const Access& read, size_t dimension) const {
+  const IndexForm& form = read.index[dimension];
+  if (!form.is_affine() || form.clamped) return false;
+  const auto moves_it = [&](const IndexForm& condition) {
+    return (condition.moved_by() & form.moved_by()) != 0;
+  };
+  return std::ranges::none_of(graph_.stage(read.by).guard.nonnegative, moves_it) &&
+         std::ranges::none_of(read.guard.nonnegative, moves_it);
+}
+
 void SizeModel::pass_on(const Access& read) {
   if (read.of < 0 || read.of == read.by.func) return;
   const auto& loops =
@@ -244,9 +266,11 @@ void SizeModel::pass_on(const Access& read) {
     }
     if (!read.index[d].is_affine() || read.index[d].clamped) found.is_certain = false;
     if (!found.range.is_bounded()) found.source = SizeSource::Default;
+    if (found.source != SizeSource::Default && is_needed(read, d)) found.needed = found.range;
     std::optional<Known>& known = regions_[static_cast<size_t>(read.of)][d];
     if (known) {
       found.range = hull(known->range, found.range);
+      found.needed = hull(known->needed, found.needed);
       found.is_certain = found.is_certain && known->is_certain;
       found.source = std::max(found.source, known->source);
     }

@@ -59,6 +59,8 @@ class SizeModel {
     SizeSource source = SizeSource::Default;
     bool is_certain = false;  // no estimate takes part
     int64_t multiple_of = 1;
+    // Of a region: what reads need that nothing clamps, guards or takes from data.
+    ir::ConstantRange needed{INT64_MAX, INT64_MIN};
   };
   struct End {
     std::optional<int64_t> value;
@@ -73,7 +75,9 @@ class SizeModel {
   void find_image(ImageId image);
   void find_func(FuncId id);
   void find_iterators(StageId stage);
+  bool is_needed(const Access& read, size_t dimension) const;
   void pass_on(const Access& read);
+  static void extend(Ends& ends, const ir::ConstantRange& needed);
   Ends told(const FuncNode& node, size_t dimension) const;
   void refine(Ends& ends, const Expr& min, const Expr& extent, SizeSource source) const;
   Known settled(const Ends& ends, const Known* region) const;

@@ -81,7 +81,7 @@ class StageWork {
     const double code_bytes = instructions_ * instruction_bytes;
     if (code_bytes > iterations() * code_cache_bytes)
       units_.fetches = code_bytes / line_bytes * far_code_line_ns;
-    const double taken = run_.facts->taken;
+    const double taken = run_.facts->taken * (1 + guarded_copies * guarded_share());
     for (double UnitTimes::*part : {&UnitTimes::arithmetic, &UnitTimes::loads, &UnitTimes::stores,
                                     &UnitTimes::scalars, &UnitTimes::fetches, &UnitTimes::chain})
       units_.*part *= taken;
@@ -169,6 +169,20 @@ class StageWork {
       units_.arithmetic += count * vectors(row.element_bytes, row.depends) * row.time.vector_ns;
     else
       (row.time.is_integer ? units_.scalars : units_.arithmetic) += count * row.time.scalar_ns;
+  }
+
+  // The share of tiles whose copies run behind conditions, as a border cuts them.
+  double guarded_share() const {
+    double share = 0;
+    for (const Touch& touch : run_.facts->touches) {
+      if (!touch.writes) continue;
+      for (size_t d = 0; d < run_.cut.size(); ++d) {
+        for (const TouchedSide::Move& move : touch.sides[d].moves) {
+          if (copies(set_of(move.iterator), true) > 1) share = std::max(share, run_.cut[d]);
+        }
+      }
+    }
+    return share;
   }
 
   // ---- memory ----

@@ -56,8 +56,9 @@ inline constexpr double far_code_line_ns = 1;
 
 // The threads that a schedule expects if nobody says how many there are.
 inline constexpr int reference_threads = 2;
-// The threads of large machines. Accumulators have this many privatised copies on every machine.
-inline constexpr int privatised_copies = 32;
+inline constexpr int threads_of_large_machines = 32;
+// Accumulators have this many privatised copies on every machine.
+inline constexpr int privatised_copies = threads_of_large_machines;
 // The iterations of parallel loops for each thread: no thread waits long for the others.
 inline constexpr int tasks_per_thread = 4;
 // The iterations of parallel loops that suffice for the reference threads.

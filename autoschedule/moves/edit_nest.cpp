@@ -148,8 +148,7 @@ std::optional<size_t> find_loop(const Nest& nest, int iterator, int64_t step) {
 }
 
 int64_t outer_step(const Nest& nest, int iterator, int64_t step) {
-  const std::vector<Part> parts = parts_of(nest, iterator);
-  const Part* larger = next_larger(parts, step);
+  const Part* larger = next_larger(nest, iterator, step);
   return larger ? larger->step : 0;
 }
 

@@ -44,18 +44,17 @@ class FuncChange {
   FuncChange(const Plan& plan, FuncId func, FuncPlan changed, const Context& context, Terms terms)
       : before_(plan), context_(context), func_(func), changed_(std::move(changed)), terms_(terms) {
     is_moved_ = !(changed_.placement == before().placement);
+    for (size_t id = 0; id < plan.funcs.size(); ++id)
+      if (is_bound(*plan.funcs[id])) bound_.push_back(static_cast<FuncId>(id));
   }
 
   std::optional<Plan> run() {
-    const auto id = static_cast<size_t>(func_);
-    Plan plan = before_;
-    plan.funcs[id] = std::make_shared<FuncPlan>(changed_);
     if (!keeps_order() || !keeps_shared_loops()) return std::nullopt;
-    for (size_t other = 0; other < plan.funcs.size(); ++other) {
-      const auto guest = static_cast<FuncId>(other);
-      if (guest == func_) continue;
-      if (is_moved_ && has_window(before_.of(guest)) && is_read(guest)) return std::nullopt;
-      if (!keeps_region(guest) || !renumber(plan, guest)) return std::nullopt;
+    Plan plan = before_;
+    plan.funcs[static_cast<size_t>(func_)] = std::make_shared<FuncPlan>(changed_);
+    if (is_moved_ && reads_window()) return std::nullopt;
+    for (const FuncId guest : bound_) {
+      if (guest != func_ && (!keeps_region(guest) || !renumber(plan, guest))) return std::nullopt;
     }
     if (joins_others() && !has_independent_company(plan)) return std::nullopt;
     if (!broken_structure(plan, before_).empty()) return std::nullopt;
@@ -69,6 +68,7 @@ class FuncChange {
   const FuncPlan changed_;
   const Terms terms_;
   bool is_moved_ = false;
+  std::vector<FuncId> bound_;  // the Funcs that may refer to loops of others
 
   const FuncPlan& before() const { return before_.of(func_); }
   const Nest& old_nest(StageId stage) const { return before_.nest(stage); }
@@ -136,10 +136,10 @@ class FuncChange {
 
   // Loops that stages share stay, and so do the places of Funcs that share theirs.
   bool keeps_shared_loops() const {
-    for (size_t id = 0; id < before_.funcs.size(); ++id) {
-      const bool is_own = static_cast<FuncId>(id) == func_;
-      for (size_t s = 0; s < before_.funcs[id]->nests.size(); ++s) {
-        const Nest& nest = before_.funcs[id]->nests[s];
+    for (const FuncId id : bound_) {
+      const bool is_own = id == func_;
+      for (size_t s = 0; s < before_.of(id).nests.size(); ++s) {
+        const Nest& nest = before_.of(id).nests[s];
         if (!nest.shared_with) continue;
         const auto [host, depth] = *nest.shared_with;
         if (!is_own && host.func != func_) continue;
@@ -201,10 +201,15 @@ class FuncChange {
     return std::nullopt;
   }
 
-  // Whether the Func reads another one, perhaps through inlined Funcs.
-  bool is_read(FuncId other) const {
-    const std::vector<StageId> readers = all_readers(before_, context_, other);
-    return std::ranges::find(readers, func_, &StageId::func) != readers.end();
+  // Whether the Func reads one with a window, perhaps through inlined Funcs.
+  bool reads_window() const {
+    for (size_t id = 0; id < before_.funcs.size(); ++id) {
+      const auto other = static_cast<FuncId>(id);
+      if (other == func_ || !has_window(before_.of(other))) continue;
+      const std::vector<StageId> readers = all_readers(before_, context_, other);
+      if (std::ranges::find(readers, func_, &StageId::func) != readers.end()) return true;
+    }
+    return false;
   }
 
   bool keeps_region(FuncId guest) const {

@@ -97,11 +97,15 @@ PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
   beam.width = search.width;
   beam.most_bytes = cost.price(result.rules).peak_bytes + static_cast<double>(search.spare_bytes);
   beam.kept = kept_funcs(result.rules, unscheduled, options, search.what);
+  beam.without = search.without;
   for (const Decision decision : options.without) {
     for (const char* move : moves_of(decision)) beam.without.insert(move);
   }
-  result.result = planning::search(result.rules, context, cost, beam);
-  // The second start is known to be slow, so small gains count, too.
+  if (search.from_rules)
+    result.result = planning::search(result.rules, context, cost, beam);
+  else
+    result.result.start = {result.rules, cost.price(result.rules), {}};
+  // The other start is known to be slow, so small gains count, too.
   beam.least_gain = least_gain_from_nothing;
   beam.least_gain_of_all = least_gain_of_all_from_nothing;
   const Plan nothing = planning::plan_from_nothing(result.rules, beam.kept, context);

@@ -3,6 +3,9 @@
 //   scheduled graph => plan => moves, by predicted time => plan => directives of what changed
 #pragma once
 
+#include <set>
+#include <string>
+
 #include "autoschedule/default_schedule.h"
 #include "autoschedule/search/search.h"
 #include "frontend/schedule/autoschedule_options.h"
@@ -22,6 +25,8 @@ struct PlanSearchOptions {
   int width = 1;            // of the beam
   int64_t spare_bytes = 0;  // that may be alive at once beyond those of `scheduled`
   autoschedule::Scheduling what = autoschedule::Scheduling::Everything;
+  bool from_rules = true;         // searches from their schedule, too, not from nothing alone
+  std::set<std::string> without;  // moves that are not made
 };
 
 // The machine that the cost of a search is for: that of the cost model, with the threads of the options.

@@ -207,6 +207,7 @@ constexpr Pass passes[] = {
     {"interleave_vectors", Phase::Vector, alone<interleave_vectors>},
     {"transpose_loads", Phase::Vector, alone<transpose_loads>},
     {"deinterleave_loads", Phase::Vector, alone<deinterleave_loads>},
+    {"share_lets", Phase::Vector, alone<share_lets>},
     {"simplify_vectors", Phase::Vector, run_simplify},
     {"mask_guarded_loads", Phase::Vector, alone<mask_guarded_loads>},
     {"try_plain_products", Phase::Vector, alone<try_plain_products>},

@@ -57,6 +57,7 @@ const std::vector<StatementPass>& statement_passes() {
       {"drop_guarded_clamps", drop_guarded_clamps},
       {"trim_loops", trim_loops},
       {"merge_equal_loops", merge_equal_loops},
+      {"share_lets", share_lets},
       {"try_plain_products", try_plain_products},
       {"unroll_loops", unroll_loops},
       {"vectorize_inner_loops",  // every loop counts as a loop over a pure variable

@@ -35,6 +35,8 @@ Stmt hoist_calls(const Stmt& s);
 Stmt bound_allocations(const Stmt& s);
 // Simplifies indices in which a quotient and its remainder recombine.
 Stmt join_indices(const Stmt& s);
+// Binds equal indices of statements that run one after another once. For any phase.
+Stmt share_lets(const Stmt& s);
 
 // ---- vectors/ ----
 

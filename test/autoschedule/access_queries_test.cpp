@@ -68,6 +68,19 @@ TEST(SizeModel, PrefersBoundsToEstimatesToRegionsToTheDefault) {
   EXPECT_EQ(known.sizes.of(known.id(unknown), 0).estimate, defaults.extent);
 }
 
+// The gradient of a stencil needs more of an adjoint than the estimate of its primal says.
+TEST(SizeModel, EstimatesAreNoLimitsToWhatReadsNeed) {
+  Func read("read"), clamped("clamped"), out("out");
+  read(x) = x;
+  clamped(x) = x;
+  for (Func* f : {&read, &clamped}) f->set_estimate(x, 0, 128);
+  out(x) = read(x - 2) + read(x) + clamped(clamp(x, -8, 200));
+  out.set_estimate(x, 0, 130);
+  const Known known(out);
+  EXPECT_EQ(known.sizes.of(known.id(read), 0).estimate, 132);
+  EXPECT_EQ(known.sizes.of(known.id(clamped), 0).estimate, 128);
+}
+
 TEST(SizeModel, KnowsShapesOfImages) {
   ImageParam image(Float(32), 1, "image");
   Buffer<float> values(40);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "autoschedule/cost/cost.h"
 #include "autoschedule/default_schedule.h"
 #include "autoschedule/moves/move.h"
 #include "driver/schedule.h"
@@ -15,6 +16,24 @@
 #include "testing/programs/large.h"
 
 namespace retrograde::fuzz {
+
+// How the price of a plan, after those of other plans, differs from that of a model that remembers nothing; empty: in no
+// bit.
+inline std::string price_difference(planning::CostModel& model, const planning::Plan& plan,
+                                    const planning::Context& context) {
+  planning::CostModel fresh(context.accesses, context.sizes, context.machine);
+  const planning::Totals totals = model.totals(plan);
+  const planning::Cost cost = model.price(plan), expected = fresh.price(plan);
+  const auto is_equal = [](const planning::StageCost& a, const planning::StageCost& b) {
+    return a.stage == b.stage && a.seconds == b.seconds && a.bytes == b.bytes;
+  };
+  const bool are_equal = totals.seconds == expected.seconds &&
+                         totals.peak_bytes == expected.peak_bytes &&
+                         std::ranges::equal(cost.stages, expected.stages, is_equal);
+  return are_equal ? ""
+                   : retrograde::text("a new model gives another price:\n", to_text(cost, plan),
+                                      to_text(expected, plan), to_text(plan));
+}
 
 class MoveWalk {
  public:
@@ -31,6 +50,11 @@ class MoveWalk {
     const planning::SizeModel sizes(accesses, {default_extent_});
     planning::Dependences dependences(accesses);
     const planning::Context context{accesses, sizes, machine_, dependences};
+    planning::Machine small = machine_;  // caches that a few rows fill
+    for (size_t level = 0; level < 3; ++level)
+      small.levels[level].bytes = static_cast<double>(1 << (10 + 2 * level));
+    const planning::Context in_small{accesses, sizes, small, dependences};
+    planning::CostModel cost(accesses, sizes, machine_), small_cost(accesses, sizes, small);
     const auto funcs = static_cast<int>(plan_.funcs.size());
     for (int step = c_.between(0, most_steps); step > 0 && broken_.empty(); --step) {
       const auto id = static_cast<planning::FuncId>(c_.below(funcs));
@@ -41,7 +65,11 @@ class MoveWalk {
       }
       if (possible.empty()) continue;
       const auto [move, plans] = c_.pick(possible);
-      for (const planning::Plan& after : plans) check(after, *move, id);
+      for (const planning::Plan& after : plans) {
+        check(after, *move, id);
+        if (broken_.empty()) broken_ = price_difference(cost, after, context);
+        if (broken_.empty()) broken_ = price_difference(small_cost, after, in_small);
+      }
       if (!broken_.empty()) break;
       plan_ = c_.pick(plans);
       keeps_bits_ = keeps_bits_ && !move->changes_bits;

@@ -337,6 +337,25 @@ TEST_F(CostProbes, ABorderIsABlock) {
   EXPECT_NEAR(loops / vectors, 1, 0.05);
 }
 
+// Two of four blocks are at the ends of a row. There, a clamp cuts the box, and the copies of the tile run behind
+// conditions, which doubles their time.
+TEST_F(CostProbes, TilesThatABorderCutsTakeTwiceAsLong) {
+  const auto seconds_of = [&](int end) {
+    RDom r(0, 64, "r");
+    Func sum("sum"), all("all");
+    sum(x, y) += in(x, r) * other(r, y);
+    all(x, y) = sum(min(x, end), y);
+    all.bound(x, 0, 4096).set_estimate(y, 0, 2048);
+    const Cost cost = priced(all,
+                             "all  root  y, x:1024, x:16, vector x\n"
+                             "sum  at all/x:1024\n"
+                             "  .0  y, x:16, vector x\n"
+                             "  .1  y, x:64, r.x, unroll x:16, vector x\n");
+    return cost.stages[1].compute_seconds;
+  };
+  EXPECT_NEAR(seconds_of(4094) / seconds_of(4095), 1.5, 0.05);
+}
+
 // A transposed convolution of stride 2: the lanes of a phase of x share a weight, and load neighbours. Without phases, each
 // copy of a tile mixes the products of its even and odd lanes.
 TEST_F(CostProbes, PhasesSpareInterleavedProducts) {
