@@ -21,6 +21,7 @@ constexpr std::array<int64_t, Machine::last_cache> set_strides{page_bytes, secon
 struct Region {
   int buffer = 0, run = 0;
   double bytes = 0;
+  double scattered_bytes = 0;  // of lines anywhere in the buffer, each as often as it is touched
   std::array<double, set_strides.size()> by_sets =
       {};  // a stride that leaves sets out fills others
   bool is_stored = false;
@@ -37,6 +38,15 @@ double bytes_of(const Regions& regions) {
   double sum = 0;
   for (const Region& region : regions) sum += region.bytes;
   return sum;
+}
+
+// Lines that data choose: those of one iteration are no neighbours of the last one's.
+double scattered_bytes(const Touch& touch, const Layout& layout, const Cover& cover) {
+  const bool goes_anywhere = std::ranges::any_of(
+      touch.sides, [](const TouchedSide& side) { return side.data != 0 && !side.is_displaced; });
+  if (!goes_anywhere || touch.is_own) return 0;
+  return touched_lines(touch, layout, Cover(cover.size(), 1)) * iterations_of(touch.moved, cover) *
+         line_bytes;
 }
 
 class RegionFinder {
@@ -88,7 +98,7 @@ class RegionFinder {
       const StoredBuffer& stored;
       const Streams streams;
       const Cover* cover = nullptr;
-      double lines = 0;
+      double lines = 0, scattered = 0;
       std::array<double, set_strides.size()> by_sets = {};
 
       void look_at(const Cover& next) {
@@ -99,6 +109,7 @@ class RegionFinder {
         cover = &next;
         if (is_known) return;
         lines = touched_lines(touch, stored.layout, next);
+        scattered = scattered_bytes(touch, stored.layout, next);
         for (size_t c = 0; c < set_strides.size(); ++c)
           by_sets[c] = bytes_by_sets(touch, stored.layout, next, set_strides[c]);
       }
@@ -111,12 +122,13 @@ class RegionFinder {
     Regions find(size_t from) {
       Regions own;
       for (Seen& seen : touches_) {
-        const auto& [touch, stored, streams, cover, lines, by_sets] = seen;
+        const auto& [touch, stored, streams, cover, lines, scattered, by_sets] = seen;
         const double share = 1 - stored.register_share;
         seen.look_at(run_.cover[std::min(std::max(from, stored.inside), run_.cover.size() - 1)]);
         const double most = std::ceil(stored.layout.elements() * touch.element_bytes / line_bytes);
         const double bytes = share * std::min(lines, most * touch.components) * line_bytes;
         Region& region = of_buffer(own, touch.buffer);
+        region.scattered_bytes += share * scattered;
         const bool is_same = touch.is_own || touch.carried;  // as what the stage writes
         region.bytes =
             is_same ? std::max(region.bytes, bytes)
@@ -162,6 +174,7 @@ class RegionFinder {
       Region& all = of_buffer(regions, region.buffer);
       if (region.bytes > all.bytes) all.run = static_cast<int>(r);
       all.bytes = std::max(all.bytes, region.bytes);
+      all.scattered_bytes += region.scattered_bytes;
       all.is_stored = all.is_stored || region.is_stored;
       all.far_lines = std::max(all.far_lines, region.far_lines);
       all.far_pages = std::max(all.far_pages, region.far_pages);
@@ -263,6 +276,13 @@ class TrafficWalk {
     for (const Region& region : regions_.run(n)) recent_.touch(region.buffer, region.bytes);
   }
 
+  // How often a run loads its lines. Those that lie anywhere are gone when they are touched again, but for the part of
+  // them that the cache holds.
+  static double loads_of(const Region& region, double room) {
+    const double again = std::max(0.0, region.scattered_bytes / region.bytes - 1);
+    return 1 + again * std::max(0.0, 1 - room / region.bytes);
+  }
+
   // `are_evicted`: lines are before they are touched again.
   double waiting_ns(const Region& region, bool are_evicted) const {
     double ns = (level_ == 0 ? region.far_lines : region.late_lines) * far_line_ns[level_];
@@ -279,8 +299,8 @@ class TrafficWalk {
       const StageRun& run = group_.runs[static_cast<size_t>(region.run)];
       const bool in_parallel = group_.nodes[static_cast<size_t>(run.path.back())].in_parallel;
       const double waiting = times * waiting_ns(region, are_evicted);
-      found_.push_back(
-          {region.run, region.buffer, times * region.moved_bytes(), 0, waiting, in_parallel});
+      const double bytes = times * loads_of(region, most) * region.moved_bytes();
+      found_.push_back({region.run, region.buffer, bytes, 0, waiting, in_parallel});
     }
     for (const Region& region : regions) recent_.touch(region.buffer, region.bytes);
   }

@@ -47,6 +47,11 @@ inline constexpr int64_t remembered_pages = 1024;
 // A store to a line that others of its set evicted waits for it, and all later stores wait for that one.
 inline constexpr double evicted_store_ns = 8;
 
+// The cache of instructions, the mean bytes of an instruction of vectors, those of each lane of a gather, and nanoseconds
+// until a line of them has come from the second cache: the body of a loop that exceeds the first one finds none of its own.
+inline constexpr double code_cache_bytes = 32 << 10, instruction_bytes = 7, lane_instructions = 3;
+inline constexpr double far_code_line_ns = 1;
+
 // ---- Threads ----
 
 // The threads that a schedule expects if nobody says how many there are.
@@ -62,6 +67,10 @@ inline constexpr int64_t reference_tasks = int64_t{tasks_per_thread} * reference
 // vectorized loop, and cycles.
 inline constexpr double launch_operations = 1 << 19;
 inline constexpr double launch_cycles = 20000;
+
+// Nanoseconds of a thread until the body of an iteration of a parallel loop runs: a call through a pointer, which keeps the
+// errors of iterations apart, and the invariants of the loops around.
+inline constexpr double task_ns = 8;
 
 // Operations that one atomic addition takes. Threads seldom add to the same cache line of an accumulator that has at
 // least this many.
