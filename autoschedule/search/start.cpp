@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "autoschedule/access/long_sums.h"
-#include "autoschedule/moves/move.h"
+#include "autoschedule/moves/edit.h"
 
 namespace retrograde::planning {
 
