@@ -109,13 +109,11 @@ bool has_bounded_region(const Plan& plan, const Context& context, FuncId func) {
   };
   return std::ranges::all_of(readers, [&](StageId reader) {
     const std::vector<Access>& reads = context.accesses.stage(reader).reads;
-    return plan.of(reader.func).opacity == Opacity::None &&
-           std::ranges::all_of(reads, [&](const Access& read) {
-             return !leads_to(read.of) ||
-                    std::ranges::all_of(read.index, [&](const IndexForm& form) {
-                      return has_range(form, context.sizes);
-                    });
-           });
+    return std::ranges::all_of(reads, [&](const Access& read) {
+      return !leads_to(read.of) || std::ranges::all_of(read.index, [&](const IndexForm& form) {
+        return has_range(form, context.sizes);
+      });
+    });
   });
 }
 

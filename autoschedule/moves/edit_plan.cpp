@@ -32,11 +32,12 @@ int64_t span(const Nest& nest, int depth, int iterator) {
   return result;
 }
 
-// Whether a Func is stored somewhere else than where it is computed, or in a window.
+// Whether a Func is stored somewhere else than where it is computed, or in a window. Opaque ones may be, in a loop.
 bool has_window(const FuncPlan& func) {
   const auto& [compute, store, hoist] = func.placement;
-  return func.opacity != Opacity::None || !func.storage.folds.empty() ||
-         hoist.kind != Kind::Undecided || (store.kind != Kind::Undecided && !(store == compute));
+  if (func.opacity != Opacity::None) return compute.kind != Kind::Root;
+  return !func.storage.folds.empty() || hoist.kind != Kind::Undecided ||
+         (store.kind != Kind::Undecided && !(store == compute));
 }
 
 // One change of a Func in a plan.
@@ -306,8 +307,12 @@ bool stays_in_place(const Context& context, FuncId func) {
 }
 
 bool may_run_in_loops(const Plan& plan, const Context& context, FuncId func) {
+  const std::vector<StageId> readers = all_readers(plan, context, func);
+  const auto is_known = [&](StageId reader) {
+    return plan.of(reader.func).opacity == Opacity::None;
+  };
   return is_editable(plan, func) && !is_output(*plan.program, func) &&
-         has_bounded_region(plan, context, func);
+         std::ranges::all_of(readers, is_known) && has_bounded_region(plan, context, func);
 }
 
 std::optional<Plan> with_func(const Plan& plan, FuncId func, FuncPlan changed,

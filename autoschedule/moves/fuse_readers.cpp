@@ -254,8 +254,7 @@ Plan with_readers_apart(Plan plan, FuncId func, const Context& context) {
 
 std::vector<Plan> fuse_readers(const Plan& plan, FuncId func, const Context& context) {
   std::vector<Plan> plans;
-  if (!is_editable(plan, func) || context.accesses.func(func).stages.size() > 1 ||
-      is_output(*plan.program, func) || !has_bounded_region(plan, context, func))
+  if (!may_run_in_loops(plan, context, func) || context.accesses.func(func).stages.size() > 1)
     return plans;
   const std::vector<int16_t>& order = plan.of(func).storage.order;
   if (order.size() < 2) return plans;

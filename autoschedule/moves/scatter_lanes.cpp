@@ -211,7 +211,7 @@ std::vector<Plan> scatter_lanes(const Plan& plan, FuncId func, const Context& co
       }))
     return plans;
   add(plans, in_iterations(plan, func, context));
-  if (is_output(*plan.program, func) || !has_bounded_region(plan, context, func)) return plans;
+  if (!may_run_in_loops(plan, context, func)) return plans;
   const Cover extents = loop_extents(plan, context, {func, 0});
   // Lanes of a recurrence have nothing in common, so that a few are no better than one.
   const bool has_slices = std::ranges::any_of(stages, [](const StageNode& stage) {

@@ -143,14 +143,6 @@ std::vector<int64_t> with_bounds(std::vector<int64_t> box, FuncId func, const Si
   return box;
 }
 
-// The depth of the level's loop in a stage that shares it with the loop's own stage.
-std::optional<int> shared_depth(const Plan& plan, StageId stage, const Level& level) {
-  if (plan.of(stage.func).opacity != Opacity::None) return std::nullopt;
-  const std::optional<LoopRef>& shared = plan.nest(stage).shared_with;
-  const auto depth = shared ? depth_in(plan, shared->stage, level) : std::nullopt;
-  return depth && *depth <= shared->depth ? depth : std::nullopt;
-}
-
 std::vector<const Access*> reads_of(const StageNode& stage, FuncId func) {
   std::vector<const Access*> result;
   for (const Access& read : stage.reads) {
@@ -195,7 +187,6 @@ Cover Covers::all_of(StageId stage) {
 // The points of a stage in one iteration of a loop around it.
 Cover Covers::cover_in(StageId stage, const Level& level) {
   if (const auto depth = depth_in(plan_, stage, level)) return inside(stage, *depth);
-  if (const auto depth = shared_depth(plan_, stage, level)) return inside(stage, *depth);
   const Level::Kind kind = plan_.of(stage.func).placement.compute.kind;
   if (kind == Level::Kind::Root || sizes_.graph().func(stage.func).is_output)
     return whole_cover(stage, sizes_);

@@ -22,11 +22,30 @@ std::vector<std::string> names_of(const Plan& plan, StageId stage) {
   return names;
 }
 
+// The loops that the stage shares with another one; null: none.
+const LoopRef* shared_with(const Plan& plan, StageId stage) {
+  if (plan.of(stage.func).opacity != Opacity::None) return nullptr;
+  const std::optional<LoopRef>& shared = plan.nest(stage).shared_with;
+  return shared ? &*shared : nullptr;
+}
+
+// The stage that owns a loop.
+StageId owner_of(const Plan& plan, const LoopRef& loop) {
+  const LoopRef* shared = shared_with(plan, loop.stage);
+  return shared && loop.depth <= shared->depth ? owner_of(plan, {shared->stage, loop.depth})
+                                               : loop.stage;
+}
+
 }  // namespace
 
 std::optional<int> depth_in(const Plan& plan, StageId stage, const Level& level) {
   const StageId host = level.loop.stage;
-  if (stage == host || level.loop.depth == around_all_loops) return level.loop.depth;
+  if (stage == host || level.loop.depth == around_all_loops || stage == owner_of(plan, level.loop))
+    return level.loop.depth;
+  if (const LoopRef* shared = shared_with(plan, stage)) {
+    const auto depth = depth_in(plan, shared->stage, level);
+    if (depth && *depth <= shared->depth) return depth;
+  }
   if (stage.func != host.func || !level.in_each_stage) return std::nullopt;
   const std::vector<std::string> own = names_of(plan, stage), wanted = names_of(plan, host);
   const auto found = std::ranges::find(own, wanted[static_cast<size_t>(level.loop.depth)]);
@@ -77,10 +96,7 @@ bool Readers::is_inside(StageId stage, const Level& level) const {
   if (depth_in(plan_, stage, level)) return true;
   const FuncPlan& plan = plan_.of(stage.func);
   const Level& compute = plan.placement.compute;
-  if (plan.opacity == Opacity::None) {
-    const Nest& nest = plan_.nest(stage);
-    if (nest.shared_with && is_place_inside(*nest.shared_with, level)) return true;
-  } else {
+  if (plan.opacity != Opacity::None) {
     const graph::StageLoops& schedule = func(stage.func).stage(stage.stage).schedule;
     if (schedule.fuse_level.kind == graph::LoopLevel::Kind::At) return true;
     if (compute.kind == Level::Kind::Undecided) return !is_output(*plan_.program, stage.func);

@@ -76,6 +76,7 @@ Interval BoundsEngine::bounds_by_rule(const Call& call) {
   auto arg = [&](int i) { return bounds(call.args[i]); };
   switch (call.op) {
     case Op::promise_clamped:
+      return interval_between(arg(0), arg(1), arg(2));
     case Op::unsafe_promise_clamped:
       return interval_clamp(arg(0), arg(1), arg(2));
     case Op::if_then_else:

@@ -241,6 +241,10 @@ Interval interval_clamp(const Interval& v, const Interval& low, const Interval& 
   return interval_max(interval_min(v, high), low);
 }
 
+Interval interval_between(const Interval& v, const Interval& low, const Interval& high) {
+  return {interval_max(v, low).min, interval_min(v, high).max};
+}
+
 namespace {
 
 Interval cast_ends(Type to, const Interval& v) {

@@ -26,6 +26,9 @@ Interval interval_mod(Type type, const Interval& a, const Interval& b);
 Interval interval_min(const Interval& a, const Interval& b);
 Interval interval_max(const Interval& a, const Interval& b);
 Interval interval_clamp(const Interval& v, const Interval& low, const Interval& high);
+// A value that lies between two others, for certain. It needs no smallest or largest value of its own to be below or
+// above them, which a clamp has to expect.
+Interval interval_between(const Interval& v, const Interval& low, const Interval& high);
 Interval interval_cast(Type to, Type from, const Interval& v);
 Interval interval_abs(Type result, Type operand, const Interval& v);
 Interval interval_absd(Type result, Type operand, const Interval& a, const Interval& b);

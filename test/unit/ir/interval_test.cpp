@@ -161,6 +161,15 @@ TEST_F(IntervalTest, LetsAndPromisesAreFollowed) {
             interval(Expr(0), max(n - 1, 0)));
 }
 
+// A user's promise may be broken; one that a split makes is not.
+TEST_F(IntervalTest, PromisesOfTheCompilerBoundBothEnds) {
+  EXPECT_EQ(bounds(call_op(Op::promise_clamped, Int(32), {anything, i * 4, n - 1})),
+            interval(Expr(0), n - 1))
+      << "not 28, if n is small";
+  EXPECT_EQ(bounds(call_op(Op::promise_clamped, Int(32), {i * 4 + 3, i * 4, n - 1})),
+            interval(Expr(3), min(31, n - 1)));
+}
+
 TEST_F(IntervalTest, ValuesOfFuncsComeFromTheCaller) {
   Expr f = call_func("f", Int(32), {x}, 0, {});
   EXPECT_EQ(bounds(f), "[?, ?]");

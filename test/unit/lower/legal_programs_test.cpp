@@ -28,6 +28,29 @@ std::vector<int> doubled(int n) {
   return values;
 }
 
+// ---- A Func reads no more of an image where it is computed in tiles ----
+
+// The tails of three splits, one in the loops of another. The last place that is read is 27 + 2 + 6.
+TEST(TilesOfTiles, StayInsideOfTheImage) {
+  Buffer<float> image({36, 12}, "image");
+  image.for_each_element([&](int i, int j) { image(i, j) = static_cast<float>(i * 7 % 10 + j); });
+  const auto values = [&](bool in_tiles) {
+    Func source("source"), sum("sum"), wide("wide");
+    source(x, y) = image(x, y);
+    sum(x, y) = source(x, y) * source(x + 6, y) + source(x + 2, y + 1) * source(x + 8, y + 1);
+    wide(x, y) = sum(x / 2, y) + sum(min(x / 2 + 1, 27), y);
+    Var tile("tile"), inner("inner");
+    if (in_tiles) {
+      wide.split(x, tile, x, 8, TailStrategy::GuardWithIf).reorder(x, y, tile);
+      sum.compute_at(wide, y).split(x, x, inner, 4, TailStrategy::GuardWithIf);
+      source.compute_at(wide, tile).vectorize(x, 16, TailStrategy::GuardWithIf);
+    }
+    const Buffer<float> result = wide.realize({56, 11});
+    return std::vector<float>(result.begin(), result.end());
+  };
+  EXPECT_EQ(values(true), values(false));
+}
+
 // ---- realize(sizes) returns that size, whatever the schedule or a promise does to it ----
 
 Func twice() {

@@ -93,6 +93,15 @@ TEST_F(PlanInvariants, P2ReadsAreInsideOfTheComputeLoop) {
   EXPECT_EQ(broken("out  root\nnext  root\nsum  root\n  .0  x, y\n  .1  y, x, r.y, r.x\n"
                    "blur  at each sum.0/y\n"),
             "");
+  Func deep("deep"), mid("mid"), host("host");
+  deep(x, y) = x + y;
+  mid(x, y) = deep(x, y) * 2;
+  host(x, y) = 0;
+  host(x, y) += mid(x, y);
+  const Plan shared = parsed(
+      "host  root\n  .1  shared with host.0/x  y, x\nmid  at each host.0/x\ndeep  at host.1/y\n",
+      {host});
+  EXPECT_EQ(broken_invariant(shared), "") << "both stages have the loop over y";
   Plan plan = parsed("out  root\n", program);
   FuncPlan lost = *plan.funcs[0];
   lost.placement.compute = {Level::Kind::At, {{3, 0}, 9}};

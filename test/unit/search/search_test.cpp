@@ -181,6 +181,19 @@ TEST_F(SearchTest, ASearchFromNothingKeepsTheReadersOfAKeptFunc) {
   EXPECT_EQ(broken_invariant(nothing), "");
 }
 
+TEST_F(SearchTest, ASearchFromNothingStoresWhatAnOpaqueFuncReads) {
+  rows.memoize();
+  start = imported({out});
+  accesses.emplace(start.program->outputs);
+  sizes.emplace(*accesses, SizeDefaults{unknown_extent});
+  Dependences dependences(*accesses);
+  const Plan nothing = plan_from_nothing(start, {}, {*accesses, *sizes, machine, dependences});
+  EXPECT_EQ(plain_text(nothing),
+            "out  root  parallel y, x:16 GuardWithIf, vector x\n"
+            "rows  root  opaque memoize\n"
+            "heavy  root  parallel y, x:16 GuardWithIf, vector x\n");
+}
+
 TEST_F(SearchTest, ASearchFromNothingKeepsLanesOfLongSums) {
   for (const int terms : {500, 600}) {
     Func sum("sum");
