@@ -86,6 +86,8 @@ struct OperationCount {
   IteratorSet depends = 0;  // the loops that change the value; it is invariant in all others
   int count = 0;
   bool in_arm = false;  // all its uses are in arms of selects that one condition decides
+  // A select whose condition these alone decide: copies of the body for each of their points need none.
+  IteratorSet decided_by = 0;
 };
 
 struct StageNode {

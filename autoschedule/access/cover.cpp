@@ -128,9 +128,10 @@ class BoxExtent {
 }  // namespace
 
 Cover whole_cover(StageId stage, const SizeModel& sizes) {
-  return ir::numbered(sizes.graph().stage(stage).iterators.size(), [&](size_t i) {
-    return std::max<int64_t>(sizes.of(stage, static_cast<int>(i)).estimate, 1);
-  });
+  Cover cover(sizes.graph().stage(stage).iterators.size());
+  for (size_t i = 0; i < cover.size(); ++i)
+    cover[i] = std::max<int64_t>(sizes.of(stage, static_cast<int>(i)).estimate, 1);
+  return cover;
 }
 
 Cover cover_of_box(StageId stage, const std::vector<int64_t>& box, const SizeModel& sizes) {

@@ -312,17 +312,21 @@ Dependences::Known& Dependences::known(StageId stage) {
 const StageDependences& Dependences::of(StageId stage) { return known(stage).forms; }
 
 bool Dependences::may_run_at_once(StageId stage, int iterator, IteratorSet around) {
-  Known& known = this->known(stage);
-  if (known.forms.are_dependent(iterator, around)) return false;
+  const auto [answer, is_new] = known(stage).at_once.try_emplace({iterator, around}, false);
+  if (is_new) answer->second = can_prove_at_once(stage, iterator, around);
+  return answer->second;
+}
+
+bool Dependences::can_prove_at_once(StageId stage, int iterator, IteratorSet around) {
+  const StageDependences& forms = of(stage);
+  if (forms.are_dependent(iterator, around)) return false;
   const StageNode& node = graph_.stage(stage);
   if (node.iterators[static_cast<size_t>(iterator)].kind == Iterator::Kind::Pure) return true;
-  const auto [answer, is_new] = known.at_once.try_emplace({iterator, around}, true);
-  if (!is_new) return answer->second;
   // The rules may understand less of a predicate.
-  const bool is_proven = known.forms.are_independent(iterator, around) &&
+  const bool is_proven = forms.are_independent(iterator, around) &&
                          (node.guard.is_empty() ||
                           StageDependences(graph_, stage, false).are_independent(iterator, around));
-  if (is_proven) return answer->second;
+  if (is_proven) return true;
   const FuncContents& f = *graph_.func(stage.func).func;
   const std::vector<Iterator>& iterators = node.iterators;
   std::unordered_set<std::string> names;
@@ -330,7 +334,7 @@ bool Dependences::may_run_at_once(StageId stage, int iterator, IteratorSet aroun
     if (around & set_of(static_cast<int>(i))) names.insert(iterators[i].name);
   }
   const std::string& name = iterators[static_cast<size_t>(iterator)].name;
-  return answer->second = can_prove_race_free(f, f.stage(stage.stage), name, names);
+  return can_prove_race_free(f, f.stage(stage.stage), name, names);
 }
 
 bool Dependences::commutes(StageId stage) {

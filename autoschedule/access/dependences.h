@@ -92,6 +92,7 @@ class Dependences {
     std::optional<bool> commutes;
   };
   Known& known(StageId stage);
+  bool can_prove_at_once(StageId stage, int iterator, IteratorSet around);
   bool keeps_order_of_variables(StageId stage, const std::vector<LoopStep>& loops);
 
   const AccessGraph& graph_;

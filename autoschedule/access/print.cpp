@@ -57,7 +57,8 @@ class Printer {
     }
     for (const OperationCount& row : stage.operations) {
       out_ << "    " << row.count << " " << row.name << " " << to_string(row.type)
-           << names(row.depends, row.depends ? " by " : "") << "\n";
+           << names(row.depends, row.depends ? " by " : "")
+           << names(row.decided_by, row.decided_by ? ", decided by " : "") << "\n";
     }
   }
 

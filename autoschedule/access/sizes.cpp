@@ -63,17 +63,47 @@ SizeModel::SizeModel(const AccessGraph& graph, const SizeDefaults& defaults)
   add_parameters();
   images_.resize(graph.images().size());
   for (size_t i = 0; i < images_.size(); ++i) find_image(static_cast<ImageId>(i));
-  funcs_.resize(graph.funcs().size());
-  iterators_.resize(funcs_.size());
-  for (const FuncNode& node : graph.funcs()) regions_.emplace_back(node.func->args.size());
-  for (size_t id = funcs_.size(); id-- > 0;) {
+  find_all();
+  if (add_adjoints()) find_all();
+}
+
+void SizeModel::find_all() {
+  const size_t count = graph_.funcs().size();
+  funcs_.assign(count, {});
+  iterators_.assign(count, {});
+  regions_.clear();
+  bounds_.clear();
+  for (const FuncNode& node : graph_.funcs()) regions_.emplace_back(node.func->args.size());
+  for (size_t id = count; id-- > 0;) {
     find_func(static_cast<FuncId>(id));
-    iterators_[id].resize(graph.funcs()[id].stages.size());
-    for (const StageNode& stage : graph.funcs()[id].stages) {
+    iterators_[id].resize(graph_.funcs()[id].stages.size());
+    for (const StageNode& stage : graph_.funcs()[id].stages) {
       find_iterators(stage.id);
       for (const Access& read : stage.reads) pass_on(read);
     }
   }
+}
+
+// Notes how large the Func is of which an output is the adjoint, where it is known. Returns whether there are such.
+bool SizeModel::add_adjoints() {
+  for (size_t id = 0; id < funcs_.size(); ++id) {
+    const FuncContents& f = *graph_.funcs()[id].func;
+    const auto is_primal = [&](const FuncNode& node) { return node.func->name == f.made->of; };
+    const bool is_unknown = std::ranges::any_of(
+        funcs_[id], [](const Known& known) { return known.source == SizeSource::Default; });
+    if (!graph_.funcs()[id].is_output || !is_unknown || !f.made ||
+        f.made->role != graph::Role::Adjoint)
+      continue;
+    const auto primal = std::ranges::find_if(graph_.funcs(), is_primal);
+    if (primal == graph_.funcs().end() || primal->func->args.size() != f.args.size()) continue;
+    std::vector<Known> known = funcs_[static_cast<size_t>(primal - graph_.funcs().begin())];
+    for (Known& dimension : known) {
+      dimension.source = std::max(dimension.source, SizeSource::Region);
+      dimension.is_certain = false;
+    }
+    adjoints_.emplace(static_cast<FuncId>(id), std::move(known));
+  }
+  return !adjoints_.empty();
 }
 
 // ---- what is known from outside ----
@@ -178,6 +208,15 @@ SizeModel::Ends SizeModel::told(const FuncNode& node, size_t dimension) const {
   return ends;
 }
 
+// An estimate of a Func that others read is no limit to what they need.
+void SizeModel::extend(Ends& ends, const ConstantRange& needed) {
+  if (needed.min > needed.max) return;
+  if (ends.min.source == SizeSource::Estimate && ends.min.value)
+    ends.min.value = std::min(*ends.min.value, needed.min);
+  if (ends.max.source == SizeSource::Estimate && ends.max.value)
+    ends.max.value = std::max(*ends.max.value, needed.max);
+}
+
 // An end that nothing gives leaves the other one where it is and takes the default extent.
 SizeModel::Known SizeModel::settled(const Ends& ends, const Known* region) const {
   Ends all = ends;
@@ -205,7 +244,12 @@ void SizeModel::find_func(FuncId id) {
   const FuncNode& node = graph_.func(id);
   for (size_t d = 0; d < node.func->args.size(); ++d) {
     const auto& region = regions_[static_cast<size_t>(id)][d];
-    Known known = settled(told(node, d), region ? &*region : nullptr);
+    Ends ends = told(node, d);
+    if (region && !node.is_output) extend(ends, region->needed);
+    const auto* adjoint = ir::find_or_null(adjoints_, id);
+    const Known* other = adjoint ? &(*adjoint)[d] : nullptr;
+    if (region) other = &*region;
+    Known known = settled(ends, other);
     for (const Bound& b : node.func->schedule.bounds) {
       const auto modulus = b.var == node.func->args[d] ? certain_value(b.modulus) : std::nullopt;
       if (modulus && known.multiple_of == 1) known.multiple_of = std::max<int64_t>(*modulus, 1);
@@ -229,6 +273,17 @@ void SizeModel::find_iterators(StageId stage) {
   }
 }
 
+// Whether the loops read all elements that the index has.
+bool SizeModel::is_needed(const Access& read, size_t dimension) const {
+  const IndexForm& form = read.index[dimension];
+  if (!form.is_affine() || form.clamped) return false;
+  const auto moves_it = [&](const IndexForm& condition) {
+    return (condition.moved_by() & form.moved_by()) != 0;
+  };
+  return std::ranges::none_of(graph_.stage(read.by).guard.nonnegative, moves_it) &&
+         std::ranges::none_of(read.guard.nonnegative, moves_it);
+}
+
 void SizeModel::pass_on(const Access& read) {
   if (read.of < 0 || read.of == read.by.func) return;
   const auto& loops =
@@ -244,9 +299,11 @@ void SizeModel::pass_on(const Access& read) {
     }
     if (!read.index[d].is_affine() || read.index[d].clamped) found.is_certain = false;
     if (!found.range.is_bounded()) found.source = SizeSource::Default;
+    if (found.source != SizeSource::Default && is_needed(read, d)) found.needed = found.range;
     std::optional<Known>& known = regions_[static_cast<size_t>(read.of)][d];
     if (known) {
       found.range = hull(known->range, found.range);
+      found.needed = hull(known->needed, found.needed);
       found.is_certain = found.is_certain && known->is_certain;
       found.source = std::max(found.source, known->source);
     }

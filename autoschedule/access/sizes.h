@@ -1,7 +1,8 @@
 // sizes.h -- how long loops and dimensions are: the only place that guesses.
 //
 // Sources, the best first: a bound of the user, an estimate of the user (set_estimate), the shape of an image, the
-// region that consumers read, a default for what nothing is known of.
+// region that consumers read, a default for what nothing is known of. An output that is the adjoint of a Func is as large
+// as that Func.
 #pragma once
 
 #include <array>
@@ -59,6 +60,8 @@ class SizeModel {
     SizeSource source = SizeSource::Default;
     bool is_certain = false;  // no estimate takes part
     int64_t multiple_of = 1;
+    // Of a region: what reads need that nothing clamps, guards or takes from data.
+    ir::ConstantRange needed{INT64_MAX, INT64_MIN};
   };
   struct End {
     std::optional<int64_t> value;
@@ -69,11 +72,15 @@ class SizeModel {
     End min, max;
   };
 
+  void find_all();
+  bool add_adjoints();
   void add_parameters();
   void find_image(ImageId image);
   void find_func(FuncId id);
   void find_iterators(StageId stage);
+  bool is_needed(const Access& read, size_t dimension) const;
   void pass_on(const Access& read);
+  static void extend(Ends& ends, const ir::ConstantRange& needed);
   Ends told(const FuncNode& node, size_t dimension) const;
   void refine(Ends& ends, const Expr& min, const Expr& extent, SizeSource source) const;
   Known settled(const Ends& ends, const Known* region) const;
@@ -92,6 +99,7 @@ class SizeModel {
   mutable std::map<std::pair<StageId, const ir::ExprNode*>, std::pair<Expr, ir::ConstantRange>>
       bounds_;
   std::vector<std::vector<Known>> funcs_, images_;
+  std::map<FuncId, std::vector<Known>> adjoints_;  // outputs of which nothing else is known
   std::vector<std::vector<std::optional<Known>>> regions_;  // of Funcs, by their consumers
   std::vector<std::vector<std::vector<Known>>> iterators_;  // by Func, stage, iterator
 };

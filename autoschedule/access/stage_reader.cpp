@@ -166,11 +166,12 @@ void StageReader::count_operations(StageNode& node) {
     for (const OpaqueTerm& term : form.opaque)
       if (term.expr.defined()) count(term.expr);
   }
-  std::map<std::tuple<std::string, Type, IteratorSet, bool>, int> rows;
-  for (const auto& [value, one] : counted_) ++rows[{one.name, one.type, one.depends, one.in_arm}];
+  std::map<std::tuple<std::string, Type, IteratorSet, bool, IteratorSet>, int> rows;
+  for (const auto& [value, one] : counted_)
+    ++rows[{one.name, one.type, one.depends, one.in_arm, one.decided_by}];
   for (const auto& [row, count] : rows) {
-    const auto& [name, type, depends, in_arm] = row;
-    node.operations.push_back({name, type, depends, count, in_arm});
+    const auto& [name, type, depends, in_arm, decided_by] = row;
+    node.operations.push_back({name, type, depends, count, in_arm, decided_by});
   }
 }
 
@@ -216,8 +217,13 @@ void StageReader::count(const Expr& e) {
   const Value value = values_.value(e);
   const std::string name = call ? call->name : kind_name(e.kind());
   const bool in_arm = in_arms_.contains(e.get());
+  IteratorSet decided_by = 0;
+  if (const auto* select = e.as<Select>()) {
+    const Value condition = values_.value(select->condition);
+    if (!condition.from_data) decided_by = condition.depends();
+  }
   const auto [known, is_new] = counted_.try_emplace(
-      {name, value}, OperationCount{name, operand.type(), value.depends(), 1, in_arm});
+      {name, value}, OperationCount{name, operand.type(), value.depends(), 1, in_arm, decided_by});
   known->second.in_arm &= in_arm;
 }
 

@@ -1,14 +1,8 @@
 #include "autoschedule/access/value_numbers.h"
 
 #include <algorithm>
-#include <limits>
 
 namespace retrograde::planning {
-
-IteratorSet set_of(int iterator) {
-  constexpr int last = std::numeric_limits<IteratorSet>::digits - 1;
-  return IteratorSet{1} << std::min(iterator, last);
-}
 
 IteratorSet Value::depends() const {
   IteratorSet result = 0;

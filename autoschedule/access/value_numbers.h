@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -22,7 +23,10 @@ using namespace graph;
 
 // A set of iterators of a stage: bit i stands for iterator i, the last bit for all from there on.
 using IteratorSet = uint32_t;
-IteratorSet set_of(int iterator);
+inline IteratorSet set_of(int iterator) {
+  constexpr int last = std::numeric_limits<IteratorSet>::digits - 1;
+  return IteratorSet{1} << (iterator < last ? iterator : last);
+}
 
 struct Value {
   uint32_t number = 0;             // 0: none

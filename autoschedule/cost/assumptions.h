@@ -29,6 +29,8 @@ inline constexpr double slice_iterations = 25;
 // A block of memory whose size is unknown takes as long as so many scalar operations, each time: the heap gives it and
 // takes it back.
 inline constexpr double heap_block_operations = 400;
+// A tile that a border cuts has a condition for each unrolled copy and takes longer by as much again.
+inline constexpr double guarded_copies = 1;
 // Operands of a loop that need a register for a while.
 inline constexpr double passing_operands = 2;
 // An array of constant indices is kept in registers if it is no larger than so many times all of them. They hold this share

@@ -6,7 +6,8 @@
 // Stages whose loops are nested make a group: a stage at root, the stages that share its loops, and the Funcs that are
 // computed inside of these. A group is priced alone, and its price is kept for what it depends on: the plans of its
 // Funcs, which Funcs are inlined into them, and the layout of what they read. What an earlier group leaves in the caches
-// is subtracted afterwards. So a plan that differs from an earlier one in a Func prices one or two groups anew.
+// is subtracted afterwards. The model remembers the last plan: the next one that differs in a Func finds the groups near
+// this Func anew, and prices one or two of them.
 #pragma once
 
 #include <array>
@@ -30,9 +31,11 @@ struct StageCost {
   double all_memory_seconds() const;
 };
 
-struct Cost {
+struct Totals {
   double seconds = 0;
-  double peak_bytes = 0;          // alive at once, of what the program itself allocates
+  double peak_bytes = 0;  // alive at once, of what the program itself allocates
+};
+struct Cost : Totals {
   std::vector<StageCost> stages;  // of those that have loops, by StageId
 };
 
@@ -47,6 +50,8 @@ class CostModel {
   // Requires: the plan keeps its invariants, and its program is that of the accesses. An undecided Func counts as
   // inlined, and as computed at root if it is an output.
   Cost price(const Plan& plan);
+  // The same without the stages, in less time.
+  Totals totals(const Plan& plan);
   // How many groups were priced so far: the others were known.
   size_t groups_priced() const;
 

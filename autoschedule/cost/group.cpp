@@ -31,6 +31,7 @@ class GroupBuilder {
           static_cast<int>(group_.runs.size()));
       group_.runs.push_back(std::move(run));
     }
+    for (size_t r = group_.runs.size(); r-- > 0;) find_cuts(group_.runs[r]);
     for (LoopNode& node : group_.nodes) {
       std::ranges::sort(node.children, {}, [&](int child) {
         return std::pair(group_.nodes[static_cast<size_t>(child)].loop.stage, child);
@@ -205,6 +206,30 @@ class GroupBuilder {
     for (size_t i = 0; i < run.cover[count].size(); ++i)
       trips *= std::ceil(double(run.cover[count][i]) / double(run.cover[count + 1][i]));
     return trips;
+  }
+
+  // A read that is clamped needs less than a whole box in the first and the last block of a row, and so does what that box
+  // is computed from. Readers come after what they read.
+  void find_cuts(StageRun& run) const {
+    if (run.place <= 1) return;
+    run.cut.assign(sizes_.graph().func(run.id.func).func->args.size(), 0);
+    for (const StageRun& reader : group_.runs) {
+      if (reader.cover.size() <= run.place) continue;
+      for (const Touch& touch : reader.facts->touches) {
+        if (touch.buffer != run.id.func || touch.writes || reader.id.func == run.id.func) continue;
+        for (size_t d = 0; d < run.cut.size(); ++d) {
+          for (const TouchedSide::Move& move : touch.sides[d].moves) {
+            const auto i = static_cast<size_t>(move.iterator);
+            const double blocks =
+                std::ceil(double(reader.cover[0][i]) / double(reader.cover[run.place][i]));
+            const double own = i < reader.cut.size() ? reader.cut[i] : 0;
+            const double here =
+                touch.sides[d].is_clamped && blocks > 1 ? std::min(1.0, 2 / blocks) : 0;
+            run.cut[d] = std::max({run.cut[d], own, here});
+          }
+        }
+      }
+    }
   }
 
   size_t store_place(const StageRun& run) const {

@@ -49,6 +49,8 @@ struct StageRun {
   size_t storage_place = 1;  // and around the storage of its Func
   // The points that the loops from path[k] inwards run over are cover[k]. All 1 at the end.
   std::vector<Cover> cover;
+  // By dimension of a Func that is computed in loops: the share of its runs in which a border of its readers cuts its box.
+  std::vector<double> cut;
 
   int node_of(size_t depth) const { return path[place + depth]; }
 };
@@ -78,18 +80,39 @@ void add_buffers(const Plan& plan, const SizeModel& sizes, const Machine& machin
 // By dimension, of a Func at root; less in folded dimensions.
 std::vector<double> stored_extents(FuncId func, const FuncPlan& plan, const SizeModel& sizes);
 
-// The Funcs whose loops are nested.
+// Funcs whose loops are nested.
 struct PlannedGroup {
   std::vector<FuncId> funcs;
   std::vector<std::vector<FuncId>> inlined;  // into each of their stages, in order
   std::vector<FuncId> reads;  // Funcs of other groups, also through inlined ones; each once
 };
 
-// In the order in which they run.
-std::vector<PlannedGroup> groups_of(const Plan& plan, const AccessGraph& graph);
+// The groups of one plan after another. A group has the number of its last Func, and they run in the order of their
+// numbers: all that a group reads is before it.
+class ProgramGroups {
+ public:
+  explicit ProgramGroups(const AccessGraph& graph);
+  // Goes on to a plan that differs in these Funcs. Returns the numbers of the groups of both plans whose prices may
+  // differ, in order.
+  std::vector<FuncId> update(const Plan& plan, const std::vector<FuncId>& changed);
+  // By number; empty where no group has it.
+  const std::vector<PlannedGroup>& all() const { return groups_; }
 
-// The bytes alive at once; `own`: what each group allocates for the Funcs that are computed in its loops.
-double peak_bytes(const Plan& plan, const SizeModel& sizes, const std::vector<PlannedGroup>& groups,
+ private:
+  static constexpr FuncId none = -1;  // of a Func that is inlined
+  const AccessGraph& graph_;
+  std::vector<PlannedGroup> groups_;
+  std::vector<FuncId> number_;  // by Func: of its group
+
+  FuncId& number_of(FuncId func) { return number_[static_cast<size_t>(func)]; }
+  void join(const Plan& plan, const std::vector<FuncId>& funcs);
+  void add_reads(const StageNode& stage, PlannedGroup& group) const;
+};
+
+// The bytes that a Func allocates at root; 0 if it is computed in loops, or an output.
+double allocated_bytes(FuncId func, const Plan& plan, const SizeModel& sizes);
+// The bytes alive at once. `root`: what each Func allocates at root; `own`: what each group allocates in its loops.
+double peak_bytes(const std::vector<PlannedGroup>& groups, const std::vector<double>& root,
                   const std::vector<double>& own);
 
 Group group_of(const Plan& plan, const PlannedGroup& planned, Covers& covers,

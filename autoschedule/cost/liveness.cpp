@@ -5,21 +5,18 @@
 
 namespace retrograde::planning {
 
-namespace {
-
-double allocated_bytes(FuncId func, const FuncPlan& plan, const SizeModel& sizes) {
-  const FuncContents& f = *sizes.graph().func(func).func;
+double allocated_bytes(FuncId func, const Plan& plan, const SizeModel& sizes) {
+  const FuncNode& node = sizes.graph().func(func);
+  if (node.is_output || plan.of(func).placement.compute.kind == Level::Kind::At) return 0;
   double bytes = 0;
-  for (const Type& type : f.types) bytes += type.bytes();
-  for (const double extent : stored_extents(func, plan, sizes)) bytes *= extent;
+  for (const Type& type : node.func->types) bytes += type.bytes();
+  for (const double extent : stored_extents(func, plan.of(func), sizes)) bytes *= extent;
   return bytes;
 }
 
-}  // namespace
-
-double peak_bytes(const Plan& plan, const SizeModel& sizes, const std::vector<PlannedGroup>& groups,
+double peak_bytes(const std::vector<PlannedGroup>& groups, const std::vector<double>& root,
                   const std::vector<double>& own) {
-  std::vector<size_t> last(plan.funcs.size());  // the group that reads it last
+  std::vector<size_t> last(groups.size());  // the group that reads a Func last
   for (size_t g = 0; g < groups.size(); ++g) {
     for (const FuncId func : groups[g].funcs) last[static_cast<size_t>(func)] = g;
     for (const FuncId read : groups[g].reads) last[static_cast<size_t>(read)] = g;
@@ -28,12 +25,8 @@ double peak_bytes(const Plan& plan, const SizeModel& sizes, const std::vector<Pl
   double alive = 0, peak = 0;
   for (size_t g = 0; g < groups.size(); ++g) {
     for (const FuncId func : groups[g].funcs) {
-      const FuncPlan& of = plan.of(func);
-      if (of.placement.compute.kind == Level::Kind::At || sizes.graph().func(func).is_output)
-        continue;
-      const double bytes = allocated_bytes(func, of, sizes);
-      alive += bytes;
-      freed[last[static_cast<size_t>(func)]] += bytes;
+      alive += root[static_cast<size_t>(func)];
+      freed[last[static_cast<size_t>(func)]] += root[static_cast<size_t>(func)];
     }
     peak = std::max(peak, alive + own[g]);
     alive -= freed[g];

@@ -19,8 +19,7 @@ class TripCounter {
     if (part.iterator == once) return 1;
     const double count = range(part) / static_cast<double>(part.step);
     if (is_full) {
-      const std::vector<Part> parts = parts_of(nest_, part.iterator);
-      const Part* larger = next_larger(parts, part.step);
+      const Part* larger = next_larger(nest_, part.iterator, part.step);
       return std::ceil(larger ? double(larger->step) / double(part.step) : count);
     }
     return part.step == 1 ? count : std::ceil(count);
@@ -66,8 +65,7 @@ class TripCounter {
   }
   // The points that all iterations of a part run over.
   double range(const Part& part) const {
-    const std::vector<Part> parts = parts_of(nest_, part.iterator);
-    const Part* larger = next_larger(parts, part.step);
+    const Part* larger = next_larger(nest_, part.iterator, part.step);
     if (!larger) return extent(part.iterator);
     return std::min(double(larger->step), range(*larger) / trips(*larger, false));
   }

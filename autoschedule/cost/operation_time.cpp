@@ -58,10 +58,11 @@ OperationTime operation_time(const std::string& name, Type type, const Machine& 
       {"Add", 1}, {"Sub", 1},   {"Mul", 1},  {"Min", 1},    {"Max", 1},        {"EQ", 1},
       {"NE", 1},  {"LT", 1},    {"LE", 1},   {"GT", 1},     {"GE", 1},         {"And", 1},
       {"Or", 1},  {"Not", 0.5}, {"Cast", 1}, {"Select", 1}, {"Reinterpret", 0}};
+  const double* count = ir::find_or_null(operations, name);
   OperationTime time;
   if (name == "Div" || name == "Mod") {
     time.vector_ns = division_ns(name, type, m);
-  } else if (const double* count = ir::find_or_null(operations, name)) {
+  } else if (count) {
     // The products of vectors of wide integers are sums of narrower ones.
     const bool is_wide = name == "Mul" && !type.is_float() && type.bits() >= 32;
     time.vector_ns = (is_wide ? type.bits() / 32 + 1 : *count) * m.operation_ns;
@@ -71,7 +72,7 @@ OperationTime operation_time(const std::string& name, Type type, const Machine& 
   }
   time.is_integer = !type.is_float() && !type.is_bool();
   const double scale = name == "Mul" || name == "Cast" ? m.operation_ns : time.vector_ns;
-  time.scalar_ns = time.is_integer ? scale / m.operation_ns * m.scalar_ns : time.vector_ns;
+  time.scalar_ns = time.is_integer || count ? scale / m.operation_ns * m.scalar_ns : time.vector_ns;
   return time;
 }
 

@@ -24,36 +24,37 @@ IteratorSet carried_by(const Access& read, const Access& write) {
 // Operations that depend on the same iterators. Products that are added are one operation with the sum.
 class OperationTable {
  public:
-  void add(const OperationCount& operation, IteratorSet depends) {
+  void add(const OperationCount& operation, IteratorSet depends, IteratorSet decided_by) {
     // Products that ignore infinite factors of 0 are tried as plain ones first.
     const std::string name = operation.name == "strong_mul"   ? "Mul"
                              : operation.name == "strong_div" ? "Div"
                                                               : operation.name;
     const Op op = op_from_name(name);
     const bool is_function = op != Op::none && op_info(op).work.functions > 0;
-    rows_[{name, operation.type, depends, operation.in_arm && is_function}] += operation.count;
+    rows_[{name, operation.type, depends, operation.in_arm && is_function, decided_by}] +=
+        operation.count;
   }
   std::vector<OperationRow> rows(const Machine& machine) {
     for (auto& [key, count] : rows_) {
-      const auto& [name, type, depends, behind_branch] = key;
+      const auto& [name, type, depends, behind_branch, decided_by] = key;
       if (name == "Mul" && type.is_float())
         count -= std::min(count, count_of("Add", type, depends) + count_of("Sub", type, depends));
     }
     std::vector<OperationRow> result;
     for (const auto& [key, count] : rows_) {
-      const auto& [name, type, depends, behind_branch] = key;
+      const auto& [name, type, depends, behind_branch, decided_by] = key;
       if (count > 0)
         result.push_back({operation_time(name, type, machine), static_cast<double>(type.bytes()),
-                          depends, count, behind_branch});
+                          depends, count, behind_branch, decided_by});
     }
     return result;
   }
 
  private:
-  std::map<std::tuple<std::string, Type, IteratorSet, bool>, double> rows_;
+  std::map<std::tuple<std::string, Type, IteratorSet, bool, IteratorSet>, double> rows_;
 
   double count_of(const char* name, Type type, IteratorSet depends) const {
-    return ir::value_or(rows_, {name, type, depends, false}, 0.0);
+    return ir::value_or(rows_, {name, type, depends, false, 0}, 0.0);
   }
 };
 
@@ -105,16 +106,19 @@ std::vector<Touch> FactsOfStages::touches(const StageNode& stage,
 std::vector<OperationRow> FactsOfStages::operations(const StageNode& stage,
                                                     const ReadComposer::Composed& composed) const {
   OperationTable table;
-  for (const OperationCount& operation : stage.operations) table.add(operation, operation.depends);
+  for (const OperationCount& operation : stage.operations)
+    table.add(operation, operation.depends, operation.decided_by);
   for (const auto& [func, elements] : composed.elements) {
     const StageNode& inlined = graph_.func(func).stages[0];
     for (const Access& element : elements) {
       for (const OperationCount& operation : inlined.operations) {
-        IteratorSet depends = 0;
-        for (size_t d = 0; d < element.index.size(); ++d)
-          if (operation.depends & set_of(static_cast<int>(d)))
-            depends |= element.index[d].moved_by();
-        table.add(operation, depends);
+        const auto moved_by = [&](IteratorSet dimensions) {
+          IteratorSet result = 0;
+          for (size_t d = 0; d < element.index.size(); ++d)
+            if (dimensions & set_of(static_cast<int>(d))) result |= element.index[d].moved_by();
+          return result;
+        };
+        table.add(operation, moved_by(operation.depends), moved_by(operation.decided_by));
       }
     }
   }

@@ -26,6 +26,7 @@ struct OperationRow {
   IteratorSet depends = 0;
   double count = 0;
   bool behind_branch = false;  // a function in an arm of a select: unrolled copies don't share it
+  IteratorSet decided_by = 0;  // a select that copies for each of their points don't need
 };
 
 struct StageFacts {

@@ -11,8 +11,10 @@ namespace retrograde::planning {
 struct UnitTimes {
   double arithmetic = 0, loads = 0, stores = 0, scalars = 0;
   double loops = 0;    // counts iterations
+  double fetches = 0;  // instructions of a body that is larger than their cache
   double chain = 0;    // operations of which each waits for the one before
-  double slices = 0;   // the first loads from each slice wait for the stores to it
+  double starts =
+      0;  // of slices, whose first loads wait for the stores to them, and of parallel iterations
   double all() const;  // with what they cannot overlap
 };
 // All iterations of a stage on one thread, if all its data are in the first cache.

@@ -11,18 +11,17 @@
 
 namespace retrograde::planning {
 
-namespace {
-
-double points_in(const Cover& cover, int iterator) {
-  return static_cast<double>(cover[static_cast<size_t>(iterator)]);
-}
-
-// The iterations of some iterators, all together.
 double iterations_of(IteratorSet iterators, const Cover& cover) {
   double result = 1;
   for (size_t i = 0; i < cover.size(); ++i)
     if (iterators & set_of(static_cast<int>(i))) result *= static_cast<double>(cover[i]);
   return result;
+}
+
+namespace {
+
+double points_in(const Cover& cover, int iterator) {
+  return static_cast<double>(cover[static_cast<size_t>(iterator)]);
 }
 
 // Elements along a dimension: how many, and from the first to the last one.

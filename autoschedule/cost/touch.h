@@ -71,6 +71,8 @@ struct LaneMoves {
   double border_share = 0;    // of vectors, whose lanes are clamped one by one
 };
 
+// The iterations of some iterators, all together.
+double iterations_of(IteratorSet iterators, const Cover& cover);
 // Cache lines while the loops run over these points.
 double touched_lines(const Touch& touch, const Layout& layout, const Cover& cover);
 // The bytes of a cache that would have to be touched evenly for as many lines in each set as the fullest sets have now.

@@ -21,6 +21,7 @@ constexpr std::array<int64_t, Machine::last_cache> set_strides{page_bytes, secon
 struct Region {
   int buffer = 0, run = 0;
   double bytes = 0;
+  double scattered_bytes = 0;  // of lines anywhere in the buffer, each as often as it is touched
   std::array<double, set_strides.size()> by_sets =
       {};  // a stride that leaves sets out fills others
   bool is_stored = false;
@@ -39,26 +40,35 @@ double bytes_of(const Regions& regions) {
   return sum;
 }
 
+// Lines that data choose: those of one iteration are no neighbours of the last one's.
+double scattered_bytes(const Touch& touch, const Layout& layout, const Cover& cover) {
+  const bool goes_anywhere = std::ranges::any_of(
+      touch.sides, [](const TouchedSide& side) { return side.data != 0 && !side.is_displaced; });
+  if (!goes_anywhere || touch.is_own) return 0;
+  return touched_lines(touch, layout, Cover(cover.size(), 1)) * iterations_of(touch.moved, cover) *
+         line_bytes;
+}
+
 class RegionFinder {
  public:
   explicit RegionFinder(const Group& group) : group_(group), below_(group.nodes.size()) {
     for (size_t r = 0; r < group.runs.size(); ++r) {
-      const StageRun& run = group.runs[r];
-      for (const int node : run.path) below_[static_cast<size_t>(node)].push_back(r);
-      streams_.push_back(ir::mapped(run.facts->touches, [&](const Touch& touch) {
-        return streams_of(run, touch, group.buffers.at(touch.buffer), group);
-      }));
+      for (const int node : group.runs[r].path) below_[static_cast<size_t>(node)].push_back(r);
+      stages_.emplace_back(group.runs[r], group);
     }
-    for (size_t n = 0; n < group.nodes.size(); ++n) {
-      iterations_.push_back(find(n, 1));
-      runs_.push_back(find(n, 0));
-    }
+    runs_.resize(group.nodes.size());
+    iterations_.resize(group.nodes.size());
   }
   // While all iterations of a node run, and one of them.
-  const Regions& run(int node) const { return runs_[static_cast<size_t>(node)]; }
-  const Regions& iteration(int node) const { return iterations_[static_cast<size_t>(node)]; }
+  const Regions& run(int node) { return find(runs_, static_cast<size_t>(node), 0); }
+  const Regions& iteration(int node) {
+    const std::vector<int>& children = group_.nodes[static_cast<size_t>(node)].children;
+    const bool is_child =
+        children.size() == 1 && group_.nodes[static_cast<size_t>(node)].stages.empty();
+    return is_child ? run(children[0]) : find(iterations_, static_cast<size_t>(node), 1);
+  }
   // The touches of the stages whose innermost loop it is.
-  Regions own(int node) const {
+  Regions own(int node) {
     Regions result;
     for (const int run : group_.nodes[static_cast<size_t>(node)].stages)
       add(result, static_cast<size_t>(run), group_.runs[static_cast<size_t>(run)].path.size());
@@ -66,19 +76,91 @@ class RegionFinder {
   }
 
  private:
+  // What one stage touches while the loops from each of its path inwards run.
+  class Stage {
+   public:
+    Stage(const StageRun& run, const Group& group) : run_(run) {
+      for (const Touch& touch : run.facts->touches) {
+        const StoredBuffer& stored = group.buffers.at(touch.buffer);
+        if (stored.register_share < 1)
+          touches_.push_back({touch, stored, streams_of(run, touch, stored, group)});
+      }
+    }
+    const Regions& from(size_t depth) {
+      while (regions_.size() <= depth) regions_.push_back(find(regions_.size()));
+      return regions_[depth];
+    }
+
+   private:
+    // A touch, and what it was in the last loops that were looked at.
+    struct Seen {
+      const Touch& touch;
+      const StoredBuffer& stored;
+      const Streams streams;
+      const Cover* cover = nullptr;
+      double lines = 0, scattered = 0;
+      std::array<double, set_strides.size()> by_sets = {};
+
+      void look_at(const Cover& next) {
+        const IteratorSet moves = touch.moved | touch.data;
+        bool is_known = cover != nullptr;
+        for (size_t i = 0; is_known && i < next.size(); ++i)
+          is_known = next[i] == (*cover)[i] || (moves & set_of(static_cast<int>(i))) == 0;
+        cover = &next;
+        if (is_known) return;
+        lines = touched_lines(touch, stored.layout, next);
+        scattered = scattered_bytes(touch, stored.layout, next);
+        for (size_t c = 0; c < set_strides.size(); ++c)
+          by_sets[c] = bytes_by_sets(touch, stored.layout, next, set_strides[c]);
+      }
+    };
+    const StageRun& run_;
+    std::vector<Seen> touches_;
+    std::vector<Regions> regions_;  // by loop
+
+    // Touches of one stage are different parts of a buffer.
+    Regions find(size_t from) {
+      Regions own;
+      for (Seen& seen : touches_) {
+        const auto& [touch, stored, streams, cover, lines, scattered, by_sets] = seen;
+        const double share = 1 - stored.register_share;
+        seen.look_at(run_.cover[std::min(std::max(from, stored.inside), run_.cover.size() - 1)]);
+        const double most = std::ceil(stored.layout.elements() * touch.element_bytes / line_bytes);
+        const double bytes = share * std::min(lines, most * touch.components) * line_bytes;
+        Region& region = of_buffer(own, touch.buffer);
+        region.scattered_bytes += share * scattered;
+        const bool is_same = touch.is_own || touch.carried;  // as what the stage writes
+        region.bytes =
+            is_same ? std::max(region.bytes, bytes)
+                    : std::min(region.bytes + bytes, share * most * touch.components * line_bytes);
+        region.is_stored = region.is_stored || touch.writes;
+        if (touch.writes) region.revisited_lines = bytes / line_bytes * (1 - 1 / streams.visits);
+        if (streams.count > prefetched_streams) {
+          const double all = bytes / line_bytes, far = all / streams.lines;
+          region.far_lines = std::max(region.far_lines, far);
+          region.late_lines = std::max(region.late_lines, std::min(all, unnoticed_lines * far));
+          if (streams.count > remembered_pages) region.far_pages = std::max(region.far_pages, far);
+        }
+        for (size_t c = 0; c < set_strides.size(); ++c)
+          region.by_sets[c] = std::max(region.by_sets[c], share * by_sets[c]);
+      }
+      return own;
+    }
+  };
+
   const Group& group_;
   std::vector<std::vector<size_t>> below_;  // the stages in a node
-  std::vector<Regions> runs_, iterations_;
-  std::vector<std::vector<Streams>> streams_;  // of each touch of each stage
+  std::vector<Stage> stages_;
+  std::vector<Regions> runs_, iterations_;  // of nodes that were asked for
 
-  Regions find(size_t n, size_t inside) const {
-    Regions result;
+  const Regions& find(std::vector<Regions>& known, size_t n, size_t inside) {
+    if (!known[n].empty()) return known[n];
     for (const size_t r : below_[n]) {
       const std::vector<int>& path = group_.runs[r].path;
       const auto at = std::ranges::find(path, static_cast<int>(n)) - path.begin();
-      add(result, r, static_cast<size_t>(at) + inside);
+      add(known[n], r, static_cast<size_t>(at) + inside);
     }
-    return sorted(std::move(result));
+    return known[n] = sorted(std::move(known[n]));
   }
   // Small ones are used all the time while large ones stream by: as if they were touched last.
   static Regions sorted(Regions regions) {
@@ -86,43 +168,13 @@ class RegionFinder {
     return regions;
   }
 
-  // Touches of one stage are different parts of a buffer; stages touch the same ones.
-  void add(Regions& regions, size_t r, size_t from) const {
-    const StageRun& run = group_.runs[r];
-    Regions own;
-    for (size_t t = 0; t < run.facts->touches.size(); ++t) {
-      const Touch& touch = run.facts->touches[t];
-      const StoredBuffer& stored = group_.buffers.at(touch.buffer);
-      const double share = 1 - stored.register_share;
-      if (share <= 0) continue;
-      const Cover& cover = run.cover[std::min(std::max(from, stored.inside), run.cover.size() - 1)];
-      const double most = std::ceil(stored.layout.elements() * touch.element_bytes / line_bytes);
-      const double lines = touched_lines(touch, stored.layout, cover);
-      const double bytes = share * std::min(lines, most * touch.components) * line_bytes;
-      Region& region = of_buffer(own, touch.buffer);
-      region.run = static_cast<int>(r);
-      const bool is_same = touch.is_own || touch.carried;  // as what the stage writes
-      region.bytes =
-          is_same ? std::max(region.bytes, bytes)
-                  : std::min(region.bytes + bytes, share * most * touch.components * line_bytes);
-      region.is_stored = region.is_stored || touch.writes;
-      const Streams& streams = streams_[r][t];
-      if (touch.writes) region.revisited_lines = bytes / line_bytes * (1 - 1 / streams.visits);
-      if (streams.count > prefetched_streams) {
-        const double all = bytes / line_bytes, far = all / streams.lines;
-        region.far_lines = std::max(region.far_lines, far);
-        region.late_lines = std::max(region.late_lines, std::min(all, unnoticed_lines * far));
-        if (streams.count > remembered_pages) region.far_pages = std::max(region.far_pages, far);
-      }
-      for (size_t c = 0; c < set_strides.size(); ++c) {
-        const double by_sets = bytes_by_sets(touch, stored.layout, cover, set_strides[c]);
-        region.by_sets[c] = std::max(region.by_sets[c], share * by_sets);
-      }
-    }
-    for (const Region& region : own) {
+  // Stages touch the same parts of a buffer.
+  void add(Regions& regions, size_t r, size_t from) {
+    for (const Region& region : stages_[r].from(from)) {
       Region& all = of_buffer(regions, region.buffer);
-      if (region.bytes > all.bytes) all.run = region.run;
+      if (region.bytes > all.bytes) all.run = static_cast<int>(r);
       all.bytes = std::max(all.bytes, region.bytes);
+      all.scattered_bytes += region.scattered_bytes;
       all.is_stored = all.is_stored || region.is_stored;
       all.far_lines = std::max(all.far_lines, region.far_lines);
       all.far_pages = std::max(all.far_pages, region.far_pages);
@@ -142,7 +194,7 @@ class RegionFinder {
 
 class TrafficWalk {
  public:
-  TrafficWalk(const Group& group, const RegionFinder& regions, const Machine& machine, size_t level)
+  TrafficWalk(const Group& group, RegionFinder& regions, const Machine& machine, size_t level)
       : group_(group),
         regions_(regions),
         machine_(machine),
@@ -164,7 +216,7 @@ class TrafficWalk {
 
  private:
   const Group& group_;
-  const RegionFinder& regions_;
+  RegionFinder& regions_;
   const Machine& machine_;
   const size_t level_;
   RecentBuffers recent_;
@@ -224,6 +276,13 @@ class TrafficWalk {
     for (const Region& region : regions_.run(n)) recent_.touch(region.buffer, region.bytes);
   }
 
+  // How often a run loads its lines. Those that lie anywhere are gone when they are touched again, but for the part of
+  // them that the cache holds.
+  static double loads_of(const Region& region, double room) {
+    const double again = std::max(0.0, region.scattered_bytes / region.bytes - 1);
+    return 1 + again * std::max(0.0, 1 - room / region.bytes);
+  }
+
   // `are_evicted`: lines are before they are touched again.
   double waiting_ns(const Region& region, bool are_evicted) const {
     double ns = (level_ == 0 ? region.far_lines : region.late_lines) * far_line_ns[level_];
@@ -240,8 +299,8 @@ class TrafficWalk {
       const StageRun& run = group_.runs[static_cast<size_t>(region.run)];
       const bool in_parallel = group_.nodes[static_cast<size_t>(run.path.back())].in_parallel;
       const double waiting = times * waiting_ns(region, are_evicted);
-      found_.push_back(
-          {region.run, region.buffer, times * region.moved_bytes(), 0, waiting, in_parallel});
+      const double bytes = times * loads_of(region, most) * region.moved_bytes();
+      found_.push_back({region.run, region.buffer, bytes, 0, waiting, in_parallel});
     }
     for (const Region& region : regions) recent_.touch(region.buffer, region.bytes);
   }
@@ -250,7 +309,7 @@ class TrafficWalk {
 }  // namespace
 
 GroupTraffic traffic_of(const Group& group, const Machine& machine) {
-  const RegionFinder regions(group);
+  RegionFinder regions(group);
   GroupTraffic result;
   for (size_t level = 0; level < result.behind.size(); ++level)
     result.behind[level] = TrafficWalk(group, regions, machine, level).find();

@@ -12,9 +12,9 @@
 namespace retrograde::planning {
 
 double UnitTimes::all() const {
-  const double slowest = std::max({arithmetic, loads, stores, scalars, loops});
-  const double sum = arithmetic + loads + stores + scalars + loops;
-  return std::max(slowest + not_overlapped * (sum - slowest), chain) + slices;
+  const double slowest = std::max({arithmetic, loads, stores, scalars, loops, fetches});
+  const double sum = arithmetic + loads + stores + scalars + loops + fetches;
+  return std::max(slowest + not_overlapped * (sum - slowest), chain) + starts;
 }
 
 namespace {
@@ -78,12 +78,15 @@ class StageWork {
     units_.loads += iterations() * spills.loads * m_.load_ns;
     units_.stores += iterations() * spills.stores * m_.store_ns;
     units_.chain = longest(chains_, instructions_);
-    const double taken = run_.facts->taken;
+    const double code_bytes = instructions_ * instruction_bytes;
+    if (code_bytes > iterations() * code_cache_bytes)
+      units_.fetches = code_bytes / line_bytes * far_code_line_ns;
+    const double taken = run_.facts->taken * (1 + guarded_copies * guarded_share());
     for (double UnitTimes::*part : {&UnitTimes::arithmetic, &UnitTimes::loads, &UnitTimes::stores,
-                                    &UnitTimes::scalars, &UnitTimes::chain})
+                                    &UnitTimes::scalars, &UnitTimes::fetches, &UnitTimes::chain})
       units_.*part *= taken;
+    units_.starts = place_times() * slice_ns(run_, group_, m_);
     add_loops();
-    units_.slices = place_times() * slice_ns(run_, group_, m_);
     return units_;
   }
 
@@ -149,7 +152,16 @@ class StageWork {
     return std::max(1.0, std::ceil(lanes_.count * element_bytes / m_.vector_bytes));
   }
 
+  // Whether each copy of the body has one point of these iterators.
+  bool are_constants(IteratorSet iterators) const {
+    for (size_t d = 0; d < depth(); ++d)
+      if (moves(d, iterators) && kind(d) != ForType::Unrolled && run_.nest.trips[d] > 1)
+        return false;
+    return true;
+  }
+
   void add_operation(const OperationRow& row) {
+    if (row.decided_by && are_constants(row.decided_by)) return;
     const double shared = row.behind_branch ? copies(row.depends, false) : 1;
     const double count = row.count * times(row.depends) * shared;
     instructions_ += count * vectors(row.element_bytes, row.depends);
@@ -157,6 +169,20 @@ class StageWork {
       units_.arithmetic += count * vectors(row.element_bytes, row.depends) * row.time.vector_ns;
     else
       (row.time.is_integer ? units_.scalars : units_.arithmetic) += count * row.time.scalar_ns;
+  }
+
+  // The share of tiles whose copies run behind conditions, as a border cuts them.
+  double guarded_share() const {
+    double share = 0;
+    for (const Touch& touch : run_.facts->touches) {
+      if (!touch.writes) continue;
+      for (size_t d = 0; d < run_.cut.size(); ++d) {
+        for (const TouchedSide::Move& move : touch.sides[d].moves) {
+          if (copies(set_of(move.iterator), true) > 1) share = std::max(share, run_.cut[d]);
+        }
+      }
+    }
+    return share;
   }
 
   // ---- memory ----
@@ -196,8 +222,8 @@ class StageWork {
       add_end_of_lanes(touch);
     }
     if (touch.carried) add_recurrence(touch);
+    if (is_carried_in_register(touch)) return;
     const double count = touch.count * times(touch.moved) * (1 - stored.register_share);
-    instructions_ += count * vectors(touch.element_bytes, touch.moved);
     if (count > 0) add_moves(touch, stored, count);
   }
 
@@ -209,10 +235,15 @@ class StageWork {
     const double by_lane = lanes_.count * (touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns);
     (touch.writes ? units : units_.arithmetic) +=
         count * by_lane * (moved.is_by_lane ? 1 : moved.border_share);
+    instructions_ += count * (moved.is_by_lane ? lane_instructions * lanes_.count
+                                               : vectors(touch.element_bytes, touch.moved));
     if (moved.is_by_lane) return;
     if (moved.is_bent) bent_ = std::max(bent_, vectors(touch.element_bytes, touch.moved));
     const double crossing = moved.is_unaligned ? 1 + m_.vector_bytes / double(line_bytes) : 1;
-    units += count * moved.vectors * crossing * (touch.writes ? m_.store_ns : m_.load_ns);
+    const double vector_ns = touch.writes ? m_.store_ns : m_.load_ns;
+    const double scalar_ns = std::min(vector_ns, (touch.writes ? 2 : 1) * m_.scalar_ns);
+    const double access_ns = is_vector(touch.moved) ? vector_ns : scalar_ns;
+    units += count * moved.vectors * crossing * access_ns;
     units_.arithmetic += count * moved.shuffles * m_.shuffle_ns;
   }
 
@@ -278,7 +309,13 @@ class StageWork {
     return lane_moves(touch, layout, lanes_, 1).is_by_lane &&
            bytes_by_sets(touch, layout, lanes, page_bytes) > m_.levels[0].bytes;
   }
-  // An element waits for the one before, which the last iteration stored.
+  // Lowering keeps what a loop over several chains reads of its last iterations (compiler/lower/loops/carry_elements.cpp).
+  bool is_carried_in_register(const Touch& touch) const {
+    const bool has_chains = lanes_.count > 1 || copies(0, false) > 1;
+    return touch.carried && touch.data == 0 && innermost_ >= 0 && has_chains &&
+           touch.carried == run_.nest.moves[static_cast<size_t>(innermost_)] && !loses_lines(touch);
+  }
+  // An element waits for the one before: a product and a sum for each that is carried, or what the last iteration stored.
   void add_recurrence(const Touch& touch) {
     if (innermost_ < 0 || !moves(static_cast<size_t>(innermost_), touch.carried)) return;
     size_t from = 0;
@@ -287,12 +324,17 @@ class StageWork {
     for (size_t d = static_cast<size_t>(innermost_) + 1; d < depth(); ++d)
       if (kind(d) == ForType::Unrolled && moves(d, touch.carried))
         in_iteration *= run_.nest.trips[d];
-    add_chain(in_iteration * m_.memory_latency_ns, from);
+    const double carried = double(std::ranges::count_if(
+        run_.facts->touches, [&](const Touch& t) { return is_carried_in_register(t); }));
+    const double wait_ns =
+        is_carried_in_register(touch) ? carried * m_.latency_ns : m_.memory_latency_ns;
+    add_chain(in_iteration * wait_ns, from);
   }
   void add_loops() {
     for (size_t d = 0; d < depth(); ++d) {
       const bool is_own = node(d).loop.stage == run_.id;
       if (is_own && is_serial(d)) units_.loops += node(d).times * m_.iteration_ns;
+      if (is_own && runs_at_once(kind(d))) units_.starts += node(d).times * task_ns;
     }
   }
 };

@@ -43,6 +43,10 @@ int64_t Machine::enough_tasks() const {
   return std::max<int64_t>(static_cast<int64_t>(parallel_tasks * count), 1);
 }
 
+int64_t Machine::many_tasks() const {
+  return std::max(enough_tasks(), int64_t{threads_of_large_machines});
+}
+
 int64_t Machine::accumulator_bytes() const {
   return static_cast<int64_t>(accumulator_share * registers * vector_bytes);
 }

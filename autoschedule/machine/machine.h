@@ -63,6 +63,8 @@ struct Machine {
   // Iterations of parallel loops that keep all threads busy. Schedules for one thread have the tasks of the reference
   // threads.
   int64_t enough_tasks() const;
+  // The same for the threads of large machines, where finer tasks cost nothing but their calls.
+  int64_t many_tasks() const;
   // Bytes of the registers that hold sums.
   int64_t accumulator_bytes() const;
   // The second cache: data below this size stay near a core from one loop to the next.

@@ -47,12 +47,18 @@ inline constexpr int64_t remembered_pages = 1024;
 // A store to a line that others of its set evicted waits for it, and all later stores wait for that one.
 inline constexpr double evicted_store_ns = 8;
 
+// The cache of instructions, the mean bytes of an instruction of vectors, those of each lane of a gather, and nanoseconds
+// until a line of them has come from the second cache: the body of a loop that exceeds the first one finds none of its own.
+inline constexpr double code_cache_bytes = 32 << 10, instruction_bytes = 7, lane_instructions = 3;
+inline constexpr double far_code_line_ns = 1;
+
 // ---- Threads ----
 
 // The threads that a schedule expects if nobody says how many there are.
 inline constexpr int reference_threads = 2;
-// The threads of large machines. Accumulators have this many privatised copies on every machine.
-inline constexpr int privatised_copies = 32;
+inline constexpr int threads_of_large_machines = 32;
+// Accumulators have this many privatised copies on every machine.
+inline constexpr int privatised_copies = threads_of_large_machines;
 // The iterations of parallel loops for each thread: no thread waits long for the others.
 inline constexpr int tasks_per_thread = 4;
 // The iterations of parallel loops that suffice for the reference threads.
@@ -61,6 +67,10 @@ inline constexpr int64_t reference_tasks = int64_t{tasks_per_thread} * reference
 // vectorized loop, and cycles.
 inline constexpr double launch_operations = 1 << 19;
 inline constexpr double launch_cycles = 20000;
+
+// Nanoseconds of a thread until the body of an iteration of a parallel loop runs: a call through a pointer, which keeps the
+// errors of iterations apart, and the invariants of the loops around.
+inline constexpr double task_ns = 8;
 
 // Operations that one atomic addition takes. Threads seldom add to the same cache line of an accumulator that has at
 // least this many.
@@ -71,6 +81,12 @@ inline constexpr int64_t uncontended_lines = 1 << 10;
 
 // The longest chain of additions to one accumulator. Longer sums run in lanes or blocks, whose rounding errors are smaller.
 inline constexpr double longest_chain = 512;
+// The terms of a block of a long sum: about as many as there are blocks, between these.
+inline constexpr int64_t least_block_terms = 64, most_block_terms = 256;
+// A sum to few elements is split into lanes and rows if it has this many terms. The terms of a lane, if its rows are parts
+// of a single loop.
+inline constexpr int64_t many_terms = 4096;
+inline constexpr int64_t lane_terms = 256;
 
 // ---- Programs ----
 

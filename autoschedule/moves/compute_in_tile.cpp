@@ -77,7 +77,7 @@ std::optional<Nest> tiled(const StageLoops& loops, const std::vector<Side>& side
 
 void add_plan(std::vector<Plan>& plans, const StageLoops& reader, FuncId func, Nest nest) {
   const auto& [plan, context, stage, before, extents] = reader;
-  if (operations(plan, context, stage) * copies(nest, extents) > most_body_operations) return;
+  if (body_operations(plan, context, stage, nest, extents) > most_body_operations) return;
   if (plan.of(stage.func).placement.compute.kind == Level::Kind::Root)
     run_in_parallel(nest, context, stage);
   const auto innermost = static_cast<int16_t>(body_depth(nest) - 1);

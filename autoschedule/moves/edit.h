@@ -55,16 +55,17 @@ Cover loop_extents(const Plan& plan, const Context& context, StageId stage);
 int64_t points_inside(const Cover& extents, const Nest& nest, int depth, int iterator);
 // How often a loop runs for each iteration of the loops around it.
 int64_t trips(const Cover& extents, const Nest& nest, size_t depth);
-// Copies of the stage's definition in the code that its loops make.
-int64_t copies(const Nest& nest, const Cover& extents);
 // Whether a step is all of so many points, or not more than half of them: others waste what lies beyond the end.
 bool fits(int64_t step, int64_t points);
 // Whether loops of two nests, in which no Func is placed, run over the points in the same order.
 bool has_same_order(const Nest& a, const Nest& b, const Cover& extents);
 // The bytes of an element that is accessed.
 double bytes_of_element(const Context& context, const Access& access);
-// Operations of the stage's definition and of what is inlined into it (L5).
+// Operations of the stage's definition and of what is inlined into it (L5): once, and in the code that its loops make,
+// whose copies share what they have in common.
 int64_t operations(const Plan& plan, const Context& context, StageId stage);
+int64_t body_operations(const Plan& plan, const Context& context, StageId stage, const Nest& nest,
+                        const Cover& extents);
 // The lanes of a vector of the stage's values along a loop of this extent: a vector, or for a shorter loop the half or
 // quarter of one. 1: the loop is too short.
 int64_t lanes_for(const Plan& plan, StageId stage, int64_t extent);

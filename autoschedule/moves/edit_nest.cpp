@@ -66,6 +66,12 @@ Nest row_loops(const Plan& plan, const Context& context, StageId stage,
   return nest;
 }
 
+// Whether threads save more than the time until they run.
+bool is_worth_a_launch(const Plan& plan, const Context& context, StageId stage) {
+  const double each = double(operations(plan, context, stage)) + cache_trip_operations;
+  return each * product_of(whole_cover(stage, context.sizes)) > launch_operations;
+}
+
 }  // namespace
 
 // ---- questions ----
@@ -142,8 +148,7 @@ std::optional<size_t> find_loop(const Nest& nest, int iterator, int64_t step) {
 }
 
 int64_t outer_step(const Nest& nest, int iterator, int64_t step) {
-  const std::vector<Part> parts = parts_of(nest, iterator);
-  const Part* larger = next_larger(parts, step);
+  const Part* larger = next_larger(nest, iterator, step);
   return larger ? larger->step : 0;
 }
 
@@ -214,23 +219,17 @@ int64_t points_inside(const Cover& extents, const Nest& nest, int depth, int ite
   int64_t points = id < extents.size() ? extents[id] : points_of_fusion;
   for (int d = 0; d <= depth; ++d) {
     const Loop& loop = nest.loops[static_cast<size_t>(d)];
-    if (loop.iterator == iterator) points = std::min(points, loop.step);
+    const bool is_around = loop.iterator == iterator && !is_phase(nest, static_cast<size_t>(d));
+    if (is_around) points = std::min(points, loop.step);
   }
   return points;
 }
 
 int64_t trips(const Cover& extents, const Nest& nest, size_t depth) {
   const Loop& loop = nest.loops[depth];
+  if (is_phase(nest, depth)) return outer_step(nest, loop.iterator, loop.step) / loop.step;
   const int64_t points = points_inside(extents, nest, static_cast<int>(depth) - 1, loop.iterator);
   return (points + loop.step - 1) / loop.step;
-}
-
-int64_t copies(const Nest& nest, const Cover& extents) {
-  int64_t product = 1;
-  for (size_t d = 0; d < nest.loops.size() && product < most_body_operations; ++d) {
-    if (nest.loops[d].kind == ForType::Unrolled) product *= trips(extents, nest, d);
-  }
-  return product;
 }
 
 bool fits(int64_t step, int64_t points) { return step == points || 2 * step <= points; }
@@ -258,16 +257,38 @@ double bytes_of_element(const Context& context, const Access& access) {
 }
 
 int64_t operations(const Plan& plan, const Context& context, StageId stage) {
-  std::map<StageId, int64_t> known;
+  return body_operations(plan, context, stage, {}, {});
+}
+
+int64_t body_operations(const Plan& plan, const Context& context, StageId stage, const Nest& nest,
+                        const Cover& extents) {
+  constexpr int64_t most = 2 * most_body_operations;  // no product overflows
+  std::map<StageId, int64_t> known;                   // of one copy
+  const auto copies = [&](IteratorSet depends) {
+    int64_t product = 1;
+    for (size_t d = 0; d < nest.loops.size() && product < most; ++d) {
+      const int16_t iterator = nest.loops[d].iterator;
+      const bool tells_apart =
+          static_cast<size_t>(iterator) >= extents.size() || (set_of(iterator) & depends);
+      if (nest.loops[d].kind == ForType::Unrolled && tells_apart)
+        product *= trips(extents, nest, d);
+    }
+    return product;
+  };
   const std::function<int64_t(StageId)> count = [&](StageId id) {
     if (const auto found = known.find(id); found != known.end()) return found->second;
     const StageNode& node = context.accesses.stage(id);
     int64_t sum = 1;
-    for (const OperationCount& operation : node.operations) sum += operation.count;
+    const auto add = [&](int64_t operations, IteratorSet depends) {
+      sum = std::min(sum + operations * (id == stage ? copies(depends) : 1), most);
+    };
+    for (const OperationCount& operation : node.operations) {
+      const bool is_decided = id == stage && copies(operation.decided_by) > 1;
+      if (!is_decided) add(operation.count, operation.depends);
+    }
     for (const Access& read : node.reads) {
       if (read.of >= 0 && read.of != id.func && is_inlined(plan, read.of))
-        sum += count({read.of, 0});
-      sum = std::min(sum, 2 * most_body_operations);  // no chain overflows
+        add(count({read.of, 0}), read.moved_by());
     }
     return known[id] = sum;
   };
@@ -350,7 +371,8 @@ void run_along_rows(FuncPlan& changed, const Plan& plan, const Context& context,
   for (size_t s = 0; s < changed.nests.size(); ++s) {
     const StageId stage{func, static_cast<int16_t>(s)};
     changed.nests[s] = row_loops(plan, context, stage, changed.storage.order, extents, min_lanes);
-    if (changed.placement.compute.kind == Level::Kind::Root)
+    if (changed.placement.compute.kind == Level::Kind::Root &&
+        is_worth_a_launch(plan, context, stage))
       run_in_parallel(changed.nests[s], context, stage);
   }
 }

@@ -1,6 +1,7 @@
 // The changes of a plan: what refers to loops that changed, and which plans are dropped.
 #include <algorithm>
 
+#include "autoschedule/access/long_sums.h"
 #include "autoschedule/moves/edit.h"
 #include "autoschedule/plan/nest.h"
 
@@ -44,20 +45,18 @@ class FuncChange {
   FuncChange(const Plan& plan, FuncId func, FuncPlan changed, const Context& context, Terms terms)
       : before_(plan), context_(context), func_(func), changed_(std::move(changed)), terms_(terms) {
     is_moved_ = !(changed_.placement == before().placement);
+    for (size_t id = 0; id < plan.funcs.size(); ++id)
+      if (is_bound(*plan.funcs[id])) bound_.push_back(static_cast<FuncId>(id));
   }
 
   std::optional<Plan> run() {
-    const auto id = static_cast<size_t>(func_);
+    if (!keeps_order() || !keeps_short_chains() || !keeps_shared_loops()) return std::nullopt;
     Plan plan = before_;
-    plan.funcs[id] = std::make_shared<FuncPlan>(changed_);
-    if (!keeps_order() || !keeps_shared_loops()) return std::nullopt;
-    for (size_t other = 0; other < plan.funcs.size(); ++other) {
-      const auto guest = static_cast<FuncId>(other);
-      if (guest == func_) continue;
-      if (is_moved_ && has_window(before_.of(guest)) && is_read(guest)) return std::nullopt;
-      if (!keeps_region(guest) || !renumber(plan, guest)) return std::nullopt;
+    plan.funcs[static_cast<size_t>(func_)] = std::make_shared<FuncPlan>(changed_);
+    if (is_moved_ && reads_window()) return std::nullopt;
+    for (const FuncId guest : bound_) {
+      if (guest != func_ && (!keeps_region(guest) || !renumber(plan, guest))) return std::nullopt;
     }
-    if (joins_others() && !has_independent_company(plan)) return std::nullopt;
     if (!broken_structure(plan, before_).empty()) return std::nullopt;
     return plan;
   }
@@ -69,6 +68,7 @@ class FuncChange {
   const FuncPlan changed_;
   const Terms terms_;
   bool is_moved_ = false;
+  std::vector<FuncId> bound_;  // the Funcs that may refer to loops of others
 
   const FuncPlan& before() const { return before_.of(func_); }
   const Nest& old_nest(StageId stage) const { return before_.nest(stage); }
@@ -132,14 +132,31 @@ class FuncChange {
     return true;
   }
 
+  // ---- L7 ----
+
+  // Lanes of terms that make the chains of a long sum short stay.
+  bool keeps_short_chains() const {
+    for (size_t s = 0; s < changed_.nests.size(); ++s) {
+      const StageId stage{func_, static_cast<int16_t>(s)};
+      if (has_lanes_of_terms(stage, old_nest(stage)) &&
+          !has_lanes_of_terms(stage, new_nest(stage)) && is_long_sum(stage, context_.sizes))
+        return false;
+    }
+    return true;
+  }
+  bool has_lanes_of_terms(StageId stage, const Nest& nest) const {
+    const std::optional<size_t> lanes = vector_loop(nest);
+    return lanes && is_reduction(context_, stage, nest.loops[*lanes].iterator);
+  }
+
   // ---- L11 ----
 
   // Loops that stages share stay, and so do the places of Funcs that share theirs.
   bool keeps_shared_loops() const {
-    for (size_t id = 0; id < before_.funcs.size(); ++id) {
-      const bool is_own = static_cast<FuncId>(id) == func_;
-      for (size_t s = 0; s < before_.funcs[id]->nests.size(); ++s) {
-        const Nest& nest = before_.funcs[id]->nests[s];
+    for (const FuncId id : bound_) {
+      const bool is_own = id == func_;
+      for (size_t s = 0; s < before_.of(id).nests.size(); ++s) {
+        const Nest& nest = before_.of(id).nests[s];
         if (!nest.shared_with) continue;
         const auto [host, depth] = *nest.shared_with;
         if (!is_own && host.func != func_) continue;
@@ -154,41 +171,6 @@ class FuncChange {
     return true;
   }
 
-  // Whether Funcs that share loops with this one, also through others, and Funcs that run with them depend on none of them.
-  bool has_independent_company(const Plan& plan) const {
-    std::vector<FuncId> company{func_};
-    const auto is_in = [&](FuncId id) { return std::ranges::find(company, id) != company.end(); };
-    for (size_t known = 0; known != company.size();) {
-      known = company.size();
-      for (size_t id = 0; id < plan.funcs.size(); ++id) {
-        for (const Nest& nest : plan.funcs[id]->nests) {
-          const FuncId own = static_cast<FuncId>(id);
-          const FuncId host = nest.shared_with ? nest.shared_with->stage.func : own;
-          if (is_in(own) != is_in(host)) company.push_back(is_in(own) ? host : own);
-        }
-      }
-    }
-    return company.size() == 1 || std::ranges::none_of(company, [&](FuncId member) {
-             std::vector<FuncId> reached{member};
-             for (size_t i = 0; i < reached.size(); ++i) {
-               for (const StageId reader : context_.accesses.consumers(reached[i])) {
-                 if (std::ranges::find(reached, reader.func) != reached.end()) continue;
-                 if (is_in(reader.func)) return true;
-                 reached.push_back(reader.func);
-               }
-             }
-             return false;
-           });
-  }
-  bool joins_others() const {
-    for (size_t s = 0; s < changed_.nests.size(); ++s) {
-      const std::optional<LoopRef>& shared = changed_.nests[s].shared_with;
-      if (shared && shared->stage.func != func_ && shared != before().nests[s].shared_with)
-        return true;
-    }
-    return false;
-  }
-
   // ---- L4, L9 ----
 
   // The loop of this Func in which another one is computed, perhaps inside of loops of others.
@@ -201,10 +183,15 @@ class FuncChange {
     return std::nullopt;
   }
 
-  // Whether the Func reads another one, perhaps through inlined Funcs.
-  bool is_read(FuncId other) const {
-    const std::vector<StageId> readers = all_readers(before_, context_, other);
-    return std::ranges::find(readers, func_, &StageId::func) != readers.end();
+  // Whether the Func reads one with a window, perhaps through inlined Funcs.
+  bool reads_window() const {
+    for (size_t id = 0; id < before_.funcs.size(); ++id) {
+      const auto other = static_cast<FuncId>(id);
+      if (other == func_ || !has_window(before_.of(other))) continue;
+      const std::vector<StageId> readers = all_readers(before_, context_, other);
+      if (std::ranges::find(readers, func_, &StageId::func) != readers.end()) return true;
+    }
+    return false;
   }
 
   bool keeps_region(FuncId guest) const {
@@ -246,6 +233,9 @@ class FuncChange {
       if (!is_at(*level, func_)) continue;
       if (level->in_each_stage && !(changed_.nests == before().nests)) return false;
       follow(level->loop);
+      const std::optional<LoopRef>& shared = new_nest(level->loop.stage).shared_with;
+      const bool is_owned = shared && shared->stage.func != func_;
+      if (is_owned && level->loop.depth <= shared->depth) level->loop.stage = shared->stage;
     }
     for (Nest& nest : other.nests) {
       if (nest.shared_with && nest.shared_with->stage.func == func_) follow(*nest.shared_with);

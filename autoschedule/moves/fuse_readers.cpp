@@ -130,10 +130,7 @@ class ReaderFusion {
       if (stage != stages_.back()) nest.shared_with = inside;
       if (!change(plan, stage.func, std::move(changed))) return std::nullopt;
     }
-    for (size_t f = 0; f < plan.funcs.size(); ++f) {
-      if (!move_to_owner(plan, static_cast<FuncId>(f), inside)) return std::nullopt;
-    }
-    if (!place(plan, func_, inside, false)) return std::nullopt;
+    if (!place(plan, inside)) return std::nullopt;
     return plan;
   }
 
@@ -153,27 +150,15 @@ class ReaderFusion {
     return next.has_value();
   }
 
-  bool place(Plan& plan, FuncId func, const LoopRef& inside, bool keeps_loops) const {
-    FuncPlan changed = plan.of(func);
+  bool place(Plan& plan, const LoopRef& inside) const {
+    FuncPlan changed = plan.of(func_);
     changed.placement = {};
     changed.placement.compute = {Level::Kind::At, inside};
     changed.storage.folds.clear();
-    if (!keeps_loops) {
-      const std::vector<int64_t> box =
-          Covers(plan, context_.sizes).box(func, changed.placement.compute);
-      run_along_rows(changed, plan, context_, func, box, lanes_for(plan, {func, 0}, INT64_MAX) / 2);
-    }
-    return change(plan, func, std::move(changed));
-  }
-  // Moves a Func out of loops that its stage no longer owns.
-  bool move_to_owner(Plan& plan, FuncId func, const LoopRef& inside) const {
-    const auto& [compute, store, hoist] = plan.of(func).placement;
-    const bool is_shared = compute.kind == Level::Kind::At && compute.loop.depth <= inside.depth &&
-                           compute.loop.stage != inside.stage &&
-                           std::ranges::find(stages_, compute.loop.stage) != stages_.end();
-    if (!is_shared) return true;
-    return store.kind == Level::Kind::Undecided && hoist.kind == Level::Kind::Undecided &&
-           place(plan, func, inside, runs_at_any_size(plan.of(func), context_, func));
+    const std::vector<int64_t> box =
+        Covers(plan, context_.sizes).box(func_, changed.placement.compute);
+    run_along_rows(changed, plan, context_, func_, box, lanes_for(plan, {func_, 0}, INT64_MAX) / 2);
+    return change(plan, func_, std::move(changed));
   }
 
   // Whether other Funcs share loops of the stage.
@@ -254,6 +239,17 @@ class ReaderFusion {
   }
 };
 
+// The plan in which stages that read the Func, but run in loops of others, are at root. There, rows may be their pure loops,
+// where the others add up what all rows give.
+Plan with_readers_apart(Plan plan, FuncId func, const Context& context) {
+  for (const StageId stage : all_readers(plan, context, func)) {
+    if (plan.of(stage.func).placement.compute.kind != Level::Kind::At) continue;
+    std::vector<Plan> apart = find_move("root")->apply(plan, stage.func, context);
+    if (!apart.empty()) plan = std::move(apart.front());
+  }
+  return plan;
+}
+
 }  // namespace
 
 std::vector<Plan> fuse_readers(const Plan& plan, FuncId func, const Context& context) {
@@ -261,11 +257,16 @@ std::vector<Plan> fuse_readers(const Plan& plan, FuncId func, const Context& con
   if (!is_editable(plan, func) || context.accesses.func(func).stages.size() > 1 ||
       is_output(*plan.program, func) || !has_bounded_region(plan, context, func))
     return plans;
-  ReaderFusion fusion(plan, func, context);
   const std::vector<int16_t>& order = plan.of(func).storage.order;
-  if (order.size() < 2 || !fusion.find_stages()) return plans;
-  for (size_t d = order.size(); d-- > 1 && plans.size() < most_dimensions;)
-    add(plans, fusion.run(order[d]));
+  if (order.size() < 2) return plans;
+  const auto add_fusions = [&](const Plan& from) {
+    ReaderFusion fusion(from, func, context);
+    if (!fusion.find_stages()) return;
+    for (size_t d = order.size(); d-- > 1 && plans.size() < most_dimensions;)
+      add(plans, fusion.run(order[d]));
+  };
+  add_fusions(plan);
+  if (plans.empty()) add_fusions(with_readers_apart(plan, func, context));
   return plans;
 }
 

@@ -11,8 +11,8 @@ namespace retrograde::planning::moves {
 namespace {
 
 int64_t body_size(const Plan& plan, const Context& context, StageId stage) {
-  return operations(plan, context, stage) *
-         copies(plan.nest(stage), loop_extents(plan, context, stage));
+  return body_operations(plan, context, stage, plan.nest(stage),
+                         loop_extents(plan, context, stage));
 }
 
 }  // namespace

@@ -16,11 +16,12 @@
 //   L4   extents of vectors and of unrolled loops are constant
 //   L5   the code that inlining and unrolling make is bounded
 //   L6   iterations that run in parallel write different elements
+//   L7   no chain of additions gets longer than one may be (access/long_sums.h)
 //   L8   no extern stage, no opaque Func and no loop of a device changes
 //   L9   windows that are stored keep the rows that are read again
 //   L11  loops that stages share stay equal
 //
-// The design has two more: L7 holds since no move splits a sum, and L10 is about devices.
+// The design has one more: L10 is about devices.
 #pragma once
 
 #include <span>

@@ -1,7 +1,7 @@
 // parallelise -- which loops of a stage at root run in parallel.
 //
 //   y, x:16, vector x     =>     parallel y, x:16, vector x
-//                         =>     parallel y:64, y, x:16, vector x       with as many rows as make enough tasks
+//                         =>     parallel y:64, y, x:16, vector x       with as many rows as make many tasks
 //   parallel y, ...       =>     y, ...                                 too little work for a launch, or one thread
 //   r.t, r.y, r.x         =>     r.t, parallel r.y, r.x                 each step of a recurrence, its rows at once
 //
@@ -34,7 +34,7 @@ std::vector<Nest> in_parallel(const StageLoops& loops) {
     const int16_t first = chunks.loops[d].iterator;
     if (d + 1 < chunks.loops.size() && chunks.loops[d + 1].iterator == first)
       drop_loop(chunks, d + 1);
-    const int64_t each = trips(extents, chunks, d) / context.machine.enough_tasks();
+    const int64_t each = trips(extents, chunks, d) / context.machine.many_tasks();
     if (each > 1) {
       const auto rows = static_cast<int64_t>(std::bit_floor(static_cast<uint64_t>(each)));
       insert_step(chunks, first, rows * chunks.loops[d].step, d, ForType::Parallel);

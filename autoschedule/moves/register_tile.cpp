@@ -45,6 +45,7 @@ class RegisterTiles {
     lanes_ = lanes_for(loops_.plan, stage_, points_of(plain_, x_));
     for (const Type& type : context_.accesses.func(stage_.func).func->types)
       bytes_ += type.bytes() * lanes_;
+    row_loads_ = ir::mapped(node_.reads, [&](const Access& read) { return row_loads(read); });
     if (lanes_ > 1) find_tiles();
     std::ranges::sort(tiles_);
     return true;
@@ -92,6 +93,7 @@ class RegisterTiles {
   Nest plain_;  // without a body
   int x_ = 0;
   int64_t lanes_ = 1, bytes_ = 0;  // of a vector
+  std::vector<double> row_loads_;  // by read
   std::vector<Tile> tiles_;
 
   // Whether the stage adds terms to elements that no loop of the reduction moves, and reads no others of its own.
@@ -148,8 +150,9 @@ class RegisterTiles {
     return static_cast<double>(all) / static_cast<double>(points);
   }
 
-  // Loads of a register that lanes read.
+  // Loads of a register that lanes read; 0: all lanes read one element.
   double row_loads(const Access& read) const {
+    if ((read.moved_by() & set_of(x_)) == 0) return 0;
     const int64_t stride = lane_stride(loops_.plan, context_, read, x_);
     const double by_lane = core.gather_lane_operations * static_cast<double>(lanes_);
     return stride == 0 ? by_lane
@@ -161,10 +164,11 @@ class RegisterTiles {
         std::max(1.0, static_cast<double>(bytes_) / context_.machine.vector_bytes);
     const double sums = registers * static_cast<double>(vectors * sides[0].size * sides[1].size);
     double loads = 0;
-    for (const Access& read : node_.reads) {
+    for (size_t r = 0; r < node_.reads.size(); ++r) {
+      const Access& read = node_.reads[r];
       if (read.of == stage_.func) continue;
       const bool is_row = read.moved_by() & set_of(x_);
-      double count = is_row ? row_loads(read) * registers * static_cast<double>(vectors) : 1;
+      double count = is_row ? row_loads_[r] * registers * static_cast<double>(vectors) : 1;
       for (const Side& side : sides)
         if (side.size > 1 && (read.moved_by() & set_of(side.iterator)))
           count *= static_cast<double>(side.size);

@@ -9,8 +9,8 @@
 //
 // Legal: L3, L8, and of the consumer L1; L9: a consumer in whose loops another Func has a window has its strips already.
 // Method: rows go along the outermost dimension of the consumer in which rows overlap or, without one, along the
-// innermost that moves the Func. Strips are as high as enough tasks allow, and as wide as rows: each end of a row in a tile
-// takes long. Dimensions of few values run inside of a row, so that all of them share it.
+// innermost that moves the Func. Strips are as high as enough tasks for each thread allow, and as wide as rows: each end of
+// a row in a tile takes long. Dimensions of few values run inside of a row if all of them share it.
 #include <algorithm>
 
 #include "autoschedule/moves/edit.h"
@@ -52,16 +52,16 @@ class StripFinder {
     Plan plan;
     size_t row = 0;  // the depth of the loop over rows; storage is in the loop around it
   };
-  // The strips that are there if they have whole rows, or new ones. None along the iterator of the lanes: a row would be a
-  // vector.
-  std::optional<Strip> along(int iterator) const {
+  // The strips that are there if they have whole rows, or new ones, inside of whose rows loops of up to `few` iterations
+  // run. None along the iterator of the lanes: a row would be a vector.
+  std::optional<Strip> along(int iterator, int64_t few) const {
     const std::optional<size_t> row = row_of(nest_, iterator);
     if (lane_ == iterator || !row) return std::nullopt;
     const auto outside = nest_.loops.begin() + static_cast<std::ptrdiff_t>(*row);
     const bool are_whole =
         std::ranges::find(nest_.loops.begin(), outside, lane_, &Loop::iterator) == outside;
     const bool are_there = outer_step(nest_, iterator, nest_.loops[*row].step) > 0;
-    return are_there && are_whole ? std::optional(Strip{plan_, *row}) : new_strip(iterator);
+    return are_there && are_whole ? std::optional(Strip{plan_, *row}) : new_strip(iterator, few);
   }
 
  private:
@@ -89,23 +89,25 @@ class StripFinder {
   }
 
   // Outside of the strips are the loops that are outside of the rows, without those of the lanes and of few values.
-  std::optional<Strip> new_strip(int iterator) const {
+  std::optional<Strip> new_strip(int iterator, int64_t few) const {
     const Nest plain = without_tiles();
     const size_t at = *row_of(plain, iterator);
     Nest nest = plain;
     std::vector<Loop> outside, inside;
+    const int64_t enough = context_.machine.enough_tasks();
     int64_t tasks = 1;
     for (size_t d = 0; d < plain.loops.size(); ++d) {
       if (d < at && !may_run_at_once(context_, host_, plain, d)) return std::nullopt;
       const int64_t count = trips(extents_, plain, d);
-      const bool is_around = d < at && count > few_values && plain.loops[d].iterator != lane_;
-      if (is_around) tasks *= count;
+      const bool is_around = d < at && count > few && plain.loops[d].iterator != lane_;
+      if (is_around) tasks = std::min(tasks * count, enough);
       if (d != at) (is_around ? outside : inside).push_back(plain.loops[d]);
     }
     const Loop& rows = plain.loops[at];
     const int64_t count = trips(extents_, plain, at);
-    const int64_t height =
-        std::min(count * tasks / context_.machine.enough_tasks(), count) * rows.step;
+    int64_t strips = (enough + tasks - 1) / tasks;
+    while (strips * tasks % context_.machine.threads != 0) ++strips;  // no thread waits
+    const int64_t height = (count + strips - 1) / strips * rows.step;
     nest.loops = outside;
     nest.loops.push_back(rows);
     nest.loops.insert(nest.loops.end(), inside.begin(), inside.end());
@@ -169,8 +171,13 @@ std::vector<Plan> slide(const Plan& plan, FuncId func, const Context& context) {
   for (const int16_t dimension : order) {  // the innermost first
     const auto i = std::ranges::find(iterators, dimension, &Iterator::dimension);
     if (i == iterators.end()) continue;
-    auto strip = strips.along(static_cast<int>(i - iterators.begin()));
-    auto window = strip ? window_in(std::move(*strip), *host, func, context) : std::nullopt;
+    const auto window_along = [&](int64_t few) {
+      auto strip = strips.along(static_cast<int>(i - iterators.begin()), few);
+      return strip ? window_in(std::move(*strip), *host, func, context) : std::nullopt;
+    };
+    auto window = window_along(few_values), apart = window_along(1);
+    const bool share_row = window && apart && product_of(window->box) <= product_of(apart->box);
+    if (!share_row && apart) window = std::move(apart);
     if (window && (!best || window->overlaps)) best = std::move(window);
   }
   if (best) add_placed(plans, best->strip.plan, func, best->placement, best->box, context);

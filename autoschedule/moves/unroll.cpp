@@ -89,10 +89,11 @@ std::vector<Nest> with_short_dimensions(const StageLoops& loops) {
 
 std::vector<Nest> unrolled(const StageLoops& loops) {
   const auto& [plan, context, stage, nest, extents] = loops;
-  const int64_t most = most_body_operations / operations(plan, context, stage);
   std::vector<Nest> nests = with_larger_body(loops);
   std::ranges::move(with_short_dimensions(loops), std::back_inserter(nests));
-  std::erase_if(nests, [&](const Nest& larger) { return copies(larger, loops.extents) > most; });
+  std::erase_if(nests, [&](const Nest& larger) {
+    return body_operations(plan, context, stage, larger, extents) > most_body_operations;
+  });
   const size_t body = body_depth(nest);
   if (body == nest.loops.size() || nest.loops[body].kind != ForType::Unrolled) return nests;
   Nest& rolled = nests.emplace_back(nest);

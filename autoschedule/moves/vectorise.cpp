@@ -77,7 +77,9 @@ std::vector<Nest> with_lanes(const StageLoops& loops) {
     if (!is_recurrence(node)) continue;
     const LaneForm form = lane_form(node.write, i, schedule_lanes, context.sizes, {line_elements});
     if (form.kind == LaneForm::Kind::Strided) {
-      if (fits(chains, points)) add(i, chains, ForType::Unrolled);
+      // Half as many where more would leave threads without rows.
+      for (const int64_t count : {chains, chains / 2})
+        if (fits(count, points)) add(i, count, ForType::Unrolled);
       if (fits(lanes / 4, points)) add(i, lanes / 4, ForType::Vectorized);
     } else if (std::optional<Nest> block = in_block(loops, nests.back(), i, lanes)) {
       nests.push_back(std::move(*block));

@@ -27,21 +27,18 @@ class NestCover {
   }
 
  private:
+  // The smallest step first.
   int64_t points(int iterator) const {
-    const std::vector<Piece> pieces = pieces_of(iterator);
     const int64_t all = extent(iterator);
     int64_t result = 1;
-    for (size_t i = 0; i < pieces.size(); ++i) {  // the smallest step first
-      const int64_t most = i + 1 < pieces.size() ? std::min(pieces[i + 1].step, all) : all;
-      result = std::min(result * pieces[i].iterations, most);
+    for (const Part* part = next_larger(nest_, iterator, 0); part;) {
+      const Part* larger = next_larger(nest_, iterator, part->step);
+      result = std::min(result * covered(*part), larger ? std::min(larger->step, all) : all);
+      part = larger;
     }
     return result;
   }
 
-  // A loop of an iterator, and how many of its iterations are covered.
-  struct Piece {
-    int64_t step, iterations;
-  };
   const Nest& nest_;
   const Cover& whole_;
   const size_t first_;
@@ -53,30 +50,20 @@ class NestCover {
     return iterations(fusion.inner) * iterations(fusion.outer);
   }
   int64_t iterations(const Part& part) const {
-    const std::vector<Part> parts = parts_of(nest_, part.iterator);
-    const Part* larger = next_larger(parts, part.step);
+    const Part* larger = next_larger(nest_, part.iterator, part.step);
     const int64_t all = extent(part.iterator);
     return rounded_up_quotient(larger ? std::min(larger->step, all) : all, part.step);
   }
-
-  std::vector<Piece> pieces_of(int iterator) const {
-    std::vector<Piece> pieces;
+  // The iterations of a part that the loops from the depth on run.
+  int64_t covered(const Part& part) const {
     for (size_t d = 0; d < nest_.loops.size(); ++d) {
-      const Loop& loop = nest_.loops[d];
-      if (loop.iterator == iterator)
-        pieces.push_back({loop.step, d < first_ ? 1 : iterations(loop)});
+      if (&nest_.loops[d] == &part) return d < first_ ? 1 : iterations(part);
     }
-    for (size_t f = 0; f < nest_.fusions.size(); ++f) {
-      const auto& [inner, outer] = nest_.fusions[f];
-      if (inner.iterator != iterator && outer.iterator != iterator) continue;
-      const int64_t covered = points(iterators_ + static_cast<int>(f));
-      const int64_t in_inner = std::min(covered, iterations(inner));
-      if (inner.iterator == iterator) pieces.push_back({inner.step, in_inner});
-      if (outer.iterator == iterator)
-        pieces.push_back({outer.step, rounded_up_quotient(covered, in_inner)});
-    }
-    std::ranges::sort(pieces, {}, &Piece::step);
-    return pieces;
+    size_t f = 0;
+    while (&nest_.fusions[f].inner != &part && &nest_.fusions[f].outer != &part) ++f;
+    const int64_t all = points(iterators_ + static_cast<int>(f));
+    const int64_t in_inner = std::min(all, iterations(nest_.fusions[f].inner));
+    return &nest_.fusions[f].inner == &part ? in_inner : rounded_up_quotient(all, in_inner);
   }
 };
 

@@ -14,6 +14,10 @@ std::vector<std::string> iterators_of(const graph::FuncContents& f, int stage) {
   return mapped(loops, [](const Dim& loop) { return loop.var; });
 }
 
+const std::vector<std::string>& iterators_of(const Program& program, StageId stage) {
+  return program.iterators[static_cast<size_t>(stage.func)][static_cast<size_t>(stage.stage)];
+}
+
 Nest loops_of_definition(const graph::FuncContents& f, int stage) {
   const std::vector<std::string> iterators = iterators_of(f, stage);
   const std::vector<Dim> loops = graph::first_loops(f, f.stage(stage));
@@ -25,25 +29,34 @@ Nest loops_of_definition(const graph::FuncContents& f, int stage) {
   return nest;
 }
 
+namespace {
+
+template <class Visit>
+void for_each_part(const Nest& nest, int iterator, Visit visit) {
+  const auto look_at = [&](const Part& part) {
+    if (part.iterator == iterator) visit(part);
+  };
+  for (const Loop& loop : nest.loops) look_at(loop);
+  for (const Fusion& fusion : nest.fusions) {
+    look_at(fusion.inner);
+    look_at(fusion.outer);
+  }
+}
+
+}  // namespace
+
 std::vector<Part> parts_of(const Nest& nest, int iterator) {
   std::vector<Part> parts;
-  const auto add = [&](const Part& part) {
-    if (part.iterator == iterator) parts.push_back(part);
-  };
-  for (const Loop& loop : nest.loops) add(loop);
-  for (const Fusion& fusion : nest.fusions) {
-    add(fusion.inner);
-    add(fusion.outer);
-  }
+  for_each_part(nest, iterator, [&](const Part& part) { parts.push_back(part); });
   std::ranges::stable_sort(parts, std::greater(), &Part::step);
   return parts;
 }
 
-const Part* next_larger(const std::vector<Part>& parts, int64_t step) {
+const Part* next_larger(const Nest& nest, int iterator, int64_t step) {
   const Part* found = nullptr;
-  for (const Part& part : parts) {
-    if (part.step > step) found = &part;
-  }
+  for_each_part(nest, iterator, [&](const Part& part) {
+    if (part.step > step && (!found || part.step < found->step)) found = &part;
+  });
   return found;
 }
 

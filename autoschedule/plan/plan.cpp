@@ -18,12 +18,16 @@ const char* opacity_name(Opacity opacity) {
 }
 
 ProgramPtr make_program(const std::vector<graph::FuncPtr>& outputs) {
-  auto program = std::make_shared<Program>(Program{outputs, graph::topological_order(outputs), {}});
+  auto program =
+      std::make_shared<Program>(Program{outputs, graph::topological_order(outputs), {}, {}});
   for (const graph::FuncPtr& f : program->funcs) {
     RETROGRADE_ASSERT(f->wrappers.empty() && f->copied_inputs.empty(), "wrappers of ",
                       quoted(f->name), " are not applied");
   }
   program->readers = readers_of(program->funcs);
+  program->iterators = mapped(program->funcs, [](const graph::FuncPtr& f) {
+    return numbered(f->stage_count(), [&](int stage) { return iterators_of(*f, stage); });
+  });
   return program;
 }
 
@@ -33,9 +37,11 @@ bool is_output(const Program& program, FuncId func) {
 }
 
 bool operator==(const Plan& a, const Plan& b) {
-  return a.program->funcs == b.program->funcs && a.program->outputs == b.program->outputs &&
-         std::ranges::equal(a.funcs, b.funcs,
-                            [](const auto& f, const auto& g) { return f == g || *f == *g; });
+  const bool is_one = a.program == b.program || (a.program->funcs == b.program->funcs &&
+                                                 a.program->outputs == b.program->outputs);
+  return is_one && std::ranges::equal(a.funcs, b.funcs, [](const auto& f, const auto& g) {
+           return f == g || *f == *g;
+         });
 }
 
 namespace {
@@ -87,10 +93,29 @@ uint64_t hash_of(const FuncPlan& plan) {
   return hash.value();
 }
 
-uint64_t hash_of(const Plan& plan) {
+namespace {
+
+uint64_t hash_at(size_t func, const FuncPlan& plan) {
   PlanHash hash;
-  for (const auto& func : plan.funcs) hash(hash_of(*func));
+  hash(func, hash_of(plan));
   return hash.value();
+}
+
+}  // namespace
+
+uint64_t hash_of(const Plan& plan) {
+  uint64_t sum = 0;
+  for (size_t f = 0; f < plan.funcs.size(); ++f) sum += hash_at(f, *plan.funcs[f]);
+  return sum;
+}
+
+uint64_t hash_of(const Plan& plan, const Plan& before, uint64_t hash_before) {
+  uint64_t sum = hash_before;
+  for (size_t f = 0; f < plan.funcs.size(); ++f) {
+    if (plan.funcs[f] != before.funcs[f])
+      sum += hash_at(f, *plan.funcs[f]) - hash_at(f, *before.funcs[f]);
+  }
+  return sum;
 }
 
 bool is_inlined(const Plan& plan, FuncId func) {

@@ -151,6 +151,7 @@ uint64_t hash_of(const FuncPlan& plan);
 struct Program {
   std::vector<graph::FuncPtr> outputs, funcs;
   std::vector<std::vector<StageId>> readers;  // of each Func: the stages of others that read it
+  std::vector<std::vector<std::vector<std::string>>> iterators;  // their names, by Func and stage
 };
 using ProgramPtr = std::shared_ptr<const Program>;
 ProgramPtr make_program(const std::vector<graph::FuncPtr>& outputs);
@@ -168,6 +169,8 @@ struct Plan {
 // Whether both are about the same program, and all Funcs run alike.
 bool operator==(const Plan& a, const Plan& b);
 uint64_t hash_of(const Plan& plan);
+// The same, from that of a plan of which a few Funcs differ.
+uint64_t hash_of(const Plan& plan, const Plan& before, uint64_t hash_before);
 
 // Whether the values of the Func are computed wherever they are read: also if nothing is decided, but not for outputs.
 bool is_inlined(const Plan& plan, FuncId func);

@@ -104,8 +104,8 @@ std::string LoopText::part(const Part& part) const {
 std::string LoopText::place(size_t depth) const {
   const Loop& loop = nest_.loops[depth];
   if (!is_phase(nest_, depth)) return base(loop.iterator) + steps(loop);
-  const std::vector<Part> parts = parts_of(nest_, loop.iterator);
-  return text(base(loop.iterator), steps(loop), "%", next_larger(parts, loop.step)->step);
+  return text(base(loop.iterator), steps(loop), "%",
+              next_larger(nest_, loop.iterator, loop.step)->step);
 }
 
 std::string LoopText::loop(size_t depth) const {

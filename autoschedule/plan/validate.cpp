@@ -8,6 +8,7 @@
 //       nothing is computed inside of it.
 //   P5  Loops that carry a dependence are serial and keep their order, unless the update commutes or is atomic. The
 //       rules of directives decide it (graph/directives/iteration_order.h).
+//   P7  Stages that share loops can run together (sharing.h).
 //
 // Not checked: what depends on the regions that loops access, such as whether a window holds all rows that are read
 // again (P6).
@@ -16,6 +17,7 @@
 #include "autoschedule/plan/nest.h"
 #include "autoschedule/plan/plan.h"
 #include "autoschedule/plan/readers.h"
+#include "autoschedule/plan/sharing.h"
 #include "diagnostics/error.h"
 #include "graph/definitions/define.h"
 #include "ir/build.h"
@@ -42,14 +44,19 @@ class PlanChecker {
     return broken_;
   }
   std::string check_structure() {
+    for (size_t f = 0; f < plan_.funcs.size(); ++f) {
+      const auto id = static_cast<FuncId>(f);
+      if (is_changed(id) || is_bound(plan_.of(id))) bound_.push_back(id);
+    }
     for_each_changed([&](StageId stage) { check_steps(stage); });
-    for_each_func([&](FuncId id) { check_levels(id); });
+    for (const FuncId id : bound_) check_levels(id);
+    if (broken_.empty()) broken_ = broken_sharing(plan_, before_);
     if (!broken_.empty()) return broken_;
     const Readers readers(plan_);
-    for_each_func([&](FuncId id) { check_reads(id, readers); });
-    for_each_func([&](FuncId id) { check_storage(id); });
+    for (const FuncId id : bound_) check_reads(id, readers);
+    for (const FuncId id : bound_) check_storage(id);
     for_each_changed([&](StageId stage) { check_lanes(stage); });
-    for_each_func([&](FuncId id) { check_outside_of_lanes(id); });
+    for (const FuncId id : bound_) check_outside_of_lanes(id);
     return broken_;
   }
 
@@ -58,23 +65,22 @@ class PlanChecker {
   const Plan& plan_;
   const Plan* before_;
   std::string broken_;
+  std::vector<FuncId> bound_;  // the Funcs that changed, and those that loops of others concern
 
   template <typename... Parts>
   void breaks(const Parts&... parts) {
     if (broken_.empty()) broken_ = text(parts...);
   }
-  template <typename F>
-  void for_each_func(const F& f) const {
-    for (size_t id = 0; id < plan_.funcs.size(); ++id) f(static_cast<FuncId>(id));
+  bool is_changed(FuncId id) const {
+    const auto i = static_cast<size_t>(id);
+    return !before_ || plan_.funcs[i] != before_->funcs[i];
   }
   template <typename F>
   void for_each_changed(const F& f) const {
-    for_each_func([&](FuncId id) {
-      const auto i = static_cast<size_t>(id);
-      if (before_ && plan_.funcs[i] == before_->funcs[i]) return;
-      for (size_t s = 0; s < plan_.of(id).nests.size(); ++s)
+    for (const FuncId id : bound_) {
+      for (size_t s = 0; s < plan_.of(id).nests.size() && is_changed(id); ++s)
         f(StageId{id, static_cast<int16_t>(s)});
-    });
+    }
   }
   const FuncContents& func(FuncId id) const {
     return *plan_.program->funcs[static_cast<size_t>(id)];
@@ -88,14 +94,15 @@ class PlanChecker {
 
   void check_steps(StageId stage) {
     const Nest& nest = plan_.nest(stage);
-    const std::vector<std::string> names = iterators_of(func(stage.func), stage.stage);
+    const std::vector<std::string>& names = iterators_of(*plan_.program, stage);
     const int count = static_cast<int>(names.size() + nest.fusions.size());
     for (size_t d = 0; d < nest.loops.size(); ++d) check_iterator(stage, d, count);
     for (int i = 0; i < count && broken_.empty(); ++i) {
-      const auto own = static_cast<size_t>(i);
-      check_parts(parts_of(nest, i),
-                  text(own < names.size() ? quoted(names[own]) : "two loops that run as one",
-                       " of ", name(stage)));
+      check_parts(parts_of(nest, i), [&] {
+        const auto own = static_cast<size_t>(i);
+        return text(own < names.size() ? quoted(names[own]) : "two loops that run as one", " of ",
+                    name(stage));
+      });
     }
   }
   void check_iterator(StageId stage, size_t depth, int count) {
@@ -106,19 +113,21 @@ class PlanChecker {
       breaks("P1: loop ", depth, " of ", name(stage),
              " runs once, but is not the outermost one over blocks of a device");
   }
-  void check_parts(const std::vector<Part>& parts, const std::string& what) {
-    if (parts.empty()) return breaks("P1: no loop runs over ", what);
+  // `what`: gives the name of the iterator.
+  template <typename Name>
+  void check_parts(const std::vector<Part>& parts, const Name& what) {
+    if (parts.empty()) return breaks("P1: no loop runs over ", what());
     for (size_t i = 0; i + 1 < parts.size(); ++i) {
       if (parts[i].step == parts[i + 1].step)
-        breaks("P1: two loops over ", what, " have step ", parts[i].step, "; steps decrease");
+        breaks("P1: two loops over ", what(), " have step ", parts[i].step, "; steps decrease");
       if (parts[i].in_blocks && parts[i].step % parts[i + 1].step != 0)
-        breaks("P1: step ", parts[i].step, " over ", what, " is in blocks of ", parts[i + 1].step,
+        breaks("P1: step ", parts[i].step, " over ", what(), " is in blocks of ", parts[i + 1].step,
                ", which do not divide it");
     }
     const Part& last = parts.back();
-    if (last.step != 1) breaks("P1: the smallest step over ", what, " is ", last.step, ", not 1");
+    if (last.step != 1) breaks("P1: the smallest step over ", what(), " is ", last.step, ", not 1");
     if (last.in_blocks || last.tail != TailStrategy::Auto)
-      breaks("P1: the loop over ", what, " with step 1 has a tail");
+      breaks("P1: the loop over ", what(), " with step 1 has a tail");
   }
 
   // ---- levels exist ----
@@ -201,14 +210,14 @@ class PlanChecker {
   }
   // Extents of pure variables are known only where regions are.
   bool has_known_extent(StageId stage, const Loop& loop) const {
-    const graph::Definition& definition = func(stage.func).stage(stage.stage);
-    const std::vector<Part> parts = parts_of(plan_.nest(stage), loop.iterator);
-    if (loop.iterator == once || next_larger(parts, loop.step)) return true;
-    const std::vector<std::string> names = iterators_of(func(stage.func), stage.stage);
+    if (loop.iterator == once || next_larger(plan_.nest(stage), loop.iterator, loop.step))
+      return true;
+    const std::vector<std::string>& names = iterators_of(*plan_.program, stage);
     const auto i = static_cast<size_t>(loop.iterator);
-    const auto rvar = std::ranges::find(definition.rvars, i < names.size() ? names[i] : "",
-                                        &graph::ReductionVariable::var);
-    return rvar == definition.rvars.end() || as_const_int(rvar->extent).has_value();
+    const auto& rvars = func(stage.func).stage(stage.stage).rvars;
+    const auto rvar =
+        std::ranges::find(rvars, i < names.size() ? names[i] : "", &graph::ReductionVariable::var);
+    return rvar == rvars.end() || as_const_int(rvar->extent).has_value();
   }
 
   void check_outside_of_lanes(FuncId id) {

@@ -1,7 +1,6 @@
 #include "autoschedule/search/search.h"
 
 #include <algorithm>
-#include <map>
 #include <memory>
 #include <unordered_set>
 
@@ -27,6 +26,7 @@ struct State {
     std::shared_ptr<const Step> before;
   };
   Plan plan;
+  uint64_t hash = 0;
   Cost cost;
   std::shared_ptr<const Step> last;
 };
@@ -35,15 +35,15 @@ bool is_faster(const State& a, const State& b) { return a.cost.seconds < b.cost.
 
 // Whether the gain exceeds the error of the model, which is about the stages whose times differ.
 bool is_worth_it(const Cost& before, const Cost& after, const SearchOptions& options) {
-  std::map<StageId, double> seconds;
-  for (const StageCost& stage : before.stages) seconds[stage.stage] = stage.seconds;
   double changed = 0;
+  auto was = before.stages.begin();
   for (const StageCost& stage : after.stages) {
-    const auto known = seconds.extract(stage.stage);
-    const double was = known ? known.mapped() : 0;
-    if (was != stage.seconds) changed += std::max(was, stage.seconds);
+    for (; was != before.stages.end() && was->stage < stage.stage; ++was) changed += was->seconds;
+    const bool is_known = was != before.stages.end() && was->stage == stage.stage;
+    const double seconds = is_known ? (was++)->seconds : 0;
+    if (seconds != stage.seconds) changed += std::max(seconds, stage.seconds);
   }
-  for (const auto& [stage, was] : seconds) changed += was;
+  for (; was != before.stages.end(); ++was) changed += was->seconds;
   const double least =
       std::max(options.least_gain * changed, options.least_gain_of_all * before.seconds);
   return after.seconds < before.seconds - least;
@@ -67,8 +67,9 @@ class Beam {
         options_(options),
         width_(static_cast<size_t>(width)),
         left_(prices_per_func * static_cast<int64_t>(start.funcs.size()) * width) {
-    states_.push_back({start, cost_.price(start), nullptr});
-    seen_.insert(hash_of(start));
+    states_.push_back({start, hash_of(start), cost_.price(start), nullptr});
+    seen_.insert(states_[0].hash);
+    find_shares();
   }
 
   // The best plans, the fastest first: one more than the width, so that a descent tells what else was good.
@@ -94,17 +95,19 @@ class Beam {
   std::unordered_set<uint64_t> seen_;
   std::vector<State> states_;  // the fastest first; never empty
 
-  // The seconds that the fastest plan spends in stages of the Func or, if it is inlined, in those that read it.
-  double share_of(FuncId f) const {
-    const State& state = states_[0];
-    double seconds = 0;
-    for (const StageCost& stage : state.cost.stages)
-      if (stage.stage.func == f) seconds += stage.seconds;
-    if (seconds == 0) {
-      for (const StageId& reader : context_.accesses.consumers(f)) seconds += share_of(reader.func);
+  // By Func, the seconds that the fastest plan spends in its stages or, if it is inlined, in those that read it.
+  std::vector<double> shares_;
+  void find_shares() {
+    shares_.assign(context_.accesses.funcs().size(), 0);
+    for (const StageCost& stage : states_[0].cost.stages)
+      shares_[static_cast<size_t>(stage.stage.func)] += stage.seconds;
+    for (size_t f = shares_.size(); f-- > 0;) {
+      if (shares_[f] > 0) continue;
+      for (const StageId& reader : context_.accesses.consumers(static_cast<FuncId>(f)))
+        shares_[f] += shares_[static_cast<size_t>(reader.func)];
     }
-    return seconds;
   }
+  double share_of(FuncId f) const { return shares_[static_cast<size_t>(f)]; }
   bool is_small(FuncId f) const { return share_of(f) < small_share * states_[0].cost.seconds; }
   bool is_worth_visiting(FuncId f) const {
     const auto i = static_cast<size_t>(f);
@@ -128,21 +131,27 @@ class Beam {
       std::ranges::stable_sort(next, is_faster);
       if (next.size() > width_ + spare_paths) next.resize(width_ + spare_paths);
       bool is_better = false;
-      for (const Candidate& candidate : next) {
+      for (Candidate& candidate : next) {
+        candidate.cost = cost_.price(candidate.plan);
         if (!is_worth_it(before[candidate.from].cost, candidate.cost, options_)) continue;
         is_better |= candidate.cost.seconds < states_[0].cost.seconds;
         states_.push_back(candidate);
       }
       std::ranges::stable_sort(states_, is_faster);
       if (states_.size() > width_ + 1) states_.resize(width_ + 1);
+      find_shares();
       // A step may make things worse once, at the beginning, where the next one makes up for it.
       if (depth > 0 && !is_better) break;
       front = std::move(next);
     }
   }
 
-  // Whether a move of another Func changes one that is to be kept. Loops that places refer to may get other numbers.
+  // Whether no Func leaves the place that it is to have, and no move of another Func changes one that is to be kept. Loops that places refer to may get other numbers.
   bool keeps_funcs(const Plan& before, const Plan& after) const {
+    for (size_t f = 0; f < options_.at_root.size(); ++f) {
+      if (options_.at_root[f] && after.funcs[f]->placement.compute.kind != Level::Kind::Root)
+        return false;
+    }
     for (size_t f = 0; f < options_.kept.size(); ++f) {
       if (!options_.kept[f] || before.funcs[f] == after.funcs[f]) continue;
       const FuncPlan &was = *before.funcs[f], &is = *after.funcs[f];
@@ -158,13 +167,14 @@ class Beam {
       for (Plan& plan : move.apply(from.plan, f, context_)) {
         if (left_ == 0) return;
         if (only_places && plan.of(f).placement == from.plan.of(f).placement) continue;
-        if (!keeps_funcs(from.plan, plan) || !seen_.insert(hash_of(plan)).second) continue;
+        const uint64_t hash = hash_of(plan, from.plan, from.hash);
+        if (!keeps_funcs(from.plan, plan) || !seen_.insert(hash).second) continue;
         --left_;
-        Cost cost = cost_.price(plan);
+        const Totals cost = cost_.totals(plan);
         if (cost.peak_bytes > std::max(options_.most_bytes, from.cost.peak_bytes)) continue;
         const SearchStep step{f, move.name, cost.seconds};
         const auto last = std::make_shared<const State::Step>(State::Step{step, from.last});
-        next.push_back({{std::move(plan), std::move(cost), last}, from.from});
+        next.push_back({{std::move(plan), hash, {cost, {}}, last}, from.from});
       }
     }
   }

@@ -32,6 +32,7 @@ FEWEST_SAMPLES = 20  # of the profiler, for a stage to count
 SAMPLE_SECONDS = 1e-3
 RIGHT_FACTOR = 1.5
 WRONG_FACTOR = 1.3
+SLOWER = 1.05  # without a move: more than noise
 
 
 # ---- statistics ----
@@ -166,27 +167,45 @@ def summary(judged):
             "ms for a price, median": 1e3 * statistics.median(known("price_seconds"))}
 
 
-def searched(run):
-    """By the width of a search over moves: (program, time of the plan that it takes over that of the default plan)."""
+def times_of_sources(run, prefix):
+    """By the rest of a plan's source after the prefix: [(program, time over that of the default plan)]."""
     result = {}
     for name, program in run["programs"].items():
         plans = measured_plans(program)
         for plan in plans:
             for source in plan["source"].split(", "):
-                if source.startswith("beam "):
-                    result.setdefault(int(source[len("beam "):]), []).append((name, plan["time"] / plans[0]["time"]))
-    return dict(sorted(result.items()))
+                if source.startswith(prefix):
+                    result.setdefault(source[len(prefix):], []).append((name, plan["time"] / plans[0]["time"]))
+    return result
 
 
 def searched_text(run):
     lines = []
-    for width, found in searched(run).items():
+    for width, found in sorted(times_of_sources(run, "beam ").items(), key=lambda item: int(item[0])):
         times = [time for _, time in found]
         worst = max(found, key=lambda pair: pair[1])
         lines.append(f"Time of the plans that a search over moves of width {width} takes, over that of the default "
                      f"plans: geometric mean {statistics.geometric_mean(times):.2f} ({len(times)} programs), "
                      f"at worst {worst[1]:.2f} ({worst[0]}).\n\n")
     return "".join(lines)
+
+
+def ablation(run):
+    """By move: [(program, time of the plan found without the move over that of the plan found with all of them)]."""
+    with_all = dict(times_of_sources(run, "beam ").get("1", []))
+    return {move: [(name, time / with_all[name]) for name, time in found if name in with_all]
+            for move, found in times_of_sources(run, "no ").items()}
+
+
+def ablation_text(run):
+    rows = []
+    for move, found in sorted(ablation(run).items()):
+        times = [time for _, time in found]
+        worst, most = max(found, key=lambda pair: pair[1])
+        rows.append([f"`{move}`", str(sum(time > SLOWER for time in times)), f"{statistics.geometric_mean(times):.2f}",
+                     f"{most:.2f} ({worst})" if most > SLOWER else "–"])
+    head = ["without the move", f"slower by more than {100 * (SLOWER - 1):.0f} %", "time, geometric mean", "slowest"]
+    return markdown(head, rows) + "\n" if rows else ""
 
 
 def wrong_pairs(program, model):
@@ -222,7 +241,7 @@ def table(report, commit=None):
     models = list(judged)
     summaries = [summary(judged[model]) for model in models]
     rows = [[key, *(number(s[key]) for s in summaries)] for key in summaries[0]] if models else []
-    text = markdown(["over all programs", *models], rows) + "\n" + searched_text(run)
+    text = markdown(["over all programs", *models], rows) + "\n" + searched_text(run) + ablation_text(run)
     figures = ("tau", "rho", "regret", "ratio")
     names = {"tau": "tau", "rho": "rho", "regret": "regret", "ratio": "predicted / measured"}
     rows = []

@@ -124,18 +124,28 @@ std::vector<SampledPlan> plans_of_walks(const std::vector<FuncPtr>& outputs,
   return result;
 }
 
-// The plans that searches over moves take.
-std::vector<SampledPlan> plans_of_beams(const std::vector<FuncPtr>& outputs,
-                                        const SampleOptions& options,
-                                        const StandardPlan& standard) {
+// The plans that searches over moves take, from a plan in which nothing is decided.
+std::vector<SampledPlan> plans_of_searches(const std::vector<FuncPtr>& outputs,
+                                           const SampleOptions& options,
+                                           const StandardPlan& standard) {
   const std::set<std::string> known = names_of(outputs);
   std::vector<SampledPlan> result;
-  for (const int width : options.widths) {
-    const auto found = driver::search_plans(standard.scheduled, outputs, {}, options.machine,
-                                            {width, std::numeric_limits<int64_t>::max()});
-    const planning::Plan& plan = found.result.found.at(0).plan;
-    result.push_back({"beam " + std::to_string(width), key_of(plan, known), plan});
-  }
+  const auto add = [&](const std::string& source, int width, std::set<std::string> without) {
+    driver::PlanSearchOptions search;
+    search.width = width;
+    search.spare_bytes = std::numeric_limits<int64_t>::max();
+    search.start = driver::SearchStart::NothingBesideRules;
+    search.without = std::move(without);
+    const auto found =
+        driver::search_plans(standard.scheduled, outputs, {}, options.machine, search);
+    if (found.result.found.empty()) return;
+    const planning::Plan& plan = found.result.found[0].plan;
+    result.push_back({source, key_of(plan, known), plan});
+  };
+  for (const int width : options.widths) add("beam " + std::to_string(width), width, {});
+  if (!options.ablation) return result;
+  for (const planning::Move& move : planning::all_moves())
+    add(std::string("no ") + move.name, 1, {move.name});
   return result;
 }
 
@@ -143,7 +153,7 @@ std::vector<SampledPlan> plans_of_beams(const std::vector<FuncPtr>& outputs,
 
 std::vector<SampledPlan> sample_plans(const std::vector<FuncPtr>& outputs,
                                       const SampleOptions& options) {
-  const PlanSource sources[] = {plans_of_beams, plans_of_decisions, plans_of_walks};
+  const PlanSource sources[] = {plans_of_searches, plans_of_decisions, plans_of_walks};
   StandardPlan standard;
   standard.scheduled =
       autoschedule::schedule_within_budget(outputs, request_of(options), Scheduling::Everything)
@@ -155,7 +165,7 @@ std::vector<SampledPlan> sample_plans(const std::vector<FuncPtr>& outputs,
       const auto known = std::ranges::find(result, plan.key, &SampledPlan::key);
       if (known == result.end())
         result.push_back(std::move(plan));
-      else if (plan.source.starts_with("beam"))
+      else if (plan.source.starts_with("beam") || plan.source.starts_with("no "))
         known->source += ", " + plan.source;
     }
   }

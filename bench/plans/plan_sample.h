@@ -17,8 +17,8 @@ using retrograde::Target;
 namespace planning = retrograde::planning;
 
 struct SampledPlan {
-  // Where it comes from: "rules", "without", "walk tile root", "beam 1". If searches over moves take it, too, they
-  // are named: "rules, beam 1, beam 4".
+  // Where it comes from: "rules", "without", "walk tile root", "beam 1", "no tile". If searches over moves take it,
+  // too, they are named: "rules, beam 1, no tile".
   std::string source;
   std::string key;  // equal for equal plans, in each run
   planning::Plan plan;
@@ -31,6 +31,7 @@ struct SampleOptions {
   size_t walks = 16;              // plans of random moves from the default plan
   uint32_t seed = 1;              // of the moves
   std::vector<int> widths = {1};  // searches over moves, a plan each
+  bool ablation = false;          // searches of width 1 without one of the moves, a plan each
 };
 
 // The default schedule.

@@ -2,7 +2,7 @@
 """plans.py -- measures plans of the benchmarks' programs and judges cost models by them.
 
     plans.py BUILD [--long] [--program PATTERN]... [--rules N] [--walks N] [--seed N] [--widths N,...]
-             [--seconds S] [--stage-seconds S] [--repeats N] [--limit S] [--minutes M] [--collect] [--output FILE]
+             [--ablation] [--seconds S] [--stage-seconds S] [--repeats N] [--limit S] [--minutes M] [--collect] [--output FILE]
              [--plot FILE] [--wrong]
     plans.py BUILD --pair PROGRAM FAST_KEY SLOW_KEY FILE.pair [--output FILE]
 
@@ -127,12 +127,13 @@ def measure_once(command, program, limit):
     return started is not None
 
 
-SAMPLE = ("rules", "walks", "seed", "widths")
+SAMPLE = ("rules", "walks", "seed", "widths", "ablation")
 
 
 def sample_options(settings):
     """The options of a worker on which its plans depend."""
-    return [word for key in SAMPLE for word in (f"--{key}", str(settings[key]))]
+    given = {key: value for key in SAMPLE if (value := settings.get(key)) is not False and value is not None}
+    return [word for key, value in given.items() for word in ([f"--{key}"] if value is True else [f"--{key}", str(value)])]
 
 
 def measure(name, folder, options):
@@ -219,6 +220,7 @@ def read_options():
     parser.add_argument("--rules", type=int, help="plans of the rules without one or two decisions")
     parser.add_argument("--walks", type=int, help="plans of random moves")
     parser.add_argument("--widths", default="1,4", help="of searches over moves, a plan each")
+    parser.add_argument("--ablation", action="store_true", help="plans of searches without one of the moves")
     parser.add_argument("--seed", type=int, default=1, help="of the moves")
     parser.add_argument("--seconds", type=float, default=0.2)
     parser.add_argument("--stage-seconds", type=float)

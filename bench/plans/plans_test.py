@@ -102,9 +102,18 @@ class Programs(unittest.TestCase):
     def test_searches_over_moves_are_compared_with_the_default(self):
         rows = [plan("a", 1, 1.0, source="rules, beam 1"), plan("b", 4, 2.0, source="beam 4"), plan("c", 4, 0.5)]
         run = {"programs": {"blur": program(*rows), "warp": program(plan("d", 1, 1.0, source="rules, beam 4"))}}
-        self.assertEqual(judge.searched(run), {1: [("blur", 1.0)], 4: [("blur", 2.0), ("warp", 1.0)]})
+        self.assertEqual(judge.times_of_sources(run, "beam "),
+                         {"1": [("blur", 1.0)], "4": [("blur", 2.0), ("warp", 1.0)]})
         self.assertIn("width 4 takes, over that of the default plans: geometric mean 1.41", judge.searched_text(run))
         self.assertIn("at worst 2.00 (blur)", judge.searched_text(run))
+
+    def test_ablation_compares_with_the_plan_that_all_moves_find(self):
+        rows = [plan("a", 1, 2.0, source="rules"), plan("b", 4, 1.0, source="beam 1, no root"),
+                plan("c", 4, 1.5, source="no tile")]
+        run = {"programs": {"blur": program(*rows)}}
+        self.assertEqual(judge.ablation(run), {"root": [("blur", 1.0)], "tile": [("blur", 1.5)]})
+        self.assertIn("| `tile` | 1 | 1.50 | 1.50 (blur) |", judge.ablation_text(run))
+        self.assertIn("| `root` | 0 | 1.00 | – |", judge.ablation_text(run))
 
     def test_a_program_that_a_model_cannot_price_has_no_figures(self):
         rows = [plan("a", 1, 1.0), plan("b", 4, 2.0)]

@@ -249,6 +249,7 @@ int run(int argc, char** argv) {
                  "plans of the rules without one or two decisions, at the most");
   app.add_option("--walks", options.sample.walks, "plans of random moves, at the most");
   app.add_option("--widths", options.sample.widths, "of searches over moves")->delimiter(',');
+  app.add_flag("--ablation", options.sample.ablation, "searches without one of the moves");
   app.add_option("--seed", options.sample.seed, "of the moves");
   app.add_option("--seconds", options.seconds, "that each plan runs");
   app.add_option("--stage-seconds", options.stage_seconds,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "graph/copy_graph.h"
 #include "graph/definitions/own_reads.h"
 #include "graph/directives/give_directive.h"
 #include "ir/build.h"
@@ -70,6 +71,8 @@ Expr GraphFactoring::redirected(const Expr& e, const FactorReads& reads) const {
   return rewrite(e, [&](const Expr& node, const auto& recurse) -> Expr {
     if (const Expr* read = find_or_null(reads, node.get())) return *read;
     const auto* call = node.as<Call>();
+    if (call && graph::is_weak_read(*call))
+      return graph::owning_read(*call, mapped(call->args, recurse));
     if (!call || call->call_type != CallType::Func) return {};
     const FuncPtr* copied =
         find_or_null(result_.copies, static_cast<const FuncContents*>(call->symbol.raw()));

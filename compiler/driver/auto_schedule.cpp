@@ -35,7 +35,7 @@ void schedule_all(const Pipeline& pipeline, const Target& target, const MachineP
         autoschedule::request_for(target, spec.autoschedule, machine);
     request.on_gpu = is_for_gpu(target);
     ChosenSchedule chosen =
-        choose_schedule(wrapped, request, autoschedule::Scheduling::Everything, target);
+        choose_schedule(wrapped, request, autoschedule::Scheduling::Everything, {target});
     const autoschedule::ScheduledGraph& scheduled = chosen.graph;
     ScheduleLog log = schedule_log(scheduled.outputs);
     log.entries.erase(log.entries.begin(), log.entries.begin() + given);

@@ -5,14 +5,16 @@
 
 #include "autoschedule/size_estimate.h"
 #include "diagnostics/error.h"
+#include "driver/plan_schedule.h"
 #include "driver/plan_search.h"
-#include "driver/schedule.h"
 #include "driver/schedule_difference.h"
 #include "graph/definitions/parameter_contents.h"
 #include "graph/directives/give_directive.h"
 #include "graph/directives/schedule_log.h"
 #include "ir/build.h"
+#include "lower/lower.h"
 #include "simplify/simplify.h"
+#include "tuning/predict.h"
 
 namespace retrograde::driver {
 
@@ -22,7 +24,7 @@ using planning::FoundPlan;
 
 namespace {
 
-constexpr int width = 4;  // of the beam
+constexpr int wide = 4;  // the beam of a search that was asked for
 // A plan is taken if its cost is less than this part of the cost of the rules' plan, and the prediction of the lowered
 // program less than that part of theirs.
 constexpr double worth_leaving = 0.9, confirmed = 0.95;
@@ -76,29 +78,46 @@ double milliseconds(double seconds) { return 1e3 * seconds; }
 // A schedule with its prediction. That of the lowered program knows borders and guards as they are.
 struct Lowered {
   std::vector<FuncPtr> outputs;
+  ir::LoweredFunction function;
   double seconds = 0;
+  double peak_bytes = 0;
 };
+
+bool is_clearly_faster(const planning::SearchResult& result, const FoundPlan& plan) {
+  return plan.cost.seconds < worth_leaving * result.start.cost.seconds;
+}
 
 // The search's plans by their cost, of which the first is taken that the lowered program confirms.
 class Choice {
  public:
-  Choice(const PlanSearch& found, const Target& target, int threads)
-      : found_(found), target_(target), threads_(threads), rules_(lowered(found.result.start)) {}
+  Choice(const PlanSearch& found, const Lowering& lowering, const planning::Machine& machine)
+      : found_(found),
+        lowering_(lowering),
+        machine_(machine),
+        rules_(lowered(found.result.start)) {}
 
-  ChosenSchedule run(ChosenSchedule rules, bool may_leave_rules) const {
+  ChosenSchedule take(ChosenSchedule rules) const {
+    for (const FoundPlan& plan : found_.result.found) {
+      if (!is_clearly_faster(found_.result, plan)) break;
+      const std::optional<Lowered> candidate = lowered_if_it_can_be(plan);
+      if (candidate && is_confirmed(*candidate)) return with(std::move(rules), *candidate);
+    }
+    return with(std::move(rules), rules_);
+  }
+
+  // The same with a report about the plan that comes next.
+  ChosenSchedule with_report(ChosenSchedule rules) const {
     const planning::SearchResult& result = found_.result;
     std::optional<Lowered> taken, other;
     for (const FoundPlan& plan : result.found) {
       if (plan.plan == result.start.plan || (taken && other)) continue;
       std::optional<Lowered> candidate = lowered_if_it_can_be(plan);
       if (!candidate) continue;
-      const bool is_faster = plan.cost.seconds < worth_leaving * result.start.cost.seconds &&
-                             candidate->seconds < confirmed * rules_.seconds;
-      (may_leave_rules && is_faster && !taken ? taken : other) = std::move(candidate);
+      const bool is_faster = is_clearly_faster(result, plan) && is_confirmed(*candidate);
+      (is_faster && !taken ? taken : other) = std::move(candidate);
     }
     if (taken && !other) other = rules_;
     const Lowered& chosen = taken ? *taken : rules_;
-    rules.graph.outputs = chosen.outputs;
     rules.search.tried = static_cast<size_t>(result.priced);
     rules.search.rules_ms = milliseconds(rules_.seconds);
     rules.search.predicted_ms = milliseconds(chosen.seconds);
@@ -107,18 +126,32 @@ class Choice {
       rules.search.runner_up =
           difference_of(graph::schedule_log(chosen.outputs), graph::schedule_log(other->outputs));
     }
-    return rules;
+    return with(std::move(rules), chosen);
   }
 
  private:
   const PlanSearch& found_;
-  const Target& target_;
-  const int threads_;
+  const Lowering& lowering_;
+  const planning::Machine& machine_;
   const Lowered rules_;
 
+  ChosenSchedule with(ChosenSchedule schedule, const Lowered& chosen) const {
+    const double more = chosen.peak_bytes - found_.result.start.cost.peak_bytes;
+    schedule.graph.memory.bytes += static_cast<int64_t>(more);
+    schedule.graph.outputs = chosen.outputs;
+    schedule.lowered = chosen.function;
+    return schedule;
+  }
+  bool is_confirmed(const Lowered& candidate) const {
+    return candidate.seconds < confirmed * rules_.seconds;
+  }
   Lowered lowered(const FoundPlan& plan) const {
-    Lowered result{found_.emitted(plan)};
-    result.seconds = predicted_seconds(result.outputs, target_, threads_);
+    Lowered result{found_.emitted(plan), {}};
+    result.peak_bytes = plan.cost.peak_bytes;
+    result.function = lowering_.lower(result.outputs);
+    const auto sizes =
+        tuning::program_sizes(result.function, tuning::output_shapes(result.outputs));
+    result.seconds = tuning::predicted_seconds(result.function, sizes, machine_, machine_.threads);
     return result;
   }
   std::optional<Lowered> lowered_if_it_can_be(const FoundPlan& plan) const {
@@ -132,6 +165,13 @@ class Choice {
 
 }  // namespace
 
+ir::LoweredFunction Lowering::lower(const std::vector<FuncPtr>& scheduled) const {
+  lower::LowerOptions options;
+  options.target = target;
+  return lower::lower(name, scheduled, inputs ? *inputs : lower::infer_arguments(scheduled),
+                      options);
+}
+
 // "cannot ..." as errors say it, though nothing fails.
 std::string note_against_search(const std::vector<FuncPtr>& outputs, const std::string& rule,
                                 const std::string& evidence, const std::string& instead) {
@@ -141,25 +181,40 @@ std::string note_against_search(const std::vector<FuncPtr>& outputs, const std::
 }
 
 ChosenSchedule choose_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
-                               Scheduling what, const Target& target, bool wants_runner_up) {
+                               Scheduling what, const Lowering& lowering, Choosing choosing) {
+  if (default_schedules == DefaultSchedules::OfPlans && choosing == Choosing::Search &&
+      !request.options.search && !request.on_gpu)
+    return {schedule_by_plan(outputs, request, what), {}, {}};
   ChosenSchedule rules{autoschedule::schedule_within_budget(outputs, request, what), {}};
-  if (!request.options.search && !wants_runner_up) return rules;
-  rules.search.note = reason_against(outputs, request);
-  if (!rules.search.note.empty()) return rules;
+  const bool is_wide = request.options.search;
+  const bool wants_report = is_wide || choosing == Choosing::SearchWithReport;
+  if (choosing == Choosing::Rules && !is_wide) return rules;
+  const std::string reason = reason_against(outputs, request);
+  if (wants_report) rules.search.note = reason;
+  if (!reason.empty()) return rules;
   const autoschedule::MemoryUse& memory = rules.graph.memory;
   PlanSearchOptions options;
   options.spare_bytes = std::max<int64_t>(memory.budget_bytes - memory.bytes, 0);
-  options.width = width;
+  if (is_wide) options.width = wide;
+  options.start = is_wide ? SearchStart::Both : SearchStart::NothingBesideRules;
   options.what = what;
+  const planning::Machine machine = wants_report ? search_machine(request.options, lowering.target)
+                                                 : autoschedule::machine_of(request);
   try {
-    const PlanSearch found = search_plans(rules.graph.outputs, outputs, request.options,
-                                          search_machine(request.options, target), options);
-    return Choice(found, target, request.options.threads).run(rules, request.options.search);
+    const PlanSearch found =
+        search_plans(rules.graph.outputs, outputs, request.options, machine, options);
+    const std::vector<FoundPlan>& plans = found.result.found;
+    if (!wants_report && (plans.empty() || !is_clearly_faster(found.result, plans.front())))
+      return rules;
+    const Choice choice(found, lowering, machine);
+    return wants_report ? choice.with_report(rules) : choice.take(rules);
   } catch (const Error& error) {  // lowering the rules' schedule says so where it matters
-    rules.search.note = note_against_search(outputs, "the schedule of the rules can be lowered",
-                                            error.what(), "Correct the program or its schedule");
-    return rules;
+    if (wants_report) {
+      rules.search.note = note_against_search(outputs, "the schedule of the rules can be lowered",
+                                              error.what(), "Correct the program or its schedule");
+    }
   }
+  return rules;
 }
 
 }  // namespace retrograde::driver

@@ -17,9 +17,7 @@ namespace {
 
 ir::LoweredFunction lowered(const PipelineSpec& pipeline, const std::string& name,
                             const std::vector<ir::LoweredArgument>& inputs, const Target& target) {
-  lower::LowerOptions options;
-  options.target = pipeline.traced(target);
-  return lower::lower(name, schedule(pipeline, target).graph.outputs, inputs, options);
+  return schedule_and_lower(pipeline, {pipeline.traced(target), name, inputs});
 }
 
 // The pipelines that extern stages call by name.
@@ -47,11 +45,11 @@ class Driver : public Compiler {
   }
 
   std::string loop_nest(const PipelineSpec& pipeline, const Target& target) override {
-    return lower::loop_nest_text(driver::schedule(pipeline, target).graph.outputs);
+    return lower::loop_nest_text(driver::schedule(pipeline, {target}).graph.outputs);
   }
 
   ScheduleLog schedule(const PipelineSpec& pipeline, const Target& target) override {
-    return graph::schedule_log(driver::schedule(pipeline, pipeline.traced(target)).graph.outputs);
+    return graph::schedule_log(driver::schedule(pipeline, {pipeline.traced(target)}).graph.outputs);
   }
 
   ScheduleReport explain_schedule(const PipelineSpec& pipeline,

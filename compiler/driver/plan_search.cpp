@@ -22,22 +22,8 @@ constexpr double least_gain_from_nothing = 0.02, least_gain_of_all_from_nothing 
 
 bool is_adjoint(const FuncPtr& f) { return f->made.has_value(); }
 
-// Funcs that no move changes, by number.
-std::vector<bool> kept_funcs(const Plan& plan, const std::vector<FuncPtr>& unscheduled,
-                             const AutoscheduleOptions& options, autoschedule::Scheduling what) {
-  std::unordered_set<std::string> kept;
-  const std::vector<FuncPtr> order = topological_order(unscheduled);
-  const bool by_hand = what == autoschedule::Scheduling::Gradients &&
-                       std::ranges::any_of(order, [](const FuncPtr& f) {
-                         return !is_adjoint(f) && has_directives(*f);
-                       });
-  for (const FuncPtr& f : order) {
-    if (graph::has_directives(*f) || (by_hand && !is_adjoint(f))) kept.insert(f->name);
-  }
-  for (const auto* named : {&options.store, &options.inlined}) {
-    for (const FuncName& f : *named) kept.insert(f.name);
-  }
-  // Funcs that keep directives before an rfactor, and what it made from their loops.
+// The same by number, with Funcs that keep directives before an rfactor, and what it made from their loops.
+std::vector<bool> kept_funcs(const Plan& plan, std::unordered_set<std::string> kept) {
   for (const FuncPtr& f : plan.program->funcs) {
     if (graph::can_reset_loops(*f)) continue;
     kept.insert(f->name);
@@ -71,7 +57,27 @@ std::vector<const char*> moves_of(Decision decision) {
   return {};
 }
 
+bool is_among(const FuncPtr& f, const std::vector<FuncName>& names) {
+  return std::ranges::find(names, FuncName(f->name)) != names.end();
+}
+
 }  // namespace
+
+std::unordered_set<std::string> kept_names(const std::vector<FuncPtr>& unscheduled,
+                                           const AutoscheduleOptions& options,
+                                           autoschedule::Scheduling what) {
+  std::unordered_set<std::string> kept;
+  const std::vector<FuncPtr> order = topological_order(unscheduled);
+  const bool by_hand = what == autoschedule::Scheduling::Gradients &&
+                       std::ranges::any_of(order, [](const FuncPtr& f) {
+                         return !is_adjoint(f) && has_directives(*f);
+                       });
+  for (const FuncPtr& f : order) {
+    if (graph::has_directives(*f) || (by_hand && !is_adjoint(f))) kept.insert(f->name);
+  }
+  for (const FuncName& f : options.inlined) kept.insert(f.name);
+  return kept;
+}
 
 std::vector<FuncPtr> PlanSearch::emitted(const FoundPlan& found) const {
   return planning::emit_changes(found.plan, rules);
@@ -95,17 +101,30 @@ PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
   const planning::Context context{accesses, sizes, machine, dependences};
   planning::SearchOptions beam;
   beam.width = search.width;
-  beam.most_bytes = cost.price(result.rules).peak_bytes + static_cast<double>(search.spare_bytes);
-  beam.kept = kept_funcs(result.rules, unscheduled, options, search.what);
+  beam.most_bytes = static_cast<double>(search.spare_bytes);
+  beam.kept = kept_funcs(result.rules, kept_names(unscheduled, options, search.what));
+  for (size_t i = 0; i < beam.kept.size(); ++i)
+    beam.at_root.push_back(!beam.kept[i] &&
+                           is_among(result.rules.program->funcs[i], options.store));
+  beam.without = search.without;
   for (const Decision decision : options.without) {
     for (const char* move : moves_of(decision)) beam.without.insert(move);
   }
-  result.result = planning::search(result.rules, context, cost, beam);
-  // The second start is known to be slow, so small gains count, too.
+  if (search.start != SearchStart::Nothing) {
+    result.result.start = {result.rules, cost.price(result.rules), {}};
+    beam.most_bytes += result.result.start.cost.peak_bytes;
+  }
+  if (search.start == SearchStart::Both)
+    result.result = planning::search(result.rules, context, cost, beam);
+  // The other start is known to be slow, so small gains count, too.
   beam.least_gain = least_gain_from_nothing;
   beam.least_gain_of_all = least_gain_of_all_from_nothing;
   const Plan nothing = planning::plan_from_nothing(result.rules, beam.kept, context);
   planning::SearchResult other = planning::search(nothing, context, cost, beam);
+  if (search.start == SearchStart::Nothing) {
+    result.result = std::move(other);
+    return result;
+  }
   std::erase_if(other.found, [&](const FoundPlan& found) { return found.plan == nothing; });
   planning::merge(result.result, std::move(other));
   return result;

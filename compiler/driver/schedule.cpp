@@ -15,8 +15,6 @@
 #include "graph/directives/give_directive.h"
 #include "graph/directives/schedule_log.h"
 #include "graph/directives/wrappers.h"
-#include "lower/lower.h"
-#include "tuning/predict.h"
 
 namespace retrograde::driver {
 
@@ -31,15 +29,14 @@ bool is_scheduled(const std::vector<FuncPtr>& outputs) {
                              [](const FuncPtr& f) { return has_directives(*f); });
 }
 
-// `searches`: by `cost`.
 ChosenSchedule schedule_graph(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
-                              const Target& target, bool wants_runner_up) {
-  const bool searches = request.options.search || wants_runner_up;
+                              const Lowering& lowering, Choosing choosing) {
+  const bool wants_report = request.options.search || choosing == Choosing::SearchWithReport;
   const std::vector<FuncPtr> wrapped = apply_wrappers(outputs);
   ChosenSchedule result;
   if (!autoschedule::is_differentiated(wrapped)) {
     result.graph.outputs = autoschedule::with_large_funcs_at_root(wrapped, request);
-    if (searches) {
+    if (wants_report) {
       result.search.note = note_against_search(wrapped, "compiling searches schedules of gradients",
                                                "none of its Funcs is one",
                                                "Call auto_schedule() with these options");
@@ -47,22 +44,26 @@ ChosenSchedule schedule_graph(const std::vector<FuncPtr>& outputs, const Schedul
     return result;
   }
   result.graph.outputs = autoschedule::with_graph_rewrites(wrapped, /*on_gpu=*/false);
-  if (!searches && is_scheduled(result.graph.outputs)) return result;
-  return choose_schedule(result.graph.outputs, request, Scheduling::Gradients, target,
-                         wants_runner_up);
+  if (!wants_report && is_scheduled(result.graph.outputs)) return result;
+  return choose_schedule(result.graph.outputs, request, Scheduling::Gradients, lowering, choosing);
 }
 
 }  // namespace
 
-ChosenSchedule schedule(const PipelineSpec& pipeline, const Target& target, bool wants_runner_up) {
-  const ScheduleRequest request = autoschedule::request_for(target, pipeline.autoschedule);
+ChosenSchedule schedule(const PipelineSpec& pipeline, const Lowering& lowering, Choosing choosing) {
+  const ScheduleRequest request = autoschedule::request_for(lowering.target, pipeline.autoschedule);
   autoschedule::keep_graph(pipeline.name, pipeline.outputs);
   ChosenSchedule result;
   run_on_large_stack([&] {
     const graph::FirstReadsMemo memo;
-    result = schedule_graph(pipeline.outputs, request, target, wants_runner_up);
+    result = schedule_graph(pipeline.outputs, request, lowering, choosing);
   });
   return result;
+}
+
+ir::LoweredFunction schedule_and_lower(const PipelineSpec& pipeline, const Lowering& lowering) {
+  ChosenSchedule chosen = schedule(pipeline, lowering);
+  return chosen.lowered ? std::move(*chosen.lowered) : lowering.lower(chosen.graph.outputs);
 }
 
 std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
@@ -73,7 +74,7 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
   std::vector<FuncPtr> result;
   run_on_large_stack([&] {
     const graph::FirstReadsMemo memo;
-    result = schedule_graph(outputs, request, Target(), /*wants_runner_up=*/false).graph.outputs;
+    result = schedule_graph(outputs, request, Lowering(), Choosing::Rules).graph.outputs;
   });
   return result;
 }
@@ -91,16 +92,6 @@ Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target) {
   copy.set_autoschedule(spec.autoschedule);
   if (schedules) copy.auto_schedule(target);
   return copy;
-}
-
-double predicted_seconds(const std::vector<FuncPtr>& scheduled, const Target& target, int threads) {
-  lower::LowerOptions lowering;
-  lowering.target = target;
-  const ir::LoweredFunction function =
-      lower::lower("searched", scheduled, lower::infer_arguments(scheduled), lowering);
-  return tuning::predicted_seconds(
-      function, tuning::program_sizes(function, tuning::output_shapes(scheduled)),
-      planning::machine_for(target), threads);
 }
 
 }  // namespace retrograde::driver

@@ -16,12 +16,13 @@
 namespace retrograde::driver {
 
 // The graph that is lowered: the pipeline's outputs with their wrappers applied or, if there are adjoints or Funcs whose
-// inlining would explode code size, those of a copy that has its schedule. `wants_runner_up`: searches without being
-// asked to take the best schedule found, too.
-ChosenSchedule schedule(const PipelineSpec& pipeline, const Target& target,
-                        bool wants_runner_up = false);
+// inlining would explode code size, those of a copy that has its schedule.
+ChosenSchedule schedule(const PipelineSpec& pipeline, const Lowering& lowering,
+                        Choosing choosing = Choosing::Search);
+// The same, lowered.
+ir::LoweredFunction schedule_and_lower(const PipelineSpec& pipeline, const Lowering& lowering);
 
-// The same without a search.
+// The schedule of the rules alone, without a search.
 std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
                                           const planning::Machine& machine = {},
                                           const AutoscheduleOptions& options = {});
@@ -30,9 +31,5 @@ std::vector<FuncPtr> schedule_unscheduled(const std::vector<FuncPtr>& outputs,
 // values of coarse grids are Funcs of their own, and sums leave out zeros between elements. If the user gave directives
 // and the target has no GPU, the copy keeps those instead.
 Pipeline scheduled_copy(const Pipeline& pipeline, const Target& target);
-
-// Predicted run time of a scheduled graph. Sizes are the estimates; 0 threads means those of the machine. Throws what
-// lowering throws.
-double predicted_seconds(const std::vector<FuncPtr>& scheduled, const Target& target, int threads);
 
 }  // namespace retrograde::driver

@@ -22,6 +22,7 @@ class Copier : public Rewriter {
   Expr rewrite(const Expr& e) override {
     const Expr mapped = children(e);
     const Call* call = mapped.as<Call>();
+    if (call && is_weak_read(*call)) return owning_read(*call, call->args);
     if (!call || call->call_type != CallType::Func) return mapped;
     const FuncPtr& callee = copies_.of.at(static_cast<const FuncContents*>(call->symbol.raw()));
     const SymbolRef symbol = call->symbol.is_weak() ? SymbolRef::weak(callee) : SymbolRef(callee);
@@ -44,6 +45,14 @@ class Copier : public Rewriter {
 };
 
 }  // namespace
+
+bool is_weak_read(const Call& call) {
+  return call.call_type == CallType::Image && call.symbol.is_weak();
+}
+
+Expr owning_read(const Call& call, std::vector<Expr> args) {
+  return call_image(call.name, call.type, std::move(args), SymbolRef(call.symbol.lock()));
+}
 
 void redirect_prefetches(FuncContents& f, const FuncCopies& copies) {
   for (int s = 0; s < f.stage_count(); ++s) {

@@ -21,6 +21,11 @@ struct GraphCopy {
 // first.
 GraphCopy copy_graph(const std::vector<FuncPtr>& outputs);
 
+// Whether the call is the one by which the Func that an image converts to refers to the image: weakly, since the image owns
+// that Func. A copy of the Func has to keep the image, with the second function.
+bool is_weak_read(const Call& call);
+Expr owning_read(const Call& call, std::vector<Expr> args);
+
 // Redirects prefetches in `f` from copied Funcs to their copies.
 void redirect_prefetches(FuncContents& f, const FuncCopies& copies);
 

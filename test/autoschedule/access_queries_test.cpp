@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "autodiff/derivative.h"
 #include "autoschedule/access/compose.h"
 #include "autoschedule/access/cover.h"
 #include "autoschedule/access/lane_form.h"
@@ -68,6 +69,19 @@ TEST(SizeModel, PrefersBoundsToEstimatesToRegionsToTheDefault) {
   EXPECT_EQ(known.sizes.of(known.id(unknown), 0).estimate, defaults.extent);
 }
 
+// The gradient of a stencil needs more of an adjoint than the estimate of its primal says.
+TEST(SizeModel, EstimatesAreNoLimitsToWhatReadsNeed) {
+  Func read("read"), clamped("clamped"), out("out");
+  read(x) = x;
+  clamped(x) = x;
+  for (Func* f : {&read, &clamped}) f->set_estimate(x, 0, 128);
+  out(x) = read(x - 2) + read(x) + clamped(clamp(x, -8, 200));
+  out.set_estimate(x, 0, 130);
+  const Known known(out);
+  EXPECT_EQ(known.sizes.of(known.id(read), 0).estimate, 132);
+  EXPECT_EQ(known.sizes.of(known.id(clamped), 0).estimate, 128);
+}
+
 TEST(SizeModel, KnowsShapesOfImages) {
   ImageParam image(Float(32), 1, "image");
   Buffer<float> values(40);
@@ -94,6 +108,24 @@ TEST(SizeModel, ReadsAllInsideOfAMirrorOnceARegionGoesBeyondIt) {
   const Access &at_edge = known.read(edge, 0, 0), &in_mirror = known.read(mirrored, 0, 0);
   EXPECT_EQ(known.sizes.range(at_edge.index[0], at_edge.by), (ir::ConstantRange{30, 39}));
   EXPECT_EQ(known.sizes.range(in_mirror.index[0], in_mirror.by), (ir::ConstantRange{0, 39}));
+}
+
+// The gradient by weights whose number nothing says but the sum that reads them.
+TEST(SizeModel, MakesAnAdjointAsLargeAsItsFunc) {
+  ImageParam values(Float(32), 1, "values"), image(Float(32), 1, "image");
+  Func weights("weights"), loss("loss");
+  const RDom r(0, 7);
+  weights(x) = image(x);
+  loss() = 0.0f;
+  loss() += weights(r) * values(r);
+  const Func adjoint = propagate_adjoints(loss)(weights);
+  adjoint.function()->schedule.estimates.clear();
+  const AccessGraph graph({loss.function(), adjoint.function()});
+  const SizeModel sizes(graph, defaults);
+  const planning::Extent extent = sizes.of(graph.find(adjoint.function().get()), 0);
+  EXPECT_EQ(extent.estimate, 7);
+  EXPECT_EQ(extent.source, SizeSource::Region);
+  EXPECT_FALSE(extent.is_constant());
 }
 
 using Extents = std::vector<int64_t>;

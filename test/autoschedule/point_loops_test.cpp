@@ -12,6 +12,7 @@
 #include "gradient/gradient_check.h"
 #include "graph/graph.h"
 #include "ir/build.h"
+#include "support/rules_schedule.h"
 #include "support/schedule_log.h"
 
 namespace retrograde {
@@ -23,7 +24,7 @@ const Var j("j"), k("k"), i("i"), x("x"), y("y");
 constexpr int many = 150, bones = 7;
 
 Func scheduled(Func f) {
-  Pipeline(f).auto_schedule(get_host_target());
+  schedule_by_rules(f);
   return f;
 }
 
@@ -108,7 +109,7 @@ TEST(PointLoops, AreThoseOfAdjoints) {
       propagate_adjoints(s.moved, gradient::random_image({3, many}, -1, 1, 6))(s.points));
   pipeline.outputs()[0].bound(pipeline.outputs()[0].args()[0], 0, 3);
   pipeline.outputs()[0].bound(pipeline.outputs()[0].args()[1], 0, many);
-  pipeline.auto_schedule(get_host_target());
+  schedule_by_rules(pipeline);
   const Func gradient = pipeline.outputs()[0];
   const Var along = gradient.args()[1];
   for (int stage = 0; stage < gradient.function()->stage_count(); ++stage)
@@ -213,7 +214,7 @@ TEST(PointLoops, OfLongSumsAddAllElementsTogether) {
     return covariance;
   };
   Pipeline pipeline(program());
-  pipeline.auto_schedule(get_host_target());
+  schedule_by_rules(pipeline);
   if (get_host_target().has_feature(Target::AVX512)) {
     EXPECT_EQ(count_unrolled_loops(pipeline.schedule_log(), "covariance_intm", 1), 2)
         << pipeline.schedule_log().to_text();
@@ -233,7 +234,7 @@ TEST(PointLoops, OfSumsOverPointsGatherEachTermOnce) {
   Skinning s(3000);
   Pipeline pipeline(
       propagate_adjoints(s.moved, gradient::random_image({3, 3000}, -1, 1, 6))(s.matrices));
-  pipeline.auto_schedule(get_host_target());
+  schedule_by_rules(pipeline);
   const ScheduleLog log = pipeline.schedule_log();
   const auto has_side = [&](const std::string& loop, int size) {
     return any_directive<graph::SplitLoop>(log, [&](const auto& entry, const auto& split) {
@@ -248,7 +249,7 @@ TEST(PointLoops, OfSumsOverPointsGatherEachTermOnce) {
 TEST(PointLoops, AreInTheLog) {
   Skinning s, again;
   Pipeline pipeline(s.moved);
-  pipeline.auto_schedule(get_host_target());
+  schedule_by_rules(pipeline);
   Pipeline(again.moved).apply_schedule(pipeline.schedule_log());
   EXPECT_EQ(innermost_in_memory(again.blended), "i");
   EXPECT_TRUE(has_vectors_along(again.blended, 1, i));

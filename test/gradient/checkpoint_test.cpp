@@ -257,7 +257,9 @@ TEST(Checkpoints, MemoryGrowsWithTheStatesAndNotWithTheSteps) {
     return peak_memory(propagate_adjoints(weighted_sum(u, {100}), only), start);
   };
   int64_t state = 400;
-  EXPECT_GT(peak(500, {.overwritten = Overwritten::Store}), 500 * state);
+  const AdjointOptions stored{.overwritten = Overwritten::Store};
+  EXPECT_GT(peak(500, stored),
+            4 * peak(100, stored));  // a schedule may keep those of a part of the line
   int64_t ten = peak(500, {.checkpoint_states = 10});
   EXPECT_LT(ten, 20 * state);
   EXPECT_EQ(peak(1000, {.checkpoint_states = 10}), ten);

@@ -71,6 +71,7 @@ TEST_P(ScheduledGraph, KeepsLoweringAfterMoves) {
   const planning::SizeModel sizes(accesses, {planning::unknown_extent});
   planning::Dependences dependences(accesses);
   const planning::Machine machine;
+  planning::CostModel cost(accesses, sizes, machine);
   const auto moves = planning::all_moves();
   Choices choices(1);
   std::string trace = "\n" + to_text(plan);
@@ -85,6 +86,8 @@ TEST_P(ScheduledGraph, KeepsLoweringAfterMoves) {
     trace += retrograde::text("\n", move.name, " of ", plan.program->funcs[size_t(id)]->name, "\n",
                               to_text(plan));
     EXPECT_EQ(broken_invariant(plan), "") << trace;
+    for (const planning::Plan& other : plans)
+      EXPECT_EQ(price_difference(cost, other, {accesses, sizes, machine, dependences}), "");
     EXPECT_EQ(lowering_error(plan), "") << trace;
   }
 }

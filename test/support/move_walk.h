@@ -2,9 +2,11 @@
 // of the last one computes what the interpreter does.
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
+#include "autoschedule/cost/cost.h"
 #include "autoschedule/default_schedule.h"
 #include "autoschedule/moves/move.h"
 #include "driver/schedule.h"
@@ -16,9 +18,33 @@
 
 namespace retrograde::fuzz {
 
+// How the price of a plan, after those of other plans, differs from that of a model that remembers nothing; empty: in no
+// bit.
+inline std::string price_difference(planning::CostModel& model, const planning::Plan& plan,
+                                    const planning::Context& context) {
+  planning::CostModel fresh(context.accesses, context.sizes, context.machine);
+  const planning::Totals totals = model.totals(plan);
+  const planning::Cost cost = model.price(plan), expected = fresh.price(plan);
+  const auto is_equal = [](const planning::StageCost& a, const planning::StageCost& b) {
+    return a.stage == b.stage && a.seconds == b.seconds && a.bytes == b.bytes;
+  };
+  const bool are_equal = totals.seconds == expected.seconds &&
+                         totals.peak_bytes == expected.peak_bytes &&
+                         std::ranges::equal(cost.stages, expected.stages, is_equal);
+  return are_equal ? ""
+                   : retrograde::text("a new model gives another price:\n", to_text(cost, plan),
+                                      to_text(expected, plan), to_text(plan));
+}
+
+struct WalkOptions {
+  int most_steps = 8;
+  std::string preferred;  // a move that is taken more often than others
+};
+
 class MoveWalk {
  public:
-  explicit MoveWalk(Choices& choices) : c_(choices), program_(made(choices)) {
+  explicit MoveWalk(Choices& choices, WalkOptions options = {})
+      : c_(choices), options_(std::move(options)), program_(made(choices)) {
     default_extent_ = c_.pick<int64_t>({7, 40, 1000});
     if (c_.chance(50)) machine_.levels[0].bytes = 1 << 10;
     if (c_.chance(50)) machine_.levels[1].bytes = 1 << 12;
@@ -31,8 +57,13 @@ class MoveWalk {
     const planning::SizeModel sizes(accesses, {default_extent_});
     planning::Dependences dependences(accesses);
     const planning::Context context{accesses, sizes, machine_, dependences};
+    planning::Machine small = machine_;  // caches that a few rows fill
+    for (size_t level = 0; level < 3; ++level)
+      small.levels[level].bytes = static_cast<double>(1 << (10 + 2 * level));
+    const planning::Context in_small{accesses, sizes, small, dependences};
+    planning::CostModel cost(accesses, sizes, machine_), small_cost(accesses, sizes, small);
     const auto funcs = static_cast<int>(plan_.funcs.size());
-    for (int step = c_.between(0, most_steps); step > 0 && broken_.empty(); --step) {
+    for (int step = c_.between(0, options_.most_steps); step > 0 && broken_.empty(); --step) {
       const auto id = static_cast<planning::FuncId>(c_.below(funcs));
       std::vector<Choice> possible;  // rare moves are as likely as others
       for (const planning::Move& move : planning::all_moves()) {
@@ -40,8 +71,15 @@ class MoveWalk {
         if (!choice.plans.empty()) possible.push_back(std::move(choice));
       }
       if (possible.empty()) continue;
-      const auto [move, plans] = c_.pick(possible);
-      for (const planning::Plan& after : plans) check(after, *move, id);
+      const auto preferred = std::ranges::find(possible, options_.preferred,
+                                               [](const Choice& c) { return c.move->name; });
+      const bool takes_preferred = preferred != possible.end() && c_.chance(50);
+      const auto [move, plans] = takes_preferred ? *preferred : c_.pick(possible);
+      for (const planning::Plan& after : plans) {
+        check(after, *move, id);
+        if (broken_.empty()) broken_ = price_difference(cost, after, context);
+        if (broken_.empty()) broken_ = price_difference(small_cost, after, in_small);
+      }
       if (!broken_.empty()) break;
       plan_ = c_.pick(plans);
       keeps_bits_ = keeps_bits_ && !move->changes_bits;
@@ -70,8 +108,8 @@ class MoveWalk {
     const planning::Move* move;
     std::vector<planning::Plan> plans;
   };
-  static constexpr int most_steps = 8;
   Choices& c_;
+  const WalkOptions options_;
   const RandomProgram program_;
   std::vector<graph::FuncPtr> unscheduled_;
   int64_t default_extent_ = 0;

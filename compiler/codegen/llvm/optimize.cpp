@@ -17,6 +17,7 @@
 //                  or four, unless short iterations wait for a sum of floats
 //   SROA, EarlyCSE allocations whose indices only such a loop hid; repeated loads in its copies
 //   InstCombine, SimplifyCFG, ADCE to clean up
+//   HoldRowStarts  the first addresses of many rows stay in registers
 //   cut_long_blocks and FenceLongBlocks, so that LLVM's code generator takes linear time
 //
 // Left out: loop and SLP vectorization, inlining, and loop idioms (a memset call is slower on the short rows that
@@ -191,6 +192,7 @@ static llvm::FunctionPassManager pipeline() {
   passes.addPass(llvm::InstCombinePass());
   passes.addPass(llvm::SimplifyCFGPass());
   passes.addPass(llvm::ADCEPass());
+  passes.addPass(HoldRowStarts());
   return passes;
 }
 

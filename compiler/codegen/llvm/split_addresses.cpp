@@ -7,9 +7,8 @@
 #include <llvm/IR/Module.h>
 #include <llvm/Transforms/Utils/Local.h>
 
-#include <algorithm>
-#include <set>
-#include <utility>
+#include <map>
+#include <tuple>
 #include <vector>
 
 namespace retrograde::codegen {
@@ -22,8 +21,6 @@ struct Term {
 
 // Indices have one or two terms per dimension. Everything beyond this count is one term.
 constexpr size_t most_terms = 24;
-// Registers that hold starts of addresses. Counters and bounds take the others.
-constexpr size_t most_starts = 12;
 
 // An index as a sum of terms, split by whether the loop changes them.
 struct Sum {
@@ -93,17 +90,16 @@ Address parts_of(const llvm::GetElementPtrInst& access, const llvm::Loop& loop) 
   return address;
 }
 
-using Addresses = std::vector<llvm::GetElementPtrInst*>;
-
 // Finds addresses in the loop whose index sums loop-invariant terms and terms that the loop changes.
-Addresses find_sums(const llvm::Loop& loop) {
-  Addresses found;
+std::vector<llvm::GetElementPtrInst*> find_sums(const llvm::Loop& loop) {
+  std::vector<llvm::GetElementPtrInst*> found;
   for (llvm::BasicBlock* block : loop.blocks()) {
     for (llvm::Instruction& one : *block) {
       auto* access = llvm::dyn_cast<llvm::GetElementPtrInst>(&one);
       if (!access || access->getNumIndices() != 1 || !access->getType()->isPointerTy()) continue;
       if (!loop.isLoopInvariant(access->getOperand(0))) continue;
-      if (!access->getOperand(1)->getType()->isIntegerTy(64)) continue;
+      llvm::Value* index = access->getOperand(1);
+      if (!index->getType()->isIntegerTy(64)) continue;
       const Sum sum = parts_of(*access, loop).index;
       if (!sum.fixed.empty() && !sum.changing.empty()) found.push_back(access);
     }
@@ -111,43 +107,88 @@ Addresses find_sums(const llvm::Loop& loop) {
   return found;
 }
 
-// The loop-invariant parts of all addresses, each once.
-size_t count_starts(const Addresses& addresses, const llvm::Loop& loop) {
-  std::set<std::vector<std::pair<llvm::Value*, bool>>> starts;
-  for (const llvm::GetElementPtrInst* access : addresses) {
-    const Address address = parts_of(*access, loop);
-    std::vector<std::pair<llvm::Value*, bool>> start{{address.start, false}};
-    for (const Term& term : address.index.fixed) start.emplace_back(term.value, term.is_negative);
-    std::sort(start.begin() + 1, start.end());
-    starts.insert(std::move(start));
-  }
-  return starts.size();
-}
-
-// LLVM's strength reduction knows how to step through memory, but it may compute long sums in each iteration rather than
-// keep their invariant parts. So addresses with a constant step are split, too, if there are registers for all starts.
-Addresses find_split(const llvm::Loop& loop, llvm::ScalarEvolution& evolution) {
-  Addresses found = find_sums(loop);
-  if (count_starts(found, loop) > most_starts) {
-    llvm::erase_if(found, [&](llvm::GetElementPtrInst* access) {
-      return llvm::isa<llvm::SCEVAddRecExpr>(evolution.getSCEV(access->getOperand(1)));
-    });
-  }
-  return found;
-}
-
-void split(llvm::GetElementPtrInst& access, const llvm::Loop& loop) {
+// `held`: the start, if it is one that nobody takes apart; null if that is to be made.
+void split(llvm::GetElementPtrInst& access, const llvm::Loop& loop, llvm::Value** held = nullptr) {
   const Address address = parts_of(access, loop);
   llvm::Type* element = access.getSourceElementType();
   llvm::IRBuilder<> before(loop.getLoopPreheader()->getTerminator()), here(&access);
-  llvm::Value* start = before.CreateGEP(element, address.start, total(before, address.index.fixed));
+  llvm::Value* start = held ? *held : nullptr;
+  if (!start) start = before.CreateGEP(element, address.start, total(before, address.index.fixed));
+  if (held && !*held) *held = start = before.CreateFreeze(start);
   llvm::Value* rest =
       here.CreateAdd(total(here, address.index.changing), here.getInt64(address.index.constant));
   access.replaceAllUsesWith(here.CreateGEP(element, start, rest));
   llvm::RecursivelyDeleteTriviallyDeadInstructions(&access);
 }
 
+// Replaces addresses by equal ones that were computed before in their block. Copies of an unrolled body may add the same
+// terms in another order.
+bool share_equal(const llvm::Loop& loop, llvm::ScalarEvolution& evolution) {
+  bool changed = false;
+  for (llvm::BasicBlock* block : loop.blocks()) {
+    std::map<std::tuple<llvm::Value*, llvm::Type*, const llvm::SCEV*>, llvm::Value*> known;
+    for (llvm::Instruction& one : *block) {
+      auto* access = llvm::dyn_cast<llvm::GetElementPtrInst>(&one);
+      if (!access || access->getNumIndices() != 1 || !access->getType()->isPointerTy()) continue;
+      const auto [first, is_new] =
+          known.try_emplace({access->getOperand(0), access->getSourceElementType(),
+                             evolution.getSCEV(access->getOperand(1))},
+                            access);
+      if (is_new) continue;
+      access->replaceAllUsesWith(first->second);
+      changed = true;
+    }
+  }
+  return changed;
+}
+
+// ---- rows ----
+
+// Pointers that all fit in registers, with counters and the start of the stack.
+constexpr size_t most_starts = 12;
+// LLVM's code generator finds the addresses of fewer rows by itself.
+constexpr size_t least_starts = 6;
+
+struct Start {
+  llvm::Value* pointer;
+  const llvm::SCEV* offset;
+  auto operator<=>(const Start&) const = default;
+};
+
+Start start_of(const Address& address, llvm::ScalarEvolution& evolution) {
+  const llvm::SCEV* sum = evolution.getZero(llvm::Type::getInt64Ty(evolution.getContext()));
+  for (const Term& term : address.index.fixed) {
+    const llvm::SCEV* value = evolution.getSCEV(term.value);
+    sum = term.is_negative ? evolution.getMinusSCEV(sum, value) : evolution.getAddExpr(sum, value);
+  }
+  return {address.start, sum};
+}
+
+// Gives each row that the loop walks along a pointer to its start that the code generator does not take apart.
+bool hold_starts(const llvm::Loop& loop, llvm::ScalarEvolution& evolution) {
+  std::map<Start, llvm::Value*> starts;
+  std::vector<std::pair<llvm::GetElementPtrInst*, Start>> accesses;
+  for (llvm::GetElementPtrInst* access : find_sums(loop)) {
+    if (!llvm::isa<llvm::SCEVAddRecExpr>(evolution.getSCEV(access->getOperand(1)))) continue;
+    accesses.emplace_back(access, start_of(parts_of(*access, loop), evolution));
+    starts[accesses.back().second] = nullptr;
+  }
+  if (starts.size() < least_starts || starts.size() > most_starts) return false;
+  for (const auto& [access, start] : accesses) split(*access, loop, &starts[start]);
+  return true;
+}
+
 }  // namespace
+
+llvm::PreservedAnalyses HoldRowStarts::run(llvm::Function& function,
+                                           llvm::FunctionAnalysisManager& analyses) {
+  auto& evolution = analyses.getResult<llvm::ScalarEvolutionAnalysis>(function);
+  bool changed = false;
+  for (llvm::Loop* loop : analyses.getResult<llvm::LoopAnalysis>(function).getLoopsInPreorder()) {
+    if (loop->isInnermost() && loop->getLoopPreheader()) changed |= hold_starts(*loop, evolution);
+  }
+  return changed ? llvm::PreservedAnalyses::none() : llvm::PreservedAnalyses::all();
+}
 
 llvm::PreservedAnalyses SplitAddresses::run(llvm::Function& function,
                                             llvm::FunctionAnalysisManager& analyses) {
@@ -155,7 +196,10 @@ llvm::PreservedAnalyses SplitAddresses::run(llvm::Function& function,
   bool changed = false;
   for (llvm::Loop* loop : analyses.getResult<llvm::LoopAnalysis>(function).getLoopsInPreorder()) {
     if (!loop->isInnermost() || !loop->getLoopPreheader()) continue;
-    for (llvm::GetElementPtrInst* address : find_split(*loop, evolution)) {
+    changed |= share_equal(*loop, evolution);
+    for (llvm::GetElementPtrInst* address : find_sums(*loop)) {
+      // The code generator splits sums that grow by a constant step.
+      if (llvm::isa<llvm::SCEVAddRecExpr>(evolution.getSCEV(address->getOperand(1)))) continue;
       split(*address, *loop);
       changed = true;
     }

@@ -1,6 +1,8 @@
 #include "graph/definitions/race_checks.h"
 
 #include <algorithm>
+#include <map>
+#include <optional>
 
 #include "analysis/interval.h"
 #include "analysis/never_meet.h"
@@ -25,6 +27,45 @@ MeetingPoints points_of(const Definition& update) {
   }
   if (update.predicate.defined()) points.conditions.push_back(update.predicate);
   return points;
+}
+
+// The loops over reduction variables, by name, as variables of `points` that have names of their own, since a loop may
+// be named after what it is a part of. nullopt: a split has no constant factor, or a loop is fused of several.
+std::optional<std::map<std::string, std::string>> add_loops(MeetingPoints& points,
+                                                            const std::vector<Split>& splits) {
+  struct Loop {
+    std::string variable;
+    Expr min;
+  };
+  std::map<std::string, Loop> loops;
+  for (const MeetingPoints::Variable& root : points.variables)
+    loops[root.name] = {root.name, root.min};
+  for (const Split& split : splits) {
+    if (split.kind == Split::Kind::Fuse) {
+      if (loops.contains(split.outer) || loops.contains(split.inner)) return std::nullopt;
+      continue;
+    }
+    const auto old = loops.extract(split.old_var);
+    if (!old) continue;
+    const Loop whole = old.mapped();
+    if (split.kind == Split::Kind::Rename) {
+      loops[split.outer] = whole;
+      continue;
+    }
+    const auto factor = as_const_int(split.factor);
+    if (!factor) return std::nullopt;
+    const Loop outer{whole.variable + "/", 0}, inner{whole.variable + "%", 0};
+    points.variables.push_back({outer.variable, {}, {}});
+    points.variables.push_back({inner.variable, 0, static_cast<int>(*factor - 1)});
+    points.conditions.push_back(variable(whole.variable) ==
+                                whole.min + variable(outer.variable) * static_cast<int>(*factor) +
+                                    variable(inner.variable));
+    loops[split.outer] = outer;
+    loops[split.inner] = inner;
+  }
+  std::map<std::string, std::string> names;
+  for (const auto& [name, loop] : loops) names[name] = loop.variable;
+  return names;
 }
 
 // Whether no iteration writes the element that this call reads.
@@ -161,10 +202,17 @@ bool can_prove_race_free(const FuncContents& f, const Definition& update, const 
 }
 
 bool can_prove_same_order(const FuncContents& f, const Definition& update,
-                          const std::vector<std::string>& before,
-                          const std::vector<std::string>& after) {
-  if (before == after) return true;
-  const MeetingPoints points = points_of(update);
+                          const std::vector<std::string>& loops_before,
+                          const std::vector<std::string>& loops_after,
+                          const std::vector<Split>& splits) {
+  if (loops_before == loops_after) return true;
+  MeetingPoints points = points_of(update);
+  const auto names = add_loops(points, splits);
+  const auto is_known = [&](const std::string& loop) { return names->contains(loop); };
+  if (!names || !std::ranges::all_of(loops_before, is_known)) return false;
+  const auto variable_of = [&](const std::string& loop) { return names->at(loop); };
+  const std::vector<std::string> before = mapped(loops_before, variable_of),
+                                 after = mapped(loops_after, variable_of);
   const Access write{update.args, {}}, change{update.args, changes_where(f, update)};
   const std::vector<Access> reads = OwnReads(f, update).find();
   const auto never_meet = [&](const PointOrder& order) {

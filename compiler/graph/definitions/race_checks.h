@@ -29,10 +29,11 @@ bool can_prove_race_free(const FuncContents& f, const Definition& update, const 
 
 // Whether loops over the reduction variables in the order `after`, instead of `before`, run every two
 // iterations that access one element in the same order, if one of them writes it. Both lists hold all
-// reduction variables, innermost first. False means unknown.
+// loops over reduction variables, innermost first: the variables, or what `splits` make of them. False means unknown.
 bool can_prove_same_order(const FuncContents& f, const Definition& update,
                           const std::vector<std::string>& before,
-                          const std::vector<std::string>& after);
+                          const std::vector<std::string>& after,
+                          const std::vector<Split>& splits = {});
 
 // Whether the order of `inner + slope * outer` is that of a loop over `inner` inside of one over `outer` for every two
 // iterations that access one element, if one of them writes it and both agree in the other variables. Iterations with

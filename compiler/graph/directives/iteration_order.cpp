@@ -1,5 +1,6 @@
 #include "graph/directives/iteration_order.h"
 
+#include <algorithm>
 #include <unordered_set>
 
 #include "diagnostics/error.h"
@@ -79,18 +80,12 @@ std::vector<std::string> reduction_loops(const std::vector<Dim>& dims) {
   return loops;
 }
 
-// Whether the reduction loops are the reduction variables themselves, in an order that keeps that of all
-// iterations that access one element.
-bool keeps_order_of_variables(const FuncContents& f, const Definition& definition,
-                              const std::vector<Dim>& before, const std::vector<Dim>& after) {
-  if (point_number(definition)) return false;
-  const std::vector<std::string> loops = reduction_loops(before);
-  const auto is_loop = [&](const ReductionVariable& r) {
-    return std::ranges::count(loops, r.var) == 1;
-  };
-  return loops.size() == definition.rvars.size() &&
-         std::ranges::all_of(definition.rvars, is_loop) &&
-         can_prove_same_order(f, definition, loops, reduction_loops(after));
+// Whether the order of reduction loops keeps that of all iterations that access one element.
+bool keeps_order_of_accesses(const FuncContents& f, const Definition& definition,
+                             const StageLoops& schedule, const std::vector<Dim>& after) {
+  return !point_number(definition) &&
+         can_prove_same_order(f, definition, reduction_loops(schedule.dims), reduction_loops(after),
+                              schedule.splits);
 }
 
 // An atomic update protects only the element that it writes; other iterations may write the others
@@ -184,7 +179,7 @@ void check_reduction_order(const SchedulePlace& at, const std::vector<Dim>& dims
   const std::vector<std::string> before = dependent_loops(f, definition, now, now.dims);
   const std::vector<std::string> after = dependent_loops(f, definition, now, dims);
   if (before == after || stores_one_value(f, definition) || can_prove_commutative(f, definition) ||
-      keeps_order_of_variables(f, definition, now.dims, dims))
+      keeps_order_of_accesses(f, definition, now, dims))
     return;
   size_t i = 0;
   while (i < before.size() && i < after.size() && before[i] == after[i]) i++;

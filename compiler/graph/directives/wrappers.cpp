@@ -104,6 +104,7 @@ class Wrapping {
       if (call->call_type == CallType::Func)
         target = static_cast<const FuncContents*>(call->symbol.raw());
       if (call->call_type == CallType::Image) target = reader_of_image(*call, f).get();
+      if (!target && is_weak_read(*call)) return owning_read(*call, call->args);
       if (!target) return mapped;
       const FuncPtr callee = read_by(target, f);
       const bool self = target == &f;

@@ -83,7 +83,8 @@ Expr Binder::bound(const Call& call, const Expr& e) const {
     const auto found = names_.funcs.find(call.name);
     if (found == names_.funcs.end()) unknown("Func", call.name);
     const FuncPtr& callee = found->second;
-    const SymbolRef symbol = owns_me(*callee) ? SymbolRef::weak(callee) : SymbolRef(callee);
+    const SymbolRef symbol =
+        owns_me(*callee) ? SymbolRef::weak(callee->shared_from_this()) : SymbolRef(callee);
     return call_func(call.name, call.type, call.args, call.component, symbol);
   }
   if (call.call_type != CallType::Image) return e;

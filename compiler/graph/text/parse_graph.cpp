@@ -3,6 +3,7 @@
 #include "diagnostics/error.h"
 #include "graph/definitions/define.h"
 #include "graph/directives/directive_text.h"
+#include "graph/directives/wrappers.h"
 #include "graph/graph.h"
 #include "graph/text/definition_reader.h"
 #include "graph/text/func_lines.h"
@@ -108,7 +109,9 @@ class GraphReader {
     size_t owner = 0, reader = 0;
     for (const Line& line : pending_) {
       if (line.word == "reader") {
-        readers_[reader++]->func = declared_.func(line, line.rest);
+        const ParameterPtr& image = readers_[reader++];
+        image->func = declared_.func(line, line.rest);
+        declared_.names.funcs[image->func->name] = func_of_image(image);  // it owns the image
         continue;
       }
       const size_t space = line.rest.find(' ');

@@ -337,6 +337,25 @@ TEST_F(CostProbes, ABorderIsABlock) {
   EXPECT_NEAR(loops / vectors, 1, 0.05);
 }
 
+// Two of four blocks are at the ends of a row. There, a clamp cuts the box, and the copies of the tile run behind
+// conditions, which doubles their time.
+TEST_F(CostProbes, TilesThatABorderCutsTakeTwiceAsLong) {
+  const auto seconds_of = [&](int end) {
+    RDom r(0, 64, "r");
+    Func sum("sum"), all("all");
+    sum(x, y) += in(x, r) * other(r, y);
+    all(x, y) = sum(min(x, end), y);
+    all.bound(x, 0, 4096).set_estimate(y, 0, 2048);
+    const Cost cost = priced(all,
+                             "all  root  y, x:1024, x:16, vector x\n"
+                             "sum  at all/x:1024\n"
+                             "  .0  y, x:16, vector x\n"
+                             "  .1  y, x:64, r.x, unroll x:16, vector x\n");
+    return cost.stages[1].compute_seconds;
+  };
+  EXPECT_NEAR(seconds_of(4094) / seconds_of(4095), 1.5, 0.05);
+}
+
 // A transposed convolution of stride 2: the lanes of a phase of x share a weight, and load neighbours. Without phases, each
 // copy of a tile mixes the products of its even and odd lanes.
 TEST_F(CostProbes, PhasesSpareInterleavedProducts) {
@@ -410,6 +429,41 @@ TEST_F(CostProbes, UnrolledCopiesShareAFunctionUnlessItIsInAnArm) {
   // The select chooses between values of a function that both of its arms use.
   const Expr both = exp(in(x, 0));
   EXPECT_NEAR(seconds(select(in(x, 0) > 0, both * 2.f, both)), shared, vectors * 0.4e-9);
+}
+
+// Copies for each component store three vectors, load two and add once.
+TEST_F(CostProbes, CopiesKnowTheArmOfASelect) {
+  Func f("f");
+  const Expr both = in(x, y) + other(x, y);
+  f(x, y, c) = select(c == 0, in(x, y), c == 1, other(x, y), both);
+  f.set_estimate(x, 0, 4096).set_estimate(y, 0, 2048).bound(c, 0, 3);
+  const double vectors = columns * rows / 16;
+  const double ns = 1e9 * compute_seconds(priced(f, "f  root  y, x:16, unroll c, vector x\n"));
+  EXPECT_NEAR(ns / vectors, 3 * 0.35 + 0.25 * (2 * 0.2 + 0.2 + 0.3), 0.02);
+}
+
+TEST_F(CostProbes, AParallelIterationBeginsWithACall) {
+  out(x, y) = in(x, y);
+  const auto seconds = [&](const std::string& loops) {
+    return compute_seconds(cost_of("out  root  parallel y, " + loops + ", vector x\n"));
+  };
+  const double calls = columns * rows / 16;
+  EXPECT_NEAR(seconds("parallel x:16") - seconds("x:16"), calls / 2 * task_ns * 1e-9, 40 * micro);
+}
+
+// A vector has 40 gathers, each of 16 lanes of three instructions, which take 14 KB. Two copies fit into 32 KB.
+TEST_F(CostProbes, BodiesBeyondTheCacheOfInstructionsAreFetched) {
+  ImageParam places(Int(32), 2, "places"), table(Float(32), 1, "table");
+  table.dim(0).set_estimate(0, 1024);
+  Expr sum = 0.f;
+  for (int i = 0; i < 40; ++i) sum += table(clamp(places(x, y), 0, 900) + i);
+  out(x, y) = sum;
+  const auto vector_ns = [&](const std::string& copies) {
+    const std::string loops = "y:" + copies + ", x:16, unroll y, vector x\n";
+    return 1e9 * compute_seconds(cost_of("out  root  " + loops)) / (columns * rows / 16);
+  };
+  EXPECT_GT(vector_ns("2"), 40 * 16 * 0.35);
+  EXPECT_NEAR(vector_ns("4") - vector_ns("2"), 0.25 * 40 * 48 * 7 / 64, 2);
 }
 
 // Rows of 16 KB: lowering keeps four of a window over three rows, whatever the height of the strip.
@@ -560,12 +614,14 @@ TEST_F(CostProbes, LanesOfASumAreCombinedOnce) {
   EXPECT_NEAR(update(4096).compute_seconds, rows * 256 * 1.3e-9, 1.5 * ends) << "hidden";
 }
 
-TEST_F(CostProbes, ARecurrenceAlongALineWaitsForMemory) {
+// A single one does through memory; of several, each carries its last element in a register.
+TEST_F(CostProbes, ARecurrenceAlongALineWaitsForItself) {
   RDom r(1, 4095, "r");
   out(x, y) = 0.0f;
   out(r, y) = 0.5f * out(r - 1, y) + in(r, y);
   const auto update = [&](const std::string& loops) { return update_cost(loops).compute_seconds; };
   EXPECT_NEAR(update("y, r.x"), 4095 * rows * 2.5e-9, 100 * micro);
+  EXPECT_NEAR(update("y:2, r.x, unroll y"), 4095 * rows / 2 * 1.3e-9, 100 * micro);
   EXPECT_LT(update("y:16, r.x, unroll y"), 4095 * rows * 1.5e-9);
   EXPECT_LT(update("y:4, r.x, vector y"), 4095 * rows * 1.2e-9);
   EXPECT_NEAR(update("y:16, r.x, vector y"), 4095 * rows * 2.5e-9, 100 * micro)
@@ -583,6 +639,19 @@ TEST_F(CostProbes, ATableIsReadALineAnElement) {
   const Cost cost = cost_of("out  root  y, x:16, vector x\n");
   EXPECT_GT(memory_bytes(cost), 4.0 * (1 << 26));
   EXPECT_GT(cost.stages[0].compute_seconds, columns * rows * 0.35e-9);
+}
+
+// A table of 4 MB, of which L2 holds a fifth.
+TEST_F(CostProbes, EachLookUpInALargeTableIsALine) {
+  ImageParam places(Int(32), 2, "places"), table(Float(32), 1, "table");
+  places.dim(0).set_estimate(0, 4096);
+  places.dim(1).set_estimate(0, 2048);
+  table.dim(0).set_estimate(0, 1 << 20);
+  out(x, y) = table(clamp(places(x, y), 0, (1 << 20) - 1));
+  for (const char* loops : {"y, x:16, vector x", "y:16, y, x:16, vector x"}) {
+    const StageCost cost = cost_of("out  root  " + std::string(loops) + "\n").stages[0];
+    EXPECT_NEAR(cost.bytes[2] / (columns * rows), 0.8 * 64, 2) << loops;
+  }
 }
 
 // The lanes of such a vector are a period of the index, or all of them are in one.

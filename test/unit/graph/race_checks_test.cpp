@@ -63,6 +63,31 @@ TEST_F(RaceChecks, StencilsOfTheStepBefore) {
   EXPECT_FALSE(keeps_order({2, 0, 1}));
 }
 
+// Loops over strips of four rows and over the rows of a strip, which keeps the name.
+TEST_F(RaceChecks, StepsOfALoop) {
+  define({r.x, r.y, r.z}, u(r.x - 1, r.y - 1, r.z));
+  const std::string x = name(0), y = name(1), z = name(2);
+  const std::vector<Split> strips{{Split::Kind::Split, y, "strips", y, 4}};
+  const auto keeps = [&](const Names& after) {
+    return can_prove_same_order(*u.function(), update(), {x, y, "strips", z}, after, strips);
+  };
+  EXPECT_TRUE(keeps({y, x, "strips", z}));
+  EXPECT_TRUE(keeps({y, "strips", x, z}));
+  EXPECT_FALSE(keeps({x, "strips", y, z})) << "row 4 would run before row 3";
+}
+
+TEST_F(RaceChecks, StepsOfALoopOverRowsThatLieAStepApart) {
+  define({r.x, r.y, r.z}, u(r.x + 1, r.y - 4, r.z));
+  const std::string x = name(0), y = name(1), z = name(2);
+  const std::vector<Split> strips{{Split::Kind::Split, y, "strips", y, 4}};
+  const auto keeps = [&](const Names& after) {
+    return can_prove_same_order(*u.function(), update(), {x, y, "strips", z}, after, strips);
+  };
+  EXPECT_TRUE(keeps({x, "strips", y, z}));
+  EXPECT_TRUE(keeps({y, x, "strips", z}));
+  EXPECT_FALSE(keeps({y, "strips", x, z})) << "column x + 1 runs later";
+}
+
 TEST_F(RaceChecks, TwoStepsBack) {
   define({r.x, r.y, r.z},
          2 * u(r.x, r.y, r.z - 1) - u(r.x, r.y, r.z - 2) + u(r.x + 1, r.y, r.z - 1));

@@ -4,7 +4,11 @@
 #include <retrograde/retrograde.h>
 #include <algorithm>
 
+#include "graph/copy_graph.h"
+#include "graph/definitions/define.h"
 #include "graph/directives/wrappers.h"
+#include "graph/graph.h"
+#include "ir/visit.h"
 #include "support/errors.h"
 
 namespace retrograde {
@@ -23,6 +27,35 @@ std::vector<std::string> read_by(const Func& output, const std::string& reader) 
 }
 
 using Names = std::vector<std::string>;
+
+// Whether the images are there that the Funcs of the graph read.
+bool has_all_images(const std::vector<graph::FuncPtr>& outputs) {
+  bool has_all = true;
+  for (const graph::FuncPtr& f : graph::topological_order(outputs)) {
+    graph::walk(*f, [&](const ir::Call& call) {
+      if (call.call_type == ir::CallType::Image) has_all &= call.symbol.lock() != nullptr;
+    });
+  }
+  return has_all;
+}
+
+// An image owns the Func that it converts to, which others read.
+TEST(FuncsOfImages, KeepTheImageInCopiesAndParsedGraphs) {
+  std::vector<graph::FuncPtr> copied, wrapped, parsed;
+  {
+    ImageParam image(Float(32), 1, "converted");
+    Var x("x");
+    Func reader = image, f("f");
+    f(x) = reader(x) + 1;
+    copied = graph::copy_graph({f.function()}).outputs;
+    parsed = graph::parse_graph(graph::to_text(graph::graph_of({f.function()}))).outputs;
+    reader.compute_root();
+    wrapped = graph::apply_wrappers({f.function()});
+  }
+  EXPECT_TRUE(has_all_images(copied));
+  EXPECT_TRUE(has_all_images(parsed));
+  EXPECT_TRUE(has_all_images(wrapped));
+}
 
 struct Wrappers : testing::Test {
   Func f, g, h;

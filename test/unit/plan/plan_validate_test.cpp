@@ -145,6 +145,40 @@ TEST_F(PlanInvariants, P5DependencesAreKept) {
   EXPECT_EQ(broken("sum  root\n  .1  atomic  y, x, r.y, vector r.x\n"), "");
 }
 
+TEST_F(PlanInvariants, P7StagesThatShareLoopsCanRunTogether) {
+  Func a("a"), b("b"), after_a("after_a"), after_b("after_b"), last("last");
+  for (Func* f : {&a, &b}) {
+    (*f)(x, y) = 0;
+    (*f)(x, y) += x + r.x;
+  }
+  after_a(x, y) = a(x, y);
+  after_b(x, y) = b(x, y);
+  last(x, y) = after_a(x, y) + after_b(x, y);
+  program = make_program(functions({last}));
+  const std::string with_b = "a  root\n  .1  shared with b.1/y  ", sums = "r.x, r.y\nb  root\n",
+                    at_root = "after_a  root\nafter_b  root\n";
+  EXPECT_EQ(broken(at_root + with_b + "y, x, " + sums), "");
+  EXPECT_EQ(broken(at_root + with_b + "parallel y, x, " + sums),
+            "P7: \"a.update(0)\" shares the loops of \"b.update(0)\", but has none of that kind");
+  EXPECT_EQ(broken("last  root\nafter_a  root\nafter_b  at last/y\na  root\n"
+                   "  .1  shared with b.1/y  y, x, r.x, r.y\nb  at last/y\n"),
+            "P7: \"a.update(0)\" shares the loops of \"b.update(0)\", but is computed elsewhere");
+  EXPECT_EQ(
+      broken(at_root + "a  root\n  .0  shared with b.1/y  y, x\n  .1  shared with b.1/y  y, x, " +
+             sums),
+      "P7: stages of one Func would not run in their order");
+  const std::string depends = "P7: of Funcs that run together, one depends on another";
+  EXPECT_EQ(broken("after_a  root  shared with a.1/y  y, x\nafter_b  root\na  root\nb  root\n"),
+            depends);
+  EXPECT_EQ(broken("after_a  root  shared with b.0/y  y, x\nafter_b  root\n"
+                   "a  root  \n  .0  shared with after_b/y  y, x\nb  root\n"),
+            depends)
+      << "each runs before what the other one reads";
+  EXPECT_EQ(broken(at_root + "a  root\n  .0  shared with b.0/y  y, x\nb  root\n"
+                             "  .0  shared with a.0/y  y, x\n"),
+            "P7: \"a\" shares the loops of \"b\", but shares its own, through others");
+}
+
 TEST_F(PlanInvariants, BrokenOnesAreBugs) {
   expect_error<InternalError>({"a plan keeps its invariants", "P4"}, [&] {
     validate(parsed("out  root  x:16, y:8, vector y, vector x\n", program));

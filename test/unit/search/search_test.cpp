@@ -146,7 +146,7 @@ TEST_F(SearchTest, FuncsWithASmallShareAreOnlyComputedElsewhere) {
 }
 
 TEST_F(SearchTest, ASearchFromNothingKeepsWhatItMust) {
-  start = parsed("out  root  y:8, y, x\nrows  at out/y:8  y, x\nheavy  at rows/y  y, x\n",
+  start = parsed("out  root  y:8, y, x\nrows  at out/y:8  y, x\nheavy  at rows/y  (y, x)  y, x\n",
                  start.program);
   Dependences dependences(*accesses);
   const Context context{*accesses, *sizes, machine, dependences};
@@ -160,7 +160,25 @@ TEST_F(SearchTest, ASearchFromNothingKeepsWhatItMust) {
   EXPECT_EQ(plain_text(plan_from_nothing(start, kept, context)),
             "out  root  y:8, y, x\n"
             "rows  at out/y:8\n"
-            "heavy  root  parallel y, x:16 GuardWithIf, vector x\n");
+            "heavy  root  (y, x)  parallel x, y:16 GuardWithIf, vector y\n");  // as it is read
+}
+
+// Two outputs that read a Func in the loops that they share.
+TEST_F(SearchTest, ASearchFromNothingKeepsTheReadersOfAKeptFunc) {
+  Func both("both");
+  both(x, y) = rows(x, y) - 1;
+  both.set_estimates({{0, 1000}, {0, 800}});
+  start = parsed(
+      "both  root  shared with out/y  y, x\nout  root  y, x\nrows  at out/y  y, x\nheavy  root\n",
+      std::vector<Func>{out, both});
+  accesses.emplace(start.program->outputs);
+  sizes.emplace(*accesses, SizeDefaults{unknown_extent});
+  Dependences dependences(*accesses);
+  std::vector<bool> kept(start.funcs.size(), false);
+  kept[static_cast<size_t>(id("rows"))] = true;
+  const Plan nothing = plan_from_nothing(start, kept, {*accesses, *sizes, machine, dependences});
+  EXPECT_TRUE(nothing.of(id("both")) == start.of(id("both"))) << plain_text(nothing);
+  EXPECT_EQ(broken_invariant(nothing), "");
 }
 
 TEST_F(SearchTest, ASearchFromNothingKeepsLanesOfLongSums) {

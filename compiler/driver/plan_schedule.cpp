@@ -1,0 +1,100 @@
+#include "driver/plan_schedule.h"
+
+#include <algorithm>
+
+#include "autoschedule/chosen_places.h"
+#include "autoschedule/rewrites/rewrites.h"
+#include "diagnostics/error.h"
+#include "driver/plan_search.h"
+#include "graph/definitions/parameter_contents.h"
+
+namespace retrograde::driver {
+
+using autoschedule::MemoryUse;
+using autoschedule::ScheduledGraph;
+using autoschedule::ScheduleRequest;
+using autoschedule::Scheduling;
+
+namespace {
+
+constexpr double allowed_times = 2;  // the largest Func of the primal, by default
+
+// Bytes of a call, without what the program allocates itself.
+class CallMemory {
+ public:
+  CallMemory(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request)
+      : accesses_(outputs), sizes_(accesses_, {planning::unknown_extent}), request_(request) {}
+
+  double callers_bytes() const {
+    double result = 0;
+    for (size_t i = 0; i < accesses_.images().size(); ++i) {
+      const auto& image = accesses_.images()[i];
+      result +=
+          image->type.bytes() * elements(static_cast<size_t>(image->dimensions), [&](size_t d) {
+            return sizes_.of_image(static_cast<planning::ImageId>(i), d);
+          });
+    }
+    for (const planning::FuncNode& node : accesses_.funcs()) {
+      if (node.is_output) result += bytes_of(node);
+    }
+    return result;
+  }
+  double budget() const {
+    if (request_.options.memory_budget > 0)
+      return static_cast<double>(request_.options.memory_budget);
+    double largest = 0;
+    for (const planning::FuncNode& node : accesses_.funcs()) {
+      if (!node.func->made && !node.is_output) largest = std::max(largest, bytes_of(node));
+    }
+    return callers_bytes() + std::max(allowed_times * largest,
+                                      static_cast<double>(request_.machine.last_cache_bytes()));
+  }
+
+ private:
+  const planning::AccessGraph accesses_;
+  const planning::SizeModel sizes_;
+  const ScheduleRequest& request_;
+
+  template <typename ExtentOf>
+  static double elements(size_t dimensions, const ExtentOf& extent_of) {
+    double result = 1;
+    for (size_t d = 0; d < dimensions; ++d) {
+      const planning::Extent extent = extent_of(d);
+      result *= extent.is_known() ? static_cast<double>(extent.estimate) : 0;
+    }
+    return result;
+  }
+  double bytes_of(const planning::FuncNode& node) const {
+    const graph::FuncContents& f = *node.func;
+    return graph::total_bytes(f.types) *
+           elements(f.args.size(), [&](size_t d) { return sizes_.of(accesses_.find(&f), d); });
+  }
+};
+
+}  // namespace
+
+ScheduledGraph schedule_by_plan(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
+                                Scheduling what) {
+  const AutoscheduleOptions& options = request.options;
+  if (autoschedule::has_chosen_places(options)) {
+    autoschedule::chosen_places(
+        outputs, autoschedule::placement_limits(graph::topological_order(outputs)), options);
+  }
+  planning::RewriteOptions rewrites;
+  rewrites.splits_sums = request.makes(Decision::CutReductions);
+  rewrites.copies_operands = request.makes(Decision::LayoutStaging);
+  rewrites.kept = kept_names(outputs, options, what);
+  const CallMemory memory(outputs, request);
+  const double callers = memory.callers_bytes(), budget = memory.budget();
+  PlanSearchOptions search;
+  search.start = SearchStart::Nothing;
+  search.spare_bytes = static_cast<int64_t>(std::max(budget - callers, 0.0));
+  search.what = what;
+  const PlanSearch found = search_plans(planning::with_rewrites(outputs, rewrites), outputs,
+                                        options, request.machine, search);
+  const planning::FoundPlan& best = found.result.found.front();
+  return {found.emitted(best), MemoryUse{static_cast<int64_t>(callers + best.cost.peak_bytes),
+                                         static_cast<int64_t>(budget)}};
+}
+
+}  // namespace retrograde::driver
