@@ -15,6 +15,8 @@ constexpr double worth_another_sweep = 0.98;  // of the time before the last one
 constexpr int moves_of_a_func = 2;            // one after another, in one visit
 // A Func with a small share of the whole time is only computed elsewhere; one with less is not visited.
 constexpr double small_share = 0.01, smallest_share = 0.002;
+// Plans that go on within a visit although others are faster so far: the next move may gain more from them.
+constexpr size_t spare_paths = 1;
 constexpr int64_t prices_per_func = 200;  // for each plan of the beam
 
 // A plan of the beam. Steps are a list that plans share, the last first.
@@ -127,7 +129,7 @@ class Beam {
       std::vector<Candidate> next;
       for (const Candidate& from : front) add_neighbours(from, f, next);
       std::ranges::stable_sort(next, is_faster);
-      if (next.size() > width_) next.resize(width_);
+      if (next.size() > width_ + spare_paths) next.resize(width_ + spare_paths);
       bool is_better = false;
       for (Candidate& candidate : next) {
         candidate.cost = cost_.price(candidate.plan);
