@@ -242,7 +242,7 @@ class StageWork {
     const double crossing = moved.is_unaligned ? 1 + m_.vector_bytes / double(line_bytes) : 1;
     const double vector_ns = touch.writes ? m_.store_ns : m_.load_ns;
     const double scalar_ns = std::min(vector_ns, (touch.writes ? 2 : 1) * m_.scalar_ns);
-    const double access_ns = is_vector(touch.moved) ? vector_ns : scalar_ns;
+    const double access_ns = lanes_.iterator >= 0 ? vector_ns : scalar_ns;
     units += count * moved.vectors * crossing * access_ns;
     units_.arithmetic += count * moved.shuffles * m_.shuffle_ns;
   }
