@@ -21,7 +21,7 @@ constexpr std::array<int64_t, Machine::last_cache> set_strides{page_bytes, secon
 struct Region {
   int buffer = 0, run = 0;
   double bytes = 0;
-  // Of lines that data choose, each as often as it is touched; and of all that one iteration chooses from.
+  // The lines that data choose, each as often as it is touched; and all that one iteration chooses from.
   double scattered_bytes = 0, choice_bytes = 0;
   std::array<double, set_strides.size()> by_sets =
       {};  // a stride that leaves sets out fills others
