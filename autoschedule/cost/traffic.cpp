@@ -21,7 +21,8 @@ constexpr std::array<int64_t, Machine::last_cache> set_strides{page_bytes, secon
 struct Region {
   int buffer = 0, run = 0;
   double bytes = 0;
-  double scattered_bytes = 0;  // of lines anywhere in the buffer, each as often as it is touched
+  // The lines that data choose, each as often as it is touched; and all that one iteration chooses from.
+  double scattered_bytes = 0, choice_bytes = 0;
   std::array<double, set_strides.size()> by_sets =
       {};  // a stride that leaves sets out fills others
   bool is_stored = false;
@@ -40,11 +41,15 @@ double bytes_of(const Regions& regions) {
   return sum;
 }
 
-// Lines that data choose: those of one iteration are no neighbours of the last one's.
+// The elements that an iteration chooses from, if it is no neighbour of the last one's.
+double choice_of(const Touch& touch) {
+  double elements = 1;
+  for (const TouchedSide& side : touch.sides)
+    if (side.data != 0 && !side.is_displaced) elements *= side.most;
+  return touch.is_own ? 1 : elements;
+}
 double scattered_bytes(const Touch& touch, const Layout& layout, const Cover& cover) {
-  const bool goes_anywhere = std::ranges::any_of(
-      touch.sides, [](const TouchedSide& side) { return side.data != 0 && !side.is_displaced; });
-  if (!goes_anywhere || touch.is_own) return 0;
+  if (choice_of(touch) == 1) return 0;
   return touched_lines(touch, layout, Cover(cover.size(), 1)) * iterations_of(touch.moved, cover) *
          line_bytes;
 }
@@ -129,6 +134,8 @@ class RegionFinder {
         const double bytes = share * std::min(lines, most * touch.components) * line_bytes;
         Region& region = of_buffer(own, touch.buffer);
         region.scattered_bytes += share * scattered;
+        region.choice_bytes =
+            std::max(region.choice_bytes, choice_of(touch) * touch.element_bytes * share);
         const bool is_same = touch.is_own || touch.carried;  // as what the stage writes
         region.bytes =
             is_same ? std::max(region.bytes, bytes)
@@ -175,6 +182,7 @@ class RegionFinder {
       if (region.bytes > all.bytes) all.run = static_cast<int>(r);
       all.bytes = std::max(all.bytes, region.bytes);
       all.scattered_bytes += region.scattered_bytes;
+      all.choice_bytes = std::max(all.choice_bytes, region.choice_bytes);
       all.is_stored = all.is_stored || region.is_stored;
       all.far_lines = std::max(all.far_lines, region.far_lines);
       all.far_pages = std::max(all.far_pages, region.far_pages);
@@ -280,7 +288,7 @@ class TrafficWalk {
   // them that the cache holds.
   static double loads_of(const Region& region, double room) {
     const double again = std::max(0.0, region.scattered_bytes / region.bytes - 1);
-    return 1 + again * std::max(0.0, 1 - room / region.bytes);
+    return 1 + again * std::max(0.0, 1 - room / std::min(region.bytes, region.choice_bytes));
   }
 
   // `are_evicted`: lines are before they are touched again.

@@ -59,48 +59,20 @@ double longest(const std::vector<Chain>& chains, double instructions) {
   return ns;
 }
 
-class StageWork {
- public:
-  StageWork(const StageRun& run, const Group& group, const Machine& machine)
+// The loops of a stage, and how often they execute what is inside.
+class StageLoops {
+ protected:
+  StageLoops(const StageRun& run, const Group& group, const Machine& machine)
       : run_(run), group_(group), m_(machine), lanes_(run.nest.lanes) {
     for (size_t d = 0; d < depth(); ++d) {
       if (is_serial(d) && run.nest.trips[d] > 1) innermost_ = static_cast<int>(d);
     }
   }
-
-  UnitTimes find() {
-    for (const OperationRow& row : run_.facts->operations) add_operation(row);
-    for (const Touch& touch : run_.facts->touches) {
-      if (!is_loaded_before(touch)) add_touch(touch);
-    }
-    add_interleaving();
-    const Spills spills = spills_of(accumulators_, invariants_, m_.registers);
-    units_.loads += iterations() * spills.loads * m_.load_ns;
-    units_.stores += iterations() * spills.stores * m_.store_ns;
-    units_.chain = longest(chains_, instructions_);
-    const double code_bytes = instructions_ * instruction_bytes;
-    if (code_bytes > iterations() * code_cache_bytes)
-      units_.fetches = code_bytes / line_bytes * far_code_line_ns;
-    const double taken = run_.facts->taken * (1 + guarded_copies * guarded_share());
-    for (double UnitTimes::*part : {&UnitTimes::arithmetic, &UnitTimes::loads, &UnitTimes::stores,
-                                    &UnitTimes::scalars, &UnitTimes::fetches, &UnitTimes::chain})
-      units_.*part *= taken;
-    units_.starts = place_times() * slice_ns(run_, group_, m_);
-    add_loops();
-    return units_;
-  }
-
- private:
   const StageRun& run_;
   const Group& group_;
   const Machine& m_;
   const LaneLoop& lanes_;
   int innermost_ = -1;  // the serial loop that runs innermost
-  UnitTimes units_;
-  double accumulators_ = 0, invariants_ = 0;  // registers of the innermost serial loop
-  double instructions_ = 0;                   // of all iterations
-  double bent_ = 0;                           // vectors whose lanes are computed in parts
-  std::vector<Chain> chains_;
 
   size_t depth() const { return run_.nest.trips.size(); }
   const LoopNode& node(size_t d) const {
@@ -159,6 +131,41 @@ class StageWork {
         return false;
     return true;
   }
+};
+
+class StageWork : StageLoops {
+ public:
+  StageWork(const StageRun& run, const Group& group, const Machine& machine)
+      : StageLoops(run, group, machine) {}
+
+  UnitTimes find() {
+    for (const OperationRow& row : run_.facts->operations) add_operation(row);
+    for (const Touch& touch : run_.facts->touches) {
+      if (!is_loaded_before(touch)) add_touch(touch);
+    }
+    add_interleaving();
+    const Spills spills = spills_of(accumulators_, invariants_, m_.registers);
+    units_.loads += iterations() * spills.loads * m_.load_ns;
+    units_.stores += iterations() * spills.stores * m_.store_ns;
+    units_.chain = longest(chains_, instructions_);
+    const double code_bytes = instructions_ * instruction_bytes;
+    if (code_bytes > iterations() * code_cache_bytes)
+      units_.fetches = code_bytes / line_bytes * far_code_line_ns;
+    const double taken = run_.facts->taken * (1 + guarded_copies * guarded_share());
+    for (double UnitTimes::*part : {&UnitTimes::arithmetic, &UnitTimes::loads, &UnitTimes::stores,
+                                    &UnitTimes::scalars, &UnitTimes::fetches, &UnitTimes::chain})
+      units_.*part *= taken;
+    units_.starts = place_times() * slice_ns(run_, group_, m_);
+    add_loops();
+    return units_;
+  }
+
+ private:
+  UnitTimes units_;
+  double accumulators_ = 0, invariants_ = 0;  // registers of the innermost serial loop
+  double instructions_ = 0;                   // of all iterations
+  double bent_ = 0;                           // vectors whose lanes are computed in parts
+  std::vector<Chain> chains_;
 
   void add_operation(const OperationRow& row) {
     if (row.decided_by && are_constants(row.decided_by)) return;
@@ -242,7 +249,7 @@ class StageWork {
     const double crossing = moved.is_unaligned ? 1 + m_.vector_bytes / double(line_bytes) : 1;
     const double vector_ns = touch.writes ? m_.store_ns : m_.load_ns;
     const double scalar_ns = std::min(vector_ns, (touch.writes ? 2 : 1) * m_.scalar_ns);
-    const double access_ns = is_vector(touch.moved) ? vector_ns : scalar_ns;
+    const double access_ns = lanes_.iterator >= 0 ? vector_ns : scalar_ns;
     units += count * moved.vectors * crossing * access_ns;
     units_.arithmetic += count * moved.shuffles * m_.shuffle_ns;
   }

@@ -3,8 +3,8 @@
 //   y, x:16, r, vector x                     =>     y, x:32, r, unroll x%2, vector x:2     if f(x / 2) or f(x % 2) is read
 //   y, x:32, r, unroll c, unroll x:16, vector x   =>   y, x:32, r, unroll c, unroll x%2, vector x:2
 //
-// In each copy the remainder is a constant, and lanes of the quotient are neighbours in memory. Otherwise, lanes would be
-// interleaved, or gathered.
+// In each copy the remainder is a constant, and lanes of the quotient are neighbours in memory. Lanes of neighbouring points
+// would be interleaved or gathered instead.
 // Legal: L1, since iterations of pure loops never meet; L4: a step of all points of the copies stands outside; L5.
 #include <algorithm>
 #include <set>
