@@ -78,7 +78,8 @@ std::vector<Nest> with_lanes(const StageLoops& loops) {
     const LaneForm form = lane_form(node.write, i, schedule_lanes, context.sizes, {line_elements});
     if (form.kind == LaneForm::Kind::Strided) {
       if (fits(chains, points)) add(i, chains, ForType::Unrolled);
-      if (fits(lanes / 4, points)) add(i, lanes / 4, ForType::Vectorized);
+      for (const int64_t fewer : {lanes / 2, lanes / 4})
+        if (fits(fewer, points)) add(i, fewer, ForType::Vectorized);
     } else if (std::optional<Nest> block = in_block(loops, nests.back(), i, lanes)) {
       nests.push_back(std::move(*block));
     }
