@@ -14,7 +14,8 @@ constexpr int sweeps = 2;
 constexpr size_t many_funcs = 64;
 constexpr double worth_another_sweep = 0.98;  // of the time before the last one
 constexpr int moves_of_a_func = 2;            // one after another, in one visit
-// A Func with a small share of the whole time is only computed elsewhere; one with less is not visited.
+// A Func with a small share of the whole time is only computed elsewhere, or stored in another order, which its consumers
+// may gain from; one with less is not visited.
 constexpr double small_share = 0.01, smallest_share = 0.002;
 constexpr int64_t prices_per_func = 200;  // for each plan of the beam
 
@@ -45,6 +46,10 @@ bool is_worth_it(const Cost& before, const Cost& after, const SearchOptions& opt
   const double least =
       std::max(options.least_gain * changed, options.least_gain_of_all * before.seconds);
   return after.seconds < before.seconds - least;
+}
+
+bool is_alike(const FuncPlan& a, const FuncPlan& b) {
+  return a.placement == b.placement && a.storage == b.storage;
 }
 
 FoundPlan found_of(const State& state) {
@@ -155,7 +160,7 @@ class Beam {
       if (options_.without.contains(move.name)) continue;
       for (Plan& plan : move.apply(from.plan, f, context_)) {
         if (left_ == 0) return;
-        if (only_places && plan.of(f).placement == from.plan.of(f).placement) continue;
+        if (only_places && is_alike(plan.of(f), from.plan.of(f))) continue;
         if (!keeps_funcs(from.plan, plan) || !seen_.insert(hash_of(plan)).second) continue;
         --left_;
         Cost cost = cost_.price(plan);
