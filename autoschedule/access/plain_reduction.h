@@ -10,7 +10,8 @@
 namespace retrograde::planning {
 
 // Whether the update adds terms to one element, multiplies it by them, or takes their minimum or maximum, which is what
-// lowering combines lanes for (compiler/lower/vectors/vector_stores.h). Terms read nothing of the Func.
+// lowering combines lanes for (compiler/lower/vectors/vector_stores.h). Terms read nothing of the Func. Each value of a
+// Tuple has terms of its own.
 bool is_plain_reduction(const graph::FuncContents& f, const graph::Definition& update);
 
 }  // namespace retrograde::planning

@@ -60,7 +60,7 @@ class SizeModel {
     SizeSource source = SizeSource::Default;
     bool is_certain = false;  // no estimate takes part
     int64_t multiple_of = 1;
-    // Of a region: what reads need that nothing clamps, guards or takes from data.
+    // The part of a region that reads need which nothing clamps, guards or takes from data.
     ir::ConstantRange needed{INT64_MAX, INT64_MIN};
   };
   struct End {

@@ -98,7 +98,7 @@ class BufferFinder {
         if (touch.buffer != written.buffer || touch.moved == 0) continue;
         if (run.place > stored.inside) return 0;
         const LaneMoves moved = lane_moves(touch, stored.layout, run.nest.lanes, 1);
-        if (moved.is_by_lane || moved.is_unaligned || moved.shuffles > 0) return 0;
+        if (moved.is_by_lane || moved.is_shifted || moved.shuffles > 0) return 0;
         for (size_t k = stored.inside; k < run.path.size(); ++k) {
           const LoopNode& loop = node(run.path[k]);
           const bool is_serial = loop.kind != ForType::Unrolled && loop.kind != ForType::Vectorized;

@@ -31,7 +31,6 @@ class GroupBuilder {
           static_cast<int>(group_.runs.size()));
       group_.runs.push_back(std::move(run));
     }
-    for (size_t r = group_.runs.size(); r-- > 0;) find_cuts(group_.runs[r]);
     for (LoopNode& node : group_.nodes) {
       std::ranges::sort(node.children, {}, [&](int child) {
         return std::pair(group_.nodes[static_cast<size_t>(child)].loop.stage, child);
@@ -141,7 +140,8 @@ class GroupBuilder {
     if (runs_at_once(kind)) {
       // Threads take chunks of all loops around. The last round may leave some without a chunk.
       child.chunks *= trips;
-      child.speedup = child.chunks / std::ceil(child.chunks / machine_.threads);
+      if (child.chunks > 1)
+        child.speedup = child.chunks / (std::ceil(child.chunks / machine_.threads) + late_chunk);
     }
     const int index = static_cast<int>(group_.nodes.size());
     group_.nodes.push_back(std::move(child));
@@ -208,30 +208,6 @@ class GroupBuilder {
     return trips;
   }
 
-  // A read that is clamped needs less than a whole box in the first and the last block of a row, and so does what that box
-  // is computed from. Readers come after what they read.
-  void find_cuts(StageRun& run) const {
-    if (run.place <= 1) return;
-    run.cut.assign(sizes_.graph().func(run.id.func).func->args.size(), 0);
-    for (const StageRun& reader : group_.runs) {
-      if (reader.cover.size() <= run.place) continue;
-      for (const Touch& touch : reader.facts->touches) {
-        if (touch.buffer != run.id.func || touch.writes || reader.id.func == run.id.func) continue;
-        for (size_t d = 0; d < run.cut.size(); ++d) {
-          for (const TouchedSide::Move& move : touch.sides[d].moves) {
-            const auto i = static_cast<size_t>(move.iterator);
-            const double blocks =
-                std::ceil(double(reader.cover[0][i]) / double(reader.cover[run.place][i]));
-            const double own = i < reader.cut.size() ? reader.cut[i] : 0;
-            const double here =
-                touch.sides[d].is_clamped && blocks > 1 ? std::min(1.0, 2 / blocks) : 0;
-            run.cut[d] = std::max({run.cut[d], own, here});
-          }
-        }
-      }
-    }
-  }
-
   size_t store_place(const StageRun& run) const {
     const Level& store = plan_.of(run.id.func).placement.store;
     if (store.kind == Level::Kind::Root) return 1;
@@ -266,11 +242,44 @@ class GroupBuilder {
   }
 };
 
+// The largest share of the blocks along a dimension of `run` that a border cuts, for one that reads it in its loops.
+double cut_share(const StageRun& reader, const TouchedSide& side, const StageRun& run) {
+  double share = 0;
+  for (const TouchedSide::Move& move : side.moves) {
+    const auto i = static_cast<size_t>(move.iterator);
+    const double blocks =
+        std::ceil(double(reader.cover[0][i]) / double(reader.cover[run.place][i]));
+    if (side.is_clamped && blocks > 1) share = std::max(share, std::min(1.0, 2 / blocks));
+    if (reader.id.stage == 0 && i < reader.cut.size()) share = std::max(share, reader.cut[i]);
+  }
+  return share;
+}
+
+// A read that is clamped needs less than a whole box in the first and the last block of a row, and so does what that box
+// is computed from. Readers come after what they read.
+void find_cuts(const SizeModel& sizes, Group& group) {
+  for (size_t r = group.runs.size(); r-- > 0;) {
+    StageRun& run = group.runs[r];
+    if (run.place <= 1) continue;
+    run.cut.assign(sizes.graph().func(run.id.func).func->args.size(), 0);
+    for (const StageRun& reader : group.runs) {
+      if (reader.cover.size() <= run.place || reader.id.func == run.id.func) continue;
+      for (const Touch& touch : reader.facts->touches) {
+        if (touch.buffer != run.id.func) continue;
+        for (size_t d = 0; d < run.cut.size(); ++d)
+          run.cut[d] = std::max(run.cut[d], cut_share(reader, touch.sides[d], run));
+      }
+    }
+  }
+}
+
 }  // namespace
 
 Group group_of(const Plan& plan, const PlannedGroup& planned, Covers& covers,
                const SizeModel& sizes, const Machine& machine, FactsOfStages& facts) {
-  return GroupBuilder(plan, covers, sizes, machine, facts).build(planned);
+  Group group = GroupBuilder(plan, covers, sizes, machine, facts).build(planned);
+  find_cuts(sizes, group);
+  return group;
 }
 
 }  // namespace retrograde::planning

@@ -68,6 +68,7 @@ struct LaneMoves {
   bool is_by_lane = false;    // an element at a time
   bool is_bent = false;       // lanes are in another order than elements: they are computed apart
   bool is_unaligned = false;  // vectors begin anywhere in a cache line
+  bool is_shifted = false;    // and in a row of vectors
   double border_share = 0;    // of vectors, whose lanes are clamped one by one
 };
 

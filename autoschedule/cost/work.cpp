@@ -59,6 +59,24 @@ double longest(const std::vector<Chain>& chains, double instructions) {
   return ns;
 }
 
+// The share of tiles whose unrolled copies run behind conditions, as a border cuts them.
+double guarded_share(const StageRun& run, const Group& group) {
+  IteratorSet copied = 0;
+  for (size_t d = 0; d < run.nest.trips.size(); ++d) {
+    const ForType kind = group.nodes[static_cast<size_t>(run.node_of(d))].kind;
+    if (kind == ForType::Unrolled && run.nest.trips[d] > 1) copied |= run.nest.moves[d];
+  }
+  double share = 0;
+  for (const Touch& touch : run.facts->touches) {
+    if (!touch.writes) continue;
+    for (size_t d = 0; d < run.cut.size(); ++d) {
+      const auto is_copied = [&](const auto& move) { return copied & set_of(move.iterator); };
+      if (std::ranges::any_of(touch.sides[d].moves, is_copied)) share = std::max(share, run.cut[d]);
+    }
+  }
+  return share;
+}
+
 // The loops of a stage, and how often they execute what is inside.
 class StageLoops {
  protected:
@@ -151,7 +169,7 @@ class StageWork : StageLoops {
     const double code_bytes = instructions_ * instruction_bytes;
     if (code_bytes > iterations() * code_cache_bytes)
       units_.fetches = code_bytes / line_bytes * far_code_line_ns;
-    const double taken = run_.facts->taken * (1 + guarded_copies * guarded_share());
+    const double taken = run_.facts->taken * (1 + guarded_copies * guarded_share(run_, group_));
     for (double UnitTimes::*part : {&UnitTimes::arithmetic, &UnitTimes::loads, &UnitTimes::stores,
                                     &UnitTimes::scalars, &UnitTimes::fetches, &UnitTimes::chain})
       units_.*part *= taken;
@@ -176,20 +194,6 @@ class StageWork : StageLoops {
       units_.arithmetic += count * vectors(row.element_bytes, row.depends) * row.time.vector_ns;
     else
       (row.time.is_integer ? units_.scalars : units_.arithmetic) += count * row.time.scalar_ns;
-  }
-
-  // The share of tiles whose copies run behind conditions, as a border cuts them.
-  double guarded_share() const {
-    double share = 0;
-    for (const Touch& touch : run_.facts->touches) {
-      if (!touch.writes) continue;
-      for (size_t d = 0; d < run_.cut.size(); ++d) {
-        for (const TouchedSide::Move& move : touch.sides[d].moves) {
-          if (copies(set_of(move.iterator), true) > 1) share = std::max(share, run_.cut[d]);
-        }
-      }
-    }
-    return share;
   }
 
   // ---- memory ----

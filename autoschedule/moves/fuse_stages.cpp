@@ -13,6 +13,7 @@
 // around its own; iterations of pure loops touch no elements of others, so none of them runs too early. No Func is computed
 // in loops that would be shared.
 #include <algorithm>
+#include <optional>
 
 #include "autoschedule/moves/edit.h"
 

@@ -55,7 +55,8 @@ std::vector<Nest> vectors_of_terms(const StageLoops& loops) {
   });
   const auto depth = static_cast<int>(innermost_loop(*terms, along));
   const int64_t points = points_inside(extents, *terms, depth - 1, along);
-  const int64_t lanes = lanes_for(plan, stage, points);
+  int64_t lanes = lanes_for(plan, stage, points);
+  if (!fits(lanes, points)) lanes /= 2;
   std::vector<Nest> nests;
   for (const int64_t n : {lanes, vectors_of_sums * lanes}) {
     if (!fits(n, points)) continue;

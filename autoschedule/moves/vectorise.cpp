@@ -80,7 +80,8 @@ std::vector<Nest> with_lanes(const StageLoops& loops) {
       // Half as many where more would leave threads without rows.
       for (const int64_t count : {chains, chains / 2})
         if (fits(count, points)) add(i, count, ForType::Unrolled);
-      if (fits(lanes / 4, points)) add(i, lanes / 4, ForType::Vectorized);
+      for (const int64_t fewer : {lanes / 2, lanes / 4})
+        if (fits(fewer, points)) add(i, fewer, ForType::Vectorized);
     } else if (std::optional<Nest> block = in_block(loops, nests.back(), i, lanes)) {
       nests.push_back(std::move(*block));
     }

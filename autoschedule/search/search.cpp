@@ -13,7 +13,8 @@ constexpr int sweeps = 2;
 constexpr size_t many_funcs = 64;
 constexpr double worth_another_sweep = 0.98;  // of the time before the last one
 constexpr int moves_of_a_func = 2;            // one after another, in one visit
-// A Func with a small share of the whole time is only computed elsewhere; one with less is not visited.
+// A Func with a small share of the whole time is only computed elsewhere, or stored in another order, which its consumers
+// may gain from; one with less is not visited.
 constexpr double small_share = 0.01, smallest_share = 0.002;
 // Plans that go on within a visit although others are faster so far: the next move may gain more from them.
 constexpr size_t spare_paths = 1;
@@ -47,6 +48,10 @@ bool is_worth_it(const Cost& before, const Cost& after, const SearchOptions& opt
   const double least =
       std::max(options.least_gain * changed, options.least_gain_of_all * before.seconds);
   return after.seconds < before.seconds - least;
+}
+
+bool is_alike(const FuncPlan& a, const FuncPlan& b) {
+  return a.placement == b.placement && a.storage == b.storage;
 }
 
 FoundPlan found_of(const State& state) {
@@ -166,7 +171,7 @@ class Beam {
       if (options_.without.contains(move.name)) continue;
       for (Plan& plan : move.apply(from.plan, f, context_)) {
         if (left_ == 0) return;
-        if (only_places && plan.of(f).placement == from.plan.of(f).placement) continue;
+        if (only_places && is_alike(plan.of(f), from.plan.of(f))) continue;
         const uint64_t hash = hash_of(plan, from.plan, from.hash);
         if (!keeps_funcs(from.plan, plan) || !seen_.insert(hash).second) continue;
         --left_;

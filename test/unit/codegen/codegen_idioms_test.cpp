@@ -268,6 +268,24 @@ TEST(CodegenIdioms, TilesThatFillTheRegistersAreNotSpilled) {
   EXPECT_EQ(count(inner, "(%rsp"), 0u);
 }
 
+// Eight rows whose distance is known at run time only: their first addresses stay in registers, and so do all sums.
+TEST(CodegenIdioms, RowsOfATileHaveAPointerEach) {
+  ImageParam image(Float(32), 2, "image"), taps(Float(32), 2, "taps");
+  Var lane("lane"), i("i"), j("j"), x("x"), y("y");
+  Param<int> blocks("blocks");
+  RDom r(0, blocks, "r");
+  Func rows("rows"), f("f");
+  rows(x, y) = image(x, y) + 1.0f;
+  f(lane, i, j) += rows(lane + 16 * r, i) * taps(lane + 16 * r, j);
+  rows.compute_root();
+  f.bound(lane, 0, 16).bound(i, 0, 8).bound(j, 0, 3);
+  f.update().reorder(lane, j, i, r).vectorize(lane).unroll(j).unroll(i);
+  const auto inner = block_with_most(assembly(f, avx512), "vfmadd");
+  EXPECT_EQ(count(inner, "vfmadd"), 24u);
+  EXPECT_EQ(count(inner, "(%rsp"), 0u);
+  EXPECT_LT(inner.size(), 50u) << "24 products and sums, 11 loads, and the loop";
+}
+
 // Vectors that reach past the end are accumulated in registers too, not by masked stores.
 TEST(CodegenIdioms, TilesAtTheBorderStayInRegisters) {
   const auto code = assembly(tiled_product(Float(32), 8), avx2);

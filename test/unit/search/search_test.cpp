@@ -54,7 +54,7 @@ TEST_F(SearchTest, SerialLoopsBecomeParallelVectorsAndProducersMove) {
   const std::string text = plain_text(best.plan);
   EXPECT_NE(text.find("out  root  parallel"), std::string::npos) << text;
   EXPECT_NE(text.find("vector x"), std::string::npos) << text;
-  EXPECT_EQ(text.find("heavy  root"), std::string::npos) << text;
+  EXPECT_EQ(text.find("rows  root"), std::string::npos) << text;
   EXPECT_EQ(broken_invariant(best.plan), "");
 }
 
