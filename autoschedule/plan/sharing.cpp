@@ -23,7 +23,7 @@ bool has_circle(std::set<std::pair<Node, Node>> edges) {
   return false;
 }
 
-// Of the stages that run in the loops of others.
+// The loops in which stages of others run, by stage.
 using Hosts = std::map<StageId, LoopRef>;
 
 Hosts hosts_of(const Plan& plan) {
