@@ -21,20 +21,22 @@ bool is_iterator(const IndexForm& form) {
 class DistinctReads {
  public:
   void add(Access read) {
-    auto& like = by_hash_[read.place_hash()];
-    for (const size_t i : like) {
-      if (!reads[i].same_place(read)) continue;
-      reads[i].components |= read.components;
-      reads[i].guard = intersection(reads[i].guard, read.guard);
+    const size_t hash = read.place_hash();
+    const auto [first, last] = by_hash_.equal_range(hash);
+    for (auto like = first; like != last; ++like) {
+      Access& known = reads[like->second];
+      if (!known.same_place(read)) continue;
+      known.components |= read.components;
+      if (!known.guard.is_empty()) known.guard = intersection(known.guard, read.guard);
       return;
     }
-    like.push_back(reads.size());
+    by_hash_.emplace(hash, reads.size());
     reads.push_back(std::move(read));
   }
   std::vector<Access> reads;
 
  private:
-  std::unordered_map<size_t, std::vector<size_t>> by_hash_;
+  std::unordered_multimap<size_t, size_t> by_hash_;
 };
 
 }  // namespace
@@ -64,8 +66,9 @@ ReadComposer::Composed ReadComposer::compose(const StageNode& stage,
   Composed found;
   DistinctReads stored;
   std::map<FuncId, DistinctReads, std::greater<>> pending;
-  const auto add = [&](const Access& read) {
-    (read.of >= 0 && is_inlined(read.of) ? pending[read.of] : stored).add(read);
+  const auto add = [&](Access read) {
+    DistinctReads& reads = read.of >= 0 && is_inlined(read.of) ? pending[read.of] : stored;
+    reads.add(std::move(read));
   };
   for (const Access& read : stage.reads) add(read);
   size_t composed = 0;
@@ -113,7 +116,7 @@ IndexForm ReadComposer::compose(const IndexForm& inner, const Access& outer) {
   if (parts && inner.modulus != 0) parts = remainder(*parts, inner.modulus);
   IndexForm result;
   if (parts) {
-    result = *parts;
+    result = std::move(*parts);
   } else {  // not of this form: its range is known alone
     result = opaque_form({compose(value_of(inner), outer), 1, inner.within, {}});
   }

@@ -7,6 +7,8 @@
 
 namespace retrograde::planning {
 
+inline constexpr double nanosecond = 1e-9;  // in seconds
+
 // Nanoseconds of one thread that each kind of unit of a core is busy. They work at the same time.
 struct UnitTimes {
   double arithmetic = 0, loads = 0, stores = 0, scalars = 0;

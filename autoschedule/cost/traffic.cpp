@@ -81,10 +81,10 @@ class RegionFinder {
   }
 
  private:
-  // What one stage touches while the loops from each of its path inwards run.
-  class Stage {
+  // The regions that one stage touches while the loops of its path from any depth inwards run.
+  class StageRegions {
    public:
-    Stage(const StageRun& run, const Group& group) : run_(run) {
+    StageRegions(const StageRun& run, const Group& group) : run_(run) {
       for (const Touch& touch : run.facts->touches) {
         const StoredBuffer& stored = group.buffers.at(touch.buffer);
         if (stored.register_share < 1)
@@ -157,7 +157,7 @@ class RegionFinder {
 
   const Group& group_;
   std::vector<std::vector<size_t>> below_;  // the stages in a node
-  std::vector<Stage> stages_;
+  std::vector<StageRegions> stages_;
   std::vector<Regions> runs_, iterations_;  // of nodes that were asked for
 
   const Regions& find(std::vector<Regions>& known, size_t n, size_t inside) {

@@ -49,6 +49,7 @@ using MoveFunction = std::vector<Plan> (*)(const Plan& plan, FuncId func, const 
 struct Move {
   const char* name;
   MoveFunction apply;
+  bool may_place;     // the Func may be computed elsewhere
   bool changes_bits;  // terms may be added in another order, in shorter chains
 };
 std::span<const Move> all_moves();               // list.def

@@ -14,8 +14,9 @@ namespace moves {
 #undef RETROGRADE_MOVE
 
 std::span<const Move> all_moves() {
-#define RETROGRADE_MOVE(name) Move{#name, moves::name, false},
-#define RETROGRADE_MOVE_OF_BITS(name) Move{#name, moves::name, true},
+#define RETROGRADE_MOVE(name) Move{#name, moves::name, false, false},
+#define RETROGRADE_MOVE_OF_PLACE(name) Move{#name, moves::name, true, false},
+#define RETROGRADE_MOVE_OF_BITS(name) Move{#name, moves::name, true, true},
   static constexpr auto all = std::to_array<Move>({
 #include "autoschedule/moves/list.def"
   });

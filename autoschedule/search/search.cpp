@@ -14,8 +14,8 @@ constexpr size_t many_funcs = 64;
 constexpr double worth_another_sweep = 0.98;  // of the time before the last one
 constexpr int moves_of_a_func = 2;            // one after another, in one visit
 // A Func with a small share of the whole time is only computed elsewhere, or stored in another order, which its consumers
-// may gain from; one with less is not visited.
-constexpr double small_share = 0.01, smallest_share = 0.002;
+// may gain from; one with less is not visited. In a program of many Funcs, a part of the mean share is enough for a visit.
+constexpr double small_share = 0.01, smallest_share = 0.002, part_of_mean = 0.2;
 // Plans that go on within a visit although others are faster so far: the next move may gain more from them.
 constexpr size_t spare_paths = 1;
 constexpr int64_t prices_per_func = 200;  // for each plan of the beam
@@ -117,7 +117,9 @@ class Beam {
   bool is_worth_visiting(FuncId f) const {
     const auto i = static_cast<size_t>(f);
     if (i < options_.kept.size() && options_.kept[i]) return false;
-    return share_of(f) >= smallest_share * states_[0].cost.seconds;
+    const double least =
+        std::min(smallest_share, part_of_mean / static_cast<double>(shares_.size()));
+    return share_of(f) >= least * states_[0].cost.seconds;
   }
 
   // A plan on the way from one of the states.
@@ -168,7 +170,7 @@ class Beam {
   void add_neighbours(const Candidate& from, FuncId f, std::vector<Candidate>& next) {
     const bool only_places = is_small(f);
     for (const Move& move : all_moves()) {
-      if (options_.without.contains(move.name)) continue;
+      if (options_.without.contains(move.name) || (only_places && !move.may_place)) continue;
       for (Plan& plan : move.apply(from.plan, f, context_)) {
         if (left_ == 0) return;
         if (only_places && is_alike(plan.of(f), from.plan.of(f))) continue;
