@@ -152,7 +152,7 @@ class SumSplitter {
     update.factor({{lane, "lanes"}, {group, "parts"}});
   }
 
-  // ---- places that data decide ----
+  // ---- data-dependent indices ----
 
   // The longest loop but the innermost, if it has rows for each part.
   std::optional<int> rows_in_parts(const StageNode& stage) const {

@@ -8,8 +8,8 @@
 //   mean(y) += f(r, y)             block(y, o) += f(256 o + i, y)                  many elements: blocks of terms
 //                                  mean(y) += block(y, o)
 //
-// A reduction to few elements has no loop that runs in vectors or in parallel, and neither has a sum at places that data
-// decide. A chain of n additions in float32 is wrong by up to n * 2^-24 of the sum of absolute values, so none is longer
+// A reduction to few elements has no loop that runs in vectors or in parallel, and neither has a sum at data-dependent
+// indices. A chain of n additions in float32 is wrong by up to n * 2^-24 of the sum of absolute values, so none is longer
 // than machine/reference.h says. How a sum is split depends on the program alone.
 #pragma once
 

@@ -153,20 +153,6 @@ class Beam {
     }
   }
 
-  // Whether no Func leaves the place that it is to have, and no move of another Func changes one that is to be kept. Loops that places refer to may get other numbers.
-  bool keeps_funcs(const Plan& before, const Plan& after) const {
-    for (size_t f = 0; f < options_.at_root.size(); ++f) {
-      if (options_.at_root[f] && after.funcs[f]->placement.compute.kind != Level::Kind::Root)
-        return false;
-    }
-    for (size_t f = 0; f < options_.kept.size(); ++f) {
-      if (!options_.kept[f] || before.funcs[f] == after.funcs[f]) continue;
-      const FuncPlan &was = *before.funcs[f], &is = *after.funcs[f];
-      if (!(was.storage == is.storage) || !(was.nests == is.nests)) return false;
-    }
-    return true;
-  }
-
   void add_neighbours(const Candidate& from, FuncId f, std::vector<Candidate>& next) {
     const bool only_places = is_small(f);
     for (const Move& move : all_moves()) {
@@ -175,7 +161,7 @@ class Beam {
         if (left_ == 0) return;
         if (only_places && is_alike(plan.of(f), from.plan.of(f))) continue;
         const uint64_t hash = hash_of(plan, from.plan, from.hash);
-        if (!keeps_funcs(from.plan, plan) || !seen_.insert(hash).second) continue;
+        if (!keeps_funcs(from.plan, plan, options_) || !seen_.insert(hash).second) continue;
         --left_;
         const Totals cost = cost_.totals(plan);
         if (cost.peak_bytes > std::max(options_.most_bytes, from.cost.peak_bytes)) continue;
@@ -188,6 +174,19 @@ class Beam {
 };
 
 }  // namespace
+
+bool keeps_funcs(const Plan& before, const Plan& after, const SearchOptions& options) {
+  const auto is_set = [](const std::vector<bool>& by_func, size_t f) {
+    return f < by_func.size() && by_func[f];
+  };
+  for (size_t f = 0; f < before.funcs.size(); ++f) {
+    const FuncPlan &was = *before.funcs[f], &is = *after.funcs[f];
+    const bool is_alike = was.storage == is.storage && was.nests == is.nests;
+    if (is_set(options.kept, f) && before.funcs[f] != after.funcs[f] && !is_alike) return false;
+    if (is_set(options.at_root, f) && is.placement.compute.kind != Level::Kind::Root) return false;
+  }
+  return true;
+}
 
 SearchResult search(const Plan& start, const Context& context, CostModel& cost,
                     const SearchOptions& options) {

@@ -36,6 +36,10 @@ struct SearchOptions {
   double least_gain = 0.1, least_gain_of_all = 0.01;
 };
 
+// Whether no Func leaves the place that it is to have, and no move of another Func changed one that is to be kept. Loops
+// that places refer to may get other numbers.
+bool keeps_funcs(const Plan& before, const Plan& after, const SearchOptions& options);
+
 struct SearchStep {
   FuncId func = -1;
   std::string move;

@@ -7,6 +7,7 @@
 #include "diagnostics/error.h"
 #include "driver/plan_search.h"
 #include "graph/definitions/parameter_contents.h"
+#include "graph/directives/give_directive.h"
 
 namespace retrograde::driver {
 
@@ -71,6 +72,14 @@ class CallMemory {
   }
 };
 
+// No plan can say so.
+void compute_extern_stages_at_root(const std::vector<FuncPtr>& outputs) {
+  for (const FuncPtr& f : graph::topological_order(outputs)) {
+    if (f->is_extern() && !graph::has_directives(*f))
+      graph::give_directive({f}, graph::ComputeAt{{{graph::LoopLevel::Kind::Root, "", "", -1}}});
+  }
+}
+
 }  // namespace
 
 ScheduledGraph schedule_by_plan(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
@@ -89,12 +98,24 @@ ScheduledGraph schedule_by_plan(const std::vector<FuncPtr>& outputs, const Sched
   PlanSearchOptions search;
   search.start = SearchStart::Nothing;
   search.spare_bytes = static_cast<int64_t>(std::max(budget - callers, 0.0));
+  search.must_fit = options.memory_budget > 0;
   search.what = what;
-  const PlanSearch found = search_plans(planning::with_rewrites(outputs, rewrites), outputs,
-                                        options, request.machine, search);
-  const planning::FoundPlan& best = found.result.found.front();
-  return {found.emitted(best), MemoryUse{static_cast<int64_t>(callers + best.cost.peak_bytes),
-                                         static_cast<int64_t>(budget)}};
+  const std::vector<FuncPtr> rewritten = planning::with_rewrites(outputs, rewrites);
+  compute_extern_stages_at_root(rewritten);
+  const PlanSearch found = search_plans(rewritten, outputs, options, request.machine, search);
+  const auto scheduled = [&](const planning::FoundPlan& plan) {
+    const auto bytes = static_cast<int64_t>(callers + plan.cost.peak_bytes);
+    return ScheduledGraph{found.emitted(plan), MemoryUse{bytes, static_cast<int64_t>(budget)}};
+  };
+  // Directives prove less than moves know: the order of the steps of a recurrence, for one.
+  for (const planning::FoundPlan& plan : found.result.found) {
+    try {
+      return scheduled(plan);
+    } catch (const Error&) {
+      continue;
+    }
+  }
+  return scheduled(found.result.start);
 }
 
 }  // namespace retrograde::driver

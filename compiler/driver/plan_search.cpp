@@ -1,9 +1,12 @@
 #include "driver/plan_search.h"
 
 #include <algorithm>
+#include <limits>
 #include <unordered_set>
+#include <utility>
 
 #include "autoschedule/machine/kept_machine.h"
+#include "autoschedule/search/fit_memory.h"
 #include "autoschedule/search/start.h"
 #include "graph/directives/give_directive.h"
 #include "graph/directives/schedule_log.h"
@@ -19,6 +22,9 @@ namespace {
 
 // The least gain of a change in a search from nothing: a part of the stages that change, and of all.
 constexpr double least_gain_from_nothing = 0.02, least_gain_of_all_from_nothing = 0.001;
+
+// How much slower a program may get to keep within a limit of bytes that its user did not give.
+constexpr double worth_fitting = 1.25;
 
 bool is_adjoint(const FuncPtr& f) { return f->made.has_value(); }
 
@@ -120,11 +126,17 @@ PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
   beam.least_gain = least_gain_from_nothing;
   beam.least_gain_of_all = least_gain_of_all_from_nothing;
   const Plan nothing = planning::plan_from_nothing(result.rules, beam.kept, context);
-  planning::SearchResult other = planning::search(nothing, context, cost, beam);
   if (search.start == SearchStart::Nothing) {
-    result.result = std::move(other);
+    const double most_bytes = std::exchange(beam.most_bytes, planning::SearchOptions().most_bytes);
+    result.result = planning::search(nothing, context, cost, beam);
+    beam.most_bytes = most_bytes;
+    FoundPlan& best = result.result.found.front();
+    const double most_seconds = search.must_fit ? std::numeric_limits<double>::infinity()
+                                                : worth_fitting * best.cost.seconds;
+    best = planning::fit_memory(std::move(best), context, cost, beam, most_seconds);
     return result;
   }
+  planning::SearchResult other = planning::search(nothing, context, cost, beam);
   std::erase_if(other.found, [&](const FoundPlan& found) { return found.plan == nothing; });
   planning::merge(result.result, std::move(other));
   return result;

@@ -36,6 +36,7 @@ struct PlanSearchOptions {
   int width = 1;  // of the beam
   // That may be alive at once; beyond those of `scheduled`, if it has the schedule of the rules.
   int64_t spare_bytes = 0;
+  bool must_fit = false;  // without rules: however slow the program gets
   autoschedule::Scheduling what = autoschedule::Scheduling::Everything;
   std::set<std::string> without;  // moves that are not made
 };

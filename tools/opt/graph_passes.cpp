@@ -5,6 +5,7 @@
 #include "autodiff/derivative.h"
 #include "autoschedule/cut_reductions.h"
 #include "autoschedule/graph_rewrites.h"
+#include "autoschedule/rewrites/rewrites.h"
 #include "driver/schedule.h"
 #include "graph/copy_graph.h"
 #include "graph/directives/wrappers.h"
@@ -41,6 +42,8 @@ const std::vector<GraphPass>& graph_passes() {
        [](const std::vector<FuncPtr>& outputs) {
          return with_graph_rewrites(outputs, /*on_gpu=*/false, SumOrder::Free);
        }},
+      {"rewrites",
+       [](const std::vector<FuncPtr>& outputs) { return planning::with_rewrites(outputs); }},
       {"schedule_unscheduled",
        [](const std::vector<FuncPtr>& outputs) { return driver::schedule_unscheduled(outputs); }}};
   return passes;
