@@ -13,12 +13,17 @@ constexpr int sweeps = 2;
 constexpr size_t many_funcs = 64;
 constexpr double worth_another_sweep = 0.98;  // of the time before the last one
 constexpr int moves_of_a_func = 2;            // one after another, in one visit
-// A Func with a small share of the whole time is only computed elsewhere, or stored in another order, which its consumers
-// may gain from; one with less is not visited. In a program of many Funcs, a part of the mean share is enough for a visit.
-constexpr double small_share = 0.01, smallest_share = 0.002, part_of_mean = 0.2;
 // Plans that go on within a visit although others are faster so far: the next move may gain more from them.
 constexpr size_t spare_paths = 1;
-constexpr int64_t prices_per_func = 200;  // for each plan of the beam
+constexpr int64_t prices_per_func = 200;      // for each plan of the beam
+// A Func with a small share of the whole time is only computed elsewhere, or stored in another order, which its consumers
+// may gain from; one with less is not visited.
+constexpr double small_share = 0.01, smallest_share = 0.002;
+// In programs of more Funcs, each has a smaller share: less is worth a visit or a change.
+constexpr double funcs_for_shares = 100;
+double share_in(const AccessGraph& accesses, double share) {
+  return share * std::min(1.0, funcs_for_shares / static_cast<double>(accesses.funcs().size()));
+}
 
 // A plan of the beam. Steps are a list that plans share, the last first.
 struct State {
@@ -35,7 +40,8 @@ struct State {
 bool is_faster(const State& a, const State& b) { return a.cost.seconds < b.cost.seconds; }
 
 // Whether the gain exceeds the error of the model, which is about the stages whose times differ.
-bool is_worth_it(const Cost& before, const Cost& after, const SearchOptions& options) {
+bool is_worth_it(const Cost& before, const Cost& after, double least_gain,
+                 double least_gain_of_all) {
   double changed = 0;
   auto was = before.stages.begin();
   for (const StageCost& stage : after.stages) {
@@ -45,8 +51,7 @@ bool is_worth_it(const Cost& before, const Cost& after, const SearchOptions& opt
     if (seconds != stage.seconds) changed += std::max(seconds, stage.seconds);
   }
   for (; was != before.stages.end(); ++was) changed += was->seconds;
-  const double least =
-      std::max(options.least_gain * changed, options.least_gain_of_all * before.seconds);
+  const double least = std::max(least_gain * changed, least_gain_of_all * before.seconds);
   return after.seconds < before.seconds - least;
 }
 
@@ -117,9 +122,7 @@ class Beam {
   bool is_worth_visiting(FuncId f) const {
     const auto i = static_cast<size_t>(f);
     if (i < options_.kept.size() && options_.kept[i]) return false;
-    const double least =
-        std::min(smallest_share, part_of_mean / static_cast<double>(shares_.size()));
-    return share_of(f) >= least * states_[0].cost.seconds;
+    return share_of(f) >= share_in(context_.accesses, smallest_share) * states_[0].cost.seconds;
   }
 
   // A plan on the way from one of the states.
@@ -140,7 +143,9 @@ class Beam {
       bool is_better = false;
       for (Candidate& candidate : next) {
         candidate.cost = cost_.price(candidate.plan);
-        if (!is_worth_it(before[candidate.from].cost, candidate.cost, options_)) continue;
+        if (!is_worth_it(before[candidate.from].cost, candidate.cost, options_.least_gain,
+                         share_in(context_.accesses, options_.least_gain_of_all)))
+          continue;
         is_better |= candidate.cost.seconds < states_[0].cost.seconds;
         states_.push_back(candidate);
       }
