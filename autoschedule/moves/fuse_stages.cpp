@@ -5,13 +5,8 @@
 //     .0  c, y, x                                                  .0  c:4, y, x:32, unroll c, unroll x:16, vector x
 //     .1  c:4, y, x:32, r.x, unroll c, unroll x:16, vector x  =>   .1  shared with sum.0/x:32  c:4, y, x:32, r.x, ...
 //
-//   scan  root                                                   scan  root
-//     .0  y, x:16, vector x                                  =>    .0  y:8, y, x:16, vector x
-//     .1  y:8, r.x, unroll y                                       .1  shared with scan.0/y:8  y:8, r.x, unroll y
-//
-// Legal: L11: the pure definition gets the loops of the update without those of its reduction, or the outer ones of these
-// around its own; iterations of pure loops touch no elements of others, so none of them runs too early. No Func is computed
-// in loops that would be shared.
+// Legal: L11: the pure definition gets the loops of the update without those of its reduction, and iterations of pure loops
+// touch no elements of others, so none of them runs too early. No Func is computed in loops that would be shared.
 #include <algorithm>
 #include <optional>
 
@@ -26,28 +21,6 @@ bool hosts_a_func(const Plan& plan, FuncId func) {
     const Level& level = other->placement.compute;
     return level.kind == Level::Kind::At && level.loop.stage.func == func;
   });
-}
-
-// Loops of the pure definition: those that it shares with an update, and inside of them the dimensions that the update moves
-// otherwise, as they were.
-std::vector<Loop> loops_inside(std::vector<Loop> shared, const std::vector<Loop>& own) {
-  std::vector<Loop> loops = shared;
-  const auto is_shared = [&](int iterator) {
-    return std::ranges::find(shared, iterator, &Loop::iterator) != shared.end();
-  };
-  for (size_t d = 0; d < shared.size(); ++d) {
-    const bool is_last =
-        std::none_of(shared.begin() + static_cast<std::ptrdiff_t>(d) + 1, shared.end(),
-                     [&](const Loop& l) { return l.iterator == shared[d].iterator; });
-    if (!is_last || shared[d].step == 1) continue;
-    loops.emplace_back().iterator = shared[d].iterator;
-  }
-  for (Loop loop : own) {
-    if (is_shared(loop.iterator)) continue;
-    if (loop.kind == ForType::Parallel) loop.kind = ForType::Serial;
-    loops.push_back(loop);
-  }
-  return loops;
 }
 
 }  // namespace
@@ -72,17 +45,14 @@ std::vector<Plan> fuse_stages(const Plan& plan, FuncId func, const Context& cont
   const auto pure =
       static_cast<size_t>(std::ranges::find_if(nest.loops, adds_up) - nest.loops.begin());
   const size_t shared = std::min(pure, body_depth(nest));
-  const std::vector<Iterator>& iterators = context.accesses.stage(update).iterators;
   const bool has_all_dimensions =
       context.accesses.stage({func, 0}).iterators.size() ==
-      static_cast<size_t>(std::ranges::count(iterators, Iterator::Kind::Pure, &Iterator::kind));
-  if (shared == 0 || first.concurrency != Concurrency::Independent) return plans;
-  std::vector<Loop> loops = nest.loops;
-  if (!has_all_dimensions) loops.resize(shared);
-  std::erase_if(loops, adds_up);
-  for (Loop& loop : loops)  // the pure definition's iterators are its dimensions
-    loop.iterator = static_cast<int16_t>(iterators[static_cast<size_t>(loop.iterator)].dimension);
-  first.loops = has_all_dimensions ? loops : loops_inside(loops, first.loops);
+      static_cast<size_t>(std::ranges::count(context.accesses.stage(update).iterators,
+                                             Iterator::Kind::Pure, &Iterator::kind));
+  if (shared == 0 || !has_all_dimensions || first.concurrency != Concurrency::Independent)
+    return plans;
+  first.loops = nest.loops;
+  std::erase_if(first.loops, adds_up);
   nest.shared_with = LoopRef{{func, 0}, static_cast<int16_t>(shared - 1)};
   add(plans, with_func(plan, func, std::move(changed), context));
   return plans;
