@@ -48,6 +48,16 @@ bool has_lanes_of_long_sum(const Plan& plan, FuncId func, const Context& context
   return false;
 }
 
+// Whether the Func is stored in another order for Funcs that stay, and for no others.
+bool is_turned_for(const std::vector<bool>& stays, const Plan& plan, FuncId func,
+                   const Context& context) {
+  const std::vector<StageId>& readers = context.accesses.consumers(func);
+  return !std::ranges::is_sorted(plan.of(func).storage.order) && !readers.empty() &&
+         std::ranges::all_of(readers, [&](const StageId& reader) {
+           return stays[static_cast<size_t>(reader.func)];
+         });
+}
+
 }  // namespace
 
 Plan plan_from_nothing(const Plan& plan, const std::vector<bool>& kept, const Context& context) {
@@ -55,6 +65,8 @@ Plan plan_from_nothing(const Plan& plan, const std::vector<bool>& kept, const Co
   stays.resize(plan.funcs.size());
   for (size_t i = 0; i < stays.size(); ++i)
     stays[i] = stays[i] || has_lanes_of_long_sum(plan, static_cast<FuncId>(i), context);
+  for (size_t i = 0; i < stays.size(); ++i)
+    stays[i] = stays[i] || is_turned_for(stays, plan, static_cast<FuncId>(i), context);
   stays = with_hosts(plan, std::move(stays));
   const Plan undecided = undecided_plan(plan.program);
   Plan start = plan;
