@@ -229,7 +229,8 @@ class StageWork {
         count * by_lane * (moved.is_by_lane ? 1 : moved.border_share);
     if (moved.is_by_lane) return;
     if (moved.is_bent) bent_ = std::max(bent_, vectors(touch.element_bytes, touch.moved));
-    const double crossing = moved.is_unaligned ? 1 + m_.vector_bytes / double(line_bytes) : 1;
+    const double bytes = std::min(double(m_.vector_bytes), lanes_.count * touch.element_bytes);
+    const double crossing = moved.is_unaligned ? 1 + bytes / double(line_bytes) : 1;
     units += count * moved.vectors * crossing * (touch.writes ? m_.store_ns : m_.load_ns);
     units_.arithmetic += count * moved.shuffles * m_.shuffle_ns;
   }
