@@ -29,9 +29,8 @@ inline constexpr double slice_iterations = 25;
 // A block of memory whose size is unknown takes as long as so many scalar operations, each time: the heap gives it and
 // takes it back.
 inline constexpr double heap_block_operations = 400;
-// Threads begin at different times, so that they end up to a chunk apart: a half in the mean of two threads, and a quarter
-// later than if they had shared that chunk, too.
-inline constexpr double late_chunk = 0.25;
+// Threads begin and end at different times: a parallel loop takes longer by this part of a chunk.
+inline constexpr double late_chunk = 0.1;
 // A tile that a border cuts has a condition for each unrolled copy and takes longer by as much again.
 inline constexpr double guarded_copies = 1;
 // Operands of a loop that need a register for a while.

@@ -146,13 +146,14 @@ Bend bend_of(const TouchedSide& side, const TouchedSide::Move& move, const LaneL
                                                                   : Bend::Anywhere;
 }
 
-// Whether vectors begin with a line if the first one does, as far as this dimension is concerned.
-bool keeps_alignment(const TouchedSide& side, double row_bytes, const LaneLoop& lanes) {
+// Whether vectors of this size cross no line if the first one does not, as far as this dimension is concerned.
+bool keeps_alignment(const TouchedSide& side, double row_bytes, const LaneLoop& lanes,
+                     double vector_bytes) {
   const bool has_others = side.taps > 1 || side.data != 0;
-  return (!has_others || divides(line_bytes, row_bytes)) &&
+  return (!has_others || divides(vector_bytes, row_bytes)) &&
          std::ranges::all_of(side.moves, [&](const TouchedSide::Move& move) {
            return move.iterator == lanes.iterator || move.iterator == lanes.outer ||
-                  divides(line_bytes, move.slope / side.divisor * row_bytes);
+                  divides(vector_bytes, move.slope / side.divisor * row_bytes);
          });
 }
 
@@ -187,10 +188,11 @@ LaneMoves lane_moves(const Touch& touch, const Layout& layout, const LaneLoop& l
   } else if (std::abs(stride) == 1) {  // runs that lie apart are put together
     const bool is_joined = lanes.outer < 0 || outer_stride == stride * lanes.inner;
     result.vectors = is_joined ? vectors : std::max(vectors, std::ceil(lanes.count / lanes.inner));
+    const double bytes = std::min(double(line_bytes), lanes.count * touch.element_bytes);
     double row_bytes = touch.element_bytes;
     for (const int16_t dimension : layout.order) {
       const auto d = static_cast<size_t>(dimension);
-      const bool is_kept = keeps_alignment(touch.sides[d], row_bytes, lanes);
+      const bool is_kept = keeps_alignment(touch.sides[d], row_bytes, lanes, bytes);
       result.is_shifted = result.is_shifted || (!is_kept && dimension == layout.order[0]);
       result.is_unaligned = result.is_unaligned || !is_kept;
       row_bytes *= layout.extents[d];

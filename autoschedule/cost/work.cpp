@@ -250,7 +250,8 @@ class StageWork : StageLoops {
                                                : vectors(touch.element_bytes, touch.moved));
     if (moved.is_by_lane) return;
     if (moved.is_bent) bent_ = std::max(bent_, vectors(touch.element_bytes, touch.moved));
-    const double crossing = moved.is_unaligned ? 1 + m_.vector_bytes / double(line_bytes) : 1;
+    const double bytes = std::min(double(m_.vector_bytes), lanes_.count * touch.element_bytes);
+    const double crossing = moved.is_unaligned ? 1 + bytes / double(line_bytes) : 1;
     const double vector_ns = touch.writes ? m_.store_ns : m_.load_ns;
     const double scalar_ns = std::min(vector_ns, (touch.writes ? 2 : 1) * m_.scalar_ns);
     const double access_ns = lanes_.iterator >= 0 ? vector_ns : scalar_ns;

@@ -52,6 +52,7 @@ bool is_read_by_extern(const Plan& plan, FuncId func) {
     return plan.of(reader.func).opacity == Opacity::Extern;
   });
 }
+
 void compute_at_root(Plan& plan, FuncId func) {
   FuncPlan changed = plan.of(func);
   changed.placement.compute.kind = Level::Kind::Root;
