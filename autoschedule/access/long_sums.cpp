@@ -40,6 +40,14 @@ std::vector<int> reduction_of(const StageNode& stage) {
   return result;
 }
 
+bool adds_in_place(const StageNode& stage) {
+  IteratorSet loops = 0;
+  for (const int i : reduction_of(stage)) loops |= set_of(i);
+  return std::ranges::none_of(stage.write.index, [&](const IndexForm& form) {
+    return form.has_data() || (form.moved_by() & loops) != 0;
+  });
+}
+
 double terms_of(StageId stage, const SizeModel& sizes) {
   double terms = 1;
   for (const int i : reduction_of(sizes.graph().stage(stage)))

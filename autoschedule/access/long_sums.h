@@ -19,5 +19,7 @@ bool is_short_in_lanes(StageId stage, const SizeModel& sizes);
 double terms_of(StageId stage, const SizeModel& sizes);
 // The iterators of an update's reduction, innermost first.
 std::vector<int> reduction_of(const StageNode& stage);
+// Whether all of the reduction is for the same elements: neither a scan nor a scatter.
+bool adds_in_place(const StageNode& stage);
 
 }  // namespace retrograde::planning

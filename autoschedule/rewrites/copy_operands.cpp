@@ -50,7 +50,7 @@ class OperandCopier {
     return points(stage) * static_cast<double>(stage.reads.size());
   }
   static bool is_contraction(const StageNode& stage) {
-    return stage.id.stage > 0 && !reduction_of(stage).empty();
+    return stage.id.stage > 0 && !reduction_of(stage).empty() && adds_in_place(stage);
   }
 
   void copy(const FuncNode& node, const StageNode& stage) const {

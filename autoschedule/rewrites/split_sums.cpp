@@ -110,17 +110,8 @@ class SumSplitter {
 
   // ---- few elements ----
 
-  // Whether all terms of the reduction are for the same elements.
-  static bool stays_in_place(const StageNode& stage) {
-    IteratorSet loops = 0;
-    for (const int i : reduction_of(stage)) loops |= set_of(i);
-    return std::ranges::none_of(stage.write.index, [&](const IndexForm& form) {
-      return form.has_data() || (form.moved_by() & loops) != 0;
-    });
-  }
-
   bool is_sum_to_few(const FuncNode& node, const StageNode& stage) const {
-    if (terms_of(stage.id, sizes_) < many_terms || !stays_in_place(stage)) return false;
+    if (terms_of(stage.id, sizes_) < many_terms || !adds_in_place(stage)) return false;
     int64_t elements = 1;
     for (size_t i = 0; i < stage.iterators.size(); ++i) {
       const auto iterator = static_cast<int>(i);

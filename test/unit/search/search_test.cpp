@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "autoschedule/search/fit_memory.h"
 #include "autoschedule/search/start.h"
 #include "unit/plan/plan_testing.h"
 
@@ -56,6 +57,34 @@ TEST_F(SearchTest, SerialLoopsBecomeParallelVectorsAndProducersMove) {
   EXPECT_NE(text.find("vector x"), std::string::npos) << text;
   EXPECT_EQ(text.find("rows  root"), std::string::npos) << text;
   EXPECT_EQ(broken_invariant(best.plan), "");
+}
+
+TEST_F(SearchTest, FuncsThatAreToBeAtRootStayThere) {
+  SearchOptions options;
+  options.at_root.assign(start.funcs.size(), false);
+  options.at_root[static_cast<size_t>(id("heavy"))] = true;
+  const std::string text = plain_text(found(options).found[0].plan);
+  EXPECT_NE(text.find("heavy  root"), std::string::npos) << text;
+}
+
+// heavy has 1002 x 802 elements and rows 1000 x 802, of 4 bytes, and both are alive at once.
+TEST_F(SearchTest, FuncsLeaveMemoryUntilTheyFit) {
+  CostModel cost(*accesses, *sizes, machine);
+  Dependences dependences(*accesses);
+  const Context context{*accesses, *sizes, machine, dependences};
+  const auto fitted = [&](double most_bytes, double most_seconds) {
+    SearchOptions options;
+    options.most_bytes = most_bytes;
+    return fit_memory({start, cost.price(start), {}}, context, cost, options, most_seconds);
+  };
+  const double all = 4 * (1002 + 1000) * 802.0;
+  EXPECT_EQ(cost.price(start).peak_bytes, all);
+  EXPECT_TRUE(fitted(all, 1).plan == start);
+  EXPECT_TRUE(fitted(all / 2, 0).plan == start) << "it takes longer than it may";
+  const FoundPlan half = fitted(all * 0.6, 1);
+  EXPECT_LE(half.cost.peak_bytes, all * 0.6);
+  EXPECT_GT(half.cost.peak_bytes, 0.1 * all) << "no more than has to leave memory";
+  EXPECT_EQ(broken_invariant(half.plan), "");
 }
 
 TEST_F(SearchTest, AWiderSearchFindsNothingSlower) {
