@@ -9,6 +9,7 @@
 
 #include "gradient/gradient_check.h"
 #include "graph/graph.h"
+#include "support/rules_schedule.h"
 #include "support/schedule_log.h"
 #include "support/variables.h"
 
@@ -31,7 +32,7 @@ bool runs_along_rows(const Func& f, int update = 0) {
 }
 
 Func scheduled(Func f) {
-  Pipeline(f).auto_schedule(get_host_target());
+  schedule_by_rules(f);
   return f;
 }
 
@@ -94,7 +95,7 @@ TEST(RowReductions, PayWithMuchArithmetic) {
 
 TEST(RowReductions, HaveTheSameBitsOnAnyNumberOfThreads) {
   Pipeline pipeline(reduction(sum_up, 5000));
-  pipeline.auto_schedule(get_host_target());
+  schedule_by_rules(pipeline);
   pipeline.jit_handlers().thread_limit = 1;
   const Buffer<float> one = pipeline.realize({rows});
   for (const int threads : {2, 4}) {
@@ -203,7 +204,7 @@ TEST(RowReductions, AreNotMadeWithoutLayoutStaging) {
   const Func f = reduction(sum_up, 1000);
   AutoscheduleOptions options;
   options.without = {Decision::LayoutStaging};
-  Pipeline(f).auto_schedule(get_host_target(), options);
+  schedule_by_rules(f, get_host_target(), options);
   EXPECT_FALSE(runs_along_rows(f));
 }
 
@@ -249,7 +250,7 @@ TEST(RowReductions, FindTheFirstOrLastOfEqualExtremes) {
 
 TEST(RowReductions, FindThePlacesOfExtremesInLanes) {
   Pipeline pipeline(Extremes(true, true).gradient);
-  pipeline.auto_schedule(get_host_target());
+  schedule_by_rules(pipeline);
   const ScheduleLog log = pipeline.schedule_log();
   EXPECT_TRUE(any_directive<graph::FactorOut>(log)) << log.to_text();
 }

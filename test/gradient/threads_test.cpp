@@ -26,11 +26,13 @@ class LargeGradients : public ::testing::TestWithParam<LargeProgram> {
     if (program.store_overwritten) options.overwritten = Overwritten::Store;
     return propagate_adjoints(program.loss, options);
   }
-  // All gradients in one call.
+  // All gradients in one call, scheduled for large machines: for few threads, less would run in parallel.
   Pipeline pipeline(const Derivative& d) const {
     std::vector<Func> funcs;
     for (const Buffer<float>& input : program.inputs) funcs.push_back(d(input));
-    return Pipeline(funcs);
+    Pipeline pipeline(funcs);
+    pipeline.set_autoschedule({.threads = planning::threads_of_large_machines});
+    return pipeline;
   }
   Outcome run(Pipeline& p, int threads, bool backward) const {
     Outcome result;
