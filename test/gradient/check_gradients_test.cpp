@@ -64,6 +64,7 @@ TEST_F(CheckGradients, NothingIsCompiledTwice) {
     check_gradients(loss, {}, {.wrt = {image}});
   }
   EXPECT_GE(compiled.size(), 5u);
+  compiled.erase("chosen");  // schedules that auto_schedule() compares
   for (const auto& [pipeline, times] : compiled) EXPECT_LE(times, 3) << pipeline;
 }
 
