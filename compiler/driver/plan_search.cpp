@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "autoschedule/machine/kept_machine.h"
+#include "autoschedule/moves/edit.h"
 #include "autoschedule/search/fit_memory.h"
 #include "autoschedule/search/start.h"
 #include "graph/directives/give_directive.h"
@@ -61,6 +62,29 @@ std::vector<const char*> moves_of(Decision decision) {
       return {"reduction_lanes"};
   }
   return {};
+}
+
+// Whether the Func takes terms in lanes: its bits depend on them.
+bool adds_in_lanes(const Plan& plan, FuncId func, const planning::Context& context) {
+  for (size_t s = 0; s < plan.of(func).nests.size(); ++s) {
+    const planning::StageId stage{func, static_cast<int16_t>(s)};
+    const auto adds = [&](const planning::Loop& loop) {
+      return loop.kind == ForType::Vectorized && loop.iterator >= 0 &&
+             planning::moves::is_reduction(context, stage, loop.iterator);
+    };
+    if (std::ranges::any_of(plan.nest(stage).loops, adds)) return true;
+  }
+  return false;
+}
+
+// A plan that may take the place of the rules' has their bits.
+void keep_bits(planning::SearchOptions& beam, const Plan& rules, const planning::Context& context) {
+  for (size_t f = 0; f < beam.kept.size(); ++f) {
+    if (adds_in_lanes(rules, static_cast<FuncId>(f), context)) beam.kept[f] = true;
+  }
+  for (const planning::Move& move : planning::all_moves()) {
+    if (move.changes_bits) beam.without.insert(move.name);
+  }
 }
 
 bool is_among(const FuncPtr& f, const std::vector<FuncName>& names) {
@@ -120,6 +144,7 @@ PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
     result.result.start = {result.rules, cost.price(result.rules), {}};
     beam.most_bytes += result.result.start.cost.peak_bytes;
   }
+  if (search.start == SearchStart::NothingBesideRules) keep_bits(beam, result.rules, context);
   if (search.start == SearchStart::Both)
     result.result = planning::search(result.rules, context, cost, beam);
   // The other start is known to be slow, so small gains count, too.
