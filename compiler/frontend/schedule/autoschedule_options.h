@@ -65,11 +65,11 @@ struct AutoscheduleOptions {
   // outputs, twice the largest Func of the differentiated program, and everything that fits the caches; then
   // no Func is recomputed if that takes much longer than its memory round trip.
   int64_t memory_budget = 0;
-  // Starts a beam search over changes of the whole schedule, from that of the rules and from one in which nothing
-  // is decided, guided by a cost model (docs/autoscheduler.md). It takes up to seconds, needs sizes that are known
-  // or estimated, and never chooses a schedule that the model predicts to be slower. The result depends only on
-  // the program, the options and the figures of the machine. Another machine or number of threads may get another
-  // schedule, whose last bits may differ.
+  // Searches wider than the default: a beam over changes of the whole schedule, from that of the rules and from one
+  // in which nothing is decided, guided by a cost model (docs/autoscheduler.md). It takes up to seconds, needs sizes
+  // that are known or estimated, and never chooses a schedule that the model predicts to be slower. The result
+  // depends only on the program, the options and the figures of the machine. Another machine or number of threads
+  // may get another schedule, whose last bits may differ; so may those of the default, which adds in another order.
   bool search = false;
   // false: scatters at data-dependent indices may become parallel atomic() updates, if that takes less memory
   // or is the only source of parallelism. Results may then differ in the last bits from run to run.
