@@ -68,8 +68,8 @@ struct AutoscheduleOptions {
   // Searches wider than the default: a beam over changes of the whole schedule, from that of the rules and from one
   // in which nothing is decided, guided by a cost model (docs/autoscheduler.md). It takes up to seconds, needs sizes
   // that are known or estimated, and never chooses a schedule that the model predicts to be slower. The result
-  // depends only on the program, the options and the figures of the machine. Another machine or number of threads
-  // may get another schedule, whose last bits may differ; so may those of the default, which adds in another order.
+  // depends only on the program, the options and the figures of the machine. Its last bits may differ from those of
+  // the default schedule, and from those on another machine or for another number of threads.
   bool search = false;
   // false: scatters at data-dependent indices may become parallel atomic() updates, if that takes less memory
   // or is the only source of parallelism. Results may then differ in the last bits from run to run.
