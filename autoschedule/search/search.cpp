@@ -15,7 +15,7 @@ constexpr double worth_another_sweep = 0.98;  // of the time before the last one
 constexpr int moves_of_a_func = 2;            // one after another, in one visit
 // Plans that go on within a visit although others are faster so far: the next move may gain more from them.
 constexpr size_t spare_paths = 1;
-constexpr int64_t prices_per_func = 200;      // for each plan of the beam
+constexpr int64_t prices_per_func = 200;  // for each plan of the beam
 // A Func with a small share of the whole time is only computed elsewhere, or stored in another order, which its consumers
 // may gain from; one with less is not visited.
 constexpr double small_share = 0.01, smallest_share = 0.002;
