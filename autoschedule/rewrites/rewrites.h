@@ -10,8 +10,8 @@
 //                                        p(j, i) += a(k, i) * b_in_p(j, k)
 //
 // No plan can split a sum or copy an operand, so this happens before. Nothing is said about loops and places: where a
-// partial sum runs, and whether a copy is worth its time, is for the search to decide. A copy starts inlined, which is
-// as if it did not exist. How sums are split depends on the program alone, never on the machine or the count of
+// partial sum runs, and whether a copy is worth its time, is for the search to decide. A copy starts at root, and the
+// search may inline it. How sums are split depends on the program alone, never on the machine or the count of
 // threads, and so does every bit.
 #pragma once
 

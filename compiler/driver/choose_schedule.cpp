@@ -198,8 +198,8 @@ ChosenSchedule choose_schedule(const std::vector<FuncPtr>& outputs, const Schedu
   if (is_wide) options.width = wide;
   options.start = is_wide ? SearchStart::Both : SearchStart::NothingBesideRules;
   options.what = what;
-  const planning::Machine machine = wants_report ? search_machine(request.options, lowering.target)
-                                                 : autoschedule::machine_of(request);
+  const planning::Machine machine = is_wide ? search_machine(request.options, lowering.target)
+                                            : autoschedule::machine_of(request);
   try {
     const PlanSearch found =
         search_plans(rules.graph.outputs, outputs, request.options, machine, options);

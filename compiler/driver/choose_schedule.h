@@ -2,7 +2,7 @@
 //
 //   options            what is taken
 //   (none)             the plan of the least cost to which a descent over moves leads (plan_search.h). It is the same on
-//                      every machine, since figures are those of the target, and adds in the order of the rules' schedule
+//                      every machine, since figures are those of the target. No move in it reorders the terms of a sum
 //   search=true        the same with a wider beam, and with the figures of this machine where it was measured
 //
 // The schedule of the rules (autoschedule/default_schedule.h, memory_budget.h) stays where nothing is clearly better, or

@@ -29,7 +29,7 @@ constexpr double worth_fitting = 1.25;
 
 bool is_adjoint(const FuncPtr& f) { return f->made.has_value(); }
 
-// The same by number, with Funcs that keep directives before an rfactor, and what it made from their loops.
+// By number: the named Funcs, Funcs that keep directives before an rfactor, and the Funcs that it made from their loops.
 std::vector<bool> kept_funcs(const Plan& plan, std::unordered_set<std::string> kept) {
   for (const FuncPtr& f : plan.program->funcs) {
     if (graph::can_reset_loops(*f)) continue;
@@ -77,7 +77,7 @@ bool adds_in_lanes(const Plan& plan, FuncId func, const planning::Context& conte
   return false;
 }
 
-// A plan that may take the place of the rules' has their bits.
+// Forbids what changes the order in which elements take their terms in the rules' plan.
 void keep_bits(planning::SearchOptions& beam, const Plan& rules, const planning::Context& context) {
   for (size_t f = 0; f < beam.kept.size(); ++f) {
     if (adds_in_lanes(rules, static_cast<FuncId>(f), context)) beam.kept[f] = true;

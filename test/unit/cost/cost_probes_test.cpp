@@ -645,12 +645,17 @@ TEST_F(CostProbes, ARecurrenceAlongALineWaitsForItself) {
 
 // ---- data-dependent indices ----
 
-TEST_F(CostProbes, ATableIsReadALineAnElement) {
+// An element of a table at a place that data give, with any value.
+Expr looked_up(const Var& column, const Var& row, int elements) {
   ImageParam places(Int(32), 2, "places"), table(Float(32), 1, "table");
   places.dim(0).set_estimate(0, 4096);
   places.dim(1).set_estimate(0, 2048);
-  table.dim(0).set_estimate(0, 1 << 26);
-  out(x, y) = table(clamp(places(x, y), 0, (1 << 26) - 1));
+  table.dim(0).set_estimate(0, elements);
+  return table(clamp(places(column, row), 0, elements - 1));
+}
+
+TEST_F(CostProbes, ATableIsReadALineAnElement) {
+  out(x, y) = looked_up(x, y, 1 << 26);
   const Cost cost = cost_of("out  root  y, x:16, vector x\n");
   EXPECT_GT(memory_bytes(cost), 4.0 * (1 << 26));
   EXPECT_GT(cost.stages[0].compute_seconds, columns * rows * 0.35e-9);
@@ -658,11 +663,7 @@ TEST_F(CostProbes, ATableIsReadALineAnElement) {
 
 // A table of 4 MB, of which L2 holds a fifth.
 TEST_F(CostProbes, EachLookUpInALargeTableIsALine) {
-  ImageParam places(Int(32), 2, "places"), table(Float(32), 1, "table");
-  places.dim(0).set_estimate(0, 4096);
-  places.dim(1).set_estimate(0, 2048);
-  table.dim(0).set_estimate(0, 1 << 20);
-  out(x, y) = table(clamp(places(x, y), 0, (1 << 20) - 1));
+  out(x, y) = looked_up(x, y, 1 << 20);
   const StageCost cost = cost_of("out  root  y, x:16, vector x\n").stages[0];
   EXPECT_NEAR(cost.bytes[2] / (columns * rows), 0.8 * 64, 2);
 }
