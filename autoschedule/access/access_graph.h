@@ -97,6 +97,7 @@ struct StageNode {
   std::vector<Access> reads;  // in the order of the expressions; equal ones once
   Guard guard;                // the predicate
   std::vector<OperationCount> operations;
+  bool needs_host = false;  // it calls what no kernel can: C functions, print, traced loads
 };
 
 struct FuncNode {

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "graph/definitions/own_reads.h"
+#include "graph/definitions/parameter_contents.h"
 #include "ir/build.h"
 #include "ir/lets.h"
 #include "ir/visit.h"
@@ -74,6 +75,7 @@ StageNode StageReader::read() {
   for_each_guarded_call(roots, values_, nodes_,
                         [&](const Call& call, const Guard& guard) { read_call(call, guard); });
   node.reads = std::move(reads_);
+  node.needs_host = needs_host_;
   if (f_.is_extern()) read_extern(node);
   count_operations(node);
   node.iterators = std::move(iterators_);
@@ -99,7 +101,16 @@ Value StageReader::place_of(const std::vector<IndexForm>& index) {
   return places.empty() ? Value() : numbers_.combine(std::move(what), pointers_to(places));
 }
 
+bool StageReader::needs_host(const Call& call) {
+  if (call.call_type == CallType::Extern) return true;
+  constexpr Op of_host[] = {Op::print, Op::print_when, Op::require, Op::trace, Op::runtime_call};
+  if (std::ranges::any_of(of_host, [&](Op op) { return call.is_op(op); })) return true;
+  const auto image = std::dynamic_pointer_cast<graph::ParameterContents>(call.symbol.lock());
+  return image && image->trace.loads;
+}
+
 void StageReader::read_call(const Call& call, const Guard& guard) {
+  needs_host_ = needs_host_ || needs_host(call);
   const bool is_access = call.call_type == CallType::Func || call.call_type == CallType::Image;
   if (is_access)
     read_access(call, guard);

@@ -63,6 +63,7 @@ class StageReader {
  private:
   void read_extern(StageNode& node);
   void read_call(const Call& call, const Guard& guard);
+  static bool needs_host(const Call& call);
   void read_access(const Call& call, const Guard& guard);
   void count_operations(StageNode& node);
   void count(const Expr& e);
@@ -79,6 +80,7 @@ class StageReader {
   StageValues values_;
   std::vector<Expr> args_, stored_;  // stored: values and predicate
   std::vector<Access> reads_;
+  bool needs_host_ = false;
   std::unordered_map<size_t, std::vector<size_t>> reads_by_hash_;
   std::unordered_set<const ir::ExprNode*> counted_nodes_, in_arms_;
   std::map<std::pair<std::string, Value>, OperationCount> counted_;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "autoschedule/access/sizes.h"
+#include "autoschedule/machine/device.h"
 #include "autoschedule/machine/machine.h"
 #include "autoschedule/plan/plan.h"
 
@@ -41,8 +42,9 @@ struct Cost : Totals {
 
 class CostModel {
  public:
-  // All are referred to.
-  CostModel(const AccessGraph& accesses, const SizeModel& sizes, const Machine& machine);
+  // All are referred to. Kernels take the time that they take on the device.
+  CostModel(const AccessGraph& accesses, const SizeModel& sizes, const Machine& machine,
+            const Device* device = nullptr);
   ~CostModel();
   CostModel(const CostModel&) = delete;
   CostModel& operator=(const CostModel&) = delete;

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "autoschedule/cost/assumptions.h"
-#include "autoschedule/cost/group.h"
+#include "autoschedule/cost/terms.h"
 
 namespace retrograde::planning {
 
@@ -55,6 +55,7 @@ bool is_small(const StageRun& run, const Group& group) {
 }  // namespace
 
 void add_inner_lanes(const SizeModel& sizes, const Machine& machine, Group& group) {
+  if (has_kernels(group)) return;
   for (StageRun& run : group.runs) {
     const int depth = run.nest.lanes.iterator < 0 ? innermost_serial(run, group) : -1;
     if (depth < 0) continue;

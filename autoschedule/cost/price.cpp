@@ -24,10 +24,12 @@ struct KeyHash {
 
 class CostModel::Prices {
  public:
-  Prices(const AccessGraph& accesses, const SizeModel& sizes, const Machine& machine)
+  Prices(const AccessGraph& accesses, const SizeModel& sizes, const Machine& machine,
+         const Device* device)
       : graph_(accesses),
         sizes_(sizes),
         machine_(machine),
+        device_(device),
         facts_(sizes, machine),
         groups_(accesses),
         supply_(machine, accesses.funcs().size(),
@@ -52,6 +54,7 @@ class CostModel::Prices {
   const AccessGraph& graph_;
   const SizeModel& sizes_;
   const Machine& machine_;
+  const Device* const device_;
   FactsOfStages facts_;
   std::unordered_map<Key, GroupPrice, KeyHash> known_;
 
@@ -113,6 +116,11 @@ class CostModel::Prices {
     if (const GroupPrice* found = ir::find_or_null(known_, key)) return *found;
     const Group group = group_of(plan, planned, covers, sizes_, machine_, facts_);
     GroupPrice price;
+    if (device_ && has_kernels(group)) {
+      for (const StageRun& run : group.runs)
+        price.stages.push_back(kernel_cost(run, group, *device_, machine_));
+      return known_.emplace(std::move(key), std::move(price)).first->second;
+    }
     price.traffic = traffic_of(group, machine_);
     for (const StageRun& run : group.runs) price.stages.push_back(cost_of(run, group));
     for (const auto& [buffer, stored] : group.buffers)
@@ -143,8 +151,9 @@ class CostModel::Prices {
   }
 };
 
-CostModel::CostModel(const AccessGraph& accesses, const SizeModel& sizes, const Machine& machine)
-    : prices_(std::make_unique<Prices>(accesses, sizes, machine)) {}
+CostModel::CostModel(const AccessGraph& accesses, const SizeModel& sizes, const Machine& machine,
+                     const Device* device)
+    : prices_(std::make_unique<Prices>(accesses, sizes, machine, device)) {}
 CostModel::~CostModel() = default;
 
 Cost CostModel::price(const Plan& plan) { return prices_->price(plan); }

@@ -152,9 +152,9 @@ void CacheSupply::find_stages(size_t g) {
       const double parallel = std::max(0.0, in.parallel - out.parallel);
       const Machine::Level& from = machine_.levels[level];
       const double shared = machine_.threads == 1 ? from.one_thread : from.all_threads;
-      stage.bytes[level] = serial + parallel;
+      stage.bytes[level] += serial + parallel;
       const double moving_ns = serial / from.one_thread + parallel / shared;
-      stage.memory_seconds[level] = overlapped(moving_ns, in.waiting_ns) * nanosecond;
+      stage.memory_seconds[level] += overlapped(moving_ns, in.waiting_ns) * nanosecond;
     }
     const double memory = stage.all_memory_seconds();
     stage.seconds = overlapped(stage.compute_seconds, memory) + stage.launch_seconds;

@@ -12,7 +12,7 @@
 namespace retrograde::planning {
 
 struct GroupPrice {
-  std::vector<StageCost> stages;  // without memory
+  std::vector<StageCost> stages;  // without the memory of the processor
   GroupTraffic traffic;
   double allocated_bytes = 0;  // for Funcs that are computed in its loops
 };

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "autoschedule/cost/cost.h"
 #include "autoschedule/cost/group.h"
 
 namespace retrograde::planning {
@@ -45,5 +46,12 @@ struct GroupTraffic {
   std::vector<std::pair<int, double>> touched;  // each buffer with its bytes, the largest first
 };
 GroupTraffic traffic_of(const Group& group, const Machine& machine);
+
+// ---- devices ----
+
+bool has_kernels(const Group& group);
+// The time and the bytes of a stage that is a kernel, or that runs in the loops of one.
+StageCost kernel_cost(const StageRun& run, const Group& group, const Device& device,
+                      const Machine& machine);
 
 }  // namespace retrograde::planning

@@ -18,6 +18,12 @@ struct Device {
   int64_t shared_bytes = 48 << 10;  // of a block
   int64_t l2_bytes = 2 << 20;
   double bytes_per_ns = 200;  // bandwidth of device memory
+  double l2_bytes_per_ns = 600, l1_bytes_per_ns = 1000;
+  int64_t l1_bytes = 64 << 10;      // of a multiprocessor
+  double operations_per_ns = 1500;  // sums and products of all multiprocessors
+  // An iteration of a serial loop, whose loads and sums wait for those of the iteration before.
+  double iteration_ns = 15;
+  double launch_ns = 4000;
 
   // ---- Launches ----
 

@@ -14,6 +14,8 @@ namespace retrograde::planning::moves {
 // Whether the plan expresses the Func, all of its loops run on the processor, and each is a step of one iterator that
 // stands outside of smaller steps (L8).
 bool is_editable(const Plan& plan, FuncId func);
+// The same, but loops of a device may change where the program is for one.
+bool is_editable(const Plan& plan, FuncId func, const Context& context);
 // Whether it is also computed somewhere, so that it has loops.
 bool has_loops(const Plan& plan, FuncId func);
 // Whether iterations of a loop over the iterator may run in any order, and concurrently (L1, L6): they access different
@@ -92,10 +94,22 @@ double product_of(const std::vector<int64_t>& extents);
 // The Func in a loop, with loops of its own as before, none of them parallel.
 FuncPlan moved_inside(FuncPlan plan, const Placement& placement);
 // Loops for all stages of a changed Func of the plan, whose dimensions have these extents, along rows as they are stored:
-// lanes of the first dimension inside, then the reduction, then the other dimensions; in parallel at root. `min_lanes`:
-// fewer aren't used.
+// lanes of the first dimension inside, then the reduction, then the other dimensions; in parallel at root, or as kernels of
+// a device. `min_lanes`: fewer aren't used.
 void run_along_rows(FuncPlan& changed, const Plan& plan, const Context& context, FuncId func,
                     const Cover& extents, int64_t min_lanes);
+bool is_kernel(const Nest& nest);
+// Whether a kernel can compute the stage, with what is inlined into it: it calls nothing of the host.
+bool may_be_kernel(const Plan& plan, const Context& context, StageId stage);
+// The threads of a block: so many along the first iterator, and the others along those that follow in memory.
+struct KernelShape {
+  int64_t along_first = 0;
+  int16_t first = -1;  // -1: the one whose elements lie together
+};
+// A grid over the iterators whose iterations may run at once, with serial loops inside of its threads; one thread if there is
+// none. Updates that may meet are atomic where their order changes no bit, or may.
+Nest kernel_loops(const Plan& plan, const Context& context, StageId stage,
+                  const std::vector<int16_t>& order, const KernelShape& shape);
 // Makes a dimension the innermost one in memory.
 void store_first(Storage& storage, int dimension);
 // Makes the outermost loops of a stage at root parallel until there are enough chunks of work for the threads, inside of

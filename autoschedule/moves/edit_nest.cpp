@@ -83,6 +83,12 @@ bool is_editable(const Plan& plan, FuncId func) {
   return own.opacity == Opacity::None && in_memory && std::ranges::all_of(own.nests, is_plain);
 }
 
+bool is_editable(const Plan& plan, FuncId func, const Context& context) {
+  const FuncPlan& own = plan.of(func);
+  return is_editable(plan, func) ||
+         (context.device && own.opacity == Opacity::None && own.storage.memory == MemoryType::Auto);
+}
+
 bool has_loops(const Plan& plan, FuncId func) {
   const Level::Kind kind = plan.of(func).placement.compute.kind;
   return is_editable(plan, func) && (kind == Level::Kind::Root || kind == Level::Kind::At);
@@ -368,9 +374,14 @@ void run_along_rows(FuncPlan& changed, const Plan& plan, const Context& context,
                     const Cover& extents, int64_t min_lanes) {
   for (size_t s = 0; s < changed.nests.size(); ++s) {
     const StageId stage{func, static_cast<int16_t>(s)};
+    const bool is_at_root = changed.placement.compute.kind == Level::Kind::Root;
+    if (context.device && is_at_root && may_be_kernel(plan, context, stage)) {
+      const KernelShape shape{context.device->warp_size};
+      changed.nests[s] = kernel_loops(plan, context, stage, changed.storage.order, shape);
+      continue;
+    }
     changed.nests[s] = row_loops(plan, context, stage, changed.storage.order, extents, min_lanes);
-    if (changed.placement.compute.kind == Level::Kind::Root &&
-        is_worth_a_launch(plan, context, stage))
+    if (is_at_root && is_worth_a_launch(plan, context, stage))
       run_in_parallel(changed.nests[s], context, stage);
   }
 }

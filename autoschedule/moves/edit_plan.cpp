@@ -90,15 +90,18 @@ class FuncChange {
   // The loops over the reduction, where neighbours of one iterator count as one: steps of it change no order.
   std::vector<LoopStep> reduction_loops(StageId stage, const Nest& nest) const {
     std::vector<LoopStep> loops;
-    for (const Loop& loop : nest.loops) {
+    for (const Loop& loop : plain(stage, nest).loops) {
       if (!is_reduction(context_, stage, loop.iterator)) continue;
-      const bool at_once = loop.kind == ForType::Vectorized || loop.kind == ForType::Parallel;
+      const bool at_once = loop.kind == ForType::Vectorized || runs_at_once(loop.kind);
       const bool is_next = !loops.empty() && loops.back().iterator == loop.iterator &&
                            loops.back().is_concurrent == at_once;
       if (is_next) loops.pop_back();
       loops.push_back({loop.iterator, loop.step, at_once});
     }
     return loops;
+  }
+  Nest plain(StageId stage, const Nest& nest) const {
+    return unfused(nest, static_cast<int>(context_.accesses.stage(stage).iterators.size()));
   }
   static bool are_alike(const std::vector<LoopStep>& a, const std::vector<LoopStep>& b) {
     return std::ranges::equal(a, b, [](const LoopStep& s, const LoopStep& t) {
@@ -107,10 +110,10 @@ class FuncChange {
   }
   // Whether loops that run at once, and are neither atomic nor vouched for, may.
   bool are_independent(StageId stage) const {
-    const Nest& nest = new_nest(stage);
+    const Nest nest = plain(stage, new_nest(stage));
     for (size_t d = 0; d < nest.loops.size(); ++d) {
       const ForType kind = nest.loops[d].kind;
-      const bool at_once = kind == ForType::Vectorized || kind == ForType::Parallel;
+      const bool at_once = kind == ForType::Vectorized || runs_at_once(kind);
       if (at_once && nest.concurrency == Concurrency::Independent &&
           !may_run_at_once(context_, stage, nest, d))
         return false;
@@ -121,7 +124,8 @@ class FuncChange {
     if (terms_ == Terms::InAnyOrder) return true;
     for (size_t s = 0; s < changed_.nests.size(); ++s) {
       const StageId stage{func_, static_cast<int16_t>(s)};
-      if (old_nest(stage) == new_nest(stage)) continue;
+      const bool is_atomic = new_nest(stage).concurrency == Concurrency::Atomic;
+      if (old_nest(stage) == new_nest(stage) || (context_.device && is_atomic)) continue;
       if (!are_independent(stage)) return false;
       const std::vector<LoopStep> loops = reduction_loops(stage, new_nest(stage));
       if (are_alike(loops, reduction_loops(stage, old_nest(stage)))) continue;

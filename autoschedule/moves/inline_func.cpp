@@ -19,7 +19,8 @@ int64_t body_size(const Plan& plan, const Context& context, StageId stage) {
 
 std::vector<Plan> inline_func(const Plan& plan, FuncId func, const Context& context) {
   const graph::FuncContents& f = *plan.program->funcs[static_cast<size_t>(func)];
-  if (!is_editable(plan, func) || f.stage_count() > 1 || is_output(*plan.program, func)) return {};
+  if (!is_editable(plan, func, context) || f.stage_count() > 1 || is_output(*plan.program, func))
+    return {};
   FuncPlan inlined;
   inlined.placement.compute.kind = Level::Kind::Inline;
   inlined.nests = {loops_of_definition(f, 0)};
@@ -29,6 +30,7 @@ std::vector<Plan> inline_func(const Plan& plan, FuncId func, const Context& cont
   for (const StageId reader : all_readers(*result, context, func)) {
     if (result->of(reader.func).opacity != Opacity::None) return {};
     if (is_inlined(*result, reader.func)) continue;
+    if (is_kernel(result->nest(reader)) && !may_be_kernel(*result, context, reader)) return {};
     const int64_t before = body_size(plan, context, reader);
     const int64_t size = body_size(*result, context, reader);
     if (size > before && size > most_body_operations) return {};

@@ -17,11 +17,14 @@
 //   L5   the code that inlining and unrolling make is bounded
 //   L6   iterations that run in parallel write different elements
 //   L7   no chain of additions gets longer than one may be (access/long_sums.h)
-//   L8   no extern stage, no opaque Func and no loop of a device changes
+//   L8   no extern stage, no opaque Func and, for processors, no loop of a device changes
 //   L9   windows that are stored keep the rows that are read again
 //   L11  loops that stages share stay equal
 //
-// The design has one more: L10 is about devices.
+// On a device (`Context::device`), `root` makes kernels, and only `inline_func`, `root`, `kernels` and `compute_in_thread` have
+// plans for them:
+//
+//   L10  a kernel calls nothing of the host
 #pragma once
 
 #include <span>
@@ -29,6 +32,7 @@
 
 #include "autoschedule/access/dependences.h"
 #include "autoschedule/access/sizes.h"
+#include "autoschedule/machine/device.h"
 #include "autoschedule/machine/machine.h"
 #include "autoschedule/plan/plan.h"
 
@@ -40,7 +44,10 @@ struct Context {
       accesses;  // of the program's outputs; its Funcs have the numbers of the plan's
   const SizeModel& sizes;
   const Machine& machine;
-  Dependences& dependences;  // of the same access graph
+  Dependences& dependences;        // of the same access graph
+  const Device* device = nullptr;  // whose kernels the program is; null: the processor runs it
+  bool any_order =
+      false;  // floats may be added up in any order, so that bits differ from run to run
 };
 
 // Plans that differ from `plan` in how `func` runs, and in some cases its operands and consumers. All invariants hold for

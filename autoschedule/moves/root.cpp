@@ -8,7 +8,8 @@
 namespace retrograde::planning::moves {
 
 std::vector<Plan> root(const Plan& plan, FuncId func, const Context& context) {
-  if (!is_editable(plan, func) || plan.of(func).placement.compute.kind == Level::Kind::Root ||
+  if (!is_editable(plan, func, context) ||
+      plan.of(func).placement.compute.kind == Level::Kind::Root ||
       !has_bounded_region(plan, context, func))
     return {};
   FuncPlan changed = plan.of(func);

@@ -111,4 +111,25 @@ std::vector<size_t> split_order(const std::vector<Part>& parts) {
   return order;
 }
 
+Nest unfused(const Nest& nest, int iterators) {
+  Nest result = nest;
+  std::erase_if(result.loops, [](const Loop& loop) { return loop.iterator == once; });
+  result.fusions.clear();
+  for (size_t d = 0; d < result.loops.size();) {
+    const Loop fused = result.loops[d];
+    if (fused.iterator < iterators) {
+      ++d;
+      continue;
+    }
+    const Fusion& both = nest.fusions[static_cast<size_t>(fused.iterator - iterators)];
+    Loop outer = fused, inner = fused;
+    static_cast<Part&>(outer) = both.outer;
+    static_cast<Part&>(inner) = both.inner;
+    const auto at = result.loops.begin() + static_cast<std::ptrdiff_t>(d);
+    *at = outer;
+    result.loops.insert(at + 1, inner);
+  }
+  return result;
+}
+
 }  // namespace retrograde::planning

@@ -21,6 +21,9 @@ std::vector<Part> parts_of(const Nest& nest, int iterator);
 const Part* next_larger(const Nest& nest, int iterator, int64_t step);
 const Part* next_smaller(const std::vector<Part>& parts, int64_t step);
 
+// The same loops without fusions and loops that run once: each fused loop is both of its loops, the outer one first.
+Nest unfused(const Nest& nest, int iterators);
+
 // Whether a loop of the same iterator with a larger step is inside of this one: the loop runs over remainders.
 bool is_phase(const Nest& nest, size_t depth);
 

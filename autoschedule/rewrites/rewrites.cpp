@@ -14,6 +14,10 @@ std::vector<graph::FuncPtr> with_rewrites(const std::vector<graph::FuncPtr>& out
   const auto may_change = [&](const graph::FuncContents& f) {
     return !f.is_extern() && !graph::has_directives(f) && !options.kept.contains(f.name);
   };
+  if (options.for_device.device) {
+    split_for_device(result, options.for_device, may_change);
+    return graph::apply_wrappers(result);
+  }
   if (options.splits_sums) split_sums(result, may_change);
   if (options.copies_operands) copy_operands(result, may_change);
   return graph::apply_wrappers(result);

@@ -19,6 +19,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "autoschedule/rewrites/split_for_device.h"
 #include "graph/function.h"
 
 namespace retrograde::planning {
@@ -27,6 +28,7 @@ namespace retrograde::planning {
 struct RewriteOptions {
   bool splits_sums = true, copies_operands = true;
   std::unordered_set<std::string> kept = {};  // names of Funcs that keep their definitions
+  SplitForDevice for_device = {};             // what is split instead where a device runs it
 };
 // The outputs of a copy of the program. Requires: wrappers are applied. Funcs with directives keep their definitions.
 std::vector<graph::FuncPtr> with_rewrites(const std::vector<graph::FuncPtr>& outputs,

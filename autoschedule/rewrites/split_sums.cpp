@@ -7,10 +7,8 @@
 
 #include "autoschedule/access/long_sums.h"
 #include "autoschedule/machine/reference.h"
+#include "autoschedule/rewrites/split_update.h"
 #include "graph/definitions/associative_update.h"
-#include "graph/definitions/rfactor.h"
-#include "graph/directives/give_directive.h"
-#include "ir/build.h"
 
 namespace retrograde::planning {
 
@@ -21,50 +19,6 @@ namespace {
 constexpr int64_t few_elements = schedule_lanes;
 constexpr int64_t bytes_of_part = first_cache_bytes / 2;
 constexpr double additions_to_element = 16;  // of a privatised copy
-
-// ---- one update that is split ----
-
-class SplitUpdate {
- public:
-  SplitUpdate(const FuncPtr& f, int stage) : place_{f, stage} {}
-
-  // Splits a loop; what is left outside keeps the name. The result: the name of the loop inside.
-  std::string split(const std::string& loop, const std::string& inner, int64_t factor) const {
-    const std::string name = new_name(inner);
-    give_directive(place_, SplitLoop{loop, loop, name, Expr(static_cast<int32_t>(factor)),
-                                     TailStrategy::GuardWithIf});
-    return name;
-  }
-  // Partial results for each iteration of these loops, which become variables with the given names.
-  void factor(const std::vector<std::pair<std::string, std::string>>& loops) {
-    std::vector<std::pair<NamedLoop, std::string>> preserved;
-    for (const auto& [loop, name] : loops) {
-      std::string own = new_name(name);
-      const auto is_own = [&](const auto& other) { return other.second == own; };
-      while (std::ranges::any_of(preserved, is_own)) own = new_name(own + "_");
-      preserved.emplace_back(loop, own);
-    }
-    made_.push_back(factor_out(place_, preserved));
-  }
-  // Leaves the definitions alone.
-  void finish() const {
-    reset_loops(*place_.f);
-    for (const FuncPtr& f : made_) reset_loops(*f);
-  }
-
- private:
-  const SchedulePlace place_;
-  std::vector<FuncPtr> made_;
-
-  std::string new_name(std::string wanted) const {
-    const auto is_taken = [&] {
-      return std::ranges::count(place_.f->args, wanted) > 0 ||
-             std::ranges::count(place_.schedule().dims, wanted, &Dim::var) > 0;
-    };
-    while (is_taken()) wanted += "_";
-    return wanted;
-  }
-};
 
 // ---- which updates are split, and how ----
 

@@ -118,11 +118,15 @@ class Beam {
     }
   }
   double share_of(FuncId f) const { return shares_[static_cast<size_t>(f)]; }
-  bool is_small(FuncId f) const { return share_of(f) < small_share * states_[0].cost.seconds; }
+  // Kernels are cheap to price, and each launch that is saved counts.
+  bool is_small(FuncId f) const {
+    return !context_.device && share_of(f) < small_share * states_[0].cost.seconds;
+  }
   bool is_worth_visiting(FuncId f) const {
     const auto i = static_cast<size_t>(f);
     if (i < options_.kept.size() && options_.kept[i]) return false;
-    return share_of(f) >= share_in(context_.accesses, smallest_share) * states_[0].cost.seconds;
+    return context_.device ||
+           share_of(f) >= share_in(context_.accesses, smallest_share) * states_[0].cost.seconds;
   }
 
   // A plan on the way from one of the states.

@@ -53,6 +53,12 @@ bool is_read_by_extern(const Plan& plan, FuncId func) {
   });
 }
 
+void keep_storage_order(Plan& plan, FuncId func, const Plan& before) {
+  FuncPlan stored = plan.of(func);
+  stored.storage.order = before.of(func).storage.order;
+  plan.funcs[static_cast<size_t>(func)] = std::make_shared<FuncPlan>(std::move(stored));
+}
+
 void compute_at_root(Plan& plan, FuncId func) {
   FuncPlan changed = plan.of(func);
   changed.placement.compute.kind = Level::Kind::Root;
@@ -68,7 +74,9 @@ Plan plan_from_nothing(const Plan& plan, const std::vector<bool>& kept, const Co
   const Plan undecided = undecided_plan(plan.program);
   Plan start = plan;
   for (size_t i = 0; i < plan.funcs.size(); ++i) {
-    if (!stays[i]) start.funcs[i] = undecided.funcs[i];
+    if (stays[i]) continue;
+    start.funcs[i] = undecided.funcs[i];
+    if (context.device) keep_storage_order(start, static_cast<FuncId>(i), plan);
   }
   // Operands of those that stay lie as they read them.
   for (size_t i = 0; i < plan.funcs.size(); ++i) {
@@ -76,9 +84,7 @@ Plan plan_from_nothing(const Plan& plan, const std::vector<bool>& kept, const Co
     const bool is_operand = std::ranges::any_of(
         readers, [&](StageId reader) { return stays[static_cast<size_t>(reader.func)]; });
     if (stays[i] || !is_operand) continue;
-    FuncPlan stored = *start.funcs[i];
-    stored.storage.order = plan.funcs[i]->storage.order;
-    start.funcs[i] = std::make_shared<FuncPlan>(std::move(stored));
+    keep_storage_order(start, static_cast<FuncId>(i), plan);
   }
   for (auto f = static_cast<FuncId>(plan.funcs.size()); f-- > 0;) {
     if (stays[static_cast<size_t>(f)]) continue;
@@ -92,7 +98,7 @@ Plan plan_from_nothing(const Plan& plan, const std::vector<bool>& kept, const Co
       start = plans.front();
       break;
     }
-    if (needs_lanes_of_terms(f, context.sizes)) {
+    if (!context.device && needs_lanes_of_terms(f, context.sizes)) {
       const std::vector<Plan> plans = find_move("reduction_lanes")->apply(start, f, context);
       if (!plans.empty()) start = plans.back();
     }

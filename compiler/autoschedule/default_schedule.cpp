@@ -11,7 +11,6 @@
 #include "autoschedule/cut_reductions.h"
 #include "autoschedule/cut_scatters.h"
 #include "autoschedule/epilogues.h"
-#include "autoschedule/gpu_schedule.h"
 #include "autoschedule/join_sweeps.h"
 #include "autoschedule/lane_dimension.h"
 #include "autoschedule/new_loop.h"
@@ -188,16 +187,6 @@ void name_inlined(const std::vector<FuncPtr>& outputs, const std::vector<FuncPtr
   }
 }
 
-// What no kernel can compute has the loops that it has without a device.
-SizeEstimate give_gpu_schedule(const std::vector<FuncPtr>& outputs,
-                               const std::vector<FuncPtr>& stored, const PlacementLimits& limits,
-                               const ScheduleRequest& request) {
-  GpuSchedule schedule = schedule_on_gpu(outputs, stored, limits.levels, request);
-  for (const HostStage& left : schedule.on_host)
-    give_root_loops(left.func, left.stage, request, schedule.sizes);
-  return schedule.sizes;
-}
-
 }  // namespace
 
 SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
@@ -219,12 +208,6 @@ SizeEstimate give_default_schedule(const std::vector<FuncPtr>& outputs,
           ? stored_in_all(outputs, limits, chosen, may_choose ? &fixed : nullptr)
           : stored_by_default(outputs, chosen);
   TaskSizes tasks(order);
-  if (request.on_gpu) {
-    const SizeEstimate sizes = give_gpu_schedule(outputs, stored, limits, request);
-    tasks.limit(outputs, request);
-    name_inlined(outputs, order);
-    return sizes;
-  }
   SizeEstimate sizes(outputs, machine_of(request));
   whole.merge(step_sums(outputs, sizes));
   cut_sums(outputs, stored, whole, chosen, request, sizes);

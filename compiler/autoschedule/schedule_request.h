@@ -20,7 +20,7 @@ struct ScheduleRequest {
   // Private parts one for each thread, added up by atomic updates (atomic_scatters.h): what a budget
   // wants of a schedule whose bits may differ.
   bool atomic_parts = false;
-  // All of a pipeline is scheduled for a device: its stages are kernels (gpu_schedule.h).
+  // All of a pipeline is scheduled for a device: its stages are kernels (autoschedule/moves/kernels.cpp).
   bool on_gpu = false;
 
   bool makes(Decision decision) const { return !options.without.contains(decision); }

@@ -176,18 +176,22 @@ ir::LoweredFunction Lowering::lower(const std::vector<FuncPtr>& scheduled) const
 std::string note_against_search(const std::vector<FuncPtr>& outputs, const std::string& rule,
                                 const std::string& evidence, const std::string& instead) {
   return Message{"search for a schedule of " + words_for(outputs), rule,
-                 evidence + ", so that what the rules choose is taken", instead}
+                 evidence + ", so that the default schedule is taken", instead}
       .render();
 }
 
 ChosenSchedule choose_schedule(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request,
                                Scheduling what, const Lowering& lowering, Choosing choosing) {
-  if (default_schedules == DefaultSchedules::OfPlans && choosing == Choosing::Search &&
-      !request.options.search && !request.on_gpu)
-    return {schedule_by_plan(outputs, request, what), {}, {}};
-  ChosenSchedule rules{autoschedule::schedule_within_budget(outputs, request, what), {}};
   const bool is_wide = request.options.search;
   const bool wants_report = is_wide || choosing == Choosing::SearchWithReport;
+  const bool of_plans = default_schedules == DefaultSchedules::OfPlans &&
+                        choosing == Choosing::Search && !wants_report;
+  if (request.on_gpu || of_plans) {
+    ChosenSchedule result{schedule_by_plan(outputs, request, what), {}, {}};
+    if (wants_report) result.search.note = reason_against(outputs, request);
+    return result;
+  }
+  ChosenSchedule rules{autoschedule::schedule_within_budget(outputs, request, what), {}, {}};
   if (choosing == Choosing::Rules && !is_wide) return rules;
   const std::string reason = reason_against(outputs, request);
   if (wants_report) rules.search.note = reason;

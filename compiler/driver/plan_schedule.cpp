@@ -92,6 +92,9 @@ ScheduledGraph schedule_by_plan(const std::vector<FuncPtr>& outputs, const Sched
   planning::RewriteOptions rewrites;
   rewrites.splits_sums = request.makes(Decision::CutReductions);
   rewrites.copies_operands = request.makes(Decision::LayoutStaging);
+  const planning::Device* device = request.on_gpu ? &request.device : nullptr;
+  rewrites.for_device = {device, rewrites.splits_sums, request.makes(Decision::ScatterStrategy),
+                         !options.deterministic};
   rewrites.kept = kept_names(outputs, options, what);
   const CallMemory memory(outputs, request);
   const double callers = memory.callers_bytes(), budget = memory.budget();
@@ -100,6 +103,7 @@ ScheduledGraph schedule_by_plan(const std::vector<FuncPtr>& outputs, const Sched
   search.spare_bytes = static_cast<int64_t>(std::max(budget - callers, 0.0));
   search.must_fit = options.memory_budget > 0;
   search.what = what;
+  search.device = device;
   const std::vector<FuncPtr> rewritten = planning::with_rewrites(outputs, rewrites);
   compute_extern_stages_at_root(rewritten);
   const PlanSearch found = search_plans(rewritten, outputs, options, request.machine, search);

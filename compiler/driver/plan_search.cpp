@@ -127,8 +127,9 @@ PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
   const planning::AccessGraph accesses(outputs);
   const planning::SizeModel sizes(accesses, {planning::unknown_extent});
   planning::Dependences dependences(accesses);
-  planning::CostModel cost(accesses, sizes, machine);
-  const planning::Context context{accesses, sizes, machine, dependences};
+  planning::CostModel cost(accesses, sizes, machine, search.device);
+  const planning::Context context{accesses,    sizes,         machine,
+                                  dependences, search.device, !options.deterministic};
   planning::SearchOptions beam;
   beam.width = search.width;
   beam.most_bytes = static_cast<double>(search.spare_bytes);
@@ -149,7 +150,7 @@ PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
     result.result = planning::search(result.rules, context, cost, beam);
   // The other start is known to be slow, so small gains count, too.
   beam.least_gain = least_gain_from_nothing;
-  beam.least_gain_of_all = least_gain_of_all_from_nothing;
+  beam.least_gain_of_all = search.device ? 0 : least_gain_of_all_from_nothing;
   const Plan nothing = planning::plan_from_nothing(result.rules, beam.kept, context);
   if (search.start == SearchStart::Nothing) {
     const double most_bytes = std::exchange(beam.most_bytes, planning::SearchOptions().most_bytes);

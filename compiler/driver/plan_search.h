@@ -39,6 +39,7 @@ struct PlanSearchOptions {
   bool must_fit = false;  // without rules: however slow the program gets
   autoschedule::Scheduling what = autoschedule::Scheduling::Everything;
   std::set<std::string> without;  // moves that are not made
+  const planning::Device* device = nullptr;  // that runs the program; null: the processor does
 };
 
 // The machine that the cost of a search is for: that of the cost model, with the threads of the options.

@@ -16,7 +16,6 @@
 #include "autoschedule/read_estimate.h"
 #include "autoschedule/read_window.h"
 #include "autoschedule/size_estimate.h"
-#include "autoschedule/stage_loops.h"
 #include "autoschedule/stored_reads.h"
 #include "gradient/programs_large.h"
 #include "graph/definitions/own_reads.h"
@@ -68,7 +67,6 @@ class Shadow {
       compare_sizes(node);
       for (const StageNode& stage : node.stages) {
         if (node.func->is_extern()) continue;
-        compare_loops(node, stage);
         compare_reads(stage, calls_of(roots_of(stage)), stage.reads, false);
       }
     }
@@ -119,28 +117,6 @@ class Shadow {
       return std::ranges::any_of(node.stages,
                                  [&](const StageNode& stage) { return is_empty(stage, sizes_); });
     });
-  }
-
-  // ---- loops ----
-
-  void compare_loops(const planning::FuncNode& node, const StageNode& stage) {
-    for (const autoschedule::StageLoop& loop :
-         autoschedule::loops_of_stage(*node.func, stage.id.stage, old_sizes_)) {
-      const auto found =
-          std::ranges::find(stage.iterators, loop.loop.name(), &planning::Iterator::name);
-      if (found == stage.iterators.end()) continue;  // a loop of the user's splits
-      const int iterator = static_cast<int>(found - stage.iterators.begin());
-      size_t dimension = 0;
-      while (dimension < stage.write.index.size() &&
-             (stage.write.index[dimension].moved_by() & planning::set_of(iterator)) == 0)
-        ++dimension;
-      EXPECT_EQ(loop.dimension, dimension) << node.func->name << " " << found->name;
-      if (found->kind == planning::Iterator::Kind::Reduction && loop.extent) {
-        EXPECT_EQ(*loop.extent, sizes_.of(stage.id, iterator).estimate);
-        EXPECT_TRUE(sizes_.of(stage.id, iterator).is_constant());
-      }
-      ++equal_;
-    }
   }
 
   // ---- reads ----

@@ -151,7 +151,7 @@ TEST(ChooseSchedule, WhatIsScheduledIsNotSearched) {
   EXPECT_EQ(report.search.tried, 0u);
   EXPECT_EQ(graph::without_numbers(report.search.note),
             "cannot search for a schedule of \"loss\", \"b_adj\": a search is for what nobody "
-            "scheduled; every Func has a directive, so that what the rules choose is taken. Search "
+            "scheduled; every Func has a directive, so that the default schedule is taken. Search "
             "before anything else schedules them.");
 }
 
@@ -165,7 +165,7 @@ TEST(ChooseSchedule, ForwardProgramsAreSearchedWhenTheyAreScheduled) {
   EXPECT_EQ(
       pipeline.explain_schedule().search.note,
       "cannot search for a schedule of \"forward\": compiling searches schedules of gradients; "
-      "none of its Funcs is one, so that what the rules choose is taken. Call auto_schedule() "
+      "none of its Funcs is one, so that the default schedule is taken. Call auto_schedule() "
       "with these options.");
 }
 

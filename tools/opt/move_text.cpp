@@ -10,7 +10,7 @@ namespace retrograde::opt {
 
 namespace {
 
-const std::string move_line = "\nmove ";
+const std::string move_line = "\nmove ", on_device = " device";
 constexpr planning::SizeDefaults defaults{planning::unknown_extent};
 
 const planning::Move& move_of(const std::string& name) {
@@ -24,10 +24,15 @@ const planning::Move& move_of(const std::string& name) {
 
 MoveText split_move(const std::string& text) {
   const size_t at = text.find(move_line);
-  if (at == std::string::npos) return {text, "", ""};
+  if (at == std::string::npos) return {text, "", "", false};
   const size_t name = at + move_line.size(), end = std::min(text.find('\n', name), text.size());
-  return {text.substr(0, at + 1), text.substr(name, end - name),
-          text.substr(std::min(end + 1, text.size()))};
+  MoveText result{text.substr(0, at + 1), text.substr(name, end - name),
+                  text.substr(std::min(end + 1, text.size())), false};
+  if (result.func.ends_with(on_device)) {
+    result.on_device = true;
+    result.func.resize(result.func.size() - on_device.size());
+  }
+  return result;
 }
 
 std::string plans_after(const std::string& name, const MoveText& parts,
@@ -49,9 +54,11 @@ std::string plans_after(const std::string& name, const MoveText& parts,
   planning::Machine machine = planning::reference_machine(Target("x86-64-linux-avx512"));
   machine.threads = threads;
   const auto id = static_cast<planning::FuncId>(func - funcs.begin());
+  const planning::Device device;
+  const planning::Context context{accesses, sizes, machine, dependences,
+                                  parts.on_device ? &device : nullptr};
   std::string result;
-  for (const planning::Plan& after :
-       move.apply(plan, id, {accesses, sizes, machine, dependences})) {
+  for (const planning::Plan& after : move.apply(plan, id, context)) {
     planning::validate(after);
     result += (result.empty() ? "" : "\n") + to_text(after);
   }

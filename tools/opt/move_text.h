@@ -2,7 +2,7 @@
 //
 //   func f(x, y) float32 ...     the text of a graph
 //   output f
-//   move f                       the Func whose loops move
+//   move f                       the Func whose loops move; `move f device`: in a program for a GPU
 //   f  root  y, x                its plan; without one, that of the graph's directives
 #pragma once
 
@@ -15,6 +15,7 @@ namespace retrograde::opt {
 
 struct MoveText {
   std::string graph, func, plan;
+  bool on_device = false;
 };
 // Without a line "move", all of it is the graph.
 MoveText split_move(const std::string& text);

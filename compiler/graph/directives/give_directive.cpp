@@ -190,6 +190,7 @@ bool can_reset_loops(const FuncContents& f) {
   for (size_t i = 0; i < f.log.size(); ++i) {
     const auto& [stage, special, directive, order] = f.log[i];
     const bool shapes_loops = std::holds_alternative<SplitLoop>(directive) ||
+                              std::holds_alternative<FuseLoops>(directive) ||
                               std::holds_alternative<ReorderLoops>(directive) ||
                               std::holds_alternative<FactorOut>(directive);
     // Splits of pure loops stand before the names.
