@@ -29,6 +29,7 @@ class CostModel::Prices {
         sizes_(sizes),
         machine_(machine),
         facts_(sizes, machine),
+        places_(places_in_order(accesses)),
         groups_(accesses),
         supply_(machine, accesses.funcs().size(),
                 accesses.funcs().size() + accesses.images().size()),
@@ -38,7 +39,7 @@ class CostModel::Prices {
 
   Totals totals(const Plan& plan) {
     follow(plan);
-    return {supply_.seconds(), peak_bytes(groups_.all(), root_bytes_, own_bytes_)};
+    return {supply_.seconds(), peak_bytes(groups_.all(), places_, root_bytes_, own_bytes_)};
   }
   Cost price(const Plan& plan) {
     Cost cost{totals(plan), {}};
@@ -53,6 +54,7 @@ class CostModel::Prices {
   const SizeModel& sizes_;
   const Machine& machine_;
   FactsOfStages facts_;
+  const std::vector<size_t> places_;
   std::unordered_map<Key, GroupPrice, KeyHash> known_;
 
   // ---- the last plan, of which the next one changes a part ----

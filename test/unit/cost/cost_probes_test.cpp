@@ -184,6 +184,22 @@ TEST_F(StencilProbes, ThePeakIsWhatIsAliveAtOnce) {
   EXPECT_EQ(sliding.peak_bytes, 2 * 4 * columns * 4);
 }
 
+// Lowering computes an output as soon as all that it reads is there, whatever the order of the outputs.
+TEST_F(CostProbes, OneImageIsAliveAtOnce) {
+  Func second("second"), third("third"), other_rows("other_rows");
+  rows_sum(x, y) = in(x, y) + in(x, y + 1);
+  other_rows(x, y) = other(x, y) + other(x, y + 1);
+  out(x, y) = rows_sum(x, y) + 1.0f;
+  second(x, y) = other_rows(x, y) + 1.0f;
+  third(x, y) = rows_sum(x, y) * 2.0f;
+  for (Func* f : {&out, &second, &third}) f->set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+  const Cost cost = Pricing({out, second, third}, probed_machine())
+                        .price(
+                            "out  root\nsecond  root\nthird  root\nrows_sum  root\n"
+                            "other_rows  root\n");
+  EXPECT_EQ(cost.peak_bytes, image_bytes);
+}
+
 TEST_F(CostProbes, ATransposeLoadsALineForEachElement) {
   out(x, y) = in(y, x);
   in.dim(0).set_estimate(0, 2064);  // rows in different sets
