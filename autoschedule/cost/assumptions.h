@@ -9,6 +9,8 @@ namespace retrograde::planning {
 // The units of a core work at the same time, and so do computing and moving data. Of all that the slower side hides, this
 // part shows.
 inline constexpr double not_overlapped = 0.25;
+// The same of computing beside data that come from memory, for which a core waits longer than it looks ahead.
+inline constexpr double not_overlapped_with_memory = 0.75;
 // The part of a cache that a loop may fill: other data take the rest, or share sets with it.
 inline constexpr double usable_share = 0.8;
 // Data that exceed a cache by this factor find nothing of the last pass in it.
