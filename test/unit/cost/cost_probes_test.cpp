@@ -421,6 +421,23 @@ TEST_F(CostProbes, SumsBeyondTheRegistersStayInMemory) {
   EXPECT_LT(ns_of("8"), 0.35);
 }
 
+TEST_F(CostProbes, SumsOfTwoStagesInALoopStayInMemory) {
+  RDom r(0, 1024, "r");
+  Func second("second");
+  out(x, y) += in(x, r) * other(y, r);
+  second(x, y) += in(x, r) * other(y, r + 1);
+  for (Func* sum : {&out, &second}) sum->bound(x, 0, 4096).bound(y, 0, 48);
+  const std::string zeros = "  root\n  .0  y, x:16, vector x\n  .1  ",
+                    loops = "y:8, x:16, r.x, unroll y, vector x\n";
+  const auto ns_of = [&](const std::string& shared) {
+    const Cost cost =
+        Pricing({out, second}).price("out" + zeros + loops + "second" + zeros + shared + loops);
+    return 1e9 * cost.stages[3].compute_seconds / (columns * 48 / 16 * 1024);
+  };
+  EXPECT_LT(ns_of(""), 0.35);
+  EXPECT_GT(ns_of("shared with out.1/r.x  "), 0.35) << "a store for each sum";
+}
+
 TEST_F(CostProbes, WhatALoopDoesNotChangeIsComputedOutsideOfIt) {
   out(x, y) = in(x, y) + exp(other(0, y));
   const double once = compute_seconds(cost_of("out  root  y, x:16, vector x\n"));
