@@ -111,10 +111,13 @@ double bytes_by_sets(const Touch& touch, const Layout& layout, const Cover& cove
     } else if (stride < touched) {
       touched = sets = stride * span.reach;
     } else {
-      const auto step = static_cast<int64_t>(stride);
+      // Rows of nearly the same sets are a little apart there. Others spread evenly over all sets that they ever reach.
+      const int64_t step = static_cast<int64_t>(stride) % set_stride;
+      const double apart = double(std::min(step, set_stride - step));
       const double places = all / double(std::max(std::gcd(step, set_stride), line_bytes));
+      const double reach = apart * (span.points - 1);
       touched *= span.points;
-      sets *= std::min(span.points, places);
+      sets = reach < all && apart < sets ? sets + reach : sets * std::min(span.points, places);
     }
     sets = std::min(sets, all);
     stride *= layout.extents[static_cast<size_t>(dimension)];
