@@ -104,8 +104,9 @@ double bytes_by_sets(const Touch& touch, const Layout& layout, const Cover& cove
   double touched = line, sets = line;  // bytes; of these, in different sets
   double stride = touch.element_bytes;
   for (const int16_t dimension : layout.order) {
-    const Span span = span_of(touch.sides[static_cast<size_t>(dimension)], cover);
-    if (touch.sides[static_cast<size_t>(dimension)].data != 0) return 0;
+    const TouchedSide& side = touch.sides[static_cast<size_t>(dimension)];
+    const Span span = span_of(side, cover);
+    if (side.data != 0 && !side.is_displaced) return 0;
     if (stride * span.reach <= touched) {
       // Inside of the line, or of the rows so far.
     } else if (stride < touched) {
@@ -122,6 +123,7 @@ double bytes_by_sets(const Touch& touch, const Layout& layout, const Cover& cove
     sets = std::min(sets, all);
     stride *= layout.extents[static_cast<size_t>(dimension)];
   }
+  if (touch.data != 0) touched = std::min(touched, touched_lines(touch, layout, cover) * line);
   return touched / sets * all;
 }
 

@@ -246,6 +246,11 @@ TEST(Touch, RowsALittleApartShareSets) {
   EXPECT_EQ(bytes_of(1024), 64 * page_bytes);
   EXPECT_EQ(bytes_of(1028), 64.0 * 256 / (1008 + 256) * page_bytes);
   EXPECT_EQ(bytes_of(1088), 64 * 256) << "all sets";
+  touch.sides[0].data = touch.data = set_of(0);
+  touch.moved = set_of(0) | set_of(1);
+  EXPECT_EQ(bytes_of(1024), 0) << "a table may be read anywhere";
+  touch.sides[0].is_displaced = true;
+  EXPECT_EQ(bytes_of(1024), 64 * page_bytes) << "rows are where they are";
 }
 
 // 16 KB that lie together, read for each eight rows that share sets: 64 times.
