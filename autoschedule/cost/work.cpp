@@ -35,10 +35,10 @@ double slice_ns(const StageRun& run, const Group& group, const Machine& m) {
 struct Spills {
   double loads = 0, stores = 0;
 };
-// Lowering keeps sums in registers if there is room for all of them (compiler/lower/loops/keep_accumulators.cpp).
-// Otherwise, it leaves all of them in memory.
-Spills spills_of(double accumulators, double invariants, double registers) {
-  const bool are_kept = accumulators <= registers;
+// Lowering keeps sums in registers if there is room for all of them and no other stage runs in their loop
+// (compiler/lower/loops/keep_accumulators.cpp). Otherwise, it leaves all of them in memory.
+Spills spills_of(double accumulators, bool are_alone, double invariants, double registers) {
+  const bool are_kept = are_alone && accumulators <= registers;
   const double kept = (are_kept ? accumulators : 0) + invariants;
   const double excess = std::clamp(kept + passing_operands - registers, 0.0, kept);
   const double sums = are_kept ? std::min(excess, accumulators) : accumulators;
@@ -127,6 +127,12 @@ class StageLoops {
     }
     return result;
   }
+  // Whether no other stage runs in the innermost serial loop.
+  bool is_alone() const {
+    for (size_t d = depth(); d-- > 0 && static_cast<int>(d) >= innermost_;)
+      if (node(d).children.size() + node(d).stages.size() > 1) return false;
+    return true;
+  }
   // The unrolled copies that these iterators tell apart.
   double copies(IteratorSet depends, bool moved) const {
     double result = 1;
@@ -162,7 +168,7 @@ class StageWork : StageLoops {
       if (!is_loaded_before(touch)) add_touch(touch);
     }
     add_interleaving();
-    const Spills spills = spills_of(accumulators_, invariants_, m_.registers);
+    const Spills spills = spills_of(accumulators_, is_alone(), invariants_, m_.registers);
     units_.loads += iterations() * spills.loads * m_.load_ns;
     units_.stores += iterations() * spills.stores * m_.store_ns;
     units_.chain = longest(chains_, instructions_);

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "autoschedule/cost/assumptions.h"
+#include "autoschedule/cost/touch.h"
+#include "autoschedule/machine/reference.h"
 #include "frontend/data/param.h"
 #include "unit/cost/cost_testing.h"
 
@@ -246,6 +248,41 @@ TEST_F(CostProbes, RowsThatShareSetsEvictEachOther) {
   EXPECT_GT(lines_of(1024), 5 * lines_of(1040));
 }
 
+// 64 rows of 256 bytes. 4112 bytes apart, they begin in 1008 bytes of sets and end 256 bytes later.
+TEST(Touch, RowsALittleApartShareSets) {
+  Touch touch;
+  touch.sides.resize(2);
+  for (int16_t d = 0; d < 2; ++d) {
+    touch.sides[static_cast<size_t>(d)].moves = {{d, 1}};
+    touch.sides[static_cast<size_t>(d)].most = 64;
+  }
+  const auto bytes_of = [&](double width) {
+    return bytes_by_sets(touch, {{0, 1}, {width, 64}}, {64, 64}, page_bytes);
+  };
+  EXPECT_EQ(bytes_of(1024), 64 * page_bytes);
+  EXPECT_EQ(bytes_of(1028), 64.0 * 256 / (1008 + 256) * page_bytes);
+  EXPECT_EQ(bytes_of(1088), 64 * 256) << "all sets";
+  touch.sides[0].data = touch.data = set_of(0);
+  touch.moved = set_of(0) | set_of(1);
+  EXPECT_EQ(bytes_of(1024), 0) << "a table may be read anywhere";
+  touch.sides[0].is_displaced = true;
+  EXPECT_EQ(bytes_of(1024), 64 * page_bytes) << "rows are where they are";
+}
+
+// 16 KB that lie together, read for each eight rows that share sets: 64 times.
+TEST_F(CostProbes, RowsThatShareSetsLeaveOtherSetsAlone) {
+  RDom k(0, 64, "k");
+  out(x, y) += in(k, y) * other(x, k);
+  in.dim(0).set_estimate(0, 1024);
+  other.dim(0).set_estimate(0, 64);
+  other.dim(1).set_estimate(0, 64);
+  out.bound(x, 0, 64).bound(y, 0, 512);
+  is_sized = true;
+  const StageCost cost = update_cost("y:8, x:16, k.x, unroll y, vector x");
+  const double rows_bytes = 8 * 64 * 4, out_bytes = 512 * 64 * 4;
+  EXPECT_EQ(cost.bytes[1], 64 * 4 * rows_bytes + 2 * out_bytes) << "the rows for each vector";
+}
+
 // Columns of vectors: each iteration jumps to another row of both images.
 TEST_F(CostProbes, LinesThatNothingFetchesAheadTakeLonger) {
   out(x, y) = in(x, y);
@@ -435,6 +472,23 @@ TEST_F(CostProbes, SumsBeyondTheRegistersStayInMemory) {
   };
   EXPECT_GT(ns_of("12"), 0.35) << "a store for each sum";
   EXPECT_LT(ns_of("8"), 0.35);
+}
+
+TEST_F(CostProbes, SumsOfTwoStagesInALoopStayInMemory) {
+  RDom r(0, 1024, "r");
+  Func second("second");
+  out(x, y) += in(x, r) * other(y, r);
+  second(x, y) += in(x, r) * other(y, r + 1);
+  for (Func* sum : {&out, &second}) sum->bound(x, 0, 4096).bound(y, 0, 48);
+  const std::string zeros = "  root\n  .0  y, x:16, vector x\n  .1  ",
+                    loops = "y:8, x:16, r.x, unroll y, vector x\n";
+  const auto ns_of = [&](const std::string& shared) {
+    const Cost cost =
+        Pricing({out, second}).price("out" + zeros + loops + "second" + zeros + shared + loops);
+    return 1e9 * cost.stages[3].compute_seconds / (columns * 48 / 16 * 1024);
+  };
+  EXPECT_LT(ns_of(""), 0.35);
+  EXPECT_GT(ns_of("shared with out.1/r.x  "), 0.35) << "a store for each sum";
 }
 
 TEST_F(CostProbes, WhatALoopDoesNotChangeIsComputedOutsideOfIt) {
