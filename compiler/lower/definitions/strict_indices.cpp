@@ -58,7 +58,7 @@ void make_indices_strict(Program& program) {
   for (LoopedFunc& f : program.funcs) {
     for (Definition& stage : f.stages) {
       stage = map_exprs(stage, std::ref(strict));
-      for (Expr& arg : stage.args) arg = coordinate(strict(arg));
+      for (Expr& arg : stage.args) arg = coordinate(arg);
     }
   }
 }
