@@ -21,7 +21,7 @@ inline constexpr double displacement = 2;
 // How far a coordinate of floating-point origin moves with an iterator when neither says: along the diagonal.
 inline constexpr double unknown_slope = 0.7;
 // Neighbouring points of data fall into the same bin this often, so that one addition waits for the last.
-inline constexpr double equal_neighbours = 0.5;
+inline constexpr double equal_neighbours = 0.1;
 // A C function takes as long as so many scalar operations.
 inline constexpr double function_call_operations = 50;
 // The wait of a consumer for a Func that is computed in one of its loops, in iterations of an empty loop.

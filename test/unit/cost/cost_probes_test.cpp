@@ -531,6 +531,41 @@ TEST_F(CostProbes, LargeBodiesStayScalar) {
   EXPECT_GT(slowdown(100, "y:2, x, unroll y"), 9);
 }
 
+// One of ten additions waits for the one before, through memory: 2.5 ns instead of what the others take.
+TEST_F(CostProbes, AdditionsToOneBinWaitForEachOther) {
+  RDom r(0, 4096, 0, 2048, "r");
+  Func bins("bins");
+  bins(x) += 1;
+  bins(clamp(cast<int>(in(r.x, r.y)), 0, 255)) += 1;
+  bins.bound(x, 0, 256);
+  const auto seconds = [&](const std::string& loops, double latency_ns) {
+    Machine machine = probed_machine();
+    machine.memory_latency_ns = latency_ns;
+    const std::string root = "bins  root\n  .0  x\n  .1  x\n  .2  ";
+    return priced(bins, root + loops + "\n", machine).stages[2].compute_seconds;
+  };
+  for (const char* loops : {"r.y, r.x", "racing  r.y, r.x:16, vector r.x"}) {
+    EXPECT_NEAR(seconds(loops, 2.5), 0.9 * seconds(loops, 0) + 0.1 * columns * rows * 2.5e-9,
+                micro);
+  }
+}
+
+// Elements that lie 4096 bytes apart have the same low bits of addresses.
+TEST_F(CostProbes, LoadsWaitForStoresWholePagesApart) {
+  const auto seconds_of = [&](int bins) {
+    RDom r(0, 4096, 0, 2048, "r");
+    Func sums("sums");
+    sums(x, c) += in(x, c);
+    sums(clamp(cast<int>(in(r.x, r.y)), 0, bins - 1), c) += 1.f;
+    sums.bound(x, 0, bins).bound(c, 0, 2);
+    const Cost cost =
+        priced(sums, "sums  root\n  .0  c, x\n  .1  c, x\n  .2  r.y, r.x, unroll c\n");
+    return cost.stages[2].compute_seconds;
+  };
+  EXPECT_NEAR(seconds_of(1024) - seconds_of(1025), columns * rows * 2.5e-9,
+              0.1 * columns * rows * 2.5e-9);
+}
+
 // A slice of one vector and its neighbours.
 TEST_F(CostProbes, TheConsumerOfASliceWaitsForIt) {
   rows_sum(x, y) = in(x, y) * 2;
