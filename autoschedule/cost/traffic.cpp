@@ -270,16 +270,16 @@ class TrafficWalk {
     const bool is_loop = node.parent >= 0;
     if (fit(regions_.run(n), room(!outside)) ||
         (is_loop && fit(regions_.iteration(n), room(node.in_parallel))))
-      return load(regions_.run(n), times * std::min(1.0, node.trips), n);
+      return load(regions_.run(n), times * std::min(1.0, node.trips), n, false);
     const double kept = is_loop ? 1 - lost_share(regions_.iteration(n), room(node.in_parallel)) : 0;
     if (kept > 0) {
       const RecentBuffers before = recent_;
-      load(regions_.run(n), times * kept, n);
+      load(regions_.run(n), times * kept, n, false);
       recent_ = before;
     }
     times *= node.trips * (1 - kept);
     for (const int child : node.children) visit(child, times);
-    if (!node.stages.empty()) load(regions_.own(n), times, n);
+    if (!node.stages.empty()) load(regions_.own(n), times, n, !have_sets(regions_.own(n)));
     // All iterations have passed, not only those that were looked at.
     for (const Region& region : regions_.run(n)) recent_.touch(region.buffer, region.bytes);
   }
@@ -299,9 +299,8 @@ class TrafficWalk {
     return ns;
   }
 
-  void load(const Regions& regions, double times, int n) {
+  void load(const Regions& regions, double times, int n, bool are_evicted) {
     const double most = room(group_.nodes[static_cast<size_t>(n)].in_parallel);
-    const bool are_evicted = !have_sets(regions);
     for (const Region& region : regions) {
       if (has_sets(region) && recent_.distance(region.buffer, region.bytes, most) <= most) continue;
       const StageRun& run = group_.runs[static_cast<size_t>(region.run)];

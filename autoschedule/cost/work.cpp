@@ -245,7 +245,10 @@ class StageWork : StageLoops {
         lane_moves(touch, stored.layout, lanes_, vectors(touch.element_bytes, touch.moved));
     double& units = touch.writes ? units_.stores : units_.loads;
     // The lanes of a gather are taken out of a vector of places and put into another one, which is arithmetic.
-    const double by_lane = lanes_.count * (touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns);
+    const bool is_strided = touch.data == 0 && moved.is_by_lane && !moved.is_bent;
+    const double share = is_strided ? known_places : 1;
+    const double by_lane =
+        share * lanes_.count * (touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns);
     (touch.writes ? units : units_.arithmetic) +=
         count * by_lane * (moved.is_by_lane ? 1 : moved.border_share);
     instructions_ += count * (moved.is_by_lane ? lane_instructions * lanes_.count
@@ -325,14 +328,14 @@ class StageWork : StageLoops {
     if (innermost_ < 0) return;
     const auto innermost = static_cast<size_t>(innermost_);
     if (touch.data != 0) {
-      const IteratorSet apart = moves_apart(touch);
-      if (moves(innermost, apart)) return;
-      const double in_vector = is_vector(touch.data) && !is_vector(apart) ? lanes_.count : 1;
-      units_.meeting += iterations() * copies(apart, false) * in_vector * m_.memory_latency_ns;
       const double alike = copies(moves_by_pages(touch), true);
       const double loads = touch.count * times(touch.moved) * lanes_.count;
       if (lanes_.iterator < 0 || is_by_lane(touch))
         units_.stores += loads * (1 - 1 / alike) * m_.memory_latency_ns;
+      const IteratorSet apart = moves_apart(touch);
+      if (moves(innermost, apart)) return;
+      const double in_vector = is_vector(touch.data) && !is_vector(apart) ? lanes_.count : 1;
+      units_.meeting += iterations() * copies(apart, false) * in_vector * m_.memory_latency_ns;
     } else if (!moves(innermost, touch.moved)) {
       size_t from = innermost;
       while (from > 0 && !(is_serial(from - 1) && moves(from - 1, touch.moved))) --from;
