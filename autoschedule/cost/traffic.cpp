@@ -267,7 +267,7 @@ class TrafficWalk {
       if (!has_sets(region, bytes - region.bytes))
         std::erase_if(kept, [&](const Region& r) { return r.buffer == region.buffer; });
     }
-    load(kept, times, n);
+    load(kept, times, n, false);
     for (const Region& region : kept) held_.push_back(region.buffer);
     return kept.size() == run.size();
   }
@@ -287,12 +287,12 @@ class TrafficWalk {
     const double kept = is_loop && !fits ? 1 - lost_share(in_turn, room(node.in_parallel)) : 0;
     if (kept > 0) {
       const RecentBuffers before = recent_;
-      load(regions_.run(n), times * kept, n);
+      load(regions_.run(n), times * kept, n, false);
       recent_ = before;
     }
     times *= node.trips * (1 - kept);
     for (const int child : node.children) visit(child, times);
-    if (!node.stages.empty()) load(regions_.own(n), times, n);
+    if (!node.stages.empty()) load(regions_.own(n), times, n, true);
     held_.resize(held);
     // All iterations have passed, not only those that were looked at.
     for (const Region& region : regions_.run(n)) recent_.touch(region.buffer, region.bytes);
@@ -313,7 +313,8 @@ class TrafficWalk {
     return ns;
   }
 
-  void load(const Regions& regions, double times, int n) {
+  // `in_turn`: of one iteration, in which lines may be evicted before they are touched again.
+  void load(const Regions& regions, double times, int n, bool in_turn) {
     const double most = room(group_.nodes[static_cast<size_t>(n)].in_parallel);
     const double all_bytes = bytes_of(regions);
     for (const Region& region : regions) {
@@ -322,7 +323,7 @@ class TrafficWalk {
       const StageRun& run = group_.runs[static_cast<size_t>(region.run)];
       const bool in_parallel = group_.nodes[static_cast<size_t>(run.path.back())].in_parallel;
       const double waiting =
-          times * waiting_ns(region, !has_sets(region, all_bytes - region.bytes));
+          times * waiting_ns(region, in_turn && !has_sets(region, all_bytes - region.bytes));
       const double bytes = times * loads_of(region, most) * region.moved_bytes();
       found_.push_back({region.run, region.buffer, bytes, 0, waiting, in_parallel});
     }

@@ -14,7 +14,8 @@ namespace retrograde::planning {
 double UnitTimes::all() const {
   const double slowest = std::max({arithmetic, loads, stores, scalars, loops, fetches});
   const double sum = arithmetic + loads + stores + scalars + loops + fetches;
-  return std::max(slowest + not_overlapped * (sum - slowest), chain) + starts;
+  const double apart = std::max(slowest + not_overlapped * (sum - slowest), chain);
+  return apart + equal_neighbours * std::max(0.0, meeting - apart) + starts;
 }
 
 namespace {
@@ -176,8 +177,9 @@ class StageWork : StageLoops {
     if (code_bytes > iterations() * code_cache_bytes)
       units_.fetches = code_bytes / line_bytes * far_code_line_ns;
     const double taken = run_.facts->taken * (1 + guarded_copies * guarded_share(run_, group_));
-    for (double UnitTimes::*part : {&UnitTimes::arithmetic, &UnitTimes::loads, &UnitTimes::stores,
-                                    &UnitTimes::scalars, &UnitTimes::fetches, &UnitTimes::chain})
+    for (double UnitTimes::*part :
+         {&UnitTimes::arithmetic, &UnitTimes::loads, &UnitTimes::stores, &UnitTimes::scalars,
+          &UnitTimes::fetches, &UnitTimes::chain, &UnitTimes::meeting})
       units_.*part *= taken;
     units_.starts = place_times() * slice_ns(run_, group_, m_);
     add_loops();
@@ -249,7 +251,10 @@ class StageWork : StageLoops {
         lane_moves(touch, stored.layout, lanes_, vectors(touch.element_bytes, touch.moved));
     double& units = touch.writes ? units_.stores : units_.loads;
     // The lanes of a gather are taken out of a vector of places and put into another one, which is arithmetic.
-    const double by_lane = lanes_.count * (touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns);
+    const bool is_strided = touch.data == 0 && moved.is_by_lane && !moved.is_bent;
+    const double share = is_strided ? known_places : 1;
+    const double by_lane =
+        share * lanes_.count * (touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns);
     (touch.writes ? units : units_.arithmetic) +=
         count * by_lane * (moved.is_by_lane ? 1 : moved.border_share);
     instructions_ += count * (moved.is_by_lane ? lane_instructions * lanes_.count
@@ -296,13 +301,47 @@ class StageWork : StageLoops {
     chains_.push_back({iterations() * iteration_ns, runs});
   }
 
+  bool is_by_lane(const Touch& touch) const {
+    return lane_moves(touch, group_.buffers.at(touch.buffer).layout, lanes_, 1).is_by_lane;
+  }
+  // The iterators that move dimensions in which data decide nothing: their iterations never meet.
+  static IteratorSet moves_apart(const Touch& touch) {
+    IteratorSet result = 0;
+    for (const TouchedSide& side : touch.sides)
+      if (side.data == 0)
+        for (const TouchedSide::Move& move : side.moves) result |= set_of(move.iterator);
+    return result;
+  }
+  // The iterators whose iterations access elements that lie whole pages apart. A core takes such a load for one of what was
+  // just stored, as it compares the low bits of addresses first.
+  IteratorSet moves_by_pages(const Touch& touch) const {
+    const Layout& layout = group_.buffers.at(touch.buffer).layout;
+    IteratorSet result = 0;
+    double row = touch.element_bytes;
+    for (const int16_t dimension : layout.order) {
+      const TouchedSide& side = touch.sides[static_cast<size_t>(dimension)];
+      for (const TouchedSide::Move& move : side.moves) {
+        const double step = std::abs(move.slope) / side.divisor * row;
+        if (side.data == 0 && step > 0 && std::fmod(step, page_bytes) == 0)
+          result |= set_of(move.iterator);
+      }
+      row *= layout.extents[static_cast<size_t>(dimension)];
+    }
+    return result;
+  }
   // A sum waits for the last one to the same element: in a register, or through memory where neighbours meet.
   void add_sum(const Touch& touch) {
     if (innermost_ < 0) return;
     const auto innermost = static_cast<size_t>(innermost_);
     if (touch.data != 0) {
-      const double in_vector = touch.data & lanes_.moves ? lanes_.count : 1;
-      add_chain(copies(0, false) * in_vector * equal_neighbours * m_.memory_latency_ns, 0);
+      const double alike = copies(moves_by_pages(touch), true);
+      const double loads = touch.count * times(touch.moved) * lanes_.count;
+      if (lanes_.iterator < 0 || is_by_lane(touch))
+        units_.stores += loads * (1 - 1 / alike) * m_.memory_latency_ns;
+      const IteratorSet apart = moves_apart(touch);
+      if (moves(innermost, apart)) return;
+      const double in_vector = is_vector(touch.data) && !is_vector(apart) ? lanes_.count : 1;
+      units_.meeting += iterations() * copies(apart, false) * in_vector * m_.memory_latency_ns;
     } else if (!moves(innermost, touch.moved)) {
       size_t from = innermost;
       while (from > 0 && !(is_serial(from - 1) && moves(from - 1, touch.moved))) --from;
@@ -324,7 +363,7 @@ class StageWork : StageLoops {
   bool loses_lines(const Touch& touch) const {
     const Layout& layout = group_.buffers.at(touch.buffer).layout;
     const Cover& lanes = run_.cover[run_.place + static_cast<size_t>(innermost_) + 1];
-    return lane_moves(touch, layout, lanes_, 1).is_by_lane &&
+    return is_by_lane(touch) &&
            bytes_by_sets(touch, layout, lanes, page_bytes) > m_.levels[0].bytes;
   }
   // Lowering keeps what a loop over several chains reads of its last iterations (compiler/lower/loops/carry_elements.cpp).

@@ -101,7 +101,7 @@ void run_along_rows(FuncPlan& changed, const Plan& plan, const Context& context,
 // Makes a dimension the innermost one in memory.
 void store_first(Storage& storage, int dimension);
 // Makes the outermost loops of a stage at root parallel until there are enough chunks of work for the threads, inside of
-// those that have to be serial; none for one thread.
+// those that have to be serial; none for one thread. The innermost loop is in chunks.
 void run_in_parallel(Nest& nest, const Context& context, StageId stage);
 
 // ---- changes of a plan ----

@@ -123,7 +123,7 @@ void make_indices_strict(Program& program) {
     for (Definition& stage : f.stages) {
       each_coordinate(stage, [&](const Expr& e) { rounded.add_coordinate(e); });
       stage = map_exprs(stage, std::ref(coordinates));
-      for (Expr& arg : stage.args) arg = coordinate(coordinates(arg));
+      for (Expr& arg : stage.args) arg = coordinate(arg);
     }
   }
   for (LoopedFunc& f : program.funcs) {

@@ -601,6 +601,69 @@ TEST_F(CostProbes, LargeBodiesStayScalar) {
   EXPECT_GT(slowdown(100, "y:2, x, unroll y"), 9);
 }
 
+// One of twenty additions waits for the one before, through memory: 2.5 ns instead of what the others take.
+TEST_F(CostProbes, AdditionsToOneBinWaitForEachOther) {
+  RDom r(0, 4096, 0, 2048, "r");
+  Func bins("bins");
+  bins(x) += 1;
+  bins(clamp(cast<int>(in(r.x, r.y)), 0, 255)) += 1;
+  bins.bound(x, 0, 256);
+  const auto seconds = [&](const std::string& loops, double latency_ns) {
+    Machine machine = probed_machine();
+    machine.memory_latency_ns = latency_ns;
+    const std::string root = "bins  root\n  .0  x\n  .1  x\n  .2  ";
+    return priced(bins, root + loops + "\n", machine).stages[2].compute_seconds;
+  };
+  for (const char* loops : {"r.y, r.x", "racing  r.y, r.x:16, vector r.x"}) {
+    EXPECT_NEAR(seconds(loops, 2.5), 0.95 * seconds(loops, 0) + 0.05 * columns * rows * 2.5e-9,
+                micro);
+  }
+}
+
+// Elements that lie 4096 bytes apart have the same low bits of addresses.
+TEST_F(CostProbes, LoadsWaitForStoresWholePagesApart) {
+  const auto seconds_of = [&](int bins) {
+    RDom r(0, 4096, 0, 2048, "r");
+    Func sums("sums");
+    sums(x, c) += in(x, c);
+    sums(clamp(cast<int>(in(r.x, r.y)), 0, bins - 1), c) += 1.f;
+    sums.bound(x, 0, bins).bound(c, 0, 2);
+    const Cost cost =
+        priced(sums, "sums  root\n  .0  c, x\n  .1  c, x\n  .2  r.y, r.x, unroll c\n");
+    return cost.stages[2].compute_seconds;
+  };
+  EXPECT_NEAR(seconds_of(1024) - seconds_of(1025), columns * rows * 2.5e-9,
+              0.1 * columns * rows * 2.5e-9);
+}
+
+// A stage that runs along rows stores each line once, whatever the columns of another one in the same loop do.
+TEST_F(CostProbes, RowsThatFitAreNotEvicted) {
+  RDom r(1, 499, "r");
+  Func run("run");
+  run(x, y) = in(0, y);
+  run(r, y) = run(r - 1, y) * other(r, y);
+  run.bound(x, 0, 500).bound(y, 0, 2048);
+  const auto first_of = [&](const std::string& strip) {
+    return priced(run, "run  root\n  .0  parallel y" + strip + ", y, x:16, vector x\n  .1  " +
+                           "shared with run.0/y" + strip + "  parallel y" + strip +
+                           ", r.x, unroll y\n")
+        .stages[0]
+        .seconds;
+  };
+  EXPECT_NEAR(first_of(":4"), first_of(":16"), 0.2 * first_of(":16"));
+}
+
+// Eight rows in lanes: each loads and stores an element of its own, at a place that no vector holds.
+TEST_F(CostProbes, StridedLanesNeedNoPlaces) {
+  Func copy("copy");
+  copy(x, y) = in(x, y);
+  copy.bound(x, 0, 500).bound(y, 0, 2048);
+  const Cost cost = priced(copy, "copy  root  y:8, x, vector y\n");
+  const double loads = 8 * 0.35, stores = 8 * 0.4, loop = 0.3;
+  const double vector_ns = 0.7 * stores + 0.25 * (0.7 * loads + loop);
+  EXPECT_NEAR(cost.stages[0].compute_seconds, 500 * 256 * vector_ns * 1e-9, 2 * micro);
+}
+
 // A slice of one vector and its neighbours.
 TEST_F(CostProbes, TheConsumerOfASliceWaitsForIt) {
   rows_sum(x, y) = in(x, y) * 2;
