@@ -9,6 +9,8 @@ namespace retrograde::planning {
 // The units of a core work at the same time, and so do computing and moving data. Of all that the slower side hides, this
 // part shows.
 inline constexpr double not_overlapped = 0.25;
+// The same of computing beside data that come from memory, for which a core waits longer than it looks ahead.
+inline constexpr double not_overlapped_with_memory = 0.75;
 // The part of a cache that a loop may fill: other data take the rest, or share sets with it.
 inline constexpr double usable_share = 0.8;
 // Data that exceed a cache by this factor find nothing of the last pass in it.
@@ -21,7 +23,7 @@ inline constexpr double displacement = 2;
 // How far a coordinate of floating-point origin moves with an iterator when neither says: along the diagonal.
 inline constexpr double unknown_slope = 0.7;
 // Neighbouring points of data fall into the same bin this often, so that one addition waits for the last.
-inline constexpr double equal_neighbours = 0.5;
+inline constexpr double equal_neighbours = 0.05;
 // A C function takes as long as so many scalar operations.
 inline constexpr double function_call_operations = 50;
 // The wait of a consumer for a Func that is computed in one of its loops, in iterations of an empty loop.
@@ -38,6 +40,8 @@ inline constexpr double passing_operands = 2;
 // An array of constant indices is kept in registers if it is no larger than so many times all of them. They hold this share
 // of it at most; operands take the rest.
 inline constexpr double largest_register_array = 4, operand_share = 0.8;
+// A lane of which no vector holds the place, as lanes are a stride apart, takes this part of the time of another one.
+inline constexpr double known_places = 0.7;
 // Loops that become vectors although no plan says so take longer than others: their remainders run element by element.
 inline constexpr double remainder_overhead = 1.1;
 // Lowering gives lanes to bodies of so many nodes of expressions at most: an operation and an operand, an access and its

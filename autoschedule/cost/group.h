@@ -111,9 +111,11 @@ class ProgramGroups {
 
 // The bytes that a Func allocates at root; 0 if it is computed in loops, or an output.
 double allocated_bytes(FuncId func, const Plan& plan, const SizeModel& sizes);
+// The place of each Func in the order in which lowering computes them (graph/computing_order.h) if all are at root.
+std::vector<size_t> places_in_order(const AccessGraph& graph);
 // The bytes alive at once. `root`: what each Func allocates at root; `own`: what each group allocates in its loops.
-double peak_bytes(const std::vector<PlannedGroup>& groups, const std::vector<double>& root,
-                  const std::vector<double>& own);
+double peak_bytes(const std::vector<PlannedGroup>& groups, const std::vector<size_t>& places,
+                  const std::vector<double>& root, const std::vector<double>& own);
 
 Group group_of(const Plan& plan, const PlannedGroup& planned, Covers& covers,
                const SizeModel& sizes, const Machine& machine, FactsOfStages& facts);

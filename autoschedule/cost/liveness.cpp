@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "autoschedule/cost/group.h"
+#include "graph/computing_order.h"
 
 namespace retrograde::planning {
 
@@ -14,16 +15,42 @@ double allocated_bytes(FuncId func, const Plan& plan, const SizeModel& sizes) {
   return bytes;
 }
 
-double peak_bytes(const std::vector<PlannedGroup>& groups, const std::vector<double>& root,
-                  const std::vector<double>& own) {
-  std::vector<size_t> last(groups.size());  // the group that reads a Func last
+std::vector<size_t> places_in_order(const AccessGraph& graph) {
+  std::vector<graph::ComputedFunc> funcs;
+  for (const FuncNode& node : graph.funcs())
+    funcs.push_back({{}, {}, node.func->args.size(), node.is_output});
+  for (size_t f = 0; f < funcs.size(); ++f) {
+    for (const StageId reader : graph.consumers(static_cast<FuncId>(f))) {
+      std::vector<size_t>& reads = funcs[static_cast<size_t>(reader.func)].callees;
+      const bool is_new = reads.empty() || reads.back() != f;
+      if (is_new && static_cast<size_t>(reader.func) != f) reads.push_back(f);
+    }
+  }
+  const std::vector<size_t> order = graph::computing_order(funcs);
+  std::vector<size_t> places(order.size());
+  for (size_t i = 0; i < order.size(); ++i) places[order[i]] = i;
+  return places;
+}
+
+double peak_bytes(const std::vector<PlannedGroup>& groups, const std::vector<size_t>& places,
+                  const std::vector<double>& root, const std::vector<double>& own) {
+  constexpr size_t none = SIZE_MAX;
+  // All that a group reads is before the last of its Funcs.
+  std::vector<size_t> turns(groups.size(), none);  // by place: the group that runs there
   for (size_t g = 0; g < groups.size(); ++g) {
+    if (groups[g].funcs.empty()) continue;
+    const auto place = [&](FuncId func) { return places[static_cast<size_t>(func)]; };
+    turns[place(std::ranges::max(groups[g].funcs, {}, place))] = g;
+  }
+  std::erase(turns, none);
+  std::vector<size_t> last(groups.size());  // the group that reads a Func last
+  for (const size_t g : turns) {
     for (const FuncId func : groups[g].funcs) last[static_cast<size_t>(func)] = g;
     for (const FuncId read : groups[g].reads) last[static_cast<size_t>(read)] = g;
   }
   std::vector<double> freed(groups.size());  // after each group
   double alive = 0, peak = 0;
-  for (size_t g = 0; g < groups.size(); ++g) {
+  for (const size_t g : turns) {
     for (const FuncId func : groups[g].funcs) {
       alive += root[static_cast<size_t>(func)];
       freed[last[static_cast<size_t>(func)]] += root[static_cast<size_t>(func)];

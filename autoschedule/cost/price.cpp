@@ -31,6 +31,7 @@ class CostModel::Prices {
         machine_(machine),
         device_(device),
         facts_(sizes, machine),
+        places_(places_in_order(accesses)),
         groups_(accesses),
         supply_(machine, accesses.funcs().size(),
                 accesses.funcs().size() + accesses.images().size()),
@@ -40,7 +41,7 @@ class CostModel::Prices {
 
   Totals totals(const Plan& plan) {
     follow(plan);
-    return {supply_.seconds(), peak_bytes(groups_.all(), root_bytes_, own_bytes_)};
+    return {supply_.seconds(), peak_bytes(groups_.all(), places_, root_bytes_, own_bytes_)};
   }
   Cost price(const Plan& plan) {
     Cost cost{totals(plan), {}};
@@ -56,6 +57,7 @@ class CostModel::Prices {
   const Machine& machine_;
   const Device* const device_;
   FactsOfStages facts_;
+  const std::vector<size_t> places_;
   std::unordered_map<Key, GroupPrice, KeyHash> known_;
 
   // ---- the last plan, of which the next one changes a part ----

@@ -157,7 +157,9 @@ void CacheSupply::find_stages(size_t g) {
       stage.memory_seconds[level] += overlapped(moving_ns, in.waiting_ns) * nanosecond;
     }
     const double memory = stage.all_memory_seconds();
-    stage.seconds = overlapped(stage.compute_seconds, memory) + stage.launch_seconds;
+    const double shown = (not_overlapped_with_memory - not_overlapped) *
+                         std::min(stage.compute_seconds, stage.memory_seconds.back());
+    stage.seconds = overlapped(stage.compute_seconds, memory) + shown + stage.launch_seconds;
     group.seconds += stage.seconds;
   }
 }

@@ -16,6 +16,7 @@ struct UnitTimes {
   double loops = 0;    // counts iterations
   double fetches = 0;  // instructions of a body that is larger than their cache
   double chain = 0;    // operations of which each waits for the one before
+  double meeting = 0;  // additions at places that data decide, if each waited for the one before
   double starts =
       0;  // of slices, whose first loads wait for the stores to them, and of parallel iterations
   double all() const;  // with what they cannot overlap

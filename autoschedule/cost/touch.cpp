@@ -104,21 +104,26 @@ double bytes_by_sets(const Touch& touch, const Layout& layout, const Cover& cove
   double touched = line, sets = line;  // bytes; of these, in different sets
   double stride = touch.element_bytes;
   for (const int16_t dimension : layout.order) {
-    const Span span = span_of(touch.sides[static_cast<size_t>(dimension)], cover);
-    if (touch.sides[static_cast<size_t>(dimension)].data != 0) return 0;
+    const TouchedSide& side = touch.sides[static_cast<size_t>(dimension)];
+    const Span span = span_of(side, cover);
+    if (side.data != 0 && !side.is_displaced) return 0;
     if (stride * span.reach <= touched) {
       // Inside of the line, or of the rows so far.
     } else if (stride < touched) {
       touched = sets = stride * span.reach;
     } else {
-      const auto step = static_cast<int64_t>(stride);
+      // Rows of nearly the same sets are a little apart there. Others spread evenly over all sets that they ever reach.
+      const int64_t step = static_cast<int64_t>(stride) % set_stride;
+      const double apart = double(std::min(step, set_stride - step));
       const double places = all / double(std::max(std::gcd(step, set_stride), line_bytes));
+      const double reach = apart * (span.points - 1);
       touched *= span.points;
-      sets *= std::min(span.points, places);
+      sets = reach < all && apart < sets ? sets + reach : sets * std::min(span.points, places);
     }
     sets = std::min(sets, all);
     stride *= layout.extents[static_cast<size_t>(dimension)];
   }
+  if (touch.data != 0) touched = std::min(touched, touched_lines(touch, layout, cover) * line);
   return touched / sets * all;
 }
 

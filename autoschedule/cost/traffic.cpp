@@ -228,6 +228,8 @@ class TrafficWalk {
   const Machine& machine_;
   const size_t level_;
   RecentBuffers recent_;
+  std::vector<int>
+      held_;  // buffers that stay in the cache from one iteration of an outer loop to the next
   std::vector<BufferTraffic> found_;
 
   // The threads share the last cache, one iteration of a parallel loop each.
@@ -237,19 +239,12 @@ class TrafficWalk {
     return is_shared ? bytes / machine_.threads : bytes;
   }
 
-  // The buffers may begin in different sets. One line of each has room anyway.
-  bool have_sets(const Regions& regions) const {
-    if (level_ >= set_strides.size()) return true;
-    double sum = 0;
-    for (const Region& region : regions)
-      sum += std::max(0.0, region.by_sets[level_] - double(set_strides[level_]));
-    return sum < machine_.levels[level_].bytes;
-  }
-  bool has_sets(const Region& region) const {
-    return level_ >= set_strides.size() || region.by_sets[level_] <= machine_.levels[level_].bytes;
-  }
-  bool fit(const Regions& regions, double room) const {
-    return bytes_of(regions) <= room && have_sets(regions);
+  // Whether the fullest sets of a region have room for it and for what others bring, which lie in all sets evenly. One line
+  // has room anyway.
+  bool has_sets(const Region& region, double others_bytes = 0) const {
+    return level_ >= set_strides.size() ||
+           region.by_sets[level_] - double(set_strides[level_]) + others_bytes <
+               machine_.levels[level_].bytes;
   }
 
   // The share of lines that are gone when they are used again after all others. A cache that forgets the line of the
@@ -257,10 +252,24 @@ class TrafficWalk {
   // the share m, a line survives the m x bytes / line_bytes others that are loaded with probability exp(-m x bytes / room).
   double lost_share(const Regions& regions, double room) const {
     const double excess = bytes_of(regions) / room;
-    if (!have_sets(regions) || excess > most_excess) return 1;
+    const auto has_own_sets = [&](const Region& region) { return has_sets(region); };
+    if (!std::ranges::all_of(regions, has_own_sets) || excess > most_excess) return 1;
     double lost = 1;
     for (int i = 0; i < 40; ++i) lost = 1 - std::exp(-lost * excess);
     return lost;
+  }
+
+  // Loads the regions of a run that keep their lines while all of `touched` are. Returns whether these are all.
+  bool load_kept(const Regions& run, const Regions& touched, double times, int n) {
+    const double bytes = bytes_of(touched);
+    Regions kept = run;
+    for (const Region& region : touched) {
+      if (!has_sets(region, bytes - region.bytes))
+        std::erase_if(kept, [&](const Region& r) { return r.buffer == region.buffer; });
+    }
+    load(kept, times, n, false);
+    for (const Region& region : kept) held_.push_back(region.buffer);
+    return kept.size() == run.size();
   }
 
   void visit(int n, double times) {
@@ -268,18 +277,23 @@ class TrafficWalk {
     const bool outside =
         node.parent < 0 || !group_.nodes[static_cast<size_t>(node.parent)].in_parallel;
     const bool is_loop = node.parent >= 0;
-    if (fit(regions_.run(n), room(!outside)) ||
-        (is_loop && fit(regions_.iteration(n), room(node.in_parallel))))
-      return load(regions_.run(n), times * std::min(1.0, node.trips), n);
-    const double kept = is_loop ? 1 - lost_share(regions_.iteration(n), room(node.in_parallel)) : 0;
+    const Regions& all = regions_.run(n);
+    const Regions& in_turn = is_loop ? regions_.iteration(n) : all;
+    const bool fits =
+        bytes_of(all) <= room(!outside) || (is_loop && bytes_of(in_turn) <= room(node.in_parallel));
+    const size_t held = held_.size();
+    const bool is_done = fits && load_kept(all, in_turn, times * std::min(1.0, node.trips), n);
+    if (is_done) return held_.resize(held);
+    const double kept = is_loop && !fits ? 1 - lost_share(in_turn, room(node.in_parallel)) : 0;
     if (kept > 0) {
       const RecentBuffers before = recent_;
-      load(regions_.run(n), times * kept, n);
+      load(regions_.run(n), times * kept, n, false);
       recent_ = before;
     }
     times *= node.trips * (1 - kept);
     for (const int child : node.children) visit(child, times);
-    if (!node.stages.empty()) load(regions_.own(n), times, n);
+    if (!node.stages.empty()) load(regions_.own(n), times, n, true);
+    held_.resize(held);
     // All iterations have passed, not only those that were looked at.
     for (const Region& region : regions_.run(n)) recent_.touch(region.buffer, region.bytes);
   }
@@ -299,14 +313,17 @@ class TrafficWalk {
     return ns;
   }
 
-  void load(const Regions& regions, double times, int n) {
+  // `in_turn`: of one iteration, in which lines may be evicted before they are touched again.
+  void load(const Regions& regions, double times, int n, bool in_turn) {
     const double most = room(group_.nodes[static_cast<size_t>(n)].in_parallel);
-    const bool are_evicted = !have_sets(regions);
+    const double all_bytes = bytes_of(regions);
     for (const Region& region : regions) {
+      if (std::ranges::count(held_, region.buffer) > 0) continue;
       if (has_sets(region) && recent_.distance(region.buffer, region.bytes, most) <= most) continue;
       const StageRun& run = group_.runs[static_cast<size_t>(region.run)];
       const bool in_parallel = group_.nodes[static_cast<size_t>(run.path.back())].in_parallel;
-      const double waiting = times * waiting_ns(region, are_evicted);
+      const double waiting =
+          times * waiting_ns(region, in_turn && !has_sets(region, all_bytes - region.bytes));
       const double bytes = times * loads_of(region, most) * region.moved_bytes();
       found_.push_back({region.run, region.buffer, bytes, 0, waiting, in_parallel});
     }

@@ -1,12 +1,12 @@
 // Values that a loop does not change are computed outside of it, and those that unrolled copies have in common once. So an
 // operation is executed as often as the loops run that are outside of the innermost loop that changes it, and that loop.
 // Functions in arms of selects run behind branches: each copy has its own.
-#include "autoschedule/cost/terms.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "autoschedule/cost/assumptions.h"
+#include "autoschedule/cost/stage_loops.h"
+#include "autoschedule/cost/terms.h"
 #include "autoschedule/machine/reference.h"
 
 namespace retrograde::planning {
@@ -14,7 +14,8 @@ namespace retrograde::planning {
 double UnitTimes::all() const {
   const double slowest = std::max({arithmetic, loads, stores, scalars, loops, fetches});
   const double sum = arithmetic + loads + stores + scalars + loops + fetches;
-  return std::max(slowest + not_overlapped * (sum - slowest), chain) + starts;
+  const double apart = std::max(slowest + not_overlapped * (sum - slowest), chain);
+  return apart + equal_neighbours * std::max(0.0, meeting - apart) + starts;
 }
 
 namespace {
@@ -35,10 +36,10 @@ double slice_ns(const StageRun& run, const Group& group, const Machine& m) {
 struct Spills {
   double loads = 0, stores = 0;
 };
-// Lowering keeps sums in registers if there is room for all of them (compiler/lower/loops/keep_accumulators.cpp).
-// Otherwise, it leaves all of them in memory.
-Spills spills_of(double accumulators, double invariants, double registers) {
-  const bool are_kept = accumulators <= registers;
+// Lowering keeps sums in registers if there is room for all of them and no other stage runs in their loop
+// (compiler/lower/loops/keep_accumulators.cpp). Otherwise, it leaves all of them in memory.
+Spills spills_of(double accumulators, bool are_alone, double invariants, double registers) {
+  const bool are_kept = are_alone && accumulators <= registers;
   const double kept = (are_kept ? accumulators : 0) + invariants;
   const double excess = std::clamp(kept + passing_operands - registers, 0.0, kept);
   const double sums = are_kept ? std::min(excess, accumulators) : accumulators;
@@ -77,80 +78,6 @@ double guarded_share(const StageRun& run, const Group& group) {
   return share;
 }
 
-// The loops of a stage, and how often they execute what is inside.
-class StageLoops {
- protected:
-  StageLoops(const StageRun& run, const Group& group, const Machine& machine)
-      : run_(run), group_(group), m_(machine), lanes_(run.nest.lanes) {
-    for (size_t d = 0; d < depth(); ++d) {
-      if (is_serial(d) && run.nest.trips[d] > 1) innermost_ = static_cast<int>(d);
-    }
-  }
-  const StageRun& run_;
-  const Group& group_;
-  const Machine& m_;
-  const LaneLoop& lanes_;
-  int innermost_ = -1;  // the serial loop that runs innermost
-
-  size_t depth() const { return run_.nest.trips.size(); }
-  const LoopNode& node(size_t d) const {
-    return group_.nodes[static_cast<size_t>(run_.node_of(d))];
-  }
-  ForType kind(size_t d) const { return node(d).kind; }
-  bool is_serial(size_t d) const {
-    return kind(d) != ForType::Unrolled && kind(d) != ForType::Vectorized;
-  }
-  double place_times() const {
-    return group_.nodes[static_cast<size_t>(run_.path[run_.place - 1])].times;
-  }
-  bool moves(size_t d, IteratorSet depends) const { return (run_.nest.moves[d] & depends) != 0; }
-  bool is_vector(IteratorSet depends) const { return (lanes_.moves & depends) != 0; }
-
-  // How often something is executed that these iterators change; lanes count as one. Each unrolled copy moves out of the
-  // loops around it by itself.
-  double times(IteratorSet depends) const {
-    double result = place_times();
-    bool is_moved = false;  // by a serial loop that is deeper
-    for (size_t d = depth(); d-- > 0;) {
-      const bool is_mover = moves(d, depends);
-      if (kind(d) != ForType::Vectorized && (is_mover || is_moved)) result *= run_.nest.trips[d];
-      is_moved = is_moved || (is_mover && is_serial(d));
-    }
-    return result;
-  }
-  // Iterations of the innermost serial loop, of which each copy that is unrolled around it has its own.
-  double iterations() const {
-    double result = place_times();
-    for (size_t d = 0; d < depth(); ++d) {
-      const bool is_copied = kind(d) == ForType::Unrolled && static_cast<int>(d) < innermost_;
-      if (is_serial(d) || is_copied) result *= run_.nest.trips[d];
-    }
-    return result;
-  }
-  // The unrolled copies that these iterators tell apart.
-  double copies(IteratorSet depends, bool moved) const {
-    double result = 1;
-    for (size_t d = 0; d < depth(); ++d) {
-      const bool is_inside = static_cast<int>(d) > innermost_;
-      if (kind(d) == ForType::Unrolled && is_inside && moves(d, depends) == moved)
-        result *= run_.nest.trips[d];
-    }
-    return result;
-  }
-  double vectors(double element_bytes, IteratorSet depends) const {
-    if (!is_vector(depends)) return 1;
-    return std::max(1.0, std::ceil(lanes_.count * element_bytes / m_.vector_bytes));
-  }
-
-  // Whether each copy of the body has one point of these iterators.
-  bool are_constants(IteratorSet iterators) const {
-    for (size_t d = 0; d < depth(); ++d)
-      if (moves(d, iterators) && kind(d) != ForType::Unrolled && run_.nest.trips[d] > 1)
-        return false;
-    return true;
-  }
-};
-
 class StageWork : StageLoops {
  public:
   StageWork(const StageRun& run, const Group& group, const Machine& machine)
@@ -162,7 +89,7 @@ class StageWork : StageLoops {
       if (!is_loaded_before(touch)) add_touch(touch);
     }
     add_interleaving();
-    const Spills spills = spills_of(accumulators_, invariants_, m_.registers);
+    const Spills spills = spills_of(accumulators_, is_alone(), invariants_, m_.registers);
     units_.loads += iterations() * spills.loads * m_.load_ns;
     units_.stores += iterations() * spills.stores * m_.store_ns;
     units_.chain = longest(chains_, instructions_);
@@ -170,8 +97,9 @@ class StageWork : StageLoops {
     if (code_bytes > iterations() * code_cache_bytes)
       units_.fetches = code_bytes / line_bytes * far_code_line_ns;
     const double taken = run_.facts->taken * (1 + guarded_copies * guarded_share(run_, group_));
-    for (double UnitTimes::*part : {&UnitTimes::arithmetic, &UnitTimes::loads, &UnitTimes::stores,
-                                    &UnitTimes::scalars, &UnitTimes::fetches, &UnitTimes::chain})
+    for (double UnitTimes::*part :
+         {&UnitTimes::arithmetic, &UnitTimes::loads, &UnitTimes::stores, &UnitTimes::scalars,
+          &UnitTimes::fetches, &UnitTimes::chain, &UnitTimes::meeting})
       units_.*part *= taken;
     units_.starts = place_times() * slice_ns(run_, group_, m_);
     add_loops();
@@ -243,7 +171,10 @@ class StageWork : StageLoops {
         lane_moves(touch, stored.layout, lanes_, vectors(touch.element_bytes, touch.moved));
     double& units = touch.writes ? units_.stores : units_.loads;
     // The lanes of a gather are taken out of a vector of places and put into another one, which is arithmetic.
-    const double by_lane = lanes_.count * (touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns);
+    const bool is_strided = touch.data == 0 && moved.is_by_lane && !moved.is_bent;
+    const double share = is_strided ? known_places : 1;
+    const double by_lane =
+        share * lanes_.count * (touch.writes ? m_.scatter_lane_ns : m_.gather_lane_ns);
     (touch.writes ? units : units_.arithmetic) +=
         count * by_lane * (moved.is_by_lane ? 1 : moved.border_share);
     instructions_ += count * (moved.is_by_lane ? lane_instructions * lanes_.count
@@ -290,13 +221,47 @@ class StageWork : StageLoops {
     chains_.push_back({iterations() * iteration_ns, runs});
   }
 
+  bool is_by_lane(const Touch& touch) const {
+    return lane_moves(touch, group_.buffers.at(touch.buffer).layout, lanes_, 1).is_by_lane;
+  }
+  // The iterators that move dimensions in which data decide nothing: their iterations never meet.
+  static IteratorSet moves_apart(const Touch& touch) {
+    IteratorSet result = 0;
+    for (const TouchedSide& side : touch.sides)
+      if (side.data == 0)
+        for (const TouchedSide::Move& move : side.moves) result |= set_of(move.iterator);
+    return result;
+  }
+  // The iterators whose iterations access elements that lie whole pages apart. A core takes such a load for one of what was
+  // just stored, as it compares the low bits of addresses first.
+  IteratorSet moves_by_pages(const Touch& touch) const {
+    const Layout& layout = group_.buffers.at(touch.buffer).layout;
+    IteratorSet result = 0;
+    double row = touch.element_bytes;
+    for (const int16_t dimension : layout.order) {
+      const TouchedSide& side = touch.sides[static_cast<size_t>(dimension)];
+      for (const TouchedSide::Move& move : side.moves) {
+        const double step = std::abs(move.slope) / side.divisor * row;
+        if (side.data == 0 && step > 0 && std::fmod(step, page_bytes) == 0)
+          result |= set_of(move.iterator);
+      }
+      row *= layout.extents[static_cast<size_t>(dimension)];
+    }
+    return result;
+  }
   // A sum waits for the last one to the same element: in a register, or through memory where neighbours meet.
   void add_sum(const Touch& touch) {
     if (innermost_ < 0) return;
     const auto innermost = static_cast<size_t>(innermost_);
     if (touch.data != 0) {
-      const double in_vector = touch.data & lanes_.moves ? lanes_.count : 1;
-      add_chain(copies(0, false) * in_vector * equal_neighbours * m_.memory_latency_ns, 0);
+      const double alike = copies(moves_by_pages(touch), true);
+      const double loads = touch.count * times(touch.moved) * lanes_.count;
+      if (lanes_.iterator < 0 || is_by_lane(touch))
+        units_.stores += loads * (1 - 1 / alike) * m_.memory_latency_ns;
+      const IteratorSet apart = moves_apart(touch);
+      if (moves(innermost, apart)) return;
+      const double in_vector = is_vector(touch.data) && !is_vector(apart) ? lanes_.count : 1;
+      units_.meeting += iterations() * copies(apart, false) * in_vector * m_.memory_latency_ns;
     } else if (!moves(innermost, touch.moved)) {
       size_t from = innermost;
       while (from > 0 && !(is_serial(from - 1) && moves(from - 1, touch.moved))) --from;
@@ -318,7 +283,7 @@ class StageWork : StageLoops {
   bool loses_lines(const Touch& touch) const {
     const Layout& layout = group_.buffers.at(touch.buffer).layout;
     const Cover& lanes = run_.cover[run_.place + static_cast<size_t>(innermost_) + 1];
-    return lane_moves(touch, layout, lanes_, 1).is_by_lane &&
+    return is_by_lane(touch) &&
            bytes_by_sets(touch, layout, lanes, page_bytes) > m_.levels[0].bytes;
   }
   // Lowering keeps what a loop over several chains reads of its last iterations (compiler/lower/loops/carry_elements.cpp).

@@ -4,7 +4,8 @@
 //   =>    out   root  c:4, y, x:32, unroll c, unroll x:16, vector x
 //         sum   at out/x:32
 //   parts  root  c, k, r.y, vector k     =>     parts  root  c:4, r.y, k, unroll c, vector k      also with its reduction
-//                                                                                                outside of other loops
+//                                                                                                outside of other loops,
+//                                                                                                or of some of the tile
 //
 // Legal: L1, L2: loops over the consumer's tile are pure, and those of its reduction keep their order; L3, L4, L5, L8.
 #include <algorithm>
@@ -107,15 +108,26 @@ void add_plans(std::vector<Plan>& plans, const Plan& plan, FuncId func, StageId 
   std::optional<Nest> nest = tiled(reader, sides);
   if (!nest || body_depth(*nest) == 0) return;
   add_plan(plans, reader, func, *nest);
-  // The steps of the tile, its reduction, and the other loops.
-  const auto rank = [&](const Loop& loop) {
-    const bool is_side =
-        loop.step > 1 && std::ranges::find(sides, loop.iterator, &Side::iterator) != sides.end();
-    return is_side ? 0 : is_reduction(context, stage, loop.iterator) ? 1 : 2;
+  const auto add_ordered = [&](const auto& rank) {
+    const auto body = nest->loops.begin() + static_cast<std::ptrdiff_t>(body_depth(*nest));
+    std::ranges::stable_sort(nest->loops.begin(), body, std::less(), rank);
+    add_plan(plans, reader, func, *nest);
   };
-  const auto body = nest->loops.begin() + static_cast<std::ptrdiff_t>(body_depth(*nest));
-  std::ranges::stable_sort(nest->loops.begin(), body, std::less(), rank);
-  add_plan(plans, reader, func, *nest);
+  const auto is_side = [&](const Loop& loop) {
+    return loop.step > 1 && std::ranges::find(sides, loop.iterator, &Side::iterator) != sides.end();
+  };
+  const auto adds_up = [&](const Loop& loop) {
+    return is_reduction(context, stage, loop.iterator);
+  };
+  // The steps of the tile, its reduction, and the other loops.
+  add_ordered([&](const Loop& loop) { return is_side(loop) ? 0 : adds_up(loop) ? 1 : 2; });
+  // Terms that tiles beside each other read stay in a cache while all of these run.
+  const std::optional<size_t> lanes = vector_loop(*nest);
+  if (!lanes || std::ranges::none_of(nest->loops, adds_up)) return;
+  const int row = nest->loops[*lanes].iterator;
+  add_ordered([&](const Loop& loop) {
+    return adds_up(loop) ? 1 : is_side(loop) && loop.iterator != row ? 2 : 0;
+  });
 }
 
 }  // namespace

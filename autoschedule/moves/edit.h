@@ -34,6 +34,8 @@ void for_each_read(const Plan& plan, const Context& context, StageId stage,
 bool has_bounded_region(const Plan& plan, const Context& context, FuncId func);
 // Whether a Func may be computed in a loop of a stage that reads it (L3, L8).
 bool may_run_in_loops(const Plan& plan, const Context& context, FuncId func);
+// Whether a Func is stored somewhere else than where it is computed, or in a window. Opaque ones may be, in a loop.
+bool has_window(const FuncPlan& func);
 // Whether each update writes the elements that its pure variables name, and reads no others of the Func.
 bool stays_in_place(const Context& context, FuncId func);
 // Whether no loop needs a dimension of constant extent (L4).
@@ -113,7 +115,7 @@ Nest kernel_loops(const Plan& plan, const Context& context, StageId stage,
 // Makes a dimension the innermost one in memory.
 void store_first(Storage& storage, int dimension);
 // Makes the outermost loops of a stage at root parallel until there are enough chunks of work for the threads, inside of
-// those that have to be serial; none for one thread.
+// those that have to be serial; none for one thread. The innermost loop is in chunks.
 void run_in_parallel(Nest& nest, const Context& context, StageId stage);
 
 // ---- changes of a plan ----
@@ -137,6 +139,10 @@ struct StageLoops {
 std::vector<Plan> with_nests(const Plan& plan, FuncId func, const Context& context,
                              std::vector<Nest> (*nests)(const StageLoops&),
                              Terms terms = Terms::InOrder);
+// The plan in which a loop takes another step, in all stages that share it. What is computed in it follows; nullopt: a box
+// changes that needs constant extents (L4), or a row of a window does (L9). Requires: the loop is one of pure iterators.
+std::optional<Plan> with_step(const Plan& plan, const LoopRef& loop, int64_t step,
+                              const Context& context);
 // The elements in memory from lane to lane of a vector along the iterator, in the storage of the Func that is read or, if it
 // can be stored otherwise, in the best one; 0: no such number.
 int64_t lane_stride(const Plan& plan, const Context& context, const Access& read, int iterator);

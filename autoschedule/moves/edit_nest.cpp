@@ -391,18 +391,4 @@ void store_first(Storage& storage, int dimension) {
   std::rotate(storage.order.begin(), at, at + 1);
 }
 
-void run_in_parallel(Nest& nest, const Context& context, StageId stage) {
-  if (context.machine.threads == 1) return;
-  const Cover extents = whole_cover(stage, context.sizes);
-  int64_t chunks = 1;
-  for (size_t d = 0; d < body_depth(nest) && chunks < context.machine.enough_tasks(); ++d) {
-    if (!may_run_at_once(context, stage, nest, d)) {
-      if (chunks > 1) return;
-      continue;  // serial, around parallel ones
-    }
-    nest.loops[d].kind = ForType::Parallel;
-    chunks *= trips(extents, nest, d);
-  }
-}
-
 }  // namespace retrograde::planning::moves

@@ -32,14 +32,6 @@ int64_t span(const Nest& nest, int depth, int iterator) {
   return result;
 }
 
-// Whether a Func is stored somewhere else than where it is computed, or in a window. Opaque ones may be, in a loop.
-bool has_window(const FuncPlan& func) {
-  const auto& [compute, store, hoist] = func.placement;
-  if (func.opacity != Opacity::None) return compute.kind != Kind::Root;
-  return !func.storage.folds.empty() || hoist.kind != Kind::Undecided ||
-         (store.kind != Kind::Undecided && !(store == compute));
-}
-
 // One change of a Func in a plan.
 class FuncChange {
  public:
@@ -294,6 +286,13 @@ bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func)
     }
   }
   return true;
+}
+
+bool has_window(const FuncPlan& func) {
+  const auto& [compute, store, hoist] = func.placement;
+  if (func.opacity != Opacity::None) return compute.kind != Kind::Root;
+  return !func.storage.folds.empty() || hoist.kind != Kind::Undecided ||
+         (store.kind != Kind::Undecided && !(store == compute));
 }
 
 bool stays_in_place(const Context& context, FuncId func) {

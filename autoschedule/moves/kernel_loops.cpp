@@ -67,7 +67,7 @@ class KernelLoops {
     }
     return result;
   }
-  // What lies together in memory first.
+  // In the order of dimensions in memory.
   template <typename Condition>
   std::vector<int16_t> iterators(Condition condition) const {
     std::vector<int16_t> result;

@@ -47,6 +47,27 @@ std::vector<Nest> in_parallel(const StageLoops& loops) {
 
 }  // namespace
 
+void run_in_parallel(Nest& nest, const Context& context, StageId stage) {
+  if (context.machine.threads == 1) return;
+  const Cover extents = whole_cover(stage, context.sizes);
+  int64_t chunks = 1;
+  for (size_t d = 0; d < body_depth(nest) && chunks < context.machine.enough_tasks(); ++d) {
+    if (!may_run_at_once(context, stage, nest, d)) {
+      if (chunks > 1) return;
+      continue;  // serial, around parallel ones
+    }
+    // The body of the innermost loop is a few vectors: many iterations are one chunk.
+    const int64_t all = trips(extents, nest, d);
+    const auto each = static_cast<uint64_t>(chunks * all / context.machine.many_tasks());
+    if (d + 1 == body_depth(nest) && each > 1) {
+      const Loop& loop = nest.loops[d];
+      insert_step(nest, loop.iterator, static_cast<int64_t>(std::bit_floor(each)) * loop.step, d);
+    }
+    nest.loops[d].kind = ForType::Parallel;
+    chunks *= all;
+  }
+}
+
 std::vector<Plan> parallelise(const Plan& plan, FuncId func, const Context& context) {
   if (plan.of(func).placement.compute.kind != Level::Kind::Root) return {};
   return with_nests(plan, func, context, in_parallel);

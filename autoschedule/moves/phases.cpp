@@ -2,6 +2,7 @@
 //
 //   y, x:16, r, vector x                     =>     y, x:32, r, unroll x%2, vector x:2     if f(x / 2) or f(x % 2) is read
 //   y, x:32, r, unroll c, unroll x:16, vector x   =>   y, x:32, r, unroll c, unroll x%2, vector x:2
+//   weights  root                                 =>   weights  root  (x, k)     also with operands along the lanes
 //
 // In each copy the remainder is a constant, and lanes of the quotient are neighbours in memory. Lanes of neighbouring points
 // would be interleaved or gathered instead.
@@ -79,6 +80,12 @@ std::vector<Plan> phases(const Plan& plan, FuncId func, const Context& context) 
   for (const Plan& tiled : find_move("register_tile")->apply(plan, func, context)) {
     for (Plan& phases : with_nests(tiled, func, context, with_phases))
       add(plans, std::move(phases));
+  }
+  // Operands that lie across the lanes would hide what phases gain.
+  const size_t count = plans.size();
+  for (size_t i = 0; i < count; ++i) {
+    for (const StageNode& stage : context.accesses.func(func).stages)
+      add(plans, with_turned_operands(plans[i], stage.id, context));
   }
   return plans;
 }

@@ -8,6 +8,7 @@
 //                                                                                    memory of what is read across lanes
 //
 // Legal: L1: iterations of pure loops never meet, and steps of a reduction keep the order of those that do.
+// L4, L9, L11: a step that changes does so in all stages that share it, and what is computed inside runs at any size.
 // Sizes are powers of two; the first ones fill the first or the second cache with what the stage accesses.
 #include <algorithm>
 #include <bit>
@@ -65,7 +66,6 @@ class Tiler {
           is_reduction(loops_.context, loops_.stage, nest_.loops[inner_[0].depth - 1].iterator);
       if (is_in_reduction) tile({{inner_[0], power_of_two_below(points)}}, outside);
     }
-    for (const Inner& inner : inner_) resize(inner);
     if (const auto lanes = vector_loop(nest_)) {
       const IteratorSet across = iterators_across(loops_, set_of(nest_.loops[*lanes].iterator));
       for (const Inner& inner : inner_) {
@@ -116,24 +116,6 @@ class Tiler {
     if (!has_same_order(nest_, nest, loops_.extents)) nests_.push_back(std::move(nest));
   }
 
-  // Doubles and halves a step between others.
-  void resize(const Inner& inner) {
-    const int64_t smaller = nest_.loops[inner.depth].step;
-    const int64_t step = outer_step(nest_, inner.iterator, smaller);
-    if (step == 0 || body_depth(nest_) <= *find_loop(nest_, inner.iterator, step)) return;
-    const int64_t larger = outer_step(nest_, inner.iterator, step);
-    const int64_t limit = larger > 0 ? larger : loops_.extents[static_cast<size_t>(inner.iterator)];
-    for (const int64_t size : {2 * step, step / 2}) {
-      if (size <= smaller || 2 * size > limit || step % 2 != 0) continue;
-      Nest nest = nest_;
-      const size_t depth = *find_loop(nest, inner.iterator, step);
-      const ForType kind = nest.loops[depth].kind;
-      nest.loops.erase(nest.loops.begin() + static_cast<std::ptrdiff_t>(depth));
-      insert_step(nest, inner.iterator, size, depth, kind);
-      nests_.push_back(std::move(nest));
-    }
-  }
-
   // Runs the points of a cache line inside of all loops around the body.
   void tile_across(const Inner& inner) {
     const Loop loop = nest_.loops[inner.depth];
@@ -151,10 +133,37 @@ class Tiler {
 
 std::vector<Nest> tiles(const StageLoops& loops) { return Tiler(loops).run(); }
 
+// Doubles and halves the steps between others, also of loops that stages share.
+void add_resized(std::vector<Plan>& plans, const StageLoops& loops) {
+  const auto& [plan, context, stage, nest, extents] = loops;
+  for (size_t d = body_depth(nest); d-- > 0;) {
+    const auto [iterator, step] = std::pair(nest.loops[d].iterator, nest.loops[d].step);
+    const auto is_inside = [&](const Loop& loop) {
+      return loop.iterator == iterator && loop.step < step;
+    };
+    const auto inner = std::ranges::find_if(nest.loops, is_inside);
+    const size_t body = body_depth(nest);
+    if (!is_free(context, stage, iterator) || inner == nest.loops.end() ||
+        inner - nest.loops.begin() >= static_cast<std::ptrdiff_t>(body))
+      continue;
+    const int64_t larger = outer_step(nest, iterator, step);
+    const int64_t limit = larger > 0 ? larger : extents[static_cast<size_t>(iterator)];
+    for (const int64_t size : {2 * step, (step + 1) / 2}) {
+      if (size <= inner->step || size % inner->step != 0 || 2 * size > limit) continue;
+      add(plans, with_step(plan, {stage, static_cast<int16_t>(d)}, size, context));
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<Plan> tile(const Plan& plan, FuncId func, const Context& context) {
-  return with_nests(plan, func, context, tiles);
+  std::vector<Plan> plans = with_nests(plan, func, context, tiles);
+  if (!has_loops(plan, func)) return plans;
+  for (const StageNode& node : context.accesses.func(func).stages)
+    add_resized(plans,
+                {plan, context, node.id, plan.nest(node.id), loop_extents(plan, context, node.id)});
+  return plans;
 }
 
 }  // namespace retrograde::planning::moves

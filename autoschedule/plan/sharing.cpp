@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "graph/definitions/define.h"
 #include "ir/build.h"
@@ -11,16 +13,26 @@ namespace retrograde::planning {
 
 namespace {
 
-// Whether a graph has a circle; an edge from a node to itself is one.
-template <typename Node>
-bool has_circle(std::set<std::pair<Node, Node>> edges) {
-  while (!edges.empty()) {
-    std::set<Node> later;
-    for (const auto& [first, second] : edges) later.insert(second);
-    if (std::erase_if(edges, [&](const auto& edge) { return !later.contains(edge.first); }) == 0)
-      return true;
+using Edges = std::vector<std::pair<size_t, size_t>>;
+
+// Whether a graph of numbered nodes has a circle; an edge from a node to itself is one. It takes away nodes that no edge
+// leads to, until none is left (A. Kahn, Topological sorting of large networks, 1962).
+bool has_circle(size_t nodes, const Edges& edges) {
+  std::vector<size_t> edges_to(nodes), first_from(nodes + 1), targets(edges.size());
+  for (const auto& [from, to] : edges) ++edges_to[to], ++first_from[from + 1];
+  for (size_t n = 0; n < nodes; ++n) first_from[n + 1] += first_from[n];
+  std::vector<size_t> end_from(first_from.begin(), first_from.end() - 1);
+  for (const auto& [from, to] : edges) targets[end_from[from]++] = to;
+  std::vector<size_t> free;
+  for (size_t n = 0; n < nodes; ++n) {
+    if (edges_to[n] == 0) free.push_back(n);
   }
-  return false;
+  for (size_t i = 0; i < free.size(); ++i) {
+    for (size_t e = first_from[free[i]]; e < end_from[free[i]]; ++e) {
+      if (--edges_to[targets[e]] == 0) free.push_back(targets[e]);
+    }
+  }
+  return free.size() < nodes;
 }
 
 // The loops in which stages of others run, by stage.
@@ -121,32 +133,38 @@ class SharingChecker {
     for (const auto& [stage, host] : hosts_) {
       const FuncId from = leaders[static_cast<size_t>(stage.func)],
                    to = leaders[static_cast<size_t>(host.stage.func)];
-      std::ranges::replace(leaders, from, to);
+      if (from != to) std::ranges::replace(leaders, from, to);
     }
-    std::set<std::pair<FuncId, FuncId>> reads;
+    Edges reads;
     for (size_t f = 0; f < leaders.size(); ++f) {
       for (const StageId reader : plan_.program->readers[f])
-        reads.emplace(leaders[f], leaders[static_cast<size_t>(reader.func)]);
+        reads.emplace_back(leaders[f], leaders[static_cast<size_t>(reader.func)]);
     }
-    return has_circle(std::move(reads));
+    return has_circle(leaders.size(), reads);
   }
 
   // The loops that stages of one Func run in come one after another, except where a stage runs in those of the one
   // before it.
   bool keep_order() const {
-    std::set<std::pair<StageId, StageId>> order;
-    for (size_t f = 0; f < plan_.funcs.size(); ++f) {
-      int16_t first = 0;  // of the stages that run in each other's loops
-      for (size_t s = 1; s < plan_.funcs[f]->nests.size(); ++s) {
-        const StageId stage{static_cast<FuncId>(f), static_cast<int16_t>(s)};
+    std::map<StageId, size_t> numbers;  // of the stages that own loops
+    const auto owner = [&](StageId stage) {
+      return numbers.emplace(*owner_of(stage), numbers.size()).first->second;
+    };
+    std::set<FuncId> company;
+    for (const auto& [stage, host] : hosts_) company.insert({stage.func, host.stage.func});
+    Edges order;
+    for (const FuncId func : company) {
+      std::vector<size_t> before, together;  // owners of the stages that run in each other's loops
+      for (size_t s = 0; s < plan_.of(func).nests.size(); ++s) {
+        const StageId stage{func, static_cast<int16_t>(s)};
         const auto host = hosts_.find(stage);
-        const bool joins_own = host != hosts_.end() && host->second.stage.func == stage.func;
-        if (!joins_own) first = stage.stage;
-        for (StageId before{stage.func}; before.stage < first; ++before.stage)
-          order.emplace(*owner_of(before), *owner_of(stage));
+        if (host == hosts_.end() || host->second.stage.func != func)
+          before = std::exchange(together, {});
+        together.push_back(owner(stage));
+        for (const size_t one : before) order.emplace_back(one, together.back());
       }
     }
-    return !has_circle(std::move(order));
+    return !has_circle(numbers.size(), order);
   }
 };
 

@@ -125,7 +125,7 @@ class DeviceSplitter {
            prove_associative(*sum.func, sum.func->stage(sum.stage.id.stage)).op;
   }
 
-  // Of a part: those among which data or the loops of the sum choose. 0: not known.
+  // The elements of a part, if data or the loops of the sum choose among them. 0: not known.
   int64_t elements_that_meet(const Sum& sum) const {
     int64_t elements = 1;
     for (size_t d = 0; d < sum.stage.write.index.size(); ++d) {
@@ -184,7 +184,7 @@ class DeviceSplitter {
     factor(update, {{part, "parts"}, {row, "rows"}});
     factor(update, {{part, "parts"}});
   }
-  // Of every so many terms one, where neighbours may take neighbours; else a stretch for each. The result: the loop over
+  // Splits terms over parts: in turn if neighbours may take neighbours, else a stretch for each. The result: the loop over
   // parts.
   static std::string parts(const SplitUpdate& update, const Sum& sum, const std::string& all,
                            int64_t terms, int64_t count) {

@@ -6,7 +6,7 @@
 //
 // Each partial sum is a thread. Neighbours take neighbours, unless the order of terms matters, as that of an argmin does
 // among equals: then each has a stretch of them. Their number depends on the program and its sizes alone, and so does every
-// bit. So it is for sums at places that data decide, if each part has few elements beside what is added to them. Loops
+// bit. The same holds for sums at data-dependent indices, if each part has few elements beside what is added to them. Loops
 // whose extents are known are split as one; of others, points of rows and rows apart.
 #pragma once
 
@@ -18,7 +18,7 @@
 
 namespace retrograde::planning {
 
-// What may be split: sums, and sums at places that data decide.
+// Which updates may be split: sums, and sums at data-dependent indices.
 struct SplitForDevice {
   const Device* device = nullptr;  // null: the processor runs the program
   bool sums = true, scatters = true;

@@ -44,6 +44,13 @@ bool is_trivial(const Expr& e) {
 
 // The argument of strict_float stays inside it: in a Let outside, it might be contracted.
 bool is_strict(const Expr& e) { return as_op(e, Op::strict_float); }
+// Parts of such an argument that are the same anywhere: elements that it reads, and strict values.
+bool is_exact(const Expr& e) {
+  const auto* call = e.as<Call>();
+  const bool is_element =
+      call && (call->call_type == CallType::Func || call->call_type == CallType::Image);
+  return is_element || e.kind() == Kind::Load || is_strict(e);
+}
 
 // Counts the parents of each node among the nodes that are evaluated unconditionally.
 class UseCounter {
@@ -58,11 +65,19 @@ class UseCounter {
     if (uses_[e.get()]++ > 0) return;
     if (const Call* branch = as_op(e, Op::if_then_else)) {
       count(branch->args[0]);  // the arms run only when selected
-    } else if (!is_strict(e)) {
-      for_each_child(e, [&](const Expr& child) { count(child); });
+    } else {
+      for_each_child(e,
+                     [&](const Expr& child) { is_strict(e) ? count_exact(child) : count(child); });
     }
   }
+  // The exact parts of a strict argument, which are shared if a part around them is: so it is visited twice.
+  void count_exact(const Expr& e) {
+    if (is_exact(e)) return count(e);
+    if (as_op(e, Op::if_then_else) || inside_[e.get()]++ > 1) return;
+    for_each_child(e, [&](const Expr& child) { count_exact(child); });
+  }
   std::unordered_map<const ExprNode*, int> uses_;
+  std::unordered_map<const ExprNode*, int> inside_;  // of strict arguments
 };
 
 // The first value, wrapped in its Lets.
@@ -77,7 +92,8 @@ class LetMaker : public Rewriter {
  protected:
   using Rewriter::rewrite;
   Expr rewrite(const Expr& e) override {
-    if (is_strict(e)) return name(e, e);
+    if (is_strict(e))
+      return name(e, map_children(e, [&](const Expr& child) { return exact_(child); }));
     const Call* choice = as_op(e, Op::if_then_else);
     return name(e, choice ? branch(*choice) : children(e));
   }
@@ -113,6 +129,21 @@ class LetMaker : public Rewriter {
    private:
     LetMaker& maker_;
   };
+  // Replaces the parts of strict arguments that have names.
+  class ExactNamer : public Rewriter {
+   public:
+    explicit ExactNamer(LetMaker& maker) : maker_(maker) {}
+
+   protected:
+    using Rewriter::rewrite;
+    Expr rewrite(const Expr& e) override {
+      if (is_exact(e)) return maker_(e);
+      return as_op(e, Op::if_then_else) ? e : children(e);
+    }
+
+   private:
+    LetMaker& maker_;
+  };
   bool gets_name(const Expr& e) const {
     return uses_.is_shared(e) && !is_trivial(e) && !must_stay(e);
   }
@@ -120,6 +151,7 @@ class LetMaker : public Rewriter {
   const UseCounter& uses_;
   Lets& lets_;
   Namer named_{*this};
+  ExactNamer exact_{*this};
 };
 
 // Replaces names by the values of the enclosing Lets. Names are unique, so one memo serves all

@@ -5,11 +5,25 @@
 #include "ir/equal.h"
 #include "ir/visit.h"
 #include "simplify/simplifier.h"
+#include "simplify/simplify_memo.h"
 
 namespace retrograde::simplification {
 
+namespace {
+thread_local SimplifyMemo* innermost_memo = nullptr;
+}  // namespace
+
+SimplifyMemo::SimplifyMemo()
+    : simplifier_(std::make_unique<Simplifier>(BoundsMap())), outer_(innermost_memo) {
+  innermost_memo = this;
+}
+SimplifyMemo::~SimplifyMemo() { innermost_memo = outer_; }
+SimplifyMemo* SimplifyMemo::innermost() { return innermost_memo; }
+
 Expr simplify(const Expr& e, const BoundsMap& bounds) {
   if (!e.defined()) return e;
+  if (SimplifyMemo* memo = SimplifyMemo::innermost(); memo && bounds.empty())
+    return memo->simplifier()(e);
   return Simplifier(bounds)(e);
 }
 

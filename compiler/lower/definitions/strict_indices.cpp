@@ -1,10 +1,13 @@
 #include "lower/definitions/strict_indices.h"
 
+#include <algorithm>
 #include <functional>
+#include <unordered_set>
 
 #include "analysis/interval.h"
 #include "analysis/nonnegative.h"
 #include "ir/build.h"
+#include "ir/equal.h"
 #include "ir/visit.h"
 
 namespace retrograde::lower {
@@ -16,19 +19,20 @@ bool reads_element(const Expr& e) {
   return call && (call->call_type == CallType::Func || call->call_type == CallType::Image);
 }
 
-// Whether e contains a float sum and a float product that could be contracted; elements that e reads count as values.
-bool may_contract(const Expr& e) {
-  bool sum = false, product = false;
-  walk(e, [&](const Expr& part) {
-    if (reads_element(part)) return false;
-    const bool is_lerp = as_op(part, Op::lerp);
-    if (part.type().is_float()) {
-      sum |= part.kind() == Kind::Add || part.kind() == Kind::Sub || is_lerp;
-      product |= part.kind() == Kind::Mul || is_lerp || as_op(part, Op::strong_mul);
-    }
-    return !(sum && product);
+bool is_sum(const Expr& e) {
+  return e.type().is_float() &&
+         (e.kind() == Kind::Add || e.kind() == Kind::Sub || as_op(e, Op::lerp));
+}
+
+// Whether the sum contains a float product, with which it could be contracted; elements that it reads count as values.
+bool may_contract(const Expr& sum) {
+  bool product = false;
+  walk(sum, [&](const Expr& part) {
+    product |= part.type().is_float() &&
+               (part.kind() == Kind::Mul || as_op(part, Op::lerp, Op::strong_mul));
+    return !product && !reads_element(part);
   });
-  return sum && product;
+  return product;
 }
 
 bool may_be_negative_as_nan(const Expr& value, Type type) {
@@ -36,30 +40,95 @@ bool may_be_negative_as_nan(const Expr& value, Type type) {
          !bounds_of(value, Scope<Interval>()).has_lower_bound();
 }
 
-// Makes a coordinate strict, down to the elements that it reads.
-Expr strict_coordinate(const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
-  if (reads_element(e)) return e;
+const Cast* as_rounding(const Expr& e) {
   const auto* cast = e.as<Cast>();
-  if (!cast || !cast->type.is_int_or_uint() || !cast->value.type().is_float()) return {};
-  const Expr& value = cast->value;
-  const Expr place = may_contract(value)
-                         ? cast_to(cast->type, call_op(Op::strict_float, value.type(), {value}))
-                         : map_children(e, recurse);
-  return may_be_negative_as_nan(value, cast->type) ? max(place, make_zero(cast->type)) : place;
+  return cast && cast->type.is_int_or_uint() && cast->value.type().is_float() ? cast : nullptr;
+}
+
+// Keeps NaN from making a coordinate negative, down to the elements that it reads.
+Expr without_nan(const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
+  if (reads_element(e)) return e;
+  const Cast* cast = as_rounding(e);
+  if (!cast || !may_be_negative_as_nan(cast->value, cast->type)) return {};
+  return max(map_children(e, recurse), make_zero(cast->type));
+}
+
+// The arithmetic of floats alone: equal for expressions that differ in elements, variables, integers and the order of
+// operands of sums and products.
+Expr arithmetic_of(const Expr& e, const std::function<Expr(const Expr&)>& recurse) {
+  if (e.as<Variable>() || reads_element(e)) return variable("", e.type());
+  if (const auto* cast = e.as<Cast>(); cast && !cast->value.type().is_float())
+    return cast_to(e.type(), variable("", cast->value.type()));
+  if (e.kind() != Kind::Add && e.kind() != Kind::Mul) return {};
+  const auto& op = static_cast<const Binary&>(*e.get());
+  const Expr a = recurse(op.a), b = recurse(op.b);
+  return compare(b, a) < 0 ? ir::binary(e.kind(), b, a) : ir::binary(e.kind(), a, b);
+}
+
+// The sums that coordinates are rounded from, by their arithmetic.
+class RoundedSums {
+ public:
+  void add_coordinate(const Expr& coordinate) {
+    walk(coordinate, [&](const Expr& e) {
+      const Cast* cast = as_rounding(e);
+      if (cast) add_sums(cast->value);
+      return !cast && !reads_element(e);
+    });
+  }
+  // `e` with these sums strict.
+  Expr made_strict(const Expr& e) { return sums_.empty() ? e : outside_(e); }
+
+ private:
+  std::unordered_set<Expr, StructuralHash, StructuralEqual> sums_;
+  StepRewriter arithmetic_{arithmetic_of};
+  StepRewriter outside_{[this](const Expr& e, const auto&) {
+    return is_sum(e) && sums_.contains(arithmetic_(e))
+               ? call_op(Op::strict_float, e.type(), {inside_(e)})
+               : Expr();
+  }};
+  // Elements that a strict sum reads have coordinates of their own.
+  StepRewriter inside_{[this](const Expr& e, const auto&) {
+    return reads_element(e) ? map_children(e, outside_) : Expr();
+  }};
+
+  void add_sums(const Expr& value) {
+    walk(value, [&](const Expr& e) {
+      if (is_sum(e) && may_contract(e)) sums_.insert(arithmetic_(e));
+      return !reads_element(e);
+    });
+  }
+};
+
+// Calls `visit` with each coordinate of elements that the stage reads or writes.
+void each_coordinate(const Definition& stage, const std::function<void(const Expr&)>& visit) {
+  for (const Expr& arg : stage.args) visit(arg);
+  map_exprs(stage, [&](const Expr& e) {
+    walk(e, [&](const Expr& part) {
+      if (reads_element(part)) std::ranges::for_each(part.as<Call>()->args, visit);
+      return true;
+    });
+    return e;
+  });
 }
 
 }  // namespace
 
 void make_indices_strict(Program& program) {
-  StepRewriter coordinate(strict_coordinate);
-  StepRewriter strict([&](const Expr& e, const auto& recurse) {
+  StepRewriter coordinate(without_nan);
+  StepRewriter coordinates([&](const Expr& e, const auto& recurse) {
     return reads_element(e) ? map_children(map_children(e, recurse), coordinate) : Expr();
   });
+  RoundedSums rounded;
   for (LoopedFunc& f : program.funcs) {
     for (Definition& stage : f.stages) {
-      stage = map_exprs(stage, std::ref(strict));
-      for (Expr& arg : stage.args) arg = coordinate(strict(arg));
+      each_coordinate(stage, [&](const Expr& e) { rounded.add_coordinate(e); });
+      stage = map_exprs(stage, std::ref(coordinates));
+      for (Expr& arg : stage.args) arg = coordinate(arg);
     }
+  }
+  for (LoopedFunc& f : program.funcs) {
+    for (Definition& stage : f.stages)
+      stage = map_exprs(stage, [&](const Expr& e) { return rounded.made_strict(e); });
   }
 }
 

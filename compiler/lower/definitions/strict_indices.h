@@ -1,12 +1,14 @@
-// strict_indices -- make coordinates computed from floats round the same everywhere, and keep NaN from making them
-// negative.
+// strict_indices -- make the sums that coordinates are rounded from the same numbers everywhere, and keep NaN from making
+// coordinates negative.
 //
-//   g(int32((float32(x) + 0.5f)*k - 0.5f))  =>
-//   g(int32(strict_float((float32(x) + 0.5f)*k - 0.5f)))
+//   at = (float32(x) + 0.5f)*k - 0.5f          at = strict_float((float32(x) + 0.5f)*k - 0.5f)
+//   g(int32(floor(at)))*(at - floor(at))   =>  g(int32(floor(at)))*(at - floor(at))
 //
 // The loops of g cover the coordinates between two ends, which are the same expression at the ends of x. If it were
-// contracted to FMA in one place and not in the other, a read could be one element outside of the computed region.
-// Without a product and a sum there is nothing to contract, and the coordinate stays unchanged.
+// contracted to FMA in one place and not in the other, a read could be one element outside of the computed region. And
+// if it were contracted in the weight of an interpolation but not in the coordinate, the two could lie on different
+// sides of an integer. So the sum is strict in all stages of the program, with the variables of any Func. Sums without a
+// product have nothing to contract and stay unchanged.
 //
 //   g(int32(abs(f(x))))   =>   g(max(int32(abs(f(x))), 0))
 //

@@ -8,6 +8,7 @@
 #include "lower/nests/own_joining.h"
 #include "lower/nests/root_statement.h"
 #include "lower/nests/shared_loops.h"
+#include "simplify/simplify_memo.h"
 
 namespace retrograde::lower {
 
@@ -132,6 +133,7 @@ void NestEmitter::check_everything_found_its_place(const Emitted& all) const {
 }
 
 Stmt build_loop_nests(const Program& program, const LoopNestOptions& options) {
+  const simplification::SimplifyMemo memo;
   return NestEmitter(program, options).emit();
 }
 

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "autoschedule/cost/assumptions.h"
+#include "autoschedule/cost/touch.h"
+#include "autoschedule/machine/reference.h"
 #include "frontend/data/param.h"
 #include "unit/cost/cost_testing.h"
 
@@ -46,7 +48,7 @@ TEST_F(CostProbes, ACopyMovesEachLineThreeTimes) {
   // A store, and a quarter of what goes on beside it.
   const double vector_ns = 0.35 + 0.25 * (0.2 + 0.3);
   EXPECT_NEAR(copy.compute_seconds, columns * rows / 16 * vector_ns * 1e-9, 10 * micro);
-  EXPECT_NEAR(copy.seconds, copy.memory_seconds.back() + 0.25 * copy.compute_seconds, 2 * micro);
+  EXPECT_NEAR(copy.seconds, copy.memory_seconds.back() + 0.75 * copy.compute_seconds, 2 * micro);
   EXPECT_EQ(copy.bound_by(), "memory");
 }
 
@@ -184,6 +186,22 @@ TEST_F(StencilProbes, ThePeakIsWhatIsAliveAtOnce) {
   EXPECT_EQ(sliding.peak_bytes, 2 * 4 * columns * 4);
 }
 
+// Lowering computes an output as soon as all that it reads is there, whatever the order of the outputs.
+TEST_F(CostProbes, OneImageIsAliveAtOnce) {
+  Func second("second"), third("third"), other_rows("other_rows");
+  rows_sum(x, y) = in(x, y) + in(x, y + 1);
+  other_rows(x, y) = other(x, y) + other(x, y + 1);
+  out(x, y) = rows_sum(x, y) + 1.0f;
+  second(x, y) = other_rows(x, y) + 1.0f;
+  third(x, y) = rows_sum(x, y) * 2.0f;
+  for (Func* f : {&out, &second, &third}) f->set_estimate(x, 0, 4096).set_estimate(y, 0, 2048);
+  const Cost cost = Pricing({out, second, third}, probed_machine())
+                        .price(
+                            "out  root\nsecond  root\nthird  root\nrows_sum  root\n"
+                            "other_rows  root\n");
+  EXPECT_EQ(cost.peak_bytes, image_bytes);
+}
+
 TEST_F(CostProbes, ATransposeLoadsALineForEachElement) {
   out(x, y) = in(y, x);
   in.dim(0).set_estimate(0, 2064);  // rows in different sets
@@ -228,6 +246,41 @@ TEST_F(CostProbes, RowsThatShareSetsEvictEachOther) {
     return cost.stages[0].bytes[1] / (width * 512);
   };
   EXPECT_GT(lines_of(1024), 5 * lines_of(1040));
+}
+
+// 64 rows of 256 bytes. 4112 bytes apart, they begin in 1008 bytes of sets and end 256 bytes later.
+TEST(Touch, RowsALittleApartShareSets) {
+  Touch touch;
+  touch.sides.resize(2);
+  for (int16_t d = 0; d < 2; ++d) {
+    touch.sides[static_cast<size_t>(d)].moves = {{d, 1}};
+    touch.sides[static_cast<size_t>(d)].most = 64;
+  }
+  const auto bytes_of = [&](double width) {
+    return bytes_by_sets(touch, {{0, 1}, {width, 64}}, {64, 64}, page_bytes);
+  };
+  EXPECT_EQ(bytes_of(1024), 64 * page_bytes);
+  EXPECT_EQ(bytes_of(1028), 64.0 * 256 / (1008 + 256) * page_bytes);
+  EXPECT_EQ(bytes_of(1088), 64 * 256) << "all sets";
+  touch.sides[0].data = touch.data = set_of(0);
+  touch.moved = set_of(0) | set_of(1);
+  EXPECT_EQ(bytes_of(1024), 0) << "a table may be read anywhere";
+  touch.sides[0].is_displaced = true;
+  EXPECT_EQ(bytes_of(1024), 64 * page_bytes) << "rows are where they are";
+}
+
+// 16 KB that lie together, read for each eight rows that share sets: 64 times.
+TEST_F(CostProbes, RowsThatShareSetsLeaveOtherSetsAlone) {
+  RDom k(0, 64, "k");
+  out(x, y) += in(k, y) * other(x, k);
+  in.dim(0).set_estimate(0, 1024);
+  other.dim(0).set_estimate(0, 64);
+  other.dim(1).set_estimate(0, 64);
+  out.bound(x, 0, 64).bound(y, 0, 512);
+  is_sized = true;
+  const StageCost cost = update_cost("y:8, x:16, k.x, unroll y, vector x");
+  const double rows_bytes = 8 * 64 * 4, out_bytes = 512 * 64 * 4;
+  EXPECT_EQ(cost.bytes[1], 64 * 4 * rows_bytes + 2 * out_bytes) << "the rows for each vector";
 }
 
 // Columns of vectors: each iteration jumps to another row of both images.
@@ -421,6 +474,23 @@ TEST_F(CostProbes, SumsBeyondTheRegistersStayInMemory) {
   EXPECT_LT(ns_of("8"), 0.35);
 }
 
+TEST_F(CostProbes, SumsOfTwoStagesInALoopStayInMemory) {
+  RDom r(0, 1024, "r");
+  Func second("second");
+  out(x, y) += in(x, r) * other(y, r);
+  second(x, y) += in(x, r) * other(y, r + 1);
+  for (Func* sum : {&out, &second}) sum->bound(x, 0, 4096).bound(y, 0, 48);
+  const std::string zeros = "  root\n  .0  y, x:16, vector x\n  .1  ",
+                    loops = "y:8, x:16, r.x, unroll y, vector x\n";
+  const auto ns_of = [&](const std::string& shared) {
+    const Cost cost =
+        Pricing({out, second}).price("out" + zeros + loops + "second" + zeros + shared + loops);
+    return 1e9 * cost.stages[3].compute_seconds / (columns * 48 / 16 * 1024);
+  };
+  EXPECT_LT(ns_of(""), 0.35);
+  EXPECT_GT(ns_of("shared with out.1/r.x  "), 0.35) << "a store for each sum";
+}
+
 TEST_F(CostProbes, WhatALoopDoesNotChangeIsComputedOutsideOfIt) {
   out(x, y) = in(x, y) + exp(other(0, y));
   const double once = compute_seconds(cost_of("out  root  y, x:16, vector x\n"));
@@ -529,6 +599,69 @@ TEST_F(CostProbes, LargeBodiesStayScalar) {
   EXPECT_NEAR(slowdown(100, "y, x"), remainder_overhead, 0.05);
   EXPECT_GT(slowdown(200, "y, x"), 9);
   EXPECT_GT(slowdown(100, "y:2, x, unroll y"), 9);
+}
+
+// One of twenty additions waits for the one before, through memory: 2.5 ns instead of what the others take.
+TEST_F(CostProbes, AdditionsToOneBinWaitForEachOther) {
+  RDom r(0, 4096, 0, 2048, "r");
+  Func bins("bins");
+  bins(x) += 1;
+  bins(clamp(cast<int>(in(r.x, r.y)), 0, 255)) += 1;
+  bins.bound(x, 0, 256);
+  const auto seconds = [&](const std::string& loops, double latency_ns) {
+    Machine machine = probed_machine();
+    machine.memory_latency_ns = latency_ns;
+    const std::string root = "bins  root\n  .0  x\n  .1  x\n  .2  ";
+    return priced(bins, root + loops + "\n", machine).stages[2].compute_seconds;
+  };
+  for (const char* loops : {"r.y, r.x", "racing  r.y, r.x:16, vector r.x"}) {
+    EXPECT_NEAR(seconds(loops, 2.5), 0.95 * seconds(loops, 0) + 0.05 * columns * rows * 2.5e-9,
+                micro);
+  }
+}
+
+// Elements that lie 4096 bytes apart have the same low bits of addresses.
+TEST_F(CostProbes, LoadsWaitForStoresWholePagesApart) {
+  const auto seconds_of = [&](int bins) {
+    RDom r(0, 4096, 0, 2048, "r");
+    Func sums("sums");
+    sums(x, c) += in(x, c);
+    sums(clamp(cast<int>(in(r.x, r.y)), 0, bins - 1), c) += 1.f;
+    sums.bound(x, 0, bins).bound(c, 0, 2);
+    const Cost cost =
+        priced(sums, "sums  root\n  .0  c, x\n  .1  c, x\n  .2  r.y, r.x, unroll c\n");
+    return cost.stages[2].compute_seconds;
+  };
+  EXPECT_NEAR(seconds_of(1024) - seconds_of(1025), columns * rows * 2.5e-9,
+              0.1 * columns * rows * 2.5e-9);
+}
+
+// A stage that runs along rows stores each line once, whatever the columns of another one in the same loop do.
+TEST_F(CostProbes, RowsThatFitAreNotEvicted) {
+  RDom r(1, 499, "r");
+  Func run("run");
+  run(x, y) = in(0, y);
+  run(r, y) = run(r - 1, y) * other(r, y);
+  run.bound(x, 0, 500).bound(y, 0, 2048);
+  const auto first_of = [&](const std::string& strip) {
+    return priced(run, "run  root\n  .0  parallel y" + strip + ", y, x:16, vector x\n  .1  " +
+                           "shared with run.0/y" + strip + "  parallel y" + strip +
+                           ", r.x, unroll y\n")
+        .stages[0]
+        .seconds;
+  };
+  EXPECT_NEAR(first_of(":4"), first_of(":16"), 0.2 * first_of(":16"));
+}
+
+// Eight rows in lanes: each loads and stores an element of its own, at a place that no vector holds.
+TEST_F(CostProbes, StridedLanesNeedNoPlaces) {
+  Func copy("copy");
+  copy(x, y) = in(x, y);
+  copy.bound(x, 0, 500).bound(y, 0, 2048);
+  const Cost cost = priced(copy, "copy  root  y:8, x, vector y\n");
+  const double loads = 8 * 0.35, stores = 8 * 0.4, loop = 0.3;
+  const double vector_ns = 0.7 * stores + 0.25 * (0.7 * loads + loop);
+  EXPECT_NEAR(cost.stages[0].compute_seconds, 500 * 256 * vector_ns * 1e-9, 2 * micro);
 }
 
 // A slice of one vector and its neighbours.
@@ -773,8 +906,8 @@ TEST_F(CostProbes, AReportHasALineForEachStage) {
   const std::string text = to_text(cost_of("out  root  y, x:16, vector x\n"), plan);
   EXPECT_EQ(std::regex_replace(graph::without_numbers(text), std::regex(" +"), " "),
             "stage us compute launch L2 KB L3 KB mem KB bound by\n"
-            "out 1.12e+04 249 0 0 0 1.01e+05 memory\n"
-            "total 1.12e+04\n"
+            "out 1.14e+04 249 0 0 0 1.01e+05 memory\n"
+            "total 1.14e+04\n"
             "peak KB 0\n");
 }
 

@@ -410,6 +410,16 @@ TEST(Cse, SeveralExpressionsShareTheirLets) {
   EXPECT_TRUE(uses_variable(shared.values[2], shared.lets[0].first));
 }
 
+// A sum is not: outside, it might be contracted.
+TEST(Cse, StrictArgumentsShareTheElementsThatTheyRead) {
+  const Expr e = introduce_lets(
+      parse_expr("strict_float(float32(a[x*3])*2f + 1f) + strict_float(float32(a[x*3])*2f + 2f)"));
+  const auto* let = e.as<Let>();
+  ASSERT_TRUE(let) << e;
+  EXPECT_TRUE(equal(let->value, parse_expr("a[x*3]"))) << e;
+  EXPECT_FALSE(let->body.as<Let>()) << e;
+}
+
 TEST(Cse, IsLinearInTheNumberOfNodes) {
   Expr e = parse_expr("x"), copy = parse_expr("x");
   for (int i = 0; i < 1000; ++i) {

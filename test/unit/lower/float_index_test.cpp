@@ -81,6 +81,38 @@ TEST(FloatIndex, AlsoWhenThePlaceSharesItsPositionWithAWeight) {
   expect_strict_places(f, in, scale);
 }
 
+// The element read at floor(at), less floor(at) in a value: of the same stage, and of a Func with loops of its own and
+// other variables, whose operands are in another order.
+TEST(FloatIndex, APlaceIsTheSameNumberWhereItIsAValue) {
+  const int n = 40;
+  Param<float> scale("scale");
+  for (const int lanes : {1, 4, 8}) {
+    Func g("g"), same("same"), apart("apart"), floors("floors"), fraction("fraction");
+    g(x) = x;
+    const Expr of_x = position(scale);
+    const Expr of_y = scale * (0.5f + cast<float>(min(y, 1000))) - 0.5f;
+    const Expr read = cast<float>(g(cast<int>(floor(of_x))));
+    floors(y) = floor(of_y);
+    fraction(y) = of_y - floor(of_y);
+    same(x) = read - floor(of_x);
+    apart(x) = read - floors(x) + select(fraction(x) < 0, 1, 0);
+    g.compute_root();
+    floors.compute_root();
+    fraction.compute_root();
+    if (lanes > 1) {
+      for (const Func& f : {same, apart}) Func(f).vectorize(x, lanes, TailStrategy::GuardWithIf);
+    }
+    for (const float k : hard_scales()) {
+      scale.set(k);
+      const Buffer<float> in_stage = same.realize({n}), in_others = apart.realize({n});
+      for (int at = 0; at < n; ++at) {
+        ASSERT_EQ(in_stage(at), 0) << "scale " << k << ", at " << at << ", lanes " << lanes;
+        ASSERT_EQ(in_others(at), 0) << "scale " << k << ", at " << at << ", lanes " << lanes;
+      }
+    }
+  }
+}
+
 TEST(FloatIndex, LinearInterpolationOfAStoredFunc) {
   for (const float scale : {0.3f, 1.0f / 3, 0.7f, 1.9f, -0.6f}) {
     Func g("g"), f("f");

@@ -1,0 +1,72 @@
+// A loop takes another step, in all stages that share it; what is computed in it follows.
+#include <algorithm>
+
+#include "autoschedule/moves/edit.h"
+
+namespace retrograde::planning::moves {
+
+namespace {
+
+using Kind = Level::Kind;
+
+// The stage that owns a loop.
+StageId owner_of(const Plan& plan, const LoopRef& loop) {
+  StageId stage = loop.stage;
+  while (const std::optional<LoopRef>& host = plan.nest(stage).shared_with) {
+    if (host->depth < loop.depth) break;
+    stage = host->stage;
+  }
+  return stage;
+}
+
+// The loop that a Func is computed in, perhaps through loops of others, from this loop inwards.
+std::optional<LoopRef> place_inside(const Plan& plan, FuncId guest, const LoopRef& loop) {
+  const Level* level = &plan.of(guest).placement.compute;
+  while (level->kind == Kind::At) {
+    const bool is_inside = level->loop.depth >= loop.depth &&
+                           owner_of(plan, {level->loop.stage, loop.depth}) == loop.stage;
+    if (is_inside) return level->loop;
+    level = &plan.of(level->loop.stage.func).placement.compute;
+  }
+  return std::nullopt;
+}
+
+// Whether smaller steps decide the box that is needed down to a loop.
+bool has_smaller_step(const Nest& nest, int depth, int inner_depth) {
+  const auto first = nest.loops.begin() + depth, last = nest.loops.begin() + inner_depth + 1;
+  return std::ranges::find(first + 1, last, first->iterator, &Loop::iterator) != last;
+}
+
+void change_step(Nest& nest, int depth, int64_t step) {
+  const auto at = nest.loops.begin() + depth;
+  const Loop loop = *at;
+  nest.loops.erase(at);
+  insert_step(nest, loop.iterator, step, static_cast<size_t>(depth), loop.kind);
+}
+
+}  // namespace
+
+std::optional<Plan> with_step(const Plan& plan, const LoopRef& loop, int64_t step,
+                              const Context& context) {
+  const LoopRef own{owner_of(plan, loop), loop.depth};
+  Plan result = plan;
+  for (size_t f = 0; f < plan.funcs.size(); ++f) {
+    const auto func = static_cast<FuncId>(f);
+    const std::optional<LoopRef> place = place_inside(plan, func, own);
+    if (place && !has_smaller_step(plan.nest(place->stage), own.depth, place->depth) &&
+        (has_window(plan.of(func)) || !runs_at_any_size(plan.of(func), context, func)))
+      return std::nullopt;
+    FuncPlan changed = *plan.funcs[f];
+    for (size_t s = 0; s < changed.nests.size(); ++s) {
+      const StageId stage{func, static_cast<int16_t>(s)};
+      const bool has_loop = changed.nests[s].loops.size() > static_cast<size_t>(own.depth);
+      if (has_loop && owner_of(plan, {stage, own.depth}) == own.stage)
+        change_step(changed.nests[s], own.depth, step);
+    }
+    if (!(changed == *plan.funcs[f]))
+      result.funcs[f] = std::make_shared<FuncPlan>(std::move(changed));
+  }
+  return broken_structure(result, plan).empty() ? std::optional(std::move(result)) : std::nullopt;
+}
+
+}  // namespace retrograde::planning::moves
