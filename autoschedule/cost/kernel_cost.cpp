@@ -99,7 +99,7 @@ class Kernel {
     }
     return cover;
   }
-  // What all warps ask for. A warp whose box holds more than its threads touch needs a line for each of these.
+  // The lines of all warps. A warp whose box holds more than its threads touch needs a line for each of these.
   double warp_bytes() const {
     const Cover warp = cover_of_warp();
     double all = 0;

@@ -9,7 +9,7 @@ namespace retrograde::planning::moves {
 
 namespace {
 
-// What is run may be larger than what was estimated.
+// Calls may be larger than estimates.
 constexpr int64_t times_the_estimate = 16;
 
 // A loop over blocks, and over the threads of each if there are any.
@@ -57,7 +57,7 @@ class KernelLoops {
     const Extent e = extent(iterator);
     return e.is_known() && e.is_constant() && e.estimate == 1;
   }
-  // Of the dimensions that it moves, the first one in memory.
+  // The first in memory of the dimensions that it moves.
   int place_in_memory(int iterator) const {
     int result = static_cast<int>(order_.size());
     for (size_t d = 0; d < node_.write.index.size(); ++d) {
