@@ -58,6 +58,9 @@ struct Move {
   MoveFunction apply;
   bool may_place;     // the Func may be computed elsewhere
   bool changes_bits;  // terms may be added in another order, in shorter chains
+  bool on_device;     // it also has plans for a device; the others have none there
+
+  bool is_for(const Context& context) const { return on_device || !context.device; }
 };
 std::span<const Move> all_moves();               // list.def
 const Move* find_move(const std::string& name);  // null: there is none

@@ -14,9 +14,10 @@ namespace moves {
 #undef RETROGRADE_MOVE
 
 std::span<const Move> all_moves() {
-#define RETROGRADE_MOVE(name) Move{#name, moves::name, false, false},
-#define RETROGRADE_MOVE_OF_PLACE(name) Move{#name, moves::name, true, false},
-#define RETROGRADE_MOVE_OF_BITS(name) Move{#name, moves::name, true, true},
+#define RETROGRADE_MOVE(name) Move{#name, moves::name, false, false, false},
+#define RETROGRADE_MOVE_OF_PLACE(name) Move{#name, moves::name, true, false, false},
+#define RETROGRADE_MOVE_OF_BITS(name) Move{#name, moves::name, true, true, false},
+#define RETROGRADE_MOVE_ON_DEVICE(name) Move{#name, moves::name, true, false, true},
   static constexpr auto all = std::to_array<Move>({
 #include "autoschedule/moves/list.def"
   });

@@ -23,7 +23,7 @@ FoundPlan fit_memory(FoundPlan found, const Context& context, CostModel& cost,
       const bool is_kept = f < options.kept.size() && options.kept[f];
       if (!in_memory || is_kept || is_output(*found.plan.program, func)) continue;
       for (const char* move : {"inline_func", "compute_at", "compute_in_tile", "slide"}) {
-        if (options.without.contains(move)) continue;
+        if (options.without.contains(move) || !find_move(move)->is_for(context)) continue;
         for (Plan& plan : find_move(move)->apply(found.plan, func, context)) {
           if (!keeps_funcs(found.plan, plan, options)) continue;
           Cost after = cost.price(plan);

@@ -165,7 +165,8 @@ class Beam {
   void add_neighbours(const Candidate& from, FuncId f, std::vector<Candidate>& next) {
     const bool only_places = is_small(f);
     for (const Move& move : all_moves()) {
-      if (options_.without.contains(move.name) || (only_places && !move.may_place)) continue;
+      const bool is_left_out = options_.without.contains(move.name) || !move.is_for(context_);
+      if (is_left_out || (only_places && !move.may_place)) continue;
       for (Plan& plan : move.apply(from.plan, f, context_)) {
         if (left_ == 0) return;
         if (only_places && is_alike(plan.of(f), from.plan.of(f))) continue;

@@ -126,8 +126,8 @@ TEST(ChooseSchedule, WithoutSizesTheRulesAreKept) {
   EXPECT_EQ(
       results.search.note,
       "cannot search for a schedule of \"of_unsized\": sizes of images and outputs are known or "
-      "estimated; the extent of dimension 0 of \"unsized\" is not known, so that what the rules "
-      "choose is taken. Give set_estimates() or bind the image.");
+      "estimated; the extent of dimension 0 of \"unsized\" is not known, so that the default "
+      "schedule is taken. Give set_estimates() or bind the image.");
   EXPECT_FALSE(results.schedule_source.empty());
 }
 
@@ -139,7 +139,7 @@ TEST(ChooseSchedule, OutputsWithoutSizesAreNamed) {
   EXPECT_EQ(
       results.search.note,
       "cannot search for a schedule of \"endless\": sizes of images and outputs are known or "
-      "estimated; the extent of \"x\" of \"endless\" is not known, so that what the rules choose "
+      "estimated; the extent of \"x\" of \"endless\" is not known, so that the default schedule "
       "is taken. Give set_estimates() or bind the image.");
 }
 
