@@ -345,7 +345,7 @@ class Totals {
   void expect(const Differences& most) const {
     for (size_t i = 0; i < differences.size(); ++i)
       EXPECT_LE(1000 * differences[i], most[i] * equal) << "difference " << i;
-    EXPECT_GT(equal, 1000);
+    EXPECT_GT(equal, 800);
   }
 
  private:
@@ -371,7 +371,7 @@ TEST(AccessGraphInShadow, AgreesOnLargePrograms) {
   Totals totals;
   for (const gradient::LargeProgram& program : gradient::large_programs())
     totals.add(with_gradients(program.build(gradient::test_side)), program.name);
-  totals.expect({0, 0, 0, 0, 0, 0, 0, 20, 0, 0});
+  totals.expect({0, 0, 0, 0, 0, 0, 0, 21, 0, 0});
 }
 
 TEST(AccessGraphInShadow, AgreesOnRandomPrograms) {

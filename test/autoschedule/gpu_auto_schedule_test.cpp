@@ -289,8 +289,8 @@ void expect_close(const std::vector<std::vector<double>>& got,
   for (size_t i = 0; i < got.size(); ++i) {
     ASSERT_EQ(got[i].size(), expected[i].size());
     double largest = 0;
-    bool is_rounded =
-        true;  // to integers: an FMA may give the next one, and a tone curve a few more
+    // Of whole numbers, an FMA may give the next one, and a tone curve a few more.
+    bool is_rounded = true;
     for (const double value : expected[i]) {
       largest = std::max(largest, std::abs(value));
       is_rounded = is_rounded && value == std::round(value);
