@@ -289,7 +289,7 @@ void expect_close(const std::vector<std::vector<double>>& got,
   for (size_t i = 0; i < got.size(); ++i) {
     ASSERT_EQ(got[i].size(), expected[i].size());
     double largest = 0;
-    // Of whole numbers, an FMA may give the next one, and a tone curve a few more.
+    // An FMA may give the next whole number, and a tone curve a few more.
     bool is_rounded = true;
     for (const double value : expected[i]) {
       largest = std::max(largest, std::abs(value));
