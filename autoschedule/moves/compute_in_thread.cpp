@@ -23,7 +23,8 @@ std::vector<Plan> compute_in_thread(const Plan& plan, FuncId func, const Context
   std::erase_if(hosts, [&](StageId reader) { return is_inlined(plan, reader.func); });
   if (hosts.size() != 1 || plan.of(hosts[0].func).opacity != Opacity::None) return {};
   const Nest& host = plan.nest(hosts[0]);
-  if (!is_kernel(host)) return {};
+  // A loop over blocks has no threads inside, and one that runs once is around the kernel.
+  if (!is_kernel(host) || host.loops.back().kind == ForType::GpuBlock) return {};
   const LoopRef innermost{hosts[0], static_cast<int16_t>(host.loops.size() - 1)};
   FuncPlan changed = plan.of(func);
   changed.placement = {};
