@@ -27,7 +27,7 @@ namespace {
 constexpr int wide = 4;  // the beam of a search that was asked for
 // A plan is taken if its cost is less than this part of the cost of the rules' plan, and the prediction of the lowered
 // program less than that part of theirs.
-constexpr double worth_leaving = 0.85, confirmed = 0.95;
+constexpr double worth_leaving = 0.8, confirmed = 0.95;
 
 std::string words_for(const std::vector<FuncPtr>& outputs) {
   return listed(outputs, [](const FuncPtr& f) { return quoted(f->name); });
