@@ -38,7 +38,7 @@ struct PlanSearchOptions {
   int64_t spare_bytes = 0;
   bool must_fit = false;  // without rules: however slow the program gets
   autoschedule::Scheduling what = autoschedule::Scheduling::Everything;
-  std::set<std::string> without;  // moves that are not made
+  std::set<std::string> without;             // moves that are not made
   const planning::Device* device = nullptr;  // that runs the program; null: the processor does
 };
 

@@ -66,9 +66,8 @@ Nonzero without_spread(const Expr& product, int depth = depth_of_factors) {
   const FuncPtr f = call && call->call_type == CallType::Func ? func_of(*call) : nullptr;
   if (!f || !is_look_up(*f)) return {};
   const Nonzero arm = nonzero_arm(value_of_read(*f, *call));
-  const bool is_spread = arm.where.defined() && any_node(arm.where, [](const Expr& e) {
-                           return e.kind() == Kind::Mod;
-                         });
+  const bool is_spread = arm.where.defined() &&
+                         any_node(arm.where, [](const Expr& e) { return e.kind() == Kind::Mod; });
   return is_spread ? arm : Nonzero();
 }
 
