@@ -113,45 +113,21 @@ class LetMaker : public Rewriter {
     const auto arm = [&](const Expr& value) { return wrap(make_lets({named_(value)})); };
     return call_op(e.op, e.type, {(*this)(e.args[0]), arm(e.args[1]), arm(e.args[2])});
   }
-  // Replaces unconditionally evaluated nodes by their names. Arms are left to their own Lets, so
-  // that an arm inside an arm is bound once, by the arm around it.
-  class Namer : public Rewriter {
-   public:
-    explicit Namer(LetMaker& maker) : maker_(maker) {}
-
-   protected:
-    using Rewriter::rewrite;
-    Expr rewrite(const Expr& e) override {
-      if (maker_.gets_name(e)) return maker_(e);
-      return is_strict(e) ? e : children(e);
-    }
-
-   private:
-    LetMaker& maker_;
-  };
-  // Replaces the parts of strict arguments that have names.
-  class ExactNamer : public Rewriter {
-   public:
-    explicit ExactNamer(LetMaker& maker) : maker_(maker) {}
-
-   protected:
-    using Rewriter::rewrite;
-    Expr rewrite(const Expr& e) override {
-      if (is_exact(e)) return maker_(e);
-      return as_op(e, Op::if_then_else) ? e : children(e);
-    }
-
-   private:
-    LetMaker& maker_;
-  };
   bool gets_name(const Expr& e) const {
     return uses_.is_shared(e) && !is_trivial(e) && !must_stay(e);
   }
 
   const UseCounter& uses_;
   Lets& lets_;
-  Namer named_{*this};
-  ExactNamer exact_{*this};
+  // Replaces unconditionally evaluated nodes by their names. Arms are left to their own Lets, so
+  // that an arm inside an arm is bound once, by the arm around it.
+  StepRewriter named_{[this](const Expr& e, const auto&) {
+    return gets_name(e) ? (*this)(e) : is_strict(e) ? e : Expr();
+  }};
+  // Replaces the parts of strict arguments that have names.
+  StepRewriter exact_{[this](const Expr& e, const auto&) {
+    return is_exact(e) ? (*this)(e) : as_op(e, Op::if_then_else) ? e : Expr();
+  }};
 };
 
 // Replaces names by the values of the enclosing Lets. Names are unique, so one memo serves all
