@@ -6,6 +6,7 @@
 
 #include "analysis/interval.h"
 #include "analysis/nonnegative.h"
+#include "graph/definitions/own_reads.h"
 #include "ir/build.h"
 #include "ir/equal.h"
 #include "ir/visit.h"
@@ -102,12 +103,8 @@ class RoundedSums {
 // Calls `visit` with each coordinate of elements that the stage reads or writes.
 void each_coordinate(const Definition& stage, const std::function<void(const Expr&)>& visit) {
   for (const Expr& arg : stage.args) visit(arg);
-  map_exprs(stage, [&](const Expr& e) {
-    walk(e, [&](const Expr& part) {
-      if (reads_element(part)) std::ranges::for_each(part.as<Call>()->args, visit);
-      return true;
-    });
-    return e;
+  graph::walk_definition(stage, [&](const Expr& e) {
+    if (reads_element(e)) std::ranges::for_each(e.as<Call>()->args, visit);
   });
 }
 
