@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "autoschedule/access/long_sums.h"
 #include "graph/definitions/own_reads.h"
 #include "graph/definitions/race_checks.h"
 #include "ir/build.h"
@@ -346,6 +347,22 @@ bool Dependences::commutes(StageId stage) {
         stage.stage == 0 || stores_one_value(f, update) || can_prove_commutative(f, update);
   }
   return *known.commutes;
+}
+
+bool Dependences::may_be_atomic(StageId stage, Atomics atomics) {
+  const StageNode& node = graph_.stage(stage);
+  const FuncContents& f = *graph_.func(stage.func).func;
+  if (atomics == Atomics::None || stage.stage == 0 || f.types.size() != 1 || adds_in_place(node))
+    return false;
+  const Type type = f.types[0];
+  const bool has_operation = type.is_scalar() && (type.bits() == 32 || type.bits() == 64);
+  if (!has_operation || (type.is_float() && atomics != Atomics::OfAll)) return false;
+  const bool reads_others = std::ranges::any_of(node.reads, [&](const Access& read) {
+    return read.of == stage.func && read.index != node.write.index;
+  });
+  const bool meets = std::ranges::any_of(
+      reduction_of(node), [&](int iterator) { return !may_run_at_once(stage, iterator); });
+  return meets && !reads_others && can_prove_commutative(f, f.stage(stage.stage));
 }
 
 bool Dependences::keeps_order(StageId stage, const std::vector<LoopStep>& loops) {

@@ -68,6 +68,13 @@ class StageDependences {
   std::vector<Dependence> dependences_;
 };
 
+// Which updates a device may make atomic.
+enum class Atomics : uint8_t {
+  None,
+  OfIntegers,  // bits are the same in any order
+  OfAll        // bits of floats differ from run to run
+};
+
 // The dependences of all stages of a program, found when they are first asked for.
 class Dependences {
  public:
@@ -80,6 +87,9 @@ class Dependences {
   // Whether any order of iterations gives the same result, but for rounding. If they are to run at the same time, the
   // update has to be atomic.
   bool commutes(StageId stage);
+  // Whether the stage adds to elements that data or its reduction choose, several times to one of them, in a type and by
+  // an operation that these updates may have.
+  bool may_be_atomic(StageId stage, Atomics atomics);
   // Whether the loops, outermost first, run all iterations that access one element in the order of the definition, so
   // that no bit changes. Those of concurrent loops may run at once.
   bool keeps_order(StageId stage, const std::vector<LoopStep>& loops);

@@ -36,6 +36,15 @@ bool is_free(const Expr& e) {
          e.as<StringImm>();
 }
 
+// Whether no kernel can make the call.
+bool needs_host(const Call& call) {
+  if (call.call_type == CallType::Extern) return true;
+  constexpr Op of_host[] = {Op::print, Op::print_when, Op::require, Op::trace, Op::runtime_call};
+  if (std::ranges::any_of(of_host, [&](Op op) { return call.is_op(op); })) return true;
+  const auto image = std::dynamic_pointer_cast<graph::ParameterContents>(call.symbol.lock());
+  return image && image->trace.loads;
+}
+
 // Whether a condition tells border and interior apart.
 bool is_about_border(const Expr& e) {
   if (is_likely(e)) return true;
@@ -99,14 +108,6 @@ Value StageReader::place_of(const std::vector<IndexForm>& index) {
     }
   }
   return places.empty() ? Value() : numbers_.combine(std::move(what), pointers_to(places));
-}
-
-bool StageReader::needs_host(const Call& call) {
-  if (call.call_type == CallType::Extern) return true;
-  constexpr Op of_host[] = {Op::print, Op::print_when, Op::require, Op::trace, Op::runtime_call};
-  if (std::ranges::any_of(of_host, [&](Op op) { return call.is_op(op); })) return true;
-  const auto image = std::dynamic_pointer_cast<graph::ParameterContents>(call.symbol.lock());
-  return image && image->trace.loads;
 }
 
 void StageReader::read_call(const Call& call, const Guard& guard) {

@@ -63,7 +63,6 @@ class StageReader {
  private:
   void read_extern(StageNode& node);
   void read_call(const Call& call, const Guard& guard);
-  static bool needs_host(const Call& call);
   void read_access(const Call& call, const Guard& guard);
   void count_operations(StageNode& node);
   void count(const Expr& e);

@@ -34,8 +34,7 @@ class Kernel {
     result.memory_seconds[Machine::level_count - 1] = memory_ns / busy() * nanosecond;
     result.memory_seconds[Machine::near_cache] = (moving - memory_ns) / busy() * nanosecond;
     result.compute_seconds = std::max(work_ns() / busy(), chain_ns()) * nanosecond;
-    if (run_.id.stage == 0 ? run_.place <= 1 : !is_guest())
-      result.launch_seconds = device_.launch_ns * nanosecond;
+    if (run_.place <= 1) result.launch_seconds = device_.launch_ns * nanosecond;
     return result;
   }
 
@@ -49,7 +48,6 @@ class Kernel {
 
   const LoopNode& node(size_t k) const { return group_.nodes[static_cast<size_t>(run_.path[k])]; }
   double times(size_t k) const { return k == 0 ? 1 : node(k - 1).times; }
-  bool is_guest() const { return run_.place > first_thread_; }
   double warps() const { return std::ceil(threads_ / device_.warp_size); }
 
   // The part of the device that has work. Threads hide waiting, so it takes all of them to be busy.
@@ -58,7 +56,7 @@ class Kernel {
     return std::min(1.0, resident / double(device_.enough_threads()));
   }
 
-  // Whatever depends on no serial loop is computed once by each thread.
+  // An operation that no serial loop changes is executed once by each thread.
   double work_ns() const {
     const double idle_lanes = warps() * device_.warp_size / threads_;
     double sum = 0;
@@ -99,7 +97,7 @@ class Kernel {
     }
     return cover;
   }
-  // The lines of all warps. A warp whose box holds more than its threads touch needs a line for each of these.
+  // The lines that all warps load and store. A warp needs no more lines than it has threads.
   double warp_bytes() const {
     const Cover warp = cover_of_warp();
     double all = 0;

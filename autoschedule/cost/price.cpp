@@ -118,15 +118,15 @@ class CostModel::Prices {
     if (const GroupPrice* found = ir::find_or_null(known_, key)) return *found;
     const Group group = group_of(plan, planned, covers, sizes_, machine_, facts_);
     GroupPrice price;
-    if (device_ && has_kernels(group)) {
-      for (const StageRun& run : group.runs)
-        price.stages.push_back(kernel_cost(run, group, *device_, machine_));
-      return known_.emplace(std::move(key), std::move(price)).first->second;
+    const bool on_device = device_ && has_kernels(group);
+    for (const StageRun& run : group.runs)
+      price.stages.push_back(on_device ? kernel_cost(run, group, *device_, machine_)
+                                       : cost_of(run, group));
+    if (!on_device) {
+      price.traffic = traffic_of(group, machine_);
+      for (const auto& [buffer, stored] : group.buffers)
+        price.allocated_bytes += stored.allocated_bytes;
     }
-    price.traffic = traffic_of(group, machine_);
-    for (const StageRun& run : group.runs) price.stages.push_back(cost_of(run, group));
-    for (const auto& [buffer, stored] : group.buffers)
-      price.allocated_bytes += stored.allocated_bytes;
     return known_.emplace(std::move(key), std::move(price)).first->second;
   }
 

@@ -34,6 +34,8 @@ void for_each_read(const Plan& plan, const Context& context, StageId stage,
 bool has_bounded_region(const Plan& plan, const Context& context, FuncId func);
 // Whether a Func may be computed in a loop of a stage that reads it (L3, L8).
 bool may_run_in_loops(const Plan& plan, const Context& context, FuncId func);
+// Whether iterations of an update that access one element run in the order of its definition (L1, L2).
+bool keeps_order(const Context& context, StageId stage, const Nest& nest);
 // Whether a Func is stored somewhere else than where it is computed, or in a window. Opaque ones may be, in a loop.
 bool has_window(const FuncPlan& func);
 // Whether each update writes the elements that its pure variables name, and reads no others of the Func.

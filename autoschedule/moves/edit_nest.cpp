@@ -14,15 +14,10 @@ namespace {
 
 constexpr int64_t points_of_fusion = INT32_MAX;  // where no step outside bounds them
 
-bool runs_on_device(const Loop& loop) {
-  return loop.iterator == once || loop.kind == ForType::GpuBlock ||
-         loop.kind == ForType::GpuThread || loop.kind == ForType::GpuLane;
-}
-
 bool is_plain(const Nest& nest) {
   if (!nest.fusions.empty()) return false;
   for (size_t d = 0; d < nest.loops.size(); ++d) {
-    if (runs_on_device(nest.loops[d]) || nest.loops[d].in_blocks || is_phase(nest, d)) return false;
+    if (is_gpu(nest.loops[d].kind) || nest.loops[d].in_blocks || is_phase(nest, d)) return false;
   }
   return true;
 }

@@ -32,6 +32,41 @@ int64_t span(const Nest& nest, int depth, int iterator) {
   return result;
 }
 
+// The nest if no loop is two, or none; else such a nest, in `room`.
+const Nest& plain(const Context& context, StageId stage, const Nest& nest, Nest& room) {
+  if (nest.fusions.empty() && (nest.loops.empty() || nest.loops[0].iterator != once)) return nest;
+  room = unfused(nest, static_cast<int>(context.accesses.stage(stage).iterators.size()));
+  return room;
+}
+
+// The loops over the reduction, where neighbours of one iterator count as one: steps of it change no order.
+std::vector<LoopStep> reduction_loops(const Context& context, StageId stage, const Nest& nest) {
+  Nest room;
+  std::vector<LoopStep> loops;
+  for (const Loop& loop : plain(context, stage, nest, room).loops) {
+    if (!is_reduction(context, stage, loop.iterator)) continue;
+    const bool at_once = loop.kind == ForType::Vectorized || runs_at_once(loop.kind);
+    const bool is_next = !loops.empty() && loops.back().iterator == loop.iterator &&
+                         loops.back().is_concurrent == at_once;
+    if (is_next) loops.pop_back();
+    loops.push_back({loop.iterator, loop.step, at_once});
+  }
+  return loops;
+}
+
+// Whether loops that run at once, and are neither atomic nor vouched for, may.
+bool are_independent(const Context& context, StageId stage, const Nest& fused) {
+  if (fused.concurrency != Concurrency::Independent) return true;
+  Nest room;
+  const Nest& nest = plain(context, stage, fused, room);
+  for (size_t d = 0; d < nest.loops.size(); ++d) {
+    const ForType kind = nest.loops[d].kind;
+    const bool at_once = kind == ForType::Vectorized || runs_at_once(kind);
+    if (at_once && !may_run_at_once(context, stage, nest, d)) return false;
+  }
+  return true;
+}
+
 // One change of a Func in a plan.
 class FuncChange {
  public:
@@ -79,38 +114,10 @@ class FuncChange {
 
   // ---- L1, L2 ----
 
-  // The loops over the reduction, where neighbours of one iterator count as one: steps of it change no order.
-  std::vector<LoopStep> reduction_loops(StageId stage, const Nest& nest) const {
-    std::vector<LoopStep> loops;
-    for (const Loop& loop : plain(stage, nest).loops) {
-      if (!is_reduction(context_, stage, loop.iterator)) continue;
-      const bool at_once = loop.kind == ForType::Vectorized || runs_at_once(loop.kind);
-      const bool is_next = !loops.empty() && loops.back().iterator == loop.iterator &&
-                           loops.back().is_concurrent == at_once;
-      if (is_next) loops.pop_back();
-      loops.push_back({loop.iterator, loop.step, at_once});
-    }
-    return loops;
-  }
-  Nest plain(StageId stage, const Nest& nest) const {
-    return unfused(nest, static_cast<int>(context_.accesses.stage(stage).iterators.size()));
-  }
   static bool are_alike(const std::vector<LoopStep>& a, const std::vector<LoopStep>& b) {
     return std::ranges::equal(a, b, [](const LoopStep& s, const LoopStep& t) {
       return s.iterator == t.iterator && s.is_concurrent == t.is_concurrent;
     });
-  }
-  // Whether loops that run at once, and are neither atomic nor vouched for, may.
-  bool are_independent(StageId stage) const {
-    const Nest nest = plain(stage, new_nest(stage));
-    for (size_t d = 0; d < nest.loops.size(); ++d) {
-      const ForType kind = nest.loops[d].kind;
-      const bool at_once = kind == ForType::Vectorized || runs_at_once(kind);
-      if (at_once && nest.concurrency == Concurrency::Independent &&
-          !may_run_at_once(context_, stage, nest, d))
-        return false;
-    }
-    return true;
   }
   bool keeps_order() const {
     if (terms_ == Terms::InAnyOrder) return true;
@@ -118,13 +125,10 @@ class FuncChange {
       const StageId stage{func_, static_cast<int16_t>(s)};
       const bool is_atomic = new_nest(stage).concurrency == Concurrency::Atomic;
       if (old_nest(stage) == new_nest(stage) || (context_.device && is_atomic)) continue;
-      if (!are_independent(stage)) return false;
-      const std::vector<LoopStep> loops = reduction_loops(stage, new_nest(stage));
-      if (are_alike(loops, reduction_loops(stage, old_nest(stage)))) continue;
-      const bool is_kept =
-          std::ranges::all_of(context_.dependences.of(stage).all(),
-                              [&](const Dependence& d) { return keeps(d, loops); });
-      if (!is_kept) return false;
+      if (!are_independent(context_, stage, new_nest(stage))) return false;
+      const bool is_alike = are_alike(reduction_loops(context_, stage, new_nest(stage)),
+                                      reduction_loops(context_, stage, old_nest(stage)));
+      if (!is_alike && !moves::keeps_order(context_, stage, new_nest(stage))) return false;
     }
     return true;
   }
@@ -286,6 +290,12 @@ bool runs_at_any_size(const FuncPlan& plan, const Context& context, FuncId func)
     }
   }
   return true;
+}
+
+bool keeps_order(const Context& context, StageId stage, const Nest& nest) {
+  const std::vector<LoopStep> loops = reduction_loops(context, stage, nest);
+  return std::ranges::all_of(context.dependences.of(stage).all(),
+                             [&](const Dependence& d) { return keeps(d, loops); });
 }
 
 bool has_window(const FuncPlan& func) {

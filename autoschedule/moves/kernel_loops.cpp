@@ -29,7 +29,7 @@ class KernelLoops {
                                         stage.stage)) {}
 
   Nest nest(const KernelShape& shape) const {
-    if (may_be_atomic()) {
+    if (context_.dependences.may_be_atomic(node_.id, context_.atomics)) {
       Nest all = over(every_iterator(), shape);
       all.concurrency = Concurrency::Atomic;
       return all;
@@ -37,7 +37,7 @@ class KernelLoops {
     for (const std::vector<int16_t>& grid : {free_iterators(), pure_iterators()}) {
       if (grid.empty()) continue;
       Nest result = over(grid, shape);
-      if (keeps_order(result)) return result;
+      if (keeps_order(context_, node_.id, result)) return result;
     }
     Nest one = definition_;
     one.loops.insert(one.loops.begin(), Loop());
@@ -89,54 +89,13 @@ class KernelLoops {
   std::vector<int16_t> pure_iterators() const {
     return iterators([&](int i) { return !is_reduction(context_, node_.id, i) && stays(i); });
   }
-  // Whether the stage reads elements of its Func at the place of a pure iterator alone. Adjoints may read another one where a
-  // condition says that nothing comes of it, but a thread that does races with the one that writes it.
+  // Whether the stage reads its Func only where the pure iterator is. Adjoints may also read elsewhere and discard the
+  // value, but that read races with the thread that writes there.
   bool stays(int iterator) const {
     const auto d = static_cast<size_t>(node_.iterators[static_cast<size_t>(iterator)].dimension);
     return std::ranges::all_of(node_.reads, [&](const Access& read) {
       return read.of != node_.id.func || read.index[d] == node_.write.index[d];
     });
-  }
-
-  // Updates at places that data or loops of the reduction choose, whose sums are the same in any order or may differ.
-  bool may_be_atomic() const {
-    const bool is_update = node_.id.stage > 0;
-    const bool meets =
-        std::ranges::any_of(reduction(), [&](int i) { return !is_free(context_, node_.id, i); });
-    const graph::FuncContents& f = *context_.accesses.func(node_.id.func).func;
-    if (!is_update || !meets || !moves_places() || f.types.size() != 1) return false;
-    const Type type = f.types[0];
-    const bool has_operation = type.is_scalar() && (type.bits() == 32 || type.bits() == 64);
-    if (!has_operation || (type.is_float() && !context_.any_order)) return false;
-    const bool reads_others = std::ranges::any_of(node_.reads, [&](const Access& read) {
-      return read.of == node_.id.func && read.index != node_.write.index;
-    });
-    return !reads_others && context_.dependences.commutes(node_.id);
-  }
-  std::vector<int> reduction() const {
-    std::vector<int> result;
-    for (size_t i = 0; i < node_.iterators.size(); ++i) {
-      if (node_.iterators[i].kind == Iterator::Kind::Reduction)
-        result.push_back(static_cast<int>(i));
-    }
-    return result;
-  }
-  bool moves_places() const {
-    IteratorSet of_reduction = 0;
-    for (const int i : reduction()) of_reduction |= set_of(i);
-    return std::ranges::any_of(node_.write.index, [&](const IndexForm& form) {
-      return form.has_data() || (form.moved_by() & of_reduction);
-    });
-  }
-
-  bool keeps_order(const Nest& nest) const {
-    std::vector<LoopStep> loops;
-    for (const Loop& loop : unfused(nest, static_cast<int>(node_.iterators.size())).loops) {
-      if (is_reduction(context_, node_.id, loop.iterator))
-        loops.push_back({loop.iterator, loop.step, runs_at_once(loop.kind)});
-    }
-    return std::ranges::all_of(context_.dependences.of(node_.id).all(),
-                               [&](const Dependence& d) { return keeps(d, loops); });
   }
 
   // ---- the grid ----

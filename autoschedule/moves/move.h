@@ -46,8 +46,7 @@ struct Context {
   const Machine& machine;
   Dependences& dependences;        // of the same access graph
   const Device* device = nullptr;  // whose kernels the program is; null: the processor runs it
-  bool any_order =
-      false;  // floats may be added up in any order, so that bits differ from run to run
+  Atomics atomics = Atomics::OfIntegers;  // on the device
 };
 
 // Plans that differ from `plan` in how `func` runs, and in some cases its operands and consumers. All invariants hold for

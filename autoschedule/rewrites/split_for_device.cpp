@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <bit>
 
-#include "autoschedule/access/dependences.h"
 #include "autoschedule/access/long_sums.h"
 #include "autoschedule/access/sizes.h"
 #include "autoschedule/machine/reference.h"
 #include "autoschedule/rewrites/split_update.h"
 #include "graph/definitions/associative_update.h"
 #include "graph/definitions/race_checks.h"
-#include "graph/directives/give_directive.h"
 
 namespace retrograde::planning {
 
@@ -36,9 +34,9 @@ class DeviceSplitter {
     for (const FuncNode& node : accesses_.funcs()) {
       if (!may_change(*node.func)) continue;
       for (const StageNode& stage : node.stages) {
+        if (stage.id.stage == 0 || !is_wanted(stage)) continue;
         const Sum sum = sum_of(stage);
-        const int64_t parts = stage.id.stage > 0 && is_wanted(sum) ? parts_of(sum) : 0;
-        if (parts > 0) split(sum, parts);
+        if (const int64_t parts = parts_of(sum); parts > 0) split(sum, parts);
       }
     }
   }
@@ -53,19 +51,15 @@ class DeviceSplitter {
   struct Sum {
     const StageNode& stage;
     FuncPtr func;
-    std::vector<int> terms;   // iterators whose iterations meet, innermost first
-    int64_t elements = 1;     // that run apart; 0: they may be many
-    size_t fused = 0;         // of the first terms, those that are split as one loop
-    bool is_scatter = false;  // loops of the reduction, or data, choose elements
+    std::vector<int> terms;  // iterators whose iterations meet, innermost first
+    int64_t elements = 1;    // that run apart; 0: they may be many
+    size_t fused = 0;        // the first terms, which are split as one loop
     bool commutes = false;
   };
 
-  bool is_wanted(const Sum& sum) const {
-    if (sum.terms.empty() || sum.stage.needs_host) return false;
-    const Type type = sum.func->types[0];
-    const bool is_atomic = sum.is_scatter && sum.commutes && sum.func->types.size() == 1 &&
-                           (!type.is_float() || how_.any_order);
-    return !is_atomic && (sum.is_scatter ? how_.scatters : how_.sums);
+  bool is_wanted(const StageNode& stage) {
+    return (adds_in_place(stage) ? how_.sums : how_.scatters) && !stage.needs_host &&
+           !dependences_.may_be_atomic(stage.id, how_.atomics);
   }
 
   int64_t extent(const Sum& sum, int iterator) const {
@@ -83,8 +77,7 @@ class DeviceSplitter {
   }
 
   Sum sum_of(const StageNode& stage) {
-    Sum sum{stage, accesses_.func(stage.id.func).func, {}, 1, 0, false, false};
-    if (stage.id.stage == 0) return sum;
+    Sum sum{stage, accesses_.func(stage.id.func).func, {}, 1, 0, false};
     const FuncContents& f = *sum.func;
     sum.commutes = can_prove_commutative(f, f.stage(stage.id.stage));
     for (size_t i = 0; i < stage.iterators.size(); ++i) {
@@ -97,18 +90,13 @@ class DeviceSplitter {
       sum.elements *= is_known(sum, iterator) ? extent(sum, iterator) : 0;
       sum.elements = std::min(sum.elements, device_.few_threads());
     }
-    // All but the last of known extents, or nothing would be known of the places that they stand for.
+    // Coordinates of fused loops follow by division, for which all extents but the last have to be known.
     int64_t terms = 1;
     while (sum.fused < sum.terms.size()) {
       terms *= std::max<int64_t>(extent(sum, sum.terms[sum.fused]), 1);
       if (sum.fused > 0 && (terms > most_terms || !is_known(sum, sum.terms[sum.fused - 1]))) break;
       ++sum.fused;
     }
-    IteratorSet of_terms = 0;
-    for (const int i : sum.terms) of_terms |= set_of(i);
-    sum.is_scatter = std::ranges::any_of(stage.write.index, [&](const IndexForm& form) {
-      return form.has_data() || (form.moved_by() & of_terms);
-    });
     return sum;
   }
 
@@ -144,7 +132,8 @@ class DeviceSplitter {
   // 0: it is no such sum.
   int64_t parts_of(const Sum& sum) const {
     const int64_t terms = product(sum, sum.terms.size());
-    if (sum.elements == 0 || sum.elements >= device_.few_threads() || terms < device_.launch_terms)
+    if (sum.terms.empty() || sum.elements == 0 || sum.elements >= device_.few_threads() ||
+        terms < device_.launch_terms)
       return 0;
     const int64_t meeting = elements_that_meet(sum);
     if (meeting == 0) return 0;
@@ -174,7 +163,7 @@ class DeviceSplitter {
     }
     update.finish();
   }
-  // Sums of every so many points of every so many rows, and then of all rows.
+  // Partial sums over some points of some rows each, then over all rows.
   void split_rows(SplitUpdate& update, const std::string& all, const std::string& rows,
                   int64_t count) const {
     const int64_t points = std::min(count, device_.block_threads());
@@ -191,7 +180,7 @@ class DeviceSplitter {
     if (sum.commutes) return update.split(all, "part", count);
     return update.split_outside(all, "part", (terms + count - 1) / count);
   }
-  // Partial results for each value of these loops, which lie beside each other.
+  // Partial results of the iterations of these loops, contiguous in memory.
   static void factor(SplitUpdate& update,
                      const std::vector<std::pair<std::string, std::string>>& loops) {
     const FuncPtr made = update.factor(loops);

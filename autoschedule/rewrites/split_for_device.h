@@ -12,6 +12,7 @@
 
 #include <vector>
 
+#include "autoschedule/access/dependences.h"
 #include "autoschedule/machine/device.h"
 #include "graph/function.h"
 #include "ir/visit.h"
@@ -22,7 +23,7 @@ namespace retrograde::planning {
 struct SplitForDevice {
   const Device* device = nullptr;  // null: the processor runs the program
   bool sums = true, scatters = true;
-  bool any_order = false;  // scatters of floats are atomic: they stay
+  Atomics atomics = Atomics::OfIntegers;  // updates that are atomic stay
 };
 void split_for_device(const std::vector<graph::FuncPtr>& outputs, const SplitForDevice& how,
                       ir::FunctionRef<bool(const graph::FuncContents&)> may_change);

@@ -93,8 +93,8 @@ ScheduledGraph schedule_by_plan(const std::vector<FuncPtr>& outputs, const Sched
   rewrites.splits_sums = request.makes(Decision::CutReductions);
   rewrites.copies_operands = request.makes(Decision::LayoutStaging);
   const planning::Device* device = request.on_gpu ? &request.device : nullptr;
-  rewrites.for_device = {device, rewrites.splits_sums, request.makes(Decision::ScatterStrategy),
-                         !options.deterministic};
+  const bool adds_at_places = request.makes(Decision::ScatterStrategy);
+  rewrites.for_device = {device, rewrites.splits_sums, adds_at_places, atomics_of(options)};
   rewrites.kept = kept_names(outputs, options, what);
   const CallMemory memory(outputs, request);
   const double callers = memory.callers_bytes(), budget = memory.budget();

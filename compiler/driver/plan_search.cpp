@@ -113,6 +113,11 @@ std::vector<FuncPtr> PlanSearch::emitted(const FoundPlan& found) const {
   return planning::emit_changes(found.plan, rules);
 }
 
+planning::Atomics atomics_of(const AutoscheduleOptions& options) {
+  if (options.without.contains(Decision::ScatterStrategy)) return planning::Atomics::None;
+  return options.deterministic ? planning::Atomics::OfIntegers : planning::Atomics::OfAll;
+}
+
 planning::Machine search_machine(const AutoscheduleOptions& options, const Target& target) {
   planning::Machine machine = planning::machine_for(target);
   if (options.threads > 0) machine.threads = options.threads;
@@ -129,7 +134,7 @@ PlanSearch search_plans(const std::vector<FuncPtr>& scheduled,
   planning::Dependences dependences(accesses);
   planning::CostModel cost(accesses, sizes, machine, search.device);
   const planning::Context context{accesses,    sizes,         machine,
-                                  dependences, search.device, !options.deterministic};
+                                  dependences, search.device, atomics_of(options)};
   planning::SearchOptions beam;
   beam.width = search.width;
   beam.most_bytes = static_cast<double>(search.spare_bytes);

@@ -45,6 +45,9 @@ struct PlanSearchOptions {
 // The machine that the cost of a search is for: that of the cost model, with the threads of the options.
 planning::Machine search_machine(const AutoscheduleOptions& options, const Target& target);
 
+// The updates of a device that are atomic.
+planning::Atomics atomics_of(const AutoscheduleOptions& options);
+
 // The names of Funcs that no move changes: what its user scheduled, or named to be inlined.
 std::unordered_set<std::string> kept_names(const std::vector<FuncPtr>& unscheduled,
                                            const AutoscheduleOptions& options,
