@@ -56,7 +56,7 @@ std::string unknown_size(const std::vector<FuncPtr>& outputs) {
 // Why there is nothing to search; empty: there is.
 std::string reason_against(const std::vector<FuncPtr>& outputs, const ScheduleRequest& request) {
   if (request.on_gpu) {
-    return note_against_search(outputs, "a search predicts times of processors",
+    return note_against_search(outputs, "a wide search predicts times of processors",
                                "the target has a GPU",
                                "Search for a target without one, or leave the search out");
   }

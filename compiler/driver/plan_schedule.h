@@ -12,7 +12,7 @@
 
 namespace retrograde::driver {
 
-// Who makes the schedules of programs that ask for no search.
+// Who makes the schedules of processors where no wide search is asked for. Those of GPUs are plans.
 enum class DefaultSchedules : uint8_t { OfRules, OfPlans };
 inline constexpr auto default_schedules = DefaultSchedules::OfRules;
 
