@@ -506,6 +506,27 @@ TEST(GpuAutoSchedules, UpdateAtomicallyWhatBitsAllow) {
   }
 }
 
+// A type without atomic additions gets partial sums, unless the options leave the strategy of scatters out.
+TEST(GpuAutoSchedules, SplitScattersThatAreNotAtomic) {
+  const auto scheduled = [&](const Type& type, const AutoscheduleOptions& options) {
+    Func counts("counts");
+    RDom r(0, 50000, "r");
+    counts(x) = cast(type, 0);
+    counts((r * 7) % 11) += cast(type, 1);
+    counts.set_estimate(x, 0, 11);
+    const Pipeline pipeline(counts);
+    const std::string source = pipeline.auto_schedule(with_gpu(), options).schedule_source;
+    const bool is_atomic = counts.function()->stage(1).schedule.atomic;
+    return std::pair(is_atomic, source.find("rfactor") != std::string::npos);
+  };
+  AutoscheduleOptions without;
+  without.without = {Decision::ScatterStrategy};
+  using Found = std::pair<bool, bool>;  // atomic updates, partial sums
+  EXPECT_EQ(scheduled(Int(32), {}), Found(true, false));
+  EXPECT_EQ(scheduled(UInt(8), {}), Found(false, true));
+  EXPECT_EQ(scheduled(Int(32), without), Found(false, false));
+}
+
 TEST(GpuAutoSchedules, CutSumsOverDomainsOfAnySize) {
   ImageParam in(Float(32), 2, "in");
   Func scaled("scaled"), total("total");
